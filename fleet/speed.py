@@ -1,14 +1,15 @@
-"""Samples a second of a fleet's job, of `modelmill identify` on one file, and of numpy and pandas, on the same data in one run.
+"""Compares speeds on the same data: `modelmill-fleet identify`, `modelmill identify` on one file, and numpy with pandas.
 
     cargo build --release -p modelmill-fleet-program -p modelmill-cli
     python fleet/speed.py                        # in an environment with numpy, pandas and pyarrow
 
-A fleet of five-bars is made in a folder that goes when it is done. All sides are kept on one core and take turns; the best round of
-each counts, in processor time, so that it matters little what else the machine does. What numpy does is what one writes by hand for
-this machine: read with pandas, low-pass and derivatives by FFT, the loop closed by formula, the columns of four links and of
-friction through the same low-pass as the forces, every so many samples, least squares by products of columns. The fleet's job does the same for any model, and besides looks for clocks, delays of
-encoders and dead sensors, and adds the columns of possible changes. Friction that numpy and the programs find is held against each
-other.
+A fleet of five-bars is simulated in a temporary folder. All programs run on one core, one after the other, in several rounds. The
+least processor time of each counts, so that other work of the computer has little effect.
+
+The numpy program is written by hand for this mechanism: read with pandas, low-pass and derivatives by FFT, loop closure by formula,
+columns of four links and of friction through the same low-pass as the forces, decimation, least squares by normal equations.
+`modelmill-fleet identify` does the same for any model. It also checks clocks, delays of encoders and dead sensors, and adds the
+columns of possible changes. At the end the friction values of numpy and of the fleet are compared.
 """
 
 from __future__ import annotations
@@ -36,11 +37,11 @@ L0, L1, L2, L3, L4, G = 0.5, 0.45, 0.6, 0.45, 0.6, 9.81
 
 
 def smooth(x: np.ndarray, dt: float, cutoff: float, derivatives: int = 0) -> np.ndarray:
-    """Signals and their derivatives through a low-pass without phase; the line from first to last sample is kept."""
+    """Signals and their derivatives after a zero-phase low-pass; the line from the first to the last sample is kept."""
     n = x.shape[-1]
     first, last = x[..., :1], x[..., -1:]
     line = first + (last - first) * np.arange(n) / (n - 1)
-    # Mirrored with its sign changed, so that value and slope are steady at the ends; as long as a transform likes it.
+    # Continue the signal with its point reflection, so that value and slope are continuous at the ends.
     rest = x - line
     spectrum = np.fft.rfft(np.concatenate([rest, -rest[..., ::-1]], axis=-1))
     w = 2 * np.pi * np.fft.rfftfreq(2 * n, dt)
@@ -59,13 +60,14 @@ def turned(angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def solve(a: np.ndarray, b: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """x and y of a x + b y = right, in the plane."""
+    """Solves a x + b y = right for x and y, with vectors in the plane."""
     d = a[0] * b[1] - a[1] * b[0]
     return (right[0] * b[1] - right[1] * b[0]) / d, (a[0] * right[1] - a[1] * right[0]) / d
 
 
 def columns(q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
-    """Drives by columns by samples: ZZ, MX, MY, M of four links, then dry and viscous friction of both motors."""
+    """The columns of the least-squares problem, drives x columns x samples: ZZ, MX, MY, M of four links, then Coulomb and viscous
+    friction of both motors."""
     (e1, n1), (e3, n3) = turned(q[0]), turned(q[1])
     a, b = L1 * e1, L3 * e3
     b[0] += L0
@@ -78,7 +80,7 @@ def columns(q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
     tip = a + along * unit + above * np.stack([-unit[1], unit[0]])
     e2, e4 = (tip - a) / L2, (tip - b) / L4
     n2, n4 = np.stack([-e2[1], e2[0]]), np.stack([-e4[1], e4[0]])
-    # Rates of the distal links for each motor, then what they are.
+    # Rates of the distal links per rate of each motor, then their total rates and accelerations.
     by = [solve(L2 * n2, -L4 * n4, right) for right in (-L1 * n1, L3 * n3)]
     w2, w4 = (by[0][k] * qd[0] + by[1][k] * qd[1] for k in range(2))
     centripetal = L1 * e1 * qd[0] ** 2 - L3 * e3 * qd[1] ** 2 + L2 * e2 * w2**2 - L4 * e4 * w4**2
@@ -86,7 +88,8 @@ def columns(q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
     acceleration2, acceleration4 = solve(L2 * n2, -L4 * n4, right)
     zero, one = np.zeros_like(q[0]), np.ones_like(q[0])
     still = np.zeros((2, len(zero)))
-    # Of each link: direction, across, rate, acceleration, acceleration of its joint; rate and velocity of its joint for each motor.
+    # For each link: direction, perpendicular, rate, acceleration, and acceleration of its joint; then for each motor the link's rate
+    # and the velocity of its joint.
     links = [
         (e1, n1, qd[0], qdd[0], still, (one, zero), (still, still)),
         (e2, n2, w2, acceleration2, L1 * (n1 * qdd[0] - e1 * qd[0] ** 2), (by[0][0], by[1][0]), (L1 * n1, still)),
@@ -111,14 +114,14 @@ def columns(q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
 
 
 def by_hand(files: list[Path], cutoff: float, every: int) -> np.ndarray:
-    """Parameters of all recordings together, by numpy and pandas."""
+    """Parameters from all recordings together, with numpy and pandas."""
     gram, right = np.zeros((20, 20)), np.zeros(20)
     for file in files:
         table = pd.read_parquet(file, columns=COLUMNS)
         t = table["t"].to_numpy()
         dt = (t[-1] - t[0]) / (len(t) - 1)
         q = np.stack([smooth(table[name].to_numpy(np.float64), dt, cutoff, 2) for name in ("q1", "q3")])
-        # Columns and forces through the same low-pass, since friction has edges.
+        # Columns and forces go through the same low-pass, because friction is not smooth.
         h = smooth(columns(q[:, 0], q[:, 1], q[:, 2]), dt, cutoff)[0][:, :, ::every]
         for d, name in enumerate(("motor_left", "motor_right")):
             tau = smooth(table[name].to_numpy(np.float64), dt, cutoff)[0, ::every]
@@ -130,11 +133,13 @@ def by_hand(files: list[Path], cutoff: float, every: int) -> np.ndarray:
 
 
 def read(files: list[Path]) -> None:
+    """Only reads the recordings, for the time that this takes."""
     for file in files:
         pd.read_parquet(file, columns=COLUMNS)
 
 
 def run(command: list[object]) -> str:
+    """Runs a program and returns its output; ends with its messages if it fails."""
     done = subprocess.run([str(part) for part in command], capture_output=True, text=True)
     if done.returncode:
         sys.exit(f"{command[0]} failed:\n{done.stderr}")
@@ -142,7 +147,7 @@ def run(command: list[object]) -> str:
 
 
 def spent(work: Callable[[], object]) -> float:
-    """Processor time of this process and those that it started, s."""
+    """The processor time of a function, with that of all programs that it starts, s."""
 
     def now() -> float:
         return sum(sum(resource.getrusage(whose)[:2]) for whose in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
@@ -165,7 +170,7 @@ def main() -> None:
         folder = Path(name)
         size = ["--per-day", 2, "--seconds", 60, "--rate", 250, "--bad", 0, "--seed", asked.seed]
         run([fleet, "make", folder / "fleet", "--robots", asked.robots, "--days", 10, *size])
-        # One recording that is as long as all of them.
+        # One recording as long as all the others together.
         long = 60 * 20 * asked.robots
         size = ["--per-day", 1, "--seconds", long, "--rate", 250, "--bad", 0, "--seed", asked.seed]
         run([fleet, "make", folder / "long", "--robots", 1, "--days", 6, *size])
@@ -191,15 +196,15 @@ def main() -> None:
         each = len(pd.read_parquet(files[0], columns=["t"]))
         sides: list[tuple[str, int, Callable[[], object]]] = [
             (f"`modelmill-fleet identify`, {len(files)} recordings", samples, summed),
-            ("`modelmill identify`, one of them", each, lambda: run([modelmill, "identify", model, "--data", files[0]])),
-            ("`modelmill identify`, one that is as long as all", samples, lambda: run([modelmill, "identify", model, "--data", long_file])),
-            ("numpy and pandas, by hand for this machine", samples, hand),
-            ("pandas, reading alone", samples, lambda: read(files)),
+            ("`modelmill identify`, one of these recordings", each, lambda: run([modelmill, "identify", model, "--data", files[0]])),
+            ("`modelmill identify`, one recording as long as all", samples, lambda: run([modelmill, "identify", model, "--data", long_file])),
+            ("numpy and pandas, written by hand for this mechanism", samples, hand),
+            ("pandas, reading only", samples, lambda: read(files)),
         ]
         best = [min(times) for times in zip(*[[spent(work) for _, _, work in sides] for _ in range(asked.rounds)])]
-        print(f"{len(files)} recordings, {samples} samples, seed {asked.seed}; one core, the best of {asked.rounds} rounds; ", end="")
-        print(f"cut-off {cutoff:.3g} Hz, one sample of {every} kept\n")
-        print("| | samples a second | s of processor |\n|---|---|---|")
+        print(f"{len(files)} recordings, {samples} samples, seed {asked.seed}; one core, best of {asked.rounds} rounds; ", end="")
+        print(f"cut-off {cutoff:.3g} Hz, decimation {every}\n")
+        print("| | samples per second | processor time, s |\n|---|---|---|")
         for (says, n, _), time_spent in zip(sides, best):
             print(f"| {says} | {n / time_spent:.2e} | {time_spent:.2f} |")
         if hasattr(os, "sched_setaffinity"):
@@ -207,20 +212,20 @@ def main() -> None:
         begin = time.perf_counter()
         summed()
         took = time.perf_counter() - begin
-        print(f"\nall {cores} cores, by the clock: {samples / took:.2e} samples a second")
+        print(f"\nall {cores} cores, wall-clock time: {samples / took:.2e} samples per second")
         same(found["by hand"], folder / "out-0" / "results.json")
 
 
 def same(by_numpy: np.ndarray, results: Path) -> None:
-    """Both found the same friction."""
+    """Checks that numpy and the fleet give the same friction."""
     told = json.loads(results.read_text())
     names = [one["expression"] for one in told["parameters"]]
     for name, at in (("Fc_left", 16), ("Fc_right", 17), ("Fv_left", 18), ("Fv_right", 19)):
         values = [day["values"][names.index(name)] for robot in told["robots"] for day in robot["days"]]
         mean = sum(values) / len(values)
         if abs(by_numpy[at] - mean) > 0.02 * abs(mean):
-            sys.exit(f"{name}: {by_numpy[at]:.4f} by numpy, {mean:.4f} by the fleet's job")
-        print(f"{name}: {by_numpy[at]:.4f} by numpy, {mean:.4f} by the fleet's job")
+            sys.exit(f"{name}: {by_numpy[at]:.4f} with numpy, {mean:.4f} with modelmill-fleet")
+        print(f"{name}: {by_numpy[at]:.4f} with numpy, {mean:.4f} with modelmill-fleet")
 
 
 if __name__ == "__main__":

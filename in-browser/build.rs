@@ -1,4 +1,4 @@
-//! Gives WebAssembly as much stack as the program has for a diagnosis.
+//! Sets the stack of the WebAssembly module to the size that the program has for a diagnosis.
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");

@@ -4,7 +4,7 @@
 
 /// A recorded pair of runs of one machine: one to identify from, one to check on.
 #[derive(Debug)]
-pub struct Runs {
+pub struct BundledRuns {
     /// Name and text of the recording to identify from.
     pub fit: (&'static str, &'static str),
     /// Name and text of the recording to check on.
@@ -12,7 +12,7 @@ pub struct Runs {
 }
 
 /// The robot as its model describes it.
-pub const PLAIN: Runs = Runs {
+pub const PLAIN: BundledRuns = BundledRuns {
     fit: (
         "spidermill-mbs/plain-fit.csv",
         include_str!("spidermill-mbs/plain-fit.csv"),
@@ -24,7 +24,7 @@ pub const PLAIN: Runs = Runs {
 };
 
 /// The robot with a rod along each drive, which its model does not know of.
-pub const WITH_RODS: Runs = Runs {
+pub const WITH_RODS: BundledRuns = BundledRuns {
     fit: (
         "spidermill-mbs/with-rods-fit.csv",
         include_str!("spidermill-mbs/with-rods-fit.csv"),

@@ -66,7 +66,7 @@ fn asked_models() -> String {
         let name = &derivation.mechanism.name;
         let reactions = derivation.reactions();
         let reactions = reactions.unwrap_or_else(|error| panic!("{name}: {error}"));
-        let emitted = modelmill_codegen::emit(derivation).with_reactions(derivation, &reactions);
+        let emitted = modelmill_emit::emit(derivation).with_reactions(derivation, &reactions);
         modules.push_str(&emitted.with_self_test(derivation).module());
     };
     for file in ASKED {
@@ -109,22 +109,19 @@ fn asked_models() -> String {
 /// Takes the last term off the first base parameter that is a sum.
 fn without_a_term(derivation: &mut Derivation) {
     let dependencies = &mut derivation.reduction.dependencies;
-    let line = dependencies
-        .iter_mut()
-        .rfind(|line| !line.equals.is_empty());
+    let line = dependencies.iter_mut().rfind(|line| !line.equals.is_empty());
     let line = line.expect("a base parameter that is a sum");
     line.equals.pop();
 }
 
 fn derived(mechanism: &Mechanism) -> Derivation {
-    modelmill_codegen::derive(mechanism)
-        .unwrap_or_else(|error| panic!("{}: {error}", mechanism.name))
+    modelmill_codegen::derive(mechanism).unwrap_or_else(|error| panic!("{}: {error}", mechanism.name))
 }
 
 fn module(mechanism: &Mechanism) -> String {
     let derivation = derived(mechanism);
     match derivation.dynamics() {
-        Ok(dynamics) => modelmill_codegen::emit_with_dynamics(&derivation, &dynamics).module(),
+        Ok(dynamics) => modelmill_emit::emit_with_dynamics(&derivation, &dynamics).module(),
         Err(error) => panic!("{}: {error}", mechanism.name),
     }
 }

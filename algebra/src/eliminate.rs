@@ -1,20 +1,20 @@
-//! Gaussian elimination in the prime field, row by row.
+//! Gaussian elimination in the prime field, row by row: rows go in, their reduced row echelon form comes out.
 
-use crate::field::Element;
+use crate::field::FieldElement;
 
-/// The reduced row echelon form of the rows seen so far. It does not depend on their order.
+/// The reduced row echelon form of the rows inserted so far. It does not depend on their order.
 #[derive(Clone, Debug)]
-pub struct Echelon<const P: u64> {
-    /// In which order columns are tried as pivots; others hold none.
+pub struct RowEchelonForm<const P: u64> {
+    /// Columns in the order in which they are tried as pivots; other columns are never pivots.
     order: Vec<usize>,
-    /// Columns that hold a pivot, in the order in which their rows came.
+    /// Pivot columns, in the order of their rows.
     pub pivots: Vec<usize>,
-    /// One row per pivot.
-    rows: Vec<Vec<Element<P>>>,
+    /// One row per pivot, with 1 in its pivot column and 0 in all other pivot columns.
+    rows: Vec<Vec<FieldElement<P>>>,
 }
 
-impl<const P: u64> Echelon<P> {
-    /// No rows yet.
+impl<const P: u64> RowEchelonForm<P> {
+    /// Without rows; `order` lists the columns that may become pivots.
     pub fn new(order: &[usize]) -> Self {
         Self {
             order: order.to_vec(),
@@ -23,20 +23,19 @@ impl<const P: u64> Echelon<P> {
         }
     }
 
-    /// Takes a row; tells whether it says anything new.
-    pub fn insert(&mut self, mut row: Vec<Element<P>>) -> bool {
-        for (pivot, known) in self.pivots.iter().zip(&self.rows) {
-            let factor = -row[*pivot];
-            add_multiple(&mut row, factor, known);
-        }
-        let Some(pivot) = self
-            .order
-            .iter()
-            .copied()
-            .find(|c| row[*c] != Element::ZERO)
-        else {
+    /// Inserts a row, and returns whether it is independent of the rows so far.
+    pub fn insert(&mut self, mut row: Vec<FieldElement<P>>) -> bool {
+        // No known row has anything in the pivot column of another one, so that all factors are known at once.
+        let known = self.pivots.iter().zip(&self.rows);
+        let multiples: Vec<(FieldElement<P>, &[FieldElement<P>])> = known
+            .map(|(pivot, known)| (-row[*pivot], known.as_slice()))
+            .filter(|(factor, _)| *factor != FieldElement::ZERO)
+            .collect();
+        FieldElement::add_multiples(&mut row, &multiples);
+        let Some(pivot) = self.order.iter().copied().find(|c| row[*c] != FieldElement::ZERO) else {
             return false;
         };
+        // The new row is scaled, and its pivot is eliminated from the known rows.
         let inverse = row[pivot].inverse().expect("a pivot is not zero");
         for x in &mut row {
             *x = *x * inverse;
@@ -50,44 +49,43 @@ impl<const P: u64> Echelon<P> {
         true
     }
 
-    /// Whether a column has shown any value but zero. Rows that say nothing new cannot be the first to show one.
-    pub fn is_seen(&self, column: usize) -> bool {
-        self.rows.iter().any(|row| row[column] != Element::ZERO)
+    /// Whether a column has any entry other than zero. A dependent row cannot be the first with such an entry.
+    pub fn has_nonzero_value(&self, column: usize) -> bool {
+        self.rows.iter().any(|row| row[column] != FieldElement::ZERO)
     }
 
-    /// The entry of a column in the row of a pivot; `None` if that column holds no pivot.
-    pub fn entry(&self, pivot: usize, column: usize) -> Option<Element<P>> {
+    /// The entry of a column in the row of a pivot; `None` if `pivot` is no pivot column.
+    pub fn entry(&self, pivot: usize, column: usize) -> Option<FieldElement<P>> {
         let row = self.pivots.iter().position(|p| *p == pivot)?;
         Some(self.rows[row][column])
     }
 }
 
-fn add_multiple<const P: u64>(row: &mut [Element<P>], factor: Element<P>, other: &[Element<P>]) {
-    if factor == Element::ZERO {
+/// Adds `factor * other` to a row.
+fn add_multiple<const P: u64>(row: &mut [FieldElement<P>], factor: FieldElement<P>, other: &[FieldElement<P>]) {
+    if factor == FieldElement::ZERO {
         return;
     }
     for (x, y) in row.iter_mut().zip(other) {
-        if *y != Element::ZERO {
-            *x = *x + factor * *y;
+        if *y != FieldElement::ZERO {
+            *x = x.plus_product(factor, *y);
         }
     }
 }
 
 /// A basis of the solutions of `rows * x = 0`, one vector per column without pivot.
-pub fn null_space<const P: u64>(
-    rows: Vec<Vec<Element<P>>>,
-    n_columns: usize,
-) -> Vec<Vec<Element<P>>> {
+pub fn null_space<const P: u64>(rows: Vec<Vec<FieldElement<P>>>, n_columns: usize) -> Vec<Vec<FieldElement<P>>> {
     let order: Vec<usize> = (0..n_columns).collect();
-    let mut echelon = Echelon::new(&order);
+    let mut echelon = RowEchelonForm::new(&order);
     for row in rows {
         echelon.insert(row);
     }
+    // One solution per column without pivot: that unknown is 1, and the pivot unknowns are determined.
     (0..n_columns)
         .filter(|c| !echelon.pivots.contains(c))
         .map(|free| {
-            let mut x = vec![Element::ZERO; n_columns];
-            x[free] = Element::ONE;
+            let mut x = vec![FieldElement::ZERO; n_columns];
+            x[free] = FieldElement::ONE;
             for (row, pivot) in echelon.rows.iter().zip(&echelon.pivots) {
                 x[*pivot] = -row[free];
             }

@@ -1,56 +1,63 @@
-//! Groebner bases: equations go in; equations with the same solutions come out from which the solutions can be read.
+//! Groebner bases: equations go in. Equations with the same solutions come out, from which the solutions can be
+//! computed.
 //!
 //! Buchberger's algorithm with the normal strategy and his two criteria, in exact arithmetic
 //! (D. Cox, J. Little, D. O'Shea, "Ideals, Varieties, and Algorithms", 2.6 to 2.10).
 
 use num_traits::One;
 
-use crate::polynomial::{Polynomial, Powers};
+use crate::polynomial::{Polynomial, TermExponents};
 
-/// More than this much work is given up: `terms * bits of coefficients`, summed over all steps of division.
+/// Limit of the work: `terms * bits of coefficients`, summed over all division steps.
 const MOST_WORK: u64 = 4_000_000_000;
 
-/// The equations are too many or of too high degree to be solved exactly.
+/// Error: the equations are too many, or of too high degree, to be solved exactly.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TooHard;
+pub struct GroebnerLimitExceeded;
 
-/// How much work was done.
+/// Work that has been done, in the units of the limit.
 #[derive(Debug, Default)]
-pub struct Work(u64);
+pub struct GroebnerWork(u64);
 
-impl Work {
-    fn spend(&mut self, polynomial: &Polynomial) -> Result<(), TooHard> {
+impl GroebnerWork {
+    /// Counts one division step by `polynomial`; an error if the limit is exceeded.
+    fn add_division_cost(&mut self, polynomial: &Polynomial) -> Result<(), GroebnerLimitExceeded> {
         let bits = polynomial
-            .leading()
+            .leading_term()
             .map_or(0, |(_, k)| k.numer().bits() + k.denom().bits());
         self.0 += polynomial.terms.len() as u64 * (64 + bits);
         if self.0 > MOST_WORK {
-            Err(TooHard)
+            Err(GroebnerLimitExceeded)
         } else {
             Ok(())
         }
     }
 }
 
-/// The remainder of division by a list of monic polynomials, of which no term can be divided any more.
+/// The remainder of a division by a list of monic polynomials: none of its terms is divisible by a leading term.
+///
+/// # Errors
+/// [`GroebnerLimitExceeded`] if the work exceeds the limit.
 pub fn remainder(
     polynomial: &Polynomial,
     by: &[Polynomial],
-    work: &mut Work,
-) -> Result<Polynomial, TooHard> {
+    work: &mut GroebnerWork,
+) -> Result<Polynomial, GroebnerLimitExceeded> {
     let mut rest = polynomial.clone();
     let mut remainder = Polynomial::new(polynomial.n);
     while let Some((term, factor)) = rest.terms.last_key_value() {
         let (term, factor) = (term.clone(), factor.clone());
+        // The first member whose leading term divides the present one is subtracted.
         let divisor = by.iter().find_map(|g| {
-            let shift = term.over(g.leading()?.0)?;
+            let shift = term.quotient(g.leading_term()?.0)?;
             Some((g, shift))
         });
         match divisor {
             Some((g, shift)) => {
-                work.spend(g)?;
+                work.add_division_cost(g)?;
                 rest.add_shifted(g, &shift, &-factor);
             }
+            // A term that no member divides belongs to the remainder.
             None => {
                 rest.terms.remove(&term);
                 remainder.terms.insert(term, factor);
@@ -60,49 +67,58 @@ pub fn remainder(
     Ok(remainder)
 }
 
-/// The reduced Groebner basis, by ascending leading terms; `[1]` where there are no solutions.
-pub fn groebner(equations: &[Polynomial], work: &mut Work) -> Result<Vec<Polynomial>, TooHard> {
+/// The reduced Groebner basis, in ascending order of leading terms; `[1]` if there are no solutions.
+///
+/// # Errors
+/// [`GroebnerLimitExceeded`] if the work exceeds the limit.
+pub fn groebner_basis(
+    equations: &[Polynomial],
+    work: &mut GroebnerWork,
+) -> Result<Vec<Polynomial>, GroebnerLimitExceeded> {
+    // Members so far, and pairs whose S-polynomials have not been reduced, each with the common multiple of its leading
+    // terms.
     let mut basis: Vec<Polynomial> = Vec::new();
-    let mut pairs: Vec<(Powers, usize, usize)> = Vec::new();
+    let mut pairs: Vec<(TermExponents, usize, usize)> = Vec::new();
     // Low degrees first: linear equations then act as a plain elimination.
     let mut inputs: Vec<&Polynomial> = equations.iter().collect();
     inputs.sort_by_key(|p| p.degree());
     for input in inputs {
         let new = remainder(input, &basis, work)?;
-        insert(new, &mut basis, &mut pairs);
+        insert_basis_member(new, &mut basis, &mut pairs);
     }
-    while let Some(next) = least(&pairs) {
+    while let Some(next) = least_pair(&pairs) {
         let (lcm, i, j) = pairs.swap_remove(next);
-        if is_covered(&lcm, i, j, &basis, &pairs) {
+        if is_redundant_pair(&lcm, i, j, &basis, &pairs) {
             continue;
         }
+        // The S-polynomial: the leading terms of both multiples cancel.
         let mut s = Polynomial::new(basis[i].n);
         for (k, sign) in [(i, 1), (j, -1)] {
-            let leading = basis[k].leading().expect("members are not zero").0;
-            let shift = lcm.over(leading).expect("a multiple of both");
+            let leading = basis[k].leading_term().expect("members are not zero").0;
+            let shift = lcm.quotient(leading).expect("a multiple of both");
             let sign = num_rational::BigRational::from_integer(sign.into());
             s.add_shifted(&basis[k], &shift, &sign);
         }
         let new = remainder(&s, &basis, work)?;
-        insert(new, &mut basis, &mut pairs);
+        insert_basis_member(new, &mut basis, &mut pairs);
     }
-    reduced(basis, work)
+    reduce_basis(basis, work)
 }
 
-/// Adds a member, and the pairs that it makes with the others.
-fn insert(
+/// Adds a member, and its pairs with the others; zero is not added.
+fn insert_basis_member(
     mut new: Polynomial,
     basis: &mut Vec<Polynomial>,
-    pairs: &mut Vec<(Powers, usize, usize)>,
+    pairs: &mut Vec<(TermExponents, usize, usize)>,
 ) {
     new.make_monic();
-    let Some((leading, _)) = new.leading() else {
+    let Some((leading, _)) = new.leading_term() else {
         return;
     };
     for (i, other) in basis.iter().enumerate() {
-        let theirs = other.leading().expect("members are not zero").0;
+        let theirs = other.leading_term().expect("members are not zero").0;
         let lcm = leading.least_common_multiple(theirs);
-        // Coprime leading terms have nothing to say to each other.
+        // Buchberger's first criterion: the S-polynomial of coprime leading terms reduces to zero.
         if lcm.degree() < leading.degree() + theirs.degree() {
             pairs.push((lcm, i, basis.len()));
         }
@@ -110,17 +126,19 @@ fn insert(
     basis.push(new);
 }
 
-fn least(pairs: &[(Powers, usize, usize)]) -> Option<usize> {
+/// Index of the pair with the least common multiple (normal strategy).
+fn least_pair(pairs: &[(TermExponents, usize, usize)]) -> Option<usize> {
     (0..pairs.len()).min_by(|a, b| pairs[*a].cmp(&pairs[*b]))
 }
 
-/// Buchberger's second criterion: a third member stands between the two, and its pairs with them are done.
-fn is_covered(
-    lcm: &Powers,
+/// Buchberger's second criterion: the leading term of a third member divides the common multiple, and its pairs with
+/// both members have been reduced.
+fn is_redundant_pair(
+    lcm: &TermExponents,
     i: usize,
     j: usize,
     basis: &[Polynomial],
-    pairs: &[(Powers, usize, usize)],
+    pairs: &[(TermExponents, usize, usize)],
 ) -> bool {
     let is_open = |a: usize, b: usize| {
         let wanted = (a.min(b), a.max(b));
@@ -130,24 +148,25 @@ fn is_covered(
         k != i
             && k != j
             && basis[k]
-                .leading()
-                .is_some_and(|(leading, _)| lcm.over(leading).is_some())
+                .leading_term()
+                .is_some_and(|(leading, _)| lcm.quotient(leading).is_some())
             && !is_open(i, k)
             && !is_open(j, k)
     })
 }
 
-/// Drops members whose leading terms others divide, and divides each by the rest.
-fn reduced(mut basis: Vec<Polynomial>, work: &mut Work) -> Result<Vec<Polynomial>, TooHard> {
-    basis.sort_by(|a, b| a.leading().map(|l| l.0).cmp(&b.leading().map(|l| l.0)));
+/// Removes members whose leading terms are divisible by others', and reduces the remaining ones by each other.
+fn reduce_basis(mut basis: Vec<Polynomial>, work: &mut GroebnerWork) -> Result<Vec<Polynomial>, GroebnerLimitExceeded> {
+    basis.sort_by(|a, b| a.leading_term().map(|l| l.0).cmp(&b.leading_term().map(|l| l.0)));
     let mut kept: Vec<Polynomial> = Vec::new();
     for member in basis {
-        let leading = member.leading().expect("members are not zero").0;
-        let divides = |g: &Polynomial| leading.over(g.leading().expect("not zero").0).is_some();
+        let leading = member.leading_term().expect("members are not zero").0;
+        let divides = |g: &Polynomial| leading.quotient(g.leading_term().expect("not zero").0).is_some();
         if !kept.iter().any(divides) {
             kept.push(member);
         }
     }
+    // Only the tail is reduced: no other member divides the leading term.
     for k in 0..kept.len() {
         let mut tail = kept[k].clone();
         let (leading, factor) = tail.terms.pop_last().expect("members are not zero");
@@ -158,35 +177,40 @@ fn reduced(mut basis: Vec<Polynomial>, work: &mut Work) -> Result<Vec<Polynomial
     Ok(kept)
 }
 
-/// Whether a basis says that there are no solutions, not even complex ones.
-pub fn is_contradiction(basis: &[Polynomial]) -> bool {
+/// Whether a basis shows that there are no solutions, not even complex ones.
+pub fn has_no_solution(basis: &[Polynomial]) -> bool {
     basis
         .first()
-        .is_some_and(|p| p.degree() == 0 && p.leading().is_some_and(|(_, factor)| factor.is_one()))
+        .is_some_and(|p| p.degree() == 0 && p.leading_term().is_some_and(|(_, factor)| factor.is_one()))
 }
 
-/// The terms that no leading term divides, by ascending order; `None` where they never end, because solutions form
-/// curves or surfaces. At most `most` of them, else [`TooHard`].
+/// The terms that no leading term divides, in ascending order; `None` if they are infinitely many, because solutions
+/// form curves or surfaces.
+///
+/// # Errors
+/// [`GroebnerLimitExceeded`] if there are more than `most`.
 pub fn standard_terms(
     basis: &[Polynomial],
     n: usize,
     most: usize,
-) -> Result<Option<Vec<Powers>>, TooHard> {
-    let leading: Vec<&Powers> = basis.iter().filter_map(|g| Some(g.leading()?.0)).collect();
+) -> Result<Option<Vec<TermExponents>>, GroebnerLimitExceeded> {
+    let leading: Vec<&TermExponents> = basis.iter().filter_map(|g| Some(g.leading_term()?.0)).collect();
+    // They are finitely many if a power of every unknown is a leading term.
     let is_bounded = |i: usize| leading.iter().any(|term| term.degree() == term.0[i]);
     if !(0..n).all(is_bounded) {
         return Ok(None);
     }
+    // Search from the term 1 by multiplication with unknowns.
     let mut terms = std::collections::BTreeSet::new();
-    let mut open = vec![Powers::one(n)];
+    let mut open = vec![TermExponents::unit_term(n)];
     while let Some(term) = open.pop() {
-        if leading.iter().any(|l| term.over(l).is_some()) || !terms.insert(term.clone()) {
+        if leading.iter().any(|l| term.quotient(l).is_some()) || !terms.insert(term.clone()) {
             continue;
         }
         if terms.len() > most {
-            return Err(TooHard);
+            return Err(GroebnerLimitExceeded);
         }
-        open.extend((0..n).map(|i| term.times(&Powers::unknown(n, i))));
+        open.extend((0..n).map(|i| term.times(&TermExponents::unknown(n, i))));
     }
     Ok(Some(terms.into_iter().collect()))
 }

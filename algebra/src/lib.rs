@@ -1,5 +1,5 @@
-//! Exact arithmetic that knows no mechanisms: rationals, prime fields and elimination in them, polynomials, their
-//! Groebner bases and their real roots, and numbers of many digits where nothing exact is to be had.
+//! Exact arithmetic without any knowledge of mechanisms: rationals, prime fields and elimination in them, polynomials,
+//! their Groebner bases and real roots. Where no exact result exists, there are floating-point numbers of many digits.
 
 pub mod digits;
 pub mod eliminate;

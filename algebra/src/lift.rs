@@ -6,16 +6,16 @@ use num_traits::{One, Signed, Zero};
 
 use crate::Rational;
 
-/// By how many bits the residues must exceed what the rational needs: a random residue passes with a chance of 2^-30.
+/// Number of bits by which the residues must exceed the rational: a random residue passes with a probability of 2^-30.
 const MARGIN: u64 = 30;
 
-/// The rational of smallest size with the given residues `(prime, residue)`, if it is so much smaller than the product
-/// of the primes that this cannot be chance.
-pub fn lift(residues: &[(u64, u64)]) -> Option<Rational> {
-    let (modulus, residue) = combine(residues);
+/// The rational of smallest size with the given residues `(prime, residue)`; `None` if it is not so much smaller than
+/// the product of the primes that this cannot be chance.
+pub fn reconstruct_rational(residues: &[(u64, u64)]) -> Option<Rational> {
+    let (modulus, residue) = combine_residues(residues);
     let bits = modulus.bits();
-    // Every step of Euclid's algorithm leaves a pair whose quotient has the residue; the smallest one stands out
-    // (Monagan 2004).
+    // Every step of Euclid's algorithm gives a quotient r1/t1 with this residue. The smallest one is clearly smaller
+    // than the others (Monagan 2004).
     let (mut r0, mut r1) = (modulus, residue);
     let (mut t0, mut t1) = (BigInt::zero(), BigInt::one());
     let mut best: Option<(u64, BigInt, BigInt)> = None;
@@ -37,20 +37,18 @@ pub fn lift(residues: &[(u64, u64)]) -> Option<Rational> {
             (t1, rest)
         };
     }
+    // The sign belongs to the numerator.
     let (_, numerator, denominator) = best.filter(|(size, ..)| size + MARGIN <= bits)?;
     let sign = if denominator.sign() == Sign::Minus {
         -BigInt::one()
     } else {
         BigInt::one()
     };
-    Some(Rational::from(BigRational::new(
-        sign * numerator,
-        denominator.abs(),
-    )))
+    Some(Rational::from(BigRational::new(sign * numerator, denominator.abs())))
 }
 
-/// Product of the primes, and the number below it with all the residues.
-fn combine(residues: &[(u64, u64)]) -> (BigInt, BigInt) {
+/// Product of the primes, and the number below it that has all the residues (Chinese remainder theorem).
+fn combine_residues(residues: &[(u64, u64)]) -> (BigInt, BigInt) {
     let (mut modulus, mut value) = (BigInt::one(), BigInt::zero());
     for &(prime, residue) in residues {
         let prime = BigInt::from(prime);
@@ -67,11 +65,11 @@ fn combine(residues: &[(u64, u64)]) -> (BigInt, BigInt) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::field::{Element, PRIMES};
+    use crate::field::{FieldElement, PRIMES};
 
     fn residues(value: &Rational, n: usize) -> Vec<(u64, u64)> {
         fn residue<const P: u64>(value: &Rational) -> (u64, u64) {
-            let element = Element::<P>::from_rational(value).unwrap();
+            let element = FieldElement::<P>::from_rational(value).unwrap();
             (P, element.representative())
         }
         [
@@ -96,7 +94,7 @@ mod tests {
         ] {
             let value = Rational::new(n, d);
             for k in 1..=3 {
-                let found = lift(&residues(&value, k));
+                let found = reconstruct_rational(&residues(&value, k));
                 assert_eq!(found, (k >= primes).then(|| value.clone()), "{n}/{d}, {k}");
             }
         }

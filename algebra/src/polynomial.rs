@@ -1,4 +1,4 @@
-//! Polynomials in several unknowns with rational coefficients, and how their terms are ordered.
+//! Polynomials in several unknowns with rational coefficients, and the order of their terms.
 
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
@@ -6,19 +6,19 @@ use std::collections::BTreeMap;
 use num_rational::BigRational;
 use num_traits::{One, ToPrimitive, Zero};
 
-/// Exponents of a term, one for each unknown, in graded reverse lexicographic order.
+/// Exponents of a term, one per unknown, in graded reverse lexicographic order.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Powers(pub Vec<u32>);
+pub struct TermExponents(pub Vec<u32>);
 
-impl Powers {
+impl TermExponents {
     /// The term 1 in `n` unknowns.
-    pub fn one(n: usize) -> Self {
+    pub fn unit_term(n: usize) -> Self {
         Self(vec![0; n])
     }
 
     /// Unknown `i` of `n`, to the first power.
     pub fn unknown(n: usize, i: usize) -> Self {
-        let mut powers = Self::one(n);
+        let mut powers = Self::unit_term(n);
         powers.0[i] = 1;
         powers
     }
@@ -35,34 +35,26 @@ impl Powers {
     }
 
     /// `self / divisor`, if it is a term.
-    pub fn over(&self, divisor: &Self) -> Option<Self> {
+    pub fn quotient(&self, divisor: &Self) -> Option<Self> {
         let pairs = self.0.iter().zip(&divisor.0);
-        pairs
-            .map(|(a, b)| a.checked_sub(*b))
-            .collect::<Option<_>>()
-            .map(Self)
+        pairs.map(|(a, b)| a.checked_sub(*b)).collect::<Option<_>>().map(Self)
     }
 
     /// The least term that both divide.
     #[must_use]
     pub fn least_common_multiple(&self, other: &Self) -> Self {
-        Self(
-            self.0
-                .iter()
-                .zip(&other.0)
-                .map(|(a, b)| *a.max(b))
-                .collect(),
-        )
+        Self(self.0.iter().zip(&other.0).map(|(a, b)| *a.max(b)).collect())
     }
 }
 
-impl PartialOrd for Powers {
+impl PartialOrd for TermExponents {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }
 
-impl Ord for Powers {
+impl Ord for TermExponents {
+    // The degree decides first; among equal degrees the term with the smaller exponent of the last unknown is greater.
     fn cmp(&self, other: &Self) -> Ordering {
         let by_degree = self.degree().cmp(&other.degree());
         by_degree.then_with(|| {
@@ -75,19 +67,19 @@ impl Ord for Powers {
     }
 }
 
-/// A polynomial in `n` unknowns with exact coefficients, none of them zero.
+/// A polynomial in `n` unknowns with exact coefficients, none of them zero: a sum of terms in their order.
 ///
 /// ```
-/// use modelmill_algebra::polynomial::{Polynomial, exact};
+/// use modelmill_algebra::polynomial::{Polynomial, exact_decimal};
 /// let mut p = Polynomial::new(2);
-/// p.add_term(&[(0, 1), (1, 2)], &exact(0.5));
-/// p.add_term(&[], &exact(3.0));
+/// p.add_term(&[(0, 1), (1, 2)], &exact_decimal(0.5));
+/// p.add_term(&[], &exact_decimal(3.0));
 /// assert_eq!(p.value(&[4.0, 3.0]), 21.0);
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Polynomial {
-    /// Terms with their coefficients, the greatest last.
-    pub terms: BTreeMap<Powers, BigRational>,
+    /// Terms with their coefficients, in ascending order.
+    pub terms: BTreeMap<TermExponents, BigRational>,
     /// Number of unknowns.
     pub n: usize,
 }
@@ -103,7 +95,7 @@ impl Polynomial {
 
     /// Adds `factor` times a product of powers of unknowns, `(unknown, exponent)`.
     pub fn add_term(&mut self, powers: &[(usize, u32)], factor: &BigRational) {
-        let mut term = Powers::one(self.n);
+        let mut term = TermExponents::unit_term(self.n);
         for (i, exponent) in powers {
             term.0[*i] += exponent;
         }
@@ -111,7 +103,7 @@ impl Polynomial {
     }
 
     /// Adds `factor` times a term.
-    pub fn add(&mut self, term: Powers, factor: &BigRational) {
+    pub fn add(&mut self, term: TermExponents, factor: &BigRational) {
         if factor.is_zero() {
             return;
         }
@@ -124,25 +116,25 @@ impl Polynomial {
     }
 
     /// Adds `factor * shift * other`.
-    pub fn add_shifted(&mut self, other: &Self, shift: &Powers, factor: &BigRational) {
+    pub fn add_shifted(&mut self, other: &Self, shift: &TermExponents, factor: &BigRational) {
         for (term, k) in &other.terms {
             self.add(term.times(shift), &(k * factor));
         }
     }
 
-    /// The greatest term with its coefficient.
-    pub fn leading(&self) -> Option<(&Powers, &BigRational)> {
+    /// The greatest term with its coefficient; `None` for the polynomial zero.
+    pub fn leading_term(&self) -> Option<(&TermExponents, &BigRational)> {
         self.terms.last_key_value()
     }
 
     /// Degree of its greatest term; 0 for zero.
     pub fn degree(&self) -> u32 {
-        self.leading().map_or(0, |(term, _)| term.degree())
+        self.leading_term().map_or(0, |(term, _)| term.degree())
     }
 
-    /// Divides by the leading coefficient.
+    /// Divides by the leading coefficient; zero stays zero.
     pub fn make_monic(&mut self) {
-        let Some((_, leading)) = self.leading() else {
+        let Some((_, leading)) = self.leading_term() else {
             return;
         };
         let inverse = leading.recip();
@@ -166,25 +158,25 @@ impl Polynomial {
         derivative
     }
 
-    /// Whether an unknown stands in it.
-    pub fn mentions(&self, i: usize) -> bool {
+    /// Whether an unknown occurs in it.
+    pub fn has_unknown(&self, i: usize) -> bool {
         self.terms.keys().any(|term| term.0[i] > 0)
     }
 
-    /// Its value in floating point.
+    /// Its value in double precision, for values of all unknowns.
     pub fn value(&self, at: &[f64]) -> f64 {
         let terms = self.terms.iter();
         terms
             .map(|(term, factor)| {
                 let exponents = term.0.iter().zip(at);
-                exponents.fold(float(factor), |product, (n, x)| {
+                exponents.fold(nearest_f64(factor), |product, (n, x)| {
                     product * x.powi(i32::try_from(*n).unwrap_or(i32::MAX))
                 })
             })
             .sum()
     }
 
-    /// Its exact value.
+    /// Its exact value, for exact values of all unknowns.
     pub fn exact_value(&self, at: &[BigRational]) -> BigRational {
         let mut sum = BigRational::zero();
         for (term, factor) in &self.terms {
@@ -200,17 +192,15 @@ impl Polynomial {
     }
 }
 
-/// The decimal number that a value is printed as: 1.13 means 113/100, not its neighbour in binary.
+/// The decimal number that a value is printed as: 1.13 means 113/100 and not the nearest binary fraction.
 ///
 /// The value must be finite.
-pub fn exact(value: f64) -> BigRational {
-    assert!(value.is_finite(), "{value} is no number");
+pub fn exact_decimal(value: f64) -> BigRational {
+    assert!(value.is_finite(), "{value} is not finite");
     let text = format!("{value:e}");
     let (digits, exponent) = text.split_once('e').expect("an exponent is printed");
     let exponent: i32 = exponent.parse().expect("a small exponent");
-    let decimals = digits
-        .split_once('.')
-        .map_or(0, |(_, decimals)| decimals.len());
+    let decimals = digits.split_once('.').map_or(0, |(_, decimals)| decimals.len());
     let digits: num_bigint::BigInt = digits.replace('.', "").parse().expect("digits");
     let power = exponent - i32::try_from(decimals).expect("at most 17 decimals");
     let ten = num_bigint::BigInt::from(10).pow(power.unsigned_abs());
@@ -221,15 +211,15 @@ pub fn exact(value: f64) -> BigRational {
     }
 }
 
-/// The nearest floating-point number.
-pub fn float(value: &BigRational) -> f64 {
+/// The nearest double; NaN if it has none.
+pub fn nearest_f64(value: &BigRational) -> f64 {
     value.to_f64().unwrap_or(f64::NAN)
 }
 
-/// Some unknown times one, as a polynomial.
-pub fn unknown(n: usize, i: usize) -> Polynomial {
+/// Unknown `i` of `n` as a polynomial.
+pub fn unknown_polynomial(n: usize, i: usize) -> Polynomial {
     let mut polynomial = Polynomial::new(n);
-    polynomial.add(Powers::unknown(n, i), &BigRational::one());
+    polynomial.add(TermExponents::unknown(n, i), &BigRational::one());
     polynomial
 }
 
@@ -239,15 +229,12 @@ mod tests {
 
     #[test]
     fn decimals_are_taken_as_they_are_printed() {
-        assert_eq!(exact(1.13), BigRational::new(113.into(), 100.into()));
+        assert_eq!(exact_decimal(1.13), BigRational::new(113.into(), 100.into()));
+        assert_eq!(exact_decimal(-2.5e-7), BigRational::new((-1).into(), 4_000_000.into()));
         assert_eq!(
-            exact(-2.5e-7),
-            BigRational::new((-1).into(), 4_000_000.into())
-        );
-        assert_eq!(
-            exact(3e20),
+            exact_decimal(3e20),
             BigRational::from_integer(300_000_000_000_000_000_000_i128.into())
         );
-        assert_eq!(float(&exact(0.1)).to_bits(), 0.1_f64.to_bits());
+        assert_eq!(nearest_f64(&exact_decimal(0.1)).to_bits(), 0.1_f64.to_bits());
     }
 }

@@ -1,35 +1,36 @@
-//! All real roots of a polynomial in one unknown: exact coefficients go in, intervals that hold one root each come out,
-//! as narrow as is asked for.
+//! All real roots of a polynomial in one unknown: exact coefficients go in, and intervals with one root each come out,
+//! as narrow as requested.
 //!
 //! Sturm's theorem (D. E. Knuth, "The Art of Computer Programming", 4.6.1 and exercise 22 of 4.6.2).
 
 use num_rational::BigRational;
 use num_traits::{One, Signed, Zero};
 
-/// Coefficients, the constant first, the last of them not zero; empty for zero.
-pub type Univariate = Vec<BigRational>;
+/// Coefficients, the constant first, the last of them not zero; empty for the polynomial zero.
+pub type UnivariatePolynomial = Vec<BigRational>;
 
-/// An interval with exact ends.
+/// A closed interval with exact ends.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Interval {
+pub struct RationalInterval {
     /// Lower end, part of the interval.
     pub low: BigRational,
     /// Upper end, part of the interval.
     pub high: BigRational,
 }
 
-impl Interval {
+impl RationalInterval {
     /// `high - low`
     pub fn width(&self) -> BigRational {
         &self.high - &self.low
     }
 
-    /// Half way between the ends.
+    /// The centre of the interval.
     pub fn middle(&self) -> BigRational {
         (&self.low + &self.high) / BigRational::from_integer(2.into())
     }
 
-    /// Values of a polynomial over the interval, by Horner's rule; wider than need be, never too narrow.
+    /// An interval that contains all values of a polynomial on this one, by Horner's rule. It may be too wide, but
+    /// never too narrow.
     #[must_use]
     pub fn image(&self, polynomial: &[BigRational]) -> Self {
         let zero = BigRational::zero();
@@ -37,6 +38,7 @@ impl Interval {
             low: zero.clone(),
             high: zero,
         };
+        // Interval arithmetic: the product of two intervals lies between its extreme corner products.
         for coefficient in polynomial.iter().rev() {
             let products = [
                 &image.low * &self.low,
@@ -55,35 +57,36 @@ impl Interval {
     }
 }
 
-/// The real roots of a polynomial without multiple roots, in ascending order, each in an interval of its own.
-pub fn isolate(polynomial: &[BigRational]) -> Vec<Interval> {
+/// The real roots of a polynomial without multiple roots, each in a separate interval.
+pub fn isolate_roots(polynomial: &[BigRational]) -> Vec<RationalInterval> {
     let chain = sturm_chain(polynomial);
     if polynomial.len() < 2 {
         return Vec::new();
     }
-    // Cauchy's bound.
+    // Cauchy's bound of the magnitudes of all roots.
     let leading = polynomial.last().expect("not empty").abs();
     let largest = polynomial.iter().map(Signed::abs).max().expect("not empty");
     let bound = BigRational::one() + (largest / leading).ceil();
     let mut roots = Vec::new();
-    let whole = Interval {
+    let whole = RationalInterval {
         low: -bound.clone(),
         high: bound,
     };
     let mut open = vec![whole];
     while let Some(interval) = open.pop() {
-        // Roots in (low, high].
-        let count = variations(&chain, &interval.low) - variations(&chain, &interval.high);
+        // Sturm's theorem: the number of roots in (low, high].
+        let count = sign_variations(&chain, &interval.low) - sign_variations(&chain, &interval.high);
         match count {
+            // Intervals with several roots are halved until each has one.
             0 => {}
             1 => roots.push(interval),
             _ => {
                 let middle = interval.middle();
-                open.push(Interval {
+                open.push(RationalInterval {
                     low: middle.clone(),
                     high: interval.high,
                 });
-                open.push(Interval {
+                open.push(RationalInterval {
                     low: interval.low,
                     high: middle,
                 });
@@ -93,8 +96,9 @@ pub fn isolate(polynomial: &[BigRational]) -> Vec<Interval> {
     roots
 }
 
-/// Halves an interval `(low, high]` that holds one simple root.
-pub fn halve(polynomial: &[BigRational], interval: &mut Interval) {
+/// Halves an interval `(low, high]` that contains one simple root.
+pub fn halve_interval(polynomial: &[BigRational], interval: &mut RationalInterval) {
+    // A root at the upper end is exact.
     let at_high = value(polynomial, &interval.high);
     if at_high.is_zero() {
         interval.low = interval.high.clone();
@@ -105,6 +109,7 @@ pub fn halve(polynomial: &[BigRational], interval: &mut Interval) {
     if at_middle.is_zero() {
         interval.low = middle.clone();
         interval.high = middle;
+    // The half whose ends have different signs contains the root.
     } else if at_middle.is_positive() == at_high.is_positive() {
         interval.high = middle;
     } else {
@@ -112,31 +117,31 @@ pub fn halve(polynomial: &[BigRational], interval: &mut Interval) {
     }
 }
 
-/// The polynomial without its multiple roots.
-pub fn squarefree(polynomial: &[BigRational]) -> Univariate {
+/// The polynomial with the same roots, each of them simple.
+pub fn squarefree_part(polynomial: &[BigRational]) -> UnivariatePolynomial {
     let common = gcd(polynomial.to_vec(), derivative(polynomial));
     divide(polynomial, &common).0
 }
 
-/// Whether no root is multiple.
+/// Whether all roots are simple.
 pub fn is_squarefree(polynomial: &[BigRational]) -> bool {
     gcd(polynomial.to_vec(), derivative(polynomial)).len() <= 1
 }
 
+/// Value by Horner's rule.
 fn value(polynomial: &[BigRational], x: &BigRational) -> BigRational {
     let coefficients = polynomial.iter().rev();
     coefficients.fold(BigRational::zero(), |value, k| value * x + k)
 }
 
-fn derivative(polynomial: &[BigRational]) -> Univariate {
+/// Coefficients of the derivative.
+fn derivative(polynomial: &[BigRational]) -> UnivariatePolynomial {
     let terms = polynomial.iter().enumerate().skip(1);
-    terms
-        .map(|(n, k)| k * BigRational::from_integer(n.into()))
-        .collect()
+    terms.map(|(n, k)| k * BigRational::from_integer(n.into())).collect()
 }
 
-/// Divided by the size of its leading coefficient, the sign kept: remainders stay short.
-fn primitive(mut polynomial: Univariate) -> Univariate {
+/// The polynomial divided by the magnitude of its leading coefficient, so that remainders stay short; signs are kept.
+fn primitive_part(mut polynomial: UnivariatePolynomial) -> UnivariatePolynomial {
     if let Some(leading) = polynomial.last().map(Signed::abs) {
         for k in &mut polynomial {
             *k /= &leading;
@@ -145,12 +150,13 @@ fn primitive(mut polynomial: Univariate) -> Univariate {
     polynomial
 }
 
-/// Quotient and remainder.
-fn divide(polynomial: &[BigRational], by: &[BigRational]) -> (Univariate, Univariate) {
+/// Quotient and remainder of a division; the divisor must not be zero.
+fn divide(polynomial: &[BigRational], by: &[BigRational]) -> (UnivariatePolynomial, UnivariatePolynomial) {
     let mut rest = polynomial.to_vec();
     let leading = by.last().expect("no division by zero");
     let steps = (rest.len() + 1).saturating_sub(by.len());
     let mut quotient = vec![BigRational::zero(); steps];
+    // From the highest power down, one coefficient of the quotient at a time.
     for shift in (0..steps).rev() {
         let factor = &rest[shift + by.len() - 1] / leading;
         for (k, coefficient) in by.iter().enumerate() {
@@ -165,31 +171,33 @@ fn divide(polynomial: &[BigRational], by: &[BigRational]) -> (Univariate, Univar
     (quotient, rest)
 }
 
-fn gcd(mut a: Univariate, mut b: Univariate) -> Univariate {
+/// A greatest common divisor, by Euclid's algorithm.
+fn gcd(mut a: UnivariatePolynomial, mut b: UnivariatePolynomial) -> UnivariatePolynomial {
     while !b.is_empty() {
         let (_, rest) = divide(&a, &b);
         a = b;
-        b = primitive(rest);
+        b = primitive_part(rest);
     }
     a
 }
 
-fn sturm_chain(polynomial: &[BigRational]) -> Vec<Univariate> {
+/// Sturm's chain: the polynomial, its derivative, and the negative remainders of each pair.
+fn sturm_chain(polynomial: &[BigRational]) -> Vec<UnivariatePolynomial> {
     let mut chain = vec![
-        primitive(polynomial.to_vec()),
-        primitive(derivative(polynomial)),
+        primitive_part(polynomial.to_vec()),
+        primitive_part(derivative(polynomial)),
     ];
     while let [.., a, b] = chain.as_slice()
         && !b.is_empty()
     {
         let (_, rest) = divide(a, b);
-        chain.push(primitive(rest.into_iter().map(|k| -k).collect()));
+        chain.push(primitive_part(rest.into_iter().map(|k| -k).collect()));
     }
     chain
 }
 
-/// Changes of sign along the chain.
-fn variations(chain: &[Univariate], x: &BigRational) -> usize {
+/// Number of changes of sign along the chain at `x`, without zeros.
+fn sign_variations(chain: &[UnivariatePolynomial], x: &BigRational) -> usize {
     let signs: Vec<bool> = chain
         .iter()
         .map(|p| value(p, x))
@@ -203,7 +211,7 @@ fn variations(chain: &[Univariate], x: &BigRational) -> usize {
 mod tests {
     use super::*;
 
-    fn from_roots(roots: &[(i64, i64)]) -> Univariate {
+    fn from_roots(roots: &[(i64, i64)]) -> UnivariatePolynomial {
         let mut product = vec![BigRational::one()];
         for (n, d) in roots {
             let root = BigRational::new((*n).into(), (*d).into());
@@ -227,12 +235,12 @@ mod tests {
             polynomial[k] += coefficient;
             polynomial[k + 2] += coefficient;
         }
-        let found = isolate(&polynomial);
+        let found = isolate_roots(&polynomial);
         assert_eq!(found.len(), roots.len());
         for (mut interval, (n, d)) in found.into_iter().zip(roots) {
             let root = BigRational::new(n.into(), d.into());
             for _ in 0..60 {
-                halve(&polynomial, &mut interval);
+                halve_interval(&polynomial, &mut interval);
                 assert!(interval.low <= root && root <= interval.high);
             }
             assert!(interval.width() < BigRational::new(1.into(), (1_u64 << 50).into()));
@@ -243,8 +251,8 @@ mod tests {
     fn multiple_roots_become_simple() {
         let polynomial = from_roots(&[(1, 2), (1, 2), (1, 2), (-3, 1)]);
         assert!(!is_squarefree(&polynomial));
-        let simple = squarefree(&polynomial);
+        let simple = squarefree_part(&polynomial);
         assert!(is_squarefree(&simple));
-        assert_eq!(isolate(&simple).len(), 2);
+        assert_eq!(isolate_roots(&simple).len(), 2);
     }
 }

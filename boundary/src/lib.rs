@@ -1,8 +1,8 @@
-//! Everything that crosses the edge of modelmill, and nothing else: files that are read with a cap and written whole
-//! ([`files`]), free text of users on its way to a terminal, a page or source code, and messages with advice that each front end
-//! spells in its own words ([`text`]).
+//! Everything that crosses the boundary of modelmill: files that are read with a limit and written atomically
+//! ([`files`]), free text of users on its way to a terminal, a page or source code, and messages with advice that
+//! each front end spells in its own words ([`text`]).
 //!
-//! All other crates stand on this one; it knows no models and depends on nothing.
+//! All other crates depend on this one; it knows no models and has no dependencies.
 
 pub mod files;
 pub mod text;

@@ -103,12 +103,12 @@ pub fn try_generate(pattern: &str, out: &Path) -> Result<(), BuildError> {
 /// # Errors
 /// Diagnostics of all faulty model files together.
 pub fn try_generate_with(pattern: &str, options: Options, out: &Path) -> Result<(), BuildError> {
-    let files = files(pattern)?;
+    let files = matching_model_files(pattern)?;
     let mut text = String::new();
     let mut faults = String::new();
     let mut names = BTreeSet::new();
     for file in &files {
-        match module(file, options) {
+        match generate_module(file, options) {
             Ok((name, module)) if names.insert(name.clone()) => text.push_str(&module),
             Ok((name, _)) => {
                 _ = writeln!(
@@ -127,31 +127,28 @@ pub fn try_generate_with(pattern: &str, options: Options, out: &Path) -> Result<
     if std::fs::read_to_string(out).is_ok_and(|old| old == text) {
         return Ok(());
     }
-    modelmill_boundary::files::write(out, text.as_bytes())
-        .map_err(|error| BuildError(format!("cannot write {error}")))
+    modelmill_boundary::files::write(out, text.as_bytes()).map_err(|error| BuildError(format!("cannot write {error}")))
 }
 
-fn files(pattern: &str) -> Result<Vec<PathBuf>, BuildError> {
+fn matching_model_files(pattern: &str) -> Result<Vec<PathBuf>, BuildError> {
     let Some(folder) = pattern.strip_suffix("/*.toml") else {
         return Ok(vec![PathBuf::from(pattern)]);
     };
     println!("cargo::rerun-if-changed={folder}");
-    let entries = std::fs::read_dir(folder)
-        .map_err(|error| BuildError(format!("cannot read folder `{folder}`: {error}")))?;
+    let entries =
+        std::fs::read_dir(folder).map_err(|error| BuildError(format!("cannot read folder `{folder}`: {error}")))?;
     let mut files: Vec<PathBuf> = entries
         .filter_map(|entry| entry.ok().map(|e| e.path()))
         .filter(|path| path.extension().is_some_and(|e| e == "toml"))
         .collect();
     files.sort();
     if files.is_empty() {
-        return Err(BuildError(format!(
-            "no model file `*.toml` in folder `{folder}`"
-        )));
+        return Err(BuildError(format!("no model file `*.toml` in folder `{folder}`")));
     }
     Ok(files)
 }
 
-fn module(file: &Path, options: Options) -> Result<(String, String), BuildError> {
+fn generate_module(file: &Path, options: Options) -> Result<(String, String), BuildError> {
     let loaded = modelmill_spec::load_file(file);
     let sources = match &loaded {
         Ok(loaded) => &loaded.sources,
@@ -168,7 +165,7 @@ fn module(file: &Path, options: Options) -> Result<(String, String), BuildError>
     let derivation = modelmill_codegen::derive(&loaded.mechanism)
         .map_err(|error| BuildError(format!("{}: {error}\n", file.display())))?;
     let fault = |error| BuildError(format!("{}: {error}\n", file.display()));
-    let mut emitted = modelmill_codegen::emit(&derivation);
+    let mut emitted = modelmill_emit::emit(&derivation);
     if options.dynamics {
         let dynamics = derivation.dynamics().map_err(fault)?;
         emitted = emitted.with_dynamics(&derivation, &dynamics);

@@ -28,8 +28,7 @@ fn folder(name: &str, files: &[(&str, &str)]) -> PathBuf {
 
 fn generate(folder: &Path) -> Result<String, String> {
     let out = folder.join("models.rs");
-    try_generate(&format!("{}/*.toml", folder.display()), &out)
-        .map_err(|error| error.to_string())?;
+    try_generate(&format!("{}/*.toml", folder.display()), &out).map_err(|error| error.to_string())?;
     Ok(std::fs::read_to_string(out).unwrap())
 }
 
@@ -38,10 +37,7 @@ fn a_sound_model_becomes_a_module_and_the_same_one_every_time() {
     let folder = folder("sound", &[("pendulum.toml", PENDULUM)]);
     let first = generate(&folder).unwrap();
     assert!(first.contains("pub mod pendulum {"));
-    assert!(
-        first.contains(r#"BaseParameter::new("p1_min", "ZZ1""#),
-        "{first}"
-    );
+    assert!(first.contains(r#"BaseParameter::new("p1_min", "ZZ1""#), "{first}");
     assert_eq!(generate(&folder).unwrap(), first);
 }
 
@@ -49,12 +45,7 @@ fn a_sound_model_becomes_a_module_and_the_same_one_every_time() {
 fn an_unchanged_module_keeps_its_date() {
     let folder = folder("unchanged", &[("pendulum.toml", PENDULUM)]);
     generate(&folder).unwrap();
-    let date = |folder: &Path| {
-        std::fs::metadata(folder.join("models.rs"))
-            .unwrap()
-            .modified()
-            .unwrap()
-    };
+    let date = |folder: &Path| std::fs::metadata(folder.join("models.rs")).unwrap().modified().unwrap();
     let before = date(&folder);
     generate(&folder).unwrap();
     assert_eq!(date(&folder), before);
@@ -64,10 +55,7 @@ fn an_unchanged_module_keeps_its_date() {
 fn faults_of_all_models_come_together_with_their_places() {
     let typing_error = PENDULUM.replace("joint = \"q\"", "joint = \"p\"");
     let wrong_unit = PENDULUM.replace("m/s^2", "kg");
-    let folder = folder(
-        "faulty",
-        &[("a.toml", &typing_error), ("b.toml", &wrong_unit)],
-    );
+    let folder = folder("faulty", &[("a.toml", &typing_error), ("b.toml", &wrong_unit)]);
     let error = generate(&folder).unwrap_err();
     assert!(error.contains("a.toml:9:"), "{error}");
     assert!(error.contains("known names: `q`"), "{error}");
@@ -82,10 +70,7 @@ fn faults_of_all_models_come_together_with_their_places() {
 fn two_models_of_one_name_are_refused() {
     let folder = folder("twice", &[("a.toml", PENDULUM), ("b.toml", PENDULUM)]);
     let error = generate(&folder).unwrap_err();
-    assert!(
-        error.contains("another model is called `pendulum` too"),
-        "{error}"
-    );
+    assert!(error.contains("another model is called `pendulum` too"), "{error}");
 }
 
 #[test]
@@ -127,14 +112,7 @@ fn the_equation_of_motion_comes_on_demand() {
     let folder = folder("dynamics", &[("pendulum.toml", PENDULUM)]);
     assert!(!generate(&folder).unwrap().contains("pub fn mass_matrix"));
     let text = with_dynamics(&folder).unwrap();
-    for method in [
-        "mass_matrix",
-        "coriolis",
-        "gravity",
-        "effects",
-        "bias",
-        "forward",
-    ] {
+    for method in ["mass_matrix", "coriolis", "gravity", "effects", "bias", "forward"] {
         assert!(text.contains(&format!("pub fn {method}(")), "{method}");
     }
 }

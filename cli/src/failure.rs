@@ -1,23 +1,22 @@
-//! What ends a command early, and the exit status that goes with it.
+//! Reasons why a command ends early, with the exit status of each.
 
 /// Why a command ended early.
 #[derive(Debug)]
-pub(crate) enum Failure {
-    /// The library has no answer: exit status 2 where options contradict each other, else 1.
+pub(crate) enum CommandFailure {
+    /// The library failed: exit status 2 if options contradict each other, else 1.
     Library(modelmill::Error),
-    /// The input is at fault: exit status 1, and one message that says where, what was expected
-    /// and what to do.
+    /// The input is at fault: exit status 1. The message has the place, what was expected, and a remedy.
     Input(String),
     /// The command line is at fault: exit status 2.
     Usage(String),
-    /// The reader of standard output went away; nobody wants to hear more.
+    /// The reader of standard output closed it: exit status 0 and no message.
     BrokenPipe,
 }
 
 /// Result of a command.
-pub(crate) type Outcome<T = ()> = Result<T, Failure>;
+pub(crate) type CommandOutcome<T = ()> = Result<T, CommandFailure>;
 
-impl Failure {
+impl CommandFailure {
     /// The exit status.
     pub(crate) fn status(&self) -> u8 {
         match self {
@@ -28,7 +27,7 @@ impl Failure {
     }
 }
 
-impl From<modelmill::Error> for Failure {
+impl From<modelmill::Error> for CommandFailure {
     fn from(error: modelmill::Error) -> Self {
         Self::Library(error)
     }

@@ -1,50 +1,53 @@
-//! How the command line asks for what the library advises: options as flags, commands of the program, whole command lines.
+//! Spelling of the library's advice for the command line: options as flags, commands of the program, complete command
+//! lines.
 
 use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-use modelmill::diagnose::{Named, Separation};
+use modelmill::diagnose::{NamedEffect, SeparationProposal};
 use modelmill::edit::NewEffect;
 use modelmill::print::{CommandName, OptionName, OptionSetting, RemedySpelling, StepSpelling};
-use modelmill::recording::Reading;
+use modelmill::recording::RecordingOptions;
 use modelmill::text::table::significant;
 use modelmill::{Host, Model};
 
-use crate::args::AskArgs;
+use crate::args::DiagnosisArgs;
 
 /// Significant digits of values on the command line.
 const DIGITS: usize = 5;
 
-/// The command line that asked, for texts that advise another one.
+/// Spells command lines that read the same recordings as the current one, for texts that advise a next step.
 pub(crate) struct CommandLineSpelling {
-    /// The recordings, as the command line has them.
+    /// Flags `--data` and `--check` of the current command.
     recordings: String,
-    /// The recordings of the fit with other names for their columns, where they need nothing else; what `excite` compares with.
+    /// Flags `--data` and `--map` for `excite`. Empty if the recordings need options that `excite` does not have.
     compared: String,
 }
 
 impl CommandLineSpelling {
-    /// Recordings for fit and check, read as `reading` says.
-    pub(crate) fn new(fit: &[PathBuf], check: &[PathBuf], reading: &Reading) -> Self {
+    /// Recordings for fit and validation, read with the options `reading`.
+    pub(crate) fn new(fit: &[PathBuf], check: &[PathBuf], reading: &RecordingOptions) -> Self {
         let named = |option: &str, paths: &[PathBuf]| -> Vec<String> {
-            let path = |p: &PathBuf| format!("{option} {}", quoted(&p.display().to_string()));
+            let path = |p: &PathBuf| format!("{option} {}", quote_word(&p.display().to_string()));
             paths.iter().map(path).collect()
         };
         let mut all = named("--data", fit);
         let mut compared = String::new();
-        let plain = Reading {
+        let plain = RecordingOptions {
             columns: reading.columns.clone(),
-            ..Reading::default()
+            ..RecordingOptions::default()
         };
+        // `excite` has `--map` but no other option for reading. Other options would give other states.
         if *reading == plain {
             for data in &all {
                 let _ = write!(compared, " {data}");
             }
             for (ours, theirs) in &reading.columns {
-                let _ = write!(compared, " --map {}", quoted(&format!("{ours}={theirs}")));
+                let _ = write!(compared, " --map {}", quote_word(&format!("{ours}={theirs}")));
             }
         }
+        // Validation runs follow the fit runs on the command line, but `excite` does not take them.
         all.extend(named("--check", check));
         Self {
             recordings: all.join(" "),
@@ -52,47 +55,51 @@ impl CommandLineSpelling {
         }
     }
 
-    /// What a command asked.
-    pub(crate) fn from_args(args: &AskArgs) -> Self {
+    /// The spelling for the arguments of `diagnose` and `report`.
+    pub(crate) fn from_args(args: &DiagnosisArgs) -> Self {
         Self::new(&args.data, &args.check, &args.preparation.reading())
     }
 }
 
 impl StepSpelling for CommandLineSpelling {
+    /// `modelmill add ...`, with the libraries of the model.
     fn spell_effect(&self, model: &Model, effect: &NewEffect) -> String {
-        let mut command = command(&model.path, effect);
-        command.push_str(&with_libraries(model));
-        command
+        let mut add_command = add_command(&model.path, effect);
+        add_command.push_str(&library_flags_of_model(model));
+        add_command
     }
 
+    /// The same with one more library, which defines the kind.
     fn spell_effect_of_library(&self, model: &Model, effect: &NewEffect, library: &str) -> String {
         let effect = self.spell_effect(model, effect);
-        format!("{effect} --library {}", quoted(library))
+        format!("{effect} --library {}", quote_word(library))
     }
 
     fn spell_identification(&self, model: &Model) -> String {
         format!(
             "modelmill identify {} {} --out fit.json",
-            quoted(&model.path),
+            quote_word(&model.path),
             self.recordings
         )
     }
 
-    fn spell_separation(&self, model: &Model, separation: &Separation) -> Option<String> {
+    /// `modelmill excite --separate ...` for a motion that distinguishes the effects.
+    fn spell_separation(&self, model: &Model, separation: &SeparationProposal) -> Option<String> {
         let mut command = format!(
             "modelmill excite {} --separate {}",
-            quoted(&model.path),
-            quoted(&named(&separation.effect))
+            quote_word(&model.path),
+            quote_word(&effect_argument(&separation.effect))
         );
+        // Rivals have no values: `excite` estimates them.
         for rival in &separation.rivals {
-            let rival = Named {
+            let rival = NamedEffect {
                 effect: rival.clone(),
                 values: Vec::new(),
             };
-            let _ = write!(command, " --from {}", quoted(&named(&rival)));
+            let _ = write!(command, " --from {}", quote_word(&effect_argument(&rival)));
         }
-        for one in &separation.beside {
-            let _ = write!(command, " --beside {}", quoted(&named(one)));
+        for one in &separation.common_effects {
+            let _ = write!(command, " --beside {}", quote_word(&effect_argument(one)));
         }
         if let Some(noise) = separation.noise {
             let _ = write!(command, " --noise {}", significant(noise, 3));
@@ -101,7 +108,7 @@ impl StepSpelling for CommandLineSpelling {
             command,
             "{}{} --out separate.csv",
             self.compared,
-            with_libraries(model)
+            library_flags_of_model(model)
         );
         Some(command)
     }
@@ -122,11 +129,11 @@ impl RemedySpelling for CommandLineSpelling {
 pub(crate) struct FlagSpelling;
 
 impl RemedySpelling for FlagSpelling {
-    /// Flags side by side are one piece of a command line.
+    /// Several flags become one piece of a command line in backticks.
     fn spell_options(&self, settings: &[OptionSetting]) -> String {
         let one = |setting: &OptionSetting| match &setting.value {
             None => flag(setting.name),
-            Some(value) => format!("{} {}", flag(setting.name), in_quotes(value)),
+            Some(value) => format!("{} {}", flag(setting.name), quote_value(value)),
         };
         let all: Vec<String> = settings.iter().map(one).collect();
         format!("`{}`", all.join(" "))
@@ -137,7 +144,7 @@ impl RemedySpelling for FlagSpelling {
     }
 }
 
-/// The flag of an option.
+/// The flag of an option: its name with hyphens, with a few exceptions.
 fn flag(option: OptionName) -> String {
     match option {
         OptionName::Columns => "--map".to_owned(),
@@ -148,11 +155,12 @@ fn flag(option: OptionName) -> String {
     }
 }
 
-/// A value as a shell takes it, in the quotes that the help shows unless a shell would look into them.
-fn in_quotes(value: &str) -> Cow<'_, str> {
+/// A value quoted for a shell: in double quotes as in the help, or in single quotes if a shell would expand its
+/// characters.
+fn quote_value(value: &str) -> Cow<'_, str> {
     if value.contains(['"', '$', '\\', '!', '\'']) {
-        Cow::Owned(quoted(value))
-    } else if quoted(value) != value || value.contains('/') || value.contains("=-") {
+        Cow::Owned(quote_word(value))
+    } else if quote_word(value) != value || value.contains('/') || value.contains("=-") {
         Cow::Owned(format!("\"{value}\""))
     } else {
         Cow::Borrowed(value)
@@ -160,13 +168,14 @@ fn in_quotes(value: &str) -> Cow<'_, str> {
 }
 
 /// The command that adds an effect to a model file.
-fn command(model: &str, effect: &NewEffect) -> String {
+fn add_command(model: &str, effect: &NewEffect) -> String {
     let mut command = format!(
         "modelmill add {} {} --at {}",
-        quoted(model),
+        quote_word(model),
         effect.kind,
-        quoted(&effect.at.join(","))
+        quote_word(&effect.at.join(","))
     );
+    // Parameters without a nominal value and constants keep their defaults.
     let parameters = effect.parameters.iter();
     let values = parameters.filter_map(|p| Some((p.symbol.as_str(), p.nominal?)));
     let constants = effect.constants.iter().map(|(s, v)| (s.as_str(), *v));
@@ -177,14 +186,14 @@ fn command(model: &str, effect: &NewEffect) -> String {
     command
 }
 
-/// How models are read, as the command line has it: libraries of kinds of one's own, and whether constants stand as numbers.
-fn with_libraries(model: &Model) -> String {
-    libraries(model.host())
+/// Flags for reading a model: `--library` and `--at-values`, each with a space before it.
+fn library_flags_of_model(model: &Model) -> String {
+    library_flags(model.host())
 }
 
-/// The same of a host.
-pub(crate) fn libraries(host: &Host) -> String {
-    let option = |path: &PathBuf| format!(" --library {}", quoted(&path.display().to_string()));
+/// The same for a host.
+pub(crate) fn library_flags(host: &Host) -> String {
+    let option = |path: &PathBuf| format!(" --library {}", quote_word(&path.display().to_string()));
     let mut options: String = host.libraries().iter().map(option).collect();
     if host.is_at_values() {
         options.push_str(" --at-values");
@@ -192,22 +201,23 @@ pub(crate) fn libraries(host: &Host) -> String {
     options
 }
 
-/// `KIND@PLACE,PLACE:NAME=VALUE`.
-fn named(named: &Named) -> String {
+/// An effect as an argument of `excite`: `KIND@PLACE,PLACE:NAME=VALUE`.
+fn effect_argument(named: &NamedEffect) -> String {
     let mut text = format!("{}@{}", named.effect.kind, named.effect.at.join(","));
     for (symbol, value) in &named.values {
-        let _ = write!(text, ":{symbol}={}", rounded(*value));
+        let _ = write!(text, ":{symbol}={}", round_significant(*value));
     }
     text
 }
 
-fn rounded(value: f64) -> f64 {
+/// A value rounded to [`DIGITS`] significant digits.
+fn round_significant(value: f64) -> f64 {
     let text = format!("{value:.*e}", DIGITS - 1);
     text.parse().unwrap_or(value)
 }
 
-/// A word as a shell takes it.
-pub(crate) fn quoted(word: &str) -> String {
+/// A word quoted for a POSIX shell; plain words stay as they are.
+pub(crate) fn quote_word(word: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./,=+:@".contains(c);
     if !word.is_empty() && word.chars().all(is_plain) {
         word.to_owned()
@@ -224,7 +234,7 @@ mod tests {
     use modelmill_boundary::message;
 
     use super::*;
-    use crate::args::Cli;
+    use crate::args::CommandLine;
 
     #[test]
     fn options_become_flags() {
@@ -250,14 +260,14 @@ mod tests {
             ("q=x", "q=x"),
             ("q=-x", "\"q=-x\""),
         ] {
-            assert_eq!(in_quotes(value), expected);
+            assert_eq!(quote_value(value), expected);
         }
     }
 
     /// Every option and command that the library may advise is a flag or a command of the program.
     #[test]
     fn what_messages_advise_exists() {
-        let commands: Vec<clap::Command> = Cli::command().get_subcommands().cloned().collect();
+        let commands: Vec<clap::Command> = CommandLine::command().get_subcommands().cloned().collect();
         let flags: Vec<String> = commands
             .iter()
             .flat_map(clap::Command::get_arguments)
@@ -267,8 +277,8 @@ mod tests {
             let flag = flag(*option);
             assert!(flags.contains(&flag), "{flag}");
         }
-        for command in CommandName::ALL {
-            let name = command.name();
+        for add_command in CommandName::ALL {
+            let name = add_command.name();
             assert!(commands.iter().any(|c| c.get_name() == name), "{name}");
         }
     }
@@ -280,14 +290,14 @@ mod tests {
             at: vec!["a".to_owned(), "b".to_owned()],
             parameters: vec![NewParameter {
                 symbol: "k".to_owned(),
-                nominal: Some(rounded(12.345_678)),
+                nominal: Some(round_significant(12.345_678)),
                 ..NewParameter::default()
             }],
             constants: vec![("q0".to_owned(), 0.5)],
             comment: None,
         };
         assert_eq!(
-            command("my arm.toml", &effect),
+            add_command("my arm.toml", &effect),
             "modelmill add 'my arm.toml' spring --at a,b --set k=12.346 --set q0=0.5 --in-place"
         );
     }

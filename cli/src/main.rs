@@ -1,5 +1,5 @@
-//! The program: arguments become options of the library, its answers become text, JSON and files. Exit status 0 done, 1 the
-//! input is at fault, 2 wrong usage.
+//! The program: arguments become options of the library, its answers become text, JSON and files. Exit status 0 done, 1
+//! the input is at fault, 2 wrong usage.
 
 mod args;
 mod commands;
@@ -14,69 +14,76 @@ use std::sync::Arc;
 use clap::Parser;
 use modelmill::{Error, Host};
 
-use args::{Cli, Command};
-use failure::{Failure, Outcome};
+use args::{CommandLine, ProgramCommand};
+use failure::{CommandFailure, CommandOutcome};
 use flags::FlagSpelling;
-use terminal::progress::Terminal;
+use terminal::progress::TerminalProgress;
 
+/// Reads the command line, runs the command, and turns a failure into a message and an exit status.
 fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
+    let cli = match CommandLine::try_parse() {
         Ok(cli) => cli,
         Err(error) => {
-            // Help is no error; a reader that goes away is none either.
+            // Help and version have status 0. A closed standard output is not reported.
             let status = u8::try_from(error.exit_code()).unwrap_or(2);
             let _ = error.print();
             return ExitCode::from(status);
         }
     };
+    // All files of the library are read through the disk of this run, which remembers them.
     let host = Host::new()
         .with_files(Arc::new(output::disk().clone()))
         .with_libraries(cli.library)
         .at_values(cli.at_values)
-        .with_progress(Arc::new(Terminal::new()));
+        .with_progress(Arc::new(TerminalProgress::new()));
     match run(&host, &cli.command) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
+            // Faults of a model file are shown with the lines of the file; other errors are one message.
             match &failure {
-                Failure::Library(Error::Model(faults)) => {
-                    let in_colour = terminal::errors_in_colour();
-                    terminal::say(faults.render_spelled(in_colour, &FlagSpelling).trim_end());
+                CommandFailure::Library(Error::Model(faults)) => {
+                    // Each fault has its line, what was expected, and a remedy.
+                    let in_colour = terminal::is_stderr_coloured();
+                    terminal::print_to_stderr(faults.render_spelled(in_colour, &FlagSpelling).trim_end());
                 }
-                Failure::Library(error) => terminal::error(&error.spell(&FlagSpelling)),
-                Failure::Input(says) | Failure::Usage(says) => terminal::error(says),
-                Failure::BrokenPipe => {}
+                CommandFailure::Library(error) => terminal::error(&error.spell(&FlagSpelling)),
+                CommandFailure::Input(says) | CommandFailure::Usage(says) => terminal::error(says),
+                CommandFailure::BrokenPipe => {}
             }
             ExitCode::from(failure.status())
         }
     }
 }
 
-fn run(host: &Host, command: &Command) -> Outcome {
+/// Runs one command.
+fn run(host: &Host, command: &ProgramCommand) -> CommandOutcome {
     match command {
-        Command::Check(args) => commands::check::run(host, args),
-        Command::Diff(args) => commands::diff::run(host, args),
-        Command::Effects(args) => commands::effects::run(host, args),
-        Command::Adopt(args) => commands::adopt::run(host, args),
-        Command::Add(args) => commands::add::run(host, args),
-        Command::Equations(args) => commands::equations::run(host, args),
-        Command::Atlas(args) => commands::atlas::run(host, args),
-        Command::Generate(args) => commands::generate::run(host, args),
-        Command::Evaluate(args) => commands::evaluate::run(host, args),
-        Command::Identify(args) => commands::identify::run(host, args),
-        Command::Compare(args) => commands::compare::run(host, args),
-        Command::Diagnose(args) => commands::diagnose::run(host, args),
-        Command::Recordings(args) => commands::recordings::run(host, args),
-        Command::Report(args) => commands::report::run(host, args),
-        Command::Simulate(args) => commands::simulate::run(host, args),
-        Command::Reduce(args) => commands::reduce::run(host, args),
-        Command::Import(args) => commands::import::run(host, args),
-        Command::Export(args) => commands::export::run(host, args),
-        Command::Runs(args) => commands::runs::run(host, args),
-        Command::Interpret(args) => commands::interpret::run(host, args),
-        Command::Excite(args) => commands::excite::run(host, args),
-        Command::Experiment(args) => commands::experiment::run(host, args),
-        Command::Completions(args) => commands::completions::run(args),
-        Command::Work(args) => commands::work::run(host, args),
-        Command::Tour(args) => commands::tour::run(host, args),
+        ProgramCommand::Check(args) => commands::check::run(host, args),
+        ProgramCommand::Diff(args) => commands::diff::run(host, args),
+        ProgramCommand::Effects(args) => commands::effects::run(host, args),
+        ProgramCommand::Adopt(args) => commands::adopt::run(host, args),
+        ProgramCommand::Add(args) => commands::add::run(host, args),
+        ProgramCommand::Equations(args) => commands::equations::run(host, args),
+        ProgramCommand::Atlas(args) => commands::atlas::run(host, args),
+        ProgramCommand::Generate(args) => commands::generate::run(host, args),
+        ProgramCommand::Evaluate(args) => commands::evaluate::run(host, args),
+        ProgramCommand::Identify(args) => commands::identify::run(host, args),
+        ProgramCommand::Compare(args) => commands::compare::run(host, args),
+        ProgramCommand::Diagnose(args) => commands::diagnose::run(host, args),
+        ProgramCommand::Recordings(args) => commands::recordings::run(host, args),
+        ProgramCommand::Report(args) => commands::report::run(host, args),
+        ProgramCommand::Simulate(args) => commands::simulate::run(host, args),
+        ProgramCommand::Reduce(args) => commands::reduce::run(host, args),
+        ProgramCommand::Import(args) => commands::import::run(host, args),
+        ProgramCommand::Export(args) => commands::export::run(host, args),
+        ProgramCommand::Runs(args) => commands::runs::run(host, args),
+        ProgramCommand::Interpret(args) => commands::interpret::run(host, args),
+        ProgramCommand::Excite(args) => commands::excite::run(host, args),
+        #[cfg(feature = "experiment")]
+        ProgramCommand::Experiment(args) => commands::experiment::run(host, args),
+        ProgramCommand::Completions(args) => commands::completions::run(args),
+        #[cfg(feature = "workbench")]
+        ProgramCommand::Work(args) => commands::work::run(host, args),
+        ProgramCommand::Tour(args) => commands::tour::run(host, args),
     }
 }

@@ -1,47 +1,46 @@
-//! Files that commands write: never over an input, with the reason when it fails.
+//! Files that commands write. A path and a text go in; the file, or a message with the reason and a remedy, comes out.
+//! A command never writes over a file that it reads, unless the user requests it.
 
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-use modelmill_boundary::files::{Disk, FileError, FileFault};
+use modelmill_boundary::files::{DiskFiles, FileError, FileFault};
 
-use crate::failure::{Failure, Outcome};
+use crate::failure::{CommandFailure, CommandOutcome};
 
-/// The disk of this run, which remembers what was read so that it is not written over.
-pub(crate) fn disk() -> &'static Disk {
-    static DISK: LazyLock<Disk> = LazyLock::new(Disk::default);
+/// The disk of this run. It remembers which files were read, so that they are not written over.
+pub(crate) fn disk() -> &'static DiskFiles {
+    static DISK: LazyLock<DiskFiles> = LazyLock::new(DiskFiles::default);
     &DISK
 }
 
 /// A place to write to that is none of the inputs.
 #[derive(Debug, Clone)]
-pub(crate) struct Target(PathBuf);
+pub(crate) struct OutputFile(PathBuf);
 
-impl Target {
+impl OutputFile {
     /// Refuses a target that is one of the files that the command reads, or a folder.
-    pub(crate) fn new<'a>(
-        path: &Path,
-        inputs: impl IntoIterator<Item = &'a Path>,
-    ) -> Outcome<Self> {
-        Self::of("--out", path, inputs)
+    pub(crate) fn new<'a>(path: &Path, inputs: impl IntoIterator<Item = &'a Path>) -> CommandOutcome<Self> {
+        Self::for_flag("--out", path, inputs)
     }
 
     /// The same for a target that another flag names.
-    pub(crate) fn of<'a>(
+    pub(crate) fn for_flag<'a>(
         flag: &str,
         path: &Path,
         inputs: impl IntoIterator<Item = &'a Path>,
-    ) -> Outcome<Self> {
+    ) -> CommandOutcome<Self> {
         refuse_dash(flag, path)?;
+        // A folder would be an obscure error of the operating system later.
         if path.is_dir() {
-            return Err(Failure::Usage(format!(
+            return Err(CommandFailure::Usage(format!(
                 "{flag} {}: this is a folder; give the name of a file in it",
                 path.display()
             )));
         }
         for input in inputs {
-            if same_file(path, input) {
-                return Err(Failure::Usage(format!(
+            if is_same_file(path, input) {
+                return Err(CommandFailure::Usage(format!(
                     "{flag} {} would overwrite a file that this command reads; choose another name",
                     path.display()
                 )));
@@ -51,7 +50,7 @@ impl Target {
     }
 
     /// Writes the file.
-    pub(crate) fn write(&self, text: &str) -> Outcome {
+    pub(crate) fn write(&self, text: &str) -> CommandOutcome {
         write(&self.0, text)
     }
 
@@ -61,68 +60,69 @@ impl Target {
     }
 }
 
-/// Makes the folder that a command writes into.
-pub(crate) fn make_folder(folder: &Path) -> Outcome {
+/// Creates the folder of `--out` with its parents. A folder that exists is no error.
+pub(crate) fn make_folder(folder: &Path) -> CommandOutcome {
     refuse_dash("--out", folder)?;
     if folder.exists() && !folder.is_dir() {
-        return Err(Failure::Input(format!(
-            "--out {}: the folder cannot be made, since this is a file; give the name of a folder, which is made if it is not \
-             there",
+        return Err(CommandFailure::Input(format!(
+            "--out {}: this is a file, but a folder is expected; give the name of a folder, which is created if it does not \
+             exist",
             folder.display()
         )));
     }
     std::fs::create_dir_all(folder).map_err(|error| {
-        Failure::Input(format!(
-            "the folder {} cannot be made: {error}; give another one with --out",
+        CommandFailure::Input(format!(
+            "the folder {} cannot be created: {error}; give another one with --out",
             folder.display()
         ))
     })
 }
 
-/// Many programs take `-` for standard output; here a file of that name would surprise who asks for it.
-pub(crate) fn refuse_dash(flag: &str, path: &Path) -> Outcome {
+/// Refuses `-` as a path: many programs use it for standard output, and nobody expects a file of this name.
+pub(crate) fn refuse_dash(flag: &str, path: &Path) -> CommandOutcome {
     if path.as_os_str() != "-" {
         return Ok(());
     }
-    Err(Failure::Usage(format!(
-        "{flag} -: the name of a file is expected; what can go to standard output does so without {flag} (a file of this very \
-         name is `./-`)"
+    Err(CommandFailure::Usage(format!(
+        "{flag} -: the name of a file is expected; commands that can print to standard output do so without {flag} (a file with \
+         this name is `./-`)"
     )))
 }
 
-/// Writes a file as a whole, but not over one that was read; the reason and what to do if it cannot be.
-pub(crate) fn write(path: &Path, text: &str) -> Outcome {
+/// Writes a file atomically, but not over one that was read. Fails with the reason and a remedy.
+pub(crate) fn write(path: &Path, text: &str) -> CommandOutcome {
     disk()
         .write(path, text.as_bytes())
-        .map_err(|error| not_written(&error))
+        .map_err(|error| write_failure(&error))
 }
 
-/// Writes a file as a whole over one that was read, as the user asks for.
-pub(crate) fn replace(path: &Path, text: &str) -> Outcome {
+/// Writes a file atomically over one that was read, as the user requested.
+pub(crate) fn replace(path: &Path, text: &str) -> CommandOutcome {
     disk()
         .replace(path, text.as_bytes())
-        .map_err(|error| not_written(&error))
+        .map_err(|error| write_failure(&error))
 }
 
-fn not_written(error: &FileError) -> Failure {
+/// The message for a file that could not be written: path, reason, remedy.
+fn write_failure(error: &FileError) -> CommandFailure {
     let path = error.path.display();
-    Failure::Input(match &error.fault {
+    CommandFailure::Input(match &error.fault {
         // Some systems have folders in which no file can be made.
-        FileFault::Missing if error.path.parent().is_some_and(Path::is_dir) => format!(
-            "{path} cannot be written: its folder takes no such file; choose another folder"
-        ),
+        FileFault::Missing if error.path.parent().is_some_and(Path::is_dir) => {
+            format!("{path} cannot be written: its folder does not accept this file; choose another folder")
+        }
         FileFault::Missing => format!(
             "{path} cannot be written: there is no such folder; check that the folder exists and may be written to"
         ),
         FileFault::Input => {
-            format!("{path} would be overwritten, which this command reads; choose another name")
+            format!("{path} would be overwritten, but this command reads it; choose another name")
         }
         fault => format!("{path} cannot be written: {fault}; {}", fault.remedy()),
     })
 }
 
-/// Whether two paths lead to one file, be it through links.
-fn same_file(a: &Path, b: &Path) -> bool {
+/// Whether two paths lead to the same file, also through symbolic or hard links.
+fn is_same_file(a: &Path, b: &Path) -> bool {
     #[cfg(unix)]
     {
         use std::os::unix::fs::MetadataExt;
@@ -133,6 +133,7 @@ fn same_file(a: &Path, b: &Path) -> bool {
             return true;
         }
     }
+    // Symbolic links and `..` disappear in canonical paths. A file that does not exist yet has none.
     match (a.canonicalize(), b.canonicalize()) {
         (Ok(a), Ok(b)) => a == b,
         _ => false,

@@ -1,53 +1,54 @@
 //! Why a valid model file may still have no derivation.
+//! `DeriveError` has one variant per cause. Its text states what was found, what it means and what to do.
 
 use std::fmt;
 
-use modelmill_spec::Exact;
+use modelmill_spec::ExactExpression;
 
-/// A mechanism that the mill cannot derive, and what to do.
+/// A mechanism for which no equations can be derived, with what the text about it needs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum DeriveError {
     /// An expression is used in a way that has no meaning here.
     Unsupported {
-        /// What is wrong.
+        /// The fault, as the first part of the text.
         why: &'static str,
-        /// The expression.
+        /// The expression in which it occurs.
         expression: String,
     },
     /// A linear system is singular for every pose.
     Singular {
-        /// Which system.
+        /// The unknowns of the system, in the plural or with an article: it follows "the linear equations for".
         what: String,
     },
     /// A linear system is larger than cofactors should solve.
     TooLarge {
-        /// Which system.
+        /// The unknowns of the system.
         what: String,
-        /// Its size.
+        /// Number of coupled unknowns.
         size: usize,
-        /// The largest size.
+        /// Largest number of unknowns that is solved symbolically.
         limit: usize,
     },
-    /// Products of sums of parameters, written out, have too many terms.
+    /// Products of sums of parameters have too many terms after expansion.
     TooManyTerms {
-        /// The most that are taken.
+        /// Largest number of terms.
         limit: usize,
     },
     /// The loops do not determine the passive coordinates, or determine too much.
     LoopCount {
-        /// Independent equations.
+        /// Number of independent closure equations.
         equations: usize,
-        /// Passive coordinates.
+        /// Number of passive coordinates.
         passive: usize,
     },
     /// The loops or the drives are singular at the nominal pose.
     SingularNominal,
     /// There must be one drive per degree of freedom.
     DriveCount {
-        /// Drives.
+        /// Number of drives.
         drives: usize,
-        /// Degrees of freedom.
+        /// Number of degrees of freedom.
         freedoms: usize,
     },
     /// No order was found in which every loop is a planar dyad, so that it cannot be sampled exactly.
@@ -55,30 +56,30 @@ pub enum DeriveError {
         /// Names of the loops.
         loops: Vec<String>,
     },
-    /// Assembly modes that square roots cannot tell apart, as those of a mechanism that can be flat.
+    /// Signs of square roots do not distinguish the assembly modes, for example those of a mechanism that can be flat.
     BranchesNotSeparated {
         /// Names of the loops.
         loops: Vec<String>,
     },
-    /// No point of the loops' variety came up.
+    /// No random draw gave a point on the variety of the closure equations.
     NoPointFound {
-        /// How many draws were made.
+        /// Number of draws.
         draws: usize,
     },
-    /// A number that is infinite or none.
+    /// A number is NaN or infinite.
     NotFinite {
         /// Which number.
         what: String,
-        /// What to do about it.
+        /// The remedy, as the last part of the text.
         todo: &'static str,
     },
-    /// At the file's values retained columns all but coincide, so that forces from p_min have lost their digits.
+    /// At the file's values retained columns are almost dependent, so that rounding makes forces from p_min wrong.
     DigitsLost {
         /// Error of the forces, relative to their size.
         lost: String,
-        /// Retained products whose columns all but coincide.
+        /// Retained products whose columns are almost dependent.
         retained: Vec<String>,
-        /// Products that are written by these with huge factors.
+        /// Dependent products whose factors on these are too large.
         dependent: Vec<String>,
     },
     /// A factor of eq. (6) is no rational function of reasonable size.
@@ -88,24 +89,25 @@ pub enum DeriveError {
         /// The retained product.
         retained: String,
     },
-    /// The factors of eq. (6) would take too long to find in symbols.
+    /// The symbolic search for the factors of eq. (6) took too many operations.
     FactorsTooLong {
-        /// How many operations of the prime field were spent.
+        /// Operations in the prime field until the search was stopped.
         operations: u64,
     },
-    /// An effect asks for a force that is not affine in the accelerations.
+    /// The force of an effect is not affine in the accelerations.
     NotAffine {
         /// Its name in the model file.
         effect: String,
     },
     /// The rank differs between two random sets of constants.
     RankChanged,
-    /// The final proof at fresh points failed.
+    /// The final check at new random points failed.
     NotConfirmed,
 }
 
 impl DeriveError {
-    pub(crate) fn unsupported(why: &'static str, expression: &Exact) -> Self {
+    /// An expression that has no meaning where it stands; `why` is the first part of the text.
+    pub(crate) fn unsupported(why: &'static str, expression: &ExactExpression) -> Self {
         Self::Unsupported {
             why,
             expression: format!("{expression:?}"),
@@ -114,44 +116,45 @@ impl DeriveError {
 }
 
 impl fmt::Display for DeriveError {
+    /// One line without a full stop at its end; the caller adds the place in the model file.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Unsupported { why, expression } => write!(f, "{why}: {expression}"),
             Self::Singular { what } => write!(
                 f,
-                "{what} are singular at every pose; check that the passive coordinates can move the loops shut and that every drive moves something"
+                "the linear equations for {what} are singular at every pose; check that the passive coordinates can close the loops and that every drive moves something"
             ),
             Self::TooLarge { what, size, limit } => {
                 write!(
                     f,
-                    "{what} make a coupled system of {size} unknowns; at most {limit} can be solved in symbols"
+                    "the linear equations for {what} have {size} coupled unknowns; at most {limit} can be solved symbolically"
                 )
             }
             Self::TooManyTerms { limit } => write!(
                 f,
-                "powers or products of sums of parameters make more than {limit} products of parameters; write such a sum as one parameter"
+                "powers or products of sums of parameters expand to more than {limit} products of parameters; define such a sum as one parameter"
             ),
             Self::LoopCount { equations, passive } => write!(
                 f,
                 "the loops give {equations} independent equations for {passive} passive coordinates; mark as many coordinates passive as there are equations"
             ),
             Self::SingularNominal => f.write_str(
-                "the nominal pose is singular: there the passive coordinates do not follow from the active ones, or a drive moves nothing; give the coordinates other nominal values",
+                "the nominal pose is singular: there the active coordinates do not determine the passive ones, or a drive moves nothing; choose other nominal values of the coordinates",
             ),
             Self::DriveCount { drives, freedoms } => {
                 write!(
                     f,
-                    "{drives} drives for {freedoms} degrees of freedom; there must be one drive for each"
+                    "the model has {drives} drives for {freedoms} degrees of freedom; give it one drive per degree of freedom"
                 )
             }
             Self::LoopsNotSampled { loops } => write!(
                 f,
-                "the loops {} cannot be solved in symbols: they are not planar, or no two coordinates of each can be solved for in turn",
+                "the loops {} cannot be solved symbolically: they are not planar, or no order was found in which each loop determines two coordinates",
                 loops.join(", ")
             ),
             Self::BranchesNotSeparated { loops } => write!(
                 f,
-                "the loops {} cannot be solved in symbols: their assembly modes meet, or depend on each other, so that square roots cannot tell them apart",
+                "the loops {} cannot be solved symbolically: their assembly modes meet or depend on each other, so the signs of square roots do not distinguish them",
                 loops.join(", ")
             ),
             Self::NoPointFound { draws } => {
@@ -168,13 +171,14 @@ impl fmt::Display for DeriveError {
                 retained,
                 dependent,
             } => {
+                // The products are quoted so that the list can be copied into the model file.
                 let quoted: Vec<String> = dependent.iter().map(|p| format!("\"{p}\"")).collect();
                 write!(
                     f,
-                    "with the file's values the columns of {} all but depend on each other, though for general values they do \
-                     not: {} would be written by them with factors so large that forces from the base parameters are wrong by \
+                    "with the file's values the columns of {} are almost linearly dependent, although for general values they \
+                     are not: {} would depend on them with factors so large that forces from the base parameters are wrong by \
                      {lost} of their size; retain other products (`retain = [{}]` at the head of the file), or change the \
-                     constants that make them coincide",
+                     constants that cause this",
                     retained.join(", "),
                     dependent.join(", "),
                     quoted.join(", ")
@@ -186,18 +190,18 @@ impl fmt::Display for DeriveError {
             ),
             Self::FactorsTooLong { operations } => write!(
                 f,
-                "the factors between dependent columns were not found in symbols within {:.0e} operations; fewer symbolic constants (write numbers for some) take fewer",
+                "the factors between dependent columns were not found symbolically within {:.0e} operations; use fewer symbolic constants (write numbers for some)",
                 *operations as f64
             ),
             Self::NotAffine { effect } => write!(
                 f,
-                "the effect `{effect}` is not affine in the accelerations, so that there is no mass matrix; the inverse dynamics holds as it is"
+                "the effect `{effect}` is not affine in the accelerations, so the model has no mass matrix; the inverse dynamics is not affected"
             ),
             Self::RankChanged => f.write_str(
-                "the rank differs between random constants",
+                "the rank of the regressor differs between two random sets of constants",
             ),
             Self::NotConfirmed => {
-                f.write_str("what was found does not hold at other poses")
+                f.write_str("the dependencies that were found are not valid at other poses")
             }
         }
     }

@@ -1,47 +1,54 @@
-//! From a mechanism to its base parameters and fast code: the mill itself.
+//! From a mechanism to its base parameters and fast code: derivation, reduction, straight-line programs and emitted
+//! modules.
+//!
+//! A `Mechanism` goes in, a `Derivation` comes out. The stages: `tree` and `loops` (kinematics as expressions),
+//! `newton_euler`
+//! and `regressor` (forces, linear in p_g), `reduce` (base parameters), `programs` and `lower` (straight-line
+//! programs); `emit`, `evaluate`, `review` and `on_request` read the result.
 //!
 //! Decision: this crate reads the validated `Mechanism` of `modelmill-spec` and no TOML. A second tree of types
 //! with the same content would only be copied.
 
 mod derive;
-mod emit;
 mod error;
 mod evaluate;
 pub mod expr;
 mod loops;
 mod lower;
+pub mod names;
 mod newton_euler;
 mod on_request;
 mod programs;
 mod reduce;
 mod regressor;
+#[cfg(any(test, feature = "review"))]
 pub mod review;
 mod tree;
 
-pub use derive::base::BaseParameter;
-pub use derive::{Derivation, derive_columns};
-pub use emit::{
-    Emitted, EmittedFile, Form, LANGUAGES, Language, Source, emit, emit_with_dynamics, module_name,
-    vectors_c,
-};
+pub use derive::base::BaseParameterEntry;
+pub use derive::{BaseFormulas, Derivation, derive_columns};
 pub use error::DeriveError;
-pub use evaluate::{Evaluator, PoseFault, PoseReason, States};
-pub use lower::{Guard, Op, OperationCount, Program, Stage, ValueId};
+pub use evaluate::{ModelEvaluator, MotionStates, PoseFault, PoseReason};
+pub use lower::{OperationCount, PoseGuard, ProgramOp, ProgramStage, SINGULAR, StraightLineProgram, ValueId};
 pub use modelmill_algebra::field;
-pub use on_request::dynamics::Dynamics;
+pub use on_request::dynamics::DynamicsPrograms;
 pub use on_request::passes::PassCount;
-pub use on_request::reactions::{JointReaction, LoopReaction, Reactions};
-pub use programs::{LoopPrograms, PassivePosition, Programs};
-pub use reduce::{Dependency, Method, Polynomial, Powers, RationalFunction, Reduction, Variable};
-pub use tree::expressions::Monomial;
+pub use on_request::reactions::{JointReaction, LoopReaction, ReactionPrograms};
+pub use programs::{LoopPrograms, ModelPrograms, PassivePosition};
+pub use reduce::base::BaseDenominator;
+pub use reduce::{
+    BaseReduction, ColumnDependency, FactorVariable, PowerProduct, RationalFunction, ReductionMethod,
+    TrigonometricPolynomial,
+};
+pub use tree::expressions::ParameterMonomial;
 
 use modelmill_spec::Mechanism;
 
-/// Derives the inverse dynamics of a mechanism and reduces it to base parameters, exactly where that can be done.
+/// Derives the inverse dynamics of a mechanism and reduces it to base parameters, in exact arithmetic where possible.
 ///
-/// A base whose columns all but depend on each other at the file's values, so that its forces are wrong, is refused.
+/// A base is refused when its columns are almost dependent at the file's values, because its forces would be wrong.
 pub fn derive(mechanism: &Mechanism) -> Result<Derivation, DeriveError> {
     let derivation = derive::derive(mechanism)?;
-    evaluate::lost_digits::check(&derivation)?;
+    evaluate::lost_digits::check_lost_digits(&derivation)?;
     Ok(derivation)
 }

@@ -2,12 +2,10 @@
 
 use std::path::PathBuf;
 
-use modelmill_draw::{Scene, Style, svg};
+use modelmill_draw::{DrawingStyle, MechanismScene, svg};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let folder = std::env::args()
-        .nth(1)
-        .ok_or("give a folder of model files")?;
+    let folder = std::env::args().nth(1).ok_or("give a folder of model files")?;
     let entries: Result<Vec<_>, _> = std::fs::read_dir(folder)?.collect();
     let mut files: Vec<PathBuf> = entries?.iter().map(std::fs::DirEntry::path).collect();
     files.retain(|file| file.extension().is_some_and(|e| e == "toml"));
@@ -22,12 +20,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         };
         let mechanism = loaded.mechanism;
         let nominal: Vec<f64> = mechanism.coordinates.iter().map(|c| c.nominal).collect();
-        let scene = Scene::new(&mechanism, &nominal);
-        let picture = svg(&[&scene], &scene.view(), &Style::default());
-        println!(
-            "<figure>{picture}<figcaption>{}</figcaption></figure>",
-            mechanism.name
-        );
+        let scene = MechanismScene::new(&mechanism, &nominal);
+        let picture = svg(&[&scene], &scene.best_view(), &DrawingStyle::default());
+        println!("<figure>{picture}<figcaption>{}</figcaption></figure>", mechanism.name);
     }
     Ok(())
 }

@@ -1,8 +1,9 @@
-//! Pictures of mechanisms.
+//! Pictures of mechanisms as SVG, and the style that all pages with pictures share.
 //!
-//! A [`Mechanism`](modelmill_spec::Mechanism) and the values of its coordinates become a [`Scene`]: what stands where, in
-//! metres. A [`View`] looks at it, flat where all motion is in one plane, else from a direction that can be chosen, and
-//! [`svg`] draws it. [`page`] is what all pages with pictures have in common. Nothing here knows of dynamics.
+//! A [`Mechanism`](modelmill_spec::Mechanism) and the values of its coordinates become a [`MechanismScene`]: the shapes
+//! to draw with their places in metres. A [`ViewDirection`] projects it, onto the plane of motion if there is one, else
+//! from a chosen direction, and [`svg`] draws it. [`page`] is common to all pages with pictures. Dynamics are not
+//! needed here.
 //!
 //! ```
 //! # let text = r#"
@@ -27,9 +28,10 @@
 //! # name = "motor"
 //! # joint = "q"
 //! # "#;
-//! let mechanism = modelmill_spec::load("pendulum.toml", text, &modelmill_boundary::files::Memory::default()).expect("a model").mechanism;
-//! let scene = modelmill_draw::Scene::new(&mechanism, &[0.3]);
-//! let picture = modelmill_draw::svg(&[&scene], &scene.view(), &modelmill_draw::Style::default());
+//! let files = modelmill_boundary::files::MemoryFiles::default();
+//! let mechanism = modelmill_spec::load("pendulum.toml", text, &files).expect("a model").mechanism;
+//! let scene = modelmill_draw::MechanismScene::new(&mechanism, &[0.3]);
+//! let picture = modelmill_draw::svg(&[&scene], &scene.best_view(), &modelmill_draw::DrawingStyle::default());
 //! assert!(picture.starts_with("<svg"));
 //! ```
 
@@ -42,7 +44,7 @@ mod scene;
 mod symbols;
 mod view;
 
-pub use loads::Load;
-pub use paint::{Style, inline_svg, loaded_svg, svg};
-pub use scene::{Joint, Mark, Scene, Shape, Use};
-pub use view::View;
+pub use loads::DriveArrow;
+pub use paint::{DrawingStyle, inline_svg, loaded_svg, svg};
+pub use scene::{JointActuation, JointMark, MarkShape, MechanismScene, SceneMark};
+pub use view::ViewDirection;

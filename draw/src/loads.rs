@@ -1,53 +1,55 @@
-//! Forces of drives as arrows: along what slides or pushes, around what turns, as long as they are large, in the colour of how
-//! far a model is off there.
+//! Forces of drives as arrows: straight for prismatic joints and linear drives, circular for revolute joints. Their
+//! length shows the force, and their colour shows the error of a model.
 
-use crate::scene::{Joint, Mark, Shape};
+use crate::scene::{JointMark, MarkShape, SceneMark};
 use crate::symbols::polygon;
 
-/// The force or torque of a drive at one moment.
+/// The force or torque of a drive at one time.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Load {
-    /// The drive.
+pub struct DriveArrow {
+    /// Name of the drive.
     pub drive: String,
-    /// The force as a share of the largest that is shown, from -1 to 1.
+    /// The force as a share of the largest one in the picture, from -1 to 1.
     pub force: f64,
-    /// How far a model is off, as a share of the largest error that is shown, from 0 to 1.
+    /// The error of a model as a share of the largest error in the picture, from 0 to 1.
     pub error: f64,
 }
 
 /// Length of the longest straight arrow, in units of the picture.
-const LONGEST: f64 = 60.0;
-/// Radius of an arrow around a joint, and the longest turn of one, rad.
-const RADIUS: f64 = 19.0;
-const TURN: f64 = 5.0;
-/// Shades from no error to the largest one; the style has a colour for each.
+const LONGEST_ARROW: f64 = 60.0;
+/// Radius of an arrow around a joint, in units of the picture.
+const ARC_RADIUS: f64 = 19.0;
+/// Largest angle of an arrow around a joint, rad.
+const LARGEST_ARC: f64 = 5.0;
+/// Number of shades from no error to the largest one; the style has a colour for each.
 const SHADES: f64 = 6.0;
-/// What is smaller than this is no arrow, in units of the picture.
-const LEAST: f64 = 3.0;
+/// Shorter arrows are left out, in units of the picture.
+const SHORTEST_ARROW: f64 = 3.0;
 
-/// The arrow of a load at the mark of its drive; nothing where the mark is another one. `at` and `direction` tell where places
-/// and directions lie in the picture, `towards` which part of a direction points at the viewer.
-pub(crate) fn arrow(
-    mark: &Mark,
-    load: &Load,
+/// The arrow of a load at the mark of its drive; empty for other marks. `at` and `direction` project places and
+/// directions onto the picture, and `towards` returns the component of a direction towards the viewer.
+pub(crate) fn drive_arrow(
+    mark: &SceneMark,
+    load: &DriveArrow,
     at: impl Fn(&nalgebra::Vector3<f64>) -> [f64; 2],
     direction: impl Fn(&nalgebra::Vector3<f64>) -> [f64; 2],
     towards: impl Fn(&nalgebra::Vector3<f64>) -> f64,
 ) -> String {
+    // A force that is not finite is drawn as zero; an error that is not finite as the largest.
     let force = if load.force.is_finite() {
         load.force.clamp(-1.0, 1.0)
     } else {
         0.0
     };
     let drawn = match &mark.shape {
-        Shape::Drive(ends) if mark.name == load.drive => {
+        MarkShape::Drive(ends) if mark.name == load.drive => {
             let [a, b] = ends.each_ref().map(&at);
             let length = (b[0] - a[0]).hypot(b[1] - a[1]).max(1e-9);
             let along = [0, 1].map(|k| (b[k] - a[k]) / length);
             // A positive force pushes the ends apart.
-            straight(b, along, force) + &straight(a, along.map(|x| -x), force)
+            straight_arrow(b, along, force) + &straight_arrow(a, along.map(|x| -x), force)
         }
-        Shape::Joint(joint) if joint.drive.as_deref() == Some(load.drive.as_str()) => of_joint(
+        MarkShape::Joint(joint) if joint.drive.as_deref() == Some(load.drive.as_str()) => joint_arrow(
             joint,
             at(&joint.at),
             direction(&joint.axis),
@@ -65,19 +67,20 @@ pub(crate) fn arrow(
     format!("<g class=\"load e{shade:.0}\">{drawn}</g>\n")
 }
 
-fn of_joint(joint: &Joint, at: [f64; 2], axis: [f64; 2], towards: f64, force: f64) -> String {
-    if joint.slides && !joint.turns {
+/// The arrow of a joint: along its axis if it is prismatic, else around it.
+fn joint_arrow(joint: &JointMark, at: [f64; 2], axis: [f64; 2], towards: f64, force: f64) -> String {
+    if joint.is_prismatic && !joint.is_revolute {
         let length = axis[0].hypot(axis[1]);
-        return straight(at, axis, force * length.max(0.2));
+        return straight_arrow(at, axis, force * length.max(0.2));
     }
-    // Seen from the tip of its axis, a positive torque turns to the left.
-    around(at, if towards < 0.0 { -force } else { force })
+    // Seen from the tip of its axis, a positive torque turns counter-clockwise.
+    circular_arrow(at, if towards < 0.0 { -force } else { force })
 }
 
-/// An arrow from `from` on; a negative force points back at it.
-fn straight(from: [f64; 2], along: [f64; 2], force: f64) -> String {
-    let by = LONGEST * force;
-    if by.abs() < LEAST {
+/// A straight arrow that begins at `from`; for a negative force it ends there.
+fn straight_arrow(from: [f64; 2], along: [f64; 2], force: f64) -> String {
+    let by = LONGEST_ARROW * force;
+    if by.abs() < SHORTEST_ARROW {
         return String::new();
     }
     let length = along[0].hypot(along[1]).max(1e-9);
@@ -94,36 +97,35 @@ fn straight(from: [f64; 2], along: [f64; 2], force: f64) -> String {
         tail[1],
         tip[0],
         tip[1],
-        head(tip, along)
+        arrow_head(tip, along)
     )
 }
 
-/// An arrow around a joint, to the left where it is positive; it begins at the right.
-fn around(at: [f64; 2], force: f64) -> String {
-    let turn = TURN * force;
-    if turn.abs() * RADIUS < LEAST {
+/// An arrow around a joint, counter-clockwise for a positive force, which begins at the right of the joint.
+fn circular_arrow(at: [f64; 2], force: f64) -> String {
+    let turn = LARGEST_ARC * force;
+    if turn.abs() * ARC_RADIUS < SHORTEST_ARROW {
         return String::new();
     }
-    let place = |angle: f64| [at[0] + RADIUS * angle.cos(), at[1] - RADIUS * angle.sin()];
+    let place = |angle: f64| [at[0] + ARC_RADIUS * angle.cos(), at[1] - ARC_RADIUS * angle.sin()];
     let (start, end) = (place(0.0), place(turn));
+    // The tangent of the circle at the end.
     let along = [-turn.signum() * turn.sin(), -turn.signum() * turn.cos()];
     format!(
-        "<path d=\"M{:.1} {:.1}A{RADIUS} {RADIUS} 0 {} {} {:.1} {:.1}\"/>{}",
+        "<path d=\"M{:.1} {:.1}A{ARC_RADIUS} {ARC_RADIUS} 0 {} {} {:.1} {:.1}\"/>{}",
         start[0],
         start[1],
         u8::from(turn.abs() > std::f64::consts::PI),
         u8::from(turn < 0.0),
         end[0],
         end[1],
-        head(end, along)
+        arrow_head(end, along)
     )
 }
 
-fn head(tip: [f64; 2], along: [f64; 2]) -> String {
+/// A triangle at the tip of an arrow.
+fn arrow_head(tip: [f64; 2], along: [f64; 2]) -> String {
     let across = [-along[1], along[0]];
     let corner = |back: f64, side: f64| [0, 1].map(|k| tip[k] + back * along[k] + side * across[k]);
-    polygon(
-        "head",
-        &[corner(5.0, 0.0), corner(-5.0, 4.5), corner(-5.0, -4.5)],
-    )
+    polygon("head", &[corner(5.0, 0.0), corner(-5.0, 4.5), corner(-5.0, -4.5)])
 }

@@ -1,41 +1,41 @@
-//! A scene as SVG without scripts: everything sorted from far to near, each thing with its name on demand.
+//! A scene as SVG without scripts: all marks sorted from far to near, each with its description as a title.
 
 use std::fmt::Write as _;
 
 use modelmill_boundary::text::html as escape;
 use nalgebra::Vector3;
 
-use crate::labels::{Labels, SIZE};
-use crate::loads::{Load, arrow};
-use crate::scene::{Mark, Scene, Shape};
-use crate::symbols::{self, Spot};
-use crate::view::View;
+use crate::labels::{LETTER_HEIGHT, LabelLayout};
+use crate::loads::{DriveArrow, drive_arrow};
+use crate::scene::{MarkShape, MechanismScene, SceneMark};
+use crate::symbols::{self, SymbolPlace};
+use crate::view::ViewDirection;
 
-/// Colours and strokes; they follow the reader's wish for light or dark.
+/// Colours and strokes, for light and dark mode.
 const STYLE: &str = include_str!("picture.css");
-/// Room around the mechanism, in units of the picture.
+/// Margin around the mechanism, in units of the picture.
 const MARGIN: f64 = 46.0;
-/// What makes a file of SVG one.
+/// The namespace that a stand-alone SVG file needs.
 const NAMESPACE: &str = " xmlns=\"http://www.w3.org/2000/svg\"";
-/// How far each layer of signs stands before the one below it, in units of the picture.
-const BEFORE: f64 = 8.0;
-/// Colours of bodies in the style.
+/// Distance of each layer of symbols in front of the one below it, in units of the picture.
+const LAYER_SPACING: f64 = 8.0;
+/// Number of colours of bodies in the style.
 const COLOURS: usize = 8;
 
-/// How a picture is made.
+/// Options of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Style {
-    /// Width in units of the picture; it grows and shrinks with the page.
+pub struct DrawingStyle {
+    /// Width in units of the picture; it is scaled with the page.
     pub width: f64,
-    /// Height in the same.
+    /// Height in units of the picture.
     pub height: f64,
-    /// Whether names always show; else under the pointer only.
+    /// Whether names are always visible; otherwise only under the pointer.
     pub names: bool,
-    /// Whether frames show their axes.
+    /// Whether the axes of frames are drawn.
     pub frames: bool,
 }
 
-impl Default for Style {
+impl Default for DrawingStyle {
     fn default() -> Self {
         Self {
             width: 640.0,
@@ -46,28 +46,33 @@ impl Default for Style {
     }
 }
 
-/// Scenes over each other, seen from one place: the last one in colour, those before it as shadows.
+/// Scenes on top of each other, in one view: the last one in colour, those before it as shadows.
 ///
-/// The text begins with `<svg`, carries its style, and can stand in a page or a file.
-pub fn svg(scenes: &[&Scene], view: &View, style: &Style) -> String {
+/// The text begins with `<svg`, contains its style, and can be part of a page or a file.
+pub fn svg(scenes: &[&MechanismScene], view: &ViewDirection, style: &DrawingStyle) -> String {
     loaded_svg(scenes, view, style, &[])
 }
 
-/// The same with forces of drives as arrows over the last scene.
-pub fn loaded_svg(scenes: &[&Scene], view: &View, style: &Style, loads: &[Load]) -> String {
-    let paper = Paper::new(scenes, view, style);
+/// The same with forces of drives as arrows over the last scene. Empty if there are no scenes.
+pub fn loaded_svg(
+    scenes: &[&MechanismScene],
+    view: &ViewDirection,
+    style: &DrawingStyle,
+    loads: &[DriveArrow],
+) -> String {
+    let paper = DrawingSheet::new(scenes, view, style);
     let mut body = String::new();
     let [shadows @ .., scene] = scenes else {
         return body;
     };
     for shadow in shadows {
-        let inner = paper.paint(shadow);
+        let inner = paper.paint_scene(shadow);
         _ = write!(body, "<g class=\"shadow\">{inner}</g>");
     }
-    body.push_str(&paper.paint(scene));
-    body.push_str(&paper.loads(scene, loads));
-    body.push_str(&paper.furniture(scene));
-    body.push_str(&paper.labels(scene));
+    body.push_str(&paper.paint_scene(scene));
+    body.push_str(&paper.paint_drive_arrows(scene, loads));
+    body.push_str(&paper.paint_axes_and_scale_bar(scene));
+    body.push_str(&paper.paint_labels(scene));
     let names = if style.names { " named" } else { "" };
     format!(
         "<svg{NAMESPACE} class=\"mechanism{names}\" role=\"img\" \
@@ -75,27 +80,25 @@ pub fn loaded_svg(scenes: &[&Scene], view: &View, style: &Style, loads: &[Load])
          <rect class=\"paper\" width=\"100%\" height=\"100%\"/>\n{body}</svg>\n",
         style.width,
         style.height,
-        escape(&says(scene)),
+        escape(&describe_scene(scene)),
     )
 }
 
-/// The same as a part of a page of HTML, which needs no namespace.
-pub fn inline_svg(scenes: &[&Scene], view: &View, style: &Style) -> String {
+/// The same as a part of an HTML page, which needs no namespace.
+pub fn inline_svg(scenes: &[&MechanismScene], view: &ViewDirection, style: &DrawingStyle) -> String {
     svg(scenes, view, style).replacen(NAMESPACE, "", 1)
 }
 
-/// What a picture shows, for those who cannot see it.
-fn says(scene: &Scene) -> String {
-    let count = |is: fn(&Shape) -> bool| scene.marks.iter().filter(|m| is(&m.shape)).count();
+/// A description of a picture for readers who cannot see it.
+fn describe_scene(scene: &MechanismScene) -> String {
+    let count = |is: fn(&MarkShape) -> bool| scene.marks.iter().filter(|m| is(&m.shape)).count();
     let kinds = [
-        ("joint", count(|s| matches!(s, Shape::Joint(_)))),
-        (
-            "drive between points",
-            count(|s| matches!(s, Shape::Drive(_))),
-        ),
-        ("closed loop", count(|s| matches!(s, Shape::Closing(_)))),
-        ("lumped mass", count(|s| matches!(s, Shape::Lump(..)))),
+        ("joint", count(|s| matches!(s, MarkShape::Joint(_)))),
+        ("drive between points", count(|s| matches!(s, MarkShape::Drive(_)))),
+        ("closed loop", count(|s| matches!(s, MarkShape::Closing(_)))),
+        ("lumped mass", count(|s| matches!(s, MarkShape::Lump(..)))),
     ];
+    // Several marks of a kind are counted in the plural.
     let counts = kinds.iter().filter(|(_, n)| *n > 0).map(|(what, n)| {
         let many = match (n, what.strip_suffix("between points")) {
             (1, _) => (*what).to_owned(),
@@ -109,20 +112,24 @@ fn says(scene: &Scene) -> String {
     format!("{}: {}", scene.title, counts.join(", "))
 }
 
-/// The sheet: where metres lie on it.
-struct Paper<'a> {
-    view: &'a View,
-    style: &'a Style,
-    /// Units of the picture for a metre.
+/// The sheet of a picture: the projection of metres onto it.
+struct DrawingSheet<'a> {
+    /// The direction of view.
+    view: &'a ViewDirection,
+    /// Options of the picture.
+    style: &'a DrawingStyle,
+    /// Units of the picture per metre.
     scale: f64,
-    /// What lies in the middle, in m to the right and up.
+    /// The projected centre of all marks, m to the right and up.
     middle: [f64; 2],
-    /// The largest mass, kg, beside which others are drawn.
+    /// The largest mass, kg, relative to which others are drawn.
     heaviest: f64,
 }
 
-impl<'a> Paper<'a> {
-    fn new(scenes: &[&Scene], view: &'a View, style: &'a Style) -> Self {
+impl<'a> DrawingSheet<'a> {
+    /// A sheet on which all scenes fit.
+    fn new(scenes: &[&MechanismScene], view: &'a ViewDirection, style: &'a DrawingStyle) -> Self {
+        // The projected range of all marks.
         let mut range = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
         let mut heaviest = 0.0_f64;
         for mark in scenes.iter().flat_map(|scene| &scene.marks) {
@@ -131,14 +138,12 @@ impl<'a> Paper<'a> {
                     *range = [range[0].min(x), range[1].max(x)];
                 }
             }
-            if let Shape::Lump(_, mass) | Shape::Centre(_, mass) = mark.shape {
+            if let MarkShape::Lump(_, mass) | MarkShape::Centre(_, mass) = mark.shape {
                 heaviest = heaviest.max(mass.abs());
             }
         }
-        let room = [
-            style.width - 2.0 * MARGIN,
-            style.height - 2.0 * MARGIN - 16.0,
-        ];
+        // The scale at which that range fits within the margins.
+        let room = [style.width - 2.0 * MARGIN, style.height - 2.0 * MARGIN - 16.0];
         let scales = [0, 1].map(|k| room[k].max(1.0) / (range[k][1] - range[k][0]).max(1e-9));
         let smallest = scales[0].min(scales[1]);
         let middle = range.map(|[low, high]| 0.5 * (low + high));
@@ -156,8 +161,8 @@ impl<'a> Paper<'a> {
         }
     }
 
-    /// Where a place lies in the picture.
-    fn at(&self, at: &Vector3<f64>) -> [f64; 2] {
+    /// The place of a point in the picture.
+    fn project_point(&self, at: &Vector3<f64>) -> [f64; 2] {
         let [right, up] = self.view.project(at);
         [
             0.5 * self.style.width + self.scale * (right - self.middle[0]),
@@ -165,33 +170,34 @@ impl<'a> Paper<'a> {
         ]
     }
 
-    /// How a direction points in the picture, y downwards.
-    fn direction(&self, v: &Vector3<f64>) -> [f64; 2] {
+    /// The projection of a direction, with y downwards.
+    fn project_direction(&self, v: &Vector3<f64>) -> [f64; 2] {
         let [right, up] = self.view.project(v);
         [right, -up]
     }
 
-    /// All marks of a scene, from far to near.
-    fn paint(&self, scene: &Scene) -> String {
-        let towards = self.view.towards();
+    /// All marks of a scene, in the order in which they are drawn.
+    fn paint_scene(&self, scene: &MechanismScene) -> String {
+        let towards = self.view.viewer_direction();
         let mut drawn: Vec<(u8, f64, String)> = Vec::new();
         for mark in &scene.marks {
+            // The mean depth of a mark's places.
             let places = mark.shape.places();
             let depth = places.iter().map(|at| at.dot(&towards)).sum::<f64>() / places.len() as f64;
-            let drawing = self.mark(scene, mark);
+            let drawing = self.paint_mark(scene, mark);
             if drawing.is_empty() {
                 continue;
             }
-            let title = escape(&mark.says);
-            let colour = colour(mark.body);
+            let title = escape(&mark.description);
+            let colour = body_colour(mark.body);
             let group = format!("<g class=\"{colour}\"><title>{title}</title>{drawing}</g>\n");
-            // In a plane nothing hides anything, so kinds lie over each other in an order of their own; in space signs stand
-            // a little before the bars that they sit on.
-            let layer = layer(&mark.shape);
+            // In a plane nothing is hidden, so the kinds of marks are drawn in a fixed order. In space, symbols are
+            // drawn slightly in front of the bars on which they are.
+            let layer = drawing_layer(&mark.shape);
             if scene.plane.is_some() {
                 drawn.push((layer, 0.0, group));
             } else {
-                let before = BEFORE / self.scale * f64::from(layer);
+                let before = LAYER_SPACING / self.scale * f64::from(layer);
                 drawn.push((0, depth + before, group));
             }
         }
@@ -199,17 +205,17 @@ impl<'a> Paper<'a> {
         drawn.into_iter().map(|(.., group)| group).collect()
     }
 
-    /// Arrows of forces.
-    fn loads(&self, scene: &Scene, loads: &[Load]) -> String {
-        let towards = self.view.towards();
+    /// Arrows of all loads.
+    fn paint_drive_arrows(&self, scene: &MechanismScene, loads: &[DriveArrow]) -> String {
+        let towards = self.view.viewer_direction();
         let mut out = String::new();
         for mark in &scene.marks {
             for load in loads {
-                out.push_str(&arrow(
+                out.push_str(&drive_arrow(
                     mark,
                     load,
-                    |at| self.at(at),
-                    |axis| self.direction(axis),
+                    |at| self.project_point(at),
+                    |axis| self.project_direction(axis),
                     |axis| axis.dot(&towards),
                 ));
             }
@@ -217,51 +223,60 @@ impl<'a> Paper<'a> {
         out
     }
 
-    fn mark(&self, scene: &Scene, mark: &Mark) -> String {
-        let spot = |at: &Vector3<f64>| Spot {
-            at: self.at(at),
+    /// The drawing of one mark; empty if it is not visible.
+    fn paint_mark(&self, scene: &MechanismScene, mark: &SceneMark) -> String {
+        let spot = |at: &Vector3<f64>| SymbolPlace {
+            at: self.project_point(at),
             is_flat: scene.plane.is_some(),
         };
         match &mark.shape {
-            Shape::Bar(ends) => self.line("bar", ends, mark.body == 0),
-            Shape::Arm(ends) => self.line("arm", ends, false),
-            Shape::Rail(at, axis) => {
-                let along = self.direction(axis);
-                symbols::rail(self.at(at), along)
+            MarkShape::Bar(ends) => self.paint_segment("bar", ends, mark.body == 0),
+            MarkShape::Arm(ends) => self.paint_segment("arm", ends, false),
+            MarkShape::Rail(at, axis) => {
+                let along = self.project_direction(axis);
+                symbols::rail(self.project_point(at), along)
             }
-            Shape::Plate(corners) => {
-                let corners: Vec<[f64; 2]> = corners.iter().map(|at| self.at(at)).collect();
+            MarkShape::Plate(corners) => {
+                let corners: Vec<[f64; 2]> = corners.iter().map(|at| self.project_point(at)).collect();
                 symbols::polygon("plate", &corners)
             }
-            Shape::Joint(joint) => {
-                let axis = self.direction(&joint.axis);
-                let towards = joint.axis.dot(&self.view.towards());
+            MarkShape::Joint(joint) => {
+                let axis = self.project_direction(&joint.axis);
+                let towards = joint.axis.dot(&self.view.viewer_direction());
                 symbols::joint(joint, spot(&joint.at), axis, towards)
             }
-            Shape::Closing(at) => symbols::closing(spot(at)),
-            Shape::Drive(ends) => symbols::drive(ends.each_ref().map(|at| self.at(at))),
-            Shape::Ground(at) => {
+            MarkShape::Closing(at) => symbols::loop_closure(spot(at)),
+            MarkShape::Drive(ends) => symbols::drive(ends.each_ref().map(|at| self.project_point(at))),
+            MarkShape::Ground(at) => {
                 let up = scene.down.map_or_else(Vector3::z, |down| -down);
-                symbols::ground(spot(at), self.direction(&up), up.dot(&self.view.towards()))
+                symbols::ground(
+                    spot(at),
+                    self.project_direction(&up),
+                    up.dot(&self.view.viewer_direction()),
+                )
             }
-            Shape::Point(at) => symbols::point(self.at(at)),
-            Shape::Lump(at, mass) => symbols::lump(self.at(at), self.size(*mass), *mass < 0.0),
-            Shape::Centre(at, mass) => symbols::centre(self.at(at), self.size(*mass), *mass < 0.0),
-            Shape::Frame(at, axes) if self.style.frames => {
-                let axes = axes.each_ref().map(|axis| self.direction(axis));
-                symbols::axes(self.at(at), &axes, 26.0, ["", "", ""])
+            MarkShape::Point(at) => symbols::point(self.project_point(at)),
+            MarkShape::Lump(at, mass) => symbols::lump(self.project_point(at), self.mass_radius(*mass), *mass < 0.0),
+            MarkShape::Centre(at, mass) => {
+                symbols::centre(self.project_point(at), self.mass_radius(*mass), *mass < 0.0)
             }
-            Shape::Frame(..) => String::new(),
+            MarkShape::Frame(at, axes) if self.style.frames => {
+                let axes = axes.each_ref().map(|axis| self.project_direction(axis));
+                symbols::axes(self.project_point(at), &axes, 26.0, ["", "", ""])
+            }
+            MarkShape::Frame(..) => String::new(),
         }
     }
 
-    /// Radius of a mass: its area grows with the mass.
-    fn size(&self, mass: f64) -> f64 {
+    /// Radius of a mass in units of the picture: its area grows with the mass.
+    fn mass_radius(&self, mass: f64) -> f64 {
         4.0 + 8.0 * (mass.abs() / self.heaviest).sqrt()
     }
 
-    fn line(&self, class: &str, ends: &[Vector3<f64>; 2], is_ground: bool) -> String {
-        let [a, b] = ends.each_ref().map(|at| self.at(at));
+    /// A bar or thin line; empty if it points at the viewer.
+    fn paint_segment(&self, class: &str, ends: &[Vector3<f64>; 2], is_ground: bool) -> String {
+        let [a, b] = ends.each_ref().map(|at| self.project_point(at));
+        // Shorter than half a unit of the picture.
         if (a[0] - b[0]).hypot(a[1] - b[1]) < 0.5 {
             return String::new();
         }
@@ -269,25 +284,21 @@ impl<'a> Paper<'a> {
         symbols::line(class, a, b)
     }
 
-    /// Gravity, the axes of the base, and a length.
-    fn furniture(&self, scene: &Scene) -> String {
+    /// Gravity, the axes of the base, and a scale bar.
+    fn paint_axes_and_scale_bar(&self, scene: &MechanismScene) -> String {
         let (width, height) = (self.style.width, self.style.height);
         let mut out = String::from("<g class=\"furniture\">");
         if let Some(down) = scene.down {
-            let depth = down.dot(&self.view.towards());
+            let depth = down.dot(&self.view.viewer_direction());
             out.push_str(&symbols::gravity(
                 [width - 30.0, 22.0],
-                self.direction(&down),
+                self.project_direction(&down),
                 depth,
             ));
         }
-        let axes = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| self.direction(&axis));
-        out.push_str(&symbols::axes(
-            [26.0, height - 24.0],
-            &axes,
-            28.0,
-            ["x", "y", "z"],
-        ));
+        let axes = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| self.project_direction(&axis));
+        out.push_str(&symbols::axes([26.0, height - 24.0], &axes, 28.0, ["x", "y", "z"]));
+        // A round length of about a fifth of the width.
         let length = round_length(0.2 * width / self.scale);
         let (x, y) = (width - 14.0, height - 14.0);
         _ = writeln!(
@@ -297,46 +308,44 @@ impl<'a> Paper<'a> {
             y - 5.0,
             x - length * self.scale - 6.0,
             y,
-            metres(length)
+            length_text(length)
         );
         out
     }
 
-    /// Names of joints, points, loops and drives, where there is room.
-    fn labels(&self, scene: &Scene) -> String {
-        let mut labels = Labels::new(self.style.width, self.style.height);
+    /// Names of joints, points and drives, where there is room.
+    fn paint_labels(&self, scene: &MechanismScene) -> String {
+        let mut labels = LabelLayout::new(self.style.width, self.style.height);
+        // Joints, masses and closures must not be covered.
         for mark in &scene.marks {
             let taken = match &mark.shape {
-                Shape::Joint(joint) => Some((&joint.at, 12.0)),
-                Shape::Lump(at, mass) => Some((at, self.size(*mass))),
-                Shape::Closing(at) | Shape::Ground(at) => Some((at, 9.0)),
+                MarkShape::Joint(joint) => Some((&joint.at, 12.0)),
+                MarkShape::Lump(at, mass) => Some((at, self.mass_radius(*mass))),
+                MarkShape::Closing(at) | MarkShape::Ground(at) => Some((at, 9.0)),
                 _ => None,
             };
             if let Some((at, radius)) = taken {
-                labels.occupy(self.at(at), radius);
+                labels.occupy(self.project_point(at), radius);
             }
         }
         let mut out = String::from("<g class=\"names\">");
         for mark in &scene.marks {
             let (at, class) = match &mark.shape {
-                Shape::Joint(joint) => (self.at(&joint.at), "of-joint"),
-                Shape::Drive(ends) => {
-                    let [a, b] = ends.each_ref().map(|at| self.at(at));
-                    (
-                        [0.6 * a[0] + 0.4 * b[0], 0.6 * a[1] + 0.4 * b[1]],
-                        "of-drive",
-                    )
+                MarkShape::Joint(joint) => (self.project_point(&joint.at), "of-joint"),
+                MarkShape::Drive(ends) => {
+                    let [a, b] = ends.each_ref().map(|at| self.project_point(at));
+                    ([0.6 * a[0] + 0.4 * b[0], 0.6 * a[1] + 0.4 * b[1]], "of-drive")
                 }
-                Shape::Point(at) => (self.at(at), "of-point"),
+                MarkShape::Point(at) => (self.project_point(at), "of-point"),
                 _ => continue,
             };
             if mark.name.is_empty() {
                 continue;
             }
-            if let Some((x, y, anchor)) = labels.place(at, mark.name.chars().count()) {
+            if let Some((x, y, anchor)) = labels.place_label(at, mark.name.chars().count()) {
                 _ = write!(
                     out,
-                    "<text class=\"{class}\" x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{SIZE}\" text-anchor=\"{anchor}\">{}</text>",
+                    "<text class=\"{class}\" x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{LETTER_HEIGHT}\" text-anchor=\"{anchor}\">{}</text>",
                     escape(&mark.name)
                 );
             }
@@ -346,30 +355,30 @@ impl<'a> Paper<'a> {
     }
 }
 
-/// The colour of a body; the ground has one of its own.
-fn colour(body: usize) -> String {
+/// The class of a body's colour; the base has a class of its own.
+fn body_colour(body: usize) -> String {
     match body {
         0 => "ground".to_owned(),
         n => format!("body c{}", (n - 1) % COLOURS),
     }
 }
 
-/// What lies over what in a plane.
-fn layer(shape: &Shape) -> u8 {
+/// The layer of a mark in a planar picture, from back to front.
+fn drawing_layer(shape: &MarkShape) -> u8 {
     match shape {
-        Shape::Ground(_) => 0,
-        Shape::Plate(_) => 1,
-        Shape::Arm(_) | Shape::Rail(..) => 2,
-        Shape::Bar(_) => 3,
-        Shape::Drive(_) => 4,
-        Shape::Lump(..) | Shape::Centre(..) => 5,
-        Shape::Closing(_) | Shape::Joint(_) => 6,
-        Shape::Point(_) => 7,
-        Shape::Frame(..) => 8,
+        MarkShape::Ground(_) => 0,
+        MarkShape::Plate(_) => 1,
+        MarkShape::Arm(_) | MarkShape::Rail(..) => 2,
+        MarkShape::Bar(_) => 3,
+        MarkShape::Drive(_) => 4,
+        MarkShape::Lump(..) | MarkShape::Centre(..) => 5,
+        MarkShape::Closing(_) | MarkShape::Joint(_) => 6,
+        MarkShape::Point(_) => 7,
+        MarkShape::Frame(..) => 8,
     }
 }
 
-/// The largest of 1, 2 and 5 times a power of ten that is not above a length.
+/// The largest of 1, 2 and 5 times a power of ten that is not above `most`.
 fn round_length(most: f64) -> f64 {
     let decade = 10_f64.powf(most.log10().floor());
     let steps = [5.0, 2.0, 1.0].map(|step| step * decade);
@@ -379,8 +388,8 @@ fn round_length(most: f64) -> f64 {
         .unwrap_or(decade)
 }
 
-/// A round length with the unit that suits it.
-fn metres(length: f64) -> String {
+/// A round length with a suitable unit.
+fn length_text(length: f64) -> String {
     if length < 0.0095 {
         format!("{:.0} mm", length * 1e3)
     } else if length < 0.95 {

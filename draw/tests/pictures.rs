@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use modelmill_draw::{Scene, Shape, Style, svg};
+use modelmill_draw::{DrawingStyle, MarkShape, MechanismScene, svg};
 use modelmill_spec::Mechanism;
 
 fn bundled() -> Vec<PathBuf> {
@@ -16,35 +16,30 @@ fn bundled() -> Vec<PathBuf> {
 }
 
 fn load(name: &str) -> Mechanism {
-    let file =
-        Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../model-spec/models/{name}.toml"));
-    modelmill_spec::load_file(&file)
-        .expect("a bundled model")
-        .mechanism
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../model-spec/models/{name}.toml"));
+    modelmill_spec::load_file(&file).expect("a bundled model").mechanism
 }
 
-fn nominal(mechanism: &Mechanism) -> Scene {
+fn nominal(mechanism: &Mechanism) -> MechanismScene {
     let q: Vec<f64> = mechanism.coordinates.iter().map(|c| c.nominal).collect();
-    Scene::new(mechanism, &q)
+    MechanismScene::new(mechanism, &q)
 }
 
 #[test]
 fn every_bundled_model_is_drawn_within_its_sheet() {
     for file in bundled() {
-        let mechanism = modelmill_spec::load_file(&file)
-            .expect("a bundled model")
-            .mechanism;
+        let mechanism = modelmill_spec::load_file(&file).expect("a bundled model").mechanism;
         let scene = nominal(&mechanism);
-        let style = Style {
+        let style = DrawingStyle {
             frames: true,
-            ..Style::default()
+            ..DrawingStyle::default()
         };
-        let text = svg(&[&scene], &scene.view(), &style);
+        let text = svg(&[&scene], &scene.best_view(), &style);
         let document = roxmltree::Document::parse(&text).expect("well-formed SVG");
         let joints = scene
             .marks
             .iter()
-            .filter(|m| matches!(m.shape, Shape::Joint(_)))
+            .filter(|m| matches!(m.shape, MarkShape::Joint(_)))
             .count();
         let drawn = document.descendants().filter(|node| {
             let class = node.attribute("class").unwrap_or_default();
@@ -71,11 +66,7 @@ fn every_bundled_model_is_drawn_within_its_sheet() {
 #[test]
 fn planar_mechanisms_are_seen_flat() {
     let planar: Vec<String> = (bundled().iter())
-        .map(|file| {
-            modelmill_spec::load_file(file)
-                .expect("a bundled model")
-                .mechanism
-        })
+        .map(|file| modelmill_spec::load_file(file).expect("a bundled model").mechanism)
         .filter(|mechanism| nominal(mechanism).plane.is_some())
         .map(|mechanism| mechanism.name)
         .collect();
@@ -100,14 +91,14 @@ fn planar_mechanisms_are_seen_flat() {
 fn lengths_are_those_of_the_model() {
     let mechanism = load("spidermill");
     let scene = nominal(&mechanism);
-    let view = scene.view();
+    let view = scene.best_view();
     let length = |name: &str| {
         let longest = scene
             .marks
             .iter()
-            .filter(|m| m.says == name)
+            .filter(|m| m.description == name)
             .filter_map(|m| match &m.shape {
-                Shape::Bar([a, b]) | Shape::Arm([a, b]) => {
+                MarkShape::Bar([a, b]) | MarkShape::Arm([a, b]) => {
                     let [a, b] = [a, b].map(|at| view.project(at));
                     Some((a[0] - b[0]).hypot(a[1] - b[1]))
                 }
@@ -117,29 +108,16 @@ fn lengths_are_those_of_the_model() {
     };
     let constant = |name: &str| {
         let mut constants = mechanism.constants.iter();
-        constants
-            .find(|c| c.name == name)
-            .expect("a constant")
-            .value
+        constants.find(|c| c.name == name).expect("a constant").value
     };
-    for (bodies, expected) in [
-        (["S1", "S7"], constant("d1")),
-        (["S3", "S5"], constant("d3")),
-    ] {
+    for (bodies, expected) in [(["S1", "S7"], constant("d1")), (["S3", "S5"], constant("d3"))] {
         for body in bodies {
-            assert!(
-                (length(body) - expected).abs() < 1e-9,
-                "{body}: {}",
-                length(body)
-            );
+            assert!((length(body) - expected).abs() < 1e-9, "{body}: {}", length(body));
         }
     }
     // Gravity points down in the picture.
     let down = view.project(&scene.down.expect("gravity"));
-    assert!(
-        down[0].abs() < 1e-12 && (down[1] + 1.0).abs() < 1e-12,
-        "{down:?}"
-    );
+    assert!(down[0].abs() < 1e-12 && (down[1] + 1.0).abs() < 1e-12, "{down:?}");
 }
 
 /// A loop that is open is seen open, and a variant lies over what it was.
@@ -147,23 +125,23 @@ fn lengths_are_those_of_the_model() {
 fn what_is_wrong_is_seen() {
     let mechanism = load("four_bar");
     let mut q: Vec<f64> = mechanism.coordinates.iter().map(|c| c.nominal).collect();
-    let closings = |scene: &Scene| {
+    let closings = |scene: &MechanismScene| {
         scene
             .marks
             .iter()
-            .filter(|m| matches!(m.shape, Shape::Closing(_)))
+            .filter(|m| matches!(m.shape, MarkShape::Closing(_)))
             .count()
     };
-    let closed = Scene::new(&mechanism, &q);
+    let closed = MechanismScene::new(&mechanism, &q);
     let passive = mechanism
         .coordinates
         .iter()
         .position(|c| c.passive)
         .expect("a passive one");
     q[passive] += 0.2;
-    let open = Scene::new(&mechanism, &q);
+    let open = MechanismScene::new(&mechanism, &q);
     assert_eq!(closings(&open), closings(&closed) + 1);
-    let text = svg(&[&closed, &open], &closed.view(), &Style::default());
+    let text = svg(&[&closed, &open], &closed.best_view(), &DrawingStyle::default());
     assert_eq!(text.matches("class=\"shadow\"").count(), 1);
 }
 
@@ -172,12 +150,12 @@ fn what_is_wrong_is_seen() {
 fn forces_are_arrows_at_their_drives() {
     let scene = nominal(&load("spidermill"));
     let length = |force: f64| {
-        let load = modelmill_draw::Load {
+        let load = modelmill_draw::DriveArrow {
             drive: "spindle_left".to_owned(),
             force,
             error: 1.0,
         };
-        let text = modelmill_draw::loaded_svg(&[&scene], &scene.view(), &Style::default(), &[load]);
+        let text = modelmill_draw::loaded_svg(&[&scene], &scene.best_view(), &DrawingStyle::default(), &[load]);
         let group = text.split("<g class=\"load e5\">").nth(1).expect("arrows");
         let d = group.split("d=\"M").nth(1).expect("a path");
         let numbers: Vec<f64> = d

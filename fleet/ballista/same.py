@@ -1,11 +1,11 @@
-"""Holds two answers against each other, to 1e-9: `same.py WHAT ONE.csv OTHER.csv`."""
+"""Compares two results to 1e-9: `same.py WHAT ONE.csv OTHER.csv`."""
 
 import csv
 import sys
 
 what = sys.argv[1]
 one, other = (list(csv.reader(open(name))) for name in sys.argv[2:])
-assert len(one) > 1, f"{what}: there is no answer"
+assert len(one) > 1, f"{what}: the result is empty"
 assert len(other) == len(one), f"{what}: {len(one)} lines, and {len(other)}"
 worst = 0.0
 for a, b in zip(one, other):

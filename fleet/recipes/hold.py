@@ -1,8 +1,8 @@
-"""Holds what the recipes find against `results.json` of one process.
+"""Compares the results of the recipes with `results.json` of one process.
 
     python hold.py sc://HOST:PORT FOLDER plan.json results.json
 
-Files that cannot be read are taken away before the samples are read as one table, which needs them all.
+Unreadable files are deleted before the samples are read as one table, which needs every file to be readable.
 """
 
 import json
@@ -14,7 +14,7 @@ import spark as recipe
 from pyspark import cloudpickle
 from pyspark.sql import SparkSession
 
-# Workers cannot import the recipe, which they do not need where it is the program itself.
+# Workers cannot import the recipe, so it is sent to them by value.
 cloudpickle.register_pickle_by_value(recipe)
 
 
@@ -32,7 +32,7 @@ def connected(url):
 
 
 def of_one_process(results):
-    """Value and deviation by robot, day and place of the parameter."""
+    """Values and standard deviations of the parameters, by robot and day."""
     return {
         (robot["robot"], day["day"]): list(zip(day["values"], day["std"]))
         for robot in results["robots"]
@@ -55,7 +55,7 @@ def hold(name, table, expected):
         for (a, b), (c, d) in zip(pairs, found[key]):
             assert is_near(a, c) and is_near(b, d), (name, key, (a, b), (c, d))
     n = sum(map(len, found.values()))
-    print(f"{name}: {n} parameters of {len(found)} robots and days are those of one process")
+    print(f"{name}: {n} parameters of {len(found)} robots and days agree with those of one process")
 
 
 def main():

@@ -1,9 +1,9 @@
-"""A fleet through Spark Connect: summaries of recordings, then parameters of each robot and day, in tables of Arrow.
+"""Evaluates a fleet with Spark Connect: summaries of recordings, then parameters of each robot and day, as Arrow tables.
 
     python spark.py sc://HOST:PORT FOLDER plan.json out.csv
 
-The folder has files `robot=R/day=D/recording=N/FILE`, which workers see at the same place. Workers need the wheel; `check` beside
-this file tries it with pysail 0.7 and pyspark 4.0.
+The folder has files `robot=R/day=D/recording=N/FILE`, with the same path on all workers. Workers need the wheel; `check` next to
+this file tests it with pysail 0.7 and pyspark 4.0.
 """
 
 import sys
@@ -21,7 +21,7 @@ PARAMETERS = pa.schema(
 
 
 def of_files(spark, folder, plan):
-    """Parameters of recordings in files of any format; a worker reads a file as a whole, and only summaries are moved."""
+    """Parameters from recordings in files of any format; a worker reads a complete file, and only summaries are sent."""
     files = sorted(path for path in Path(folder).rglob("*") if path.is_file())
     rows = [(*(part.split("=", 1)[1] for part in path.parts[-4:-1]), str(path)) for path in files]
 
@@ -38,7 +38,7 @@ def of_files(spark, folder, plan):
 
 
 def of_samples(samples, plan):
-    """Parameters of a table of samples with `robot`, `day` and `recording`, whose rows are in any order."""
+    """Parameters from a table of samples with `robot`, `day` and `recording`, with rows in any order."""
 
     def summarised(key, rows):
         robot, day, recording = (one.as_py() for one in key)
@@ -53,7 +53,7 @@ def of_samples(samples, plan):
 
 
 def parameters(summaries, plan):
-    """Base parameters per robot and day of a table of summaries; a day without an answer has no rows."""
+    """Base parameters per robot and day from a table of summaries; a day without a usable recording has no rows."""
 
     def solved(key, rows):
         robot, day = (one.as_py() for one in key)

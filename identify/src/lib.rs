@@ -1,19 +1,24 @@
-//! Recordings held against a model: measured columns and a regressor go in; base parameters with
-//! honest uncertainty, error figures and the places where the error lives come out.
+//! Recordings compared with a model: measured columns and a regressor go in. Base parameters with their uncertainty,
+//! error figures, and the places of large errors come out.
 //!
-//! The crate takes numbers and knows nothing of how a regressor is made. The pipeline:
+//! The crate works on numbers only and does not know how a regressor is derived. The pipeline:
 //!
-//! 1. [`Recording::read`] - CSV, Parquet, MATLAB, HDF5, MCAP or rosbag2 into named columns; every fault has its line and its remedy.
-//! 2. [`Recording::runs_with`] - coordinates with derivatives and forces, as a [`Run`] for each stretch between gaps in time;
-//!    the caller evaluates its regressor along it, rows interleaved per sample (`row = sample * n_channels + channel`), and
-//!    applies [`decimate_table`] to regressor and force where the run asks for it.
-//! 3. [`Recording::suspicions`] and [`ForceAudit`] - what looks wrong with them.
-//! 4. [`estimate`] - eq. (12) from a stream of rows ([`LeastSquares`]), weighted, robust, with instruments or nominal values,
-//!    and what the result is worth.
-//! 5. [`Comparison`] and [`locate`] - how far the model is off, and where; [`FitFile`] - the result on disk and back.
+//! 1. [`SignalRecording::read`] - CSV, Parquet, MATLAB, HDF5, MCAP or rosbag2 into named columns; every fault has its
+//!    line and its remedy.
+//! 2. [`SignalRecording::runs_with`] - coordinates with derivatives and forces, as a [`PreparedRun`] for each segment
+//!    between gaps in time. The caller evaluates its regressor along it, rows interleaved per sample
+//!    (`row = sample * n_channels + channel`), and applies [`decimate_table`] to regressor and force if the run
+//!    requires it.
+//! 3. [`SignalRecording::suspicious_columns`], [`SignalRecording::position_faults`] and [`ForceAudit`] - what is
+//!    likely wrong with them.
+//! 4. [`estimate`] - eq. (12) from a stream of rows ([`LeastSquares`]), weighted, robust, with
+//!    instruments or nominal values, and the uncertainty of the result.
+//! 5. [`ErrorAccumulator`] and [`locate_errors`] - size and place of the model error; [`FitFile`] - the result as a
+//!    file.
 //!
-//! Beside it, [`diagnose`]: which effects the recording needs; [`excite`]: the motion that tells base parameters apart best,
-//! within limits; and [`interpret`]: physical parameters from identified base parameters, all real solutions.
+//! In addition, [`diagnose`] finds the effects that the model lacks, [`excite`] plans the motion that determines the
+//! base parameters best within limits, and [`interpret`] computes physical parameters from identified base
+//! parameters, with all real solutions.
 //!
 //! Folders, each of which uses only those above it:
 //!
@@ -21,11 +26,11 @@
 //! - `signal`: filters, spectra, statistics of plain numbers
 //! - `recording`: files to named columns
 //! - `motion`: columns to states
-//! - `audit`: what looks wrong
+//! - `audit`: checks of recordings
 //! - `estimate`: rows to parameters
-//! - `figures`: how far off, and where; the file of a fit
+//! - `figures`: size and place of errors; the file of a fit
 //! - `diagnose`: which effects are missing
-//! - `changes`: what differs between runs
+//! - `changes`: differences between runs
 //! - `excite`: motion for a recording
 //! - `interpret`: physical parameters
 
@@ -44,24 +49,26 @@ mod test_noise;
 mod words;
 
 pub use audit::{
-    ByChannel, Delay, DelayAudit, Delays, ForceAudit, PositionFault, RobustFit, Suspect, robust_fit,
+    ChannelRegressor, DelayAudit, DelayEstimate, ForceAudit, ForceDelays, PositionFault, RobustFit, WiringFault,
+    robust_fit,
 };
 pub use estimate::{
-    Deviations, Direction, LeastSquares, LeastSquaresError, RANK_TOLERANCE, Solution, Triangle,
+    LeastSquares, LeastSquaresError, NullDirection, ParameterUncertainty, RANK_TOLERANCE, RFactor, RegressionSolution,
 };
 pub use figures::{
-    BandError, ChannelFigures, Comparison, Estimator, Figures, FiguresError, FilteredFigures,
-    FitFault, FitFile, FitFileError, FitParameter, InBand, LocateOptions, ParameterInfo, Region,
-    Status, TIME_COLUMN, TRIMMED_PART, compare, fit_parameters, in_band, locate,
+    BandError, ChannelFigures, ErrorAccumulator, ErrorFigures, ErrorRegion, EstimatorOutput, FiguresError,
+    FilteredChannelFigures, FilteredFigures, FitFault, FitFile, FitFileError, FitParameter, LocateOptions,
+    ParameterInfo, ParameterStatus, TIME_COLUMN, TRIMMED_PART, add_filtered_forces, compare_forces, fit_parameters,
+    locate_errors,
 };
 pub use motion::{
-    DerivativeSource, Open, PASSED_BY_DECIMATION, Preparation, PreparedAs, Repeats, Run, Smoothed,
-    Smoothing, decimate, decimate_columns, decimate_table, decimate_time, differentiate,
-    filter_and_differentiate,
+    DECIMATION_PASSBAND, DerivativeSource, PreparationChoices, PreparationRecord, PreparedRun, RunRepeatability,
+    SmoothedCoordinate, SmoothingMethod, StatePreparation, decimate, decimate_columns, decimate_table, decimate_time,
+    differentiate, filter_and_differentiate,
 };
 pub use recording::{
-    ColumnInfo, Computed, Fault, NotFinite, Note, ReadOptions, Recording, RecordingError,
-    RecordingFile, RecordingFiles, Severity, TableInfo, has_ending_of_a_recording, name_of_bytes,
-    place_word,
+    ColumnInfo, ComputedColumn, NonFinitePolicy, NoteSeverity, ReadOptions, RecordingError, RecordingFault,
+    RecordingFile, RecordingFiles, RecordingNote, SignalRecording, TableInfo, display_name_of_bytes,
+    has_recording_extension, sample_place_word,
 };
 pub use signal::{FilterError, LowPass, MAX_FILTER_ORDER};

@@ -1,39 +1,44 @@
-//! What the host calls by name, and what it lends. Bytes go in through memory that [`reserve`] gives; what is answered stays
-//! where it is until the next question.
+//! The functions that the host calls by name, and those that it provides. Bytes go in through the memory of
+//! [`reserve`]. A response stays in place until the next request.
 //!
-//! Decision: four functions that pass bytes replace a generator of bindings with its own tool. Ending a worker is
-//! the only way to stop a computation; a second worker for diagnoses keeps the text alive.
+//! Decision: four functions that pass bytes replace a generator of bindings with its own tool. Ending a worker is the
+//! only way to stop a computation; with a second worker for diagnoses the editor stays responsive.
 
 use std::cell::RefCell;
 
-use modelmill_workbench::Desk;
+use modelmill_workbench::RequestHandler;
 
 #[link(wasm_import_module = "mill")]
 unsafe extern "C" {
-    /// Seconds since some moment.
+    /// Seconds since a fixed but unspecified moment.
     safe fn seconds() -> f64;
-    /// Hears how far long work is: JSON that begins there and is that long.
+    /// Receives the progress of long work: `length` bytes of JSON at `start`.
     safe fn goes(start: *const u8, length: usize);
 }
 
-struct State {
-    desk: Desk,
+/// The state between calls.
+struct BrowserState {
+    /// Answers requests; it has the files and the session.
+    request_handler: RequestHandler,
+    /// Memory for the input of the next call.
     given: Vec<u8>,
+    /// The last response.
     answer: String,
 }
 
 thread_local! {
-    static STATE: RefCell<State> = RefCell::new(State {
-        desk: Desk::new(|| seconds(), |told| {
-            let told = told.to_string();
-            goes(told.as_ptr(), told.len());
+    // A worker is single-threaded, so one state per thread is one state per module.
+    static STATE: RefCell<BrowserState> = RefCell::new(BrowserState {
+        request_handler: RequestHandler::new(|| seconds(), |view_json| {
+            let view_json = view_json.to_string();
+            goes(view_json.as_ptr(), view_json.len());
         }),
         given: Vec::new(),
         answer: String::new(),
     });
 }
 
-/// Where the host may write that many bytes before it asks.
+/// Reserves memory into which the host writes the input of the next call; returns its address.
 #[unsafe(no_mangle)]
 pub extern "C" fn reserve(length: usize) -> *mut u8 {
     STATE.with_borrow_mut(|state| {
@@ -42,32 +47,34 @@ pub extern "C" fn reserve(length: usize) -> *mut u8 {
     })
 }
 
-/// Puts a file on the desk: its name, which is that long, and its bytes.
+/// Adds a file. The input is its name, of `name` bytes, and its contents.
 #[unsafe(no_mangle)]
 pub extern "C" fn put(name: usize) {
     STATE.with_borrow_mut(|state| {
-        let (name, bytes) = split(&state.given, name);
-        state.desk.put(&name, bytes);
+        let (name, bytes) = split_input(&state.given, name);
+        state.request_handler.add_file(&name, bytes);
     });
 }
 
-/// Answers a question, which is that long, and has its body behind it; the length of the answer in bytes.
+/// Answers a request. The input is the name of the request, of `question` bytes, and its body. Returns the length of
+/// the response in bytes.
 #[unsafe(no_mangle)]
 pub extern "C" fn ask(question: usize) -> usize {
     STATE.with_borrow_mut(|state| {
-        let (question, body) = split(&state.given, question);
-        state.answer = state.desk.ask(&question, body);
+        let (question, body) = split_input(&state.given, question);
+        state.answer = state.request_handler.answer_request(&question, body);
         state.answer.len()
     })
 }
 
-/// Where the answer begins: JSON.
+/// The address of the response, as JSON.
 #[unsafe(no_mangle)]
 pub extern "C" fn answer() -> *const u8 {
     STATE.with_borrow(|state| state.answer.as_ptr())
 }
 
-fn split(given: &[u8], head: usize) -> (String, &[u8]) {
+/// Splits the input into its head of `head` bytes, as text, and the rest.
+fn split_input(given: &[u8], head: usize) -> (String, &[u8]) {
     let (head, rest) = given.split_at(head.min(given.len()));
     (String::from_utf8_lossy(head).into_owned(), rest)
 }

@@ -1,5 +1,5 @@
-//! The workbench as WebAssembly: a [`modelmill_workbench::Desk`] behind four functions that a host calls by name, and two that
-//! it lends. Everywhere else, what makes the page around it.
+//! The workbench as WebAssembly: a [`modelmill_workbench::RequestHandler`] behind four functions that a host calls by
+//! name, and two that the host provides. On other targets, the functions that build the page around it.
 
 #[cfg(target_family = "wasm")]
 pub mod exports;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use modelmill_in_browser::make;
-use modelmill_workbench::Desk;
+use modelmill_workbench::RequestHandler;
 use serde_json::{Value, json};
 
 /// Largest deviation of a number, relative: sines and cosines come from another library there, in whose last digit they differ.
@@ -18,11 +18,8 @@ const FOUND: [&str; 5] = ["verdict", "noise_floor", "budget", "steps", "effects"
 #[test]
 fn node_derives_identifies_and_diagnoses_with_the_same_numbers() {
     let Some(module) = module() else { return };
-    let bundle = make::bundle().expect("models and recordings are there");
-    let recordings = bundle
-        .recordings
-        .iter()
-        .map(|(_, name, text, _)| (name, text));
+    let bundle = make::load_bundle().expect("models and recordings are there");
+    let recordings = bundle.recordings.iter().map(|(_, name, text, _)| (name, text));
     let models = bundle.models.iter().map(|(name, text)| (name, text));
     let files: Vec<(&String, &String)> = models.chain(recordings).collect();
     let open = json!({
@@ -38,12 +35,12 @@ fn node_derives_identifies_and_diagnoses_with_the_same_numbers() {
         ("save", json!({})),
     ];
 
-    let mut desk = Desk::new(|| 0.0, |_| {});
+    let mut desk = RequestHandler::new(|| 0.0, |_| {});
     for (name, text) in &files {
-        desk.put(name, text.as_bytes());
+        desk.add_file(name, text.as_bytes());
     }
     let here = questions.iter().map(|(question, body)| {
-        let answer = desk.ask(question, body.to_string().as_bytes());
+        let answer = desk.answer_request(question, body.to_string().as_bytes());
         serde_json::from_str(&answer).expect("JSON")
     });
     let here: Vec<Value> = here.collect();
@@ -63,15 +60,12 @@ fn node_derives_identifies_and_diagnoses_with_the_same_numbers() {
     let errors = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{errors}");
     let there: Value = serde_json::from_str(&text).unwrap_or_else(|_| panic!("{text}"));
-    assert!(
-        there["heard"].as_u64() > Some(3),
-        "the diagnosis says how far it is"
-    );
+    assert!(there["heard"].as_u64() > Some(3), "the diagnosis says how far it is");
     let mut numbers = 0;
-    for ((question, _), (here, there)) in questions.iter().zip(
-        here.iter()
-            .zip(there["answers"].as_array().expect("answers")),
-    ) {
+    for ((question, _), (here, there)) in questions
+        .iter()
+        .zip(here.iter().zip(there["answers"].as_array().expect("answers")))
+    {
         let found = "/told/found";
         match (here.pointer(found), there.pointer(found)) {
             (Some(here), Some(there)) => {
@@ -90,18 +84,15 @@ fn node_derives_identifies_and_diagnoses_with_the_same_numbers() {
 fn module() -> Option<PathBuf> {
     let node = Command::new("node").arg("--version").output().is_ok();
     let no_node = (!node).then(|| "there is no `node` to run WebAssembly".to_owned());
-    if let Some(why) = no_node.or_else(make::lacks) {
-        assert!(
-            std::env::var_os("MODELMILL_WASM_REQUIRED").is_none(),
-            "{why}"
-        );
+    if let Some(why) = no_node.or_else(make::missing_target) {
+        assert!(std::env::var_os("MODELMILL_WASM_REQUIRED").is_none(), "{why}");
         eprintln!("skipped: {why}");
         return None;
     }
     // The folder of this test is `deps` in that of its profile, and that in the folder of builds or of a target in it.
     let test = std::env::current_exe().expect("a test has a path");
     let builds = test.ancestors().nth(3).expect("a folder of builds");
-    Some(make::module("dev", builds).unwrap_or_else(|says| panic!("{says}")))
+    Some(make::build_module("dev", builds).unwrap_or_else(|says| panic!("{says}")))
 }
 
 /// Compares two answers, and counts their numbers. How long something took is no part of them, and pictures and texts of

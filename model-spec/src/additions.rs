@@ -1,28 +1,30 @@
-//! Effects that join a model which was read: entries beside those of its file, of which nothing is written and nothing is
-//! read again.
+//! Effects that are added to a loaded model, as if its file had the same entries.
+//!
+//! No file is written, and no file is read again: the entries of the loaded model are copied, extended and built
+//! anew.
 
 use crate::build::build;
-use crate::diagnostic::{Log, Span};
-use crate::document::Key;
-use crate::formula::{Ast, AstKind, Formula};
-use crate::load::{Failure, Loaded};
-use crate::mechanism::{Constant, Mechanism};
+use crate::diagnostic::{DiagnosticLog, SourceSpan};
+use crate::document::TomlKey;
+use crate::formula::{FormulaAst, FormulaAstKind, SourceFormula};
+use crate::load::{LoadFailure, LoadedModel};
+use crate::mechanism::{Mechanism, ModelConstant};
 use crate::parser::parse;
-use crate::record::{List, Named, OneOrMany};
+use crate::record::{EntryList, NamedEntries, OneOrMany};
 use crate::schema::{ConstantEntry, EffectEntry, EffectParameterEntry};
-use crate::unit::Unit;
-use crate::values::{Name, Number, Text};
+use crate::unit::ModelUnit;
+use crate::values::{SpannedName, SpannedNumber, SpannedText};
 
-/// An effect that shall join a model.
+/// An effect to be added to a model.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct AddedEffect {
     /// Name of the kind.
     pub kind: String,
-    /// Where it acts.
+    /// Names of the places on which it acts.
     pub at: Vec<String>,
-    /// Symbols of parameters with the names that they get; others are called `symbol_place`.
+    /// Symbols of parameters with the names that they get; the names of all others are `symbol_place`.
     pub parameters: Vec<(String, String)>,
-    /// Symbols of constants with their values; others have those of the kind.
+    /// Symbols of constants with their values; all others have the defaults of the kind.
     pub constants: Vec<(String, ConstantValue)>,
 }
 
@@ -35,34 +37,33 @@ pub enum ConstantValue {
     Named(String),
 }
 
-/// Where what is in no file stands.
-const NOWHERE: Span = Span {
+/// The place of entries that are in no file.
+const NOWHERE: SourceSpan = SourceSpan {
     file: usize::MAX,
     start: 0,
     end: 0,
 };
 
-impl Loaded {
-    /// The mechanism with further constants and effects, which come behind those that it has.
+impl LoadedModel {
+    /// The mechanism with further constants and effects, which follow those that it has.
     ///
-    /// Fails with what is wrong, as a file with these entries would: a name that is taken, an unknown kind or place, a
-    /// value that is missing.
-    pub fn with(
+    /// Fails with the findings that a file with these entries would have: a name that is taken, an unknown kind or
+    /// place, or a missing value.
+    pub fn with_additions(
         &self,
-        constants: &[Constant],
+        constants: &[ModelConstant],
         effects: &[AddedEffect],
-    ) -> Result<Mechanism, Failure> {
-        let mut log = Log::default();
+    ) -> Result<Mechanism, LoadFailure> {
+        let mut log = DiagnosticLog::default();
+        // The loaded model stays unchanged; its entries are copied.
         let mut model = self.entries.model.clone();
-        let table = model.constants.get_or_insert_with(|| Named {
+        let table = model.constants.get_or_insert_with(|| NamedEntries {
             entries: Vec::new(),
             faulty: Vec::new(),
         });
-        let further = constants
-            .iter()
-            .map(|one| (key(&one.name), constant(one, &mut log)));
+        let further = constants.iter().map(|one| (key(&one.name), constant(one, &mut log)));
         table.entries.extend(further);
-        let list = model.effect.get_or_insert_with(|| List {
+        let list = model.effect.get_or_insert_with(|| EntryList {
             entries: Vec::new(),
             span: NOWHERE,
             faulty: false,
@@ -70,45 +71,48 @@ impl Loaded {
         for added in effects {
             list.entries.push(effect(added, &mut log));
         }
+        // The same checks as for a file, with the libraries that were read for it.
         let (mechanism, _) = build(&model, &self.entries.libraries, &mut log);
-        mechanism.ok_or_else(|| Failure {
+        mechanism.ok_or_else(|| LoadFailure {
             diagnostics: log.finish(),
             sources: self.sources.clone(),
         })
     }
 }
 
-fn key(text: &str) -> Key {
-    Key {
+/// A key that is in no file.
+fn key(text: &str) -> TomlKey {
+    TomlKey {
         name: text.to_owned(),
         span: NOWHERE,
     }
 }
 
-fn name(text: &str) -> Name {
-    Name {
+/// A name that is in no file.
+fn name(text: &str) -> SpannedName {
+    SpannedName {
         text: text.to_owned(),
         span: NOWHERE,
     }
 }
 
-fn constant(constant: &Constant, log: &mut Log) -> ConstantEntry {
+/// The entry of a constant; a unit that cannot be parsed is reported.
+fn constant(constant: &ModelConstant, log: &mut DiagnosticLog) -> ConstantEntry {
     ConstantEntry {
         span: NOWHERE,
-        value: Some(Number {
+        value: Some(SpannedNumber {
             value: constant.value,
             span: NOWHERE,
         }),
-        unit: Unit::from_text(&constant.unit, NOWHERE, None, log),
-        note: constant.note.clone().map(|text| Text {
-            text,
-            span: NOWHERE,
-        }),
+        unit: ModelUnit::from_text(&constant.unit, NOWHERE, None, log),
+        note: constant.note.clone().map(|text| SpannedText { text, span: NOWHERE }),
         faulty: false,
     }
 }
 
-fn effect(added: &AddedEffect, log: &mut Log) -> EffectEntry {
+/// The entry of an effect.
+fn effect(added: &AddedEffect, log: &mut DiagnosticLog) -> EffectEntry {
+    // Parameters get names only; their nominal values stay zero.
     let named = |name_of: &str| EffectParameterEntry {
         span: NOWHERE,
         name: Some(name(name_of)),
@@ -125,13 +129,12 @@ fn effect(added: &AddedEffect, log: &mut Log) -> EffectEntry {
             entries: added.at.iter().map(|place| name(place)).collect(),
             span: NOWHERE,
         }),
-        parameters: Some(Named {
-            entries: parameters
-                .map(|(symbol, name)| (key(symbol), named(name)))
-                .collect(),
+        parameters: Some(NamedEntries {
+            entries: parameters.map(|(symbol, name)| (key(symbol), named(name))).collect(),
             faulty: Vec::new(),
         }),
-        constants: (!added.constants.is_empty()).then(|| Named {
+        // Without values of its own the effect has no table of constants, so that it is compared with its twins.
+        constants: (!added.constants.is_empty()).then(|| NamedEntries {
             entries: constants
                 .filter_map(|(symbol, value)| Some((key(symbol), formula(value, log)?)))
                 .collect(),
@@ -142,20 +145,21 @@ fn effect(added: &AddedEffect, log: &mut Log) -> EffectEntry {
     }
 }
 
-fn formula(value: &ConstantValue, log: &mut Log) -> Option<Formula> {
+/// The formula of a constant's value; `None` if a number cannot be parsed, which is reported.
+fn formula(value: &ConstantValue, log: &mut DiagnosticLog) -> Option<SourceFormula> {
     Some(match value {
-        ConstantValue::Named(name) => Formula {
+        ConstantValue::Named(name) => SourceFormula {
             text: name.clone(),
-            ast: Ast {
+            ast: FormulaAst {
                 span: NOWHERE,
-                kind: AstKind::Name(name.clone()),
+                kind: FormulaAstKind::Name(name.clone()),
             },
         },
         ConstantValue::Number(value) => {
-            // The decimal that a file would have, so that both mean the same rational number.
+            // The decimal that a file would contain, so that both give the same rational number.
             let text = format!("{value:?}");
             let ast = parse(&text, NOWHERE, None, log)?;
-            Formula { text, ast }
+            SourceFormula { text, ast }
         }
     })
 }

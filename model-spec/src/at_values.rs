@@ -1,47 +1,47 @@
-//! A mechanism for its file's values alone: constants become numbers, so that whatever is special about them is there for
-//! all that follows: lengths that are zero or equal, axes that are parallel.
+//! A mechanism at the values of its file: constants become numbers, so that their special values are visible to all
+//! later stages, such as lengths that are zero or equal, and parallel axes.
+//!
+//! A [`Mechanism`] goes in, one with fewer constants comes out. Its geometry is the same up to rounding.
 
 use num_bigint::BigInt;
 use num_rational::BigRational;
 use num_traits::{One, ToPrimitive, Zero};
 
-use crate::exact::{Angle, ConstantIdx, Exact, Length, Symbol};
-use crate::mechanism::{Bodies, Constant, Inertial, LumpedMass, Mechanism, Part, Step};
+use crate::exact::{ConstantIdx, ExactAngle, ExactExpression, ExactLength, ModelSymbol};
+use crate::mechanism::{EffectBodies, FrameStep, LumpedMass, Mechanism, ModelConstant, ModelPart, PartInertia};
 
-/// How many significant digits every decimal keeps as a number of the machine; what stands behind them is rounding.
+/// Number of significant digits of a decimal that are kept; digits behind them are rounding.
 const DIGITS: usize = 15;
 
-/// What a constant is beside the largest of the same unit where it counts as zero, and an angle beside a multiple of pi/12
-/// where it counts as that.
-const NOTHING: f64 = 1e-15;
+/// A constant below this share of the largest of the same unit counts as zero. An angle that differs from a multiple
+/// of pi/12 by less than this share counts as that multiple.
+const ROUNDING_SHARE: f64 = 1e-15;
 
 impl Mechanism {
-    /// The same mechanism for its file's values alone.
+    /// The same mechanism with its constants replaced by their values.
     ///
-    /// Constants stand as the decimals that they are to 15 digits, and angles that are multiples of pi/12 as such. Other
-    /// angles keep their names, those of equal value one name, since their sines are no rational numbers.
+    /// Constants become decimals of 15 digits, and angles near multiples of pi/12 become these multiples. Other
+    /// angles stay constants, because their sines are not rational. Those with equal values share one constant.
     #[must_use]
-    pub fn at_values(&self) -> Self {
+    pub fn with_numeric_constants(&self) -> Self {
         let mut at = self.clone();
-        let stands = Stands::new(&self.constants);
-        at.constants = stands
-            .kept
-            .iter()
-            .map(|i| self.constants[*i].clone())
-            .collect();
+        let stands = ConstantSubstitutes::new(&self.constants);
+        // Only angles that stay constants are kept, under new indices.
+        at.constants = stands.kept.iter().map(|i| self.constants[*i].clone()).collect();
         at.gravity = self.gravity.each_ref().map(|x| stands.exact(x));
+        // Replace constants in every expression: frames, points, couplings, bodies and effects.
         for frame in &mut at.frames {
             for step in &mut frame.steps {
                 *step = match step {
-                    Step::Rotate(axis, angle) => Step::Rotate(*axis, stands.angle(angle)),
-                    Step::Translate(axis, length) => Step::Translate(
+                    FrameStep::Rotate(axis, angle) => FrameStep::Rotate(*axis, stands.angle(angle)),
+                    FrameStep::Translate(axis, length) => FrameStep::Translate(
                         *axis,
-                        Length {
+                        ExactLength {
                             offset: stands.exact(&length.offset),
                             coordinates: length.coordinates.clone(),
                         },
                     ),
-                    Step::Free(body) => Step::Free(*body),
+                    FrameStep::Free(body) => FrameStep::Free(*body),
                 };
             }
         }
@@ -62,10 +62,7 @@ impl Mechanism {
             for (_, value) in &mut effect.constants {
                 *value = stands.exact(value);
             }
-            let Bodies {
-                parts,
-                lumped_masses,
-            } = &mut effect.bodies;
+            let EffectBodies { parts, lumped_masses } = &mut effect.bodies;
             stands.bodies(parts, lumped_masses);
         }
         at.is_at_values = true;
@@ -73,86 +70,103 @@ impl Mechanism {
     }
 }
 
-/// What stands for a constant.
-enum Stand {
+/// The replacement of a constant.
+enum SubstituteValue {
+    /// A rational number.
     Number(BigRational),
-    /// A multiple of pi.
+    /// An angle, as a multiple of pi.
     Turn(BigRational),
-    /// A constant of the new mechanism.
+    /// An angle that stays a constant, by its index in the new mechanism.
     Constant(ConstantIdx),
 }
 
-struct Stands {
-    of: Vec<Stand>,
-    /// Constants that keep their names.
+/// The replacements of all constants.
+struct ConstantSubstitutes {
+    /// By index in the old mechanism.
+    values: Vec<SubstituteValue>,
+    /// Old indices of the constants that are kept, in their new order.
     kept: Vec<usize>,
 }
 
-impl Stands {
-    fn new(constants: &[Constant]) -> Self {
-        let (mut of, mut kept): (Vec<Stand>, Vec<usize>) = Default::default();
+impl ConstantSubstitutes {
+    /// Decides for each constant by its value and its unit.
+    fn new(constants: &[ModelConstant]) -> Self {
+        let (mut of, mut kept): (Vec<SubstituteValue>, Vec<usize>) = Default::default();
         for constant in constants {
             if !constant.is_angle {
+                // Zero is decided relative to the largest constant of the same unit.
                 let alike = constants.iter().filter(|c| c.unit == constant.unit);
+                // Values of the same unit, this one included.
                 let largest = alike.map(|c| c.value.abs()).fold(0.0, f64::max);
-                of.push(Stand::Number(if constant.value.abs() < NOTHING * largest {
-                    BigRational::zero()
-                } else {
-                    decimal(constant.value)
-                }));
+                of.push(SubstituteValue::Number(
+                    if constant.value.abs() < ROUNDING_SHARE * largest {
+                        BigRational::zero()
+                    } else {
+                        exact_decimal(constant.value)
+                    },
+                ));
                 continue;
             }
             let twelfths = constant.value * 12.0 / std::f64::consts::PI;
+            // The nearest multiple of pi/12, if the value is that multiple up to rounding.
             let whole = twelfths.round();
-            if (twelfths - whole).abs() <= NOTHING * 12.0 * whole.abs().max(1.0) {
+            if (twelfths - whole).abs() <= ROUNDING_SHARE * 12.0 * whole.abs().max(1.0) {
                 let whole = BigInt::from(whole.to_i64().unwrap_or(0));
-                of.push(Stand::Turn(BigRational::new(whole, BigInt::from(12))));
+                of.push(SubstituteValue::Turn(BigRational::new(whole, BigInt::from(12))));
                 continue;
             }
-            let same = |at: &usize| decimal(constants[*at].value) == decimal(constant.value);
+            // Equal angles share one constant, so that their sines are recognised as equal.
+            let same = |at: &usize| exact_decimal(constants[*at].value) == exact_decimal(constant.value);
             let at = kept.iter().position(same).unwrap_or(kept.len());
             if at == kept.len() {
                 kept.push(of.len());
             }
-            of.push(Stand::Constant(ConstantIdx(at)));
+            of.push(SubstituteValue::Constant(ConstantIdx(at)));
         }
-        Self { of, kept }
+        Self { values: of, kept }
     }
 
-    fn exact(&self, exact: &Exact) -> Exact {
-        let inner = |a: &Exact| Box::new(self.exact(a));
-        let all = |operands: &[Exact]| operands.iter().map(|a| self.exact(a)).collect();
+    /// An expression with all constants replaced.
+    fn exact(&self, exact: &ExactExpression) -> ExactExpression {
+        // Operands are replaced one by one; the shape of the expression stays.
+        let inner = |a: &ExactExpression| Box::new(self.exact(a));
+        let all = |operands: &[ExactExpression]| operands.iter().map(|a| self.exact(a)).collect();
         match exact {
-            Exact::Symbol(Symbol::Constant(i)) => match &self.of[i.0] {
-                Stand::Number(value) => Exact::Rational(value.clone()),
-                Stand::Turn(value) if value.is_zero() => Exact::Rational(value.clone()),
-                Stand::Turn(value) => {
-                    Exact::Product(vec![Exact::Rational(value.clone()), Exact::Pi])
+            ExactExpression::Symbol(ModelSymbol::Constant(i)) => match &self.values[i.0] {
+                SubstituteValue::Number(value) => ExactExpression::Rational(value.clone()),
+                // A zero angle becomes the number zero, which later stages recognise.
+                SubstituteValue::Turn(value) if value.is_zero() => ExactExpression::Rational(value.clone()),
+                SubstituteValue::Turn(value) => {
+                    ExactExpression::Product(vec![ExactExpression::Rational(value.clone()), ExactExpression::Pi])
                 }
-                Stand::Constant(i) => Exact::Symbol(Symbol::Constant(*i)),
+                SubstituteValue::Constant(i) => ExactExpression::Symbol(ModelSymbol::Constant(*i)),
             },
-            Exact::Rational(_) | Exact::Pi | Exact::Symbol(_) => exact.clone(),
-            Exact::Sum(operands) => Exact::Sum(all(operands)),
-            Exact::Product(operands) => Exact::Product(all(operands)),
-            Exact::Quotient(a, b) => Exact::Quotient(inner(a), inner(b)),
-            Exact::Negative(a) => Exact::Negative(inner(a)),
-            Exact::Power(a, n) => Exact::Power(inner(a), *n),
-            Exact::Apply(function, a) => Exact::Apply(*function, inner(a)),
+            ExactExpression::Rational(_) | ExactExpression::Pi | ExactExpression::Symbol(_) => exact.clone(),
+            ExactExpression::Sum(operands) => ExactExpression::Sum(all(operands)),
+            ExactExpression::Product(operands) => ExactExpression::Product(all(operands)),
+            ExactExpression::Quotient(a, b) => ExactExpression::Quotient(inner(a), inner(b)),
+            ExactExpression::Negative(a) => ExactExpression::Negative(inner(a)),
+            ExactExpression::Power(a, n) => ExactExpression::Power(inner(a), *n),
+            ExactExpression::Apply(function, a) => ExactExpression::Apply(*function, inner(a)),
         }
     }
 
-    fn angle(&self, angle: &Angle) -> Angle {
+    /// An angle with its constants replaced; equal symbols are added, and the terms are sorted.
+    fn angle(&self, angle: &ExactAngle) -> ExactAngle {
         let mut pi = angle.pi.clone();
-        let mut terms: Vec<(Symbol, i32)> = Vec::new();
+        let mut terms: Vec<(ModelSymbol, i32)> = Vec::new();
+        // Terms with the same constant are added.
         for (symbol, n) in &angle.terms {
             let symbol = match symbol {
-                Symbol::Constant(i) => match &self.of[i.0] {
-                    Stand::Turn(value) => {
+                ModelSymbol::Constant(i) => match &self.values[i.0] {
+                    SubstituteValue::Turn(value) => {
                         pi += value * BigRational::from_integer(BigInt::from(*n));
                         continue;
                     }
-                    Stand::Constant(i) => Symbol::Constant(*i),
-                    Stand::Number(_) => unreachable!("what stands in an angle is one"),
+                    SubstituteValue::Constant(i) => ModelSymbol::Constant(*i),
+                    SubstituteValue::Number(_) => {
+                        unreachable!("constants in an angle have the unit rad")
+                    }
                 },
                 other => *other,
             };
@@ -163,17 +177,19 @@ impl Stands {
         }
         terms.retain(|(_, n)| *n != 0);
         terms.sort_unstable();
-        Angle { pi, terms }
+        ExactAngle { pi, terms }
     }
 
-    fn bodies(&self, parts: &mut [Part], lumped_masses: &mut [LumpedMass]) {
+    /// Replaces constants in the inertias of parts and in lumped masses.
+    fn bodies(&self, parts: &mut [ModelPart], lumped_masses: &mut [LumpedMass]) {
+        // Both forms of an inertia have the same quantities to replace.
         for part in parts {
-            let (Inertial::AboutCentre {
+            let (PartInertia::AboutCentre {
                 mass,
                 centre: moment,
                 inertia,
             }
-            | Inertial::Linear {
+            | PartInertia::Linear {
                 mass,
                 first_moment: moment,
                 inertia,
@@ -191,9 +207,12 @@ impl Stands {
     }
 }
 
-/// The decimal that a number of the machine stands for.
-fn decimal(value: f64) -> BigRational {
+/// The decimal of 15 digits for a floating-point number, as an exact rational.
+///
+/// Panics if the number is not finite.
+fn exact_decimal(value: f64) -> BigRational {
     let digits = DIGITS - 1;
+    // The printed mantissa and exponent are read back as integers.
     let written = format!("{value:.digits$e}");
     let read = written.split_once('e').and_then(|(mantissa, exponent)| {
         let mantissa: BigInt = mantissa.replace('.', "").parse().ok()?;
@@ -217,19 +236,19 @@ mod tests {
     #[test]
     fn decimals_are_those_that_were_written() {
         let ratio = |a: i64, b: i64| BigRational::new(a.into(), b.into());
-        assert_eq!(decimal(0.3), ratio(3, 10));
-        assert_eq!(decimal(0.1 + 0.2), ratio(3, 10));
-        assert_eq!(decimal(-12.5e-7), ratio(-125, 100_000_000));
-        assert_eq!(decimal(0.0), BigRational::zero());
+        assert_eq!(exact_decimal(0.3), ratio(3, 10));
+        assert_eq!(exact_decimal(0.1 + 0.2), ratio(3, 10));
+        assert_eq!(exact_decimal(-12.5e-7), ratio(-125, 100_000_000));
+        assert_eq!(exact_decimal(0.0), BigRational::zero());
         assert_eq!(
-            decimal(6.02e23),
+            exact_decimal(6.02e23),
             BigRational::from_integer(BigInt::from(602) * BigInt::from(10).pow(21))
         );
     }
 
     #[test]
     fn angles_that_are_parts_of_a_turn_stand_as_such() {
-        let constant = |value: f64, unit: &str| Constant {
+        let constant = |value: f64, unit: &str| ModelConstant {
             name: "x".to_owned(),
             value,
             unit: unit.to_owned(),
@@ -244,18 +263,18 @@ mod tests {
             constant(0.5, "rad"),
             constant(0.0, "rad"),
         ];
-        let stands = Stands::new(&constants);
+        let stands = ConstantSubstitutes::new(&constants);
         assert_eq!(stands.kept, [1]);
-        let name = |i: usize| Symbol::Constant(ConstantIdx(i));
-        let angle = stands.angle(&Angle {
+        let name = |i: usize| ModelSymbol::Constant(ConstantIdx(i));
+        let angle = stands.angle(&ExactAngle {
             pi: BigRational::zero(),
             terms: vec![(name(0), 1), (name(1), 2), (name(4), -1), (name(5), 3)],
         });
         assert_eq!(angle.pi, BigRational::new(1.into(), 2.into()));
         assert_eq!(angle.terms, [(name(0), 1)]);
         assert_eq!(
-            stands.exact(&Exact::Symbol(name(2))),
-            Exact::Rational(BigRational::zero())
+            stands.exact(&ExactExpression::Symbol(name(2))),
+            ExactExpression::Rational(BigRational::zero())
         );
     }
 }

@@ -1,20 +1,14 @@
-//! Model and rig files of the paper's robot as texts, for programs that carry them: name and text of each.
+//! Model and rig files of the paper's robot as texts, compiled into the program: name and text of each.
 
-/// The robot with true lengths, and as the paper has it.
+/// Models of the robot: with its true lengths, and as the paper has them.
 pub const MODELS: [(&str, &str); 2] = [
     ("spidermill.toml", include_str!("../models/spidermill.toml")),
-    (
-        "spidermill-paper.toml",
-        include_str!("../models/spidermill-paper.toml"),
-    ),
+    ("spidermill-paper.toml", include_str!("../models/spidermill-paper.toml")),
 ];
 
-/// The whole robot in numbers, and the same with rods along its drives.
+/// Rigs, the robot with numeric values for simulation: the complete robot, and the same with rods along its drives.
 pub const RIGS: [(&str, &str); 2] = [
-    (
-        "spidermill-full.toml",
-        include_str!("../rigs/spidermill-full.toml"),
-    ),
+    ("spidermill-full.toml", include_str!("../rigs/spidermill-full.toml")),
     (
         "spidermill-with-rods.toml",
         include_str!("../rigs/spidermill-with-rods.toml"),

@@ -1,8 +1,9 @@
-//! Columns of recordings as a model file or a command line describes them: `"q_meas_m"`, `"qm5/45"`,
-//! `"(qm6 - qm5)/32 - pi/2"`, `"pos1 [deg]"` go in, together with the names that a recording has; an affine sum of
-//! its columns in SI units comes out.
+//! Columns of recordings as a model file or a command line describes them.
 //!
-//! A text that is the name of a column, letter by letter, is that column, whatever else it could mean.
+//! A text such as `"q_meas_m"`, `"qm5/45"`, `"(qm6 - qm5)/32 - pi/2"` or `"pos1 [deg]"` and the column names of a
+//! recording go in. An affine sum of its columns in SI units comes out.
+//!
+//! A text that equals the name of a column is that column, even if it could also be an expression.
 //!
 //! Decision: this crate reads the sum and resolves it against each file, so that `modelmill-identify` gets numbers
 //! only.
@@ -11,18 +12,18 @@ use std::fmt;
 
 use num_traits::ToPrimitive;
 
-use crate::diagnostic::{Log, Span};
-use crate::exact::Function;
-use crate::formula::{Ast, AstKind};
-use crate::joint_motion::Motion;
-use crate::kinds::Carries;
+use crate::diagnostic::{DiagnosticLog, SourceSpan};
+use crate::exact::ExactFunction;
+use crate::formula::{FormulaAst, FormulaAstKind};
+use crate::joint_motion::CoordinateMotion;
+use crate::kinds::PlaceLoad;
 use crate::mechanism::Mechanism;
 use crate::parser::parse;
 use crate::suggest;
 
-/// What a column of a recording holds.
+/// The quantity in a column of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Quantity {
+pub enum ColumnQuantity {
     /// Time, s.
     Time,
     /// An angle or its first or second derivative, rad, rad/s, rad/s^2.
@@ -46,11 +47,11 @@ pub enum Quantity {
 pub struct ColumnSum {
     /// Columns of the recording with their factors, none of which is zero; in the order of the text.
     pub terms: Vec<(String, f64)>,
-    /// What is added.
+    /// The constant term, in SI units.
     pub offset: f64,
 }
 
-/// Why a text describes no column of a recording.
+/// Why a text does not describe a column of a recording.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ColumnFault {
@@ -61,7 +62,7 @@ pub enum ColumnFault {
         /// The closest name that the recording has.
         nearest: Option<String>,
     },
-    /// It cannot be read, or is no affine sum of columns.
+    /// It cannot be parsed, or is not an affine sum of columns.
     Malformed {
         /// What is wrong, as a clause.
         says: String,
@@ -74,7 +75,7 @@ impl fmt::Display for ColumnFault {
             Self::Missing { column, nearest } => {
                 write!(f, "the recording has no column `{column}`")?;
                 match nearest {
-                    Some(nearest) => write!(f, "; is `{nearest}` meant?"),
+                    Some(nearest) => write!(f, "; did you mean `{nearest}`?"),
                     None => Ok(()),
                 }
             }
@@ -85,32 +86,24 @@ impl fmt::Display for ColumnFault {
 
 impl std::error::Error for ColumnFault {}
 
+/// One degree in radians.
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
+/// One turn in radians.
 const TURN: f64 = std::f64::consts::TAU;
 
-/// Units of columns with the factor that leads to SI, the SI unit first.
-fn units(quantity: Quantity) -> &'static [(&'static str, f64)] {
+/// Units of columns with their factors to SI; the SI unit comes first.
+fn units(quantity: ColumnQuantity) -> &'static [(&'static str, f64)] {
     match quantity {
-        Quantity::Time => &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("min", 60.0)],
-        Quantity::Number => &[("1", 1.0)],
-        Quantity::Angle(0) => &[("rad", 1.0), ("deg", DEGREE), ("mrad", 1e-3), ("rev", TURN)],
-        Quantity::Angle(1) => &[
-            ("rad/s", 1.0),
-            ("deg/s", DEGREE),
-            ("rpm", TURN / 60.0),
-            ("rev/s", TURN),
-        ],
-        Quantity::Angle(_) => &[("rad/s^2", 1.0), ("deg/s^2", DEGREE), ("rev/s^2", TURN)],
-        Quantity::Length(0) => &[("m", 1.0), ("mm", 1e-3), ("cm", 1e-2), ("um", 1e-6)],
-        Quantity::Length(1) => &[
-            ("m/s", 1.0),
-            ("mm/s", 1e-3),
-            ("cm/s", 1e-2),
-            ("mm/min", 1e-3 / 60.0),
-        ],
-        Quantity::Length(_) => &[("m/s^2", 1.0), ("mm/s^2", 1e-3), ("cm/s^2", 1e-2)],
-        Quantity::Force => &[("N", 1.0), ("kN", 1e3), ("mN", 1e-3)],
-        Quantity::Torque => &[
+        ColumnQuantity::Time => &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("min", 60.0)],
+        ColumnQuantity::Number => &[("1", 1.0)],
+        ColumnQuantity::Angle(0) => &[("rad", 1.0), ("deg", DEGREE), ("mrad", 1e-3), ("rev", TURN)],
+        ColumnQuantity::Angle(1) => &[("rad/s", 1.0), ("deg/s", DEGREE), ("rpm", TURN / 60.0), ("rev/s", TURN)],
+        ColumnQuantity::Angle(_) => &[("rad/s^2", 1.0), ("deg/s^2", DEGREE), ("rev/s^2", TURN)],
+        ColumnQuantity::Length(0) => &[("m", 1.0), ("mm", 1e-3), ("cm", 1e-2), ("um", 1e-6)],
+        ColumnQuantity::Length(1) => &[("m/s", 1.0), ("mm/s", 1e-3), ("cm/s", 1e-2), ("mm/min", 1e-3 / 60.0)],
+        ColumnQuantity::Length(_) => &[("m/s^2", 1.0), ("mm/s^2", 1e-3), ("cm/s^2", 1e-2)],
+        ColumnQuantity::Force => &[("N", 1.0), ("kN", 1e3), ("mN", 1e-3)],
+        ColumnQuantity::Torque => &[
             ("N m", 1.0),
             ("Nm", 1.0),
             ("N mm", 1e-3),
@@ -122,33 +115,33 @@ fn units(quantity: Quantity) -> &'static [(&'static str, f64)] {
             ("kN m", 1e3),
             ("kNm", 1e3),
         ],
-        Quantity::ForceVariance => &[("N^2", 1.0), ("kN^2", 1e6), ("mN^2", 1e-6)],
-        Quantity::TorqueVariance => &[("N^2 m^2", 1.0), ("(N m)^2", 1.0), ("Nm^2", 1.0)],
+        ColumnQuantity::ForceVariance => &[("N^2", 1.0), ("kN^2", 1e6), ("mN^2", 1e-6)],
+        ColumnQuantity::TorqueVariance => &[("N^2 m^2", 1.0), ("(N m)^2", 1.0), ("Nm^2", 1.0)],
     }
 }
 
 impl Mechanism {
-    /// The names that columns of recordings have in this model, with what each holds: `t`, every active coordinate
+    /// The names that columns of recordings have in this model, with their quantities: `t`, every active coordinate
     /// with its two derivatives (`_d`, `_dd`), and every drive with the variance of its force (`_var`).
-    pub fn columns(&self) -> Vec<(String, Quantity)> {
-        let mut columns = vec![("t".to_owned(), Quantity::Time)];
+    pub fn columns(&self) -> Vec<(String, ColumnQuantity)> {
+        let mut columns = vec![("t".to_owned(), ColumnQuantity::Time)];
         for coordinate in self.coordinates.iter().filter(|c| !c.passive) {
             for (order, suffix) in (0..).zip(["", "_d", "_dd"]) {
                 let quantity = match coordinate.motion {
-                    Motion::Revolute => Quantity::Angle(order),
-                    Motion::Prismatic => Quantity::Length(order),
+                    CoordinateMotion::Revolute => ColumnQuantity::Angle(order),
+                    CoordinateMotion::Prismatic => ColumnQuantity::Length(order),
                     // Rates of the vector part are angular velocities; the scalar part has none.
-                    Motion::Quaternion if order > 0 => Quantity::Angle(order),
-                    Motion::QuaternionScalar if order > 0 => continue,
-                    Motion::Quaternion | Motion::QuaternionScalar => Quantity::Number,
+                    CoordinateMotion::Quaternion if order > 0 => ColumnQuantity::Angle(order),
+                    CoordinateMotion::QuaternionScalar if order > 0 => continue,
+                    CoordinateMotion::Quaternion | CoordinateMotion::QuaternionScalar => ColumnQuantity::Number,
                 };
                 columns.push((format!("{}{suffix}", coordinate.name), quantity));
             }
         }
         for drive in self.drives.iter().chain(&self.shared_drives) {
-            let (force, variance) = match drive.kind.carries(&self.coordinates) {
-                Carries::Torque => (Quantity::Torque, Quantity::TorqueVariance),
-                _ => (Quantity::Force, Quantity::ForceVariance),
+            let (force, variance) = match drive.kind.place_load(&self.coordinates) {
+                PlaceLoad::Torque => (ColumnQuantity::Torque, ColumnQuantity::TorqueVariance),
+                _ => (ColumnQuantity::Force, ColumnQuantity::ForceVariance),
             };
             columns.push((drive.name.clone(), force));
             columns.push((format!("{}_var", drive.name), variance));
@@ -157,24 +150,24 @@ impl Mechanism {
     }
 }
 
-/// Reads the description of a column that holds `quantity`, for a recording whose columns are called `names`.
+/// Reads the description of a column with the quantity `quantity`, for a recording whose columns are called `names`.
 ///
-/// The text is the name of a column or an expression in names of columns, the model's constants (`constants` gives
-/// their values) and numbers, affine in the columns; a unit in brackets at its end, such as `[deg]`, says what it is
-/// in if not in SI units.
-/// Fails when it names a column that is not there, is not affine, or has a unit that does not suit the quantity.
+/// The text is the name of a column or an expression. An expression is affine in names of columns and may contain
+/// numbers and constants of the model, whose values `constants` gives. A unit in brackets at its end, such as
+/// `[deg]`, states the unit of the column if it is not the SI unit.
+/// Fails when it names a column that does not exist, is not affine, or has a unit that does not fit the quantity.
 ///
 /// ```
-/// use modelmill_spec::{Quantity, read_column};
+/// use modelmill_spec::{ColumnQuantity, read_column};
 /// let names = ["time_s".to_owned(), "qm5".to_owned(), "qm6".to_owned()];
-/// let sum = read_column("(qm6 - qm5)/32 [deg]", Quantity::Angle(0), &names, &|_| None)?;
+/// let sum = read_column("(qm6 - qm5)/32 [deg]", ColumnQuantity::Angle(0), &names, &|_| None)?;
 /// assert_eq!(sum.terms[1].0, "qm5");
 /// assert!((sum.terms[1].1 + std::f64::consts::PI / 180.0 / 32.0).abs() < 1e-18);
 /// # Ok::<(), modelmill_spec::ColumnFault>(())
 /// ```
 pub fn read_column(
     text: &str,
-    quantity: Quantity,
+    quantity: ColumnQuantity,
     names: &[String],
     constants: &dyn Fn(&str) -> Option<f64>,
 ) -> Result<ColumnSum, ColumnFault> {
@@ -184,6 +177,7 @@ pub fn read_column(
         offset: 0.0,
     };
     let has = |name: &str| names.iter().any(|other| other == name);
+    // The complete text comes first: a column may be called `pos [deg]`.
     if has(text) {
         return Ok(single(text, 1.0));
     }
@@ -199,15 +193,16 @@ pub fn read_column(
         column: column.to_owned(),
         nearest: suggest::nearest(column, names.iter().map(String::as_str)).map(str::to_owned),
     };
+    // Names with dots cannot be parsed; they are replaced by names that can.
     let (plain, stand_ins) = with_plain_names(body, names);
-    let span = Span {
+    let span = SourceSpan {
         file: 0,
         start: 0,
         end: plain.len(),
     };
-    let mut log = Log::default();
+    let mut log = DiagnosticLog::default();
     let Some(ast) = parse(&plain, span, None, &mut log) else {
-        // What cannot be read as an expression is taken for a name with blanks and the like.
+        // A text without operators is reported as a missing column, because names may contain blanks.
         if !body.contains(['+', '*', '/', '^', '(']) {
             return Err(missing(body));
         }
@@ -220,25 +215,26 @@ pub fn read_column(
             ),
         });
     };
-    let sum = affine(&ast, &|name| {
+    // Names of columns take precedence over constants of the model.
+    let sum = affine_value(&ast, &|name| {
         let stands_for = stand_ins.iter().find(|(stand_in, _)| stand_in == name);
         if let Some((_, column)) = stands_for {
-            Some(Value::column(column))
+            Some(AffineValue::column(column))
         } else if has(name) {
-            Some(Value::column(name))
+            Some(AffineValue::column(name))
         } else {
-            constants(name).map(Value::number)
+            constants(name).map(AffineValue::number)
         }
     })
     .map_err(|fault| match fault {
-        Unread::Name(name) => missing(&name),
-        Unread::Says(says) => ColumnFault::Malformed {
+        AffineFault::Name(name) => missing(&name),
+        AffineFault::Says(says) => ColumnFault::Malformed {
             says: format!("in `{body}` {says}"),
         },
     })?;
     if sum.terms.is_empty() {
         return Err(ColumnFault::Malformed {
-            says: format!("`{body}` holds no column of the recording"),
+            says: format!("`{body}` contains no column of the recording"),
         });
     }
     Ok(ColumnSum {
@@ -251,19 +247,20 @@ pub fn read_column(
     })
 }
 
-/// A text in which columns whose names no expression can hold, such as `joint_states.position.elbow`, have names that it
-/// can, and what these stand for.
+/// Replaces names of columns with dots, such as `joint_states.position.elbow`, which no expression can contain.
+/// Returns the text, and each replacement with the column it stands for.
 fn with_plain_names<'a>(text: &str, names: &'a [String]) -> (String, Vec<(String, &'a str)>) {
     let mut others: Vec<&String> = names
         .iter()
         .filter(|name| name.contains('.') && text.contains(name.as_str()))
         .collect();
-    // A name may begin another one.
+    // Longer names come first because one name may be the beginning of another.
     others.sort_by_key(|name| std::cmp::Reverse(name.len()));
     let is_part = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '.';
     let mut plain = text.to_owned();
     let mut stand_ins = Vec::new();
     for name in others {
+        // The replacement must not occur in the text or among the columns.
         let mut stand_in = format!("column_{}", stand_ins.len());
         while text.contains(&stand_in) || names.contains(&stand_in) {
             stand_in.push('_');
@@ -271,6 +268,7 @@ fn with_plain_names<'a>(text: &str, names: &'a [String]) -> (String, Vec<(String
         let mut done = String::new();
         let mut rest = plain.as_str();
         while let Some(at) = rest.find(name.as_str()) {
+            // A match inside of a longer name is left unchanged.
             let end = at + name.len();
             let is_within = rest[end..].starts_with(is_part)
                 || rest[..at].ends_with(is_part)
@@ -286,63 +284,65 @@ fn with_plain_names<'a>(text: &str, names: &'a [String]) -> (String, Vec<(String
     (plain, stand_ins)
 }
 
-/// Why a text can be the description of no column of any recording; `None` if it can be.
+/// Why a text can describe no column of any recording; `None` if it may describe one.
 pub(crate) fn fault_without_recording(text: &str) -> Option<String> {
     let (body, _) = split_unit(text.trim());
-    let span = Span {
+    let span = SourceSpan {
         file: 0,
         start: 0,
         end: text.len(),
     };
-    let ast = parse(body, span, None, &mut Log::default())?;
-    match affine(&ast, &|name| Some(Value::column(name))) {
-        Err(Unread::Says(says)) => Some(says),
+    let ast = parse(body, span, None, &mut DiagnosticLog::default())?;
+    match affine_value(&ast, &|name| Some(AffineValue::column(name))) {
+        Err(AffineFault::Says(says)) => Some(says),
         _ => None,
     }
 }
 
-/// The text before a unit in brackets at its end, and the unit.
+/// Splits a unit in brackets off the end: the text before it, and the unit.
 fn split_unit(text: &str) -> (&str, Option<&str>) {
-    let split = text
-        .strip_suffix(']')
-        .and_then(|rest| rest.rsplit_once('['));
+    let split = text.strip_suffix(']').and_then(|rest| rest.rsplit_once('['));
     match split {
         Some((body, unit)) if !body.trim().is_empty() => (body.trim(), Some(unit.trim())),
         _ => (text, None),
     }
 }
 
-fn factor_of(unit: &str, quantity: Quantity) -> Result<f64, ColumnFault> {
+/// The factor from a unit to SI; fails with the list of units that fit the quantity.
+fn factor_of(unit: &str, quantity: ColumnQuantity) -> Result<f64, ColumnFault> {
     let units = units(quantity);
     let found = units.iter().find(|(name, _)| *name == unit);
-    found
-        .map(|(_, factor)| *factor)
-        .ok_or_else(|| ColumnFault::Malformed {
-            says: format!(
-                "the unit `{unit}` does not suit it; expected one of {}",
-                units
-                    .iter()
-                    .map(|(name, _)| format!("`{name}`"))
-                    .collect::<Vec<_>>()
-                    .join(", ")
-            ),
-        })
+    found.map(|(_, factor)| *factor).ok_or_else(|| ColumnFault::Malformed {
+        says: format!(
+            "the unit `{unit}` does not fit this quantity; expected one of {}",
+            units
+                .iter()
+                .map(|(name, _)| format!("`{name}`"))
+                .collect::<Vec<_>>()
+                .join(", ")
+        ),
+    })
 }
 
-/// An affine value while it is worked out.
+/// An affine value during evaluation.
 #[derive(Clone, Debug, Default)]
-struct Value {
+struct AffineValue {
+    /// Columns with their factors; none is zero after an addition.
     terms: Vec<(String, f64)>,
+    /// The constant term.
     offset: f64,
 }
 
-/// Why an expression has no affine value.
-enum Unread {
+/// Why an expression is not affine.
+enum AffineFault {
+    /// It uses a name that is neither a column nor a constant.
     Name(String),
+    /// Any other reason, as a clause for a message.
     Says(String),
 }
 
-impl Value {
+impl AffineValue {
+    /// A value without columns.
     fn number(offset: f64) -> Self {
         Self {
             terms: Vec::new(),
@@ -350,6 +350,7 @@ impl Value {
         }
     }
 
+    /// A column with factor one.
     fn column(name: &str) -> Self {
         Self {
             terms: vec![(name.to_owned(), 1.0)],
@@ -357,6 +358,7 @@ impl Value {
         }
     }
 
+    /// The sum; terms of the same column are added, and terms that cancel are dropped.
     fn add(mut self, other: Self) -> Self {
         for (name, factor) in other.terms {
             match self.terms.iter_mut().find(|(known, _)| *known == name) {
@@ -369,6 +371,7 @@ impl Value {
         self
     }
 
+    /// Applies a linear function to all factors and to the constant term.
     fn map(mut self, f: impl Fn(f64) -> f64) -> Self {
         for (_, factor) in &mut self.terms {
             *factor = f(*factor);
@@ -378,32 +381,33 @@ impl Value {
     }
 }
 
-/// The affine value of an expression.
-fn affine(ast: &Ast, look_up: &dyn Fn(&str) -> Option<Value>) -> Result<Value, Unread> {
-    let of = |ast: &Ast| affine(ast, look_up);
-    let number = |ast: &Ast, what: &str| {
-        let value = affine(ast, look_up)?;
+/// Evaluates an expression; `look_up` gives the value of each name.
+fn affine_value(ast: &FormulaAst, look_up: &dyn Fn(&str) -> Option<AffineValue>) -> Result<AffineValue, AffineFault> {
+    let of = |ast: &FormulaAst| affine_value(ast, look_up);
+    // Divisors, bases of powers and operands of functions must be free of columns.
+    let number = |ast: &FormulaAst, what: &str| {
+        let value = affine_value(ast, look_up)?;
         if value.terms.is_empty() {
             return Ok(value.offset);
         }
-        Err(Unread::Says(format!(
+        Err(AffineFault::Says(format!(
             "a column stands {what}; expected a sum of columns, each times a number, and numbers"
         )))
     };
     let value = match &ast.kind {
-        AstKind::Rational(value) => Value::number(value.to_f64().unwrap_or(f64::NAN)),
-        AstKind::Pi => Value::number(std::f64::consts::PI),
-        AstKind::Name(name) => look_up(name).ok_or_else(|| Unread::Name(name.clone()))?,
-        AstKind::Sum(terms) => {
-            let mut sum = Value::default();
+        FormulaAstKind::Rational(value) => AffineValue::number(value.to_f64().unwrap_or(f64::NAN)),
+        FormulaAstKind::Pi => AffineValue::number(std::f64::consts::PI),
+        FormulaAstKind::Name(name) => look_up(name).ok_or_else(|| AffineFault::Name(name.clone()))?,
+        FormulaAstKind::Sum(terms) => {
+            let mut sum = AffineValue::default();
             for term in terms {
                 sum = sum.add(of(term)?);
             }
             sum
         }
-        AstKind::Negative(inner) => of(inner)?.map(|value| -value),
-        AstKind::Product(factors) => {
-            let mut product = Value::number(1.0);
+        FormulaAstKind::Negative(inner) => of(inner)?.map(|value| -value),
+        FormulaAstKind::Product(factors) => {
+            let mut product = AffineValue::number(1.0);
             for factor in factors {
                 let factor = of(factor)?;
                 product = if factor.terms.is_empty() {
@@ -411,7 +415,7 @@ fn affine(ast: &Ast, look_up: &dyn Fn(&str) -> Option<Value>) -> Result<Value, U
                 } else if product.terms.is_empty() {
                     factor.map(|value| value * product.offset)
                 } else {
-                    return Err(Unread::Says(
+                    return Err(AffineFault::Says(
                         "columns are multiplied with each other; expected a sum of columns, each times a number"
                             .to_owned(),
                     ));
@@ -419,37 +423,36 @@ fn affine(ast: &Ast, look_up: &dyn Fn(&str) -> Option<Value>) -> Result<Value, U
             }
             product
         }
-        AstKind::Quotient(above, below) => {
+        FormulaAstKind::Quotient(above, below) => {
             let below = number(below, "below a fraction line")?;
             of(above)?.map(|value| value / below)
         }
-        AstKind::Power(base, 1) => of(base)?,
-        AstKind::Power(base, exponent) => {
-            Value::number(number(base, "in a power")?.powi(*exponent))
-        }
-        AstKind::Apply(function, inner) => {
-            Value::number(apply(*function, number(inner, "in a function")?))
+        FormulaAstKind::Power(base, 1) => of(base)?,
+        FormulaAstKind::Power(base, exponent) => AffineValue::number(number(base, "in a power")?.powi(*exponent)),
+        FormulaAstKind::Apply(function, inner) => {
+            AffineValue::number(apply_function(*function, number(inner, "in a function")?))
         }
     };
     if value.offset.is_finite() && value.terms.iter().all(|(_, factor)| factor.is_finite()) {
         Ok(value)
     } else {
-        Err(Unread::Says(
+        Err(AffineFault::Says(
             "a number is not finite; is something divided by zero?".to_owned(),
         ))
     }
 }
 
-fn apply(function: Function, x: f64) -> f64 {
+/// Value of a function in floating point; the sign of zero is zero.
+fn apply_function(function: ExactFunction, x: f64) -> f64 {
     match function {
-        Function::Sin => x.sin(),
-        Function::Cos => x.cos(),
-        Function::Sqrt => x.sqrt(),
-        Function::Abs => x.abs(),
-        Function::Sign if x == 0.0 => 0.0,
-        Function::Sign => x.signum(),
-        Function::Tanh => x.tanh(),
-        Function::Exp => x.exp(),
+        ExactFunction::Sin => x.sin(),
+        ExactFunction::Cos => x.cos(),
+        ExactFunction::Sqrt => x.sqrt(),
+        ExactFunction::Abs => x.abs(),
+        ExactFunction::Sign if x == 0.0 => 0.0,
+        ExactFunction::Sign => x.signum(),
+        ExactFunction::Tanh => x.tanh(),
+        ExactFunction::Exp => x.exp(),
     }
 }
 
@@ -461,7 +464,7 @@ mod tests {
 
     fn read(text: &str) -> Result<ColumnSum, ColumnFault> {
         let names = ["t_s", "qm5", "qm6", "pos 1 [deg]", "pos"].map(str::to_owned);
-        read_column(text, Quantity::Angle(0), &names, &|name| {
+        read_column(text, ColumnQuantity::Angle(0), &names, &|name| {
             (name == "N5").then_some(45.0)
         })
     }
@@ -498,10 +501,7 @@ mod tests {
     #[test]
     fn what_cannot_be_read_says_why() {
         let says = |text: &str| read(text).unwrap_err().to_string();
-        assert_eq!(
-            says("qm7/45"),
-            "the recording has no column `qm7`; is `qm5` meant?"
-        );
+        assert_eq!(says("qm7/45"), "the recording has no column `qm7`; did you mean `qm5`?");
         assert_eq!(says("gear box"), "the recording has no column `gear box`");
         assert!(says("qm5*qm6").contains("multiplied with each other"));
         assert!(says("1/qm5").contains("below a fraction line"));
@@ -510,18 +510,13 @@ mod tests {
         assert!(says("qm5/0").contains("zero") || says("qm5/0").contains("finite"));
         assert!(says("qm5 - qm5 + 1").contains("no column"));
         assert!(says("qm5 +").contains("neither the name of a column nor an expression"));
-        assert!(says("qm5 [mm]").contains("`mm` does not suit it; expected one of `rad`, `deg`"));
+        assert!(says("qm5 [mm]").contains("`mm` does not fit this quantity; expected one of `rad`, `deg`"));
     }
 
     #[test]
     fn columns_of_logs_stand_in_sums() {
-        let names = [
-            "joints.position.q",
-            "joints.position.q2",
-            "lab/split.effort.arm/wrist",
-        ]
-        .map(str::to_owned);
-        let read = |text: &str| read_column(text, Quantity::Angle(0), &names, &|_| None).unwrap();
+        let names = ["joints.position.q", "joints.position.q2", "lab/split.effort.arm/wrist"].map(str::to_owned);
+        let read = |text: &str| read_column(text, ColumnQuantity::Angle(0), &names, &|_| None).unwrap();
         let sum = read("-joints.position.q/2 + 3*joints.position.q2");
         assert_eq!(
             sum.terms,
@@ -533,7 +528,7 @@ mod tests {
         let sum = read("2*lab/split.effort.arm/wrist - 1");
         assert_eq!(sum.terms, [("lab/split.effort.arm/wrist".to_owned(), 2.0)]);
         assert!((sum.offset + 1.0).abs() < 1e-15);
-        let missing = read_column("-joints.position.q3", Quantity::Angle(0), &names, &|_| None);
+        let missing = read_column("-joints.position.q3", ColumnQuantity::Angle(0), &names, &|_| None);
         assert!(missing.is_err());
     }
 }

@@ -10,15 +10,15 @@ use annotate_snippets::renderer::DecorStyle;
 use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet};
 use modelmill_boundary::text::{Message, RemedySpelling};
 
-/// How many diagnostics are kept; a file with more has one cause behind them.
+/// How many diagnostics are kept. A file with more usually has one common cause.
 const MOST_DIAGNOSTICS: usize = 100;
-/// Lines longer than this are named by their position and not printed.
+/// Longest line in bytes that is printed; longer ones are only named by line and column.
 const LONGEST_PRINTED_LINE: usize = 400;
 
-/// A stretch of bytes in one of the files read.
+/// A segment of bytes in one of the files read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Span {
-    /// Index into [`Sources::files`].
+pub struct SourceSpan {
+    /// Index into [`SourceFiles::files`].
     pub file: usize,
     /// First byte.
     pub start: usize,
@@ -26,12 +26,12 @@ pub struct Span {
     pub end: usize,
 }
 
-/// How grave a finding is.
+/// How serious a finding is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Severity {
-    /// The file has no meaning until this is mended.
+pub enum DiagnosticSeverity {
+    /// The model cannot be built until this is corrected.
     Error,
-    /// The file has a meaning, though perhaps not the one intended.
+    /// The model can be built, though perhaps not as intended.
     Warning,
 }
 
@@ -39,24 +39,24 @@ pub enum Severity {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Diagnostic {
     /// Error or warning.
-    pub severity: Severity,
+    pub severity: DiagnosticSeverity,
     /// What is wrong, in one line.
     pub message: String,
     /// Where; absent if a file could not be read at all.
-    pub span: Option<Span>,
+    pub span: Option<SourceSpan>,
     /// What was expected there; may be empty.
     pub label: String,
     /// Another place that explains the finding, such as a first definition.
-    pub related: Option<(Span, String)>,
+    pub related: Option<(SourceSpan, String)>,
     /// What to do, one sentence each.
     pub help: Vec<Message>,
 }
 
 impl Diagnostic {
     /// An error at a place.
-    pub(crate) fn error(span: Span, message: impl Into<String>) -> Self {
+    pub(crate) fn error(span: SourceSpan, message: impl Into<String>) -> Self {
         Self {
-            severity: Severity::Error,
+            severity: DiagnosticSeverity::Error,
             message: message.into(),
             span: Some(span),
             label: String::new(),
@@ -66,30 +66,30 @@ impl Diagnostic {
     }
 
     /// A warning at a place.
-    pub(crate) fn warning(span: Span, message: impl Into<String>) -> Self {
+    pub(crate) fn warning(span: SourceSpan, message: impl Into<String>) -> Self {
         Self {
-            severity: Severity::Warning,
+            severity: DiagnosticSeverity::Warning,
             ..Self::error(span, message)
         }
     }
 
-    /// Says what was expected at the marked text.
+    /// Sets the text at the marked place: what was expected there.
     #[must_use]
     pub(crate) fn label(mut self, label: impl Into<String>) -> Self {
         self.label = label.into();
         self
     }
 
-    /// Points at a second place.
+    /// Adds a second place with its own text, such as a first definition.
     #[must_use]
-    pub(crate) fn related(mut self, span: Span, label: impl Into<String>) -> Self {
+    pub(crate) fn related(mut self, span: SourceSpan, label: impl Into<String>) -> Self {
         self.related = Some((span, label.into()));
         self
     }
 
     /// Points to where a variant removes what is missing; otherwise gives other advice.
     #[must_use]
-    pub(crate) fn removed_or(self, removal: Option<Span>, advice: impl FnOnce() -> String) -> Self {
+    pub(crate) fn with_removal_or(self, removal: Option<SourceSpan>, advice: impl FnOnce() -> String) -> Self {
         match removal {
             Some(span) => self
                 .related(span, "the variant removes it here")
@@ -98,14 +98,14 @@ impl Diagnostic {
         }
     }
 
-    /// Says what to do.
+    /// Adds one sentence of advice.
     #[must_use]
     pub(crate) fn help(mut self, help: impl Into<Message>) -> Self {
         self.help.push(help.into());
         self
     }
 
-    /// Says what to do, if there is something to say.
+    /// Adds advice if there is any.
     #[must_use]
     pub(crate) fn help_if(mut self, help: Option<String>) -> Self {
         self.help.extend(help.map(Message::from));
@@ -124,19 +124,19 @@ pub struct SourceFile {
 
 /// The files that a model was read from, the model's own first.
 #[derive(Clone, Debug, Default)]
-pub struct Sources {
+pub struct SourceFiles {
     /// The files in the order in which they were read.
     pub files: Vec<SourceFile>,
 }
 
-impl Sources {
+impl SourceFiles {
     /// The paths of all files, for `cargo:rerun-if-changed`.
     pub fn paths(&self) -> impl Iterator<Item = &std::path::Path> {
         self.files.iter().map(|file| file.path.as_path())
     }
 
     /// Line and column of a place, both counted from one, the column in characters.
-    pub fn line_and_column(&self, span: Span) -> (usize, usize) {
+    pub fn line_and_column(&self, span: SourceSpan) -> (usize, usize) {
         let Some(file) = self.files.get(span.file) else {
             return (1, 1);
         };
@@ -149,20 +149,23 @@ impl Sources {
 
 /// Collects findings while a file is read.
 #[derive(Debug, Default)]
-pub(crate) struct Log {
+pub(crate) struct DiagnosticLog {
+    /// The findings that are kept, without duplicates; at most [`MOST_DIAGNOSTICS`].
     diagnostics: Vec<Diagnostic>,
+    /// Number of errors that were pushed, including those that are not kept.
     n_errors: usize,
+    /// Number of findings beyond the limit.
     n_left_off: usize,
-    /// Set while the text itself is broken: what is missing then is no news.
+    /// Set while the text itself is broken: missing entries are then not reported.
     pub(crate) syntax_broken: bool,
-    /// Where variants remove entries, by section and name: what still uses one is told so.
-    pub(crate) removed: BTreeMap<(String, String), Span>,
+    /// Where variants remove entries, by section and name; a use of a removed entry is reported with this place.
+    pub(crate) removed: BTreeMap<(String, String), SourceSpan>,
 }
 
-impl Log {
-    /// Takes a finding.
+impl DiagnosticLog {
+    /// Adds a finding, unless it is a duplicate or a consequence of another one.
     pub(crate) fn push(&mut self, diagnostic: Diagnostic) {
-        if diagnostic.severity == Severity::Error {
+        if diagnostic.severity == DiagnosticSeverity::Error {
             self.n_errors += 1;
         }
         if self.diagnostics.contains(&diagnostic) || self.is_consequence(&diagnostic) {
@@ -175,7 +178,7 @@ impl Log {
         }
     }
 
-    /// Whether the text is broken at the very place that a finding means.
+    /// Whether broken text was already reported at the place of this finding.
     fn is_consequence(&self, diagnostic: &Diagnostic) -> bool {
         let start = |one: &Diagnostic| one.span.map(|span| (span.file, span.start));
         let is_there = |one: &Diagnostic| start(one) == start(diagnostic);
@@ -188,7 +191,7 @@ impl Log {
     }
 
     /// Where a variant removes an entry from one of these sections.
-    pub(crate) fn removal(&self, sections: &[&str], name: &str) -> Option<Span> {
+    pub(crate) fn removal(&self, sections: &[&str], name: &str) -> Option<SourceSpan> {
         sections.iter().find_map(|section| {
             let key = ((*section).to_owned(), name.to_owned());
             self.removed.get(&key).copied()
@@ -202,17 +205,18 @@ impl Log {
 
     /// All findings in the order of their places.
     pub(crate) fn finish(mut self) -> Vec<Diagnostic> {
+        // A stable sort keeps the order of findings at the same place; those without a place come first.
         self.diagnostics
             .sort_by_key(|found| found.span.map(|span| (span.file, span.start)));
         if self.n_left_off > 0 {
             self.diagnostics.push(Diagnostic {
                 severity: if self.n_errors > 0 {
-                    Severity::Error
+                    DiagnosticSeverity::Error
                 } else {
-                    Severity::Warning
+                    DiagnosticSeverity::Warning
                 },
                 message: format!(
-                    "{} not shown; mend the first ones and look again",
+                    "{} not shown; correct the first ones and check again",
                     match self.n_left_off {
                         1 => "1 more finding is".to_owned(),
                         n => format!("{n} more findings are"),
@@ -228,19 +232,14 @@ impl Log {
     }
 }
 
-/// Renders findings one below the other, with the text they mean and advice in the words of whoever reads it.
+/// Renders findings one below the other, with the source lines and advice spelled for the reader's front end.
 pub(crate) fn render(
     diagnostics: &[Diagnostic],
-    sources: &Sources,
+    sources: &SourceFiles,
     color: bool,
     spelling: &dyn RemedySpelling,
 ) -> String {
-    let renderer = if color {
-        Renderer::styled()
-    } else {
-        Renderer::plain()
-    }
-    .decor_style(DecorStyle::Ascii);
+    let renderer = if color { Renderer::styled() } else { Renderer::plain() }.decor_style(DecorStyle::Ascii);
     let mut text = String::new();
     for diagnostic in diagnostics {
         text.push_str(&render_one(diagnostic, sources, &renderer, spelling));
@@ -248,38 +247,36 @@ pub(crate) fn render(
     }
     text.truncate(text.trim_end().len());
     text.push('\n');
-    // Names of files and texts of users are in it.
+    // File names and source lines come from users and may contain control sequences of terminals.
     modelmill_boundary::text::terminal(&text, color).into_owned()
 }
 
+/// Renders one finding: title, marked source lines, and its advice.
 fn render_one(
     diagnostic: &Diagnostic,
-    sources: &Sources,
+    sources: &SourceFiles,
     renderer: &Renderer,
     spelling: &dyn RemedySpelling,
 ) -> String {
     let help = diagnostic.help.iter();
     let help: Vec<String> = help.map(|help| help.spell(spelling)).collect();
     let level = match diagnostic.severity {
-        Severity::Error => Level::ERROR,
-        Severity::Warning => Level::WARNING,
+        DiagnosticSeverity::Error => Level::ERROR,
+        DiagnosticSeverity::Warning => Level::WARNING,
     };
     let mut group = Group::with_title(level.primary_title(diagnostic.message.as_str()));
     if let Some(span) = diagnostic.span {
         let label = Some(diagnostic.label.as_str()).filter(|label| !label.is_empty());
+        // A second place in the same file goes into the same snippet, otherwise into a snippet of its own.
         match diagnostic.related.as_ref() {
             Some((other, text)) if other.file == span.file => {
-                group = place(
-                    group,
-                    sources,
-                    &[(span, label, true), (*other, Some(text), false)],
-                );
+                group = annotate_lines(group, sources, &[(span, label, true), (*other, Some(text), false)]);
             }
             Some((other, text)) => {
-                group = place(group, sources, &[(span, label, true)]);
-                group = place(group, sources, &[(*other, Some(text), false)]);
+                group = annotate_lines(group, sources, &[(span, label, true)]);
+                group = annotate_lines(group, sources, &[(*other, Some(text), false)]);
             }
-            None => group = place(group, sources, &[(span, label, true)]),
+            None => group = annotate_lines(group, sources, &[(span, label, true)]),
         }
     }
     if diagnostic.span.is_none() {
@@ -296,18 +293,17 @@ fn render_one(
     renderer.render(&[group])
 }
 
+///
 /// Adds the marked lines of one file to a group; long lines are named, not shown.
-fn place<'a>(
+fn annotate_lines<'a>(
     group: Group<'a>,
-    sources: &'a Sources,
-    marks: &[(Span, Option<&'a str>, bool)],
+    sources: &'a SourceFiles,
+    marks: &[(SourceSpan, Option<&'a str>, bool)],
 ) -> Group<'a> {
-    let Some(file) = marks
-        .first()
-        .and_then(|mark| sources.files.get(mark.0.file))
-    else {
+    let Some(file) = marks.first().and_then(|mark| sources.files.get(mark.0.file)) else {
         return group;
     };
+    // The window covers all complete lines from the first mark to the last.
     let text = file.text.as_str();
     let path = file.path.to_string_lossy().replace('\\', "/");
     let first = marks.iter().map(|mark| mark.0.start).min().unwrap_or(0);
@@ -315,9 +311,7 @@ fn place<'a>(
     let start = line_start(text, first);
     let end = line_end(text, last);
     let window = &text[start..end];
-    if window.lines().any(|line| line.len() > LONGEST_PRINTED_LINE)
-        || window.len() > 200 * LONGEST_PRINTED_LINE
-    {
+    if window.lines().any(|line| line.len() > LONGEST_PRINTED_LINE) || window.len() > 200 * LONGEST_PRINTED_LINE {
         let (line, column) = sources.line_and_column(marks[0].0);
         let mut group = group.element(Origin::path(path).line(line).char_column(column));
         if let Some(label) = marks[0].1 {
@@ -325,6 +319,7 @@ fn place<'a>(
         }
         return group;
     }
+    // Line numbers count from one; positions of marks are relative to the window.
     let line = text[..start].matches('\n').count() + 1;
     let mut snippet = Snippet::source(window).line_start(line).path(path);
     for &(span, label, primary) in marks {
@@ -340,17 +335,20 @@ fn place<'a>(
     group.element(snippet)
 }
 
+/// Byte at which the line that contains `at` starts.
 fn line_start(text: &str, at: usize) -> usize {
     text[..floor_boundary(text, at)]
         .rfind('\n')
         .map_or(0, |found| found + 1)
 }
 
+/// Byte at which the line that contains `at` ends, without its line feed.
 fn line_end(text: &str, at: usize) -> usize {
     let at = ceil_boundary(text, at);
     text[at..].find('\n').map_or(text.len(), |found| at + found)
 }
 
+/// The last character boundary at or before `at`, so that slicing cannot panic.
 fn floor_boundary(text: &str, at: usize) -> usize {
     let mut at = at.min(text.len());
     while !text.is_char_boundary(at) {
@@ -359,6 +357,7 @@ fn floor_boundary(text: &str, at: usize) -> usize {
     at
 }
 
+/// The first character boundary at or after `at`.
 fn ceil_boundary(text: &str, at: usize) -> usize {
     let mut at = at.min(text.len());
     while !text.is_char_boundary(at) {

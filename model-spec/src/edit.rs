@@ -1,47 +1,47 @@
 //! Edits of a model file: an effect is added to its text, and everything else stays as it is, byte for byte.
 //!
-//! A text and a [`NewEffect`] go in, the new text comes out. The table goes behind the last effect, or to the end of a
-//! file without any; an inline list of effects gets one more entry.
+//! A text and a [`NewEffect`] go in, the new text comes out. The table is inserted behind the last effect, or at the
+//! end of a file without effects. An inline list of effects gets one more entry.
 //!
 //! Decision: an edit inserts text at one place, which is found from the spans of the parsed file. A parser that
-//! prints the whole document would change line ends and layout. The diagnosis and `add` use the same edit.
+//! prints the complete document would change line ends and layout. The diagnosis and `add` use the same edit.
 
 use std::collections::BTreeSet;
 use std::fmt;
 use std::path::PathBuf;
 
-use modelmill_boundary::files::Files;
+use modelmill_boundary::files::FileSource;
 
-use crate::diagnostic::{Log, SourceFile, Span};
-use crate::document::{self, Node, Value, get, quote};
-use crate::exact::Exact;
+use crate::diagnostic::{DiagnosticLog, SourceFile, SourceSpan};
+use crate::document::{self, TomlNode, TomlValue, find_key, quote};
+use crate::exact::ExactExpression;
 use crate::kinds::EffectKind;
-use crate::load::{Failure, Loaded, load_with};
-use crate::mechanism::{Effect, Mechanism, Place};
+use crate::load::{LoadFailure, LoadedModel, load_with};
+use crate::mechanism::{EffectPlace, Mechanism, ModelEffect};
 use crate::suggest;
 use crate::values::is_name;
 
-/// An effect that a model file shall have.
+/// An effect to be written into a model file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct NewEffect {
     /// Name of the kind.
     pub kind: String,
-    /// Where it acts.
+    /// Names of the places on which it acts.
     pub at: Vec<String>,
-    /// What is said of its parameters.
+    /// Names and nominal values of its parameters; all others have the defaults of the kind.
     pub parameters: Vec<NewParameter>,
     /// Values of its constants by their symbols, in SI units.
     pub constants: Vec<(String, f64)>,
-    /// A remark; its lines become comments above the effect.
+    /// A remark, which becomes comment lines above the effect.
     pub comment: Option<String>,
 }
 
-/// What is said of a parameter of a new effect.
+/// Name and nominal value of a parameter of a new effect.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct NewParameter {
     /// Its symbol in the kind.
     pub symbol: String,
-    /// Its name, if it is not to be called `symbol_place`; the name of a parameter that is there shares it.
+    /// Its name if that is not to be `symbol_place`. The name of an existing parameter shares that parameter.
     pub name: Option<String>,
     /// Nominal value in SI units.
     pub nominal: Option<f64>,
@@ -50,10 +50,10 @@ pub struct NewParameter {
 /// Why an effect cannot be added.
 #[derive(Clone, Debug)]
 pub enum EditFailure {
-    /// The effect is at fault: what is wrong, and what to do.
+    /// The effect is faulty: what is wrong, and what to do.
     Effect(String),
-    /// The model file is faulty, or would be with the effect.
-    Model(Box<Failure>),
+    /// The model file has errors, or would have them with the effect.
+    Model(Box<LoadFailure>),
 }
 
 impl fmt::Display for EditFailure {
@@ -69,55 +69,53 @@ impl std::error::Error for EditFailure {}
 
 /// A model file with an effect added.
 #[derive(Clone, Debug)]
-pub struct Edited {
+pub struct EditedModel {
     /// Its text.
     pub text: String,
-    /// What it means now.
-    pub loaded: Loaded,
-    /// The effect as it was added: with names for parameters whose usual names are taken.
+    /// The model after the edit.
+    pub loaded: LoadedModel,
+    /// The effect as it was added, with names for parameters whose default names are taken.
     pub effect: NewEffect,
 }
 
 /// Adds an effect to a model that is read from its text, as [`crate::load_with`] does, and reads the result.
 ///
-/// Fails if the model file is faulty before or after, if the kind or one of its symbols is unknown, and if the same
-/// effect acts at one of the places already.
+/// Fails if the model file has errors before or after the edit, if the kind or one of its symbols is unknown, or if
+/// the same effect already acts at one of the places.
 pub fn add_to_model(
     path_name: &str,
     text: &str,
     effect: &NewEffect,
     libraries: &[PathBuf],
-    files: &dyn Files,
-) -> Result<Edited, EditFailure> {
+    files: &dyn FileSource,
+) -> Result<EditedModel, EditFailure> {
     let model = |failure| EditFailure::Model(Box::new(failure));
+    // The file is read before and after the edit, so that the result is known to be valid.
     let before = load_with(path_name, text, libraries, files).map_err(model)?;
     let kind = kind_of(effect, &before.kinds)?;
     refuse_twin(effect, kind, &before.mechanism)?;
     let effect = with_free_names(effect, kind, &before.mechanism);
     let edited = add_effect(text, &effect)?;
     let loaded = load_with(path_name, &edited, libraries, files)
-        .map_err(|failure| model(apart(failure, text, &edited, &effect)))?;
-    Ok(Edited {
+        .map_err(|failure| model(relocate_failure(failure, text, &edited, &effect)))?;
+    Ok(EditedModel {
         text: edited,
         loaded,
         effect,
     })
 }
 
-/// What messages call the text of an effect that is not in any file yet.
+/// Name in messages for the text of the new effect, which is in no file yet.
 const NEW_EFFECT: &str = "the effect to be added";
 
-/// A failure of the edited text with its places in what the user knows: the file as it is, and the effect as a text of
-/// its own. Lines of the edited text are those of no file.
-fn apart(mut failure: Failure, old: &str, new: &str, effect: &NewEffect) -> Failure {
+/// Moves the places of a failure from the edited text to texts that the user knows: the file as it is, and the effect
+/// as a text of its own.
+fn relocate_failure(mut failure: LoadFailure, old: &str, new: &str, effect: &NewEffect) -> LoadFailure {
     let line_end = if old.contains("\r\n") { "\r\n" } else { "\n" };
-    let same = old
-        .bytes()
-        .zip(new.bytes())
-        .take_while(|(a, b)| a == b)
-        .count();
-    // The same text before the place of the edit is another effect's.
-    let found = [block(effect, line_end), inline(effect)]
+    // Length of the common beginning of both texts; the edit lies behind it.
+    let same = old.bytes().zip(new.bytes()).take_while(|(a, b)| a == b).count();
+    // The same text before the place of the edit belongs to another effect.
+    let found = [effect_table(effect, line_end), inline_effect(effect)]
         .into_iter()
         .find_map(|entry| {
             let mut places = new.match_indices(&entry);
@@ -127,6 +125,7 @@ fn apart(mut failure: Failure, old: &str, new: &str, effect: &NewEffect) -> Fail
     let (Some((start, entry)), Some(file)) = (found, failure.sources.files.first_mut()) else {
         return failure;
     };
+    // The first source becomes the file of the user again; the effect becomes an additional source.
     old.clone_into(&mut file.text);
     let end = start + entry.len();
     let added = failure.sources.files.len();
@@ -135,7 +134,8 @@ fn apart(mut failure: Failure, old: &str, new: &str, effect: &NewEffect) -> Fail
         text: entry,
     });
     let longer = new.len().saturating_sub(old.len());
-    let moved = |span: &mut Span| {
+    // Places inside of the effect move to the new source, those behind it back by the added length.
+    let moved = |span: &mut SourceSpan| {
         if span.file != 0 {
             return;
         }
@@ -155,10 +155,10 @@ fn apart(mut failure: Failure, old: &str, new: &str, effect: &NewEffect) -> Fail
     failure
 }
 
-/// Identified values that a model file shall have.
+/// Identified values to be written into a model file.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Adopted {
-    /// Where they come from.
+pub struct AdoptedValues {
+    /// Where the values come from; printed as comment lines.
     pub comment: String,
     /// Values of parameters by their names.
     pub parameters: Vec<(String, f64)>,
@@ -166,36 +166,35 @@ pub struct Adopted {
     pub base: Vec<(String, f64)>,
 }
 
-/// Writes identified values into the text of a model file, in the place of earlier ones; everything else stays as it is.
+/// Writes identified values into the text of a model file and replaces earlier ones; everything else stays unchanged.
 ///
-/// Fails if the text is not TOML, or has its table `identified` in another form than this function writes.
+/// Fails if the text is not TOML, or if its table `identified` has another form than this function writes.
 ///
 /// ```
-/// use modelmill_spec::edit::{Adopted, adopt};
-/// let values = Adopted {
+/// use modelmill_spec::edit::{AdoptedValues, write_identified};
+/// let values = AdoptedValues {
 ///     comment: "from a fit".to_owned(),
 ///     base: vec![("m*l".to_owned(), 2.5)],
-///     ..Adopted::default()
+///     ..AdoptedValues::default()
 /// };
-/// let text = adopt("name = \"arm\" # mine\n", &values).unwrap();
+/// let text = write_identified("name = \"arm\" # mine\n", &values).unwrap();
 /// assert_eq!(text, "name = \"arm\" # mine\n\n[identified]\n# from a fit\nbase = [\n  \
 ///                   { expression = \"m*l\", value = 2.5 },\n]\n");
-/// assert_eq!(adopt(&text, &values).unwrap(), text);
+/// assert_eq!(write_identified(&text, &values).unwrap(), text);
 /// ```
-pub fn adopt(text: &str, values: &Adopted) -> Result<String, String> {
-    let mut log = Log::default();
-    let table = document::parse(text, 0, &mut log);
+pub fn write_identified(text: &str, values: &AdoptedValues) -> Result<String, String> {
+    let mut log = DiagnosticLog::default();
+    let table = document::parse_toml(text, 0, &mut log);
     if log.n_errors() > 0 {
-        return Err("this is not TOML; mend the file first".to_owned());
+        return Err("this is not TOML; correct the file first".to_owned());
     }
     let line_end = if text.contains("\r\n") { "\r\n" } else { "\n" };
     let mut kept = text.to_owned();
-    if let Some((key, _)) = get(&table, "identified") {
+    // An earlier table is removed from its header to its last line of values.
+    if let Some((key, _)) = find_key(&table, "identified") {
         let start = text[..key.span.start].rfind('\n').map_or(0, |end| end + 1);
         if text[start..].lines().next().map(str::trim) != Some("[identified]") {
-            return Err(
-                "write `[identified]` as a table of its own, on a line of its own".to_owned(),
-            );
+            return Err("write `[identified]` as a table of its own, on a line of its own".to_owned());
         }
         let mut end = text.len();
         let mut at = start;
@@ -206,62 +205,57 @@ pub fn adopt(text: &str, values: &Adopted) -> Result<String, String> {
             }
             at += line.len();
         }
-        // What stands above the next table belongs to it.
+        // Comments and blank lines above the next table belong to that table.
         let own = &text[start..end];
-        let last = own
-            .trim_end()
-            .rfind(['\n', ']', '}'])
-            .unwrap_or(own.len() - 1);
-        let own_end = own[last..]
-            .find('\n')
-            .map_or(own.len(), |line| last + line + 1);
+        let last = own.trim_end().rfind(['\n', ']', '}']).unwrap_or(own.len() - 1);
+        let own_end = own[last..].find('\n').map_or(own.len(), |line| last + line + 1);
         kept = format!("{}{}", text[..start].trim_end(), line_end);
         let rest = &text[start + own_end..];
+        // The new table takes the place of the old one if other tables follow.
         if !rest.trim().is_empty() {
-            let block = identified(values, line_end);
+            let block = identified_table(values, line_end);
             return Ok(format!(
                 "{kept}{line_end}{block}{line_end}{}",
                 rest.trim_start_matches(['\r', '\n'])
             ));
         }
     }
+    // Otherwise it is appended, separated by an empty line.
     if !kept.is_empty() {
         if !kept.ends_with('\n') {
             kept.push_str(line_end);
         }
         kept.push_str(line_end);
     }
-    Ok(kept + &identified(values, line_end))
+    Ok(kept + &identified_table(values, line_end))
 }
 
-/// The table of identified values.
-fn identified(values: &Adopted, line_end: &str) -> String {
+/// The text of the table of identified values.
+fn identified_table(values: &AdoptedValues, line_end: &str) -> String {
     let mut lines = vec!["[identified]".to_owned()];
+    // Control characters would end a comment.
     let comment = values.comment.lines();
     lines.extend(comment.map(|line| format!("# {}", line.replace(char::is_control, " "))));
     if !values.parameters.is_empty() {
         let pairs = values.parameters.iter();
-        let pairs: Vec<String> = pairs
-            .map(|(name, value)| format!("{name} = {value:?}"))
-            .collect();
+        let pairs: Vec<String> = pairs.map(|(name, value)| format!("{name} = {value:?}")).collect();
         lines.push(format!("parameters = {{ {} }}", pairs.join(", ")));
     }
     if !values.base.is_empty() {
         lines.push("base = [".to_owned());
         for (expression, value) in &values.base {
             let expression = expression.replace('\\', "\\\\").replace('"', "\\\"");
-            lines.push(format!(
-                "  {{ expression = \"{expression}\", value = {value:?} }},"
-            ));
+            lines.push(format!("  {{ expression = \"{expression}\", value = {value:?} }},"));
         }
         lines.push("]".to_owned());
     }
     lines.join(line_end) + line_end
 }
 
-/// Adds an effect to the text of a model file; whether it means anything there is not looked at.
+/// Adds an effect to the text of a model file. Whether the effect fits the model is not checked.
 ///
-/// Fails if the text is not TOML, its `effect` is no list of tables, or the effect cannot be written.
+/// Fails if the text is not TOML, if its `effect` is not a list of tables, or if the effect has names or values that
+/// cannot be written.
 ///
 /// ```
 /// use modelmill_spec::edit::{NewEffect, NewParameter, add_effect};
@@ -277,26 +271,25 @@ fn identified(values: &Adopted, line_end: &str) -> String {
 /// ```
 pub fn add_effect(text: &str, effect: &NewEffect) -> Result<String, EditFailure> {
     check_writable(effect)?;
-    let mut log = Log::default();
-    let table = document::parse(text, 0, &mut log);
+    let mut log = DiagnosticLog::default();
+    let table = document::parse_toml(text, 0, &mut log);
     if log.n_errors() > 0 {
         let says = log.finish().into_iter().next().map(|found| found.message);
         return Err(EditFailure::Effect(format!(
-            "{}; mend the file first",
+            "{}; correct the file first",
             says.unwrap_or_else(|| "this is not TOML".to_owned())
         )));
     }
     let line_end = if text.contains("\r\n") { "\r\n" } else { "\n" };
-    match get(&table, "effect") {
+    match find_key(&table, "effect") {
         None => Ok(append(text, effect, line_end)),
         Some((key, node)) => {
-            let Value::Array(entries) = &node.value else {
+            let TomlValue::Array(entries) = &node.value else {
                 return Err(EditFailure::Effect(
-                    "`effect` of this file is no list of tables; write effects as `[[effect]]`"
-                        .to_owned(),
+                    "`effect` of this file is not a list of tables; write effects as `[[effect]]`".to_owned(),
                 ));
             };
-            // Behind the key of an inline list stands `=`, behind that of a header `]]`.
+            // The key of an inline list is followed by `=`, that of a header by `]]`.
             let is_inline = text[key.span.end..].trim_start().starts_with('=');
             if is_inline {
                 Ok(extend_inline(text, node, entries, effect, line_end))
@@ -307,31 +300,29 @@ pub fn add_effect(text: &str, effect: &NewEffect) -> Result<String, EditFailure>
     }
 }
 
-/// The last byte that belongs to a value or anything in it.
-fn end_of(node: &Node) -> usize {
+/// End of a value, including everything in it, in bytes.
+fn end_of(node: &TomlNode) -> usize {
     let inner = match &node.value {
-        Value::Array(entries) => entries.iter().map(end_of).max(),
-        Value::Table(table) => table
-            .iter()
-            .map(|(key, node)| key.span.end.max(end_of(node)))
-            .max(),
+        TomlValue::Array(entries) => entries.iter().map(end_of).max(),
+        TomlValue::Table(table) => table.iter().map(|(key, node)| key.span.end.max(end_of(node))).max(),
         _ => None,
     };
     inner.unwrap_or(0).max(node.span.end)
 }
 
-/// Puts a table behind the last effect.
-fn insert_behind(text: &str, list: &Node, effect: &NewEffect, line_end: &str) -> String {
+/// Inserts a table behind the last effect.
+fn insert_behind(text: &str, list: &TomlNode, effect: &NewEffect, line_end: &str) -> String {
     let end = end_of(list).min(text.len());
+    // Without a line end behind the last effect the file ends there.
     let Some(rest) = text[end..].find('\n') else {
         return append(text, effect, line_end);
     };
     let at = end + rest + 1;
-    let block = block(effect, line_end);
+    let block = effect_table(effect, line_end);
     format!("{}{line_end}{block}{}", &text[..at], &text[at..])
 }
 
-/// Puts a table at the end of a file.
+/// Appends a table to the file, separated by an empty line.
 fn append(text: &str, effect: &NewEffect, line_end: &str) -> String {
     let mut new = text.to_owned();
     if !text.is_empty() {
@@ -340,25 +331,19 @@ fn append(text: &str, effect: &NewEffect, line_end: &str) -> String {
         }
         new.push_str(line_end);
     }
-    new.push_str(&block(effect, line_end));
+    new.push_str(&effect_table(effect, line_end));
     new
 }
 
-/// Puts an entry behind the last one of an inline list.
-fn extend_inline(
-    text: &str,
-    list: &Node,
-    entries: &[Node],
-    effect: &NewEffect,
-    line_end: &str,
-) -> String {
-    let entry = inline(effect);
+/// Inserts an entry behind the last one of an inline list.
+fn extend_inline(text: &str, list: &TomlNode, entries: &[TomlNode], effect: &NewEffect, line_end: &str) -> String {
+    let entry = inline_effect(effect);
     let Some(last) = entries.last() else {
-        let at = list.span.start + 1; // Behind the bracket.
+        let at = list.span.start + 1; // Position behind the bracket.
         return format!("{}{entry}{}", &text[..at], &text[at..]);
     };
     let end = last.span.end;
-    // A list with an entry per line goes on like that.
+    // If entries stand on lines of their own, the new one gets its own line with the same indentation.
     let line = text[..last.span.start].rfind('\n').map_or(0, |at| at + 1);
     let indent = &text[line..last.span.start];
     let lead = if line > list.span.start && indent.trim().is_empty() {
@@ -366,15 +351,13 @@ fn extend_inline(
     } else {
         " ".to_owned()
     };
+    // A comma behind the last entry is kept; otherwise one is inserted.
     let (comma, behind) = match comma_behind(text, end) {
         Some(comma) => (None, comma + 1),
         None => (Some(end), end),
     };
-    // A remark on the same line belongs to the last entry.
-    let rest_of_line = text[behind..]
-        .split_inclusive('\n')
-        .next()
-        .unwrap_or_default();
+    // A comment on the same line belongs to the last entry, so the new one goes to the next line.
+    let rest_of_line = text[behind..].split_inclusive('\n').next().unwrap_or_default();
     let remark = rest_of_line.trim_start().starts_with('#');
     let (at, lead) = if remark {
         let length = rest_of_line.trim_end_matches(['\r', '\n']).len();
@@ -383,6 +366,7 @@ fn extend_inline(
     } else {
         (behind, lead)
     };
+    // The new entry ends with a comma exactly if the last one did.
     let (comma, close) = match comma {
         Some(_) => (",", ""),
         None => ("", ","),
@@ -395,7 +379,7 @@ fn extend_inline(
     )
 }
 
-/// The comma behind an entry of a list, past blanks and remarks.
+/// Position of the comma behind an entry of a list, after blanks and comments; `None` if there is none.
 fn comma_behind(text: &str, end: usize) -> Option<usize> {
     let mut at = end;
     loop {
@@ -410,8 +394,8 @@ fn comma_behind(text: &str, end: usize) -> Option<usize> {
     }
 }
 
-/// The effect as a table with a header.
-fn block(effect: &NewEffect, line_end: &str) -> String {
+/// The effect as a table with a header, preceded by its remark as comment lines.
+fn effect_table(effect: &NewEffect, line_end: &str) -> String {
     let mut lines: Vec<String> = remarks(effect).map(|line| format!("# {line}")).collect();
     lines.push("[[effect]]".to_owned());
     lines.extend(fields(effect));
@@ -419,8 +403,8 @@ fn block(effect: &NewEffect, line_end: &str) -> String {
     lines.join(line_end)
 }
 
-/// The effect as an inline table.
-fn inline(effect: &NewEffect) -> String {
+/// The effect as an inline table; its remark becomes the field `note`.
+fn inline_effect(effect: &NewEffect) -> String {
     let mut fields = fields(effect);
     let remark: Vec<String> = remarks(effect).collect();
     if !remark.is_empty() {
@@ -430,23 +414,20 @@ fn inline(effect: &NewEffect) -> String {
     format!("{{ {} }}", fields.join(", "))
 }
 
-/// The lines of the remark, without what a line cannot hold.
+/// The lines of the remark without control characters.
 fn remarks(effect: &NewEffect) -> impl Iterator<Item = String> {
     let lines = effect.comment.iter().flat_map(|comment| comment.lines());
-    lines.map(|line| {
-        line.trim()
-            .chars()
-            .filter(|char| !char.is_control())
-            .collect()
-    })
+    lines.map(|line| line.trim().chars().filter(|char| !char.is_control()).collect())
 }
 
+/// The fields of the effect as `key = value`; parameters and constants only if there are any.
 fn fields(effect: &NewEffect) -> Vec<String> {
     let places: Vec<String> = effect.at.iter().map(|name| format!("\"{name}\"")).collect();
     let mut fields = vec![
         format!("kind = \"{}\"", effect.kind),
         format!("at = [{}]", places.join(", ")),
     ];
+    // Parameters without a name and a value keep the defaults of the kind.
     let said = effect
         .parameters
         .iter()
@@ -471,7 +452,7 @@ fn fields(effect: &NewEffect) -> Vec<String> {
     fields
 }
 
-/// Refuses names and numbers that a model file cannot hold.
+/// Refuses names that are not identifiers, and values that are not finite.
 fn check_writable(effect: &NewEffect) -> Result<(), EditFailure> {
     let parameters = effect.parameters.iter();
     let names = std::iter::once(&effect.kind)
@@ -489,12 +470,7 @@ fn check_writable(effect: &NewEffect) -> Result<(), EditFailure> {
     }
     let values = parameters
         .filter_map(|one| Some((&one.symbol, one.nominal?)))
-        .chain(
-            effect
-                .constants
-                .iter()
-                .map(|(symbol, value)| (symbol, *value)),
-        );
+        .chain(effect.constants.iter().map(|(symbol, value)| (symbol, *value)));
     for (symbol, value) in values {
         if !value.is_finite() {
             return Err(EditFailure::Effect(format!(
@@ -505,7 +481,7 @@ fn check_writable(effect: &NewEffect) -> Result<(), EditFailure> {
     Ok(())
 }
 
-/// The kind of a new effect, if it has all symbols that the effect names.
+/// The kind of a new effect; fails if it is unknown or lacks a symbol that the effect uses.
 fn kind_of<'a>(effect: &NewEffect, kinds: &'a [EffectKind]) -> Result<&'a EffectKind, EditFailure> {
     let unknown = |what: &str, name: &str, known: Vec<&str>, of: &str| {
         let advice = suggest::advice(name, &format!("{what}s"), known.iter().copied());
@@ -516,17 +492,13 @@ fn kind_of<'a>(effect: &NewEffect, kinds: &'a [EffectKind]) -> Result<&'a Effect
         return Err(unknown("kind", &effect.kind, known, ""));
     };
     let of = format!(" of `{}`", kind.name);
-    let symbols: Vec<&str> = (kind.parameters.iter())
-        .map(|one| one.symbol.as_str())
-        .collect();
+    let symbols: Vec<&str> = (kind.parameters.iter()).map(|one| one.symbol.as_str()).collect();
     for one in &effect.parameters {
         if !symbols.contains(&one.symbol.as_str()) {
             return Err(unknown("parameter", &one.symbol, symbols, &of));
         }
     }
-    let symbols: Vec<&str> = (kind.constants.iter())
-        .map(|one| one.symbol.as_str())
-        .collect();
+    let symbols: Vec<&str> = (kind.constants.iter()).map(|one| one.symbol.as_str()).collect();
     for (symbol, _) in &effect.constants {
         if !symbols.contains(&symbol.as_str()) {
             return Err(unknown("constant", symbol, symbols, &of));
@@ -535,12 +507,9 @@ fn kind_of<'a>(effect: &NewEffect, kinds: &'a [EffectKind]) -> Result<&'a Effect
     Ok(kind)
 }
 
-/// Refuses an effect that acts at one of its places already, with the same constants.
-fn refuse_twin(
-    effect: &NewEffect,
-    kind: &EffectKind,
-    mechanism: &Mechanism,
-) -> Result<(), EditFailure> {
+/// Refuses an effect that already acts at one of its places with the same constants.
+fn refuse_twin(effect: &NewEffect, kind: &EffectKind, mechanism: &Mechanism) -> Result<(), EditFailure> {
+    // The value of the new effect, else the default of the kind.
     let wanted = |symbol: &str| {
         let given = effect.constants.iter().find(|(name, _)| name == symbol);
         given.map(|(_, value)| *value).or_else(|| {
@@ -553,16 +522,15 @@ fn refuse_twin(
             .constants
             .iter()
             .all(|one| known.constant(&one.symbol, mechanism) == wanted(&one.symbol));
-        // What couples two places may couple each with a third.
+        // Effects that couple two places are equal only if they couple the same ones.
         let places = known.places.iter().chain(&known.other);
         let names = places.map(|p| mechanism.place_name(*p));
         if kind.places == Some(2) && !names.clone().all(|n| effect.at.iter().any(|at| at == n)) {
             continue;
         }
-        let whole = matches!(known.places[..], [Place::Base | Place::Force]);
-        let place = names
-            .into_iter()
-            .find(|name| effect.at.iter().any(|at| at == name));
+        // Tilt and delay are properties of the complete mechanism, whatever their constants are.
+        let whole = matches!(known.places[..], [EffectPlace::Base | EffectPlace::Force]);
+        let place = names.into_iter().find(|name| effect.at.iter().any(|at| at == name));
         if let Some(place) = place.filter(|_| alike || whole) {
             return Err(EditFailure::Effect(format!(
                 "`{}` acts at `{place}` already; change that effect in the model file instead, or remove it there",
@@ -573,7 +541,7 @@ fn refuse_twin(
     Ok(())
 }
 
-/// The effect with names for those parameters whose usual names mean something else already.
+/// The effect with new names for parameters whose default names are taken by other quantities.
 fn with_free_names(effect: &NewEffect, kind: &EffectKind, mechanism: &Mechanism) -> NewEffect {
     let parameters = mechanism.parameters.iter().map(|one| one.name.as_str());
     let constants = mechanism.constants.iter().map(|one| one.name.as_str());
@@ -582,16 +550,11 @@ fn with_free_names(effect: &NewEffect, kind: &EffectKind, mechanism: &Mechanism)
     let mut named = effect.clone();
     for symbol in kind.parameters.iter().map(|one| &one.symbol) {
         let usual = format!("{symbol}_{}", effect.at.join("_"));
-        let said = named
-            .parameters
-            .iter()
-            .position(|one| one.symbol == *symbol);
-        if !taken.contains(usual.as_str())
-            || said.is_some_and(|i| named.parameters[i].name.is_some())
-        {
+        let said = named.parameters.iter().position(|one| one.symbol == *symbol);
+        if !taken.contains(usual.as_str()) || said.is_some_and(|i| named.parameters[i].name.is_some()) {
             continue;
         }
-        // More names are not taken than there are names.
+        // One of these numbers is free, because there are more of them than names.
         let free = (2..taken.len() + 3)
             .map(|n| format!("{usual}_{n}"))
             .find(|name| !taken.contains(name.as_str()));
@@ -608,24 +571,25 @@ fn with_free_names(effect: &NewEffect, kind: &EffectKind, mechanism: &Mechanism)
 }
 
 impl Mechanism {
-    /// The name of a place, as the model file calls it.
-    pub fn place_name(&self, place: Place) -> &str {
+    /// The name of a place in the model file.
+    pub fn place_name(&self, place: EffectPlace) -> &str {
         match place {
-            Place::Drive(idx) => &self.drives[idx.0].name,
-            Place::Coordinate(idx) => &self.coordinates[idx.0].name,
-            Place::Point(idx) => &self.points[idx.0].name,
-            Place::Part(idx) => &self.parts[idx.0].name,
-            Place::Base => "base",
-            Place::Force => "force",
+            EffectPlace::Drive(idx) => &self.drives[idx.0].name,
+            EffectPlace::Coordinate(idx) => &self.coordinates[idx.0].name,
+            EffectPlace::Point(idx) => &self.points[idx.0].name,
+            EffectPlace::Part(idx) => &self.parts[idx.0].name,
+            EffectPlace::Base => "base",
+            EffectPlace::Force => "force",
         }
     }
 }
 
-impl Effect {
-    /// The value of a constant of its kind, in SI units; `None` if the kind has none of this symbol or it is left away.
+impl ModelEffect {
+    /// The value of a constant of its kind, in SI units; `None` if the kind has no such constant or the value is
+    /// omitted.
     pub fn constant(&self, symbol: &str, mechanism: &Mechanism) -> Option<f64> {
         let found = self.constants.iter().find(|(name, _)| name == symbol);
-        let value = |exact: &Exact| exact.evaluate(&|symbol| mechanism.symbol_nominal(symbol));
+        let value = |exact: &ExactExpression| exact.evaluate(&|symbol| mechanism.symbol_nominal(symbol));
         found.map(|(_, exact)| value(exact))
     }
 }

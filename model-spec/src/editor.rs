@@ -1,32 +1,36 @@
-//! The JSON Schema of model files, by which editors complete, explain and check them while they are written.
+//! The JSON Schema of model files, which editors use to complete, explain and check them.
+//!
+//! The types that read a file go in, one JSON document comes out. A test compares it with the stored file.
 
 use serde_json::{Map, Value, json};
 
-/// Ends the names of definitions that serve variants, whose entries may be parts of entries.
+/// Suffix of the names of definitions for variants, whose entries may be incomplete.
 const PARTIAL: &str = "InVariant";
 
 /// The JSON Schema of model files.
 ///
-/// It derives from the types that read a file. Entries of a variant (a file with `extends`) override single fields,
-/// so only there may required fields be missing.
+/// It is derived from the types that read a file. Entries of a variant, a file with `extends`, override single
+/// fields. Therefore required fields may be missing only there.
 pub fn json_schema() -> Value {
     let root = schemars::generate::SchemaSettings::draft2020_12()
         .into_generator()
         .into_root_schema_for::<crate::schema::ModelEntry>()
         .to_value();
+    // Every definition exists twice: as it is, and with all fields optional.
     let mut strict_definitions = root["$defs"].as_object().cloned().unwrap_or_default();
     let mut definitions = Map::new();
     for (name, schema) in &strict_definitions {
-        definitions.insert(format!("{name}{PARTIAL}"), partial(schema));
+        definitions.insert(format!("{name}{PARTIAL}"), optional_schema(schema));
     }
     definitions.append(&mut strict_definitions);
     let known: Vec<String> = definitions.keys().cloned().collect();
+    // Without `extends` the strict properties apply in addition.
     let mut schema = json!({
         "$schema": root["$schema"],
         "title": "A model file of modelmill",
         "description": root["description"],
         "type": "object",
-        "properties": partial(&root["properties"]),
+        "properties": optional_schema(&root["properties"]),
         "required": root["required"],
         "additionalProperties": false,
         "if": { "not": { "required": ["extends"] } },
@@ -37,8 +41,8 @@ pub fn json_schema() -> Value {
     schema
 }
 
-/// A copy in which nothing is required, and which refers to such copies.
-fn partial(schema: &Value) -> Value {
+/// A copy without required fields, whose references lead to such copies.
+fn optional_schema(schema: &Value) -> Value {
     match schema {
         Value::Object(fields) => Value::Object(
             fields
@@ -46,20 +50,19 @@ fn partial(schema: &Value) -> Value {
                 // A property may be called `required`; only a list of names is the keyword.
                 .filter(|(key, value)| !(*key == "required" && value.is_array()))
                 .map(|(key, value)| match value.as_str() {
-                    Some(target) if key == "$ref" => {
-                        (key.clone(), Value::String(format!("{target}{PARTIAL}")))
-                    }
-                    _ => (key.clone(), partial(value)),
+                    Some(target) if key == "$ref" => (key.clone(), Value::String(format!("{target}{PARTIAL}"))),
+                    _ => (key.clone(), optional_schema(value)),
                 })
                 .collect(),
         ),
-        Value::Array(entries) => Value::Array(entries.iter().map(partial).collect()),
+        Value::Array(entries) => Value::Array(entries.iter().map(optional_schema).collect()),
         other => other.clone(),
     }
 }
 
-/// Drops copies that do not differ from their originals, and points to these instead.
+/// Removes copies that equal their originals, and redirects references to the originals.
 fn prune(schema: &mut Value, known: &[String]) {
+    // Each removal may make further copies equal, so passes are repeated until nothing changes.
     for _ in 0..known.len() {
         let Some(definitions) = schema["$defs"].as_object() else {
             return;
@@ -81,15 +84,12 @@ fn prune(schema: &mut Value, known: &[String]) {
             if let Some(definitions) = schema["$defs"].as_object_mut() {
                 definitions.remove(&copy);
             }
-            redirect(
-                schema,
-                &format!("#/$defs/{copy}"),
-                &format!("#/$defs/{name}"),
-            );
+            redirect(schema, &format!("#/$defs/{copy}"), &format!("#/$defs/{name}"));
         }
     }
 }
 
+/// Replaces all references to `from` by references to `to`.
 fn redirect(schema: &mut Value, from: &str, to: &str) {
     match schema {
         Value::Object(fields) => {

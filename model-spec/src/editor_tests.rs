@@ -57,13 +57,7 @@ fn fits_every_model() {
 #[test]
 fn refuses_what_the_loader_refuses() {
     let validator = jsonschema::validator_for(&json_schema()).unwrap();
-    for name in [
-        "unknown_keys",
-        "wrong_types",
-        "empty",
-        "schema_version",
-        "bad_parts",
-    ] {
+    for name in ["unknown_keys", "wrong_types", "empty", "schema_version", "bad_parts"] {
         let model = to_json(&folder("tests/faulty").join(format!("{name}.toml")));
         assert!(!validator.is_valid(&model), "{name}");
     }

@@ -1,6 +1,6 @@
 //! Exact scalars and angles as a model file writes them: `"-pi/2"`, `"1/2"`, `"2*r3 + d4"`.
 //!
-//! Text goes in (see `parse`), trees over the file's symbols come out; nothing here is rounded.
+//! They are trees over the symbols of a file, made by `parser` and `scope`. Nothing here is rounded.
 
 use num_rational::BigRational;
 
@@ -14,27 +14,27 @@ pub struct ParameterIdx(pub usize);
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct CoordinateIdx(pub usize);
 
-/// What an effect may refer to at its place.
+/// A quantity of its place that an effect may use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum PlaceQuantity {
-    /// The actuator's length or angle, or the joint coordinate itself.
+    /// The length or angle of the actuator, or the joint coordinate itself.
     Coordinate,
     /// Its first time derivative.
     Rate,
     /// Its second time derivative.
     Acceleration,
-    /// The force or torque that the place carries, effects aside.
+    /// The force or torque at the place, without those of effects.
     Load,
-    /// The coordinate of the other of two places.
+    /// The coordinate of the other one of two places.
     OtherCoordinate,
-    /// The rate of the other of two places.
+    /// The rate of the other one of two places.
     OtherRate,
-    /// The acceleration of the other of two places.
+    /// The acceleration of the other one of two places.
     OtherAcceleration,
 }
 
 impl PlaceQuantity {
-    /// Every quantity.
+    /// All quantities.
     pub const ALL: [Self; 7] = [
         Self::Coordinate,
         Self::Rate,
@@ -45,7 +45,7 @@ impl PlaceQuantity {
         Self::OtherAcceleration,
     ];
 
-    /// The word for it in expressions.
+    /// Its name in expressions.
     pub fn name(self) -> &'static str {
         match self {
             Self::Coordinate => "coordinate",
@@ -58,21 +58,18 @@ impl PlaceQuantity {
         }
     }
 
-    /// Whether it belongs to the other of two places.
+    /// Whether it belongs to the other one of two places.
     pub fn is_other(self) -> bool {
-        matches!(
-            self,
-            Self::OtherCoordinate | Self::OtherRate | Self::OtherAcceleration
-        )
+        matches!(self, Self::OtherCoordinate | Self::OtherRate | Self::OtherAcceleration)
     }
 }
 
 /// A name of the model file, resolved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Symbol {
+pub enum ModelSymbol {
     /// Known geometry, gravity and the like.
     Constant(ConstantIdx),
-    /// A dynamic parameter, which identification may find.
+    /// A dynamic parameter, which identification may estimate.
     Parameter(ParameterIdx),
     /// A joint coordinate.
     Coordinate(CoordinateIdx),
@@ -82,7 +79,7 @@ pub enum Symbol {
 
 /// Functions that may stand in an exact expression.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Function {
+pub enum ExactFunction {
     /// Sine of an angle.
     Sin,
     /// Cosine of an angle.
@@ -101,43 +98,43 @@ pub enum Function {
 
 /// An exact expression over the symbols of a model file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Exact {
+pub enum ExactExpression {
     /// A rational number; decimals such as `0.316` are rationals too.
     Rational(BigRational),
-    /// The ratio of a circle's circumference to its diameter.
+    /// The number pi.
     Pi,
     /// A named quantity.
-    Symbol(Symbol),
+    Symbol(ModelSymbol),
     /// Sum of the operands.
-    Sum(Vec<Exact>),
+    Sum(Vec<ExactExpression>),
     /// Product of the operands.
-    Product(Vec<Exact>),
+    Product(Vec<ExactExpression>),
     /// First operand over the second.
-    Quotient(Box<Exact>, Box<Exact>),
-    /// The operand with its sign changed.
-    Negative(Box<Exact>),
-    /// Integer power; the exponent's magnitude is at most 16.
-    Power(Box<Exact>, i32),
+    Quotient(Box<ExactExpression>, Box<ExactExpression>),
+    /// The operand with the opposite sign.
+    Negative(Box<ExactExpression>),
+    /// Integer power with an exponent of magnitude at most 16.
+    Power(Box<ExactExpression>, i32),
     /// A function of the operand.
-    Apply(Function, Box<Exact>),
+    Apply(ExactFunction, Box<ExactExpression>),
 }
 
-/// An angle whose sine and cosine are exact: `pi * turns + sum of integer multiples of symbols`, in rad.
+/// An angle whose sine and cosine are exact, in rad: `pi` times a coefficient, plus integer multiples of symbols.
 ///
-/// `pi` is a multiple of 1/12, so that the sine and cosine of the fixed part lie in Q(sqrt 2, sqrt 3).
+/// The coefficient is a multiple of 1/12, so that the sine and cosine of the fixed part lie in Q(sqrt 2, sqrt 3).
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Angle {
+pub struct ExactAngle {
     /// Coefficient of pi.
     pub pi: BigRational,
     /// Constants (unit rad) and revolute coordinates with their integer factors; sorted, without zeros.
-    pub terms: Vec<(Symbol, i32)>,
+    pub terms: Vec<(ModelSymbol, i32)>,
 }
 
 /// A length that is linear in prismatic coordinates, in m.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Length {
-    /// The part that does not move; an expression over constants only.
-    pub offset: Exact,
+pub struct ExactLength {
+    /// The constant part; an expression over constants only.
+    pub offset: ExactExpression,
     /// Prismatic coordinates with their rational factors; sorted, without zeros.
     pub coordinates: Vec<(CoordinateIdx, BigRational)>,
 }

@@ -1,95 +1,107 @@
-//! Expressions that have no value at the constants of the file: divisions by zero, roots of negative numbers, numbers
-//! beyond what a float can hold.
+//! Finds expressions without a finite value at the constants of the file: divisions by zero, roots of negative
+//! numbers, and numbers beyond the range of a float.
 //!
-//! A parsed expression goes in, the innermost piece of it at fault comes out; what depends on the motion or on dynamic
-//! parameters has no value of its own and is looked into only.
+//! A parsed expression goes in, the innermost faulty part of it comes out. Parts that depend on the motion or on
+//! dynamic parameters have no value, but the expressions inside of them are checked.
 
 use num_traits::ToPrimitive;
 
-use crate::diagnostic::{Diagnostic, Span};
-use crate::exact::Function;
-use crate::formula::{Ast, AstKind};
+use crate::diagnostic::{Diagnostic, SourceSpan};
+use crate::exact::ExactFunction;
+use crate::formula::{FormulaAst, FormulaAstKind};
 
-/// A piece of an expression without a value.
+/// A part of an expression without a finite value.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Fault<'a> {
-    /// The divisor, the operand of the root, or the whole that is too large.
-    pub(crate) piece: &'a Ast,
+pub(crate) struct ValueFault<'a> {
+    /// The divisor, the operand of the root, or the expression that is too large.
+    pub(crate) piece: &'a FormulaAst,
     /// Its value.
     pub(crate) value: f64,
-    pub(crate) why: Why,
+    /// Why there is no finite value.
+    pub(crate) cause: ValueFaultCause,
 }
 
-/// Why there is no value.
+/// Why there is no finite value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Why {
-    /// The piece is zero, and something is divided by it.
+pub(crate) enum ValueFaultCause {
+    /// The part is zero and a divisor.
     Divides,
-    /// The piece is negative, and its root is taken.
+    /// The part is negative and the operand of a square root.
     Root,
-    /// The piece is too large.
+    /// The part is too large.
     TooLarge,
 }
 
-/// The value of an expression; `None` where it depends on names whose value is not known.
+/// The value of an expression; `None` if it depends on names without a known value.
+///
+/// `known` gives the values of names. Fails with the innermost part that has no finite value.
 pub(crate) fn value<'a>(
-    ast: &'a Ast,
+    ast: &'a FormulaAst,
     known: &dyn Fn(&str) -> Option<f64>,
-) -> Result<Option<f64>, Fault<'a>> {
-    let fault = |piece: &'a Ast, value: f64, why: Why| Err(Fault { piece, value, why });
+) -> Result<Option<f64>, ValueFault<'a>> {
+    let fault = |piece: &'a FormulaAst, value: f64, why: ValueFaultCause| {
+        Err(ValueFault {
+            piece,
+            value,
+            cause: why,
+        })
+    };
     let found = match &ast.kind {
-        AstKind::Rational(value) => value.to_f64(),
-        AstKind::Pi => Some(std::f64::consts::PI),
-        AstKind::Name(name) => known(name),
-        AstKind::Sum(terms) => fold(terms, known, 0.0, |a, b| a + b)?,
-        AstKind::Product(factors) => fold(factors, known, 1.0, |a, b| a * b)?,
-        AstKind::Quotient(above, below) => {
+        FormulaAstKind::Rational(value) => value.to_f64(),
+        FormulaAstKind::Pi => Some(std::f64::consts::PI),
+        FormulaAstKind::Name(name) => known(name),
+        FormulaAstKind::Sum(terms) => fold(terms, known, 0.0, |a, b| a + b)?,
+        FormulaAstKind::Product(factors) => fold(factors, known, 1.0, |a, b| a * b)?,
+        FormulaAstKind::Quotient(above, below) => {
+            // Both sides are evaluated, so that a fault in either is found.
             let (above, divisor) = (value(above, known)?, value(below, known)?);
             if divisor == Some(0.0) {
-                return fault(below, 0.0, Why::Divides);
+                return fault(below, 0.0, ValueFaultCause::Divides);
             }
             above.zip(divisor).map(|(a, b)| a / b)
         }
-        AstKind::Negative(inner) => value(inner, known)?.map(|x| -x),
-        AstKind::Power(base, exponent) => {
+        FormulaAstKind::Negative(inner) => value(inner, known)?.map(|x| -x),
+        FormulaAstKind::Power(base, exponent) => {
             let x = value(base, known)?;
             if x == Some(0.0) && *exponent < 0 {
-                return fault(base, 0.0, Why::Divides);
+                return fault(base, 0.0, ValueFaultCause::Divides);
             }
             x.map(|x| x.powi(*exponent))
         }
-        AstKind::Apply(function, inner) => {
+        FormulaAstKind::Apply(function, inner) => {
             let x = value(inner, known)?;
-            if let (Function::Sqrt, Some(x)) = (function, x)
+            // A root of a negative number has no real value.
+            if let (ExactFunction::Sqrt, Some(x)) = (function, x)
                 && x < 0.0
             {
-                return fault(inner, x, Why::Root);
+                return fault(inner, x, ValueFaultCause::Root);
             }
             x.map(|x| match function {
-                Function::Sin => x.sin(),
-                Function::Cos => x.cos(),
-                Function::Sqrt => x.sqrt(),
-                Function::Abs => x.abs(),
-                Function::Sign if x == 0.0 => 0.0,
-                Function::Sign => x.signum(),
-                Function::Tanh => x.tanh(),
-                Function::Exp => x.exp(),
+                ExactFunction::Sin => x.sin(),
+                ExactFunction::Cos => x.cos(),
+                ExactFunction::Sqrt => x.sqrt(),
+                ExactFunction::Abs => x.abs(),
+                ExactFunction::Sign if x == 0.0 => 0.0,
+                ExactFunction::Sign => x.signum(),
+                ExactFunction::Tanh => x.tanh(),
+                ExactFunction::Exp => x.exp(),
             })
         }
     };
+    // Every part is checked here, so the innermost one is reported.
     match found {
-        Some(x) if !x.is_finite() => fault(ast, x, Why::TooLarge),
+        Some(x) if !x.is_finite() => fault(ast, x, ValueFaultCause::TooLarge),
         found => Ok(found),
     }
 }
 
-/// All operands are looked into, also behind one that is not known.
+/// Combines the values of operands. All of them are evaluated, also after one that is unknown.
 fn fold<'a>(
-    operands: &'a [Ast],
+    operands: &'a [FormulaAst],
     known: &dyn Fn(&str) -> Option<f64>,
     start: f64,
     join: impl Fn(f64, f64) -> f64,
-) -> Result<Option<f64>, Fault<'a>> {
+) -> Result<Option<f64>, ValueFault<'a>> {
     let mut total = Some(start);
     for operand in operands {
         let found = value(operand, known)?;
@@ -98,47 +110,44 @@ fn fold<'a>(
     Ok(total)
 }
 
-impl Fault<'_> {
-    /// The finding; `declared` is where the name at fault is, if the piece is a name alone.
-    pub(crate) fn report(&self, declared: Option<Span>) -> Diagnostic {
-        let (message, help) = match self.why {
-            Why::Divides => (
+impl ValueFault<'_> {
+    /// The diagnostic; `declared` is the place of the faulty name, if the part is a name only.
+    pub(crate) fn report(&self, declared: Option<SourceSpan>) -> Diagnostic {
+        // What was found, and what to do about it.
+        let (message, help) = match self.cause {
+            ValueFaultCause::Divides => (
                 "this divides by zero",
-                "change the constants in it, or leave away what is divided",
+                "change the constants in it, or omit the quotient",
             ),
-            Why::Root => (
+            ValueFaultCause::Root => (
                 "this is the root of a negative number",
                 "check the sign, and the values of the constants in it",
             ),
-            Why::TooLarge => (
+            ValueFaultCause::TooLarge => (
                 "this has no finite value",
                 "check the values and units of the constants in it",
             ),
         };
-        let label = match self.why {
-            Why::TooLarge => "it is too large with the constants of this file".to_owned(),
+        let label = match self.cause {
+            ValueFaultCause::TooLarge => "it is too large with the constants of this file".to_owned(),
             _ => format!("this is {} with the constants of this file", self.value),
         };
-        let found = Diagnostic::error(self.piece.span, message)
-            .label(label)
-            .help(help);
+        let found = Diagnostic::error(self.piece.span, message).label(label).help(help);
         match (declared, &self.piece.kind) {
-            (Some(declared), AstKind::Name(_)) => found.related(declared, "its value stands here"),
+            (Some(declared), FormulaAstKind::Name(_)) => found.related(declared, "its value stands here"),
             _ => found,
         }
     }
 }
 
-/// Whether an expression mentions a name.
-pub(crate) fn mentions(ast: &Ast, name: &str) -> bool {
+/// Whether an expression contains a name.
+pub(crate) fn mentions(ast: &FormulaAst, name: &str) -> bool {
     match &ast.kind {
-        AstKind::Rational(_) | AstKind::Pi => false,
-        AstKind::Name(found) => found == name,
-        AstKind::Sum(inner) | AstKind::Product(inner) => {
-            inner.iter().any(|one| mentions(one, name))
-        }
-        AstKind::Quotient(above, below) => mentions(above, name) || mentions(below, name),
-        AstKind::Negative(inner) | AstKind::Power(inner, _) | AstKind::Apply(_, inner) => {
+        FormulaAstKind::Rational(_) | FormulaAstKind::Pi => false,
+        FormulaAstKind::Name(found) => found == name,
+        FormulaAstKind::Sum(inner) | FormulaAstKind::Product(inner) => inner.iter().any(|one| mentions(one, name)),
+        FormulaAstKind::Quotient(above, below) => mentions(above, name) || mentions(below, name),
+        FormulaAstKind::Negative(inner) | FormulaAstKind::Power(inner, _) | FormulaAstKind::Apply(_, inner) => {
             mentions(inner, name)
         }
     }

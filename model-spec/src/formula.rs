@@ -1,65 +1,80 @@
-//! Expressions of a model file before their names are looked up: trees whose every node knows its place.
+//! Expressions of a model file before their names are resolved: trees in which every node has its place.
+//!
+//! Text of the file goes in; the scope turns the tree into an exact expression.
 
 #[cfg(any(test, feature = "schema"))]
 use std::borrow::Cow;
 
 use num_rational::BigRational;
 
-use crate::diagnostic::{Diagnostic, Log, Span};
-use crate::document::{Node, Value, quote};
-use crate::exact::Function;
+use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
+use crate::document::{TomlNode, TomlValue, quote};
+use crate::exact::ExactFunction;
 use crate::parser::parse;
-use crate::record::{Read, wrong_type};
+use crate::record::{SchemaValue, wrong_type};
 
 /// Longest text of an expression, in bytes.
 pub(crate) const LONGEST_FORMULA: usize = 4000;
-/// The functions of the language.
-pub(crate) const FUNCTIONS: [(&str, Function); 7] = [
-    ("sin", Function::Sin),
-    ("cos", Function::Cos),
-    ("sqrt", Function::Sqrt),
-    ("abs", Function::Abs),
-    ("sign", Function::Sign),
-    ("tanh", Function::Tanh),
-    ("exp", Function::Exp),
+/// The functions of the expression language, by their names.
+pub(crate) const FUNCTIONS: [(&str, ExactFunction); 7] = [
+    ("sin", ExactFunction::Sin),
+    ("cos", ExactFunction::Cos),
+    ("sqrt", ExactFunction::Sqrt),
+    ("abs", ExactFunction::Abs),
+    ("sign", ExactFunction::Sign),
+    ("tanh", ExactFunction::Tanh),
+    ("exp", ExactFunction::Exp),
 ];
 
-/// A parsed expression whose names are not yet looked up.
+/// A parsed expression whose names are not resolved yet.
 #[derive(Clone, Debug)]
-pub(crate) struct Ast {
-    pub(crate) span: Span,
-    pub(crate) kind: AstKind,
+pub(crate) struct FormulaAst {
+    /// Where the node stands.
+    pub(crate) span: SourceSpan,
+    /// Its shape with its operands.
+    pub(crate) kind: FormulaAstKind,
 }
 
-/// Shape of a node; see [`crate::Exact`].
+/// Shape of a node; see [`crate::ExactExpression`].
 #[derive(Clone, Debug)]
-pub(crate) enum AstKind {
+pub(crate) enum FormulaAstKind {
+    /// A number, exact.
     Rational(BigRational),
+    /// The number pi.
     Pi,
+    /// A name that is not resolved yet.
     Name(String),
-    Sum(Vec<Ast>),
-    Product(Vec<Ast>),
-    Quotient(Box<Ast>, Box<Ast>),
-    Negative(Box<Ast>),
-    Power(Box<Ast>, i32),
-    Apply(Function, Box<Ast>),
+    /// Sum of at least two terms.
+    Sum(Vec<FormulaAst>),
+    /// Product of factors.
+    Product(Vec<FormulaAst>),
+    /// First operand over the second.
+    Quotient(Box<FormulaAst>, Box<FormulaAst>),
+    /// The operand with the opposite sign.
+    Negative(Box<FormulaAst>),
+    /// Integer power.
+    Power(Box<FormulaAst>, i32),
+    /// A function of its operand.
+    Apply(ExactFunction, Box<FormulaAst>),
 }
 
 /// An expression of the file with its text.
 #[derive(Clone, Debug)]
-pub(crate) struct Formula {
+pub(crate) struct SourceFormula {
+    /// The text as the author wrote it.
     pub(crate) text: String,
-    pub(crate) ast: Ast,
+    /// The parsed tree.
+    pub(crate) ast: FormulaAst,
 }
 
-impl Read for Formula {
+impl SchemaValue for SourceFormula {
     const EXPECTED: &'static str = "an expression in quotes, or a number";
     const EXAMPLE: &'static str = "\"2*d1\"";
 
-    fn read(node: &Node, log: &mut Log) -> Option<Self> {
+    fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
         let (text, inner) = match &node.value {
-            Value::Text { text, inner } => (text, *inner),
-            Value::Number { text, .. } => {
+            TomlValue::Text { text, inner } => (text, *inner),
+            TomlValue::Number { text, .. } => {
                 if text.parse::<f64>().is_ok_and(|value| !value.is_finite()) {
                     log.push(
                         Diagnostic::error(node.span, format!("`{}` is not finite", quote(text)))
@@ -67,7 +82,7 @@ impl Read for Formula {
                     );
                     return None;
                 }
-                // The number as written may hold `_`; only an untouched one can be marked digit by digit.
+                // A number in the file may contain `_`. Only without them the parts of the number have known places.
                 let same = text.len() == node.span.end - node.span.start;
                 (text, same.then_some(node.span.start))
             }
@@ -82,7 +97,7 @@ impl Read for Formula {
 }
 
 #[cfg(any(test, feature = "schema"))]
-impl schemars::JsonSchema for Formula {
+impl schemars::JsonSchema for SourceFormula {
     fn schema_name() -> Cow<'static, str> {
         "Expression".into()
     }

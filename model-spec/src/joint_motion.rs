@@ -1,25 +1,25 @@
-//! How a coordinate moves what stands behind its joint, and what follows from that: units, and what a drive carries.
+//! The kind of motion of a coordinate, and its consequences: units, and the load of a drive.
 
-use crate::kinds::Carries;
-use crate::mechanism::{Coordinate, DriveKind};
-use crate::unit::Dimension;
+use crate::kinds::PlaceLoad;
+use crate::mechanism::{DriveKind, JointCoordinate};
+use crate::unit::UnitDimension;
 
 /// Kind of motion of a coordinate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Motion {
+pub enum CoordinateMotion {
     /// Angle in rad.
     Revolute,
     /// Length in m.
     Prismatic,
-    /// Component of the vector part of a free body's unit quaternion. Its rate is the body's angular velocity about the same
-    /// axis, in rad/s, and not the component's own derivative.
+    /// Component of the vector part of a free body's unit quaternion. Its rate is the body's angular velocity about
+    /// the same axis, in rad/s, and not the derivative of the component.
     Quaternion,
-    /// The scalar part, which has no rate of its own.
+    /// The scalar part of such a quaternion, which has no rate of its own.
     QuaternionScalar,
 }
 
-impl Motion {
-    /// Whether the coordinate is an angle in rad; else it is a length in m.
+impl CoordinateMotion {
+    /// Whether the coordinate is an angle in rad.
     pub fn is_angle(self) -> bool {
         match self {
             Self::Revolute => true,
@@ -37,12 +37,12 @@ impl Motion {
         matches!(self, Self::Quaternion | Self::QuaternionScalar)
     }
 
-    /// Whether a rate belongs to the coordinate; else its place among the rates and accelerations is not read.
+    /// Whether the coordinate has a rate. If not, its entries in vectors of rates and accelerations are ignored.
     pub fn has_rate(self) -> bool {
         self != Self::QuaternionScalar
     }
 
-    /// The field's word for the joint.
+    /// The common name of such a joint.
     pub fn name(self) -> &'static str {
         match self {
             Self::Revolute => "revolute",
@@ -61,40 +61,42 @@ impl Motion {
         }
     }
 
-    /// What acts on the coordinate.
-    pub fn carries(self) -> Carries {
+    /// Whether a force or a torque acts on the coordinate.
+    ///
+    /// The vector part of a quaternion carries a torque, dual to its angular velocity.
+    pub fn place_load(self) -> PlaceLoad {
         if self.is_length() {
-            Carries::Force
+            PlaceLoad::Force
         } else {
-            Carries::Torque
+            PlaceLoad::Torque
         }
     }
 
     /// The dimension of the coordinate.
-    pub(crate) fn dimension(self) -> Dimension {
+    pub(crate) fn dimension(self) -> UnitDimension {
         if self.is_length() {
-            Dimension::LENGTH
+            UnitDimension::LENGTH
         } else {
-            Dimension::ONE
+            UnitDimension::ONE
         }
     }
 }
 
 impl DriveKind {
-    /// What a drive of this kind carries, among the coordinates of its mechanism.
-    pub fn carries(self, coordinates: &[Coordinate]) -> Carries {
+    /// Whether a drive of this kind has a force or a torque; `coordinates` are those of its mechanism.
+    pub fn place_load(self, coordinates: &[JointCoordinate]) -> PlaceLoad {
         match self {
             Self::Joint(i) => coordinates
                 .get(i.0)
-                .map_or(Carries::Torque, |one| one.motion.carries()),
-            Self::Linear { .. } => Carries::Force,
+                .map_or(PlaceLoad::Torque, |one| one.motion.place_load()),
+            Self::Linear { .. } => PlaceLoad::Force,
         }
     }
 
     /// The unit of the force or torque of a drive of this kind.
-    pub fn force_unit(self, coordinates: &[Coordinate]) -> &'static str {
-        match self.carries(coordinates) {
-            Carries::Torque => "N m",
+    pub fn force_unit(self, coordinates: &[JointCoordinate]) -> &'static str {
+        match self.place_load(coordinates) {
+            PlaceLoad::Torque => "N m",
             _ => "N",
         }
     }

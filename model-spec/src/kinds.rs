@@ -1,29 +1,29 @@
-//! Kinds of effects: data that say what an effect adds to the force of its place.
+//! Kinds of effects: data that state what an effect adds to the force of its place.
 //!
 //! A library file and the model's own `[[effect_kind]]` tables go in; checked kinds come out, and for each effect
 //! the factor that multiplies each of its parameters.
 
 use std::sync::OnceLock;
 
-use crate::diagnostic::{Diagnostic, Log};
+use crate::diagnostic::{Diagnostic, DiagnosticLog};
 use crate::document;
-use crate::exact::{ConstantIdx, Exact, PlaceQuantity, Symbol};
+use crate::exact::{ConstantIdx, ExactExpression, ModelSymbol, PlaceQuantity};
 use crate::finite;
-use crate::kind_mechanics::check_way;
-use crate::kind_terms::{factors, lacking_units};
+use crate::kind_mechanics::check_expression_or_mechanics;
+use crate::kind_terms::{factors, symbols_without_unit};
 use crate::mechanics::Mechanics;
 use crate::schema::{EffectKindEntry, LibraryEntry, ModelEntry};
-use crate::scope::Scope;
-use crate::unit::{Dimension, Unit};
-use crate::values::{self, Text, UnitByPlace};
+use crate::scope::FormulaScope;
+use crate::unit::{ModelUnit, UnitDimension};
+use crate::values::{self, SpannedText, UnitByPlace};
 use crate::words::words;
 
-/// The library of kinds as the program brings it along.
+/// The library of kinds that is part of the program, as TOML.
 pub const LIBRARY: &str = include_str!("../library/effects.toml");
 
-/// What a place carries, which settles the units there.
+/// The load of a place, which determines the units there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Carries {
+pub enum PlaceLoad {
     /// A force, on a prismatic joint or a linear drive.
     Force,
     /// A torque, on a revolute joint.
@@ -34,21 +34,21 @@ pub enum Carries {
     Elsewhere,
 }
 
-impl Carries {
-    /// Whatever a place may carry.
+impl PlaceLoad {
+    /// All loads.
     pub const ALL: [Self; 4] = [Self::Force, Self::Torque, Self::Mass, Self::Elsewhere];
 
     /// The dimension of what the place carries.
-    pub(crate) fn dimension(self) -> Dimension {
+    pub(crate) fn dimension(self) -> UnitDimension {
         match self {
-            Self::Force => Dimension::FORCE,
-            Self::Torque => Dimension::TORQUE,
-            Self::Mass => Dimension::MASS,
-            Self::Elsewhere => Dimension::ONE,
+            Self::Force => UnitDimension::FORCE,
+            Self::Torque => UnitDimension::TORQUE,
+            Self::Mass => UnitDimension::MASS,
+            Self::Elsewhere => UnitDimension::ONE,
         }
     }
 
-    /// The key of its units.
+    /// The key of its units in a model file.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Force => "force",
@@ -58,8 +58,8 @@ impl Carries {
         }
     }
 
-    /// The unit for it among several.
-    pub(crate) fn unit(self, units: &UnitByPlace) -> Option<&Unit> {
+    /// The unit for this load among units by place, if there is one.
+    pub(crate) fn unit(self, units: &UnitByPlace) -> Option<&ModelUnit> {
         match self {
             Self::Force => units.force.as_ref(),
             Self::Torque => units.torque.as_ref(),
@@ -77,7 +77,7 @@ words! {
     "positive" => Positive,
     /// Not above zero.
     "negative" => Negative,
-    /// Either.
+    /// Either sign is possible.
     "any" => Any,
 }
 
@@ -93,15 +93,15 @@ words! {
     "point" => Point,
     /// A part.
     "part" => Part,
-    /// The base as a whole, named `base`.
+    /// The complete base, named `base`.
     "base" => Base,
-    /// The measured forces as a whole, named `force`.
+    /// All measured forces, named `force`.
     "force" => Force,
 }
 
 impl ActsOn {
-    /// What it is, for people.
-    pub fn words(self) -> &'static str {
+    /// The place with its article, for messages.
+    pub fn description(self) -> &'static str {
         match self {
             Self::Drive => "a drive",
             Self::Coordinate => "a coordinate",
@@ -114,62 +114,62 @@ impl ActsOn {
 }
 
 words! {
-    /// How the second place of a kind moves that acts at the first alone.
+    /// How the second place of a kind moves, if the kind acts at the first place only.
     #[derive(PartialOrd, Ord, Hash)]
     pub OtherMotion as "OtherMotionName": "how a place moves",
-    /// It turns.
+    /// It is revolute.
     "angle" => Angle,
-    /// It slides, or is the length of a linear drive.
+    /// It is prismatic, or the length of a linear drive.
     "length" => Length,
 }
 
 impl OtherMotion {
-    /// What a place carries that moves so.
-    pub fn carries(self) -> Carries {
+    /// The load of a place that moves in this way.
+    pub fn place_load(self) -> PlaceLoad {
         match self {
-            Self::Angle => Carries::Torque,
-            Self::Length => Carries::Force,
+            Self::Angle => PlaceLoad::Torque,
+            Self::Length => PlaceLoad::Force,
         }
     }
 
-    /// How it moves, for people.
-    pub fn words(self) -> &'static str {
+    /// How it moves, for messages.
+    pub fn description(self) -> &'static str {
         match self {
-            Self::Angle => "turns",
-            Self::Length => "slides",
+            Self::Angle => "is revolute",
+            Self::Length => "is prismatic",
         }
     }
 }
 
 words! {
-    /// What the values of a search are relative to.
+    /// The scale of a search range.
     #[derive(PartialOrd, Ord, Hash)]
     pub Scale as "ScaleName": "what a range is relative to",
     /// The largest rate of the place.
     "rate" => Rate,
     /// The travel of the place's coordinate: the largest value less the smallest.
     "travel" => Travel,
-    /// Nothing: they are in SI units.
+    /// No scale: values are in SI units.
     "one" => One,
 }
 
-/// How a constant's value is found where it is not known.
+/// How the value of an unknown constant is found.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Search {
+pub enum ConstantSearch {
     /// The expression is affine in it, so that its product with the parameter is a parameter itself.
     Linear,
     /// Values from `from` to `to`, times the scale, are tried.
     Range {
-        /// The least.
+        /// The least value.
         from: f64,
-        /// The largest.
+        /// The largest value.
         to: f64,
-        /// What both are multiples of.
+        /// The scale that multiplies both.
         of: Scale,
     },
 }
 
-/// A kind of effect, for people and programs that choose among them.
+/// A kind of effect, as messages, pages and searches use it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EffectKind {
     /// Name of the kind.
@@ -178,25 +178,25 @@ pub struct EffectKind {
     pub says: String,
     /// Where it may act.
     pub on: Vec<ActsOn>,
-    /// What it adds, as text; empty where `mechanics` says it.
+    /// What it adds, as text; empty if `mechanics` describes it.
     pub expression: String,
-    /// What it does, if that is no expression.
+    /// What it does, if that is not an expression.
     pub mechanics: Option<Mechanics>,
-    /// Its parameters.
+    /// Its parameters, which identification estimates.
     pub parameters: Vec<KindParameter>,
-    /// Quantities that give its shape.
+    /// Known quantities that determine its shape.
     pub constants: Vec<KindConstant>,
-    /// How many places it must have; any number if `None`.
+    /// How many places it must have; `None` for any number.
     pub places: Option<usize>,
-    /// How the second place moves, where it acts at the first alone.
+    /// How the second place moves, if the kind acts at the first place only.
     pub other: Option<OtherMotion>,
-    /// One paragraph: what it is, where it comes from, how the error looks that it leaves. May be empty.
+    /// One paragraph: what it is, where it comes from, and how the error looks if a model lacks it. May be empty.
     pub explains: String,
-    /// What it is easily taken for, and which experiment tells them apart. May be empty.
+    /// Effects it can be confused with, and the experiment that distinguishes them. May be empty.
     pub doubles: String,
-    /// A simpler kind that it holds as a special case.
+    /// A simpler kind that is a special case of this one.
     pub refines: Option<String>,
-    /// True if the model file or a library of its own defines it, false if the program's library does.
+    /// True if the model file or a library of the user defines it, false for the program's library.
     pub is_own: bool,
 }
 
@@ -208,7 +208,7 @@ pub struct KindParameter {
     /// The sign that it must have.
     pub sign: Sign,
     /// Units by what the place carries; only where the kind may act.
-    pub units: Vec<(Carries, String)>,
+    pub units: Vec<(PlaceLoad, String)>,
     /// Remark; may be empty.
     pub note: String,
 }
@@ -218,42 +218,40 @@ pub struct KindParameter {
 pub struct KindConstant {
     /// Its symbol in the expression.
     pub symbol: String,
-    /// Value as text where the effect gives none; `None` if the effect must give one.
+    /// Default value as text; `None` if the effect must give one.
     pub value: Option<String>,
     /// Units by what the place carries.
-    pub units: Vec<(Carries, String)>,
-    /// How it is found where it is not known; `None` if it must be known.
-    pub search: Option<Search>,
+    pub units: Vec<(PlaceLoad, String)>,
+    /// How it is found if it is unknown; `None` if it must be known.
+    pub search: Option<ConstantSearch>,
     /// Remark; may be empty.
     pub note: String,
 }
 
 /// The kinds of the library that comes with the program.
 pub fn library() -> Vec<EffectKind> {
-    library_entries()
-        .iter()
-        .map(|entry| describe(entry, false))
-        .collect()
+    library_entries().iter().map(|entry| describe(entry, false)).collect()
 }
 
-/// The tables of the library.
+/// The entries of the program's library, parsed once.
 pub(crate) fn library_entries() -> &'static [EffectKindEntry] {
     static ENTRIES: OnceLock<Vec<EffectKindEntry>> = OnceLock::new();
     ENTRIES.get_or_init(|| {
-        // The library is no file of the user's: its places lie outside the sources, and a test keeps it sound.
-        let mut log = Log::default();
-        let table = document::parse(LIBRARY, usize::MAX, &mut log);
-        let span = crate::Span {
+        // Its places are outside of the user's files; the assertion below and a test keep it free of faults.
+        let mut log = DiagnosticLog::default();
+        let table = document::parse_toml(LIBRARY, usize::MAX, &mut log);
+        let span = crate::SourceSpan {
             file: usize::MAX,
             start: 0,
             end: 0,
         };
-        log.syntax_broken = true; // It is no whole model, so nothing is missing.
+        // It is not a complete model, so missing entries must not be reported.
+        log.syntax_broken = true;
         let entries = ModelEntry::from_table(&table, span, &mut log)
             .effect_kind
             .map_or_else(Vec::new, |list| list.entries);
         for entry in &entries {
-            check(entry, &mut log);
+            check_kind(entry, &mut log);
         }
         let found = log.finish();
         assert!(found.is_empty(), "the effect library is faulty: {found:?}");
@@ -261,46 +259,35 @@ pub(crate) fn library_entries() -> &'static [EffectKindEntry] {
     })
 }
 
-/// The tables of a library that a file names.
-pub(crate) fn own_library(text: &str, file: usize, log: &mut Log) -> Vec<EffectKindEntry> {
-    let table = document::parse(text, file, log);
-    let span = crate::Span {
-        file,
-        start: 0,
-        end: 0,
-    };
+/// The kinds of a library file of the user; `file` is its index among the sources.
+pub(crate) fn own_library(text: &str, file: usize, log: &mut DiagnosticLog) -> Vec<EffectKindEntry> {
+    let table = document::parse_toml(text, file, log);
+    let span = crate::SourceSpan { file, start: 0, end: 0 };
     LibraryEntry::from_table(&table, span, log)
         .effect_kind
         .map_or_else(Vec::new, |list| list.entries)
 }
 
-/// A kind as other crates see it.
+/// The public description of a kind.
 pub(crate) fn describe(entry: &EffectKindEntry, is_own: bool) -> EffectKind {
+    // Units are listed only for loads that the places of the kind can have.
     let units = |units: &Option<UnitByPlace>| {
-        Carries::ALL
+        PlaceLoad::ALL
             .into_iter()
-            .filter(|carries| may_carry(entry, *carries))
+            .filter(|carries| can_carry(entry, *carries))
             .filter_map(|carries| {
                 let unit = carries.unit(units.as_ref()?)?;
                 Some((carries, unit.text.clone()))
             })
             .collect()
     };
-    let words = |text: &Option<Text>| text.as_ref().map_or_else(String::new, |t| t.text.clone());
+    let words = |text: &Option<SpannedText>| text.as_ref().map_or_else(String::new, |t| t.text.clone());
     let parameters = entry.parameters.iter().flat_map(|table| &table.entries);
     let constants = entry.constants.iter().flat_map(|table| &table.entries);
     EffectKind {
-        name: entry
-            .name
-            .as_ref()
-            .map_or_else(String::new, |name| name.text.clone()),
+        name: entry.name.as_ref().map_or_else(String::new, |name| name.text.clone()),
         says: words(&entry.says),
-        on: entry
-            .on
-            .iter()
-            .flat_map(|on| &on.entries)
-            .copied()
-            .collect(),
+        on: entry.on.iter().flat_map(|on| &on.entries).copied().collect(),
         expression: entry
             .expression
             .as_ref()
@@ -332,11 +319,12 @@ pub(crate) fn describe(entry: &EffectKindEntry, is_own: bool) -> EffectKind {
     }
 }
 
-fn search(entry: &values::Search) -> Search {
+/// The public form of a search entry.
+fn search(entry: &values::SearchEntry) -> ConstantSearch {
     match entry {
-        values::Search::Linear => Search::Linear,
-        values::Search::Range(range) => Search::Range {
-            // What is missing is reported where it is read.
+        values::SearchEntry::Linear => ConstantSearch::Linear,
+        values::SearchEntry::Range(range) => ConstantSearch::Range {
+            // Missing bounds are reported by the reader of the entry.
             from: range.from.map_or(0.0, |number| number.value),
             to: range.to.map_or(0.0, |number| number.value),
             of: range.of.unwrap_or(Scale::One),
@@ -344,11 +332,12 @@ fn search(entry: &values::Search) -> Search {
     }
 }
 
-/// How many places a kind must have; any number if `None`.
+/// How many places a kind must have; `None` for any number.
 pub(crate) fn n_places(entry: &EffectKindEntry) -> Option<usize> {
     match entry.mechanics {
         Some(mechanics) => mechanics.entry().n_places(),
         None => {
+            // An expression that uses the motion of another place needs exactly two places.
             let expression = entry.expression.as_ref()?;
             PlaceQuantity::ALL
                 .iter()
@@ -358,45 +347,47 @@ pub(crate) fn n_places(entry: &EffectKindEntry) -> Option<usize> {
     }
 }
 
-pub(crate) fn may_carry(entry: &EffectKindEntry, carries: Carries) -> bool {
+/// Whether any place where the kind may act can have this load.
+pub(crate) fn can_carry(entry: &EffectKindEntry, carries: PlaceLoad) -> bool {
     let mut places = entry.on.iter().flat_map(|on| &on.entries);
     places.any(|on| match on {
         ActsOn::Drive | ActsOn::Coordinate => {
-            matches!(carries, Carries::Force | Carries::Torque)
+            matches!(carries, PlaceLoad::Force | PlaceLoad::Torque)
         }
-        ActsOn::Point => carries == Carries::Mass,
-        ActsOn::Part | ActsOn::Base | ActsOn::Force => carries == Carries::Elsewhere,
+        ActsOn::Point => carries == PlaceLoad::Mass,
+        ActsOn::Part | ActsOn::Base | ActsOn::Force => carries == PlaceLoad::Elsewhere,
     })
 }
 
-/// Checks a kind by itself: names, units at every place where it may act, linearity in its parameters.
-pub(crate) fn check(entry: &EffectKindEntry, log: &mut Log) {
+/// Checks a kind without a model: names, units for every load that it can have, linearity in its parameters.
+pub(crate) fn check_kind(entry: &EffectKindEntry, log: &mut DiagnosticLog) {
     check_constant_values(entry, log);
-    if !check_way(entry, log) {
+    if !check_expression_or_mechanics(entry, log) {
         return;
     }
     if let (Some(_), Some(expression), None) = (entry.other, &entry.expression, n_places(entry)) {
         log.push(
             Diagnostic::error(
                 expression.ast.span,
-                "this kind says how its other place moves and does not use it",
+                "this kind declares `other` but does not use the motion of the other place",
             )
             .label("expected `other_coordinate`, `other_rate` or `other_acceleration`")
-            .help("delete `other`, or use the other place's motion"),
+            .help("delete `other`, or use one of these names"),
         );
     }
+    // Each load that has all units is checked by resolving the expression with symbols in place of constants.
     let mut acts = false;
-    for carries in Carries::ALL {
-        if !may_carry(entry, carries) {
+    for carries in PlaceLoad::ALL {
+        if !can_carry(entry, carries) {
             continue;
         }
         acts = true;
-        let lacking = lacking_units(entry, carries);
-        // A kind for linear drives alone need not say what it would be on a joint that turns.
+        let lacking = symbols_without_unit(entry, carries);
+        // A kind for linear drives only needs no units for revolute joints.
         if !lacking.is_empty() {
             continue;
         }
-        let placeholders: Vec<(String, Exact)> = entry
+        let placeholders: Vec<(String, ExactExpression)> = entry
             .constants
             .iter()
             .flat_map(|constants| &constants.entries)
@@ -404,7 +395,7 @@ pub(crate) fn check(entry: &EffectKindEntry, log: &mut Log) {
             .map(|(i, (key, _))| {
                 (
                     key.name.clone(),
-                    Exact::Symbol(Symbol::Constant(ConstantIdx(i))),
+                    ExactExpression::Symbol(ModelSymbol::Constant(ConstantIdx(i))),
                 )
             })
             .collect();
@@ -412,10 +403,11 @@ pub(crate) fn check(entry: &EffectKindEntry, log: &mut Log) {
             return; // One report is enough; the other places have the same fault.
         }
     }
-    let nowhere = Carries::ALL
+    // If every load lacks a unit, the kind could never be used.
+    let nowhere = PlaceLoad::ALL
         .into_iter()
-        .filter(|carries| may_carry(entry, *carries))
-        .all(|carries| !lacking_units(entry, carries).is_empty());
+        .filter(|carries| can_carry(entry, *carries))
+        .all(|carries| !symbols_without_unit(entry, carries).is_empty());
     if acts
         && nowhere
         && let Some((key, _)) = entry
@@ -429,21 +421,18 @@ pub(crate) fn check(entry: &EffectKindEntry, log: &mut Log) {
                 key.span,
                 format!("the unit of `{}` fits no place of this kind", key.name),
             )
-            .label("expected units for `force`, `torque` or `point`, as `on` asks for")
+            .label("expected units for `force`, `torque` or `point`, as `on` requires")
             .help("for example `unit = { force = \"N s/m\", torque = \"N m s/rad\" }`"),
         );
     }
 }
 
-fn check_constant_values(entry: &EffectKindEntry, log: &mut Log) {
-    for (_, constant) in entry
-        .constants
-        .iter()
-        .flat_map(|constants| &constants.entries)
-    {
+/// Checks the default values of constants, which must be numbers.
+fn check_constant_values(entry: &EffectKindEntry, log: &mut DiagnosticLog) {
+    for (_, constant) in entry.constants.iter().flat_map(|constants| &constants.entries) {
         if let Some(value) = &constant.value {
-            // Values of the library may only be numbers; names mean something in a model only.
-            Scope::default().walk(&value.ast, &[], log);
+            // Names have values only inside of a model, so an empty scope is used.
+            FormulaScope::default().resolve_ast(&value.ast, &[], log);
         }
     }
 }

@@ -49,20 +49,20 @@ mod values;
 mod words;
 
 pub use additions::{AddedEffect, ConstantValue};
-pub use column::{ColumnFault, ColumnSum, Quantity, read_column};
-pub use diagnostic::{Diagnostic, Severity, SourceFile, Sources, Span};
+pub use column::{ColumnFault, ColumnQuantity, ColumnSum, read_column};
+pub use diagnostic::{Diagnostic, DiagnosticSeverity, SourceFile, SourceFiles, SourceSpan};
 pub use document::LARGEST_FILE;
 pub use exact::*;
-pub use joint_motion::Motion;
+pub use joint_motion::CoordinateMotion;
 pub use kinds::{
-    ActsOn, Carries, EffectKind, KindConstant, KindParameter, LIBRARY, OtherMotion, Scale, Search,
-    Sign, library,
+    ActsOn, ConstantSearch, EffectKind, KindConstant, KindParameter, LIBRARY, OtherMotion, PlaceLoad, Scale, Sign,
+    library,
 };
-pub use load::{Failure, Loaded, kinds_with, load, load_file, load_file_with, load_with};
+pub use load::{LoadFailure, LoadedModel, kinds_with, load, load_file, load_file_with, load_with};
 pub use mechanics::Mechanics;
 pub use mechanism::*;
-pub use motion::{Kinematics, Moved, Pose, Poses};
-pub use reading::{read_named, read_text};
+pub use motion::{CoordinateAxis, FramePlacement, Kinematics, MechanismPoses};
+pub use reading::{read_referenced, read_text};
 pub use unit::unit_product;
 
 /// The JSON Schema of model files, by which editors complete and explain them; a test keeps it true.

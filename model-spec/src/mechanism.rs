@@ -1,11 +1,12 @@
-//! A validated mechanism: what a model file means once every name is resolved and every check has passed.
+//! A validated mechanism: the content of a model file after every name is resolved and every check has passed.
 //!
-//! [`crate::load`] makes it, `modelmill-codegen` consumes it. Indices point into the vectors of [`Mechanism`].
+//! [`crate::load`] builds it, `modelmill-codegen` derives equations from it. Indices point into the vectors of
+//! [`Mechanism`].
 
 use num_rational::BigRational;
 
-use crate::exact::{Angle, CoordinateIdx, Exact, Length, ParameterIdx, Symbol};
-use crate::joint_motion::Motion;
+use crate::exact::{CoordinateIdx, ExactAngle, ExactExpression, ExactLength, ModelSymbol, ParameterIdx};
+use crate::joint_motion::CoordinateMotion;
 use crate::mechanics::Mechanics;
 
 /// Index of a frame in [`Mechanism::frames`]; 0 is the base.
@@ -26,61 +27,61 @@ pub struct PartIdx(pub usize);
 pub struct Mechanism {
     /// Name of the model; an identifier, used for the emitted module.
     pub name: String,
-    /// One line for people.
+    /// Title of one line.
     pub title: Option<String>,
-    /// Gravity in the base frame, m/s^2; expressions over constants. A tilt among the effects has turned it already.
-    pub gravity: [Exact; 3],
-    /// Known geometry and the like.
-    pub constants: Vec<Constant>,
+    /// Gravity in the base frame, m/s^2; expressions over constants. A tilt among the effects is included.
+    pub gravity: [ExactExpression; 3],
+    /// Known quantities such as geometry.
+    pub constants: Vec<ModelConstant>,
     /// Dynamic parameters in the order of declaration, which orders `p_g`.
-    pub parameters: Vec<Parameter>,
+    pub parameters: Vec<DynamicParameter>,
     /// Joint coordinates in the order of declaration.
-    pub coordinates: Vec<Coordinate>,
+    pub coordinates: Vec<JointCoordinate>,
     /// Frames; parents come before their children, 0 is the base.
-    pub frames: Vec<Frame>,
+    pub frames: Vec<ModelFrame>,
     /// Named points.
-    pub points: Vec<Point>,
+    pub points: Vec<FramePoint>,
     /// Rigid bodies.
-    pub parts: Vec<Part>,
+    pub parts: Vec<ModelPart>,
     /// Lumped masses.
     pub lumped_masses: Vec<LumpedMass>,
     /// Loops closed by coincident points.
-    pub loops: Vec<Loop>,
+    pub loops: Vec<KinematicLoop>,
     /// Coordinates that follow others; they are passive.
-    pub couplings: Vec<Coupling>,
-    /// Drives, one per degree of freedom; what nothing drives has its row here too.
-    pub drives: Vec<Drive>,
-    /// Drives of a mechanism that has more of them than degrees of freedom, such as cables; then none of [`Self::drives`] is
-    /// driven, and these act on all of them by their transposed Jacobian, `J' f`.
-    pub shared_drives: Vec<Drive>,
+    pub couplings: Vec<CoordinateCoupling>,
+    /// Drives, one per degree of freedom. A degree of freedom without a drive has its row here too.
+    pub drives: Vec<ModelDrive>,
+    /// Drives of a mechanism with more drives than degrees of freedom, such as cables. Then none of [`Self::drives`]
+    /// is driven, and these act on all of them by their transposed Jacobian, `J' f`.
+    pub shared_drives: Vec<ModelDrive>,
     /// Friction, drive inertia and the like.
-    pub effects: Vec<Effect>,
-    /// How much later than they act the forces of recordings are read, s; zero unless an effect says otherwise.
-    /// Equations and code know nothing of it: only where a model is held against a recording does it matter.
+    pub effects: Vec<ModelEffect>,
+    /// Delay of the recorded forces relative to the motion, s; zero unless an effect defines it. Equations and code
+    /// do not contain it. It matters only where a model is compared with a recording.
     pub force_delay: f64,
     /// Products of dynamic parameters whose columns should be retained, most wanted first;
     /// each is a product of powers of parameters.
     pub retain: Vec<Vec<(ParameterIdx, u32)>>,
-    /// What planned motion must keep.
-    pub limits: Limits,
-    /// Values of base parameters by their expressions, which take the place of those of the nominal parameters.
+    /// Limits of planned motions.
+    pub limits: MotionLimits,
+    /// Identified values of base parameters by their expressions; they replace the values from nominal parameters.
     pub identified_base: Vec<(String, f64)>,
-    /// How recordings name their columns: ours to theirs.
-    pub recording: Recording,
-    /// Whether constants of the file were replaced by their values, see [`Mechanism::at_values`].
+    /// How recordings name their columns: the model's names and theirs.
+    pub recording: RecordingColumns,
+    /// Whether constants of the file were replaced by their values, see [`Mechanism::with_numeric_constants`].
     pub is_at_values: bool,
 }
 
 /// A known quantity.
 #[derive(Clone, Debug)]
-pub struct Constant {
+pub struct ModelConstant {
     /// Identifier.
     pub name: String,
     /// Value in SI units.
     pub value: f64,
     /// Unit as printed, e.g. `m`, `rad`, `m/s^2`, `1`.
     pub unit: String,
-    /// True if it is an angle (unit rad) and may stand in [`Angle`].
+    /// True if it is an angle (unit rad) and may be a term of an [`ExactAngle`].
     pub is_angle: bool,
     /// Remark of the author.
     pub note: Option<String>,
@@ -88,10 +89,10 @@ pub struct Constant {
 
 /// A dynamic parameter.
 #[derive(Clone, Debug)]
-pub struct Parameter {
+pub struct DynamicParameter {
     /// Identifier.
     pub name: String,
-    /// Nominal value in SI units; zero where the file gives none.
+    /// Nominal value in SI units; zero if the file gives none.
     pub nominal: f64,
     /// Unit as printed.
     pub unit: String,
@@ -101,52 +102,55 @@ pub struct Parameter {
 
 /// A joint coordinate.
 #[derive(Clone, Debug)]
-pub struct Coordinate {
+pub struct JointCoordinate {
     /// Identifier.
     pub name: String,
-    /// Angle or length.
-    pub motion: Motion,
-    /// Passive coordinates follow from the loops or by a coupling; the others are independent.
+    /// Kind of motion: an angle, a length, or a component of a quaternion.
+    pub motion: CoordinateMotion,
+    /// True if loop closure or a coupling determines the coordinate; the others are independent.
     pub passive: bool,
-    /// Value at the nominal pose, which chooses the assembly mode.
-    /// For passive coordinates refined until the loops close.
+    /// Value at the nominal pose, rad or m, which selects the assembly mode. Values of passive coordinates are
+    /// refined until the loops close.
     pub nominal: f64,
 }
 
 /// An axis of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
-pub enum Axis {
+pub enum FrameAxis {
     X,
     Y,
     Z,
 }
 
-/// One elementary motion from a parent frame towards its child; each acts about or along the axes reached so far.
+/// One elementary motion from a parent frame to its child. Each acts about or along the axes that the steps before it
+/// give.
 #[derive(Clone, Debug)]
-pub enum Step {
+pub enum FrameStep {
     /// Rotation about an axis.
-    Rotate(Axis, Angle),
+    Rotate(FrameAxis, ExactAngle),
     /// Translation along an axis.
-    Translate(Axis, Length),
-    /// Any motion at all; the only step of a frame that hangs on the base.
+    Translate(FrameAxis, ExactLength),
+    /// Free motion; the only step of a frame on the base.
     Free(FreeBody),
 }
 
-/// How a body moves that hangs on nothing: by its position, a unit quaternion, and its twist.
+/// The coordinates of a free body: its position, a unit quaternion, and the axes of its twist.
 ///
-/// The rates of `position` are the velocity of the frame's origin, those of the quaternion's vector part the angular velocity,
-/// and accelerations are the time derivatives of these components; forces on the coordinates are the components of the
-/// wrench about the frame's origin in the same axes. So they are dual to each other, whichever axes are chosen.
+/// The rates of `position` are the velocity of the frame's origin, and those of the quaternion's vector part are the
+/// angular velocity. Accelerations are the time derivatives of these components. Forces on the coordinates are the
+/// components of the wrench about the frame's origin in the same axes. So rates and forces are dual to each other in
+/// any axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FreeBody {
-    /// Of the origin in the base frame, m.
+    /// Position of the origin in the base frame, m.
     pub position: [CoordinateIdx; 3],
-    /// w, x, y, z: it turns components in the body's axes into those in the base's. Its length does not matter.
+    /// Quaternion w, x, y, z, which transforms components in the body's axes into those in the base. Its length does
+    /// not matter.
     pub quaternion: [CoordinateIdx; 4],
-    /// In which axes velocity and force are given.
+    /// Axes of velocity and force.
     pub linear: TwistAxes,
-    /// In which axes angular velocity and moment are given.
+    /// Axes of angular velocity and moment.
     pub angular: TwistAxes,
 }
 
@@ -161,128 +165,130 @@ pub enum TwistAxes {
 
 /// A frame in the tree.
 #[derive(Clone, Debug)]
-pub struct Frame {
+pub struct ModelFrame {
     /// Identifier; `base` for the base.
     pub name: String,
-    /// Parent; the base is its own.
+    /// Parent; that of the base is the base itself.
     pub parent: FrameIdx,
-    /// Elementary motions from the parent, e.g. Rx(alpha) Tx(a) Rz(theta) Tz(d) for modified DH.
-    pub steps: Vec<Step>,
-    /// The convention the file used, for the frames table of a page.
-    pub convention: Convention,
+    /// Elementary motions from the parent, such as Rx(alpha) Tx(a) Rz(theta) Tz(d) for modified DH.
+    pub steps: Vec<FrameStep>,
+    /// The convention of the file, for the table of frames on a page.
+    pub convention: FrameConvention,
 }
 
-/// How a frame was written in the file.
+/// How the file describes a frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Convention {
+pub enum FrameConvention {
     /// The base frame.
     Base,
     /// Rx(alpha) Tx(a) Rz(theta) Tz(d); the texts of a, alpha, d, theta.
     ModifiedDh([String; 4]),
     /// Rz(theta) Tz(d) Tx(a) Rx(alpha); the texts of a, alpha, d, theta.
     StandardDh([String; 4]),
-    /// A transform, perhaps followed by a joint; as text.
+    /// A transform, with or without a joint behind it; as text.
     Transform(String),
 }
 
 /// A point fixed to a frame.
 #[derive(Clone, Debug)]
-pub struct Point {
+pub struct FramePoint {
     /// Identifier.
     pub name: String,
     /// Its frame.
     pub frame: FrameIdx,
     /// Position in that frame, m; expressions over constants.
-    pub at: [Exact; 3],
+    pub at: [ExactExpression; 3],
 }
 
 /// Inertia of a part; expressions over constants and parameters, polynomial in the parameters.
 #[derive(Clone, Debug)]
-pub enum Inertial {
+pub enum PartInertia {
     /// Mass, centre of mass in the frame, and inertia about the centre (xx, xy, xz, yy, yz, zz) along the frame's axes.
     AboutCentre {
-        /// kg
-        mass: Exact,
-        /// m
-        centre: [Exact; 3],
-        /// kg m^2; the off-diagonal entries are elements of the inertia matrix (negative products).
-        inertia: [Exact; 6],
+        /// Mass, kg.
+        mass: ExactExpression,
+        /// Centre of mass in the frame, m.
+        centre: [ExactExpression; 3],
+        /// Inertia about the centre, kg m^2; off the diagonal the elements of the matrix, which are negative products
+        /// of inertia.
+        inertia: [ExactExpression; 6],
     },
     /// The ten linear parameters about the frame's origin.
     Linear {
-        /// kg
-        mass: Exact,
+        /// Mass, kg.
+        mass: ExactExpression,
         /// Mass times centre, kg m.
-        first_moment: [Exact; 3],
+        first_moment: [ExactExpression; 3],
         /// xx, xy, xz, yy, yz, zz about the origin, kg m^2.
-        inertia: [Exact; 6],
+        inertia: [ExactExpression; 6],
     },
 }
 
 /// A rigid body on a frame.
 #[derive(Clone, Debug)]
-pub struct Part {
-    /// Name for people; the frame's if the file gives none.
+pub struct ModelPart {
+    /// Name; that of the frame if the file gives none.
     pub name: String,
     /// The frame that carries it.
     pub frame: FrameIdx,
     /// Its inertia.
-    pub inertial: Inertial,
+    pub inertial: PartInertia,
 }
 
-/// A mass concentrated at a point of a frame, or at different points for the two balances of a body.
+/// A mass concentrated at a point of a frame, or at different points in the balances of forces and of moments.
 #[derive(Clone, Debug)]
 pub struct LumpedMass {
     /// The mass; an expression over constants and parameters, kg.
-    pub mass: Exact,
-    /// The share of that mass which sits here.
+    pub mass: ExactExpression,
+    /// The share of that mass at this place.
     pub share: BigRational,
     /// The frame that carries it.
     pub frame: FrameIdx,
-    /// Where the balance of forces sees it, in the frame, m; over constants and parameters.
-    pub force_at: [Exact; 3],
-    /// Where the balance of moments about the frame's origin sees it, in the frame, m.
-    pub moment_at: [Exact; 3],
+    /// Its place in the balance of forces, in the frame, m; over constants and parameters.
+    pub force_at: [ExactExpression; 3],
+    /// Its place in the balance of moments about the frame's origin, in the frame, m.
+    pub moment_at: [ExactExpression; 3],
 }
 
 /// A loop closed by two points that coincide.
 #[derive(Clone, Debug)]
-pub struct Loop {
-    /// Name for people.
+pub struct KinematicLoop {
+    /// Name, for messages.
     pub name: String,
-    /// The points.
+    /// The two points that coincide.
     pub joins: [PointIdx; 2],
 }
 
 /// A coordinate that follows others, as by gears, a belt or a screw: `coordinate = sum of factor * other + offset`.
 #[derive(Clone, Debug)]
-pub struct Coupling {
-    /// What follows.
+pub struct CoordinateCoupling {
+    /// The coordinate that follows.
     pub coordinate: CoordinateIdx,
-    /// What it follows, sorted, each with its factor: expressions over constants, in units of one over the other.
-    pub terms: Vec<(CoordinateIdx, Exact)>,
-    /// An expression over constants, rad or m.
-    pub offset: Exact,
+    /// The coordinates that it follows, sorted, each with its factor. Factors are expressions over constants; their
+    /// unit is that of this coordinate over that of the other.
+    pub terms: Vec<(CoordinateIdx, ExactExpression)>,
+    /// The constant term, an expression over constants, rad or m.
+    pub offset: ExactExpression,
 }
 
-impl Coupling {
-    /// The value of what follows, rad or m.
-    pub fn value(&self, value: &dyn Fn(Symbol) -> f64) -> f64 {
+impl CoordinateCoupling {
+    /// The value of the coordinate that follows, rad or m; `value` gives those of symbols.
+    pub fn value(&self, value: &dyn Fn(ModelSymbol) -> f64) -> f64 {
         let terms = self.terms.iter();
-        let moved = terms.map(|(i, factor)| factor.evaluate(value) * value(Symbol::Coordinate(*i)));
+        let moved = terms.map(|(i, factor)| factor.evaluate(value) * value(ModelSymbol::Coordinate(*i)));
         self.offset.evaluate(value) + moved.sum::<f64>()
     }
 }
 
 /// A drive.
 #[derive(Clone, Debug)]
-pub struct Drive {
+pub struct ModelDrive {
     /// Identifier; the name of its force in recordings.
     pub name: String,
     /// How it acts.
     pub kind: DriveKind,
-    /// False where nothing drives the coordinate: the row of the equation of motion is there all the same, and its force is
-    /// zero unless a recording has one under this name.
+    /// False for a degree of freedom without a drive. Its row of the equation of motion exists, and its force is zero
+    /// unless a recording has a column of this name.
     pub is_driven: bool,
 }
 
@@ -302,66 +308,67 @@ pub enum DriveKind {
 
 /// Where an effect acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Place {
+pub enum EffectPlace {
     /// On a drive: adds to its force.
     Drive(DriveIdx),
-    /// On a joint coordinate, also a passive one: adds to its torque or force.
+    /// On a joint coordinate, possibly passive: adds to its torque or force.
     Coordinate(CoordinateIdx),
     /// At a point: adds a mass there.
     Point(PointIdx),
     /// On a part: adds to its inertia.
     Part(PartIdx),
-    /// On the base as a whole.
+    /// On the base, as a property of the complete mechanism.
     Base,
-    /// On the measured forces as a whole.
+    /// On the measured forces, as a property of all recordings.
     Force,
 }
 
-/// An effect of the file, with its kind's expressions put in place.
+/// An effect of the file with the expressions of its kind.
 #[derive(Clone, Debug)]
-pub struct Effect {
+pub struct ModelEffect {
     /// Name of the kind.
     pub kind: String,
-    /// Where it acts; its parameters are shared by all places.
-    pub places: Vec<Place>,
-    /// The place whose motion it has besides, where it acts at one place alone.
-    pub other: Option<Place>,
-    /// Mechanics of its own. Without them the effect is `sum of parameter * expression`, the same at every place: a force
-    /// or torque on drives and coordinates; at points the parameter is a mass and the expression its factor.
+    /// Where it acts. All places share its parameters.
+    pub places: Vec<EffectPlace>,
+    /// A second place whose motion it uses, if it acts at one place only.
+    pub other: Option<EffectPlace>,
+    /// Mechanics of its own. Without them the effect is `sum of parameter * expression`, the same at every place. It
+    /// is a force or torque on drives and coordinates. At points the parameter is a mass and the expression its
+    /// factor.
     pub mechanics: Option<Mechanics>,
-    /// Its parameters; none where the effect only has constants.
+    /// Its parameters; none if the effect has constants only.
     pub terms: Vec<EffectTerm>,
     /// The values of its kind's constants by their symbols; expressions over constants.
-    pub constants: Vec<(String, Exact)>,
-    /// Bodies that join those of the mechanism; their parameters are those of the terms.
-    pub bodies: Bodies,
+    pub constants: Vec<(String, ExactExpression)>,
+    /// Bodies that are added to those of the mechanism; their parameters are those of the terms.
+    pub bodies: EffectBodies,
 }
 
-/// One parameter of an effect with what it multiplies.
+/// One parameter of an effect with its factor.
 #[derive(Clone, Debug)]
 pub struct EffectTerm {
     /// Its symbol in the kind.
     pub symbol: String,
     /// The parameter, listed in [`Mechanism::parameters`] after those that the file declares.
     pub parameter: ParameterIdx,
-    /// Expression over constants and [`crate::PlaceQuantity`]; 1 where it has mechanics.
-    pub expression: Exact,
+    /// Factor of the parameter, over constants and [`crate::PlaceQuantity`]; 1 for mechanics.
+    pub expression: ExactExpression,
 }
 
-/// Bodies of an effect.
+/// Bodies that an effect adds.
 #[derive(Clone, Debug, Default)]
-pub struct Bodies {
-    /// Parts.
-    pub parts: Vec<Part>,
+pub struct EffectBodies {
+    /// Rigid bodies.
+    pub parts: Vec<ModelPart>,
     /// Lumped masses.
     pub lumped_masses: Vec<LumpedMass>,
 }
 
-/// What planned motion must keep; ranges are `[low, high]`, and what is not named is not limited.
+/// Limits of planned motions. Ranges are `[low, high]`; quantities that are not listed have no limit.
 #[derive(Clone, Debug, Default)]
-pub struct Limits {
-    /// Of coordinates, each at most once.
-    pub coordinates: Vec<(CoordinateIdx, CoordinateLimits)>,
+pub struct MotionLimits {
+    /// Limits of coordinates, each at most once.
+    pub coordinates: Vec<(CoordinateIdx, CoordinateBounds)>,
     /// Forces of drives, N or N m.
     pub forces: Vec<(DriveIdx, [f64; 2])>,
     /// Boxes of points along the axes of the base frame, m.
@@ -372,21 +379,21 @@ pub struct Limits {
 
 /// Limits of a coordinate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct CoordinateLimits {
-    /// rad or m
+pub struct CoordinateBounds {
+    /// Position, rad or m.
     pub position: Option<[f64; 2]>,
-    /// rad/s or m/s; contains 0.
+    /// Rate, rad/s or m/s; contains 0.
     pub rate: Option<[f64; 2]>,
-    /// rad/s^2 or m/s^2; contains 0.
+    /// Acceleration, rad/s^2 or m/s^2; contains 0.
     pub acceleration: Option<[f64; 2]>,
 }
 
 /// How recordings name their columns.
 #[derive(Clone, Debug, Default)]
-pub struct Recording {
-    /// Pairs of our name (`t`, a coordinate, with `_d` or `_dd`, a drive) and theirs: a column, or a sum of columns
-    /// as [`crate::read_column`] reads it.
+pub struct RecordingColumns {
+    /// Pairs of the model's name (`t`, a coordinate, with `_d` or `_dd`, a drive) and the recording's: a column, or a
+    /// sum of columns as [`crate::read_column`] reads it.
     pub columns: Vec<(String, String)>,
-    /// By what the column of a drive is multiplied to be what acts at the joint, where it measures the motor.
+    /// Factors from the columns of drives to the load at the joint, for columns that measure the motor.
     pub torque: Vec<(String, f64)>,
 }

@@ -1,100 +1,116 @@
-//! Where points are at given coordinates, and how loops move with them: a mechanism goes in once, and is asked many
-//! times, as limits of planned motion need it.
+//! Positions of points and gaps of loops at given coordinates. A mechanism goes in once; its geometry is then
+//! evaluated many times, as the limits of planned motions require.
 
-use crate::exact::{CoordinateIdx, Symbol};
-use crate::kinematics::{Vec3, turned_by};
-use crate::mechanism::{Axis, DriveKind, FreeBody, Mechanism, PointIdx, Step};
+use crate::exact::{CoordinateIdx, ModelSymbol};
+use crate::kinematics::{Vec3, rotation_from_quaternion};
+use crate::mechanism::{DriveKind, FrameAxis, FrameStep, FreeBody, Mechanism, PointIdx};
 
-/// The geometry of a mechanism with the file's constants.
+/// The geometry of a mechanism at the constants of its file.
 #[derive(Clone, Debug)]
 pub struct Kinematics {
-    n: usize,
-    frames: Vec<(usize, Vec<Motion>)>,
+    /// Number of coordinates, passive ones included.
+    n_coordinates: usize,
+    /// Frames with the index of the parent and the steps from it.
+    frames: Vec<(usize, Vec<NumericStep>)>,
+    /// Points with the index of the frame and the position in it, m.
     points: Vec<(usize, Vec3)>,
+    /// Pairs of points that coincide.
     loops: Vec<[usize; 2]>,
-    couplings: Vec<Follower>,
+    /// Coordinates that follow others.
+    couplings: Vec<FollowerCoordinate>,
 }
 
 /// A coordinate that follows others: `offset + sum of factor * other`.
 #[derive(Clone, Debug)]
-struct Follower {
+struct FollowerCoordinate {
+    /// Index of the coordinate.
     coordinate: usize,
+    /// Indices of the others with their factors.
     terms: Vec<(usize, f64)>,
+    /// The constant term, rad or m.
     offset: f64,
 }
 
-/// One step on the way to a frame.
+/// One step from a parent frame to its child.
 #[derive(Clone, Debug)]
-enum Motion {
-    One(Move),
+enum NumericStep {
+    /// A rotation or translation.
+    One(ElementaryMotion),
+    /// The motion of a free body.
     Free(FreeBody),
 }
 
 /// One elementary motion: `offset + sum of factor * coordinate` about or along an axis.
 #[derive(Clone, Debug)]
-struct Move {
+struct ElementaryMotion {
+    /// 0, 1, 2 for x, y, z.
     axis: usize,
+    /// True for a rotation, false for a translation.
     is_rotation: bool,
+    /// The constant part, rad or m.
     offset: f64,
+    /// Indices of coordinates with their factors.
     coordinates: Vec<(usize, f64)>,
 }
 
-/// All frames at given coordinates.
+/// Poses of all frames at given coordinates.
 #[derive(Clone, Debug)]
-pub struct Poses {
-    frames: Vec<Pose>,
+pub struct MechanismPoses {
+    /// In the order of the mechanism.
+    frames: Vec<FramePlacement>,
 }
 
 /// A frame at given coordinates, all in the axes of the base frame.
 #[derive(Clone, Debug)]
-pub struct Pose {
-    /// Row by row; its columns are the frame's axes.
+pub struct FramePlacement {
+    /// Rotation by rows; its columns are the axes of the frame.
     pub rotation: [[f64; 3]; 3],
-    /// m
+    /// Origin, m.
     pub origin: [f64; 3],
     /// The joints between its parent and this frame, in the order of its steps.
-    pub moved: Vec<Moved>,
-    /// Where translations led on the way from the parent's origin, m, and how many of `moved` lay behind by then.
-    pub way: Vec<([f64; 3], usize)>,
+    pub joint_axes: Vec<CoordinateAxis>,
+    /// Positions after each translation from the parent's origin, m, each with the number of `joint_axes` before it.
+    pub translations: Vec<([f64; 3], usize)>,
 }
 
-/// How a coordinate moves a frame against its parent.
+/// How a coordinate moves a frame relative to its parent.
 #[derive(Clone, Copy, Debug)]
-pub struct Moved {
+pub struct CoordinateAxis {
     /// Position of the coordinate in [`Mechanism::coordinates`].
     pub coordinate: usize,
-    /// By what the coordinate is multiplied.
+    /// Factor of the coordinate.
     pub factor: f64,
-    /// Whether it turns about the axis; else it slides along it.
+    /// True for a rotation about the axis, false for a translation along it.
     pub is_rotation: bool,
-    /// Unit vector.
+    /// Unit vector along the axis.
     pub axis: [f64; 3],
-    /// Where the joint is reached, m.
+    /// A point on the axis, m.
     pub origin: [f64; 3],
 }
 
-impl Poses {
+impl MechanismPoses {
     /// The frames in the order of the file, the base first.
-    pub fn frames(&self) -> &[Pose] {
+    pub fn frames(&self) -> &[FramePlacement] {
         &self.frames
     }
 }
 
 impl Kinematics {
-    /// The geometry, ready to be asked.
+    /// Evaluates all constants of a mechanism; only coordinates remain variable.
     pub fn new(mechanism: &Mechanism) -> Self {
-        let value = |symbol: Symbol| match symbol {
-            Symbol::Coordinate(_) => 0.0,
+        // With coordinates of zero only the constant part of an angle or length remains.
+        let value = |symbol: ModelSymbol| match symbol {
+            ModelSymbol::Coordinate(_) => 0.0,
             other => mechanism.symbol_nominal(other),
         };
-        let axis = |axis: &Axis| match axis {
-            Axis::X => 0,
-            Axis::Y => 1,
-            Axis::Z => 2,
+        let axis = |axis: &FrameAxis| match axis {
+            FrameAxis::X => 0,
+            FrameAxis::Y => 1,
+            FrameAxis::Z => 2,
         };
-        let moves = |step: &Step| match step {
-            Step::Free(body) => Motion::Free(*body),
-            Step::Rotate(about, angle) => Motion::One(Move {
+        let moves = |step: &FrameStep| match step {
+            FrameStep::Free(body) => NumericStep::Free(*body),
+            FrameStep::Rotate(about, angle) => NumericStep::One(ElementaryMotion {
                 axis: axis(about),
                 is_rotation: true,
                 offset: angle.evaluate(&value),
@@ -102,12 +118,12 @@ impl Kinematics {
                     .terms
                     .iter()
                     .filter_map(|(symbol, n)| match symbol {
-                        Symbol::Coordinate(i) => Some((i.0, f64::from(*n))),
+                        ModelSymbol::Coordinate(i) => Some((i.0, f64::from(*n))),
                         _ => None,
                     })
                     .collect(),
             }),
-            Step::Translate(along, length) => Motion::One(Move {
+            FrameStep::Translate(along, length) => NumericStep::One(ElementaryMotion {
                 axis: axis(along),
                 is_rotation: false,
                 offset: length.evaluate(&value),
@@ -119,7 +135,7 @@ impl Kinematics {
             }),
         };
         Self {
-            n: mechanism.coordinates.len(),
+            n_coordinates: mechanism.coordinates.len(),
             frames: mechanism
                 .frames
                 .iter()
@@ -130,15 +146,11 @@ impl Kinematics {
                 .iter()
                 .map(|p| (p.frame.0, [0, 1, 2].map(|k| p.at[k].evaluate(&value))))
                 .collect(),
-            loops: mechanism
-                .loops
-                .iter()
-                .map(|l| [l.joins[0].0, l.joins[1].0])
-                .collect(),
+            loops: mechanism.loops.iter().map(|l| [l.joins[0].0, l.joins[1].0]).collect(),
             couplings: mechanism
                 .couplings
                 .iter()
-                .map(|coupling| Follower {
+                .map(|coupling| FollowerCoordinate {
                     coordinate: coupling.coordinate.0,
                     terms: coupling
                         .terms
@@ -151,10 +163,13 @@ impl Kinematics {
         }
     }
 
-    /// All frames at given coordinates, rad and m, in the order of the file; one for each (asserted).
-    pub fn poses(&self, coordinates: &[f64]) -> Poses {
-        assert_eq!(coordinates.len(), self.n, "one value for each coordinate");
-        let mut frames: Vec<Pose> = Vec::with_capacity(self.frames.len());
+    /// Poses of all frames at given coordinates, rad and m.
+    ///
+    /// Panics unless there is one value for each coordinate.
+    pub fn poses(&self, coordinates: &[f64]) -> MechanismPoses {
+        assert_eq!(coordinates.len(), self.n_coordinates, "one value for each coordinate");
+        let mut frames: Vec<FramePlacement> = Vec::with_capacity(self.frames.len());
+        // Parents come first, so each frame starts at its parent's pose.
         for (i, (parent, moves)) in self.frames.iter().enumerate() {
             let (rotation, origin) = if i == 0 {
                 let unity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
@@ -162,27 +177,28 @@ impl Kinematics {
             } else {
                 (frames[*parent].rotation, frames[*parent].origin)
             };
-            let mut pose = Pose {
+            let mut pose = FramePlacement {
                 rotation,
                 origin,
-                moved: Vec::new(),
-                way: Vec::new(),
+                joint_axes: Vec::new(),
+                translations: Vec::new(),
             };
             for step in moves {
                 let step = match step {
-                    Motion::One(step) => step,
-                    Motion::Free(body) => {
+                    NumericStep::One(step) => step,
+                    NumericStep::Free(body) => {
                         let of = |i: CoordinateIdx| coordinates[i.0];
                         pose.origin = body.position.map(of);
-                        pose.rotation = turned_by(body.quaternion.map(of));
+                        pose.rotation = rotation_from_quaternion(body.quaternion.map(of));
                         continue;
                     }
                 };
+                // The axis of a step is a column of the rotation that the steps before it give.
                 let direction: Vec3 = std::array::from_fn(|k| pose.rotation[k][step.axis]);
                 let mut amount = step.offset;
                 for (coordinate, factor) in &step.coordinates {
                     amount += factor * coordinates[*coordinate];
-                    pose.moved.push(Moved {
+                    pose.joint_axes.push(CoordinateAxis {
                         coordinate: *coordinate,
                         factor: *factor,
                         is_rotation: step.is_rotation,
@@ -191,35 +207,35 @@ impl Kinematics {
                     });
                 }
                 if step.is_rotation {
-                    turn(&mut pose.rotation, step.axis, amount);
+                    rotate_columns(&mut pose.rotation, step.axis, amount);
                 } else {
                     for k in 0..3 {
                         pose.origin[k] += amount * direction[k];
                     }
-                    pose.way.push((pose.origin, pose.moved.len()));
+                    pose.translations.push((pose.origin, pose.joint_axes.len()));
                 }
             }
             frames.push(pose);
         }
-        Poses { frames }
+        MechanismPoses { frames }
     }
 
     /// A point's position in the base frame, m.
-    pub fn point(&self, poses: &Poses, point: PointIdx) -> [f64; 3] {
+    pub fn point_position(&self, poses: &MechanismPoses, point: PointIdx) -> [f64; 3] {
         self.position(poses, point.0)
     }
 
-    fn position(&self, poses: &Poses, point: usize) -> Vec3 {
+    /// A point's position in the base frame, m, by the index of the point.
+    fn position(&self, poses: &MechanismPoses, point: usize) -> Vec3 {
         let (frame, at) = &self.points[point];
         let pose = &poses.frames[*frame];
-        std::array::from_fn(|k| {
-            pose.origin[k] + (0..3).map(|j| pose.rotation[k][j] * at[j]).sum::<f64>()
-        })
+        std::array::from_fn(|k| pose.origin[k] + (0..3).map(|j| pose.rotation[k][j] * at[j]).sum::<f64>())
     }
 
-    /// How far apart the two points of each loop are, m: three numbers for each loop; then by how much each coordinate that
-    /// follows others is off, rad or m, at the coordinates that the poses were made of.
-    pub fn gaps(&self, poses: &Poses, coordinates: &[f64]) -> Vec<f64> {
+    /// The residuals of the constraints at the coordinates of the poses. First come the differences of the two points
+    /// of each loop, m, three per loop. Then comes the difference of each coordinate that follows others from its
+    /// value, rad or m.
+    pub fn gaps(&self, poses: &MechanismPoses, coordinates: &[f64]) -> Vec<f64> {
         let ends = |l: &[usize; 2]| l.map(|point| self.position(poses, point));
         let of_loops = self.loops.iter().flat_map(|l| {
             let [a, b] = ends(l);
@@ -233,12 +249,13 @@ impl Kinematics {
         of_loops.chain(of_couplings).collect()
     }
 
-    /// Derivative of [`Self::gaps`] by all coordinates, one row for each gap.
-    pub fn gap_jacobian(&self, poses: &Poses) -> Vec<Vec<f64>> {
-        let mut rows = vec![vec![0.0; self.n]; 3 * self.loops.len()];
+    /// Derivative of [`Self::gaps`] by all coordinates, one row per gap.
+    pub fn gap_jacobian(&self, poses: &MechanismPoses) -> Vec<Vec<f64>> {
+        let mut rows = vec![vec![0.0; self.n_coordinates]; 3 * self.loops.len()];
         for (l, ends) in self.loops.iter().enumerate() {
+            // The gap is the first point minus the second one.
             for (point, sign) in ends.iter().zip([1.0, -1.0]) {
-                self.moves(poses, *point, &mut |coordinate, velocity| {
+                self.visit_point_rates(poses, *point, &mut |coordinate, velocity| {
                     for k in 0..3 {
                         rows[3 * l + k][coordinate] += sign * velocity[k];
                     }
@@ -246,7 +263,7 @@ impl Kinematics {
             }
         }
         for follower in &self.couplings {
-            let mut row = vec![0.0; self.n];
+            let mut row = vec![0.0; self.n_coordinates];
             row[follower.coordinate] = 1.0;
             for (i, factor) in &follower.terms {
                 row[*i] -= factor;
@@ -256,12 +273,14 @@ impl Kinematics {
         rows
     }
 
-    /// Shows each coordinate that moves a point, with the point's velocity for a rate of one, joint by joint.
-    fn moves(&self, poses: &Poses, point: usize, show: &mut dyn FnMut(usize, Vec3)) {
+    /// Calls `show` for each joint that moves a point: its coordinate, and the velocity of the point for a rate of
+    /// one.
+    fn visit_point_rates(&self, poses: &MechanismPoses, point: usize, show: &mut dyn FnMut(usize, Vec3)) {
         let at = self.position(poses, point);
         let mut frame = self.points[point].0;
+        // Follows the chain from the point's frame to the base.
         while frame != 0 {
-            for moved in &poses.frames[frame].moved {
+            for moved in &poses.frames[frame].joint_axes {
                 let axis = moved.axis;
                 let velocity = if moved.is_rotation {
                     let arm: Vec3 = std::array::from_fn(|k| at[k] - moved.origin[k]);
@@ -279,17 +298,20 @@ impl Kinematics {
         }
     }
 
-    /// Derivative of a drive's angle or length by all coordinates: a row of J. No loop may tie the coordinates.
-    pub fn drive_slopes(&self, poses: &Poses, kind: DriveKind) -> Vec<f64> {
-        let mut row = vec![0.0; self.n];
+    /// Derivative of a drive's angle or length by all coordinates: one row of the drives' Jacobian.
+    ///
+    /// All coordinates count as independent, so the mechanism must have no loops.
+    pub fn drive_slopes(&self, poses: &MechanismPoses, kind: DriveKind) -> Vec<f64> {
+        let mut row = vec![0.0; self.n_coordinates];
         match kind {
             DriveKind::Joint(i) => row[i.0] = 1.0,
             DriveKind::Linear { from, to } => {
                 let ends = [from, to].map(|point| self.position(poses, point.0));
+                // The rate of a length is the velocity of the end relative to the start along the line.
                 let along: Vec3 = std::array::from_fn(|k| ends[1][k] - ends[0][k]);
                 let length = along.iter().map(|x| x * x).sum::<f64>().sqrt();
                 for (point, sign) in [(from, -1.0), (to, 1.0)] {
-                    self.moves(poses, point.0, &mut |coordinate, velocity| {
+                    self.visit_point_rates(poses, point.0, &mut |coordinate, velocity| {
                         let slope: f64 = along.iter().zip(velocity).map(|(a, v)| a * v).sum();
                         row[coordinate] += sign * slope / length;
                     });
@@ -300,8 +322,8 @@ impl Kinematics {
     }
 }
 
-/// Multiplies from the right by an elementary rotation.
-fn turn(rotation: &mut [Vec3; 3], axis: usize, angle: f64) {
+/// Multiplies a rotation from the right by an elementary rotation about one of its axes.
+fn rotate_columns(rotation: &mut [Vec3; 3], axis: usize, angle: f64) {
     let (sin, cos) = angle.sin_cos();
     let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
     for row in rotation {
@@ -314,25 +336,20 @@ fn turn(rotation: &mut [Vec3; 3], axis: usize, angle: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pose::gaps;
+    use crate::pose::loop_gaps;
 
     #[test]
     fn agrees_with_the_nominal_pose_and_with_differences() {
         for name in ["spidermill", "three_rrr", "four_bar", "panda"] {
-            let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
-                .join(format!("models/{name}.toml"));
+            let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("models/{name}.toml"));
             let mechanism = crate::load_file(&path).unwrap().mechanism;
             let kinematics = Kinematics::new(&mechanism);
             let mut q: Vec<f64> = mechanism.coordinates.iter().map(|c| c.nominal).collect();
-            let expected = gaps(&mechanism);
-            let close = |a: &[f64], b: &[f64], by: f64| {
-                a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() < by)
-            };
+            let expected = loop_gaps(&mechanism);
+            let close =
+                |a: &[f64], b: &[f64], by: f64| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() < by);
             let poses = kinematics.poses(&q);
-            assert!(
-                close(&kinematics.gaps(&poses, &q), &expected.values, 1e-12),
-                "{name}"
-            );
+            assert!(close(&kinematics.gaps(&poses, &q), &expected.values, 1e-12), "{name}");
             // Away from the nominal pose, against differences.
             for (i, value) in q.iter_mut().enumerate() {
                 *value += 0.1 + 0.03 * f64::from(u8::try_from(i).unwrap());
@@ -348,11 +365,7 @@ mod tests {
                     gaps
                 };
                 let (high, low) = (moved(step), moved(-step));
-                let slope: Vec<f64> = high
-                    .iter()
-                    .zip(&low)
-                    .map(|(a, b)| (a - b) / (2.0 * step))
-                    .collect();
+                let slope: Vec<f64> = high.iter().zip(&low).map(|(a, b)| (a - b) / (2.0 * step)).collect();
                 let column: Vec<f64> = rows.iter().map(|row| row[i]).collect();
                 assert!(close(&column, &slope, 1e-8), "{name}, coordinate {i}");
             }

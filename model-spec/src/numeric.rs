@@ -1,22 +1,24 @@
-//! The little linear algebra that checks of a pose need: rank and least squares of small dense matrices.
+//! Linear algebra for the checks of a pose: rank and least squares of small dense matrices.
 
 /// A dense matrix by rows.
-pub(crate) type Rows = Vec<Vec<f64>>;
+pub(crate) type DenseRows = Vec<Vec<f64>>;
 
-/// The numeric rank: pivots above `tolerance` times the largest entry, by elimination with full pivoting.
-pub(crate) fn rank(rows: &Rows, tolerance: f64) -> usize {
+/// The numeric rank: number of pivots above `tolerance` times the largest entry, by elimination with full pivoting.
+///
+/// A matrix with entries that are not finite has rank zero.
+pub(crate) fn rank(rows: &DenseRows, tolerance: f64) -> usize {
     let mut rows = rows.clone();
     let n_columns = rows.first().map_or(0, Vec::len);
-    let largest = rows
-        .iter()
-        .flatten()
-        .fold(0.0_f64, |most, entry| most.max(entry.abs()));
+    // The tolerance is relative to the largest entry.
+    let largest = rows.iter().flatten().fold(0.0_f64, |most, entry| most.max(entry.abs()));
     if largest == 0.0 || !largest.is_finite() {
         return 0;
     }
+    // Columns that have had a pivot.
     let mut used = vec![false; n_columns];
     let mut rank = 0;
     while rank < rows.len() {
+        // The largest entry of the remaining rows and columns becomes the pivot.
         let mut pivot = (rank, 0, 0.0);
         for (i, row) in rows.iter().enumerate().skip(rank) {
             for (j, entry) in row.iter().enumerate() {
@@ -26,6 +28,7 @@ pub(crate) fn rank(rows: &Rows, tolerance: f64) -> usize {
             }
         }
         let (i, j, size) = pivot;
+        // All remaining entries are rounding, so the rank is reached.
         if size <= tolerance * largest {
             break;
         }
@@ -33,6 +36,7 @@ pub(crate) fn rank(rows: &Rows, tolerance: f64) -> usize {
         used[j] = true;
         let (done, rest) = rows.split_at_mut(rank + 1);
         let pivot_row = &done[rank];
+        // Subtract multiples of the pivot row, so that its column becomes zero below.
         for row in rest {
             let factor = row[j] / pivot_row[j];
             if factor != 0.0 {
@@ -47,9 +51,10 @@ pub(crate) fn rank(rows: &Rows, tolerance: f64) -> usize {
     rank
 }
 
-/// Solves the normal equations `(JᵀJ + damping) x = Jᵀ r` by elimination; `None` where they are singular.
-pub(crate) fn least_squares(jacobian: &Rows, residual: &[f64], damping: f64) -> Option<Vec<f64>> {
+/// Solves the normal equations `(J'J + damping I) x = J' r` by elimination; `None` if they are singular.
+pub(crate) fn least_squares(jacobian: &DenseRows, residual: &[f64], damping: f64) -> Option<Vec<f64>> {
     let n = jacobian.first()?.len();
+    // The matrix J'J with J'r as its last column.
     let mut matrix = vec![vec![0.0; n + 1]; n];
     for (row, r) in jacobian.iter().zip(residual) {
         for i in 0..n {
@@ -62,10 +67,13 @@ pub(crate) fn least_squares(jacobian: &Rows, residual: &[f64], damping: f64) -> 
             matrix[i][n] += row[i] * r;
         }
     }
+    // Damping on the diagonal makes singular equations solvable.
     for (i, row) in matrix.iter_mut().enumerate() {
         row[i] += damping;
     }
+    // Gaussian elimination with partial pivoting.
     for k in 0..n {
+        // The largest entry of the column becomes the pivot.
         let best = (k..n).max_by(|&i, &j| matrix[i][k].abs().total_cmp(&matrix[j][k].abs()))?;
         if matrix[best][k] == 0.0 || !matrix[best][k].is_finite() {
             return None;
@@ -79,10 +87,12 @@ pub(crate) fn least_squares(jacobian: &Rows, residual: &[f64], damping: f64) -> 
             }
         }
     }
+    // Back substitution.
     let mut x = vec![0.0; n];
     for k in (0..n).rev() {
         let known: f64 = (k + 1..n).map(|j| matrix[k][j] * x[j]).sum();
         x[k] = (matrix[k][n] - known) / matrix[k][k];
     }
+    // Overflow in the solution counts as singular.
     x.iter().all(|entry| entry.is_finite()).then_some(x)
 }

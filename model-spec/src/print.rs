@@ -1,67 +1,69 @@
-//! Prints exact expressions so that the parser reads the same expression again, and evaluates them.
+//! Prints exact expressions in the syntax of the parser, and evaluates them in double precision.
 
 use num_rational::BigRational;
 use num_traits::{One, Signed, ToPrimitive, Zero};
 
-use crate::exact::{Angle, Exact, Function, Length, Symbol};
+use crate::exact::{ExactAngle, ExactExpression, ExactFunction, ExactLength, ModelSymbol};
 use crate::mechanism::Mechanism;
 
-impl Exact {
+impl ExactExpression {
     /// The number zero.
     pub fn zero() -> Self {
         Self::Rational(BigRational::zero())
     }
 
     /// The number one.
-    pub fn one() -> Self {
+    pub fn unity() -> Self {
         Self::Rational(BigRational::one())
     }
 
-    /// True for the number zero as written; a formula that happens to vanish is not recognised.
+    /// True for the number zero as written; an expression that simplifies to zero is not recognised.
     pub fn is_zero(&self) -> bool {
         matches!(self, Self::Rational(value) if value.is_zero())
     }
 
-    /// The expression as the model file would write it, symbols named by `name`.
-    pub fn to_text(&self, name: &dyn Fn(Symbol) -> String) -> String {
+    /// The expression in the syntax of a model file; `name` gives the names of symbols.
+    /// The text starts in the context of a sum, where no parentheses are needed.
+    pub fn to_text(&self, name: &dyn Fn(ModelSymbol) -> String) -> String {
         let mut text = String::new();
-        print(self, Level::Sum, name, &mut text);
+        print_expression(self, OperandPrecedence::Sum, name, &mut text);
         text
     }
 
-    /// The value in double precision, symbols valued by `value`; not finite where the expression has no value.
-    pub fn evaluate(&self, value: &dyn Fn(Symbol) -> f64) -> f64 {
+    /// The value in double precision; `value` gives the values of symbols. It is not finite where the expression is
+    /// undefined.
+    /// Exact numbers are rounded only here.
+    pub fn evaluate(&self, value: &dyn Fn(ModelSymbol) -> f64) -> f64 {
         match self {
             Self::Rational(number) => to_f64(number),
             Self::Pi => std::f64::consts::PI,
             Self::Symbol(symbol) => value(*symbol),
             Self::Sum(terms) => terms.iter().map(|term| term.evaluate(value)).sum(),
-            Self::Product(factors) => factors
-                .iter()
-                .map(|factor| factor.evaluate(value))
-                .product(),
+            Self::Product(factors) => factors.iter().map(|factor| factor.evaluate(value)).product(),
             Self::Quotient(above, below) => above.evaluate(value) / below.evaluate(value),
             Self::Negative(inner) => -inner.evaluate(value),
             Self::Power(base, exponent) => base.evaluate(value).powi(*exponent),
             Self::Apply(function, inner) => {
                 let x = inner.evaluate(value);
                 match function {
-                    Function::Sin => x.sin(),
-                    Function::Cos => x.cos(),
-                    Function::Sqrt => x.sqrt(),
-                    Function::Abs => x.abs(),
-                    Function::Sign if x > 0.0 => 1.0,
-                    Function::Sign if x < 0.0 => -1.0,
-                    Function::Sign => 0.0,
-                    Function::Tanh => x.tanh(),
-                    Function::Exp => x.exp(),
+                    ExactFunction::Sin => x.sin(),
+                    ExactFunction::Cos => x.cos(),
+                    ExactFunction::Sqrt => x.sqrt(),
+                    ExactFunction::Abs => x.abs(),
+                    // Unlike `signum`, the sign of zero is zero.
+                    ExactFunction::Sign if x > 0.0 => 1.0,
+                    ExactFunction::Sign if x < 0.0 => -1.0,
+                    ExactFunction::Sign => 0.0,
+                    ExactFunction::Tanh => x.tanh(),
+                    ExactFunction::Exp => x.exp(),
                 }
             }
         }
     }
 
-    /// Calls `visit` with every symbol of the expression.
-    pub fn for_each_symbol(&self, visit: &mut dyn FnMut(Symbol)) {
+    /// Calls `visit` for every occurrence of a symbol in the expression.
+    /// Symbols are visited in the order in which they are printed, also repeatedly.
+    pub fn for_each_symbol(&self, visit: &mut dyn FnMut(ModelSymbol)) {
         match self {
             Self::Rational(_) | Self::Pi => {}
             Self::Symbol(symbol) => visit(*symbol),
@@ -80,15 +82,15 @@ impl Exact {
         }
     }
 
-    /// True if any symbol of the expression satisfies the condition.
-    pub fn mentions(&self, condition: &dyn Fn(Symbol) -> bool) -> bool {
+    /// True if any symbol in the expression satisfies the condition.
+    pub fn mentions(&self, condition: &dyn Fn(ModelSymbol) -> bool) -> bool {
         let mut found = false;
         self.for_each_symbol(&mut |symbol| found |= condition(symbol));
         found
     }
 }
 
-impl Angle {
+impl ExactAngle {
     /// The angle zero.
     pub fn zero() -> Self {
         Self {
@@ -102,8 +104,9 @@ impl Angle {
         self.pi.is_zero() && self.terms.is_empty()
     }
 
-    /// The value in rad, symbols valued by `value`.
-    pub fn evaluate(&self, value: &dyn Fn(Symbol) -> f64) -> f64 {
+    /// The value in rad; `value` gives the values of symbols.
+    /// The fixed part, then the multiples of symbols.
+    pub fn evaluate(&self, value: &dyn Fn(ModelSymbol) -> f64) -> f64 {
         to_f64(&self.pi) * std::f64::consts::PI
             + self
                 .terms
@@ -113,14 +116,15 @@ impl Angle {
     }
 }
 
-impl Length {
-    /// The value in m, symbols valued by `value`.
-    pub fn evaluate(&self, value: &dyn Fn(Symbol) -> f64) -> f64 {
+impl ExactLength {
+    /// The value in m; `value` gives the values of symbols.
+    /// The fixed part, then the multiples of coordinates.
+    pub fn evaluate(&self, value: &dyn Fn(ModelSymbol) -> f64) -> f64 {
         self.offset.evaluate(value)
             + self
                 .coordinates
                 .iter()
-                .map(|(coordinate, factor)| to_f64(factor) * value(Symbol::Coordinate(*coordinate)))
+                .map(|(coordinate, factor)| to_f64(factor) * value(ModelSymbol::Coordinate(*coordinate)))
                 .sum::<f64>()
     }
 
@@ -132,27 +136,28 @@ impl Length {
 
 impl Mechanism {
     /// The name of a symbol in the model file.
-    pub fn symbol_name(&self, symbol: Symbol) -> &str {
+    pub fn symbol_name(&self, symbol: ModelSymbol) -> &str {
         match symbol {
-            Symbol::Constant(idx) => &self.constants[idx.0].name,
-            Symbol::Parameter(idx) => &self.parameters[idx.0].name,
-            Symbol::Coordinate(idx) => &self.coordinates[idx.0].name,
-            Symbol::Place(quantity) => quantity.name(),
+            ModelSymbol::Constant(idx) => &self.constants[idx.0].name,
+            ModelSymbol::Parameter(idx) => &self.parameters[idx.0].name,
+            ModelSymbol::Coordinate(idx) => &self.coordinates[idx.0].name,
+            ModelSymbol::Place(quantity) => quantity.name(),
         }
     }
 
-    /// The nominal value of a symbol; zero for the quantities of a place, which have none.
-    pub fn symbol_nominal(&self, symbol: Symbol) -> f64 {
+    /// The nominal value of a symbol; zero for the quantities of a place, which have no nominal value.
+    pub fn symbol_nominal(&self, symbol: ModelSymbol) -> f64 {
+        // Each symbol has one value in the mechanism.
         match symbol {
-            Symbol::Constant(idx) => self.constants[idx.0].value,
-            Symbol::Parameter(idx) => self.parameters[idx.0].nominal,
-            Symbol::Coordinate(idx) => self.coordinates[idx.0].nominal,
-            Symbol::Place(_) => 0.0,
+            ModelSymbol::Constant(idx) => self.constants[idx.0].value,
+            ModelSymbol::Parameter(idx) => self.parameters[idx.0].nominal,
+            ModelSymbol::Coordinate(idx) => self.coordinates[idx.0].nominal,
+            ModelSymbol::Place(_) => 0.0,
         }
     }
 
-    /// An expression as the model file would write it.
-    pub fn text_of(&self, exact: &Exact) -> String {
+    /// An expression in the syntax of the model file, with its names.
+    pub fn text_of(&self, exact: &ExactExpression) -> String {
         exact.to_text(&|symbol| self.symbol_name(symbol).to_owned())
     }
 }
@@ -162,70 +167,90 @@ pub(crate) fn to_f64(number: &BigRational) -> f64 {
     number.to_f64().unwrap_or(f64::NAN)
 }
 
-/// How tightly the surroundings of an operand bind.
+/// Precedence of the context of an operand, from weak to strong.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Level {
+enum OperandPrecedence {
+    /// In a sum: nothing needs parentheses.
     Sum,
+    /// In a product as its first factor: sums need parentheses.
     Product,
-    /// A later factor or a divisor, where a fraction would be read otherwise.
+    /// As a later factor or a divisor: fractions need parentheses, too.
     Factor,
+    /// As the base of a power: only numbers, names and calls need none.
     Power,
 }
 
-fn print(exact: &Exact, level: Level, name: &dyn Fn(Symbol) -> String, text: &mut String) {
+/// Appends an expression; parentheses are added if its own precedence is below that of its context.
+/// The parser reads the same tree again.
+fn print_expression(
+    exact: &ExactExpression,
+    level: OperandPrecedence,
+    name: &dyn Fn(ModelSymbol) -> String,
+    text: &mut String,
+) {
+    // A negative number prints a sign and a fraction prints a slash, so both bind less than an integer.
     let own = match exact {
-        Exact::Rational(value) if value.is_negative() => Level::Sum,
-        Exact::Rational(value) if !value.is_integer() => Level::Product,
-        Exact::Sum(_) | Exact::Negative(_) => Level::Sum,
-        Exact::Product(_) | Exact::Quotient(..) => Level::Product,
-        Exact::Power(..) => Level::Factor,
-        Exact::Rational(_) | Exact::Pi | Exact::Symbol(_) | Exact::Apply(..) => Level::Power,
+        ExactExpression::Rational(value) if value.is_negative() => OperandPrecedence::Sum,
+        ExactExpression::Rational(value) if !value.is_integer() => OperandPrecedence::Product,
+        ExactExpression::Sum(_) | ExactExpression::Negative(_) => OperandPrecedence::Sum,
+        ExactExpression::Product(_) | ExactExpression::Quotient(..) => OperandPrecedence::Product,
+        ExactExpression::Power(..) => OperandPrecedence::Factor,
+        ExactExpression::Rational(_)
+        | ExactExpression::Pi
+        | ExactExpression::Symbol(_)
+        | ExactExpression::Apply(..) => OperandPrecedence::Power,
     };
     let bracket = own < level;
     if bracket {
         text.push('(');
     }
     match exact {
-        Exact::Rational(value) => text.push_str(&value.to_string()),
-        Exact::Pi => text.push_str("pi"),
-        Exact::Symbol(symbol) => text.push_str(&name(*symbol)),
-        Exact::Sum(terms) => print_sum(terms, name, text),
-        Exact::Product(factors) => {
+        ExactExpression::Rational(value) => text.push_str(&value.to_string()),
+        ExactExpression::Pi => text.push_str("pi"),
+        ExactExpression::Symbol(symbol) => text.push_str(&name(*symbol)),
+        // Terms of a sum are printed with their signs.
+        ExactExpression::Sum(terms) => print_sum(terms, name, text),
+        ExactExpression::Product(factors) => {
             for (i, factor) in factors.iter().enumerate() {
                 if i > 0 {
                     text.push('*');
                 }
-                let number = i == 0 && matches!(factor, Exact::Rational(_));
+                // A leading number may be a fraction, because products are read from left to right.
+                let number = i == 0 && matches!(factor, ExactExpression::Rational(_));
                 let inner = if number {
-                    Level::Product
+                    OperandPrecedence::Product
                 } else {
-                    Level::Factor
+                    OperandPrecedence::Factor
                 };
-                print(factor, inner, name, text);
+                print_expression(factor, inner, name, text);
             }
         }
-        Exact::Quotient(above, below) => {
+        // A divisor always needs parentheses around products and fractions.
+        ExactExpression::Quotient(above, below) => {
+            // `(a/b)/c` needs parentheses, because chains of fractions are parsed into one.
             let inner = match **above {
-                Exact::Quotient(..) => Level::Factor,
-                _ => Level::Product,
+                ExactExpression::Quotient(..) => OperandPrecedence::Factor,
+                _ => OperandPrecedence::Product,
             };
-            print(above, inner, name, text);
+            print_expression(above, inner, name, text);
             text.push('/');
-            print(below, Level::Factor, name, text);
+            print_expression(below, OperandPrecedence::Factor, name, text);
         }
-        Exact::Negative(inner) => {
+        // A sign is printed before a product, but before a sum only with parentheses.
+        ExactExpression::Negative(inner) => {
             text.push('-');
-            print(inner, Level::Product, name, text);
+            print_expression(inner, OperandPrecedence::Product, name, text);
         }
-        Exact::Power(base, exponent) => {
-            print(base, Level::Power, name, text);
+        // The base of a power is printed as an atom.
+        ExactExpression::Power(base, exponent) => {
+            print_expression(base, OperandPrecedence::Power, name, text);
             text.push('^');
             text.push_str(&exponent.to_string());
         }
-        Exact::Apply(function, inner) => {
+        ExactExpression::Apply(function, inner) => {
             text.push_str(function_name(*function));
             text.push('(');
-            print(inner, Level::Sum, name, text);
+            print_expression(inner, OperandPrecedence::Sum, name, text);
             text.push(')');
         }
     }
@@ -234,14 +259,17 @@ fn print(exact: &Exact, level: Level, name: &dyn Fn(Symbol) -> String, text: &mu
     }
 }
 
-fn print_sum(terms: &[Exact], name: &dyn Fn(Symbol) -> String, text: &mut String) {
+/// Appends a sum, in which negative terms become differences.
+fn print_sum(terms: &[ExactExpression], name: &dyn Fn(ModelSymbol) -> String, text: &mut String) {
     for (i, term) in terms.iter().enumerate() {
+        // A negative term after the first one is subtracted.
         match term {
-            Exact::Negative(inner) if i > 0 => {
+            ExactExpression::Negative(inner) if i > 0 => {
                 text.push_str(" - ");
-                print(inner, Level::Product, name, text);
+                print_expression(inner, OperandPrecedence::Product, name, text);
             }
-            Exact::Rational(value) if i > 0 && value.is_negative() => {
+            // A negative number after the first term is subtracted, too.
+            ExactExpression::Rational(value) if i > 0 && value.is_negative() => {
                 text.push_str(" - ");
                 text.push_str(&(-value).to_string());
             }
@@ -249,25 +277,26 @@ fn print_sum(terms: &[Exact], name: &dyn Fn(Symbol) -> String, text: &mut String
                 if i > 0 {
                     text.push_str(" + ");
                 }
+                // A sign is allowed without parentheses only at the start of the sum.
                 let inner = match term {
-                    Exact::Negative(_) | Exact::Rational(_) if i == 0 => Level::Sum,
-                    _ => Level::Product,
+                    ExactExpression::Negative(_) | ExactExpression::Rational(_) if i == 0 => OperandPrecedence::Sum,
+                    _ => OperandPrecedence::Product,
                 };
-                print(term, inner, name, text);
+                print_expression(term, inner, name, text);
             }
         }
     }
 }
 
-/// The word for a function.
-pub(crate) fn function_name(function: Function) -> &'static str {
+/// The name of a function in expressions.
+pub(crate) fn function_name(function: ExactFunction) -> &'static str {
     match function {
-        Function::Sin => "sin",
-        Function::Cos => "cos",
-        Function::Sqrt => "sqrt",
-        Function::Abs => "abs",
-        Function::Sign => "sign",
-        Function::Tanh => "tanh",
-        Function::Exp => "exp",
+        ExactFunction::Sin => "sin",
+        ExactFunction::Cos => "cos",
+        ExactFunction::Sqrt => "sqrt",
+        ExactFunction::Abs => "abs",
+        ExactFunction::Sign => "sign",
+        ExactFunction::Tanh => "tanh",
+        ExactFunction::Exp => "exp",
     }
 }

@@ -1,4 +1,4 @@
-//! Ranges of values: `2.5` for what may reach 2.5 either way, `[-1, 2.5]` for two ends.
+//! Ranges of values: `2.5` for the range from -2.5 to 2.5, `[-1, 2.5]` for two ends.
 
 #[cfg(any(test, feature = "schema"))]
 use std::borrow::Cow;
@@ -6,27 +6,31 @@ use std::borrow::Cow;
 #[cfg(any(test, feature = "schema"))]
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 
-use crate::diagnostic::{Diagnostic, Log, Span};
-use crate::document::{Node, Value};
-use crate::record::{Read, wrong_type};
-use crate::values::Number;
+use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
+use crate::document::{TomlNode, TomlValue};
+use crate::record::{SchemaValue, wrong_type};
+use crate::values::SpannedNumber;
 
 /// A range with its place.
+/// The file gives two ends, or one positive number for a symmetric range.
 #[derive(Clone, Debug)]
-pub(crate) struct Range {
+pub(crate) struct ValueRange {
+    /// Lower and upper end, in SI units; the lower one is smaller.
     pub(crate) ends: [f64; 2],
-    pub(crate) span: Span,
+    /// Where the range stands.
+    pub(crate) span: SourceSpan,
 }
 
-impl Read for Range {
+impl SchemaValue for ValueRange {
     const EXPECTED: &'static str = "two numbers, the lower one first, or one for both directions";
     const EXAMPLE: &'static str = "[-1.5, 2]";
 
-    fn read(node: &Node, log: &mut Log) -> Option<Self> {
+    fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
         let span = node.span;
         let ends = match &node.value {
-            Value::Number { .. } => {
-                let size = Number::read(node, log)?.value;
+            // One number stands for both directions, so it must be positive.
+            TomlValue::Number { .. } => {
+                let size = SpannedNumber::read(node, log)?.value;
                 if size <= 0.0 {
                     log.push(
                         Diagnostic::error(span, "this range is empty")
@@ -37,13 +41,15 @@ impl Read for Range {
                 }
                 [-size, size]
             }
-            Value::Array(entries) if entries.len() == 2 => {
-                let low = Number::read(&entries[0], log);
-                let high = Number::read(&entries[1], log);
+            // Two numbers: both are read before either fault ends the reading.
+            TomlValue::Array(entries) if entries.len() == 2 => {
+                let low = SpannedNumber::read(&entries[0], log);
+                let high = SpannedNumber::read(&entries[1], log);
                 [low?.value, high?.value]
             }
             _ => return wrong_type::<Self>(node, log),
         };
+        // An empty range is often one with swapped ends.
         if ends[0] >= ends[1] {
             log.push(
                 Diagnostic::error(span, "this range is empty")
@@ -57,7 +63,7 @@ impl Read for Range {
 }
 
 #[cfg(any(test, feature = "schema"))]
-impl JsonSchema for Range {
+impl JsonSchema for ValueRange {
     fn schema_name() -> Cow<'static, str> {
         "Range".into()
     }

@@ -6,11 +6,11 @@
 
 use std::path::Path;
 
-use crate::exact::{Exact, ParameterIdx, PlaceQuantity, Symbol};
+use crate::exact::{ExactExpression, ModelSymbol, ParameterIdx, PlaceQuantity};
 use crate::kinematics::{FramePose, Vec3, frame_poses, position};
-use crate::mechanism::{Inertial, Mechanism, Place};
-use crate::numeric::{Rows, least_squares, rank};
-use crate::pose::gaps;
+use crate::mechanism::{EffectPlace, Mechanism, PartInertia};
+use crate::numeric::{DenseRows, least_squares, rank};
+use crate::pose::loop_gaps;
 
 /// Numbers between -1 and 1 that are the same everywhere (Marsaglia 2003).
 struct Random(u64);
@@ -46,20 +46,15 @@ fn into_frame(pose: &FramePose, v: Vec3) -> Vec3 {
 }
 
 /// Angular velocity and velocity of the origin of a frame, in the base frame.
-fn velocity(
-    mechanism: &Mechanism,
-    poses: &[FramePose],
-    frame: usize,
-    rates: &[f64],
-) -> (Vec3, Vec3) {
+fn velocity(mechanism: &Mechanism, poses: &[FramePose], frame: usize, rates: &[f64]) -> (Vec3, Vec3) {
     let at = poses[frame].origin;
     let (mut angular, mut linear) = ([0.0; 3], [0.0; 3]);
     let mut up = frame;
     while up != 0 {
-        for moved in &poses[up].own {
+        for moved in &poses[up].motions {
             let rate = moved.factor * rates[moved.coordinate.0];
             let axis = moved.axis.map(|x| x * rate);
-            if moved.turns {
+            if moved.is_rotation {
                 angular = add(angular, axis);
                 let arm = std::array::from_fn(|k| at[k] - moved.origin[k]);
                 linear = add(linear, cross(axis, arm));
@@ -87,10 +82,7 @@ fn draw(mechanism: &mut Mechanism, nominal: &[f64], random: &mut Random) -> Vec<
 fn try_draw(mechanism: &mut Mechanism, nominal: &[f64], random: &mut Random) -> Option<Vec<f64>> {
     let closed = !mechanism.loops.is_empty();
     let spread = if closed { 0.3 } else { 2.0 };
-    let targets: Vec<f64> = nominal
-        .iter()
-        .map(|value| value + spread * random.next())
-        .collect();
+    let targets: Vec<f64> = nominal.iter().map(|value| value + spread * random.next()).collect();
     let mut rates: Vec<f64> = nominal.iter().map(|_| random.next()).collect();
     let passive: Vec<usize> = (0..nominal.len())
         .filter(|&i| mechanism.coordinates[i].passive)
@@ -104,7 +96,7 @@ fn try_draw(mechanism: &mut Mechanism, nominal: &[f64], random: &mut Random) -> 
             mechanism.coordinates[i].nominal = nominal[i] + way * (targets[i] - nominal[i]);
         }
         for _ in 0..6 {
-            let found = gaps(mechanism);
+            let found = loop_gaps(mechanism);
             let rows = of_passive(&found.rows, &passive);
             if let Some(change) = least_squares(&rows, &found.values, 0.0) {
                 for (&i, change) in passive.iter().zip(change) {
@@ -112,11 +104,11 @@ fn try_draw(mechanism: &mut Mechanism, nominal: &[f64], random: &mut Random) -> 
                 }
             }
         }
-        if gaps(mechanism).values.iter().any(|gap| gap.abs() > 1e-12) {
+        if loop_gaps(mechanism).values.iter().any(|gap| gap.abs() > 1e-12) {
             return None;
         }
     }
-    let found = gaps(mechanism);
+    let found = loop_gaps(mechanism);
     let driven: Vec<f64> = found
         .rows
         .iter()
@@ -133,7 +125,7 @@ fn try_draw(mechanism: &mut Mechanism, nominal: &[f64], random: &mut Random) -> 
     Some(rates)
 }
 
-fn of_passive(rows: &Rows, passive: &[usize]) -> Rows {
+fn of_passive(rows: &DenseRows, passive: &[usize]) -> DenseRows {
     rows.iter()
         .map(|row| passive.iter().map(|&j| row[j]).collect())
         .collect()
@@ -142,22 +134,18 @@ fn of_passive(rows: &Rows, passive: &[usize]) -> Rows {
 /// Kinetic plus potential energy per unit of each parameter.
 fn energies(mechanism: &Mechanism, rates: &[f64]) -> Vec<f64> {
     let poses = frame_poses(mechanism);
-    let gravity: Vec3 = std::array::from_fn(|k| {
-        mechanism.gravity[k].evaluate(&|symbol| mechanism.symbol_nominal(symbol))
-    });
+    let gravity: Vec3 =
+        std::array::from_fn(|k| mechanism.gravity[k].evaluate(&|symbol| mechanism.symbol_nominal(symbol)));
     let mut row = vec![0.0; mechanism.parameters.len()];
     for (i, energy) in row.iter_mut().enumerate() {
-        let unit = |symbol: Symbol| match symbol {
-            Symbol::Parameter(idx) => f64::from(u8::from(idx == ParameterIdx(i))),
+        let unit = |symbol: ModelSymbol| match symbol {
+            ModelSymbol::Parameter(idx) => f64::from(u8::from(idx == ParameterIdx(i))),
             other => mechanism.symbol_nominal(other),
         };
-        let value = |exact: &Exact| exact.evaluate(&unit);
+        let value = |exact: &ExactExpression| exact.evaluate(&unit);
         let mut body = |frame: usize, mass: f64, first: Vec3, inertia: [f64; 6]| {
             let (angular, linear) = velocity(mechanism, &poses, frame, rates);
-            let (w, v) = (
-                into_frame(&poses[frame], angular),
-                into_frame(&poses[frame], linear),
-            );
+            let (w, v) = (into_frame(&poses[frame], angular), into_frame(&poses[frame], linear));
             let [xx, xy, xz, yy, yz, zz] = inertia;
             let momentum = [
                 xx * w[0] + xy * w[1] + xz * w[2],
@@ -169,7 +157,7 @@ fn energies(mechanism: &Mechanism, rates: &[f64]) -> Vec<f64> {
                 - dot(into_frame(&poses[frame], gravity), first);
         };
         for part in &mechanism.parts {
-            let Inertial::Linear {
+            let PartInertia::Linear {
                 mass,
                 first_moment,
                 inertia,
@@ -189,32 +177,20 @@ fn energies(mechanism: &Mechanism, rates: &[f64]) -> Vec<f64> {
             let mass = value(&lumped.mass);
             let at: Vec3 = std::array::from_fn(|k| value(&lumped.force_at[k]));
             let [x, y, z] = at;
-            let inertia = [
-                y * y + z * z,
-                -x * y,
-                -x * z,
-                x * x + z * z,
-                -y * z,
-                x * x + y * y,
-            ];
-            body(
-                lumped.frame.0,
-                mass,
-                at.map(|x| x * mass),
-                inertia.map(|x| x * mass),
-            );
+            let inertia = [y * y + z * z, -x * y, -x * z, x * x + z * z, -y * z, x * x + y * y];
+            body(lumped.frame.0, mass, at.map(|x| x * mass), inertia.map(|x| x * mass));
         }
     }
     for effect in &mechanism.effects {
-        let acceleration = Exact::Symbol(Symbol::Place(PlaceQuantity::Acceleration));
+        let acceleration = ExactExpression::Symbol(ModelSymbol::Place(PlaceQuantity::Acceleration));
         for (term, place) in effect.terms.iter().zip(&effect.places) {
             assert_eq!(term.expression, acceleration);
             let coordinate = match *place {
-                Place::Drive(idx) => match mechanism.drives[idx.0].kind {
+                EffectPlace::Drive(idx) => match mechanism.drives[idx.0].kind {
                     crate::DriveKind::Joint(coordinate) => coordinate,
                     crate::DriveKind::Linear { .. } => panic!("these models drive joints"),
                 },
-                Place::Coordinate(coordinate) => coordinate,
+                EffectPlace::Coordinate(coordinate) => coordinate,
                 _ => panic!("only drives and coordinates have an inertia here"),
             };
             row[term.parameter.0] += 0.5 * rates[coordinate.0].powi(2);
@@ -227,14 +203,10 @@ fn n_base_parameters(path: &str) -> usize {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
     let loaded = crate::load_file(&path).unwrap_or_else(|failure| panic!("{failure}"));
     let mut mechanism = loaded.mechanism;
-    let nominal: Vec<f64> = mechanism
-        .coordinates
-        .iter()
-        .map(|one| one.nominal)
-        .collect();
+    let nominal: Vec<f64> = mechanism.coordinates.iter().map(|one| one.nominal).collect();
     let mut random = Random(0x0123_4567_89ab_cdef);
     let n_samples = 2 * mechanism.parameters.len() + 10;
-    let mut rows: Rows = Vec::new();
+    let mut rows: DenseRows = Vec::new();
     for _ in 0..n_samples {
         let rates = draw(&mut mechanism, &nominal, &mut random);
         let mut row = energies(&mechanism, &rates);
@@ -306,8 +278,7 @@ fn the_spidermill_has_its_m_shape() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/spidermill.toml");
     let mechanism = crate::load_file(&path).unwrap().mechanism;
     let poses = frame_poses(&mechanism);
-    let [elbow, other, platform] =
-        [0, 1, 2].map(|i| position(&mechanism, &poses, crate::PointIdx(i)));
+    let [elbow, other, platform] = [0, 1, 2].map(|i| position(&mechanism, &poses, crate::PointIdx(i)));
     assert!(platform[1] < elbow[1] && (elbow[1] - other[1]).abs() < 1e-6);
     assert!((platform[0] - 0.45).abs() < 1e-6);
 }

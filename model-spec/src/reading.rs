@@ -1,33 +1,32 @@
-//! How files of text are read, whatever they describe: with a cap, and with what to do when it fails.
+//! Reads text files of any kind, with a limit on their size and with advice when reading fails.
 
 use std::path::Path;
 
-use modelmill_boundary::files::{FileError, FileFault, Files};
+use modelmill_boundary::files::{FileError, FileFault, FileSource};
 use toml::de::DeTable;
 
-use crate::diagnostic::{Diagnostic, Severity, SourceFile, Sources, Span};
+use crate::diagnostic::{Diagnostic, DiagnosticSeverity, SourceFile, SourceFiles, SourceSpan};
 use crate::document::LARGEST_FILE;
-use crate::load::Failure;
+use crate::load::LoadFailure;
 
-/// Reads the text of a file that a user names; `advice` is what to do when there is none.
+/// Reads the text of a file that a user names; `advice` is printed when the path leads to no file.
 ///
-/// Fails when it cannot be read, is too large to be meant, or is no text.
-pub fn read_text(files: &dyn Files, path: &Path, advice: &str) -> Result<String, Failure> {
-    let bytes = files
-        .read(path, LARGEST_FILE as u64)
-        .map_err(|error| Failure {
-            diagnostics: vec![unreadable(&error, advice)],
-            sources: Sources::default(),
-        })?;
-    String::from_utf8(bytes).map_err(|error| no_text(path, error.as_bytes()))
+/// Fails when the file cannot be read, exceeds [`LARGEST_FILE`] bytes, or is not UTF-8.
+pub fn read_text(files: &dyn FileSource, path: &Path, advice: &str) -> Result<String, LoadFailure> {
+    let bytes = files.read(path, LARGEST_FILE as u64).map_err(|error| LoadFailure {
+        diagnostics: vec![unreadable_file(&error, advice)],
+        sources: SourceFiles::default(),
+    })?;
+    String::from_utf8(bytes).map_err(|error| invalid_utf8(path, error.as_bytes()))
 }
 
-/// Reads the text of a file that another one names, which must hold one of these keys outside of all tables.
+/// Reads the text of a file that another file names. It must contain one of these keys outside of all tables.
 ///
-/// Fails with what the file is not, in one line and without a word of its text: nobody who hands on a model file shall
-/// learn in this way what else is on the reader's disk.
-pub fn read_named(files: &dyn Files, path: &Path, keys: &[&str]) -> Result<String, FileError> {
+/// Errors are one line and quote nothing of the text. A model file from someone else must not reveal the contents of
+/// other files on the reader's disk.
+pub fn read_referenced(files: &dyn FileSource, path: &Path, keys: &[&str]) -> Result<String, FileError> {
     let text = files.read_text(path, LARGEST_FILE as u64)?;
+    // A file with syntax errors is accepted here; the reader of the file reports them.
     let (table, _) = DeTable::parse_recoverable(&text);
     if keys.iter().any(|key| table.get_ref().contains_key(*key)) {
         return Ok(text);
@@ -38,13 +37,14 @@ pub fn read_named(files: &dyn Files, path: &Path, keys: &[&str]) -> Result<Strin
     Err(FileError::new(path, fault))
 }
 
-fn unreadable(error: &FileError, advice: &str) -> Diagnostic {
+/// The error of a file that cannot be read; it has no place because there is no text.
+fn unreadable_file(error: &FileError, advice: &str) -> Diagnostic {
     let help = match &error.fault {
         FileFault::Missing | FileFault::Folder => advice,
         other => other.remedy(),
     };
     Diagnostic {
-        severity: Severity::Error,
+        severity: DiagnosticSeverity::Error,
         message: format!("cannot read `{}`: {}", error.path.display(), error.fault),
         span: None,
         label: String::new(),
@@ -53,26 +53,23 @@ fn unreadable(error: &FileError, advice: &str) -> Diagnostic {
     }
 }
 
-/// What is wrong with a file whose bytes are no text, with the place of the first of them.
-fn no_text(path: &Path, bytes: &[u8]) -> Failure {
+/// The error of a file that is not UTF-8, marked at its first invalid byte.
+fn invalid_utf8(path: &Path, bytes: &[u8]) -> LoadFailure {
     let start = match std::str::from_utf8(bytes) {
         Ok(text) => text.len(),
         Err(error) => error.valid_up_to(),
     };
+    // The lossy text has a replacement character at the invalid byte, which the span covers.
     let text = String::from_utf8_lossy(bytes).into_owned();
     let end = (start + char::REPLACEMENT_CHARACTER.len_utf8()).min(text.len());
-    let span = Span {
-        file: 0,
-        start,
-        end,
-    };
-    Failure {
+    let span = SourceSpan { file: 0, start, end };
+    LoadFailure {
         diagnostics: vec![
-            Diagnostic::error(span, "this file is no text in UTF-8")
-                .label("the first byte that is not")
+            Diagnostic::error(span, "this file is not UTF-8 text")
+                .label("the first invalid byte")
                 .help("save it as UTF-8; `modelmill` reads model files as text (TOML)"),
         ],
-        sources: Sources {
+        sources: SourceFiles {
             files: vec![SourceFile {
                 path: path.to_owned(),
                 text,

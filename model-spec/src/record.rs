@@ -9,33 +9,32 @@ use std::borrow::Cow;
 #[cfg(any(test, feature = "schema"))]
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 
-use crate::diagnostic::{Diagnostic, Log, Span};
-use crate::document::{Key, Node, Table, Value, get, quote};
+use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
+use crate::document::{TomlKey, TomlNode, TomlTable, TomlValue, find_key, quote};
 use crate::suggest;
 use crate::values::check_name;
 
 /// Most entries of one list or table.
 const MOST_ENTRIES: usize = 1000;
 /// A type of the schema.
-pub(crate) trait Read: Sized {
-    /// What a place of this type holds, for messages: `a string`.
+/// Reading never stops at the first fault: faults go to the log, so that one run reports all of them.
+pub(crate) trait SchemaValue: Sized {
+    /// What a place of this type must contain, for messages: `a string`.
     const EXPECTED: &'static str;
     /// An example of it as TOML.
     const EXAMPLE: &'static str;
 
     /// Reads a value; a fault goes to the log and gives `None`.
-    fn read(node: &Node, log: &mut Log) -> Option<Self>;
+    /// The place of the node is kept in the value where later messages need it.
+    fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self>;
 }
 
 /// Reports a value of the wrong type.
-pub(crate) fn wrong_type<T: Read>(node: &Node, log: &mut Log) -> Option<T> {
+pub(crate) fn wrong_type<T: SchemaValue>(node: &TomlNode, log: &mut DiagnosticLog) -> Option<T> {
     log.push(
-        Diagnostic::error(
-            node.span,
-            format!("{} stands where it does not belong", node.kind()),
-        )
-        .label(format!("expected {}", T::EXPECTED))
-        .help(format!("for example `{}`", T::EXAMPLE)),
+        Diagnostic::error(node.span, format!("{} stands where it does not belong", node.kind()))
+            .label(format!("expected {}", T::EXPECTED))
+            .help(format!("for example `{}`", T::EXAMPLE)),
     );
     None
 }
@@ -43,6 +42,7 @@ pub(crate) fn wrong_type<T: Read>(node: &Node, log: &mut Log) -> Option<T> {
 /// Declares a table of the schema: a struct whose fields are all optional once read (faults are reported, not fatal),
 /// its reader and its JSON Schema.
 macro_rules! record {
+    // One table: docs, type, title for messages, then key, field, whether it is required, and type per field.
     (
         $(#[doc = $about:literal])*
         $name:ident = $title:literal {
@@ -52,29 +52,31 @@ macro_rules! record {
         $(#[doc = $about])*
         #[derive(Clone, Debug)]
         #[allow(dead_code)] // Remarks, for example, are there for people and for the schema.
+        // All fields are optional here, because a missing required field is reported and reading continues.
         pub(crate) struct $name {
             /// The place of the table.
-            pub(crate) span: $crate::diagnostic::Span,
+            pub(crate) span: $crate::diagnostic::SourceSpan,
             $( $(#[doc = $doc])* pub(crate) $field: Option<$type>, )*
             /// True if something in the table was faulty, so that what seems to be missing may be there.
             pub(crate) faulty: bool,
         }
 
+        // The reader.
         impl $name {
             /// The keys of the table.
             pub(crate) const KEYS: &'static [&'static str] = &[$($key),*];
 
-            /// Reads a table; every fault is reported, and what is sound comes back.
+            /// Reads a table; every fault is reported, and the fields without faults are returned.
             pub(crate) fn from_table(
-                table: &$crate::document::Table,
-                span: $crate::diagnostic::Span,
-                log: &mut $crate::diagnostic::Log,
+                table: &$crate::document::TomlTable,
+                span: $crate::diagnostic::SourceSpan,
+                log: &mut $crate::diagnostic::DiagnosticLog,
             ) -> Self {
                 let n_errors = log.n_errors();
                 $crate::record::check_keys(table, Self::KEYS, $title, log);
                 Self {
                     span,
-                    $( $field: $crate::record::field::<$type>(
+                    $( $field: $crate::record::read_field::<$type>(
                         table,
                         $key,
                         $crate::record::need!($need).then_some(Self::KEYS),
@@ -87,18 +89,20 @@ macro_rules! record {
             }
         }
 
-        impl $crate::record::Read for $name {
+        // A table as the value of a field of another table.
+        impl $crate::record::SchemaValue for $name {
             const EXPECTED: &'static str = concat!("a table: ", $title);
             const EXAMPLE: &'static str = concat!("{ ", $crate::record::first!($($key),*), " = ... }");
 
-            fn read(node: &$crate::document::Node, log: &mut $crate::diagnostic::Log) -> Option<Self> {
-                let $crate::document::Value::Table(table) = &node.value else {
+            fn read(node: &$crate::document::TomlNode, log: &mut $crate::diagnostic::DiagnosticLog) -> Option<Self> {
+                let $crate::document::TomlValue::Table(table) = &node.value else {
                     return $crate::record::wrong_type::<Self>(node, log);
                 };
                 Some(Self::from_table(table, node.span, log))
             }
         }
 
+        // The JSON Schema: docs of the fields become descriptions in editors.
         #[cfg(any(test, feature = "schema"))]
         impl schemars::JsonSchema for $name {
             fn schema_name() -> std::borrow::Cow<'static, str> {
@@ -109,7 +113,7 @@ macro_rules! record {
                 let mut properties = serde_json::Map::new();
                 let mut required: Vec<&str> = Vec::new();
                 $(
-                    let schema = $crate::record::described(
+                    let schema = $crate::record::with_description(
                         generator.subschema_for::<$type>(), concat!($($doc, "\n"),*));
                     properties.insert($key.to_owned(), schema);
                     if $crate::record::need!($need) {
@@ -127,6 +131,7 @@ macro_rules! record {
         }
     };
 }
+// Whether a field is required.
 macro_rules! need {
     (required) => {
         true
@@ -135,6 +140,7 @@ macro_rules! need {
         false
     };
 }
+// The first key, for examples.
 macro_rules! first {
     ($first:tt $(, $rest:tt)*) => {
         $first
@@ -143,21 +149,23 @@ macro_rules! first {
 pub(crate) use {first, need, record};
 
 /// Reads one field of a table; `required_of` lists all keys of the table if the field must be there.
-pub(crate) fn field<T: Read>(
-    table: &Table,
+/// Returns `None` if the field is absent or faulty. A missing required field is reported, unless a misspelt key may
+/// be it.
+pub(crate) fn read_field<T: SchemaValue>(
+    table: &TomlTable,
     key: &str,
     required_of: Option<&[&str]>,
     title: &str,
-    span: Span,
-    log: &mut Log,
+    span: SourceSpan,
+    log: &mut DiagnosticLog,
 ) -> Option<T> {
-    if let Some((_, node)) = get(table, key) {
+    if let Some((_, node)) = find_key(table, key) {
         return T::read(node, log);
     }
+    // An unknown key close to this one is reported as misspelt, so it is not reported as missing as well.
     let misspelt = |keys: &[&str]| {
         table.iter().take(MOST_ENTRIES).any(|(other, _)| {
-            !keys.contains(&other.name.as_str())
-                && suggest::nearest(&other.name, keys.iter().copied()) == Some(key)
+            !keys.contains(&other.name.as_str()) && suggest::nearest(&other.name, keys.iter().copied()) == Some(key)
         })
     };
     if let Some(keys) = required_of
@@ -174,7 +182,8 @@ pub(crate) fn field<T: Read>(
 }
 
 /// Reports keys that a table does not have.
-pub(crate) fn check_keys(table: &Table, known: &[&str], title: &str, log: &mut Log) {
+/// `known` are all keys of the table, and `title` names the table in messages.
+pub(crate) fn check_keys(table: &TomlTable, known: &[&str], title: &str, log: &mut DiagnosticLog) {
     for (key, _) in table {
         // Broken text leaves scraps that look like keys.
         if known.contains(&key.name.as_str()) || log.is_full() || log.syntax_broken {
@@ -190,7 +199,7 @@ pub(crate) fn check_keys(table: &Table, known: &[&str], title: &str, log: &mut L
 
 /// Adds a description to a schema, also to a reference.
 #[cfg(any(test, feature = "schema"))]
-pub(crate) fn described(mut schema: Schema, text: &str) -> serde_json::Value {
+pub(crate) fn with_description(mut schema: Schema, text: &str) -> serde_json::Value {
     if !text.trim().is_empty() {
         schema.insert("description".to_owned(), tidy(text).into());
     }
@@ -205,56 +214,54 @@ pub(crate) fn tidy(text: &str) -> String {
 
 /// A list; faulty entries are left out once they are reported.
 #[derive(Clone, Debug)]
-pub(crate) struct List<T> {
+pub(crate) struct EntryList<T> {
+    /// The entries that could be read.
     pub(crate) entries: Vec<T>,
-    pub(crate) span: Span,
+    /// Where the list stands.
+    pub(crate) span: SourceSpan,
     /// True if any entry was faulty.
     pub(crate) faulty: bool,
 }
 
-impl<T: Read> Read for List<T> {
+impl<T: SchemaValue> SchemaValue for EntryList<T> {
     const EXPECTED: &'static str = "a list";
     const EXAMPLE: &'static str = "[ ... ]";
 
-    fn read(node: &Node, log: &mut Log) -> Option<Self> {
-        let Value::Array(array) = &node.value else {
+    fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
+        let TomlValue::Array(array) = &node.value else {
             log.push(
-                Diagnostic::error(
-                    node.span,
-                    format!("{} stands where it does not belong", node.kind()),
-                )
-                .label(format!("expected a list, each entry {}", T::EXPECTED))
-                .help("lists of tables are headed by double brackets, `[[frame]]`; short ones stand in `[ ]`"),
+                Diagnostic::error(node.span, format!("{} stands where it does not belong", node.kind()))
+                    .label(format!("expected a list, each entry {}", T::EXPECTED))
+                    .help("lists of tables are headed by double brackets, `[[frame]]`; short ones stand in `[ ]`"),
             );
             return None;
         };
+        // Very long lists are refused as a unit, so that reading stays fast.
         if too_many(array.len(), node.span, log) {
             return None;
         }
+        // Faulty entries are detected by the number of errors that reading them adds.
         let n_errors = log.n_errors();
         Some(Self {
-            entries: array
-                .iter()
-                .filter_map(|entry| T::read(entry, log))
-                .collect(),
+            entries: array.iter().filter_map(|entry| T::read(entry, log)).collect(),
             span: node.span,
             faulty: log.n_errors() > n_errors,
         })
     }
 }
 
-fn too_many(n: usize, span: Span, log: &mut Log) -> bool {
+/// Reports a list or table with more than [`MOST_ENTRIES`] entries; true if it has more.
+fn too_many(n: usize, span: SourceSpan, log: &mut DiagnosticLog) -> bool {
     if n > MOST_ENTRIES {
         log.push(
-            Diagnostic::error(span, format!("there are {n} entries here"))
-                .label(format!("at most {MOST_ENTRIES}")),
+            Diagnostic::error(span, format!("there are {n} entries here")).label(format!("at most {MOST_ENTRIES}")),
         );
     }
     n > MOST_ENTRIES
 }
 
 #[cfg(any(test, feature = "schema"))]
-impl<T: JsonSchema> JsonSchema for List<T> {
+impl<T: JsonSchema> JsonSchema for EntryList<T> {
     fn inline_schema() -> bool {
         true
     }
@@ -271,17 +278,19 @@ impl<T: JsonSchema> JsonSchema for List<T> {
 /// One entry, or a list of them.
 #[derive(Clone, Debug)]
 pub(crate) struct OneOrMany<T> {
+    /// The entries; exactly one if the file gives no list.
     pub(crate) entries: Vec<T>,
-    pub(crate) span: Span,
+    /// Where the value stands.
+    pub(crate) span: SourceSpan,
 }
 
-impl<T: Read> Read for OneOrMany<T> {
+impl<T: SchemaValue> SchemaValue for OneOrMany<T> {
     const EXPECTED: &'static str = T::EXPECTED;
     const EXAMPLE: &'static str = T::EXAMPLE;
 
-    fn read(node: &Node, log: &mut Log) -> Option<Self> {
-        if let Value::Array(_) = node.value {
-            let list = List::<T>::read(node, log)?;
+    fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
+        if let TomlValue::Array(_) = node.value {
+            let list = EntryList::<T>::read(node, log)?;
             return Some(Self {
                 entries: list.entries,
                 span: list.span,
@@ -312,18 +321,19 @@ impl<T: JsonSchema> JsonSchema for OneOrMany<T> {
 
 /// Entries under names of the author's choice, in the order of the file.
 #[derive(Clone, Debug)]
-pub(crate) struct Named<T> {
-    pub(crate) entries: Vec<(Key, T)>,
+pub(crate) struct NamedEntries<T> {
+    /// The entries that could be read, with their names and the places of these.
+    pub(crate) entries: Vec<(TomlKey, T)>,
     /// Names whose entries could not be read; they count as known.
-    pub(crate) faulty: Vec<Key>,
+    pub(crate) faulty: Vec<TomlKey>,
 }
 
-impl<T: Read> Read for Named<T> {
+impl<T: SchemaValue> SchemaValue for NamedEntries<T> {
     const EXPECTED: &'static str = "a table of names";
     const EXAMPLE: &'static str = "{ name = ... }";
 
-    fn read(node: &Node, log: &mut Log) -> Option<Self> {
-        let Value::Table(table) = &node.value else {
+    fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
+        let TomlValue::Table(table) = &node.value else {
             return wrong_type::<Self>(node, log);
         };
         if too_many(table.len(), node.span, log) {
@@ -333,6 +343,7 @@ impl<T: Read> Read for Named<T> {
             entries: Vec::new(),
             faulty: Vec::new(),
         };
+        // An entry with a faulty name is read too, so that its own faults are reported.
         for (key, entry) in table {
             let fine = check_name(&key.name, key.span, log);
             match T::read(entry, log) {
@@ -345,7 +356,7 @@ impl<T: Read> Read for Named<T> {
 }
 
 #[cfg(any(test, feature = "schema"))]
-impl<T: JsonSchema> JsonSchema for Named<T> {
+impl<T: JsonSchema> JsonSchema for NamedEntries<T> {
     fn inline_schema() -> bool {
         true
     }

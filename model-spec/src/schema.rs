@@ -1,62 +1,62 @@
 //! The tables of a model file as types; readers and the JSON Schema for editors derive from them.
 
-use crate::formula::Formula;
+use crate::formula::SourceFormula;
 use crate::kinds::{ActsOn, OtherMotion, Scale, Sign};
 use crate::mechanics::Mechanics;
-use crate::range::Range;
-use crate::record::{List, Named, OneOrMany, record};
-use crate::unit::Unit;
+use crate::range::ValueRange;
+use crate::record::{EntryList, NamedEntries, OneOrMany, record};
+use crate::unit::ModelUnit;
 use crate::values::{
-    AxisName, Flag, Name, Number, QuaternionOrder, Search, Spot, Suffix, Text, TwistName,
-    UnitByPlace, Vector, Version,
+    AxisName, BooleanFlag, FormulaVector, LumpedMassPlace, NameSuffix, QuaternionOrder, SchemaVersion, SearchEntry,
+    SpannedName, SpannedNumber, SpannedText, TwistName, UnitByPlace,
 };
 
 record! {
     /// A mechanism: its geometry, its masses, its drives and the effects that act in it.
     ModelEntry = "the model file" {
         /// Version of the file format; 1.
-        "schema" schema: required Version,
+        "schema" schema: required SchemaVersion,
         /// Name of the model; also the name of the generated module.
-        "name" name: required Name,
+        "name" name: required SpannedName,
         /// What the model is, in one line.
-        "title" title: optional Text,
+        "title" title: optional SpannedText,
         /// Another model file, relative to this one, of which this file is a variant:
         /// its entries are taken over, and entries here replace or join them.
-        "extends" extends: optional Text,
+        "extends" extends: optional SpannedText,
         /// Entries of the extended file that this variant drops, as `table.name`,
         /// such as `lumped_mass.platform_left`, `constants.g` or `gravity`.
-        "remove" remove: optional List<Text>,
-        /// Acceleration of gravity in the base frame, m/s^2; none if left away.
-        "gravity" gravity: optional Vector,
-        /// Known quantities: geometry, gravity and the like.
-        "constants" constants: optional Named<ConstantEntry>,
-        /// Dynamic parameters, which identification may find; their order orders the equations.
-        "parameters" parameters: optional Named<ParameterEntry>,
+        "remove" remove: optional EntryList<SpannedText>,
+        /// Acceleration of gravity in the base frame, m/s^2; none if omitted.
+        "gravity" gravity: optional FormulaVector,
+        /// Known quantities such as geometry and gravity.
+        "constants" constants: optional NamedEntries<ConstantEntry>,
+        /// Dynamic parameters, which identification may estimate; their order is that of the equations.
+        "parameters" parameters: optional NamedEntries<ParameterEntry>,
         /// Joint coordinates; whether one is an angle or a length follows from its use.
-        "coordinates" coordinates: optional Named<CoordinateEntry>,
+        "coordinates" coordinates: optional NamedEntries<CoordinateEntry>,
         /// Frames, a tree that grows from the frame `base`.
-        "frame" frame: optional List<FrameEntry>,
+        "frame" frame: optional EntryList<FrameEntry>,
         /// Named points, each fixed to a frame.
-        "point" point: optional List<PointEntry>,
+        "point" point: optional EntryList<PointEntry>,
         /// Rigid bodies, each fixed to a frame.
-        "part" part: optional List<PartEntry>,
+        "part" part: optional EntryList<PartEntry>,
         /// Masses concentrated at a point.
-        "lumped_mass" lumped_mass: optional List<LumpedMassEntry>,
+        "lumped_mass" lumped_mass: optional EntryList<LumpedMassEntry>,
         /// Loops: pairs of points that coincide.
-        "loop" loops: optional List<LoopEntry>,
+        "loop" loops: optional EntryList<LoopEntry>,
         /// Drives, one per degree of freedom.
-        "drive" drive: optional List<DriveEntry>,
+        "drive" drive: optional EntryList<DriveEntry>,
         /// Friction, drive inertia and the like.
-        "effect" effect: optional List<EffectEntry>,
+        "effect" effect: optional EntryList<EffectEntry>,
         /// Libraries of further kinds of effects: TOML files of `[[effect_kind]]` tables, relative to this one.
-        "library" library: optional OneOrMany<Text>,
+        "library" library: optional OneOrMany<SpannedText>,
         /// Kinds of effects that this file adds to the library.
-        "effect_kind" effect_kind: optional List<EffectKindEntry>,
+        "effect_kind" effect_kind: optional EntryList<EffectKindEntry>,
         /// Products of parameters that should stay in the base parameters, most wanted first, such as `m1*dc1^2`.
-        "retain" retain: optional List<Formula>,
-        /// What planned motion must keep: `modelmill excite` obeys it.
+        "retain" retain: optional EntryList<SourceFormula>,
+        /// Limits of planned motions, which `modelmill excite` respects.
         "limits" limits: optional LimitsEntry,
-        /// What was identified, in the place of nominal values: `modelmill adopt` writes it.
+        /// Identified values, which replace nominal ones; `modelmill adopt` writes them.
         "identified" identified: optional IdentifiedEntry,
         /// How recordings of this mechanism name their columns.
         "recording" recording: optional RecordingEntry,
@@ -67,42 +67,42 @@ record! {
     /// A known quantity.
     ConstantEntry = "a constant" {
         /// Value in SI units.
-        "value" value: required Number,
+        "value" value: required SpannedNumber,
         /// Unit; `rad` makes it an angle, `1` a pure number.
-        "unit" unit: required Unit,
+        "unit" unit: required ModelUnit,
         /// Remark.
-        "note" note: optional Text,
+        "note" note: optional SpannedText,
     }
 }
 
 record! {
     /// A dynamic parameter.
     ParameterEntry = "a parameter" {
-        /// Value from CAD or a data sheet, in SI units; zero if left away.
-        "nominal" nominal: optional Number,
+        /// Value from CAD or a data sheet, in SI units; zero if omitted.
+        "nominal" nominal: optional SpannedNumber,
         /// Unit.
-        "unit" unit: required Unit,
+        "unit" unit: required ModelUnit,
         /// Remark.
-        "note" note: optional Text,
+        "note" note: optional SpannedText,
     }
 }
 
 record! {
     /// A joint coordinate.
     CoordinateEntry = "a coordinate" {
-        /// Value at the nominal pose, in rad or m; zero if left away.
-        /// For passive coordinates it chooses how the loops are assembled.
-        "nominal" nominal: optional Number,
-        /// True if the coordinate follows from the loops; no drive holds it.
-        "passive" passive: optional Flag,
+        /// Value at the nominal pose, in rad or m; zero if omitted. For passive coordinates it chooses how the loops
+        /// are assembled.
+        "nominal" nominal: optional SpannedNumber,
+        /// True if loop closure determines the coordinate; it is then not independent.
+        "passive" passive: optional BooleanFlag,
         /// False if nothing drives the coordinate: its row of the equation of motion, with a force of zero, takes part in
         /// identification.
-        "driven" driven: optional Flag,
+        "driven" driven: optional BooleanFlag,
         /// What the coordinate follows, by gears, a belt or a screw: a sum of other coordinates, each times constants, and of
         /// constants, such as `"n*q1 + q0"`.
-        "follows" follows: optional Formula,
+        "follows" follows: optional SourceFormula,
         /// Remark.
-        "note" note: optional Text,
+        "note" note: optional SpannedText,
     }
 }
 
@@ -110,9 +110,9 @@ record! {
     /// A frame of the tree, placed by one of `modified_dh`, `standard_dh` and `transform`.
     FrameEntry = "a frame" {
         /// Name.
-        "name" name: required Name,
+        "name" name: required SpannedName,
         /// The parent frame, or `base`.
-        "on" on: required Name,
+        "on" on: required SpannedName,
         /// Modified Denavit-Hartenberg (Khalil-Kleinfinger): Rx(alpha) Tx(a) Rz(theta) Tz(d).
         "modified_dh" modified_dh: optional DhEntry,
         /// Standard Denavit-Hartenberg: Rz(theta) Tz(d) Tx(a) Rx(alpha).
@@ -122,21 +122,21 @@ record! {
         /// The joint behind `transform`.
         "joint" joint: optional JointEntry,
         /// Remark.
-        "note" note: optional Text,
+        "note" note: optional SpannedText,
     }
 }
 
 record! {
-    /// Denavit-Hartenberg parameters; what is left away is zero.
+    /// Denavit-Hartenberg parameters; omitted entries are zero.
     DhEntry = "a Denavit-Hartenberg row" {
         /// Length along x, m.
-        "a" a: optional Formula,
+        "a" a: optional SourceFormula,
         /// Angle about x, rad.
-        "alpha" alpha: optional Formula,
+        "alpha" alpha: optional SourceFormula,
         /// Length along z, m; a coordinate here makes a prismatic joint.
-        "d" d: optional Formula,
+        "d" d: optional SourceFormula,
         /// Angle about z, rad; a coordinate here makes a revolute joint.
-        "theta" theta: optional Formula,
+        "theta" theta: optional SourceFormula,
     }
 }
 
@@ -144,9 +144,9 @@ record! {
     /// A fixed transform: the translation first, then Rz(yaw) Ry(pitch) Rx(roll).
     TransformEntry = "a transform" {
         /// Position of the frame's origin in its parent, m.
-        "xyz" xyz: optional Vector,
+        "xyz" xyz: optional FormulaVector,
         /// Roll, pitch and yaw, rad.
-        "rpy" rpy: optional Vector,
+        "rpy" rpy: optional FormulaVector,
     }
 }
 
@@ -154,28 +154,28 @@ record! {
     /// A joint: exactly one of the kinds, with a name for each of its coordinates.
     JointEntry = "a joint" {
         /// Angle of a revolute joint about `axis`.
-        "revolute" revolute: optional Formula,
+        "revolute" revolute: optional SourceFormula,
         /// Displacement of a prismatic joint along `axis`.
-        "prismatic" prismatic: optional Formula,
+        "prismatic" prismatic: optional SourceFormula,
         /// Angle and displacement of a cylindrical joint, about and along `axis`.
-        "cylindrical" cylindrical: optional List<Formula>,
+        "cylindrical" cylindrical: optional EntryList<SourceFormula>,
         /// Two angles of a universal joint, about the first of its `axes` and then about the second, turned by the first.
-        "universal" universal: optional List<Formula>,
+        "universal" universal: optional EntryList<SourceFormula>,
         /// Three angles of a spherical joint, about its `axes` one after the other, each turned by those before.
-        "spherical" spherical: optional List<Formula>,
+        "spherical" spherical: optional EntryList<SourceFormula>,
         /// Six coordinates of a free body: its position along x, y and z, then three angles as those of a spherical
-        /// joint; or seven, its position and a unit quaternion, of a body that hangs on nothing and needs no drives.
-        "free" free: optional List<Formula>,
-        /// Order of the quaternion of a free body with seven coordinates: `xyzw` or `wxyz`. It turns the body's axes into those
-        /// of the base.
+        /// joint; or seven, its position and a unit quaternion, of a free body, which needs no drives.
+        "free" free: optional EntryList<SourceFormula>,
+        /// Order of the quaternion of a free body with seven coordinates: `xyzw` or `wxyz`. It transforms components in
+        /// the axes of the body into components in the axes of the base.
         "quaternion" quaternion: optional QuaternionOrder,
         /// Axes of its velocity, angular velocity, force and moment: `body`, `world`, or `mixed` for velocity and force in
         /// those of the base, angular velocity and moment in those of the body.
         "twist" twist: optional TwistName,
-        /// Axis of a revolute, prismatic or cylindrical joint; z if left away.
+        /// Axis of a revolute, prismatic or cylindrical joint; z if omitted.
         "axis" axis: optional AxisName,
-        /// Axes of a universal, spherical or free joint, such as `yz` or `zyx`; `xy` or `zyx` if left away.
-        "axes" axes: optional Text,
+        /// Axes of a universal, spherical or free joint, such as `yz` or `zyx`; `xy` or `zyx` if omitted.
+        "axes" axes: optional SpannedText,
     }
 }
 
@@ -183,34 +183,34 @@ record! {
     /// A point fixed to a frame.
     PointEntry = "a point" {
         /// Name.
-        "name" name: required Name,
+        "name" name: required SpannedName,
         /// The frame that carries it, or `base`.
-        "on" on: required Name,
+        "on" on: required SpannedName,
         /// Position in the frame, m.
-        "at" at: required Vector,
+        "at" at: required FormulaVector,
         /// Remark.
-        "note" note: optional Text,
+        "note" note: optional SpannedText,
     }
 }
 
 record! {
-    /// A rigid body: either `mass`, `centre` and `inertia` about the centre, or the `linear` parameters
-    /// about the frame's origin. What is left away is exactly zero.
+    /// A rigid body: either `mass`, `centre` and `inertia` about the centre, or the `linear` parameters about the
+    /// frame's origin. Omitted entries are exactly zero.
     PartEntry = "a part" {
-        /// Name; the frame's if left away.
-        "name" name: optional Name,
+        /// Name; that of the frame if omitted.
+        "name" name: optional SpannedName,
         /// The frame that carries it.
-        "on" on: required Name,
+        "on" on: required SpannedName,
         /// Mass, kg.
-        "mass" mass: optional Formula,
+        "mass" mass: optional SourceFormula,
         /// Centre of mass in the frame, m.
-        "centre" centre: optional Vector,
+        "centre" centre: optional FormulaVector,
         /// Inertia about the centre of mass, along the frame's axes, kg m^2.
         "inertia" inertia: optional InertiaEntry,
         /// The ten linear parameters about the frame's origin.
         "linear" linear: optional LinearEntry,
         /// Remark.
-        "note" note: optional Text,
+        "note" note: optional SpannedText,
     }
 }
 
@@ -218,100 +218,99 @@ record! {
     /// Entries of an inertia matrix, kg m^2; off the diagonal the negative products of inertia.
     InertiaEntry = "an inertia" {
         /// About x.
-        "xx" xx: optional Formula,
+        "xx" xx: optional SourceFormula,
         /// Between x and y.
-        "xy" xy: optional Formula,
+        "xy" xy: optional SourceFormula,
         /// Between x and z.
-        "xz" xz: optional Formula,
+        "xz" xz: optional SourceFormula,
         /// About y.
-        "yy" yy: optional Formula,
+        "yy" yy: optional SourceFormula,
         /// Between y and z.
-        "yz" yz: optional Formula,
+        "yz" yz: optional SourceFormula,
         /// About z.
-        "zz" zz: optional Formula,
+        "zz" zz: optional SourceFormula,
     }
 }
 
 record! {
-    /// The linear parameters of a body about its frame's origin.
-    /// `all = "1"` stands for the ten parameters XX1, XY1, ..., M1, `planar = "1"` for ZZ1, MX1, MY1, M1;
-    /// both declare those parameters, and bodies with the same suffix share them.
-    /// Single entries replace what the shorthand says; what neither names is exactly zero.
+    /// The linear parameters of a body about its frame's origin. `all = "1"` stands for the ten parameters XX1, XY1,
+    /// ..., M1, `planar = "1"` for ZZ1, MX1, MY1, M1; both declare those parameters, and bodies with the same suffix
+    /// share them. Single entries replace those of the shorthand; all others are exactly zero.
     LinearEntry = "a set of linear parameters" {
         /// Suffix of ten parameters: XX, XY, XZ, YY, YZ, ZZ, MX, MY, MZ, M.
-        "all" all: optional Suffix,
+        "all" all: optional NameSuffix,
         /// Suffix of the four parameters of a body in the x-y plane: ZZ, MX, MY, M.
-        "planar" planar: optional Suffix,
+        "planar" planar: optional NameSuffix,
         /// Nominal values of the parameters that the shorthand declares.
         "nominal" nominal: optional LinearNominalEntry,
         /// Moment of inertia about x, kg m^2.
-        "XX" xx: optional Formula,
+        "XX" xx: optional SourceFormula,
         /// Inertia matrix entry xy, kg m^2.
-        "XY" xy: optional Formula,
+        "XY" xy: optional SourceFormula,
         /// Inertia matrix entry xz, kg m^2.
-        "XZ" xz: optional Formula,
+        "XZ" xz: optional SourceFormula,
         /// Moment of inertia about y, kg m^2.
-        "YY" yy: optional Formula,
+        "YY" yy: optional SourceFormula,
         /// Inertia matrix entry yz, kg m^2.
-        "YZ" yz: optional Formula,
+        "YZ" yz: optional SourceFormula,
         /// Moment of inertia about z, kg m^2.
-        "ZZ" zz: optional Formula,
+        "ZZ" zz: optional SourceFormula,
         /// Mass times the centre's x, kg m.
-        "MX" mx: optional Formula,
+        "MX" mx: optional SourceFormula,
         /// Mass times the centre's y, kg m.
-        "MY" my: optional Formula,
+        "MY" my: optional SourceFormula,
         /// Mass times the centre's z, kg m.
-        "MZ" mz: optional Formula,
+        "MZ" mz: optional SourceFormula,
         /// Mass, kg.
-        "M" m: optional Formula,
+        "M" m: optional SourceFormula,
     }
 }
 
 record! {
-    /// Nominal values of linear parameters; zero if left away.
+    /// Nominal values of linear parameters; zero if omitted.
     LinearNominalEntry = "a set of nominal values" {
         /// kg m^2
-        "XX" xx: optional Number,
+        "XX" xx: optional SpannedNumber,
         /// kg m^2
-        "XY" xy: optional Number,
+        "XY" xy: optional SpannedNumber,
         /// kg m^2
-        "XZ" xz: optional Number,
+        "XZ" xz: optional SpannedNumber,
         /// kg m^2
-        "YY" yy: optional Number,
+        "YY" yy: optional SpannedNumber,
         /// kg m^2
-        "YZ" yz: optional Number,
+        "YZ" yz: optional SpannedNumber,
         /// kg m^2
-        "ZZ" zz: optional Number,
+        "ZZ" zz: optional SpannedNumber,
         /// kg m
-        "MX" mx: optional Number,
+        "MX" mx: optional SpannedNumber,
         /// kg m
-        "MY" my: optional Number,
+        "MY" my: optional SpannedNumber,
         /// kg m
-        "MZ" mz: optional Number,
+        "MZ" mz: optional SpannedNumber,
         /// kg
-        "M" m: optional Number,
+        "M" m: optional SpannedNumber,
     }
 }
 
 record! {
-    /// A mass concentrated at a point; the balances of forces and of moments may see it at different places.
+    /// A mass concentrated at a point; it may have different places in the balances of forces and of moments.
     LumpedMassEntry = "a lumped mass" {
         /// Name, by which a variant can override it.
-        "name" name: optional Name,
+        "name" name: optional SpannedName,
         /// The mass, kg.
-        "mass" mass: required Formula,
-        /// The share of that mass which sits here, a rational number such as `1/2`; 1 if left away.
-        "share" share: optional Formula,
+        "mass" mass: required SourceFormula,
+        /// The share of that mass at this place, a rational number such as `1/2`; 1 if omitted.
+        "share" share: optional SourceFormula,
         /// The frame that carries it; the point's if `at` names a point.
-        "on" on: optional Name,
-        /// Where it sits: a point's name, or a position in the frame, m.
-        "at" at: optional Spot,
-        /// Where the balance of forces sees it, if not `at`.
-        "force_at" force_at: optional Spot,
-        /// Where the balance of moments about the frame's origin sees it, if not `at`.
-        "moment_at" moment_at: optional Spot,
+        "on" on: optional SpannedName,
+        /// Its place: a point's name, or a position in the frame, m.
+        "at" at: optional LumpedMassPlace,
+        /// Its place in the balance of forces, if not `at`.
+        "force_at" force_at: optional LumpedMassPlace,
+        /// Its place in the balance of moments about the frame's origin, if not `at`.
+        "moment_at" moment_at: optional LumpedMassPlace,
         /// Remark.
-        "note" note: optional Text,
+        "note" note: optional SpannedText,
     }
 }
 
@@ -319,9 +318,9 @@ record! {
     /// A loop, closed where two points coincide.
     LoopEntry = "a loop" {
         /// Name, by which a variant can override it.
-        "name" name: optional Name,
+        "name" name: optional SpannedName,
         /// The two points.
-        "joins" joins: required List<Name>,
+        "joins" joins: required EntryList<SpannedName>,
     }
 }
 
@@ -329,13 +328,13 @@ record! {
     /// A drive: the torque or force of a joint, or a force between two points.
     DriveEntry = "a drive" {
         /// Name; also that of its force in recordings.
-        "name" name: required Name,
+        "name" name: required SpannedName,
         /// The coordinate that it drives.
-        "joint" joint: optional Name,
+        "joint" joint: optional SpannedName,
         /// The two points that it pushes apart.
         "linear" linear: optional LinearDriveEntry,
         /// Remark.
-        "note" note: optional Text,
+        "note" note: optional SpannedText,
     }
 }
 
@@ -343,9 +342,9 @@ record! {
     /// A force between two points, positive when it pushes them apart.
     LinearDriveEntry = "a linear drive" {
         /// One end, often on the base.
-        "from" from: required Name,
+        "from" from: required SpannedName,
         /// The other end.
-        "to" to: required Name,
+        "to" to: required SpannedName,
     }
 }
 
@@ -353,19 +352,19 @@ record! {
     /// An effect of a kind from the library or from this file.
     EffectEntry = "an effect" {
         /// Name, by which a variant can override it.
-        "name" name: optional Name,
+        "name" name: optional SpannedName,
         /// Name of the kind.
-        "kind" kind: required Name,
+        "kind" kind: required SpannedName,
         /// Where it acts: a drive, a coordinate, a point or a part, `base` or `force`, as its kind has it, or a list
         /// whose members share the parameters.
-        "at" at: required OneOrMany<Name>,
-        /// Names and nominal values of its parameters, by the kind's symbols.
-        /// A parameter is called `symbol_place` if nothing is said.
-        "parameters" parameters: optional Named<EffectParameterEntry>,
+        "at" at: required OneOrMany<SpannedName>,
+        /// Names and nominal values of its parameters, by the kind's symbols. A parameter without a name here is
+        /// called `symbol_place`.
+        "parameters" parameters: optional NamedEntries<EffectParameterEntry>,
         /// Values of the kind's constants: numbers, or expressions over the constants of this file.
-        "constants" constants: optional Named<Formula>,
+        "constants" constants: optional NamedEntries<SourceFormula>,
         /// Remark.
-        "note" note: optional Text,
+        "note" note: optional SpannedText,
     }
 }
 
@@ -373,9 +372,9 @@ record! {
     /// A parameter of an effect.
     EffectParameterEntry = "a parameter of an effect" {
         /// Its name; a name that is declared elsewhere shares that parameter.
-        "name" name: optional Name,
-        /// Nominal value in SI units; zero if left away.
-        "nominal" nominal: optional Number,
+        "name" name: optional SpannedName,
+        /// Nominal value in SI units; zero if omitted.
+        "nominal" nominal: optional SpannedNumber,
     }
 }
 
@@ -383,31 +382,31 @@ record! {
     /// A kind of effect: what it adds to the force of the place on which it acts.
     EffectKindEntry = "a kind of effect" {
         /// Name of the kind.
-        "name" name: required Name,
+        "name" name: required SpannedName,
         /// The places that it may act on.
         "on" on: required OneOrMany<ActsOn>,
         /// The force, torque or, at a point, mass that it adds: an expression in the kind's parameters,
         /// linear in them, and in `coordinate`, `rate`, `acceleration` and `load` of the place. A kind that uses
         /// `other_coordinate`, `other_rate` or `other_acceleration` acts on two places, at each with the other's.
-        "expression" expression: optional Formula,
-        /// That it acts at the first of its two places alone, with the motion of the second, which turns (`angle`) or slides
-        /// (`length`).
+        "expression" expression: optional SourceFormula,
+        /// States that it acts at the first of its two places only, with the motion of the second one, which is
+        /// revolute (`angle`) or prismatic (`length`).
         "other" other: optional OtherMotion,
         /// What it does in place of an expression: a swinging `rod` along a linear drive, another `placement` of
         /// lumped masses, differences of a `part`, a `tilt` of gravity, a `delay` of the measured forces.
         "mechanics" mechanics: optional Mechanics,
         /// Its parameters.
-        "parameters" parameters: optional Named<KindParameterEntry>,
+        "parameters" parameters: optional NamedEntries<KindParameterEntry>,
         /// Quantities that give its shape and are known.
-        "constants" constants: optional Named<KindConstantEntry>,
+        "constants" constants: optional NamedEntries<KindConstantEntry>,
         /// One sentence that explains it.
-        "says" says: required Text,
-        /// One paragraph: what it is, where it comes from, and how an error that it leaves looks.
-        "explains" explains: optional Text,
-        /// What it is easily taken for, and which experiment tells them apart.
-        "doubles" doubles: optional Text,
-        /// A simpler kind that it holds as a special case and is looked for before it.
-        "refines" refines: optional Text,
+        "says" says: required SpannedText,
+        /// One paragraph: what it is, where it comes from, and how the error looks if a model lacks it.
+        "explains" explains: optional SpannedText,
+        /// Effects it can be confused with, and the experiment that distinguishes them.
+        "doubles" doubles: optional SpannedText,
+        /// A simpler kind that is a special case of it and is tried before it.
+        "refines" refines: optional SpannedText,
     }
 }
 
@@ -415,7 +414,7 @@ record! {
     /// A library of kinds of effects.
     LibraryEntry = "the library" {
         /// Kinds of effects.
-        "effect_kind" effect_kind: required List<EffectKindEntry>,
+        "effect_kind" effect_kind: required EntryList<EffectKindEntry>,
     }
 }
 
@@ -424,10 +423,10 @@ record! {
     KindParameterEntry = "a parameter of a kind" {
         /// Its unit, or its units where the place carries a force, a torque, or a mass at a point.
         "unit" unit: required UnitByPlace,
-        /// The sign that it must have to make physical sense; any if left away.
+        /// The sign that it must have to make physical sense; any if omitted.
         "sign" sign: optional Sign,
         /// Remark.
-        "note" note: optional Text,
+        "note" note: optional SpannedText,
     }
 }
 
@@ -436,12 +435,12 @@ record! {
     KindConstantEntry = "a constant of a kind" {
         /// Its unit, or its units where the place carries a force or a torque.
         "unit" unit: required UnitByPlace,
-        /// Its value where the effect gives none; an effect must give one if this is left away.
-        "value" value: optional Formula,
-        /// How its value is found where it is not known: `linear` where the expression is affine in it, or a range.
-        "search" search: optional Search,
+        /// Its value where the effect gives none; an effect must give one if this is omitted.
+        "value" value: optional SourceFormula,
+        /// How its value is found if it is not known: `linear` where the expression is affine in it, or a range.
+        "search" search: optional SearchEntry,
         /// Remark.
-        "note" note: optional Text,
+        "note" note: optional SpannedText,
     }
 }
 
@@ -449,28 +448,28 @@ record! {
     /// A range in which the value of a constant is searched.
     SearchRangeEntry = "a range to search" {
         /// The least value.
-        "from" from: required Number,
+        "from" from: required SpannedNumber,
         /// The largest value.
-        "to" to: required Number,
-        /// What both are multiples of: the largest `rate` of the place, the `travel` of its coordinate, or `one`,
-        /// for values in SI units; `one` if left away.
+        "to" to: required SpannedNumber,
+        /// The scale of both: the largest `rate` of the place, the `travel` of its coordinate, or `one`, for values
+        /// in SI units; `one` if omitted.
         "of" of: optional Scale,
     }
 }
 
 record! {
-    /// What planned motion must keep; what is not named is not limited.
+    /// Limits of planned motions; quantities that are not named have no limit.
     LimitsEntry = "the table of limits" {
         /// Limits of coordinates, by name.
-        "coordinates" coordinates: optional Named<CoordinateLimitsEntry>,
+        "coordinates" coordinates: optional NamedEntries<CoordinateLimitsEntry>,
         /// Limits of drives, by name.
-        "drives" drives: optional Named<DriveLimitsEntry>,
+        "drives" drives: optional NamedEntries<DriveLimitsEntry>,
         /// Boxes that points must stay in, by name.
-        "points" points: optional Named<PointLimitsEntry>,
+        "points" points: optional NamedEntries<PointLimitsEntry>,
         /// Distance from singular poses, between 0 and 1: the least singular value of the loops' Jacobian by the
         /// passive coordinates, and of the drives' by the active ones, stays above this share of its value at the
         /// nominal pose.
-        "singularity" singularity: optional Number,
+        "singularity" singularity: optional SpannedNumber,
     }
 }
 
@@ -478,11 +477,11 @@ record! {
     /// Limits of a coordinate; a passive one has a position only.
     CoordinateLimitsEntry = "the set of limits of a coordinate" {
         /// Angle or displacement, rad or m: `[low, high]`.
-        "position" position: optional Range,
+        "position" position: optional ValueRange,
         /// Rate, rad/s or m/s.
-        "rate" rate: optional Range,
+        "rate" rate: optional ValueRange,
         /// Acceleration, rad/s^2 or m/s^2.
-        "acceleration" acceleration: optional Range,
+        "acceleration" acceleration: optional ValueRange,
     }
 }
 
@@ -490,7 +489,7 @@ record! {
     /// Limits of a drive.
     DriveLimitsEntry = "the set of limits of a drive" {
         /// Force or torque of the nominal model, N or N m.
-        "force" force: required Range,
+        "force" force: required ValueRange,
     }
 }
 
@@ -498,21 +497,21 @@ record! {
     /// A box that a point must stay in, along the axes of the base frame.
     PointLimitsEntry = "the set of limits of a point" {
         /// m
-        "x" x: optional Range,
+        "x" x: optional ValueRange,
         /// m
-        "y" y: optional Range,
+        "y" y: optional ValueRange,
         /// m
-        "z" z: optional Range,
+        "z" z: optional ValueRange,
     }
 }
 
 record! {
-    /// What was identified. It takes the place of nominal values.
+    /// Identified values. They replace nominal values.
     IdentifiedEntry = "what was identified" {
-        /// Values of parameters, which bodies can have.
-        "parameters" parameters: optional Named<Number>,
-        /// Values of base parameters, which say nothing of single bodies.
-        "base" base: optional List<IdentifiedBaseEntry>,
+        /// Values of parameters that are physically possible.
+        "parameters" parameters: optional NamedEntries<SpannedNumber>,
+        /// Values of base parameters, which are combinations over several bodies.
+        "base" base: optional EntryList<IdentifiedBaseEntry>,
     }
 }
 
@@ -520,32 +519,31 @@ record! {
     /// The value of a base parameter.
     IdentifiedBaseEntry = "the value of a base parameter" {
         /// The base parameter in the parameters and constants of the file, as `modelmill check --json` has it.
-        "expression" expression: required Text,
+        "expression" expression: required SpannedText,
         /// Value in SI units.
-        "value" value: required Number,
+        "value" value: required SpannedNumber,
     }
 }
 
 record! {
     /// How recordings name their columns.
     RecordingEntry = "the recording" {
-        /// Our names (`t`, a coordinate, a coordinate with `_d` or `_dd`, a drive, a drive with `_var` for the
-        /// variance of its force) and theirs: the name of a column,
-        /// or a sum of columns such as `(pos6 - pos5)/32 - pi/2`, with a unit in brackets behind it if it is not in
-        /// SI units: `pos1 [deg]`.
-        "columns" columns: optional Named<Text>,
+        /// The model's names (`t`, a coordinate, a coordinate with `_d` or `_dd`, a drive, a drive with `_var` for
+        /// the variance of its force) and the recording's: the name of a column, or a sum of columns such as `(pos6 -
+        /// pos5)/32 - pi/2`, with a unit in brackets behind it if it is not in SI units: `pos1 [deg]`.
+        "columns" columns: optional NamedEntries<SpannedText>,
         /// What the columns of drives measure, where it is not what acts at the joint: by the name of the drive.
-        "torque" torque: optional Named<TorqueEntry>,
+        "torque" torque: optional NamedEntries<TorqueEntry>,
     }
 }
 
 record! {
     /// What the column of a drive measures: the motor's torque or current rather than what acts at the joint.
     TorqueEntry = "what the column of a drive measures" {
-        /// Turns of the motor for one of the joint, with its sign; 1 if it is not given.
-        "ratio" ratio: optional Number,
+        /// Turns of the motor per turn of the joint, with its sign; 1 if it is not given.
+        "ratio" ratio: optional SpannedNumber,
         /// N m/A, where the column is a current.
-        "constant" constant: optional Number,
+        "constant" constant: optional SpannedNumber,
     }
 }
 
@@ -553,10 +551,10 @@ record! {
     /// Units by what the place carries.
     UnitTable = "a set of units" {
         /// Where the place carries a force.
-        "force" force: optional Unit,
+        "force" force: optional ModelUnit,
         /// Where the place carries a torque.
-        "torque" torque: optional Unit,
+        "torque" torque: optional ModelUnit,
         /// At a point.
-        "point" point: optional Unit,
+        "point" point: optional ModelUnit,
     }
 }

@@ -1,18 +1,18 @@
 //! Units and their algebra: `"kg m^2"`, `"N s/m"` become powers of kg, m, s and A.
 //!
-//! Only coherent SI units are known, so that no factor ever enters; rad counts as 1.
+//! Only coherent SI units are known, so that no conversion factor is needed; rad counts as 1.
 
 #[cfg(any(test, feature = "schema"))]
 use std::borrow::Cow;
 
-use crate::diagnostic::{Diagnostic, Log, Span};
-use crate::document::{Node, Value, quote};
-use crate::record::Read;
+use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
+use crate::document::{TomlNode, TomlValue, quote};
+use crate::record::SchemaValue;
 use crate::suggest;
 
-/// Twice the exponents of kg, m, s, A; twice, so that square roots stay whole.
+/// Twice the exponents of kg, m, s, A; doubled, so that exponents of square roots are integers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(crate) struct Dimension([i32; 4]);
+pub(crate) struct UnitDimension([i32; 4]);
 
 /// The base of the algebra and the units derived from it, as single exponents of kg, m, s, A.
 const UNITS: [(&str, [i32; 4]); 17] = [
@@ -35,7 +35,7 @@ const UNITS: [(&str, [i32; 4]); 17] = [
     ("T", [1, 0, -2, -1]),
 ];
 
-/// Units that people write and that would need a factor.
+/// Common units that would need a factor, each with the SI unit to use instead.
 const FOREIGN: [(&str, &str); 14] = [
     ("mm", "m"),
     ("cm", "m"),
@@ -53,7 +53,7 @@ const FOREIGN: [(&str, &str); 14] = [
     ("lb", "kg"),
 ];
 
-/// How common dimensions are printed, and what people call them.
+/// How common dimensions are printed: unit, single exponents of kg, m, s, A, and name.
 const PRINTED: [(&str, [i32; 4], &str); 18] = [
     ("1", [0, 0, 0, 0], "a pure number or an angle"),
     ("m", [0, 1, 0, 0], "a length"),
@@ -75,43 +75,58 @@ const PRINTED: [(&str, [i32; 4], &str); 18] = [
     ("A", [0, 0, 0, 1], "a current"),
 ];
 
-impl Dimension {
+impl UnitDimension {
+    /// A pure number or an angle.
     pub(crate) const ONE: Self = Self::new([0, 0, 0, 0]);
+    /// s
     pub(crate) const TIME: Self = Self::new([0, 0, 1, 0]);
+    /// m
     pub(crate) const LENGTH: Self = Self::new([0, 1, 0, 0]);
+    /// kg
     pub(crate) const MASS: Self = Self::new([1, 0, 0, 0]);
+    /// kg m, mass times a distance.
     pub(crate) const FIRST_MOMENT: Self = Self::new([1, 1, 0, 0]);
+    /// kg m^2
     pub(crate) const INERTIA: Self = Self::new([1, 2, 0, 0]);
+    /// m/s^2
     pub(crate) const ACCELERATION: Self = Self::new([0, 1, -2, 0]);
+    /// N
     pub(crate) const FORCE: Self = Self::new([1, 1, -2, 0]);
+    /// N m
     pub(crate) const TORQUE: Self = Self::new([1, 2, -2, 0]);
+    /// N/m
     pub(crate) const STIFFNESS: Self = Self::new([1, 0, -2, 0]);
+    /// N s/m
     pub(crate) const DAMPING: Self = Self::new([1, 0, -1, 0]);
+    /// m/s
     pub(crate) const VELOCITY: Self = Self::new([0, 1, -1, 0]);
+    /// 1/s, an angular rate.
     pub(crate) const RATE: Self = Self::new([0, 0, -1, 0]);
+    /// 1/s^2
     pub(crate) const ANGULAR_ACCELERATION: Self = Self::new([0, 0, -2, 0]);
 
+    /// A dimension from the single exponents of kg, m, s, A.
     pub(crate) const fn new(single: [i32; 4]) -> Self {
         Self([2 * single[0], 2 * single[1], 2 * single[2], 2 * single[3]])
     }
 
-    pub(crate) fn times(self, other: Self) -> Self {
-        Self(std::array::from_fn(|i| {
-            self.0[i].saturating_add(other.0[i])
-        }))
+    /// The dimension of a product.
+    pub(crate) fn multiplied_by(self, other: Self) -> Self {
+        Self(std::array::from_fn(|i| self.0[i].saturating_add(other.0[i])))
     }
 
-    pub(crate) fn over(self, other: Self) -> Self {
-        Self(std::array::from_fn(|i| {
-            self.0[i].saturating_sub(other.0[i])
-        }))
+    /// The dimension of a quotient.
+    pub(crate) fn divided_by(self, other: Self) -> Self {
+        Self(std::array::from_fn(|i| self.0[i].saturating_sub(other.0[i])))
     }
 
+    /// The dimension of an integer power.
     pub(crate) fn power(self, exponent: i32) -> Self {
         Self(self.0.map(|one| one.saturating_mul(exponent)))
     }
 
-    /// The square root, if the doubled exponents allow it.
+    /// The dimension of the square root; `None` if an exponent would not be a multiple of one half.
+    /// An odd doubled exponent would need quarters of exponents.
     pub(crate) fn square_root(self) -> Option<Self> {
         self.0
             .iter()
@@ -119,7 +134,8 @@ impl Dimension {
             .then(|| Self(self.0.map(|one| one / 2)))
     }
 
-    /// What people call it, with its unit: `a length (m)`.
+    /// Its common name with its unit: `a length (m)`.
+    /// Dimensions without a common name are printed as powers.
     pub(crate) fn describe(self) -> String {
         PRINTED
             .iter()
@@ -137,15 +153,14 @@ impl Dimension {
     }
 }
 
-impl std::fmt::Display for Dimension {
+/// Prints the common unit, or powers of the base units.
+impl std::fmt::Display for UnitDimension {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        if let Some((unit, _, _)) = PRINTED
-            .iter()
-            .find(|(_, single, _)| Self::new(*single) == *self)
-        {
+        if let Some((unit, _, _)) = PRINTED.iter().find(|(_, single, _)| Self::new(*single) == *self) {
             return f.write_str(unit);
         }
         let mut blank = "";
+        // One factor per base unit, exponents of one half as fractions.
         for (name, twice) in ["kg", "m", "s", "A"].iter().zip(self.0) {
             if twice == 0 {
                 continue;
@@ -164,21 +179,25 @@ impl std::fmt::Display for Dimension {
 
 /// A unit of the file.
 #[derive(Clone, Debug)]
-pub(crate) struct Unit {
-    /// As the author wrote it, blanks tidied.
+pub(crate) struct ModelUnit {
+    /// As the author wrote it, with single blanks.
     pub(crate) text: String,
-    pub(crate) dimension: Dimension,
+    /// Its dimension, for checks of expressions.
+    pub(crate) dimension: UnitDimension,
 }
 
-impl Unit {
-    /// A unit by its text, such as `N s/m`, which stands at `span` and, as far as it is known, begins at `inner` there.
+impl ModelUnit {
+    /// Parses a unit such as `N s/m`. It stands at `span`; its text begins at byte `inner`, if that is known.
+    ///
+    /// A fault goes to the log and gives `None`.
     pub(crate) fn from_text(
         text: &str,
-        span: Span,
+        span: SourceSpan,
         inner: Option<usize>,
-        log: &mut Log,
+        log: &mut DiagnosticLog,
     ) -> Option<Self> {
-        let fault = match parse(text) {
+        // The fault has the part of the text that is wrong.
+        let fault = match parse_unit(text) {
             Ok(dimension) => {
                 return Some(Self {
                     text: text.split_whitespace().collect::<Vec<_>>().join(" "),
@@ -187,15 +206,16 @@ impl Unit {
             }
             Err(fault) => fault,
         };
-        let place = inner.map_or(span, |inner| Span {
+        // The mark covers only the faulty part if the position of the text is known.
+        let place = inner.map_or(span, |inner| SourceSpan {
             file: span.file,
             start: inner + fault.start,
             end: inner + fault.end,
         });
         let found = &text[fault.start..fault.end];
-        let mut diagnostic = Diagnostic::error(place, fault.message).label(
-            "expected SI units such as `kg`, `m`, `rad`, `kg m^2`, `N s/m`, `m/s^2`, or `1`",
-        );
+        let mut diagnostic = Diagnostic::error(place, fault.message)
+            .label("expected SI units such as `kg`, `m`, `rad`, `kg m^2`, `N s/m`, `m/s^2`, or `1`");
+        // Prefixed units are refused, because no factor is ever applied.
         if let Some((_, si)) = FOREIGN.iter().find(|(foreign, _)| *foreign == found) {
             diagnostic = diagnostic.help(format!(
                 "write `{si}` and convert the value; modelmill uses SI units without prefixes"
@@ -207,18 +227,18 @@ impl Unit {
         None
     }
 
-    /// True for an angle, which may stand in sines and cosines.
+    /// True for an angle, which may be the operand of sines and cosines.
     pub(crate) fn is_angle(&self) -> bool {
         self.text == "rad"
     }
 }
 
-impl Read for Unit {
+impl SchemaValue for ModelUnit {
     const EXPECTED: &'static str = "a unit in quotes";
     const EXAMPLE: &'static str = "\"kg m^2\"";
 
-    fn read(node: &Node, log: &mut Log) -> Option<Self> {
-        let Value::Text { text, inner } = &node.value else {
+    fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
+        let TomlValue::Text { text, inner } = &node.value else {
             return crate::record::wrong_type::<Self>(node, log);
         };
         Self::from_text(text, node.span, *inner, log)
@@ -226,7 +246,7 @@ impl Read for Unit {
 }
 
 #[cfg(any(test, feature = "schema"))]
-impl schemars::JsonSchema for Unit {
+impl schemars::JsonSchema for ModelUnit {
     fn schema_name() -> Cow<'static, str> {
         "Unit".into()
     }
@@ -242,28 +262,32 @@ impl schemars::JsonSchema for Unit {
 
 /// Unit of a product of powers of quantities: `kg m` for a mass times a length.
 ///
-/// A single quantity keeps its unit as the file writes it; what is no unit counts as a pure number.
+/// A single quantity keeps its unit as the file writes it. A text that is not a unit counts as a pure number.
+/// A single unit keeps its spelling, such as `N m s/rad`.
 pub fn unit_product(factors: &[(&str, i32)]) -> String {
     if let [(unit, 1)] = factors {
         return (*unit).to_owned();
     }
     let product = factors
         .iter()
-        .filter_map(|(unit, n)| parse(unit).ok().map(|dimension| dimension.power(*n)))
-        .fold(Dimension::ONE, Dimension::times);
+        .filter_map(|(unit, n)| parse_unit(unit).ok().map(|dimension| dimension.power(*n)))
+        .fold(UnitDimension::ONE, UnitDimension::multiplied_by);
     product.to_string()
 }
 
-/// A stretch of the unit's text that has no meaning.
-struct Fault {
+/// A segment of the unit's text that is not valid.
+struct UnitFault {
+    /// First byte in the text of the unit.
     start: usize,
+    /// One past the last byte.
     end: usize,
+    /// What is wrong, for the title of the diagnostic.
     message: String,
 }
 
-/// Products by blanks or `*`; after one `/` comes a single unit or a bracket.
-fn parse(text: &str) -> Result<Dimension, Fault> {
-    let whole = |message: &str| Fault {
+/// The dimension of a unit: factors separated by blanks or `*`; after one `/` a single unit or a bracket.
+fn parse_unit(text: &str) -> Result<UnitDimension, UnitFault> {
+    let whole = |message: &str| UnitFault {
         start: 0,
         end: text.len(),
         message: message.to_owned(),
@@ -274,6 +298,7 @@ fn parse(text: &str) -> Result<Dimension, Fault> {
     if text.trim().is_empty() {
         return Err(whole("this unit is empty"));
     }
+    // At most one `/` is allowed.
     let (above, below) = match text.split_once('/') {
         Some((above, below)) => (above, Some(below)),
         None => (text, None),
@@ -281,30 +306,33 @@ fn parse(text: &str) -> Result<Dimension, Fault> {
     let mut dimension = factors(above, 0)?.0;
     if let Some(below) = below {
         let offset = above.len() + 1;
+        // A bracket counts as one divisor.
         let trimmed = below.trim();
-        let bracket = trimmed
-            .strip_prefix('(')
-            .and_then(|rest| rest.strip_suffix(')'));
+        let bracket = trimmed.strip_prefix('(').and_then(|rest| rest.strip_suffix(')'));
         let (divisor, n_factors) = if let Some(inner) = bracket {
             let skip = below.find('(').unwrap_or(0) + 1;
             (factors(inner, offset + skip)?.0, 1)
         } else {
             factors(below, offset)?
         };
+        // `N/m s` could mean `N/(m s)` or `(N/m) s`.
         if n_factors != 1 {
-            return Err(Fault {
+            return Err(UnitFault {
                 start: offset,
                 end: text.len(),
-                message: "it is not clear what this unit divides by".to_owned(),
+                message: "this unit has an ambiguous divisor".to_owned(),
             });
         }
-        dimension = dimension.over(divisor);
+        dimension = dimension.divided_by(divisor);
     }
     Ok(dimension)
 }
 
-fn factors(text: &str, offset: usize) -> Result<(Dimension, usize), Fault> {
-    let mut dimension = Dimension::ONE;
+/// The product of units separated by blanks, `*` or a middle dot, and their number.
+/// `offset` is the position of `text` in the complete unit, for the places of faults.
+fn factors(text: &str, offset: usize) -> Result<(UnitDimension, usize), UnitFault> {
+    // Units are separated by blanks or product signs.
+    let mut dimension = UnitDimension::ONE;
     let mut n_factors = 0;
     let mut at = 0;
     while at < text.len() {
@@ -321,11 +349,12 @@ fn factors(text: &str, offset: usize) -> Result<(Dimension, usize), Fault> {
             .find(|found: char| found.is_whitespace() || found == '*' || found == '\u{b7}')
             .unwrap_or(rest.len());
         let word = &rest[..end];
+        // A unit may have an integer exponent, up to nine.
         let (name, exponent) = match word.split_once('^') {
             Some((name, exponent)) => (name, exponent.parse::<i32>().ok()),
             None => (word, Some(1)),
         };
-        let fault = |message: String, length: usize| Fault {
+        let fault = |message: String, length: usize| UnitFault {
             start: offset + at,
             end: offset + at + length,
             message,
@@ -334,17 +363,15 @@ fn factors(text: &str, offset: usize) -> Result<(Dimension, usize), Fault> {
             return Err(fault(format!("unknown unit `{}`", quote(name)), name.len()));
         };
         let Some(exponent) = exponent.filter(|exponent| exponent.abs() <= 9) else {
-            return Err(fault(
-                format!("this exponent of `{name}` is not allowed"),
-                word.len(),
-            ));
+            return Err(fault(format!("this exponent of `{name}` is not allowed"), word.len()));
         };
-        dimension = dimension.times(Dimension::new(*single).power(exponent));
+        dimension = dimension.multiplied_by(UnitDimension::new(*single).power(exponent));
         n_factors += 1;
         at += end;
     }
+    // A missing unit is reported at its position.
     if n_factors == 0 {
-        return Err(Fault {
+        return Err(UnitFault {
             start: offset,
             end: offset + text.len(),
             message: "a unit is missing here".to_owned(),
@@ -355,7 +382,7 @@ fn factors(text: &str, offset: usize) -> Result<(Dimension, usize), Fault> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Dimension, UNITS, parse};
+    use super::{UNITS, UnitDimension, parse_unit};
 
     #[test]
     fn units_multiply_and_divide() {
@@ -370,23 +397,23 @@ mod tests {
             ("V s/(rad A)", "kg m^2 s^-2 A^-2"),
             ("rad", "1"),
         ] {
-            let dimension = parse(text).map_err(|fault| fault.message).unwrap();
+            let dimension = parse_unit(text).map_err(|fault| fault.message).unwrap();
             assert_eq!(dimension.to_string(), printed, "{text}");
         }
         for text in [
             "", "kg m s/", "m/s/s", "N/m s", "Nm", "mm", "m^x", "m^99", "()", "m/(", "\u{e9}",
         ] {
-            assert!(parse(text).is_err(), "{text}");
+            assert!(parse_unit(text).is_err(), "{text}");
         }
     }
 
     #[test]
     fn printed_dimensions_read_as_the_same() {
         for (name, _) in UNITS {
-            let dimension = parse(name).map_err(|fault| fault.message).unwrap();
-            let square = dimension.times(dimension);
-            for found in [dimension, square, Dimension::ONE.over(dimension)] {
-                assert_eq!(parse(&found.to_string()).ok(), Some(found), "{name}");
+            let dimension = parse_unit(name).map_err(|fault| fault.message).unwrap();
+            let square = dimension.multiplied_by(dimension);
+            for found in [dimension, square, UnitDimension::ONE.divided_by(dimension)] {
+                assert_eq!(parse_unit(&found.to_string()).ok(), Some(found), "{name}");
             }
         }
     }

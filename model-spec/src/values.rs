@@ -1,4 +1,6 @@
 //! The small values of a model file: names, texts, numbers, vectors, and the words for an axis.
+//!
+//! Each type reads itself from a node of the document and reports faults with its place.
 
 #[cfg(any(test, feature = "schema"))]
 use std::borrow::Cow;
@@ -6,15 +8,15 @@ use std::borrow::Cow;
 #[cfg(any(test, feature = "schema"))]
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 
-use crate::diagnostic::{Diagnostic, Log, Span};
-use crate::document::{Node, Value, quote};
-use crate::formula::Formula;
-use crate::record::{Read, wrong_type};
+use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
+use crate::document::{TomlNode, TomlValue, quote};
+use crate::formula::SourceFormula;
+use crate::record::{SchemaValue, wrong_type};
 use crate::schema::{SearchRangeEntry, UnitTable};
-use crate::unit::Unit;
+use crate::unit::ModelUnit;
 use crate::words::words;
 
-/// Words that mean something in expressions and so name nothing else.
+/// Words with a meaning in expressions, which therefore cannot be names.
 const RESERVED: [&str; 17] = [
     "pi",
     "sin",
@@ -37,17 +39,20 @@ const RESERVED: [&str; 17] = [
 
 /// A name, where it is defined or where it is used.
 #[derive(Clone, Debug)]
-pub(crate) struct Name {
+pub(crate) struct SpannedName {
+    /// The name, checked to be an identifier.
     pub(crate) text: String,
-    pub(crate) span: Span,
+    /// Where it stands.
+    pub(crate) span: SourceSpan,
 }
 
-impl Read for Name {
+impl SchemaValue for SpannedName {
     const EXPECTED: &'static str = "a name in quotes";
     const EXAMPLE: &'static str = "\"S1\"";
 
-    fn read(node: &Node, log: &mut Log) -> Option<Self> {
-        let Value::Text { text, .. } = &node.value else {
+    // Text that is not an identifier is reported and not read.
+    fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
+        let TomlValue::Text { text, .. } = &node.value else {
             return wrong_type::<Self>(node, log);
         };
         check_name(text, node.span, log).then(|| Self {
@@ -57,17 +62,17 @@ impl Read for Name {
     }
 }
 
-/// Whether a text is an identifier.
+/// Whether a text is an identifier: a letter, then letters, digits and `_`, at most 60 characters.
+///
+/// Generated code uses names of models, so they must be identifiers there.
 pub(crate) fn is_name(text: &str) -> bool {
     text.len() <= 60
         && text.starts_with(|first: char| first.is_ascii_alphabetic())
-        && text
-            .chars()
-            .all(|found| found.is_ascii_alphanumeric() || found == '_')
+        && text.chars().all(|found| found.is_ascii_alphanumeric() || found == '_')
 }
 
-/// Reports a name that is no identifier.
-pub(crate) fn check_name(text: &str, span: Span, log: &mut Log) -> bool {
+/// Reports a name that is not an identifier; true if it is one.
+pub(crate) fn check_name(text: &str, span: SourceSpan, log: &mut DiagnosticLog) -> bool {
     let fine = is_name(text);
     if !fine {
         log.push(
@@ -78,8 +83,10 @@ pub(crate) fn check_name(text: &str, span: Span, log: &mut Log) -> bool {
     fine
 }
 
-/// Reports a name that is taken by the language of expressions.
-pub(crate) fn check_not_reserved(text: &str, span: Span, log: &mut Log) -> bool {
+/// Reports a name that is a word of the expression language; true if it is not one.
+///
+/// These are functions, quantities of a place, `base`, and the time `t`.
+pub(crate) fn check_not_reserved(text: &str, span: SourceSpan, log: &mut DiagnosticLog) -> bool {
     let reserved = RESERVED.contains(&text);
     if reserved {
         log.push(
@@ -92,7 +99,7 @@ pub(crate) fn check_not_reserved(text: &str, span: Span, log: &mut Log) -> bool 
 }
 
 #[cfg(any(test, feature = "schema"))]
-impl JsonSchema for Name {
+impl JsonSchema for SpannedName {
     fn schema_name() -> Cow<'static, str> {
         "Name".into()
     }
@@ -109,24 +116,25 @@ impl JsonSchema for Name {
 
 /// Free text.
 #[derive(Clone, Debug)]
-pub(crate) struct Text {
+pub(crate) struct SpannedText {
+    /// The text without its quotes; at most 4000 bytes.
     pub(crate) text: String,
-    pub(crate) span: Span,
+    /// Where it stands.
+    pub(crate) span: SourceSpan,
 }
 
-impl Read for Text {
+impl SchemaValue for SpannedText {
     const EXPECTED: &'static str = "a text in quotes";
     const EXAMPLE: &'static str = "\"...\"";
 
-    fn read(node: &Node, log: &mut Log) -> Option<Self> {
-        let Value::Text { text, .. } = &node.value else {
+    // Titles, notes and paths are such texts.
+    fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
+        let TomlValue::Text { text, .. } = &node.value else {
             return wrong_type::<Self>(node, log);
         };
+        // Notes are printed on pages and in messages, so their length is limited.
         if text.len() > 4000 {
-            log.push(
-                Diagnostic::error(node.span, "this text is too long")
-                    .label("at most 4000 characters"),
-            );
+            log.push(Diagnostic::error(node.span, "this text is too long").label("at most 4000 characters"));
             return None;
         }
         Some(Self {
@@ -137,7 +145,7 @@ impl Read for Text {
 }
 
 #[cfg(any(test, feature = "schema"))]
-impl JsonSchema for Text {
+impl JsonSchema for SpannedText {
     fn inline_schema() -> bool {
         true
     }
@@ -153,29 +161,29 @@ impl JsonSchema for Text {
 
 /// A finite number.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Number {
+pub(crate) struct SpannedNumber {
+    /// The value in SI units.
     pub(crate) value: f64,
-    pub(crate) span: Span,
+    /// Where it stands.
+    pub(crate) span: SourceSpan,
 }
 
-impl Read for Number {
+impl SchemaValue for SpannedNumber {
     const EXPECTED: &'static str = "a number";
     const EXAMPLE: &'static str = "0.25";
 
-    fn read(node: &Node, log: &mut Log) -> Option<Self> {
-        let Value::Number { text, .. } = &node.value else {
+    fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
+        let TomlValue::Number { text, .. } = &node.value else {
             return wrong_type::<Self>(node, log);
         };
+        // TOML has `inf` and `nan`, which no quantity of a mechanism may be.
         match text.parse::<f64>() {
-            Ok(value) if value.is_finite() => Some(Self {
-                value,
-                span: node.span,
-            }),
+            Ok(value) if value.is_finite() => Some(Self { value, span: node.span }),
             _ => {
                 log.push(
                     Diagnostic::error(node.span, format!("`{}` is not finite", quote(text)))
                         .label("expected a finite number")
-                        .help("nothing in a mechanism is infinite; leave the entry away if it is not known"),
+                        .help("quantities of a mechanism are finite; omit the entry if its value is not known"),
                 );
                 None
             }
@@ -184,7 +192,7 @@ impl Read for Number {
 }
 
 #[cfg(any(test, feature = "schema"))]
-impl JsonSchema for Number {
+impl JsonSchema for SpannedNumber {
     fn inline_schema() -> bool {
         true
     }
@@ -198,16 +206,16 @@ impl JsonSchema for Number {
     }
 }
 
-/// Yes or no.
+/// A boolean.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Flag(pub(crate) bool);
+pub(crate) struct BooleanFlag(pub(crate) bool);
 
-impl Read for Flag {
+impl SchemaValue for BooleanFlag {
     const EXPECTED: &'static str = "`true` or `false`";
     const EXAMPLE: &'static str = "true";
 
-    fn read(node: &Node, log: &mut Log) -> Option<Self> {
-        let Value::Boolean(value) = node.value else {
+    fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
+        let TomlValue::Boolean(value) = node.value else {
             return wrong_type::<Self>(node, log);
         };
         Some(Self(value))
@@ -215,7 +223,7 @@ impl Read for Flag {
 }
 
 #[cfg(any(test, feature = "schema"))]
-impl JsonSchema for Flag {
+impl JsonSchema for BooleanFlag {
     fn inline_schema() -> bool {
         true
     }
@@ -229,24 +237,29 @@ impl JsonSchema for Flag {
     }
 }
 
-/// A unit that may depend on what the place carries.
+/// A unit that may depend on the load of the place: force, torque or mass.
 #[derive(Clone, Debug)]
+// `None` where the author gives no unit: the kind does not act at such places.
 pub(crate) struct UnitByPlace {
-    pub(crate) force: Option<Unit>,
-    pub(crate) torque: Option<Unit>,
-    pub(crate) point: Option<Unit>,
-    /// Elsewhere: one unit for all places serves there.
-    pub(crate) elsewhere: Option<Unit>,
+    /// Where the place carries a force.
+    pub(crate) force: Option<ModelUnit>,
+    /// Where the place carries a torque.
+    pub(crate) torque: Option<ModelUnit>,
+    /// At a point, which carries a mass.
+    pub(crate) point: Option<ModelUnit>,
+    /// At all other places; only a single unit for all places applies there.
+    pub(crate) elsewhere: Option<ModelUnit>,
 }
 
-impl Read for UnitByPlace {
+impl SchemaValue for UnitByPlace {
     const EXPECTED: &'static str = "a unit in quotes, or units by place";
     const EXAMPLE: &'static str = "{ force = \"N\", torque = \"N m\" }";
 
-    fn read(node: &Node, log: &mut Log) -> Option<Self> {
+    fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
+        // One unit serves all places.
         match &node.value {
-            Value::Text { .. } => {
-                let unit = Unit::read(node, log)?;
+            TomlValue::Text { .. } => {
+                let unit = ModelUnit::read(node, log)?;
                 Some(Self {
                     force: Some(unit.clone()),
                     torque: Some(unit.clone()),
@@ -254,7 +267,8 @@ impl Read for UnitByPlace {
                     elsewhere: Some(unit),
                 })
             }
-            Value::Table(table) => {
+            // Units by place leave other places without a unit.
+            TomlValue::Table(table) => {
                 let table = UnitTable::from_table(table, node.span, log);
                 Some(Self {
                     force: table.force,
@@ -279,32 +293,30 @@ impl JsonSchema for UnitByPlace {
     }
 
     fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        let unit = generator.subschema_for::<Unit>();
+        let unit = generator.subschema_for::<ModelUnit>();
         let table = generator.subschema_for::<UnitTable>();
         json_schema!({ "anyOf": [unit, table] })
     }
 }
 
-/// The version of the file format.
+/// The version of the file format; only 1 exists.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Version;
+pub(crate) struct SchemaVersion;
 
-impl Read for Version {
+impl SchemaValue for SchemaVersion {
     const EXPECTED: &'static str = "the version of the file format";
     const EXAMPLE: &'static str = "1";
 
-    fn read(node: &Node, log: &mut Log) -> Option<Self> {
-        let Value::Number { text, .. } = &node.value else {
+    fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
+        let TomlValue::Number { text, .. } = &node.value else {
             return wrong_type::<Self>(node, log);
         };
+        // Another version is reported, and reading continues with the rules of this one.
         if text != "1" {
             log.push(
-                Diagnostic::error(
-                    node.span,
-                    format!("file format {} is not known", quote(text)),
-                )
-                .label("expected 1")
-                .help("a newer modelmill may read this file; this one reads `schema = 1`"),
+                Diagnostic::error(node.span, format!("file format {} is not known", quote(text)))
+                    .label("expected 1")
+                    .help("a newer modelmill may read this file; this one reads `schema = 1`"),
             );
         }
         Some(Self)
@@ -312,7 +324,7 @@ impl Read for Version {
 }
 
 #[cfg(any(test, feature = "schema"))]
-impl JsonSchema for Version {
+impl JsonSchema for SchemaVersion {
     fn inline_schema() -> bool {
         true
     }
@@ -327,21 +339,25 @@ impl JsonSchema for Version {
 }
 
 /// Three expressions, or two in the x-y plane.
+///
+/// In the x-y plane the third entry is zero.
 #[derive(Clone, Debug)]
-pub(crate) struct Vector {
+pub(crate) struct FormulaVector {
     /// The entries; absent where one was faulty.
-    pub(crate) entries: Vec<Option<Formula>>,
-    pub(crate) span: Span,
+    pub(crate) entries: Vec<Option<SourceFormula>>,
+    /// Where the vector stands.
+    pub(crate) span: SourceSpan,
 }
 
-impl Read for Vector {
+impl SchemaValue for FormulaVector {
     const EXPECTED: &'static str = "a vector of three expressions, or of two in the x-y plane";
     const EXAMPLE: &'static str = "[\"d1\", 0, 0]";
 
-    fn read(node: &Node, log: &mut Log) -> Option<Self> {
-        let Value::Array(array) = &node.value else {
+    fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
+        let TomlValue::Array(array) = &node.value else {
             return wrong_type::<Self>(node, log);
         };
+        // Other lengths are refused, because it is unclear which entry is missing.
         if !(2..=3).contains(&array.len()) {
             log.push(
                 Diagnostic::error(
@@ -356,44 +372,44 @@ impl Read for Vector {
             );
             return None;
         }
+        // A faulty entry is `None`; its fault is reported by the reader of expressions.
         Some(Self {
-            entries: array
-                .iter()
-                .map(|entry| Formula::read(entry, log))
-                .collect(),
+            entries: array.iter().map(|entry| SourceFormula::read(entry, log)).collect(),
             span: node.span,
         })
     }
 }
 
 #[cfg(any(test, feature = "schema"))]
-impl JsonSchema for Vector {
+impl JsonSchema for FormulaVector {
     fn schema_name() -> Cow<'static, str> {
         "Vector".into()
     }
 
     fn json_schema(generator: &mut SchemaGenerator) -> Schema {
         json_schema!({
-            "description": "x, y and z; z may be left away.",
+            "description": "x, y and z; z may be omitted.",
             "type": "array",
-            "items": generator.subschema_for::<Formula>(),
+            "items": generator.subschema_for::<SourceFormula>(),
             "minItems": 2,
             "maxItems": 3,
         })
     }
 }
 
-/// A place of a lumped mass.
+/// The place of a lumped mass.
 #[derive(Clone, Debug)]
-pub(crate) enum Spot {
+pub(crate) enum LumpedMassPlace {
     /// A named point.
-    Point(Name),
+    Point(SpannedName),
     /// A position in the frame.
-    Vector(Vector),
+    Vector(FormulaVector),
 }
 
-impl Spot {
-    pub(crate) fn span(&self) -> Span {
+// Both forms know their place.
+impl LumpedMassPlace {
+    /// Where it stands in the file.
+    pub(crate) fn span(&self) -> SourceSpan {
         match self {
             Self::Point(name) => name.span,
             Self::Vector(vector) => vector.span,
@@ -401,21 +417,22 @@ impl Spot {
     }
 }
 
-impl Read for Spot {
+impl SchemaValue for LumpedMassPlace {
     const EXPECTED: &'static str = "the name of a point, or a vector";
     const EXAMPLE: &'static str = "\"R3m\"";
 
-    fn read(node: &Node, log: &mut Log) -> Option<Self> {
+    // A text is the name of a point, a list is a position.
+    fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
         match &node.value {
-            Value::Text { .. } => Name::read(node, log).map(Self::Point),
-            Value::Array(_) => Vector::read(node, log).map(Self::Vector),
+            TomlValue::Text { .. } => SpannedName::read(node, log).map(Self::Point),
+            TomlValue::Array(_) => FormulaVector::read(node, log).map(Self::Vector),
             _ => wrong_type::<Self>(node, log),
         }
     }
 }
 
 #[cfg(any(test, feature = "schema"))]
-impl JsonSchema for Spot {
+impl JsonSchema for LumpedMassPlace {
     fn inline_schema() -> bool {
         true
     }
@@ -425,36 +442,32 @@ impl JsonSchema for Spot {
     }
 
     fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        let name = generator.subschema_for::<Name>();
-        let vector = generator.subschema_for::<Vector>();
+        let name = generator.subschema_for::<SpannedName>();
+        let vector = generator.subschema_for::<FormulaVector>();
         json_schema!({ "anyOf": [name, vector] })
     }
 }
 
 /// The end of a parameter's name, such as `1` in `M1`.
 #[derive(Clone, Debug)]
-pub(crate) struct Suffix {
+pub(crate) struct NameSuffix {
+    /// The suffix: letters, digits and `_`, at most 40; it may be empty.
     pub(crate) text: String,
-    pub(crate) span: Span,
+    /// Where it stands.
+    pub(crate) span: SourceSpan,
 }
 
-impl Read for Suffix {
+impl SchemaValue for NameSuffix {
     const EXPECTED: &'static str = "the end of a name in quotes";
     const EXAMPLE: &'static str = "\"1\"";
 
-    fn read(node: &Node, log: &mut Log) -> Option<Self> {
-        let (Value::Text { text, .. }
-        | Value::Number {
-            text,
-            is_integer: true,
-        }) = &node.value
-        else {
+    fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
+        // Numbers are allowed, because suffixes are often indices.
+        let (TomlValue::Text { text, .. } | TomlValue::Number { text, is_integer: true }) = &node.value else {
             return wrong_type::<Self>(node, log);
         };
-        let fine = text.len() <= 40
-            && text
-                .chars()
-                .all(|found| found.is_ascii_alphanumeric() || found == '_');
+        // The suffix may start with a digit, unlike a name.
+        let fine = text.len() <= 40 && text.chars().all(|found| found.is_ascii_alphanumeric() || found == '_');
         if !fine {
             log.push(
                 Diagnostic::error(node.span, "this cannot end a name")
@@ -470,7 +483,7 @@ impl Read for Suffix {
 }
 
 #[cfg(any(test, feature = "schema"))]
-impl JsonSchema for Suffix {
+impl JsonSchema for NameSuffix {
     fn schema_name() -> Cow<'static, str> {
         "Suffix".into()
     }
@@ -483,42 +496,47 @@ impl JsonSchema for Suffix {
     }
 }
 
+// The direction of an axis of a joint; a minus sign reverses it.
 words! {
     /// An axis with its direction.
     pub(crate) AxisName: "an axis",
     "x" => X, "y" => Y, "z" => Z, "-x" => MinusX, "-y" => MinusY, "-z" => MinusZ
 }
 
+// The scalar part w comes last or first.
 words! {
     /// The order in which a quaternion is written.
     pub(crate) QuaternionOrder: "the order of a quaternion",
     "xyzw" => Xyzw, "wxyz" => Wxyz
 }
 
+// The axes of velocity and force, and of angular velocity and moment.
 words! {
     /// The axes of the twist of a free body.
     pub(crate) TwistName: "the axes of a twist",
     "body" => Body, "world" => World, "mixed" => Mixed
 }
 
-/// How a constant's value is found where it is not known.
+/// How the value of an unknown constant is found.
 #[derive(Clone, Debug)]
-pub(crate) enum Search {
+pub(crate) enum SearchEntry {
     /// The expression is affine in it.
     Linear,
-    /// Values of a range are tried.
+    /// A grid of values in a range is tried.
     Range(SearchRangeEntry),
 }
 
-impl Read for Search {
+impl SchemaValue for SearchEntry {
     const EXPECTED: &'static str = "a range to search, or `linear`";
     const EXAMPLE: &'static str = "{ from = 0.01, to = 1, of = \"rate\" }";
 
-    fn read(node: &Node, log: &mut Log) -> Option<Self> {
+    fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
+        // The word `linear`, or a table with a range.
         match &node.value {
-            Value::Text { text, .. } if text == "linear" => Some(Self::Linear),
-            Value::Table(table) => {
+            TomlValue::Text { text, .. } if text == "linear" => Some(Self::Linear),
+            TomlValue::Table(table) => {
                 let range = SearchRangeEntry::from_table(table, node.span, log);
+                // Both bounds must be present to be compared.
                 if let (Some(from), Some(to)) = (range.from, range.to)
                     && from.value >= to.value
                 {
@@ -535,7 +553,7 @@ impl Read for Search {
 }
 
 #[cfg(any(test, feature = "schema"))]
-impl JsonSchema for Search {
+impl JsonSchema for SearchEntry {
     fn inline_schema() -> bool {
         true
     }

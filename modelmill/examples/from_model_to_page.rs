@@ -1,12 +1,12 @@
-//! From a model file and two recordings to the effect that the model lacks, the completed model file, and a page that shows
-//! it all: `cargo run --release -p modelmill --example from_model_to_page`.
+//! Finds the effect that a model lacks, from a model file and two recordings, and writes the completed model file and
+//! a page with the findings: `cargo run --release -p modelmill --example from_model_to_page`.
 
 use std::path::Path;
 
-use modelmill::diagnose::Question;
-use modelmill::identify::Estimation;
+use modelmill::diagnose::DiagnosisOptions;
+use modelmill::identify::EstimatorOptions;
 use modelmill::print::LibrarySpelling;
-use modelmill::recording::Reading;
+use modelmill::recording::RecordingOptions;
 use modelmill::{Model, Outcome, report};
 
 fn main() -> Outcome {
@@ -18,23 +18,21 @@ fn main() -> Outcome {
     }
 
     let recordings = root.join("recordings/spidermill-mbs");
-    let fit = model.recording(recordings.join("with-rods-fit.csv"), &Reading::default())?;
-    let check = model.recording(recordings.join("with-rods-check.csv"), &Reading::default())?;
-    let before = model.identify(&[&fit], &[&check], &Estimation::default())?;
-    println!("identified: {:.2} % off on the check run", percent(&before));
+    let fit = model.recording(recordings.join("with-rods-fit.csv"), &RecordingOptions::default())?;
+    let check = model.recording(recordings.join("with-rods-check.csv"), &RecordingOptions::default())?;
+    // Identification of the model as it is, for comparison.
+    let before = model.identify(&[&fit], &[&check], &EstimatorOptions::default())?;
+    println!("identified: error {:.2} % on the validation run", percent(&before));
 
-    let findings = model.diagnose(&[&fit], &[&check], &Question::default())?;
+    let findings = model.diagnose(&[&fit], &[&check], &DiagnosisOptions::default())?;
     for missing in &findings.missing {
-        println!(
-            "missing: {} at {}",
-            missing.effect.kind,
-            missing.effect.at.join(", ")
-        );
+        println!("missing: {} at {}", missing.effect.kind, missing.effect.at.join(", "));
     }
 
-    let better = model.with(&findings.entries)?;
-    let after = better.identify(&[&fit], &[&check], &Estimation::default())?;
-    println!("with it: {:.2e} % off on the check run", percent(&after));
+    // The completed model is derived again and fitted to the same recordings.
+    let better = model.with_added_effects(&findings.entries)?;
+    let after = better.identify(&[&fit], &[&check], &EstimatorOptions::default())?;
+    println!("with the effect: error {:.2e} % on the validation run", percent(&after));
 
     let folder = std::env::temp_dir();
     let write = |name: &str, text: &str| {
@@ -44,13 +42,10 @@ fn main() -> Outcome {
         Ok(())
     };
     write("spidermill-completed.toml", better.text())?;
-    write(
-        "what-the-model-lacks.html",
-        &report::page(&findings, &LibrarySpelling)?,
-    )
+    write("what-the-model-lacks.html", &report::page(&findings, &LibrarySpelling)?)
 }
 
-/// The error on the check run relative to the measured forces, per cent.
+/// The error on the validation run relative to the measured forces, per cent.
 fn percent(found: &modelmill::identify::Identification) -> f64 {
     let nrms = found.fit.check.as_ref().and_then(|check| check.nrms);
     100.0 * nrms.unwrap_or(f64::NAN)

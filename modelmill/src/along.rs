@@ -1,70 +1,82 @@
 //! A model along a recording: its forces and reactions, the measured ones, and variables on which an error may depend.
 
-use modelmill_codegen::{Evaluator, PoseFault, PoseReason, Reactions, States};
-use modelmill_identify::{PASSED_BY_DECIMATION, decimate_columns};
+use modelmill_codegen::{ModelEvaluator, MotionStates, PoseFault, PoseReason, ReactionPrograms};
+use modelmill_identify::{DECIMATION_PASSBAND, decimate_columns};
 use modelmill_spec::DriveKind;
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
-use crate::stretch::Stretch;
+use crate::segment::RecordingSegment;
 
-/// The model's forces along a recording for given base parameters, `[drive][sample]`, of every sample.
-pub fn forces(model: &Model, data: &Stretch, values: &[f64]) -> Outcome<Vec<Vec<f64>>> {
-    let evaluator = Evaluator::new(&model.derivation);
-    columns(model, data, |states| {
-        evaluator.inverse_dynamics(states, values)
-    })
+/// The model's forces along a segment for given base parameters, `[drive][sample]`, N or N m, not decimated.
+///
+/// Fails when a pose has no solution.
+pub fn forces(model: &Model, data: &RecordingSegment, values: &[f64]) -> Outcome<Vec<Vec<f64>>> {
+    let evaluator = ModelEvaluator::new(&model.derivation);
+    columns(model, data, |states| evaluator.inverse_dynamics(states, values))
 }
 
-/// Determined components of the reactions along a recording for nominal parameters, `[component][sample]`, decimated.
-pub fn reactions(model: &Model, data: &Stretch, reactions: &Reactions) -> Outcome<Vec<Vec<f64>>> {
-    let evaluator = Evaluator::new(&model.derivation);
+/// Determined components of the reactions along a segment for nominal parameters, `[component][sample]`, N or N m,
+/// decimated.
+///
+/// Fails when a pose has no solution, or the segment is too short to be filtered.
+pub fn reactions(model: &Model, data: &RecordingSegment, reactions: &ReactionPrograms) -> Outcome<Vec<Vec<f64>>> {
+    let evaluator = ModelEvaluator::new(&model.derivation);
     let columns = columns(model, data, |states| evaluator.reactions(reactions, states))?;
-    decimated(columns, data)
+    filter_and_decimate(columns, data)
 }
 
-/// The measured forces, `[drive][sample]`, decimated.
-pub fn measured(data: &Stretch) -> Outcome<Vec<Vec<f64>>> {
-    decimated(data.run.measured()?.to_vec(), data)
+/// The measured forces, `[drive][sample]`, N or N m, decimated.
+///
+/// Fails when the recording has no forces, or the segment is too short to be filtered.
+pub fn measured_forces(data: &RecordingSegment) -> Outcome<Vec<Vec<f64>>> {
+    filter_and_decimate(data.run.measured_forces()?.to_vec(), data)
 }
 
-/// The measured forces without those that do not count, `[drive][sample]`, decimated; [`crate::stretch::Stretch`] leaves the same
-/// rows of a regressor empty, so that both sides of each equation stay alike whatever filter they pass.
-pub fn counted(data: &Stretch) -> Outcome<Vec<Vec<f64>>> {
-    let mut forces = data.run.measured()?.to_vec();
+/// The measured forces with excluded samples set to zero, `[drive][sample]`, decimated. Rows of the regressor are set
+/// to zero at the same samples, so that both sides of each equation stay consistent after any filter.
+///
+/// Fails as [`measured_forces`] does.
+pub fn included_forces(data: &RecordingSegment) -> Outcome<Vec<Vec<f64>>> {
+    let mut forces = data.run.measured_forces()?.to_vec();
     for (force, out) in forces.iter_mut().zip(&data.run.left_out) {
         for (force, _) in force.iter_mut().zip(out).filter(|(_, out)| **out) {
             *force = 0.0;
         }
     }
-    decimated(forces, data)
+    filter_and_decimate(forces, data)
 }
 
-/// `[sample * n_drives + drive]`.
-pub fn interleaved(channels: &[Vec<f64>]) -> Vec<f64> {
+/// Channels interleaved per sample: `[sample * n_drives + drive]`.
+pub fn interleave(channels: &[Vec<f64>]) -> Vec<f64> {
     let samples = channels.first().map_or(0, Vec::len);
     (0..samples)
         .flat_map(|sample| channels.iter().map(move |channel| channel[sample]))
         .collect()
 }
 
-/// Variables on which an error may depend, decimated like the forces: coordinates and their
-/// derivatives, passive coordinates, lengths and rates of linear drives, and measured loads.
-pub fn variables(model: &Model, data: &Stretch) -> Outcome<Vec<(String, Vec<f64>)>> {
+/// Variables on which an error may depend, with their names, decimated like the forces: coordinates and their
+/// derivatives, passive coordinates, lengths and rates of linear drives, and measured loads; SI units.
+///
+/// Fails when a pose has no solution.
+pub fn variables(model: &Model, data: &RecordingSegment) -> Outcome<Vec<(String, Vec<f64>)>> {
     let run = &data.run;
     let mut variables = Vec::new();
-    for (i, name) in model.active().into_iter().enumerate() {
+    // Active coordinates come from the recording with their derivatives.
+    for (i, name) in model.active_coordinates().into_iter().enumerate() {
         variables.push((format!("{name}_d"), run.qd[i].clone()));
         variables.push((format!("{name}_dd"), run.qdd[i].clone()));
         variables.push((name, run.q[i].clone()));
     }
-    let evaluator = Evaluator::new(&model.derivation);
-    let passive = model.passive();
+    // Passive coordinates and their rates are computed by loop closure.
+    let evaluator = ModelEvaluator::new(&model.derivation);
+    let passive = model.passive_coordinates();
     if !passive.is_empty() {
-        let mut columns = columns(model, data, |states| evaluator.passive(states))?.into_iter();
+        let mut columns = columns(model, data, |states| evaluator.passive_motion(states))?.into_iter();
         variables.extend(passive.iter().cloned().zip(columns.by_ref()));
         variables.extend(passive.iter().map(|name| format!("{name}_d")).zip(columns));
     }
+    // Linear drives act along a length that is no coordinate.
     let mechanism = &model.derivation.mechanism;
     let n_drives = mechanism.drives.len();
     if mechanism
@@ -72,7 +84,7 @@ pub fn variables(model: &Model, data: &Stretch) -> Outcome<Vec<(String, Vec<f64>
         .iter()
         .any(|d| matches!(d.kind, DriveKind::Linear { .. }))
     {
-        let columns = columns(model, data, |states| evaluator.drives(states))?;
+        let columns = columns(model, data, |states| evaluator.drive_motion(states))?;
         for (d, drive) in mechanism.drives.iter().enumerate() {
             if matches!(drive.kind, DriveKind::Linear { .. })
                 && let [length, rate] = [d, n_drives + d].map(|i| columns.get(i).cloned())
@@ -83,12 +95,12 @@ pub fn variables(model: &Model, data: &Stretch) -> Outcome<Vec<(String, Vec<f64>
             }
         }
     }
-    // A force by the name of its column in the recording is the load.
+    // A variable with the name of a drive is its measured force, the load.
     for (drive, force) in mechanism.drives.iter().zip(run.force.iter().flatten()) {
         variables.push((drive.name.clone(), force.clone()));
     }
     let (names, columns): (Vec<String>, Vec<Vec<f64>>) = variables.into_iter().unzip();
-    // Variables only say where: every n-th value will do, and keeps signs and ends as they are.
+    // Variables only locate errors: every n-th value suffices, and keeps signs and ends unchanged.
     let factor = data.decimation();
     let picked = columns
         .into_iter()
@@ -96,20 +108,21 @@ pub fn variables(model: &Model, data: &Stretch) -> Outcome<Vec<(String, Vec<f64>
     Ok(names.into_iter().zip(picked).collect())
 }
 
-/// Columns of numbers along a recording, evaluated block by block.
+/// Columns of numbers along a segment, evaluated block by block: `[column][sample]`.
+///
+/// Fails at the first pose without a solution, and at the first value that is not finite.
 pub fn columns(
     model: &Model,
-    data: &Stretch,
-    mut evaluate: impl FnMut(&States<'_>) -> Result<Vec<Vec<f64>>, PoseFault>,
+    data: &RecordingSegment,
+    mut evaluate: impl FnMut(&MotionStates<'_>) -> Result<Vec<Vec<f64>>, PoseFault>,
 ) -> Outcome<Vec<Vec<f64>>> {
     let mut columns: Vec<Vec<f64>> = Vec::new();
-    model.host().watched(
-        &format!("evaluating {}", data.run.file),
-        data.samples(),
-        |job| {
+    model
+        .host()
+        .run_job(&format!("evaluating {}", data.run.file), data.samples(), |job| {
             data.for_each_block(model, |states| {
                 job.step(states.len())?;
-                Ok::<_, Error>(evaluate(states).and_then(finite).map(|block| {
+                Ok::<_, Error>(evaluate(states).and_then(check_finite).map(|block| {
                     if columns.is_empty() {
                         columns = block;
                     } else {
@@ -119,13 +132,12 @@ pub fn columns(
                     }
                 }))
             })
-        },
-    )??;
+        })??;
     Ok(columns)
 }
 
-/// Columns without numbers that are infinite or none, as values too large to be multiplied make them.
-fn finite(block: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>, PoseFault> {
+/// Rejects infinite values and NaN, such as products of values that are too large.
+fn check_finite(block: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>, PoseFault> {
     let first = block
         .iter()
         .filter_map(|column| column.iter().position(|x| !x.is_finite()));
@@ -138,12 +150,15 @@ fn finite(block: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>, PoseFault> {
     }
 }
 
-/// The parallel filter, on every column; one of zeros stays one.
-pub fn decimated(columns: Vec<Vec<f64>>, data: &Stretch) -> Outcome<Vec<Vec<f64>>> {
+/// Low-pass filters and decimates every column by the factor of the recording; a column of zeros stays zero.
+///
+/// Fails when a column is too short for the filter.
+pub fn filter_and_decimate(columns: Vec<Vec<f64>>, data: &RecordingSegment) -> Outcome<Vec<Vec<f64>>> {
     let factor = data.decimation();
     if factor == 1 {
         return Ok(columns);
     }
+    // Zero columns are only thinned: filtering them would take time and add rounding.
     let is_zero = |column: &[f64]| column.iter().all(|x| *x == 0.0);
     let moving: Vec<&[f64]> = columns
         .iter()
@@ -166,22 +181,24 @@ pub fn decimated(columns: Vec<Vec<f64>>, data: &Stretch) -> Outcome<Vec<Vec<f64>
         .collect())
 }
 
-/// Up to which frequency the parallel filter passes forces, Hz.
-pub fn passed_by_decimation(data: &Stretch) -> f64 {
+/// The highest frequency that the filter of the decimation passes, Hz.
+pub fn decimation_passband(data: &RecordingSegment) -> f64 {
     let time = &data.run.time;
     let rate = match time.as_slice() {
         [first, .., last] => (time.len() - 1) as f64 / (last - first),
         _ => 0.0,
     };
-    PASSED_BY_DECIMATION * rate / data.decimation() as f64
+    DECIMATION_PASSBAND * rate / data.decimation() as f64
 }
 
-/// Rates of the drives, `[drive][sample]`, before decimation: from the drives' Jacobian, since a drive may act along a rod
-/// or on a passive coordinate.
-pub fn drive_rates(model: &Model, data: &Stretch) -> Outcome<Vec<Vec<f64>>> {
-    let evaluator = Evaluator::new(&model.derivation);
-    let mut positions = columns(model, data, |states| evaluator.drives(states))?;
-    // Positions come first, rates behind them, the Jacobian last.
+/// Rates of the drives, `[drive][sample]`, rad/s or m/s, not decimated. They are computed from the drives' Jacobian,
+/// since a drive may act along a rod or on a passive coordinate.
+///
+/// Fails when a pose has no solution.
+pub fn drive_rates(model: &Model, data: &RecordingSegment) -> Outcome<Vec<Vec<f64>>> {
+    let evaluator = ModelEvaluator::new(&model.derivation);
+    let mut positions = columns(model, data, |states| evaluator.drive_motion(states))?;
+    // Columns are ordered: positions, rates, Jacobian.
     let mut rates = positions.split_off(model.derivation.mechanism.drives.len());
     rates.truncate(positions.len());
     Ok(rates)

@@ -1,107 +1,112 @@
 //! An atlas of mechanisms: how many base parameters each has, what they are, and what its functions cost.
 //!
-//! Base parameters are counted for bodies alone, without what the file's effects add, so that they can be held against
-//! published ones: with gravity and without, for constants in general and in numbers for the file's values.
+//! Base parameters are counted for the bodies alone, without the effects of the file, so that they can be compared with
+//! published ones: with gravity and without, for general constants and numerically for the file's values.
 
 use std::fmt::Write as _;
 
-use modelmill_codegen::{Method, OperationCount, Stage};
-use modelmill_spec::{Exact, Loaded, Mechanism, Motion};
+use modelmill_codegen::{OperationCount, ProgramStage, ReductionMethod};
+use modelmill_spec::{CoordinateMotion, ExactExpression, LoadedModel, Mechanism};
 
 use crate::error::Outcome;
 use crate::model::Model;
 use crate::text::table::{count, significant};
 
-/// What the atlas says of a mechanism.
+/// The figures of one mechanism in the atlas.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Entry {
-    /// The model's name; files of the atlas are called so.
+pub struct AtlasEntry {
+    /// The model's name; also the stem of its files in the atlas.
     pub name: String,
     /// Its title.
     pub title: String,
-    /// Joints that turn and joints that slide, those that loops settle among them.
+    /// Numbers of revolute and of prismatic joints, including passive ones (determined by loop closure).
     pub joints: [usize; 2],
-    /// Bodies that hang on nothing.
+    /// Number of free bodies: bodies without a joint to the base.
     pub free: usize,
-    /// Coordinates that loops settle.
+    /// Number of passive coordinates (determined by loop closure).
     pub passive: usize,
-    /// Loops.
+    /// Number of loops.
     pub loops: usize,
-    /// Drives.
+    /// Number of drives.
     pub drives: usize,
-    /// Base parameters of the bodies for constants in general: with gravity and without.
+    /// Numbers of base parameters of the bodies for general constants: with gravity and without.
     pub base: [usize; 2],
-    /// The rank in numbers, eq. (9), of the same at the file's values, with gravity.
+    /// The numeric rank, eq. (9), of the same regressor at the file's values, with gravity.
     pub at_values: usize,
-    /// Whether general constants were reduced exactly.
+    /// Whether the reduction is exact for general constants; else it is numeric.
     pub is_exact: bool,
-    /// Effects beside the bodies, and the base parameters with them.
+    /// Number of effects of the file, and of base parameters including them.
     pub effects: [usize; 2],
-    /// Operations of the regressor and of the inverse dynamics per state, effects included.
+    /// Numbers of operations of the regressor and of the inverse dynamics per state, effects included.
     pub operations: [OperationCount; 2],
-    /// Seconds that it took to derive the model, if they were measured.
+    /// Time of the derivation, s, if it was measured.
     pub seconds: Option<f64>,
-    /// Whether the model was made of a robot description: it has a line and a picture, but no page of expressions.
+    /// Whether the model was imported from a robot description: it has a line and a picture, but no page of
+    /// expressions.
     pub is_imported: bool,
 }
 
 impl Model {
-    /// What the atlas says of this model; `seconds` is how long it took to derive, if that was measured.
+    /// The atlas entry of this model; `seconds` is the time of its derivation, if that was measured.
     ///
     /// Fails where a variant of it (without gravity, without effects) cannot be derived.
-    pub fn atlas(&self, seconds: Option<f64>) -> Outcome<Entry> {
+    pub fn atlas(&self, seconds: Option<f64>) -> Outcome<AtlasEntry> {
         let derivation = &self.derivation;
         let mechanism = &derivation.mechanism;
+        // Three variants are counted: bodies alone, bodies without gravity, and the model with its effects.
         let mut bodies = mechanism.clone();
         bodies.effects.clear();
         bodies.retain.clear();
         let mut weightless = bodies.clone();
-        weightless.gravity = std::array::from_fn(|_| Exact::Sum(Vec::new()));
+        weightless.gravity = std::array::from_fn(|_| ExactExpression::Sum(Vec::new()));
+        // A model without effects is its own variant, so that one derivation is saved.
         let general = if mechanism.effects.is_empty() {
             self.clone()
         } else {
-            self.variant(bodies)?
+            self.derive_variant(bodies)?
         };
-        let base = [&general, &self.variant(weightless)?].map(|m| m.base.len());
-        let at_values = general.check()?.rank.map_or(0, |rank| rank.shown.rank);
-        let of = |motion: Motion| {
+        let base = [&general, &self.derive_variant(weightless)?].map(|m| m.base.len());
+        let at_values = general.check()?.rank.map_or(0, |rank| rank.numeric_rank.rank);
+        let of = |motion: CoordinateMotion| {
             let coordinates = mechanism.coordinates.iter();
             coordinates.filter(|c| c.motion == motion).count()
         };
-        let free = of(Motion::QuaternionScalar);
+        let free = of(CoordinateMotion::QuaternionScalar);
         let programs = &derivation.programs;
-        Ok(Entry {
+        Ok(AtlasEntry {
             name: self.name.clone(),
             title: mechanism.title.clone().unwrap_or_default(),
-            // The position of a free body is no joint.
-            joints: [of(Motion::Revolute), of(Motion::Prismatic) - 3 * free],
+            // The three position coordinates of a free body are prismatic, but are no joints.
+            joints: [
+                of(CoordinateMotion::Revolute),
+                of(CoordinateMotion::Prismatic) - 3 * free,
+            ],
             free,
             passive: mechanism.coordinates.iter().filter(|c| c.passive).count(),
             loops: mechanism.loops.len(),
-            drives: mechanism.drives.iter().filter(|d| d.is_driven).count()
-                + mechanism.shared_drives.len(),
+            drives: mechanism.drives.iter().filter(|d| d.is_driven).count() + mechanism.shared_drives.len(),
             base,
             at_values,
-            is_exact: matches!(derivation.reduction.method, Method::Exact { .. }),
+            is_exact: matches!(derivation.reduction.method, ReductionMethod::Exact { .. }),
             effects: [mechanism.effects.len(), derivation.reduction.retained.len()],
             operations: [
-                programs.regressor.count(Stage::State),
-                programs.inverse_dynamics.count(Stage::State),
+                programs.regressor.count_operations(ProgramStage::State),
+                programs.inverse_dynamics.count_operations(ProgramStage::State),
             ],
             seconds,
             is_imported: false,
         })
     }
 
-    /// The base parameters as a page of the atlas: expressions, with the values of the file, beside the picture.
-    pub fn atlas_page(&self, entry: &Entry) -> String {
+    /// The page of one mechanism: picture, summary, and base parameters with the values of the file.
+    pub fn atlas_page(&self, entry: &AtlasEntry) -> String {
         let mut text = format!(
             "# {}\n\n{}.\n\n![{}]({}.svg)\n\n{}.\n\n## Base parameters, eq. (16)\n\n| | expression | value | unit |\n|---|---|---:|---|\n",
             entry.name,
             entry.title,
             entry.name,
             entry.name,
-            entry.in_words(),
+            entry.summary_text(),
         );
         for (base, value) in self.base.iter().zip(&self.nominal) {
             let _ = writeln!(
@@ -117,22 +122,25 @@ impl Model {
         text
     }
 
-    /// The same model of another mechanism.
-    fn variant(&self, mechanism: Mechanism) -> Outcome<Self> {
-        let mut loaded = Loaded::clone(&self.loaded);
+    /// The model with another mechanism in place of its own, derived anew.
+    ///
+    /// Fails when the derivation fails or is cancelled.
+    fn derive_variant(&self, mechanism: Mechanism) -> Outcome<Self> {
+        let mut loaded = LoadedModel::clone(&self.loaded);
         loaded.mechanism = mechanism;
         self.host().derive(&self.path, loaded)
     }
 }
 
-impl Entry {
-    pub(crate) fn in_words(&self) -> String {
+impl AtlasEntry {
+    /// Numbers of free bodies, joints, loops and drives as one phrase; zero counts are omitted.
+    pub(crate) fn summary_text(&self) -> String {
         let [turning, sliding] = self.joints;
         let mut parts = Vec::new();
         for (n, one, many) in [
             (self.free, "free body", "free bodies"),
-            (turning, "joint that turns", "joints that turn"),
-            (sliding, "joint that slides", "joints that slide"),
+            (turning, "revolute joint", "revolute joints"),
+            (sliding, "prismatic joint", "prismatic joints"),
             (self.loops, "loop", "loops"),
             (self.drives, "drive", "drives"),
         ] {
@@ -143,6 +151,7 @@ impl Entry {
         parts.join(", ")
     }
 
+    /// Joints by letters, such as `1 free + 3 R + 2 P`.
     pub(crate) fn joints_in_letters(&self) -> String {
         let [turning, sliding] = self.joints;
         let mut parts = Vec::new();
@@ -154,7 +163,7 @@ impl Entry {
         parts.join(" + ")
     }
 
-    /// The line of the table.
+    /// The table line of the mechanism in Markdown.
     fn row(&self) -> String {
         let [with, without] = self.base;
         let operations = |count: &OperationCount| format!("{} + {}", count.add, count.mul);
@@ -179,27 +188,27 @@ impl Entry {
             self.at_values,
             operations(regressor),
             operations(dynamics),
-            self.seconds
-                .map_or_else(|| "-".to_owned(), |s| significant(s, 2)),
+            self.seconds.map_or_else(|| "-".to_owned(), |s| significant(s, 2)),
         )
+        // Pictures and pages are in a folder next to the table.
         .replace("](", "](atlas/")
     }
 }
 
-/// What the atlas is, and what its columns are.
+/// Two paragraphs: what the atlas shows, and what its columns mean.
 pub(crate) const ABOUT: [&str; 2] = [
     "How many parameters the inverse dynamics of a mechanism has, and what they are: the columns of `H` eliminated and \
      regrouped exactly, eqs. (6) to (16).",
     "Counts are of the bodies alone: *general* for constants in general with gravity, *weightless* without gravity, *at \
-     values* the rank in numbers at the values of the model file, where lengths that are zero or equal let fewer remain. \
+     values* the rank in numbers at the values of the model file, where zero or equal lengths leave fewer. \
      *With effects* is the number with the effects of the file, such as friction. Operations are additions and \
-     multiplications of one call at one state, effects included. Joints: R turns, P slides, free hangs on nothing; \
-     *passive* are coordinates that loops settle. Seconds are those of one derivation on the machine that wrote this \
-     page. What is *imported* was made of a robot description of other people, and has no page of expressions.",
+     multiplications of one call at one state, effects included. Joints: R revolute, P prismatic, free for a free body; \
+     *passive* coordinates are determined by loop closure. Seconds are those of one derivation on the machine that wrote this \
+     page. *Imported* mechanisms come from published robot descriptions and have no page of expressions.",
 ];
 
-/// The atlas as a page in Markdown; pictures and pages of the mechanisms stand in the folder `atlas` beside it.
-pub fn page(entries: &[Entry]) -> String {
+/// The atlas as a page in Markdown; pictures and pages of the mechanisms are in the folder `atlas` next to it.
+pub fn page(entries: &[AtlasEntry]) -> String {
     let mut text = format!(
         "# Atlas of mechanisms\n\n{}\n\n\
         | | mechanism | joints | passive | loops | drives | general | weightless | at values | with effects | regressor | \

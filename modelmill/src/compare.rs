@@ -1,88 +1,91 @@
-//! `compare`: how far a model is off along recordings, and where the error lives.
+//! `compare`: errors of a model along recordings, and the regions in which they occur.
 
 use modelmill_identify::{
-    BandError, Comparison, Figures, FilteredFigures, LocateOptions, Note, Region, TIME_COLUMN,
-    in_band, locate,
+    BandError, ErrorAccumulator, ErrorFigures, ErrorRegion, FilteredFigures, LocateOptions, RecordingNote, TIME_COLUMN,
+    add_filtered_forces, locate_errors,
 };
 
-use crate::along::{self, interleaved, variables};
+use crate::along::{self, interleave, variables};
 use crate::error::Outcome;
 use crate::model::Model;
-use crate::recording::{self, Recording};
-use crate::stretch::Stretch;
+use crate::recording::{self, PreparedRecording};
+use crate::segment::RecordingSegment;
 
-/// How far a model is off along recordings.
-pub struct Compared {
-    /// What the JSON calls the model.
+/// Errors of a model along recordings.
+pub struct ModelComparison {
+    /// Name of the model in the JSON.
     pub model: String,
-    /// Names of the stretches, in order.
+    /// File names of the segments, in order.
     pub files: Vec<String>,
-    /// Error figures, in all and for each drive.
-    pub figures: Figures,
-    /// Where the error lives.
-    pub places: Places,
-    /// Remarks on the recordings.
-    pub notes: Vec<Note>,
+    /// Error metrics, over all drives and for each drive.
+    pub figures: ErrorFigures,
+    /// Regions in which the error occurs.
+    pub places: ErrorLocations,
+    /// Notes on the recordings.
+    pub notes: Vec<RecordingNote>,
 }
 
 impl Model {
-    /// Holds the model against recordings; `values` are those of its base parameters, in its order and their units.
+    /// Compares the model with recordings; `values` are those of its base parameters, in its order and in their units.
     ///
-    /// Fails when a recording lacks the force of a drive, or leads where the mechanism cannot stand.
-    pub fn compare(&self, recordings: &[&Recording], values: &[f64]) -> Outcome<Compared> {
-        let [data, _] = recording::stretches(self, recordings, &[]);
+    /// Fails when a recording lacks the force of a drive, or contains a pose that the mechanism cannot reach.
+    pub fn compare(&self, recordings: &[&PreparedRecording], values: &[f64]) -> Outcome<ModelComparison> {
+        // Forces are computed once, for the figures and for the regions.
+        let [data, _] = recording::segments(self, recordings, &[]);
         let forces = data
             .iter()
             .map(|one| along::forces(self, one, values))
             .collect::<Outcome<Vec<_>>>()?;
         let figures = figures(self, &data, &forces, band(&data))?;
-        let measured = (data.iter().map(along::measured)).collect::<Outcome<Vec<_>>>()?;
+        // Regions are located on decimated forces, figures are computed on all samples.
+        let measured = (data.iter().map(along::measured_forces)).collect::<Outcome<Vec<_>>>()?;
         let forces = (forces.into_iter().zip(&data))
-            .map(|(forces, one)| along::decimated(forces, one))
+            .map(|(forces, one)| along::filter_and_decimate(forces, one))
             .collect::<Outcome<Vec<_>>>()?;
-        Ok(Compared {
+        Ok(ModelComparison {
             model: self.name.clone(),
             files: data.iter().map(|one| one.run.file.clone()).collect(),
             figures,
-            places: places(self, &data, &measured, &forces)?,
+            places: error_locations(self, &data, &measured, &forces)?,
             notes: {
-                let notes = data.iter().flat_map(Stretch::notes).cloned();
+                let notes = data.iter().flat_map(RecordingSegment::notes).cloned();
                 self.caution().into_iter().chain(notes).collect()
             },
         })
     }
 }
 
-/// Up to which frequency forces along some recordings are compared, Hz: the lowest of their bands.
-pub fn band(data: &[Stretch]) -> Option<f64> {
+/// The highest frequency at which forces along some recordings are compared, Hz: the lowest of their bands.
+pub fn band(data: &[RecordingSegment]) -> Option<f64> {
     let bands = data.iter().filter_map(|one| one.run.prepared.band_hz);
     bands.reduce(f64::min)
 }
 
-/// Error figures over several recordings, of every sample whose force was measured, and in the band; `forces` are the
-/// model's, `[drive][sample]` for each.
+/// Error metrics over several recordings: over every sample whose force was measured, and below `band_hz`, Hz.
+/// `forces` are the model's, `[drive][sample]` for each recording.
+///
+/// Fails when a recording has no forces, or when forces differ in number.
 pub fn figures(
     model: &Model,
-    data: &[Stretch],
+    data: &[RecordingSegment],
     forces: &[Vec<Vec<f64>>],
     band_hz: Option<f64>,
-) -> Outcome<Figures> {
+) -> Outcome<ErrorFigures> {
     let mut raw = comparison(model);
     for (one, forces) in data.iter().zip(forces) {
-        let measured = one.run.measured()?;
-        raw.add_counted(
-            &interleaved(measured),
-            &interleaved(forces),
-            |sample, drive| one.run.counts(drive, sample),
-        )?;
+        let measured = one.run.measured_forces()?;
+        raw.add_counted(&interleave(measured), &interleave(forces), |sample, drive| {
+            one.run.is_force_measured(drive, sample)
+        })?;
     }
     let mut figures = raw.finish()?;
+    // Figures in the band use both forces after the same low-pass.
     figures.band = band_hz.and_then(|band_hz| {
         let mut filtered = comparison(model);
         for (one, forces) in data.iter().zip(forces) {
-            let measured = one.run.measured().ok()?;
-            // A stretch that is too short for the filter has no samples left between its ends.
-            match in_band(&mut filtered, &one.run.time, measured, forces, band_hz) {
+            let measured = one.run.measured_forces().ok()?;
+            // A segment that is too short for the filter has no samples left between its ends.
+            match add_filtered_forces(&mut filtered, &one.run.time, measured, forces, band_hz) {
                 Ok(()) | Err(BandError::Filter(_)) => {}
                 Err(BandError::Figures(_)) => return None,
             }
@@ -93,10 +96,12 @@ pub fn figures(
     Ok(figures)
 }
 
-/// Error figures of the rows that a fit was made from, where the parallel filter made fewer of them.
+/// Error metrics of the rows that a fit used, if decimation made fewer rows than samples; else `None`.
+///
+/// Fails as [`figures`] does.
 pub fn figures_of_rows(
     model: &Model,
-    data: &[Stretch],
+    data: &[RecordingSegment],
     forces: &[Vec<Vec<f64>>],
 ) -> Outcome<Option<FilteredFigures>> {
     let Some(first) = data.iter().find(|one| one.decimation() > 1) else {
@@ -104,44 +109,48 @@ pub fn figures_of_rows(
     };
     let mut rows = comparison(model);
     for (one, forces) in data.iter().zip(forces) {
-        let measured = along::measured(one)?;
-        let forces = along::decimated(forces.clone(), one)?;
-        rows.add(&interleaved(&measured), &interleaved(&forces))?;
+        let measured = along::measured_forces(one)?;
+        let forces = along::filter_and_decimate(forces.clone(), one)?;
+        rows.add(&interleave(&measured), &interleave(&forces))?;
     }
-    let passed = along::passed_by_decimation(first);
+    // The passband of the first decimated segment stands for all.
+    let passed = along::decimation_passband(first);
     Ok(Some(FilteredFigures::new(passed, &rows.finish()?)))
 }
 
-/// A comparison of the model's drives, without samples yet.
-fn comparison(model: &Model) -> Comparison {
+/// An accumulator of errors for the model's drives, without samples yet.
+fn comparison(model: &Model) -> ErrorAccumulator {
     let drives = model.drives();
     let units = (0..drives.len()).map(|d| model.force_unit(d).to_owned());
-    Comparison::new(drives.clone()).with_units(units)
+    ErrorAccumulator::new(drives.clone()).with_units(units)
 }
 
-/// Errors below this fraction of the measured force are rounding of the numbers in the recording; where they sit says
-/// nothing about the mechanism.
+/// Errors below this fraction of the measured force are rounding of the numbers in the recording; their location does
+/// not depend on the mechanism.
 pub const ROUNDING: f64 = 1e-6;
 
-/// Where errors live.
-pub struct Places {
-    /// Regions that hold more than their share.
-    pub regions: Vec<Region>,
-    /// Drives whose error is so small that it was not looked at.
+/// Locations of errors.
+pub struct ErrorLocations {
+    /// Regions with more than their share of the error.
+    pub regions: Vec<ErrorRegion>,
+    /// Drives whose error is rounding and was not located.
     pub rounding: Vec<String>,
 }
 
-/// Regions of coordinates, rates, loads and time that hold more than their share of the error.
+/// Regions of coordinates, rates, loads and time that contain more than their share of the error.
 ///
-/// With several recordings, time is looked at in each of them on its own.
-pub fn places(
+/// With several recordings, time is analysed in each of them separately.
+///
+/// Fails when a pose has no solution.
+pub fn error_locations(
     model: &Model,
-    data: &[Stretch],
+    data: &[RecordingSegment],
     measured: &[Vec<Vec<f64>>],
     forces: &[Vec<Vec<f64>>],
-) -> Outcome<Places> {
+) -> Outcome<ErrorLocations> {
     let mut rounding = Vec::new();
     let mut drives = Vec::new();
+    // Drives with nothing but rounding are excluded first.
     for (d, drive) in model.drives().into_iter().enumerate() {
         if is_rounding(d, measured, forces) {
             rounding.push(drive);
@@ -150,7 +159,7 @@ pub fn places(
         }
     }
     if drives.is_empty() {
-        return Ok(Places {
+        return Ok(ErrorLocations {
             regions: Vec::new(),
             rounding,
         });
@@ -159,6 +168,7 @@ pub fn places(
         let pairs = measured[k][d].iter().zip(&forces[k][d]);
         pairs.map(|(y, m)| y - m).collect()
     };
+    // Errors and variables of all recordings are joined, except for time, which is analysed per recording.
     let mut joined: Vec<(String, Vec<f64>)> = Vec::new();
     let mut errors: Vec<Vec<f64>> = vec![Vec::new(); drives.len()];
     let mut in_time = Vec::new();
@@ -170,17 +180,14 @@ pub fn places(
         } else {
             for (d, drive) in &drives {
                 let error = errors_of(k, *d);
-                let mut found = locate(
-                    &[(drive, &error)],
-                    &[(TIME_COLUMN, &time)],
-                    &LocateOptions::default(),
-                );
+                let mut found = locate_errors(&[(drive, &error)], &[(TIME_COLUMN, &time)], &LocateOptions::default());
                 for region in &mut found {
                     region.says = format!("{}: {}", one.run.file, region.says);
                 }
                 in_time.extend(found);
             }
         }
+        // Errors and variables of a recording are appended together, so that their samples stay aligned.
         for (slot, (d, _)) in errors.iter_mut().zip(&drives) {
             slot.extend(errors_of(k, *d));
         }
@@ -201,16 +208,14 @@ pub fn places(
         .iter()
         .map(|(name, values)| (name.as_str(), values.as_slice()))
         .collect();
-    let mut regions = model
-        .host()
-        .watched("looking where the error lives", 0, |_| {
-            locate(&errors, &variables, &LocateOptions::default())
-        })?;
+    let mut regions = model.host().run_job("locating errors", 0, |_| {
+        locate_errors(&errors, &variables, &LocateOptions::default())
+    })?;
     regions.extend(in_time);
-    Ok(Places { regions, rounding })
+    Ok(ErrorLocations { regions, rounding })
 }
 
-/// Whether the error of a drive is rounding beside its force.
+/// Whether the error of a drive is rounding relative to its force; samples of all recordings count.
 fn is_rounding(drive: usize, measured: &[Vec<Vec<f64>>], forces: &[Vec<Vec<f64>>]) -> bool {
     let (mut error, mut size) = (0.0, 0.0);
     for (measured, forces) in measured.iter().zip(forces) {

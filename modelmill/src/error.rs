@@ -1,60 +1,61 @@
-//! Why a verb gives no answer.
+//! Errors of the library's methods: each states the place of the fault, what was expected and what to do.
 
 use std::fmt;
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{LibrarySpelling, Message, RemedySpelling};
 use modelmill_codegen::DeriveError;
-use modelmill_identify::{
-    FiguresError, FilterError, FitFileError, LeastSquaresError, RecordingError,
-};
+use modelmill_identify::{FiguresError, FilterError, FitFileError, LeastSquaresError, RecordingError};
 
-/// Result of a verb.
+/// Result of a method of the library.
 pub type Outcome<T = ()> = Result<T, Error>;
 
-/// Why a verb gives no answer. All say in words where the fault is, what was expected, and what to do.
+/// The reason why a method returned no result. The message of each variant states where the fault is, what was
+/// expected, and what to do.
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum Error {
-    /// A model, rig or plan file has no meaning; every finding has its place.
-    Model(Box<modelmill_spec::Failure>),
-    /// The mechanism cannot be derived.
+    /// A model, rig or plan file is invalid. It contains all errors and warnings of the file, each with its line and
+    /// column.
+    Model(Box<modelmill_spec::LoadFailure>),
+    /// The equations of the mechanism cannot be derived.
     Derivation {
-        /// What messages call the model file.
+        /// Name of the model file in messages.
         model: String,
-        /// What is wrong.
+        /// The fault of the mechanism.
         error: Box<DeriveError>,
     },
     /// A recording cannot be read or prepared.
     Recording(Box<RecordingError>),
     /// A fit cannot be read, or belongs to another model.
     Fit(Box<FitFileError>),
-    /// Least squares have no answer.
+    /// Least squares has no solution.
     LeastSquares(LeastSquaresError),
-    /// Measured forces and the model's do not go together.
+    /// Error metrics cannot be computed: measured and model forces have different lengths, are not finite, or there are
+    /// no samples.
     Figures(FiguresError),
-    /// A filter does not suit the recording.
+    /// A filter is not applicable to the recording, such as a cut-off above half the sampling rate.
     Filter(FilterError),
-    /// Another fault of what the verb was given.
+    /// Another fault of an input.
     Input(Message),
-    /// Options that contradict each other, or that the verb does not know.
+    /// Options contradict each other, or the method does not support them.
     Options(Message),
-    /// The caller asked the verb to stop.
+    /// The caller stopped the job.
     Cancelled,
 }
 
 impl Error {
-    /// A fault of what the verb was given, from a text or a message that says what it is.
+    /// An error of an input; `says` is its text or message.
     pub fn input(says: impl Into<Message>) -> Self {
         Self::Input(says.into())
     }
 
-    /// Options that make no sense together.
+    /// Options that contradict each other.
     pub(crate) fn options(says: impl Into<Message>) -> Self {
         Self::Options(says.into())
     }
 
-    /// A mechanism that cannot be derived; `model` is what messages call its file.
+    /// A mechanism that cannot be derived; `model` is the name of its file in messages.
     pub(crate) fn derivation(model: &str, error: DeriveError) -> Self {
         Self::Derivation {
             model: model.to_owned(),
@@ -62,7 +63,7 @@ impl Error {
         }
     }
 
-    /// What is wrong, in the words of whoever reads it.
+    /// The error text, with remedies formatted for the reader: as command-line options, in Python or in Rust.
     pub fn spell(&self, spelling: &dyn RemedySpelling) -> String {
         match self {
             Self::Model(failure) => failure.render_spelled(false, spelling),
@@ -70,7 +71,9 @@ impl Error {
         }
     }
 
-    /// What is wrong. That of a file without meaning is a text with snippets, in which [`Error::spell`] spells advice.
+    /// The error as a message, whose remedies can be formatted for any reader. For an invalid model file it is plain
+    /// text with excerpts of the file, with remedies in the Rust form; use [`Error::spell`] to get them in another
+    /// form.
     pub fn message(&self) -> Message {
         match self {
             Self::Model(failure) => failure.render(false).into(),
@@ -81,12 +84,13 @@ impl Error {
             Self::Figures(error) => error.to_string().into(),
             Self::Filter(error) => error.to_string().into(),
             Self::Input(says) | Self::Options(says) => says.clone(),
-            Self::Cancelled => "stopped before there was an answer, as was asked for".into(),
+            Self::Cancelled => "stopped on request before there was a result".into(),
         }
     }
 }
 
 impl fmt::Display for Error {
+    // Without a known reader the remedies are spelled as fields of the library's options.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.spell(&LibrarySpelling))
     }
@@ -94,8 +98,9 @@ impl fmt::Display for Error {
 
 impl std::error::Error for Error {}
 
-impl From<modelmill_spec::Failure> for Error {
-    fn from(failure: modelmill_spec::Failure) -> Self {
+// Large payloads are boxed, so that `Result` stays small.
+impl From<modelmill_spec::LoadFailure> for Error {
+    fn from(failure: modelmill_spec::LoadFailure) -> Self {
         Self::Model(Box::new(failure))
     }
 }

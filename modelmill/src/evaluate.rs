@@ -1,69 +1,67 @@
-//! `evaluate`: a model's forces along a recording, of the drives or in the joints.
+//! `evaluate`: a model's forces along a recording, at its drives or in its joints.
 
 use std::path::Path;
 
-use modelmill_codegen::Reactions;
+use modelmill_codegen::ReactionPrograms;
 
 use crate::along;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
-use crate::recording::{self, Reading};
+use crate::recording::{self, RecordingOptions};
 use crate::text::csv::csv;
 
 /// Columns of numbers along a recording.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Evaluated {
-    /// Times of the samples that are kept, s.
+pub struct RecordingEvaluation {
+    /// Times of the samples after decimation, s.
     pub time: Vec<f64>,
     /// Names and values of the columns, N or N m.
     pub columns: Vec<(String, Vec<f64>)>,
-    /// Components that equations of motion do not determine, since the mechanism is held there more often than once.
+    /// Components that the equations of motion do not determine, since the mechanism is statically indeterminate there.
     pub left_out: Vec<String>,
 }
 
 impl Model {
-    /// The model's forces along a recording, one column for each drive, when they act: without a delay of their reading.
-    /// `values` are those of the base parameters.
+    /// The model's forces along a recording, one column for each drive, at the time at which they act: without the
+    /// delay of the model's `time_delay`. `values` are those of the base parameters.
     ///
-    /// Fails when the recording lacks a position, or leads where the mechanism cannot stand.
+    /// Fails when the recording lacks a position, or contains a pose that the mechanism cannot reach.
     pub fn evaluate(
         &self,
         path: impl AsRef<Path>,
-        reading: &Reading,
+        reading: &RecordingOptions,
         values: &[f64],
-    ) -> Outcome<Evaluated> {
-        let mut found = Evaluated::new(self.drives(), Vec::new());
-        for stretch in &recording::read_as_recorded(self, path.as_ref(), reading)? {
-            let forces = along::forces(self, stretch, values)?;
-            found.extend(&stretch.time(), along::decimated(forces, stretch)?);
+    ) -> Outcome<RecordingEvaluation> {
+        let mut found = RecordingEvaluation::new(self.drives(), Vec::new());
+        for segment in &recording::read_as_recorded(self, path.as_ref(), reading)? {
+            let forces = along::forces(self, segment, values)?;
+            found.extend(&segment.time(), along::filter_and_decimate(forces, segment)?);
         }
         Ok(found)
     }
 
-    /// What the joints and the cuts of loops transmit along a recording, for the parameters of the model file: one column for
-    /// each component that is determined.
+    /// Forces and moments that the joints and the cuts of loops transmit along a recording, for the parameters of the
+    /// model file: one column for each component that is determined.
     ///
     /// Fails as [`Model::evaluate`] does.
     pub fn evaluate_reactions(
         &self,
         path: impl AsRef<Path>,
-        reading: &Reading,
-    ) -> Outcome<Evaluated> {
+        reading: &RecordingOptions,
+    ) -> Outcome<RecordingEvaluation> {
         let derived = self.derivation.reactions();
         let reactions = derived.map_err(|error| Error::derivation(&self.path, error))?;
-        let components = components(&reactions);
-        let mut found = Evaluated::new(components.determined, components.left_out);
-        for stretch in &recording::read_as_recorded(self, path.as_ref(), reading)? {
-            found.extend(
-                &stretch.time(),
-                along::reactions(self, stretch, &reactions)?,
-            );
+        let components = reaction_components(&reactions);
+        let mut found = RecordingEvaluation::new(components.determined, components.left_out);
+        for segment in &recording::read_as_recorded(self, path.as_ref(), reading)? {
+            found.extend(&segment.time(), along::reactions(self, segment, &reactions)?);
         }
         Ok(found)
     }
 }
 
-impl Evaluated {
+impl RecordingEvaluation {
+    /// Named columns without samples yet.
     fn new(names: Vec<String>, left_out: Vec<String>) -> Self {
         Self {
             time: Vec::new(),
@@ -72,6 +70,7 @@ impl Evaluated {
         }
     }
 
+    /// Appends the samples of one segment.
     fn extend(&mut self, time: &[f64], columns: Vec<Vec<f64>>) {
         self.time.extend(time);
         for ((_, whole), more) in self.columns.iter_mut().zip(columns) {
@@ -88,15 +87,17 @@ impl Evaluated {
     }
 }
 
-/// Names of the components of all reactions, such as `elbow.Fx`, `elbow.Mz`, and of a loop `closure.Fx`.
-pub(crate) struct Components {
-    /// Those that equations of motion determine, in the order of the program's outputs.
+/// Names of the components of all reactions, such as `elbow.Fx`, `elbow.Mz`, and `closure.Fx` of a loop.
+pub(crate) struct ReactionComponents {
+    /// Components that the equations of motion determine, in the order of the program's outputs.
     pub(crate) determined: Vec<String>,
+    /// Statically indeterminate components.
     pub(crate) left_out: Vec<String>,
 }
 
-pub(crate) fn components(reactions: &Reactions) -> Components {
-    let mut found = Components {
+/// The names of all components, in the order in which the program returns them.
+pub(crate) fn reaction_components(reactions: &ReactionPrograms) -> ReactionComponents {
+    let mut found = ReactionComponents {
         determined: Vec::new(),
         left_out: Vec::new(),
     };

@@ -1,127 +1,146 @@
-//! `generate`: a model as code.
+//! `generate`: writes a model as source code.
 
 use std::fmt;
 
-use modelmill_codegen::{Form, LANGUAGES, Source};
+use modelmill_emit::{EmissionRequest, LANGUAGES, OutputForm};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 
-pub use modelmill_codegen::{EmittedFile, Form as LanguageForm};
+pub use modelmill_emit::{EmittedFile, OutputForm as LanguageForm};
 
-/// A language that models are emitted for: an entry of [`Self::all`], the first of which is the default.
+/// A target language of the generator: an entry of [`Self::all`], the first of which is the default.
 #[derive(Clone, Copy)]
-pub struct Language(&'static dyn modelmill_codegen::Language);
+pub struct CodeLanguage(&'static dyn modelmill_emit::OutputLanguage);
 
-impl Language {
-    /// All languages.
+impl CodeLanguage {
+    /// All target languages.
     pub fn all() -> impl Iterator<Item = Self> {
         LANGUAGES.into_iter().map(Self)
     }
 
-    /// The language of a name, such as `rust`, `c99`, `c` and `python`.
-    pub fn named(name: &str) -> Option<Self> {
+    /// The language with a name, such as `rust`, `c99`, `c` and `python`; `None` if there is none.
+    ///
+    /// ```
+    /// use modelmill::generate::CodeLanguage;
+    ///
+    /// assert_eq!(CodeLanguage::from_name("c99").map(CodeLanguage::name), Some("c99"));
+    /// assert!(CodeLanguage::from_name("cobol").is_none());
+    /// ```
+    pub fn from_name(name: &str) -> Option<Self> {
         Self::all().find(|language| language.name() == name)
     }
 
-    /// What it is called.
+    /// Its name, as [`Self::from_name`] reads it.
     pub fn name(self) -> &'static str {
         self.0.name()
     }
 
-    /// What is made in it, in a few words.
+    /// A short description of what is generated in it.
     pub fn about(self) -> &'static str {
-        self.0.about()
+        self.0.description()
     }
 
-    /// What its files are.
-    pub fn form(self) -> Form {
-        self.0.form()
+    /// Form of its files: one module, several sources, or a crate.
+    pub fn form(self) -> OutputForm {
+        self.0.output_form()
     }
 
-    /// Whether it can have reactions and a self-test.
+    /// Whether reactions and a self-test can be generated in it.
     pub fn has_all(self) -> bool {
-        self.0.has_all()
+        self.0.has_reactions_and_self_test()
     }
 }
 
-impl Default for Language {
+impl Default for CodeLanguage {
     fn default() -> Self {
         Self(LANGUAGES[0])
     }
 }
 
-impl PartialEq for Language {
+// A language is identified by its name, since the entries are trait objects.
+impl PartialEq for CodeLanguage {
     fn eq(&self, other: &Self) -> bool {
         self.name() == other.name()
     }
 }
 
-impl Eq for Language {}
+impl Eq for CodeLanguage {}
 
-impl fmt::Debug for Language {
+impl fmt::Debug for CodeLanguage {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())
     }
 }
 
-/// What is emitted.
+/// Options of the generated code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Code {
-    /// For which language.
-    pub language: Language,
-    /// With the equation of motion: mass matrix, velocity terms, gravity, forward dynamics.
+pub struct CodeOptions {
+    /// Target language.
+    pub language: CodeLanguage,
+    /// Whether to include the equation of motion: mass matrix, velocity terms, gravity, forward dynamics.
     pub dynamics: bool,
-    /// With what the joints transmit: forces and moments in all joints, and the forces that close loops.
+    /// Whether to include reactions: forces and moments in all joints, and the forces that close loops.
     pub reactions: bool,
-    /// With a function that holds base parameters against all parameters, for a test of one's own.
+    /// Whether to include a function that compares forces from base parameters with forces from all parameters, for a
+    /// test on the target.
     pub self_test: bool,
 }
 
 impl Model {
-    /// The model as source files: one module in Rust, a header and a source in C99, or a crate with a copy of the runtime, so that its folder can go
-    /// anywhere. Paths are relative to that folder.
+    /// The model as source files: one module in Rust, a header and a source in C99, or a crate with a copy of the
+    /// runtime, so that its folder can be moved freely. Paths are relative to that folder.
     ///
-    /// Fails when a language lacks something that is asked for, or the mechanism has no such equations.
-    pub fn generate(&self, code: &Code) -> Outcome<Vec<EmittedFile>> {
-        let more = [
-            ("reactions", code.reactions),
-            ("a self-test", code.self_test),
-        ];
+    /// Fails when the language lacks a requested part, or the equations cannot be derived for the mechanism.
+    ///
+    /// ```
+    /// use modelmill::Model;
+    /// use modelmill::generate::{CodeLanguage, CodeOptions};
+    ///
+    /// let arm = Model::open("../model-spec/models/two_link.toml")?;
+    /// let language = CodeLanguage::from_name("c99").unwrap();
+    /// let files = arm.generate(&CodeOptions { language, ..CodeOptions::default() })?;
+    /// assert!(files.iter().any(|file| file.path.ends_with(".h")));
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
+    pub fn generate(&self, code: &CodeOptions) -> Outcome<Vec<EmittedFile>> {
+        // Not all languages can express reactions and the self-test; the error names those that can.
+        let more = [("reactions", code.reactions), ("a self-test", code.self_test)];
         if let Some((what, _)) = more.iter().find(|(_, asked)| *asked)
             && !code.language.has_all()
         {
-            let able = Language::all().filter(|language| language.has_all());
-            let able: Vec<&str> = able.map(Language::name).collect();
-            return Err(Error::options(format!(
-                "only {} can have {what}",
-                able.join(" and ")
-            )));
+            let able = CodeLanguage::all().filter(|language| language.has_all());
+            let able: Vec<&str> = able.map(CodeLanguage::name).collect();
+            return Err(Error::options(format!("only {} can have {what}", able.join(" and "))));
         }
         let what = format!("writing the code of {}", self.name);
-        self.host().watched(&what, 0, |_| self.written(*code))?
+        self.host().run_job(&what, 0, |_| self.emit_files(*code))?
     }
 
-    fn written(&self, code: Code) -> Outcome<Vec<EmittedFile>> {
+    /// Derives the requested programs and writes them in the target language.
+    ///
+    /// Fails when a derivation fails.
+    fn emit_files(&self, code: CodeOptions) -> Outcome<Vec<EmittedFile>> {
         let derivation = &self.derivation;
         let fault = |error| Error::derivation(&self.path, error);
         let dynamics = code.dynamics.then(|| derivation.dynamics()).transpose();
         let reactions = code.reactions.then(|| derivation.reactions()).transpose();
         let (dynamics, reactions) = (dynamics.map_err(fault)?, reactions.map_err(fault)?);
-        let files = code.language.0.write(&Source {
+        let files = code.language.0.emit_files(&EmissionRequest {
             derivation,
             dynamics: dynamics.as_ref(),
             reactions: reactions.as_ref(),
             self_test: code.self_test,
         });
+        // A crate must build anywhere, so that the runtime is copied into it.
         Ok(match code.language.form() {
-            Form::Crate { .. } => with_runtime(files),
-            Form::Module | Form::Sources => files,
+            OutputForm::Crate { .. } => with_runtime(files),
+            OutputForm::Module | OutputForm::Sources => files,
         })
     }
 }
 
-/// A crate with a copy of the runtime.
+/// Adds a copy of the runtime to the files of a crate, in the folder `modelmill-runtime`.
 fn with_runtime(mut files: Vec<EmittedFile>) -> Vec<EmittedFile> {
     let runtime = modelmill_runtime::source::FILES;
     files.extend(runtime.map(|(path, text)| EmittedFile {

@@ -1,35 +1,46 @@
-//! `import`: a robot description of other programs as the start of a model file.
+//! `import`: converts a robot description (URDF, MJCF, SDF) to a first model file.
 
 use std::path::Path;
 
-use modelmill_identify::Note;
+use modelmill_identify::RecordingNote;
 
 pub use modelmill_reduction::{ImportOptions as Options, ImportedJoint};
 
 use crate::error::{Error, Outcome};
 use crate::host::Host;
 
-/// No robot description, and no file that it includes, is longer, bytes.
+/// Largest size of a robot description and of each file that it includes, bytes.
 const LARGEST_DESCRIPTION: u64 = modelmill_reduction::LARGEST_DESCRIPTION as u64;
 
-/// A model file that was made of a robot description.
+/// A model file made from a robot description.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Imported {
+pub struct ImportedRobot {
     /// The text of the model file.
     pub model: String,
-    /// Joints of the description that move, with the coordinates of the model.
+    /// Movable joints of the description, with the coordinates of the model.
     pub joints: Vec<ImportedJoint>,
-    /// What was left out or rounded.
-    pub notes: Vec<Note>,
+    /// Notes on what was left out or rounded.
+    pub notes: Vec<RecordingNote>,
 }
 
 impl Host {
-    /// Makes a model file of the text of a URDF, MJCF or SDF: links behind fixed joints join the body that carries them, every
-    /// body gets its ten linear parameters. `name` is what messages call the file; where it is a path, files that an MJCF
-    /// includes are read beside it.
+    /// Makes a model file from the text of a URDF, MJCF or SDF. Links behind fixed joints are merged with the body
+    /// that carries them, and every body gets its ten linear parameters. `name` is the name of the file in messages;
+    /// if it is a path, files that an MJCF includes are read from the same folder.
     ///
-    /// Fails when the text is none of these formats, or describes what a model file cannot.
-    pub fn import(&self, name: &str, text: &str, options: &Options) -> Outcome<Imported> {
+    /// Fails when the text is none of these formats, or describes something that a model file cannot express.
+    ///
+    /// ```no_run
+    /// use modelmill::Host;
+    /// use modelmill::import::Options;
+    ///
+    /// let text = std::fs::read_to_string("arm.urdf").unwrap();
+    /// let imported = Host::new().import("arm.urdf", &text, &Options::default())?;
+    /// std::fs::write("arm.toml", imported.model).unwrap();
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
+    pub fn import(&self, name: &str, text: &str, options: &Options) -> Outcome<ImportedRobot> {
+        // Included files are read relative to the description, through the host's file source.
         let read = |file: &str| {
             let path = Path::new(name).with_file_name(file);
             let text = self.files().read_text(&path, LARGEST_DESCRIPTION);
@@ -37,13 +48,13 @@ impl Host {
         };
         let text = modelmill_reduction::expand_includes(text, &read)
             .map_err(|fault| Error::input(format!("{name}: {fault}")))?;
-        let imported = modelmill_reduction::import(&text, options)
-            .map_err(|error| Error::input(format!("{name}: {error}")))?;
-        let notes: Vec<Note> = imported.remarks.into_iter().map(Note::warning).collect();
+        let imported =
+            modelmill_reduction::import(&text, options).map_err(|error| Error::input(format!("{name}: {error}")))?;
+        let notes: Vec<RecordingNote> = imported.remarks.into_iter().map(RecordingNote::warning).collect();
         for note in &notes {
             self.note(note);
         }
-        Ok(Imported {
+        Ok(ImportedRobot {
             joints: imported.joints,
             model: imported.model,
             notes,

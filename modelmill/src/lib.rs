@@ -1,11 +1,18 @@
-//! modelmill as a library: from a declarative model file to base parameters, equations and fast code, and from recordings to
-//! parameters, to the effect that a model lacks, and to a page that shows it.
+//! modelmill as a library: from a declarative model file it derives base parameters, equations and fast code.
+//! From recordings it identifies parameter values, detects the physical effects that a model lacks, and writes these
+//! findings as one page.
 //!
-//! The library owns no terminal, no path and no global. Files, libraries of effects and progress come from a [`Host`]; results
-//! are values; [`mod@print`] and [`report`] make text, JSON and pages of them. What a reader of a text is advised to do is spelled
-//! by a [`print::StepSpelling`], since a command line, a notebook and a Rust program ask for it in different words.
+//! The library uses no terminal, no fixed path and no global state. A [`Host`] provides files and libraries of effects,
+//! and passes progress to the caller's listener. Results are values; [`mod@print`] and [`report`] convert them to text,
+//! JSON and pages. A [`print::StepSpelling`] formats the recommended next steps for the reader: as a command, as a
+//! Python call, or in words for a caller of the Rust library.
 //!
-//! Units are SI throughout (m, rad, kg, s, N, N m); a recording or a model file may say otherwise of itself.
+//! All quantities are in SI units (m, rad, kg, s, N, N m). A recording or a model file may declare other units for its
+//! own values.
+//!
+//! Equation and table numbers, such as eq. (16) and Table 1, are those of the paper "Dynamic Modeling and
+//! Identification of a Complex-structured Parallel Robot" about the robot SpiderMill. The page `docs/experiment.html`
+//! of the repository reproduces its experiment.
 //!
 //! # A first model
 //!
@@ -13,12 +20,14 @@
 //! use modelmill::Model;
 //!
 //! let model = Model::open("../model-spec/models/spidermill-paper.toml")?;
+//! // `retained` is the product of parameters whose regressor column was kept for this base parameter.
 //! let first = &model.base[0];
 //! assert_eq!((first.name.as_str(), first.retained.as_str()), ("p1_min", "m1*dc1"));
 //! # Ok::<(), modelmill::Error>(())
 //! ```
 //!
-//! A model may come from text as well ([`Model::from_text`]). What is wrong with a file comes with its places:
+//! A model can also be read from text ([`Model::from_text`]). Every error of a file is reported with its line and
+//! column:
 //!
 //! ```
 //! let Err(modelmill::Error::Model(faults)) = modelmill::Model::from_text("arm.toml", "schema = 1\nname = 3") else {
@@ -27,119 +36,122 @@
 //! assert!(faults.render(false).contains("arm.toml:2"));
 //! ```
 //!
-//! # The verbs
+//! # Methods
 //!
-//! Each is a method: of [`Model`] where there is one, else of [`Host`].
+//! Methods of [`Model`] need a model whose equations have been derived; methods of [`Host`] do not.
 //!
-//! | verb | what it does |
+//! | method | what it does |
 //! |---|---|
-//! | [`Model::check`] | what the model consists of, and its numeric rank beside the exact one |
-//! | [`model::Changes::between`] | what a variant changes |
-//! | [`variants::Variants::along`] | what it costs along recordings: forces, power, work, limits, error |
+//! | [`Model::check`] | summary of the model, and the numeric rank of its regressor (over random states) compared with the exact rank |
+//! | [`model::ModelChanges::from_models`] | entries, base parameters and operation counts that differ between a model and its variant |
+//! | [`variants::VariantComparison::along_recordings`] | forces, power, work, use of limits, and errors of two variants |
 //! | [`Host::kinds`] | the kinds of effects that a model may have |
-//! | [`Model::with`] | the model with effects added to its file |
+//! | [`Model::with_added_effects`] | the model with effects added to its file |
 //! | [`Model::picture`] | the mechanism at a pose, as SVG |
-//! | [`Model::equations`] | p_g, dependences, p_min and programs as a page |
-//! | [`Model::generate`] | code |
+//! | [`Model::equations`] | parameter products p_g, linear dependencies of the regressor columns, base parameters p_min and straight-line programs, as a page |
+//! | [`Model::generate`] | source code of the model in a target language |
 //! | [`Model::evaluate`] | forces along a recording |
-//! | [`Model::functions`] | forces, regressor, mass matrix and the like at given states |
-//! | [`Model::identify`] | base parameters from recordings, eq. (12) |
-//! | [`Model::compare`] | error figures, and where the error lives |
-//! | [`Model::diagnose`] | which physical effect is missing |
+//! | [`Model::functions`] | forces, regressor, mass matrix and other functions at given states |
+//! | [`Model::identify`] | base parameters from recordings by least squares, eq. (12) |
+//! | [`Model::compare`] | error metrics (such as the NRMS), and the regions in which errors occur |
+//! | [`Model::diagnose`] | the physical effects that are missing |
+//! | [`Model::runs`] | changes between recordings of one machine |
 //! | [`report::page`] | a diagnosis as one page |
-//! | [`Host::simulate`] | a full-body rig along a trajectory |
-//! | [`Host::reduce`] | a rig to a planar model |
+//! | [`Host::simulate`] | simulation of a rig (a numeric stand-in for the machine, with every body modelled) along a trajectory |
+//! | [`Host::reduce`] | the reduction of a rig to a planar model |
 //! | [`Host::import`] | a model file from a URDF, MJCF or SDF |
 //! | [`export::description`], [`Model::export`] | a URDF or MJCF from a model file, or from a fit |
+//! | [`Model::adopt`] | the model file with the values of a fit |
 //! | [`Model::interpret`] | physical parameters from base parameters |
-//! | [`Model::excite`] | the motion that tells base parameters, or effects, apart best |
+//! | [`Model::excite`] | the excitation trajectory that determines the base parameters best, or that best distinguishes an effect from its alternatives |
 //!
 //! ## Check, compare variants, write equations and code
 //!
 //! ```
-//! use modelmill::generate::{Code, Language};
-//! use modelmill::model::{Changes, Format};
+//! use modelmill::generate::{CodeLanguage, CodeOptions};
+//! use modelmill::model::{ModelChanges, PageFormat};
 //! use modelmill::Model;
 //!
 //! let paper = Model::open("../model-spec/models/spidermill-paper.toml")?;
 //! let consistent = Model::open("../model-spec/models/spidermill.toml")?;
 //! let checked = paper.check()?;
-//! assert_eq!((checked.summary.loops.len(), checked.rank.map(|rank| rank.shown.rank)), (1, Some(5)));
+//! assert_eq!((checked.summary.loops.len(), checked.rank.map(|rank| rank.numeric_rank.rank)), (1, Some(5)));
 //!
-//! let changes = Changes::between(&paper, &consistent);
+//! let changes = ModelChanges::from_models(&paper, &consistent);
 //! assert!(!changes.base.is_empty());
 //!
-//! assert!(paper.equations(Format::Markdown)?.text.contains("p1_min"));
-//! let module = &paper.generate(&Code { language: Language::default(), ..Code::default() })?[0];
+//! assert!(paper.equations(PageFormat::Markdown)?.text.contains("p1_min"));
+//! let module = &paper.generate(&CodeOptions { language: CodeLanguage::default(), ..CodeOptions::default() })?[0];
 //! assert!(module.text.contains("pub struct InverseDynamics"));
 //! # Ok::<(), modelmill::Error>(())
 //! ```
 //!
-//! ## Hold a model against recordings
+//! ## Compare a model with recordings
 //!
 //! ```
 //! use modelmill::Model;
-//! use modelmill::identify::Estimation;
-//! use modelmill::recording::Reading;
+//! use modelmill::identify::EstimatorOptions;
+//! use modelmill::recording::RecordingOptions;
 //!
 //! let model = Model::open("../model-spec/models/spidermill-paper.toml")?;
-//! let reading = Reading::default();
+//! let reading = RecordingOptions::default();
 //! let fit = model.recording("../recordings/spidermill-mbs/plain-fit.csv", &reading)?;
 //! let check = model.recording("../recordings/spidermill-mbs/plain-check.csv", &reading)?;
 //!
 //! let compared = model.compare(&[&check], &model.nominal)?;
-//! let identified = model.identify(&[&fit], &[&check], &Estimation::default())?;
+//! let identified = model.identify(&[&fit], &[&check], &EstimatorOptions::default())?;
 //! let after = identified.fit.check.as_ref().and_then(|figures| figures.nrms);
 //! assert!(after < compared.figures.nrms);
 //!
 //! let forces = model.evaluate("../recordings/spidermill-mbs/plain-check.csv", &reading, &identified.values())?;
 //! assert_eq!(forces.columns[0].0, "spindle_left");
 //!
-//! // Table 1 of the paper: physical parameters, the others held at their nominal values.
+//! // Table 1 of the paper: five physical parameters are solved for, the others are fixed at their nominal values.
 //! let unknown = ["m2", "m4", "dc3", "Ic12", "Ic32"].map(str::to_owned);
 //! let physical = model.interpret(&identified.fit, "the fit", &unknown)?;
 //! assert!(!physical.solutions().is_empty());
 //! # Ok::<(), modelmill::Error>(())
 //! ```
 //!
-//! ## Learn what is missing, and add it
+//! ## Find missing effects, and add them
 //!
 //! ```
-//! use modelmill::diagnose::Question;
+//! use modelmill::diagnose::DiagnosisOptions;
 //! use modelmill::print::LibrarySpelling;
-//! use modelmill::recording::Reading;
+//! use modelmill::recording::RecordingOptions;
 //! use modelmill::{Model, report};
 //!
 //! let model = Model::open("../model-spec/models/spidermill.toml")?;
-//! let run = model.recording("../recordings/spidermill-mbs/with-rods-fit.csv", &Reading::default())?;
-//! let other = model.recording("../recordings/spidermill-mbs/with-rods-check.csv", &Reading::default())?;
-//! let findings = model.diagnose(&[&run], &[&other], &Question::default())?;
+//! let reading = RecordingOptions::default();
+//! let run = model.recording("../recordings/spidermill-mbs/with-rods-fit.csv", &reading)?;
+//! let other = model.recording("../recordings/spidermill-mbs/with-rods-check.csv", &reading)?;
+//! let findings = model.diagnose(&[&run], &[&other], &DiagnosisOptions::default())?;
 //! assert_eq!(findings.missing[0].effect.kind, "rod_inertia");
 //!
-//! let better = model.with(&findings.entries)?;
+//! let better = model.with_added_effects(&findings.entries)?;
 //! assert!(better.text().contains("rod_inertia"));
 //! assert!(report::page(&findings, &LibrarySpelling)?.contains("<h1>"));
 //! # Ok::<(), modelmill::Error>(())
 //! ```
 //!
-//! ## Motions and rigs
+//! ## Plan an excitation trajectory, reduce a rig
 //!
 //! ```
 //! use std::path::Path;
 //! use modelmill::{Host, Model};
-//! use modelmill::excite::{Limit, Options, Request};
+//! use modelmill::excite::{ExcitationRequest, Options, TrajectoryLimit};
 //!
 //! let arm = Model::open("../model-spec/models/two_link.toml")?;
 //! let limits = ["q1=-1:1", "q1_d=2", "q2=-1.5:1.5", "q2_d=3"];
-//! let found = arm.excite(
-//!     &Request {
+//! let result = arm.excite(
+//!     &ExcitationRequest {
 //!         options: Options { harmonics: 3, period: 5.0, random: 20, starts: 1, ..Options::default() },
-//!         limits: limits.iter().map(|text| Limit::parse(text).unwrap()).collect(),
-//!         ..Request::default()
+//!         limits: limits.iter().map(|text| TrajectoryLimit::parse(text).unwrap()).collect(),
+//!         ..ExcitationRequest::default()
 //!     },
 //!     &[],
 //! )?;
-//! assert!(found.found.condition_number <= found.found.start);
+//! assert!(result.found.condition_number <= result.found.start_condition_number);
 //!
 //! let host = Host::new();
 //! let rig = Path::new("../model-spec/rigs/spidermill-full.toml");
@@ -149,16 +161,18 @@
 //! # Ok::<(), modelmill::Error>(())
 //! ```
 //!
-//! # Progress, cancellation, remarks
+//! # Progress, cancellation, notes
 //!
-//! A [`progress::Progress`] of the host hears which job goes on and how far it is, may stop it ([`Error::Cancelled`]), and hears
-//! remarks as they come up. Results hold these remarks too, as [`Note`]s.
+//! A [`progress::ProgressListener`] of the host receives the name and the progress of each job, can stop it
+//! ([`Error::Cancelled`]), and receives notes when they occur. Results contain these notes too; their type is
+//! [`RecordingNote`].
 //!
-//! # Layout
+//! # Modules
 //!
-//! In the order of the flow, each standing on those before it: [`text`], [`error`], [`progress`], [`host`], [`model`],
-//! [`stretch`], [`along`], [`audit`], [`recording`], [`compare`], [`evaluate`], [`states`], [`identify`], [`diagnose`], [`add`], [`adopt`],
-//! [`runs`], [`interpret`], [`excite`], [`variants`], [`generate`], [`simulate`], [`reduce`], [`mod@import`], [`mod@print`], [`report`].
+//! In the order of the data flow; each module uses only modules before it: [`text`], [`error`], [`progress`], [`host`],
+//! [`model`], [`picture`], [`atlas`], [`segment`], [`along`], [`audit`], [`recording`], [`compare`], [`evaluate`],
+//! [`states`], [`identify`], [`runs`], [`diagnose`], [`add`], [`adopt`], [`interpret`], [`excite`], [`variants`],
+//! [`generate`], [`simulate`], [`reduce`], [`mod@import`], [`mod@export`], [`mod@print`], [`report`].
 
 pub mod add;
 pub mod adopt;
@@ -170,10 +184,12 @@ pub mod diagnose;
 pub mod error;
 pub mod evaluate;
 pub mod excite;
+#[cfg(feature = "import")]
 pub mod export;
 pub mod generate;
 pub mod host;
 pub mod identify;
+#[cfg(feature = "import")]
 pub mod import;
 pub mod interpret;
 pub mod model;
@@ -181,18 +197,20 @@ pub mod picture;
 pub mod print;
 pub mod progress;
 pub mod recording;
+#[cfg(feature = "import")]
 pub mod reduce;
 mod regressors;
 pub mod report;
 pub mod runs;
+pub mod segment;
+#[cfg(feature = "rig")]
 pub mod simulate;
 pub mod states;
-pub mod stretch;
 pub mod text;
 pub mod variants;
 
 pub use modelmill_boundary::files;
-pub use modelmill_identify::{FitFile, Note, Severity};
+pub use modelmill_identify::{FitFile, NoteSeverity, RecordingNote};
 pub use modelmill_spec::{EffectKind, SCHEMA, bundled, edit};
 
 pub use error::{Error, Outcome};

@@ -1,65 +1,66 @@
-//! Progress and cancellation: whoever starts a verb hears what goes on, and may stop it.
+//! Progress and cancellation: the caller of a method receives the name and progress of each job, and can stop it.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use modelmill_identify::Note;
+use modelmill_identify::RecordingNote;
 
 use crate::error::{Error, Outcome};
 
-/// What a caller wants to hear while a verb works. All methods do nothing unless they are written.
-pub trait Progress: Send + Sync {
-    /// A job begins. `total` counts its steps; 0 if nobody knows how many there are. `job` lives until the job ends, so
-    /// that a watcher may look at it whenever it likes.
-    fn begins(&self, what: &str, total: usize, job: &Arc<Job>) {
+/// Receives progress and notes of a method. All methods have empty default implementations.
+pub trait ProgressListener: Send + Sync {
+    /// A job starts. `what` is its name, `total` its number of steps, 0 if that is unknown. `job` lives until the job
+    /// ends, so that a listener may read it at any time.
+    fn on_job_start(&self, what: &str, total: usize, job: &Arc<JobHandle>) {
         let _ = (what, total, job);
     }
 
-    /// The last job that began ends, whether it succeeded or not.
-    fn ends(&self) {}
+    /// The job that started last has ended, with or without success.
+    fn on_job_end(&self) {}
 
-    /// A remark that comes up on the way. The verb's result holds it as well.
-    fn notes(&self, note: &Note) {
+    /// A note was issued. The result of the method contains it as well.
+    fn on_note(&self, note: &RecordingNote) {
         let _ = note;
     }
 }
 
-/// Nobody listens.
+/// A listener that ignores everything.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Silent;
+pub struct SilentProgress;
 
-impl Progress for Silent {}
+impl ProgressListener for SilentProgress {}
 
-/// A job that goes on: how far it has come, and whether it is to stop.
+/// A running job: its progress, and whether it has been cancelled. Shared between the job and its listener.
 #[derive(Debug, Default)]
-pub struct Job {
+pub struct JobHandle {
+    /// Finished steps.
     done: AtomicU64,
     is_cancelled: AtomicBool,
 }
 
-impl Job {
-    /// Steps that are done.
+impl JobHandle {
+    /// Number of finished steps.
     pub fn done(&self) -> u64 {
         self.done.load(Ordering::Relaxed)
     }
 
-    /// Asks the job to stop; it ends with [`Error::Cancelled`] at its next step.
+    /// Requests the job to stop; it ends with [`Error::Cancelled`] at its next step.
     pub fn cancel(&self) {
         self.is_cancelled.store(true, Ordering::Relaxed);
     }
 
-    /// Whether somebody asked the job to stop.
+    /// Whether the job has been requested to stop.
     pub fn is_cancelled(&self) -> bool {
         self.is_cancelled.load(Ordering::Relaxed)
     }
 
-    /// Counts some more steps.
+    /// Adds finished steps.
     pub fn add(&self, steps: usize) {
         self.done.fetch_add(steps as u64, Ordering::Relaxed);
     }
 
-    /// Counts some more steps, and says whether to go on.
+    /// Adds finished steps, and returns whether to continue.
     pub fn flow(&self, steps: usize) -> ControlFlow<()> {
         match self.step(steps) {
             Ok(()) => ControlFlow::Continue(()),
@@ -67,9 +68,9 @@ impl Job {
         }
     }
 
-    /// Counts some more steps.
+    /// Adds finished steps.
     ///
-    /// Fails with [`Error::Cancelled`] once somebody asked the job to stop.
+    /// Fails with [`Error::Cancelled`] once the job has been requested to stop.
     pub fn step(&self, steps: usize) -> Outcome {
         self.add(steps);
         if self.is_cancelled() {
@@ -79,27 +80,28 @@ impl Job {
     }
 }
 
-/// Ends a job when it goes out of scope, also by an early return.
-struct Ending<'a>(&'a dyn Progress);
+/// Reports the end of a job when it goes out of scope, also after an early return or a panic.
+struct JobGuard<'a>(&'a dyn ProgressListener);
 
-impl Drop for Ending<'_> {
+impl Drop for JobGuard<'_> {
     fn drop(&mut self) {
-        self.0.ends();
+        self.0.on_job_end();
     }
 }
 
-/// Runs a job while `progress` watches it.
+/// Runs a job that `progress` observes.
 ///
-/// Fails with [`Error::Cancelled`] if somebody asked it to stop, whatever it found until then.
-pub(crate) fn watched<T>(
-    progress: &dyn Progress,
+/// Fails with [`Error::Cancelled`] if the job was requested to stop, even if it has a result.
+pub(crate) fn run_job<T>(
+    progress: &dyn ProgressListener,
     what: &str,
     total: usize,
-    work: impl FnOnce(&Job) -> T,
+    work: impl FnOnce(&JobHandle) -> T,
 ) -> Outcome<T> {
-    let job = Arc::new(Job::default());
-    progress.begins(what, total, &job);
-    let ending = Ending(progress);
+    let job = Arc::new(JobHandle::default());
+    progress.on_job_start(what, total, &job);
+    let ending = JobGuard(progress);
+    // A listener may cancel the job as soon as it starts.
     if job.is_cancelled() {
         return Err(Error::Cancelled);
     }
@@ -124,15 +126,15 @@ mod tests {
         stops: &'static str,
     }
 
-    impl Progress for Listener {
-        fn begins(&self, what: &str, total: usize, job: &Arc<Job>) {
+    impl ProgressListener for Listener {
+        fn on_job_start(&self, what: &str, total: usize, job: &Arc<JobHandle>) {
             self.heard.lock().unwrap().push(format!("{what} {total}"));
             if what == self.stops {
                 job.cancel();
             }
         }
 
-        fn ends(&self) {
+        fn on_job_end(&self) {
             self.heard.lock().unwrap().push("end".to_owned());
         }
     }
@@ -143,12 +145,9 @@ mod tests {
             stops: "long",
             ..Listener::default()
         };
-        assert!(matches!(watched(&listener, "short", 2, Job::done), Ok(0)));
-        let found = watched(&listener, "long", 0, |_| unreachable!("it was cancelled"));
+        assert!(matches!(run_job(&listener, "short", 2, JobHandle::done), Ok(0)));
+        let found = run_job(&listener, "long", 0, |_| unreachable!("it was cancelled"));
         assert!(matches!(found, Err::<(), _>(Error::Cancelled)));
-        assert_eq!(
-            *listener.heard.lock().unwrap(),
-            ["short 2", "end", "long 0", "end"]
-        );
+        assert_eq!(*listener.heard.lock().unwrap(), ["short 2", "end", "long 0", "end"]);
     }
 }

@@ -1,36 +1,38 @@
-//! A model's functions at states that are given as numbers, many at once: forces, regressor, mass matrix, bias, forward dynamics,
-//! reactions. A program of the derivation runs over blocks of states, without a compiler.
+//! Functions of a model at given states, many at once: forces, regressor, mass matrix, bias, forward dynamics,
+//! reactions. A program of the derivation is interpreted over blocks of states, so that no compiler is needed.
 
 use std::ops::Range;
 use std::sync::OnceLock;
 
-use modelmill_codegen::{Dynamics, Evaluator, PoseFault, PoseReason, Reactions, States, vectors_c};
+use modelmill_codegen::{DynamicsPrograms, ModelEvaluator, MotionStates, PoseFault, PoseReason, ReactionPrograms};
+use modelmill_emit::vectors_c;
 use rayon::prelude::*;
 
 use crate::error::{Error, Outcome};
-use crate::evaluate::components;
+use crate::evaluate::reaction_components;
 use crate::model::Model;
 
-/// States that are evaluated at once; large beside the preparation of a program, small beside the cache.
+/// States evaluated at once: large compared with the preparation of a program, small compared with the cache.
 const CHUNK: usize = 4096;
 
-/// Numbers of many states, such as positions: a row for each state, a column for each coordinate or drive.
+/// Values of many states, such as positions: one row for each state, one column for each coordinate or drive.
 #[derive(Clone, Copy, Debug)]
-pub struct Rows<'a> {
-    /// The numbers, as many as rows times columns.
+pub struct StateMatrix<'a> {
+    /// The values, as many as rows times columns.
     pub numbers: &'a [f64],
-    /// How many there are of each state.
+    /// Number of values of each state.
     pub width: usize,
-    /// Whether those of one state lie side by side; else those of one column do.
+    /// Whether values of one state are contiguous (row-major); otherwise values of one column are.
     pub by_state: bool,
 }
 
-impl Rows<'_> {
+impl StateMatrix<'_> {
+    /// Number of states.
     fn len(&self) -> usize {
         self.numbers.len() / self.width.max(1)
     }
 
-    /// The columns of some states, one after the other.
+    /// The columns of a range of states, one vector for each column.
     fn columns(&self, states: &Range<usize>) -> Vec<Vec<f64>> {
         let n = self.len();
         (0..self.width)
@@ -46,40 +48,40 @@ impl Rows<'_> {
     }
 }
 
-/// States, and the forces that go with them. What a function does not read may be left out.
+/// States and the forces that act at them. An input that a function does not read may be omitted.
 #[derive(Clone, Copy, Debug)]
-pub struct Given<'a> {
-    /// Positions of the active coordinates, rad or m, in the order of [`Model::active`].
-    pub q: Rows<'a>,
-    /// Rates, rad/s or m/s.
-    pub qd: Option<Rows<'a>>,
-    /// Accelerations, rad/s^2 or m/s^2.
-    pub qdd: Option<Rows<'a>>,
-    /// Forces of the drives, N or N m: what forward dynamics starts from, and what effects by load depend on.
-    pub forces: Option<Rows<'a>>,
+pub struct StateSamples<'a> {
+    /// Positions of the active coordinates, rad or m, in the order of [`Model::active_coordinates`].
+    pub q: StateMatrix<'a>,
+    /// Rates of the active coordinates, rad/s or m/s.
+    pub qd: Option<StateMatrix<'a>>,
+    /// Accelerations of the active coordinates, rad/s^2 or m/s^2.
+    pub qdd: Option<StateMatrix<'a>>,
+    /// Forces of the drives, N or N m: inputs of forward dynamics and of effects that depend on the load.
+    pub forces: Option<StateMatrix<'a>>,
 }
 
 /// A function of a state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Function {
+pub enum ModelFunction {
     /// Forces of the drives, N or N m.
     InverseDynamics,
     /// H_min of eq. (4): a row for each drive, a column for each base parameter.
     Regressor,
     /// M of `J' f = M q'' + b`: a row and a column for each active coordinate.
     MassMatrix,
-    /// b of `J' f = M q'' + b`: generalised forces of rates, weight and effects, one for each active coordinate.
+    /// b of `J' f = M q'' + b`: generalised forces of rates, gravity and effects, one for each active coordinate.
     Bias,
-    /// Accelerations of the active coordinates under given forces of the drives.
+    /// Accelerations of the active coordinates for given forces of the drives, rad/s^2 or m/s^2.
     ForwardDynamics,
-    /// What joints and the cuts of loops transmit, for the parameters of the model file: the components that
-    /// [`Functions::reactions`] names.
+    /// Forces and moments that joints and the cuts of loops transmit, for the parameters of the model file: the
+    /// components that [`ModelFunctions::reactions`] names.
     Reactions,
 }
 
-impl Function {
-    /// Whether rates, accelerations and forces are read.
-    fn reads(self) -> [bool; 3] {
+impl ModelFunction {
+    /// Whether rates, accelerations and forces are read, in this order; positions always are.
+    fn required_inputs(self) -> [bool; 3] {
         match self {
             Self::InverseDynamics | Self::Regressor | Self::Reactions => [true, true, false],
             Self::MassMatrix => [false, false, false],
@@ -89,17 +91,20 @@ impl Function {
     }
 }
 
-/// The functions of a model; what is derived for one of them is kept.
-pub struct Functions {
+/// Functions of a model at given states. Programs are derived at their first use and kept.
+pub struct ModelFunctions {
+    /// The model, with its own derivation.
     model: Model,
-    dynamics: OnceLock<Dynamics>,
-    reactions: OnceLock<Reactions>,
+    /// Mass matrix and bias, once they were needed.
+    dynamics: OnceLock<DynamicsPrograms>,
+    /// Reactions, once they were needed.
+    reactions: OnceLock<ReactionPrograms>,
 }
 
 impl Model {
-    /// The model's functions at states that are given as numbers.
-    pub fn functions(&self) -> Functions {
-        Functions {
+    /// The model's functions at given states.
+    pub fn functions(&self) -> ModelFunctions {
+        ModelFunctions {
             model: self.clone(),
             dynamics: OnceLock::new(),
             reactions: OnceLock::new(),
@@ -107,44 +112,61 @@ impl Model {
     }
 }
 
-/// What is made once for all states.
-struct Prepared<'a> {
-    evaluator: Evaluator<'a>,
-    dynamics: Option<&'a Dynamics>,
-    reactions: Option<&'a Reactions>,
+/// Everything that is prepared once for all states.
+struct FunctionPrograms<'a> {
+    /// Interprets the programs of the derivation.
+    evaluator: ModelEvaluator<'a>,
+    /// Present for functions of the equation of motion.
+    dynamics: Option<&'a DynamicsPrograms>,
+    /// Present for reactions.
+    reactions: Option<&'a ReactionPrograms>,
 }
 
-impl Functions {
-    /// Names of the components that [`Function::Reactions`] gives, such as `elbow.Fx`, and of those that equations of motion do
-    /// not determine.
+impl ModelFunctions {
+    /// Names of the components of [`ModelFunction::Reactions`], such as `elbow.Fx`, and of those that the equations
+    /// of motion do not determine.
     ///
     /// Fails when reactions cannot be derived.
     pub fn reactions(&self) -> Outcome<(Vec<String>, Vec<String>)> {
-        let named = components(self.derived_reactions()?);
+        let named = reaction_components(self.derived_reactions()?);
         Ok((named.determined, named.left_out))
     }
 
-    /// How many numbers a function has of one state: rows and columns, 1 column for a vector.
+    /// Shape of a function at one state: rows and columns, 1 column for a vector.
     ///
     /// Fails when the function cannot be derived.
-    pub fn shape(&self, function: Function) -> Outcome<[usize; 2]> {
-        let (active, drives) = (self.model.active().len(), self.model.drives().len());
+    pub fn shape(&self, function: ModelFunction) -> Outcome<[usize; 2]> {
+        let (active, drives) = (self.model.active_coordinates().len(), self.model.drives().len());
         Ok(match function {
-            Function::InverseDynamics => [drives, 1],
-            Function::Regressor => [drives, self.model.base.len()],
-            Function::MassMatrix => [active, active],
-            Function::Bias | Function::ForwardDynamics => [active, 1],
-            Function::Reactions => [self.reactions()?.0.len(), 1],
+            ModelFunction::InverseDynamics => [drives, 1],
+            ModelFunction::Regressor => [drives, self.model.base.len()],
+            ModelFunction::MassMatrix => [active, active],
+            ModelFunction::Bias | ModelFunction::ForwardDynamics => [active, 1],
+            ModelFunction::Reactions => [self.reactions()?.0.len(), 1],
         })
     }
 
-    /// A function at all given states: its numbers row by row, state after state. `values` are those of the base parameters.
-    /// Work is shared among all cores, unless each state starts from the one before (loops without closed form).
+    /// A function at all given states, row by row, state after state. `values` are those of the base parameters, in
+    /// the order of the model. The work is distributed over all cores, unless each state starts from the one before
+    /// (loops without closed form).
     ///
-    /// Fails when something that the function reads is not given or has another length, and at the first state without an
-    /// answer.
-    pub fn at(&self, function: Function, given: &Given<'_>, values: &[f64]) -> Outcome<Vec<f64>> {
-        let parts = self.parts(function, given)?;
+    /// Fails when a required input is missing or has another length, and at the first state without a solution.
+    ///
+    /// ```
+    /// use modelmill::Model;
+    /// use modelmill::states::{ModelFunction, StateMatrix, StateSamples};
+    ///
+    /// let arm = Model::open("../model-spec/models/two_link.toml")?;
+    /// // One state: the stretched arm at standstill, whose drives balance gravity (N m).
+    /// let zero = StateMatrix { numbers: &[0.0, 0.0], width: 2, by_state: true };
+    /// let states = StateSamples { q: zero, qd: Some(zero), qdd: Some(zero), forces: None };
+    /// let functions = arm.functions();
+    /// let forces = functions.evaluate_at(ModelFunction::InverseDynamics, &states, &arm.nominal)?;
+    /// assert!(forces.len() == 2 && forces[0] > forces[1]);
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
+    pub fn evaluate_at(&self, function: ModelFunction, given: &StateSamples<'_>, values: &[f64]) -> Outcome<Vec<f64>> {
+        let parts = self.checked_inputs(function, given)?;
         if values.len() != self.model.base.len() {
             return Err(Error::input(format!(
                 "{} values of base parameters are given; the model has {}",
@@ -152,11 +174,12 @@ impl Functions {
                 self.model.base.len()
             )));
         }
+        // Newton's method needs the states in order, as one chunk; otherwise chunks are independent.
         let n = given.q.len();
         let width: usize = self.shape(function)?.iter().product();
-        let prepared = self.prepared(function)?;
+        let prepared = self.programs_for(function)?;
         let mut out = vec![0.0; n * width];
-        let chunk = if self.model.follows_loops() {
+        let chunk = if self.model.has_iterative_loops() {
             n.max(1)
         } else {
             CHUNK
@@ -168,16 +191,18 @@ impl Functions {
                 reason: fault.reason,
             })
         };
+        // Faults count states within a chunk; the message counts them from the first.
         let of_state = |fault: PoseFault| Error::input(format!("{}: {fault}", self.model.path));
         if width == 0 || n == 0 {
             return Ok(out);
         }
+        // A single chunk runs on this thread, without progress.
         if n <= chunk {
             one(0, &mut out).map_err(of_state)?;
             return Ok(out);
         }
         let what = "evaluating states";
-        let found = self.model.host().watched(what, n, |job| {
+        let found = self.model.host().run_job(what, n, |job| {
             let chunks = out.par_chunks_mut(chunk * width).enumerate();
             let done = chunks.map(|(k, out)| {
                 job.step(out.len() / width)?;
@@ -185,24 +210,25 @@ impl Functions {
             });
             done.collect::<Outcome<Vec<_>>>()
         })??;
-        // The first state that has no answer is told, whichever core met one first.
+        // The first state without a solution is reported, whichever core found one first.
         for result in found {
             result.map_err(of_state)?;
         }
         Ok(out)
     }
 
-    /// A function as C for many states ([`vectors_c`]), for callers with a C compiler; base parameters are its arguments,
-    /// other values those of the model.
+    /// A function as C source for many states ([`vectors_c`]), for callers with a C compiler. Base parameters are
+    /// arguments of the function; all other values are those of the model.
     ///
-    /// Fails for forward dynamics, which is no straight-line program, and where each state starts from the one before.
-    pub fn vectors_c(&self, function: Function) -> Outcome<String> {
+    /// Fails for forward dynamics, which is not a straight-line program, and when each state starts from the one
+    /// before.
+    pub fn vectors_c(&self, function: ModelFunction) -> Outcome<String> {
         let derivation = &self.model.derivation;
-        if self.model.follows_loops() || function == Function::ForwardDynamics {
+        if self.model.has_iterative_loops() || function == ModelFunction::ForwardDynamics {
             return Err(Error::input(format!(
                 "{}: {} takes steps that depend on the state and is not compiled",
                 self.model.path,
-                if function == Function::ForwardDynamics {
+                if function == ModelFunction::ForwardDynamics {
                     "forward dynamics"
                 } else {
                     "closing the loops by Newton's method"
@@ -210,21 +236,28 @@ impl Functions {
             )));
         }
         let program = match function {
-            Function::InverseDynamics => &derivation.programs.inverse_dynamics,
-            Function::Regressor => &derivation.programs.regressor,
-            Function::MassMatrix => &self.dynamics()?.mass_matrix,
-            Function::Bias | Function::ForwardDynamics => &self.dynamics()?.bias,
-            Function::Reactions => &self.derived_reactions()?.program,
+            ModelFunction::InverseDynamics => &derivation.programs.inverse_dynamics,
+            ModelFunction::Regressor => &derivation.programs.regressor,
+            ModelFunction::MassMatrix => &self.dynamics()?.mass_matrix,
+            ModelFunction::Bias | ModelFunction::ForwardDynamics => &self.dynamics()?.bias,
+            ModelFunction::Reactions => &self.derived_reactions()?.program,
         };
         let width = self.shape(function)?.iter().product();
         Ok(vectors_c(derivation, program, width))
     }
 
-    /// Positions, rates, accelerations and forces as far as they are read, with their lengths looked at.
-    fn parts<'a>(&self, function: Function, given: &Given<'a>) -> Outcome<[Option<Rows<'a>>; 4]> {
-        let (active, drives) = (self.model.active().len(), self.model.drives().len());
-        let [rates, accelerations, forces] = function.reads();
-        let by_load = self.model.load_dependent();
+    /// Positions, rates, accelerations and forces as far as the function reads them.
+    ///
+    /// Fails when one of them is missing or has another number of rows or columns.
+    fn checked_inputs<'a>(
+        &self,
+        function: ModelFunction,
+        given: &StateSamples<'a>,
+    ) -> Outcome<[Option<StateMatrix<'a>>; 4]> {
+        let (active, drives) = (self.model.active_coordinates().len(), self.model.drives().len());
+        // Effects that depend on the load need forces of the drives for every function.
+        let [rates, accelerations, forces] = function.required_inputs();
+        let by_load = self.model.load_dependent_effects();
         let n = given.q.len();
         let parts = [
             ("positions", Some(given.q), true, active),
@@ -243,7 +276,7 @@ impl Functions {
                 _ if !is_read => {}
                 None if name.starts_with("forces") && !forces => {
                     return Err(Error::input(format!(
-                        "{} depends on the load: forces of the drives are needed besides the states",
+                        "{} depends on the load: forces of the drives are needed in addition to the states",
                         by_load.join(", ")
                     )));
                 }
@@ -261,47 +294,55 @@ impl Functions {
         Ok(found)
     }
 
-    fn prepared(&self, function: Function) -> Outcome<Prepared<'_>> {
+    /// The programs that a function needs, derived if this is their first use.
+    ///
+    /// Fails when a derivation fails or is cancelled.
+    fn programs_for(&self, function: ModelFunction) -> Outcome<FunctionPrograms<'_>> {
         let needs_dynamics = matches!(
             function,
-            Function::MassMatrix | Function::Bias | Function::ForwardDynamics
+            ModelFunction::MassMatrix | ModelFunction::Bias | ModelFunction::ForwardDynamics
         );
-        Ok(Prepared {
-            evaluator: Evaluator::new(&self.model.derivation),
+        Ok(FunctionPrograms {
+            evaluator: ModelEvaluator::new(&self.model.derivation),
             dynamics: needs_dynamics.then(|| self.dynamics()).transpose()?,
-            reactions: (function == Function::Reactions)
+            reactions: (function == ModelFunction::Reactions)
                 .then(|| self.derived_reactions())
                 .transpose()?,
         })
     }
 
-    fn dynamics(&self) -> Outcome<&Dynamics> {
+    /// The equation of motion, derived at its first use.
+    ///
+    /// Fails when the derivation fails or is cancelled.
+    fn dynamics(&self) -> Outcome<&DynamicsPrograms> {
         if let Some(known) = self.dynamics.get() {
             return Ok(known);
         }
         let what = "deriving the equation of motion";
-        let derived = (self.model.host()).watched(what, 0, |_| self.model.derivation.dynamics())?;
+        let derived = (self.model.host()).run_job(what, 0, |_| self.model.derivation.dynamics())?;
         let derived = derived.map_err(|error| Error::derivation(&self.model.path, error))?;
         Ok(self.dynamics.get_or_init(|| derived))
     }
 
-    fn derived_reactions(&self) -> Outcome<&Reactions> {
+    /// The reactions, derived at their first use.
+    ///
+    /// Fails when the derivation fails or is cancelled.
+    fn derived_reactions(&self) -> Outcome<&ReactionPrograms> {
         if let Some(known) = self.reactions.get() {
             return Ok(known);
         }
         let what = "deriving the reactions";
-        let derived =
-            (self.model.host()).watched(what, 0, |_| self.model.derivation.reactions())?;
+        let derived = (self.model.host()).run_job(what, 0, |_| self.model.derivation.reactions())?;
         let derived = derived.map_err(|error| Error::derivation(&self.model.path, error))?;
         Ok(self.reactions.get_or_init(|| derived))
     }
 }
 
-/// Writes a function of some states to `out`, a row for each.
+/// Writes a function at a range of states to `out`, one row for each state.
 fn fill(
-    function: Function,
-    prepared: &Prepared<'_>,
-    parts: &[Option<Rows<'_>>; 4],
+    function: ModelFunction,
+    prepared: &FunctionPrograms<'_>,
+    parts: &[Option<StateMatrix<'_>>; 4],
     states: &Range<usize>,
     values: &[f64],
     out: &mut [f64],
@@ -311,9 +352,9 @@ fn fill(
     let [q, qd, qdd, forces] = columns
         .each_ref()
         .map(|columns| columns.iter().map(Vec::as_slice).collect::<Vec<_>>());
-    // What a function does not read is not given, but has its place.
+    // The evaluator expects every input; those that the function does not read are zero.
     let all_zeros: Vec<&[f64]> = q.iter().map(|_| zeros.as_slice()).collect();
-    let given = States {
+    let given = MotionStates {
         qd: if qd.is_empty() { all_zeros.clone() } else { qd },
         qdd: if qdd.is_empty() { all_zeros } else { qdd },
         q,
@@ -323,34 +364,29 @@ fn fill(
     let evaluator = &prepared.evaluator;
     let (dynamics, reactions) = (prepared.dynamics, prepared.reactions);
     let found = match (function, dynamics, reactions) {
-        (Function::InverseDynamics, ..) => evaluator.inverse_dynamics(&given, values)?,
-        (Function::MassMatrix, Some(dynamics), _) => {
-            evaluator.mass_matrix(dynamics, &given, values)?
-        }
-        (Function::Bias, Some(dynamics), _) => evaluator.bias(dynamics, &given, values)?,
-        (Function::ForwardDynamics, Some(dynamics), _) => {
+        (ModelFunction::InverseDynamics, ..) => evaluator.inverse_dynamics(&given, values)?,
+        (ModelFunction::MassMatrix, Some(dynamics), _) => evaluator.mass_matrix(dynamics, &given, values)?,
+        (ModelFunction::Bias, Some(dynamics), _) => evaluator.bias(dynamics, &given, values)?,
+        (ModelFunction::ForwardDynamics, Some(dynamics), _) => {
             evaluator.forward_dynamics(dynamics, &given, values, &forces)?
         }
-        (Function::Reactions, _, Some(reactions)) => evaluator.reactions(reactions, &given)?,
-        (Function::Regressor, ..) => {
+        (ModelFunction::Reactions, _, Some(reactions)) => evaluator.reactions(reactions, &given)?,
+        // The regressor is large: it is written block by block, without its columns in memory.
+        (ModelFunction::Regressor, ..) => {
             let mut start = 0;
             return evaluator.regressor_blocks(&given, |len, columns| {
-                scatter(
-                    columns,
-                    &mut out[start * width..(start + len) * width],
-                    start,
-                )?;
+                scatter(columns, &mut out[start * width..(start + len) * width], start)?;
                 start += len;
                 Ok(())
             });
         }
-        _ => unreachable!("what a function needs is prepared before"),
+        _ => unreachable!("the programs of a function are prepared before"),
     };
     let columns: Vec<&[f64]> = found.iter().map(Vec::as_slice).collect();
     scatter(&columns, out, 0)
 }
 
-/// Columns to rows; `first` is the state of the first row, for the fault of a number that is none.
+/// Writes columns to rows of `out`; `first` is the state of the first row, for the place of a value that is not finite.
 fn scatter(columns: &[&[f64]], out: &mut [f64], first: usize) -> Result<(), PoseFault> {
     for (k, row) in out.chunks_exact_mut(columns.len().max(1)).enumerate() {
         for (value, column) in row.iter_mut().zip(columns) {

@@ -1,4 +1,4 @@
-//! Faults as exceptions of the package's own class, with diagnostics as data.
+//! Faults as exceptions of the class `ModelmillError` of the package, with diagnostics as data.
 
 use modelmill::{Error, print};
 use pyo3::exceptions::PyKeyboardInterrupt;
@@ -9,8 +9,9 @@ use serde_json::{Value, json};
 
 use crate::spelling::PythonSpelling;
 
-/// An exception `modelmill.ModelmillError` that says `says`; `diagnostics` is a list of objects.
-pub(crate) fn raised(py: Python<'_>, says: &str, diagnostics: &Value) -> PyErr {
+/// An exception `modelmill.ModelmillError` with a text; `diagnostics` is a list of objects.
+pub(crate) fn modelmill_error(py: Python<'_>, says: &str, diagnostics: &Value) -> PyErr {
+    /// The exception class of the Python part, imported at its first use.
     static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
     let class = CLASS.import(py, "modelmill._errors", "ModelmillError");
     let made = class.and_then(|class| class.call1((says, diagnostics.to_string())));
@@ -20,21 +21,21 @@ pub(crate) fn raised(py: Python<'_>, says: &str, diagnostics: &Value) -> PyErr {
     }
 }
 
-/// An exception that says what is wrong with what was given.
-pub(crate) fn refused(py: Python<'_>, says: &str) -> PyErr {
+/// An exception for a fault of the input.
+pub(crate) fn input_error(py: Python<'_>, says: &str) -> PyErr {
     let diagnostics = json!([{ "severity": "error", "says": says }]);
-    raised(py, says, &diagnostics)
+    modelmill_error(py, says, &diagnostics)
 }
 
 /// A fault of the library as an exception.
-pub(crate) fn of_library(py: Python<'_>, error: &Error) -> PyErr {
+pub(crate) fn library_error(py: Python<'_>, error: &Error) -> PyErr {
     match error {
         Error::Model(faults) => {
             let told = print::faults(faults, &PythonSpelling);
             let says = faults.render_spelled(false, &PythonSpelling);
-            raised(py, says.trim_end(), &told["diagnostics"])
+            modelmill_error(py, says.trim_end(), &told["diagnostics"])
         }
         Error::Cancelled => PyKeyboardInterrupt::new_err(error.to_string()),
-        other => refused(py, &other.spell(&PythonSpelling)),
+        other => input_error(py, &other.spell(&PythonSpelling)),
     }
 }

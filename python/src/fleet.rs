@@ -1,27 +1,29 @@
-//! Summaries of recordings for engines that run Python: they take bytes, and give bytes.
+//! Summaries of recordings of a fleet, as bytes, for query engines that run Python.
 
 use std::path::{Path, PathBuf};
 
-use modelmill::recording::{Preparation, Reading};
-use modelmill_fleet::{Fault, Ground, Plan, Summary};
+use modelmill::recording::{RecordingOptions, StatePreparation};
+use modelmill_fleet::{FleetFault, FleetModel, FleetPlan, FleetSummary};
 use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
-use crate::errors::refused;
+use crate::errors::input_error;
 use crate::spelling::PythonSpelling;
 
 /// A plan with its model derived.
 #[pyclass(frozen)]
 pub(crate) struct FleetGround {
-    ground: Ground,
+    /// The plan with its derived model.
+    ground: FleetModel,
 }
 
-fn of_fleet(py: Python<'_>, fault: &Fault) -> PyErr {
-    refused(py, &fault.message().spell(&PythonSpelling))
+/// A fault of the library as an exception.
+fn fleet_error(py: Python<'_>, fault: &FleetFault) -> PyErr {
+    input_error(py, &fault.message().spell(&PythonSpelling))
 }
 
-/// The plan that reference recordings make, as JSON.
+/// Makes a plan from reference recordings, as JSON.
 #[pyfunction]
 #[pyo3(signature = (model, reference, columns, cutoff_hz, decimate, skip_bad_samples))]
 pub(crate) fn fleet_plan(
@@ -33,33 +35,30 @@ pub(crate) fn fleet_plan(
     decimate: usize,
     skip_bad_samples: bool,
 ) -> PyResult<String> {
-    let reading = Reading {
+    let reading = RecordingOptions {
         columns,
-        preparation: Preparation {
+        preparation: StatePreparation {
             cutoff_hz,
             decimate: decimate.max(1),
-            ..Preparation::default()
+            ..StatePreparation::default()
         },
         skip_bad_samples,
-        ..Reading::default()
+        ..RecordingOptions::default()
     };
     let made = py.detach(|| {
         let reference: Vec<&Path> = reference.iter().map(PathBuf::as_path).collect();
-        Plan::make(&model, &reading, &reference).map(|plan| plan.json())
+        FleetPlan::from_recordings(&model, &reading, &reference).map(|plan| plan.json())
     });
-    made.map_err(|fault| of_fleet(py, &fault))
+    made.map_err(|fault| fleet_error(py, &fault))
 }
 
 /// Adds summaries; `None` without any.
 #[pyfunction]
-pub(crate) fn fleet_merge(
-    py: Python<'_>,
-    summaries: Vec<Vec<u8>>,
-) -> PyResult<Option<Bound<'_, PyBytes>>> {
+pub(crate) fn fleet_merge(py: Python<'_>, summaries: Vec<Vec<u8>>) -> PyResult<Option<Bound<'_, PyBytes>>> {
     let merged = py.detach(|| {
-        let mut sum: Option<Summary> = None;
+        let mut sum: Option<FleetSummary> = None;
         for bytes in &summaries {
-            let one = Summary::of_bytes(bytes)?;
+            let one = FleetSummary::from_bytes(bytes)?;
             match &mut sum {
                 None => sum = Some(one),
                 Some(sum) => sum.merge(&one)?,
@@ -67,16 +66,17 @@ pub(crate) fn fleet_merge(
         }
         Ok(sum.map(|sum| sum.bytes()))
     });
-    let merged = merged.map_err(|fault| of_fleet(py, &fault))?;
+    let merged = merged.map_err(|fault| fleet_error(py, &fault))?;
     Ok(merged.map(|bytes| PyBytes::new(py, &bytes)))
 }
 
 #[pymethods]
 impl FleetGround {
+    /// Derives the model of a plan, which is given as JSON.
     #[new]
     fn new(py: Python<'_>, plan: &str) -> PyResult<Self> {
-        let made = py.detach(|| Plan::parse("the plan", plan).and_then(|plan| plan.ground()));
-        let ground = made.map_err(|fault| of_fleet(py, &fault))?;
+        let made = py.detach(|| FleetPlan::parse("the plan", plan).and_then(|plan| plan.derive_model()));
+        let ground = made.map_err(|fault| fleet_error(py, &fault))?;
         Ok(Self { ground })
     }
 
@@ -86,6 +86,7 @@ impl FleetGround {
         self.ground.columns()
     }
 
+    /// The summary of a recording from its columns in SI units, as bytes.
     fn summarise<'py>(
         &self,
         py: Python<'py>,
@@ -101,36 +102,32 @@ impl FleetGround {
         PyBytes::new(py, &bytes)
     }
 
-    fn summarise_file<'py>(
-        &self,
-        py: Python<'py>,
-        recording: &str,
-        path: PathBuf,
-    ) -> Bound<'py, PyBytes> {
+    /// The summary of a recording from a file, as bytes.
+    fn summarise_file<'py>(&self, py: Python<'py>, recording: &str, path: PathBuf) -> Bound<'py, PyBytes> {
         let bytes = py.detach(|| self.ground.summarise_file(recording, &path).bytes());
         PyBytes::new(py, &bytes)
     }
 
-    /// Parameters with deviations, as JSON, with what was wrong.
+    /// Parameters with standard deviations, and the number of bad recordings, as JSON.
     fn solve(&self, py: Python<'_>, summary: &[u8]) -> PyResult<String> {
         let solved = py.detach(|| {
-            let summary = Summary::of_bytes(summary)?;
+            let summary = FleetSummary::from_bytes(summary)?;
             let fit = self.ground.solve(&summary)?;
             Ok(self.ground.json(&fit).to_string())
         });
-        solved.map_err(|fault: Fault| of_fleet(py, &fault))
+        solved.map_err(|fault: FleetFault| fleet_error(py, &fault))
     }
 
-    /// The days of a robot in order, each with its summary, as JSON.
+    /// Changes and dead sensors of a robot, from the summaries of its days in order, as JSON.
     fn robot(&self, py: Python<'_>, name: &str, days: Vec<(String, Vec<u8>)>) -> PyResult<String> {
         let found = py.detach(|| {
             let days = days
                 .iter()
-                .map(|(day, bytes)| Ok((day.clone(), Summary::of_bytes(bytes)?)));
-            let days = days.collect::<Result<Vec<_>, Fault>>()?;
-            let robot = modelmill_fleet::robot::robot(&self.ground, name, &days)?;
+                .map(|(day, bytes)| Ok((day.clone(), FleetSummary::from_bytes(bytes)?)));
+            let days = days.collect::<Result<Vec<_>, FleetFault>>()?;
+            let robot = modelmill_fleet::robot::robot_history(&self.ground, name, &days)?;
             Ok(robot.json(&self.ground).to_string())
         });
-        found.map_err(|fault: Fault| of_fleet(py, &fault))
+        found.map_err(|fault: FleetFault| fleet_error(py, &fault))
     }
 }

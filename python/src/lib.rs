@@ -1,9 +1,9 @@
-//! The compiled part of the Python package `modelmill`: models, recordings and verbs of the library, with JSON and text of
-//! what they find. The Python part (`package/`) makes objects with attributes of them.
+//! The compiled part of the Python package `modelmill`: models, recordings and methods of the library, with their
+//! results as JSON and text. The Python part (`package/`) makes objects with attributes from them.
 //!
-//! Decision: this is a workspace of its own on the same target folder. Nobody without Python builds it, and
-//! features of its crates do not mix with those of the rest. Results cross as the JSON that the program prints, so
-//! that both cannot differ; only arrays cross as arrays.
+//! Decision: this is a separate workspace with the same target folder. So it is built only with Python, and features of
+//! its crates do not mix with those of the rest. Results are passed as the JSON that the program prints, so that both
+//! agree; only arrays are passed as arrays.
 
 mod arrays;
 mod errors;
@@ -25,9 +25,9 @@ mod _core {
     #[pymodule_export]
     use crate::model::{CoreModel, contents, import_text, kinds, load, load_text};
     #[pymodule_export]
-    use crate::results::{Excited, Found, Recorded};
+    use crate::results::{PythonExcitation, PythonRecording, PythonResult};
     #[pymodule_export]
-    use crate::rigs::{Simulated, reduce, simulate};
+    use crate::rigs::{PythonSimulation, reduce, simulate};
     #[pymodule_export]
     use crate::spelling::advised_names;
 }

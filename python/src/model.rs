@@ -1,41 +1,43 @@
-//! A model and its verbs.
+//! A model with its methods: arguments from Python go to the library; results come back as JSON, text, pages and
+//! arrays.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use modelmill::add::{Said, Setting, new_effect};
-use modelmill::diagnose::{Held, Question};
-use modelmill::generate::{Code, Language};
+use modelmill::add::{EffectSetting, SettingValue, new_effect};
+use modelmill::diagnose::{DiagnosisOptions, FixedParameters};
+use modelmill::generate::{CodeLanguage, CodeOptions};
 use modelmill::identify::Instruments;
-use modelmill::model::{Changes, Format};
-use modelmill::picture::Drawing;
-use modelmill::recording::Recording;
+use modelmill::model::{ModelChanges, PageFormat};
+use modelmill::picture::PictureOptions;
+use modelmill::recording::PreparedRecording;
 use modelmill::report::{page, runs_page};
-use modelmill::runs::Unread;
-use modelmill::states::{Function, Functions, Given};
-use modelmill::text::style::Style;
-use modelmill::variants::Variants;
+use modelmill::runs::UnreadRun;
+use modelmill::states::{ModelFunction, ModelFunctions, StateSamples};
+use modelmill::text::style::TerminalStyle;
+use modelmill::variants::VariantComparison;
 use modelmill::{Error, FitFile, Host, Model, Outcome, export, import, print};
 use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
-use crate::arrays::rows;
-use crate::errors::refused;
-use crate::options::{self, EstimationOptions, ExcitationOptions, ReadingOptions, Says};
-use crate::results::{Excited, Found, Recorded, Remarks, Source, remarks};
+use crate::arrays::state_matrix;
+use crate::errors::input_error;
+use crate::options::{self, EstimationOptions, ExcitationOptions, OptionResult, ReadingOptions};
+use crate::results::{PythonExcitation, PythonRecording, PythonResult, PythonSource, RemarkList, remarks};
 use crate::spelling::PythonSpelling;
-use crate::work::{Listener, at_once, work};
+use crate::work::{JobListener, run_blocking, run_interruptible};
 
-/// States whose functions are computed in this thread, without looking for interrupts.
+/// Largest number of states for which a function is computed in this thread, without a check for interrupts.
 const FEW: usize = 256;
-/// No robot description is longer, bytes.
+/// Largest robot description that is read, bytes.
 const LARGEST_DESCRIPTION: u64 = 16 << 20;
 
-pub(crate) type Callback<'a, 'py> = Option<&'a Bound<'py, PyAny>>;
+/// A function of Python that is called with name, steps done and number of steps of a job.
+pub(crate) type ProgressCallback<'a, 'py> = Option<&'a Bound<'py, PyAny>>;
 
-/// A host whose jobs the listener hears.
-pub(crate) fn host(libraries: Vec<PathBuf>, at_values: bool) -> (Host, Arc<Listener>) {
-    let listener = Arc::new(Listener::default());
+/// A host, and a listener for its jobs.
+pub(crate) fn new_host(libraries: Vec<PathBuf>, at_values: bool) -> (Host, Arc<JobListener>) {
+    let listener = Arc::new(JobListener::default());
     let host = Host::new()
         .with_libraries(libraries)
         .at_values(at_values)
@@ -43,9 +45,9 @@ pub(crate) fn host(libraries: Vec<PathBuf>, at_values: bool) -> (Host, Arc<Liste
     (host, listener)
 }
 
-/// Options that make sense, or an exception.
-fn asked<T>(py: Python<'_>, says: Says<T>) -> PyResult<T> {
-    says.map_err(|says| refused(py, &says))
+/// Valid options, or an exception.
+fn valid_options<T>(py: Python<'_>, says: OptionResult<T>) -> PyResult<T> {
+    says.map_err(|says| input_error(py, &says))
 }
 
 /// Reads a model file.
@@ -57,12 +59,12 @@ pub(crate) fn load(
     at_values: bool,
     progress: Option<Bound<'_, PyAny>>,
 ) -> PyResult<CoreModel> {
-    let (host, listener) = host(libraries, at_values);
-    let model = work(py, &listener, progress.as_ref(), || host.model(&path))?;
+    let (host, listener) = new_host(libraries, at_values);
+    let model = run_interruptible(py, &listener, progress.as_ref(), || host.model(&path))?;
     Ok(CoreModel::new(model, listener))
 }
 
-/// Derives a model of the text of a model file.
+/// Derives a model from the text of a model file.
 #[pyfunction]
 pub(crate) fn load_text(
     py: Python<'_>,
@@ -72,14 +74,14 @@ pub(crate) fn load_text(
     at_values: bool,
     progress: Option<Bound<'_, PyAny>>,
 ) -> PyResult<CoreModel> {
-    let (host, listener) = host(libraries, at_values);
-    let model = work(py, &listener, progress.as_ref(), || {
+    let (host, listener) = new_host(libraries, at_values);
+    let model = run_interruptible(py, &listener, progress.as_ref(), || {
         host.derive(name, host.load_text(Path::new(name), text)?)
     })?;
     Ok(CoreModel::new(model, listener))
 }
 
-/// The text of a model file of a robot description, given as its text or as a file, and remarks.
+/// Converts a robot description, given as text or as a file, into the text of a model file; also returns the remarks.
 #[pyfunction]
 #[allow(clippy::too_many_arguments, reason = "each is a keyword of Python")]
 pub(crate) fn import_text(
@@ -90,23 +92,19 @@ pub(crate) fn import_text(
     round_angles: bool,
     closures: Option<PathBuf>,
     pose: Vec<(String, f64)>,
-) -> PyResult<(String, Remarks)> {
-    let (host, listener) = host(Vec::new(), false);
+) -> PyResult<(String, RemarkList)> {
+    let (host, listener) = new_host(Vec::new(), false);
+    // Text of a file of limited size.
     let read = |path: &Path| {
         let read = host.files().read_text(path, LARGEST_DESCRIPTION);
-        read.map_err(|error| {
-            Error::input(format!(
-                "{} cannot be read: {}",
-                path.display(),
-                error.fault
-            ))
-        })
+        read.map_err(|error| Error::input(format!("{} cannot be read: {}", path.display(), error.fault)))
     };
-    let imported = work(py, &listener, None, || {
+    let imported = run_interruptible(py, &listener, None, || {
         let (text, path) = match text {
             Some(text) => (text, None),
             None => (read(Path::new(name))?, Some(Path::new(name))),
         };
+        // Without a given file, the closures of a URDF are those of a `robot.yaml` in the same folder.
         let beside = path.filter(|path| path.extension().is_some_and(|e| e == "urdf"));
         let beside = beside.map(|path| path.with_file_name("robot.yaml"));
         let closures = closures.or(beside.filter(|path| path.is_file()));
@@ -126,13 +124,17 @@ pub(crate) fn import_text(
 #[pyclass(frozen, name = "Model")]
 #[derive(Clone)]
 pub(crate) struct CoreModel {
+    /// The derived model.
     model: Model,
-    functions: Arc<Functions>,
-    listener: Arc<Listener>,
+    /// Its functions at states, shared by all copies.
+    functions: Arc<ModelFunctions>,
+    /// Listener for the jobs of its host.
+    listener: Arc<JobListener>,
 }
 
 impl CoreModel {
-    fn new(model: Model, listener: Arc<Listener>) -> Self {
+    /// A model with the listener of its host.
+    fn new(model: Model, listener: Arc<JobListener>) -> Self {
         Self {
             functions: Arc::new(model.functions()),
             model,
@@ -140,7 +142,7 @@ impl CoreModel {
         }
     }
 
-    /// A fit: its text with what messages call it, or a file.
+    /// Reads a fit from a text with a name, or from a file.
     fn fit(&self, text: Option<&str>, name: &str) -> Outcome<FitFile> {
         let host = self.model.host();
         match text {
@@ -150,78 +152,89 @@ impl CoreModel {
     }
 
     /// Another model of the same host.
-    fn like(&self, model: Model) -> Self {
+    fn with_same_host(&self, model: Model) -> Self {
         Self::new(model, Arc::clone(&self.listener))
     }
 
-    fn work<T: Send>(
+    /// Runs work on this model in a separate thread, with progress and interrupts.
+    fn run_interruptible<T: Send>(
         &self,
         py: Python<'_>,
-        progress: Callback<'_, '_>,
+        progress: ProgressCallback<'_, '_>,
         job: impl FnOnce() -> Outcome<T> + Send,
     ) -> PyResult<T> {
-        work(py, &self.listener, progress, job)
+        run_interruptible(py, &self.listener, progress, job)
     }
 }
 
 /// A function by the name of its method.
-fn named(py: Python<'_>, function: &str) -> PyResult<Function> {
+fn function_by_name(py: Python<'_>, function: &str) -> PyResult<ModelFunction> {
     Ok(match function {
-        "inverse_dynamics" => Function::InverseDynamics,
-        "regressor" => Function::Regressor,
-        "mass_matrix" => Function::MassMatrix,
-        "bias" => Function::Bias,
-        "forward_dynamics" => Function::ForwardDynamics,
-        "reactions" => Function::Reactions,
-        other => return Err(refused(py, &format!("there is no function `{other}`"))),
+        "inverse_dynamics" => ModelFunction::InverseDynamics,
+        "regressor" => ModelFunction::Regressor,
+        "mass_matrix" => ModelFunction::MassMatrix,
+        "bias" => ModelFunction::Bias,
+        "forward_dynamics" => ModelFunction::ForwardDynamics,
+        "reactions" => ModelFunction::Reactions,
+        other => return Err(input_error(py, &format!("there is no function `{other}`"))),
     })
 }
 
-fn recordings(all: &[PyRef<'_, Recorded>]) -> Vec<Arc<Recording>> {
+/// The recordings of the library in objects of Python.
+fn recordings(all: &[PyRef<'_, PythonRecording>]) -> Vec<Arc<PreparedRecording>> {
     all.iter().map(|one| Arc::clone(&one.recording)).collect()
 }
 
-fn borrowed(all: &[Arc<Recording>]) -> Vec<&Recording> {
+/// References to recordings, as methods of the library take them.
+fn borrow_recordings(all: &[Arc<PreparedRecording>]) -> Vec<&PreparedRecording> {
     all.iter().map(|one| &**one).collect()
 }
 
 #[pymethods]
 impl CoreModel {
+    /// Name of the model.
     #[getter]
     fn name(&self) -> &str {
         &self.model.name
     }
 
+    /// Path of the model file, or the name of the text.
     #[getter]
     fn path(&self) -> &str {
         &self.model.path
     }
 
+    /// Text of the model file.
     #[getter]
     fn text(&self) -> &str {
         self.model.text()
     }
 
+    /// Title of the model, if the file has one.
     #[getter]
     fn title(&self) -> Option<&str> {
         self.model.derivation.mechanism.title.as_deref()
     }
 
+    /// Names of the active coordinates.
     #[getter]
     fn coordinates(&self) -> Vec<String> {
-        self.model.active()
+        self.model.active_coordinates()
     }
 
+    /// Names of the passive coordinates.
     #[getter]
     fn passive(&self) -> Vec<String> {
-        self.model.passive()
+        self.model.passive_coordinates()
     }
 
+    /// Names of the drives.
     #[getter]
     fn drives(&self) -> Vec<String> {
         self.model.drives()
     }
 
+    /// Nominal values of the base parameters, in SI units.
     #[getter]
     fn nominal<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_slice(py, &self.model.nominal)
@@ -230,7 +243,7 @@ impl CoreModel {
     /// Name, retained product, expression, unit, nominal value, whether that is given.
     #[getter]
     fn base(&self) -> Vec<(String, String, String, String, f64, bool)> {
-        let infos = self.model.infos();
+        let infos = self.model.parameter_infos();
         let all = self.model.base.iter().zip(infos).enumerate();
         all.map(|(k, (base, info))| {
             (
@@ -247,70 +260,68 @@ impl CoreModel {
 
     /// Warnings about the model file, and remarks on the model.
     #[getter]
-    fn notes(&self) -> Remarks {
+    fn notes(&self) -> RemarkList {
         let of_file = self.model.loaded.warnings.iter();
         let of_file = of_file.map(|one| ("warning", one.message.clone()));
         of_file.chain(remarks(&self.model.notes)).collect()
     }
 
-    /// What there is to know about nominal values that are missing.
+    /// Remarks on missing nominal values.
     #[getter]
-    fn nominal_notes(&self) -> Remarks {
+    fn nominal_notes(&self) -> RemarkList {
         remarks(&self.model.nominal_values().notes)
     }
 
+    /// The equations as text in a format.
     fn equations(&self, py: Python<'_>, format: &str) -> PyResult<String> {
         let format = match format {
-            "text" => Some(Format::Text),
-            "markdown" => Some(Format::Markdown),
-            "latex" => Some(Format::Latex),
-            "html" => Some(Format::Html),
+            "text" => Some(PageFormat::Text),
+            "markdown" => Some(PageFormat::Markdown),
+            "latex" => Some(PageFormat::Latex),
+            "html" => Some(PageFormat::Html),
             "json" => None,
             other => {
-                let says =
-                    format!("format={other:?}: expected text, markdown, latex, html or json");
-                return Err(refused(py, &says));
+                let says = format!("format={other:?}: expected text, markdown, latex, html or json");
+                return Err(input_error(py, &says));
             }
         };
         let model = &self.model;
-        let written = self.work(py, None, || match format {
+        let written = self.run_interruptible(py, None, || match format {
             Some(format) => model.equations(format),
             None => model.equations_json(),
         })?;
         Ok(written.text)
     }
 
-    fn check(&self, py: Python<'_>) -> PyResult<Found> {
-        let checked = self.work(py, None, || self.model.check())?;
-        Ok(Found::new(
+    /// Checks the model.
+    fn check(&self, py: Python<'_>) -> PyResult<PythonResult> {
+        let checked = self.run_interruptible(py, None, || self.model.check())?;
+        Ok(PythonResult::new(
             &checked.json(&PythonSpelling),
-            &checked.text(Style::PLAIN),
-            Remarks::new(),
+            &checked.text(TerminalStyle::PLAIN),
+            RemarkList::new(),
         ))
     }
 
-    fn picture(
-        &self,
-        py: Python<'_>,
-        at: Vec<(String, f64)>,
-        view: Option<[f64; 2]>,
-    ) -> PyResult<String> {
-        let drawing = Drawing {
+    /// The picture of the mechanism as SVG, at given coordinates and from a direction.
+    fn picture(&self, py: Python<'_>, at: Vec<(String, f64)>, view: Option<[f64; 2]>) -> PyResult<String> {
+        let drawing = PictureOptions {
             at,
             from: view,
-            ..Drawing::default()
+            ..PictureOptions::default()
         };
-        self.work(py, None, || self.model.picture(&drawing, None))
+        self.run_interruptible(py, None, || self.model.picture(&drawing, None))
     }
 
     /// Names of the components of the reactions, and of those that are not determined.
     fn reaction_names(&self, py: Python<'_>) -> PyResult<(Vec<String>, Vec<String>)> {
-        self.work(py, None, || self.functions.reactions())
+        self.run_interruptible(py, None, || self.functions.reactions())
     }
 
-    /// A function at states, its numbers row by row and state by state, and its shape.
+    /// Evaluates a function at states. Returns its numbers state by state and row by row, and its shape.
     #[allow(clippy::too_many_arguments, reason = "each is an array of Python")]
-    fn at<'py>(
+    #[pyo3(name = "at")]
+    fn evaluate_at<'py>(
         &self,
         py: Python<'py>,
         function: &str,
@@ -320,35 +331,33 @@ impl CoreModel {
         forces: Option<PyReadonlyArray2<'py, f64>>,
         values: Vec<f64>,
     ) -> PyResult<(Bound<'py, PyArray1<f64>>, [usize; 2])> {
-        let function = named(py, function)?;
-        let given = Given {
-            q: rows(py, &q)?,
-            qd: qd.as_ref().map(|array| rows(py, array)).transpose()?,
-            qdd: qdd.as_ref().map(|array| rows(py, array)).transpose()?,
-            forces: forces.as_ref().map(|array| rows(py, array)).transpose()?,
+        let function = function_by_name(py, function)?;
+        let given = StateSamples {
+            q: state_matrix(py, &q)?,
+            qd: qd.as_ref().map(|array| state_matrix(py, array)).transpose()?,
+            qdd: qdd.as_ref().map(|array| state_matrix(py, array)).transpose()?,
+            forces: forces.as_ref().map(|array| state_matrix(py, array)).transpose()?,
         };
+        // A thread costs more time than a few states.
         let few = given.q.numbers.len() <= FEW * given.q.width;
         let functions = &self.functions;
         let job = || {
             let shape = functions.shape(function)?;
-            Ok((functions.at(function, &given, &values)?, shape))
+            Ok((functions.evaluate_at(function, &given, &values)?, shape))
         };
         let (found, shape) = if few {
-            at_once(py, job)?
+            run_blocking(py, job)?
         } else {
-            self.work(py, None, job)?
+            self.run_interruptible(py, None, job)?
         };
         Ok((PyArray1::from_vec(py, found), shape))
     }
 
-    /// A function as C for many states, and its shape.
+    /// The C source of a function for many states, and the shape of its result.
     fn vectors_c(&self, py: Python<'_>, function: &str) -> PyResult<(String, [usize; 2])> {
-        let function = named(py, function)?;
-        self.work(py, None, || {
-            Ok((
-                self.functions.vectors_c(function)?,
-                self.functions.shape(function)?,
-            ))
+        let function = function_by_name(py, function)?;
+        self.run_interruptible(py, None, || {
+            Ok((self.functions.vectors_c(function)?, self.functions.shape(function)?))
         })
     }
 
@@ -357,152 +366,157 @@ impl CoreModel {
         &self,
         py: Python<'_>,
         name: &str,
-        source: Source<'_>,
+        source: PythonSource<'_>,
         options: ReadingOptions,
         progress: Option<Bound<'_, PyAny>>,
-    ) -> PyResult<Recorded> {
-        let reading = asked(py, options.reading())?;
+    ) -> PyResult<PythonRecording> {
+        let reading = valid_options(py, options.reading())?;
         let model = &self.model;
         let recording = match source {
-            Source::Files(files) => self.work(py, progress.as_ref(), || {
+            PythonSource::Files(files) => self.run_interruptible(py, progress.as_ref(), || {
                 let files: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
                 model.recording_of(&files, &reading)
             }),
-            Source::Table(columns) => {
+            PythonSource::Table(columns) => {
                 let columns = columns.into_iter().map(|(name, values)| {
                     let values = values.as_array().iter().copied().collect();
                     (name, values)
                 });
                 let columns = columns.collect();
-                self.work(py, progress.as_ref(), || {
+                self.run_interruptible(py, progress.as_ref(), || {
                     model.recording_of_table(name, columns, &reading)
                 })
             }
         }?;
-        Ok(Recorded {
+        Ok(PythonRecording {
             recording: Arc::new(recording),
         })
     }
 
+    /// Compares measured forces with those of the model.
     fn compare(
         &self,
         py: Python<'_>,
-        data: Vec<PyRef<'_, Recorded>>,
+        data: Vec<PyRef<'_, PythonRecording>>,
         values: Vec<f64>,
         name: &str,
         progress: Option<Bound<'_, PyAny>>,
-    ) -> PyResult<Found> {
+    ) -> PyResult<PythonResult> {
         let data = recordings(&data);
-        self.work(py, progress.as_ref(), || {
-            let found = self.model.compare(&borrowed(&data), &values)?;
-            let text = found.text(name, Style::PLAIN);
+        self.run_interruptible(py, progress.as_ref(), || {
+            let found = self.model.compare(&borrow_recordings(&data), &values)?;
+            let text = found.text(name, TerminalStyle::PLAIN);
             let json = found.json(name, &PythonSpelling)?;
-            Ok(Found::new(&json, &text, remarks(&found.notes)))
+            Ok(PythonResult::new(&json, &text, remarks(&found.notes)))
         })
     }
 
+    /// Estimates the base parameters.
     #[allow(clippy::too_many_arguments, reason = "each is a keyword of Python")]
     fn identify(
         &self,
         py: Python<'_>,
-        data: Vec<PyRef<'_, Recorded>>,
-        check: Vec<PyRef<'_, Recorded>>,
+        data: Vec<PyRef<'_, PythonRecording>>,
+        check: Vec<PyRef<'_, PythonRecording>>,
         options: EstimationOptions,
-        instruments: Vec<PyRef<'_, Recorded>>,
+        instruments: Vec<PyRef<'_, PythonRecording>>,
         instrument_period: Option<f64>,
         progress: Option<Bound<'_, PyAny>>,
-    ) -> PyResult<Found> {
-        let estimation = asked(py, options.estimation())?;
+    ) -> PyResult<PythonResult> {
+        let estimation = valid_options(py, options.estimation())?;
         let (data, check) = (recordings(&data), recordings(&check));
         let instruments = recordings(&instruments);
-        self.work(py, progress.as_ref(), || {
-            let recorded = borrowed(&instruments);
+        self.run_interruptible(py, progress.as_ref(), || {
+            let recorded = borrow_recordings(&instruments);
             let instruments = match instrument_period {
                 Some(period) => Instruments::Period(period),
                 None if recorded.is_empty() => Instruments::None,
                 None => Instruments::Recordings(&recorded),
             };
-            let (data, check) = (borrowed(&data), borrowed(&check));
-            let found = self
-                .model
-                .identify_with(&data, &instruments, &check, &estimation)?;
-            let text = found.text(&self.model, Style::PLAIN, &PythonSpelling);
+            let (data, check) = (borrow_recordings(&data), borrow_recordings(&check));
+            let found = self.model.identify_with(&data, &instruments, &check, &estimation)?;
+            let text = found.text(&self.model, TerminalStyle::PLAIN, &PythonSpelling);
             let json = found.json(&self.model, &PythonSpelling)?;
-            let told = Found::new(&json, &text, remarks(&found.notes));
+            let told = PythonResult::new(&json, &text, remarks(&found.notes));
             Ok(told.with_values(found.values()))
         })
     }
 
+    /// Searches for missing effects; with `held` all parameters keep their values.
     fn diagnose(
         &self,
         py: Python<'_>,
-        data: Vec<PyRef<'_, Recorded>>,
-        check: Vec<PyRef<'_, Recorded>>,
+        data: Vec<PyRef<'_, PythonRecording>>,
+        check: Vec<PyRef<'_, PythonRecording>>,
         held: bool,
         progress: Option<Bound<'_, PyAny>>,
-    ) -> PyResult<Found> {
+    ) -> PyResult<PythonResult> {
         let (data, check) = (recordings(&data), recordings(&check));
-        let question = Question {
-            held: if held { Held::All } else { Held::Known },
-            ..Question::default()
+        let question = DiagnosisOptions {
+            fixed: if held {
+                FixedParameters::All
+            } else {
+                FixedParameters::Known
+            },
+            ..DiagnosisOptions::default()
         };
-        self.work(py, progress.as_ref(), || {
+        self.run_interruptible(py, progress.as_ref(), || {
             let found = self
                 .model
-                .diagnose(&borrowed(&data), &borrowed(&check), &question)?;
+                .diagnose(&borrow_recordings(&data), &borrow_recordings(&check), &question)?;
             let spelling = PythonSpelling;
-            let text = found.text(Style::PLAIN, &spelling).join("\n");
+            let text = found.text(TerminalStyle::PLAIN, &spelling).join("\n");
+            // The model with the effects that were found.
             let better = match found.entries.as_slice() {
                 [] => None,
-                entries => Some(self.like(self.model.with(entries)?)),
+                entries => Some(self.with_same_host(self.model.with_added_effects(entries)?)),
             };
-            Ok(
-                Found::new(&found.json(&spelling), &text, remarks(&found.notes))
-                    .with_page(page(&found, &spelling)?)
-                    .with_model(better),
-            )
+            Ok(PythonResult::new(&found.json(&spelling), &text, remarks(&found.notes))
+                .with_page(page(&found, &spelling)?)
+                .with_model(better))
         })
     }
 
-    /// Several runs against the first; `unread` are those that could not be read, with the place among all, name and reason.
+    /// Compares runs with the first one; `unread` are those that could not be read, with index, name and reason.
     fn runs(
         &self,
         py: Python<'_>,
-        data: Vec<PyRef<'_, Recorded>>,
+        data: Vec<PyRef<'_, PythonRecording>>,
         unread: Vec<(usize, String, String)>,
         per_run: Vec<String>,
         loads: Vec<String>,
         progress: Option<Bound<'_, PyAny>>,
-    ) -> PyResult<Found> {
-        let what = asked(py, options::asked(&per_run, &loads))?;
-        let mut all: Vec<Result<Arc<Recording>, Unread>> =
-            recordings(&data).into_iter().map(Ok).collect();
+    ) -> PyResult<PythonResult> {
+        let what = valid_options(py, options::runs_options(&per_run, &loads))?;
+        let mut all: Vec<Result<Arc<PreparedRecording>, UnreadRun>> = recordings(&data).into_iter().map(Ok).collect();
+        // Runs that could not be read keep their places in the sequence.
         for (place, file, says) in unread {
             let error = Error::input(says);
-            all.insert(place.min(all.len()), Err(Unread { file, error }));
+            all.insert(place.min(all.len()), Err(UnreadRun { file, error }));
         }
-        self.work(py, progress.as_ref(), || {
+        self.run_interruptible(py, progress.as_ref(), || {
             let found = self.model.runs(all, &what)?;
-            let text = found.text(Style::PLAIN, &PythonSpelling);
+            let text = found.text(TerminalStyle::PLAIN, &PythonSpelling);
             let json = found.json(&PythonSpelling);
-            let told = Found::new(&json, &text, remarks(&found.notes));
+            let told = PythonResult::new(&json, &text, remarks(&found.notes));
             Ok(told.with_page(runs_page(&found, &PythonSpelling)))
         })
     }
 
+    /// Plans a trajectory; with recordings it distinguishes an effect from others.
     fn excite(
         &self,
         py: Python<'_>,
         options: ExcitationOptions,
-        data: Vec<PyRef<'_, Recorded>>,
+        data: Vec<PyRef<'_, PythonRecording>>,
         progress: Option<Bound<'_, PyAny>>,
-    ) -> PyResult<Excited> {
-        let request = asked(py, options.request())?;
+    ) -> PyResult<PythonExcitation> {
+        let request = valid_options(py, options.request())?;
         let data = recordings(&data);
-        let found = self.work(py, progress.as_ref(), || {
-            self.model.excite(&request, &borrowed(&data))
+        let found = self.run_interruptible(py, progress.as_ref(), || {
+            self.model.excite(&request, &borrow_recordings(&data))
         })?;
-        Ok(Excited { found })
+        Ok(PythonExcitation { found })
     }
 
     /// The model with an effect; settings are values, or names of parameters.
@@ -516,19 +530,19 @@ impl CoreModel {
     ) -> PyResult<Self> {
         let values = values
             .into_iter()
-            .map(|(symbol, value)| (symbol, Said::Value(value)));
+            .map(|(symbol, value)| (symbol, SettingValue::Value(value)));
         let names = names
             .into_iter()
-            .map(|(symbol, name)| (symbol, Said::Name(name)));
+            .map(|(symbol, name)| (symbol, SettingValue::Name(name)));
         let settings = values.chain(names);
-        let settings: Vec<Setting> = settings
-            .map(|(symbol, said)| Setting { symbol, said })
+        let settings: Vec<EffectSetting> = settings
+            .map(|(symbol, value)| EffectSetting { symbol, value })
             .collect();
-        let model = self.work(py, None, || {
+        let model = self.run_interruptible(py, None, || {
             let effect = new_effect(&self.model.loaded.kinds, kind, &at, &settings)?;
-            self.model.with(&[effect])
+            self.model.with_added_effects(&[effect])
         })?;
-        Ok(self.like(model))
+        Ok(self.with_same_host(model))
     }
 
     /// The model with other values of its base parameters.
@@ -538,14 +552,14 @@ impl CoreModel {
                 "{} finite values are expected, one for each base parameter",
                 self.model.base.len()
             );
-            return Err(refused(py, &says));
+            return Err(input_error(py, &says));
         }
-        Ok(self.like(self.model.with_values(&values)))
+        Ok(self.with_same_host(self.model.with_values(&values)))
     }
 
     /// Values of a fit that `identify` wrote to a file.
-    fn values_of_fit(&self, py: Python<'_>, path: PathBuf) -> PyResult<(Vec<f64>, Remarks)> {
-        let found = at_once(py, || {
+    fn values_of_fit(&self, py: Python<'_>, path: PathBuf) -> PyResult<(Vec<f64>, RemarkList)> {
+        let found = run_blocking(py, || {
             let fit = self.model.host().fit(&path)?;
             self.model.values_of(&fit, &path.display().to_string())
         })?;
@@ -553,79 +567,72 @@ impl CoreModel {
     }
 
     /// Physical parameters from a fit, which is a text with a name or the path of a file.
-    fn interpret(
-        &self,
-        py: Python<'_>,
-        fit: Option<&str>,
-        name: &str,
-        unknown: Vec<String>,
-    ) -> PyResult<Found> {
-        self.work(py, None, || {
-            let found = self
-                .model
-                .interpret(&self.fit(fit, name)?, name, &unknown)?;
-            let text = found.text(Style::PLAIN, &PythonSpelling);
-            Ok(Found::new(&found.json(), &text, remarks(&found.notes)))
+    fn interpret(&self, py: Python<'_>, fit: Option<&str>, name: &str, unknown: Vec<String>) -> PyResult<PythonResult> {
+        self.run_interruptible(py, None, || {
+            let found = self.model.interpret(&self.fit(fit, name)?, name, &unknown)?;
+            let text = found.text(TerminalStyle::PLAIN, &PythonSpelling);
+            Ok(PythonResult::new(&found.json(), &text, remarks(&found.notes)))
         })
     }
 
-    /// The model with a fit in its file, and remarks.
-    fn adopt(&self, py: Python<'_>, fit: Option<&str>, name: &str) -> PyResult<(Self, Remarks)> {
-        let (model, notes) = self.work(py, None, || {
+    /// The model with the values of a fit in its file, and remarks.
+    fn adopt(&self, py: Python<'_>, fit: Option<&str>, name: &str) -> PyResult<(Self, RemarkList)> {
+        let (model, notes) = self.run_interruptible(py, None, || {
             let adoption = self.model.adopt(&self.fit(fit, name)?, name)?;
             let host = self.model.host();
             let model = host.derive(&self.model.path, adoption.loaded)?;
             Ok((model, remarks(&adoption.notes)))
         })?;
-        Ok((self.like(model), notes))
+        Ok((self.with_same_host(model), notes))
     }
 
-    /// A robot description of the model, with the physical parameters of a fit if there is one; and remarks.
+    /// A robot description of the model, with the physical parameters of a fit if given, and remarks.
     fn export(
         &self,
         py: Python<'_>,
         format: &str,
         fit: Option<&str>,
         name: Option<&str>,
-    ) -> PyResult<(String, Remarks)> {
+    ) -> PyResult<(String, RemarkList)> {
         let mut formats = export::Format::ALL.into_iter();
         let Some(format) = formats.find(|one| one.name() == format) else {
             let known = export::Format::ALL.map(export::Format::name).join(", ");
             let says = format!("format={format:?}: expected one of {known}");
-            return Err(refused(py, &says));
+            return Err(input_error(py, &says));
         };
-        self.work(py, None, || {
+        self.run_interruptible(py, None, || {
             let fit = name.map(|name| self.fit(fit, name)).transpose()?;
             let exported = self.model.export(format, fit.as_ref().zip(name))?;
             Ok((exported.text, remarks(&exported.notes)))
         })
     }
 
-    /// What another model changes; along recordings, as both read them, what that costs.
+    /// Changes from this model to another one; with recordings also changes of force, power and error along them.
     fn diff(
         &self,
         py: Python<'_>,
         other: PyRef<'_, Self>,
-        data: Vec<PyRef<'_, Recorded>>,
-        other_data: Vec<PyRef<'_, Recorded>>,
+        data: Vec<PyRef<'_, PythonRecording>>,
+        other_data: Vec<PyRef<'_, PythonRecording>>,
         progress: Option<Bound<'_, PyAny>>,
-    ) -> PyResult<Found> {
+    ) -> PyResult<PythonResult> {
         let models = [&self.model, &other.model.clone()];
         let runs = [recordings(&data), recordings(&other_data)];
-        self.work(py, progress.as_ref(), || {
+        self.run_interruptible(py, progress.as_ref(), || {
+            // Changes of the text and the equations, then those along recordings.
             let [before, after] = models;
-            let changes = Changes::between(before, after);
+            let changes = ModelChanges::from_models(before, after);
             let mut object = changes.json(before, after);
-            let mut text = changes.text(before, after, Style::PLAIN);
-            let mut notes = Remarks::new();
+            let mut text = changes.text(before, after, TerminalStyle::PLAIN);
+            let mut notes = RemarkList::new();
             if !runs[0].is_empty() {
-                let [first, second] = [&runs[0], &runs[1]].map(|runs| borrowed(runs));
-                let variants = Variants::along(models, [&first, &second])?;
+                let [first, second] = [&runs[0], &runs[1]].map(|runs| borrow_recordings(runs));
+                let variants = VariantComparison::along_recordings(models, [&first, &second])?;
                 object["along"] = variants.json(&PythonSpelling);
-                text = format!("{text}\n\n{}", variants.text(Style::PLAIN));
+                text = format!("{text}\n\n{}", variants.text(TerminalStyle::PLAIN));
                 notes = remarks(&variants.notes);
             }
-            Ok(Found::new(&object, &text, notes))
+            Ok(PythonResult::new(&object, &text, notes))
         })
     }
 
@@ -638,44 +645,38 @@ impl CoreModel {
         reactions: bool,
         self_test: bool,
     ) -> PyResult<Vec<(String, String)>> {
-        let Some(language) = Language::named(language) else {
-            let known: Vec<&str> = Language::all().map(Language::name).collect();
-            let says = format!(
-                "language={language:?}: expected one of {}",
-                known.join(", ")
-            );
-            return Err(refused(py, &says));
+        let Some(language) = CodeLanguage::from_name(language) else {
+            let known: Vec<&str> = CodeLanguage::all().map(CodeLanguage::name).collect();
+            let says = format!("language={language:?}: expected one of {}", known.join(", "));
+            return Err(input_error(py, &says));
         };
-        let code = Code {
+        let code = CodeOptions {
             language,
             dynamics,
             reactions,
             self_test,
         };
-        let files = self.work(py, None, || self.model.generate(&code))?;
-        Ok(files
-            .into_iter()
-            .map(|file| (file.path, file.text))
-            .collect())
+        let files = self.run_interruptible(py, None, || self.model.generate(&code))?;
+        Ok(files.into_iter().map(|file| (file.path, file.text)).collect())
     }
 }
 
-/// What a log holds, before a model reads it.
+/// Contents of a log, independent of a model.
 #[pyfunction]
-pub(crate) fn contents(py: Python<'_>, path: PathBuf) -> PyResult<Found> {
-    let (host, listener) = host(Vec::new(), false);
-    let found = work(py, &listener, None, || host.recordings(&path))?;
-    Ok(Found::new(
+pub(crate) fn contents(py: Python<'_>, path: PathBuf) -> PyResult<PythonResult> {
+    let (host, listener) = new_host(Vec::new(), false);
+    let found = run_interruptible(py, &listener, None, || host.recordings(&path))?;
+    Ok(PythonResult::new(
         &found.json(),
-        &found.text(Style::PLAIN),
-        Remarks::new(),
+        &found.text(TerminalStyle::PLAIN),
+        RemarkList::new(),
     ))
 }
 
 /// Kinds of effects that a model may have: name and description.
 #[pyfunction]
 pub(crate) fn kinds(py: Python<'_>, libraries: Vec<PathBuf>) -> PyResult<String> {
-    let (host, _) = host(libraries, false);
-    let kinds = at_once(py, || host.kinds())?;
+    let (host, _) = new_host(libraries, false);
+    let kinds = run_blocking(py, || host.kinds())?;
     Ok(print::effects::json(&kinds).to_string())
 }

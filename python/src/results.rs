@@ -1,10 +1,10 @@
-//! What verbs found: JSON as the program writes it, text, pages; and recordings that were read.
+//! Results of methods as JSON (the same as the program prints), text and pages; and prepared recordings.
 
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use modelmill::recording::Recording;
-use modelmill::{Note, Severity};
+use modelmill::recording::PreparedRecording;
+use modelmill::{NoteSeverity, RecordingNote};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use serde_json::Value;
@@ -12,49 +12,57 @@ use serde_json::Value;
 use crate::model::CoreModel;
 use crate::spelling::PythonSpelling;
 
-/// Remarks: severity and text.
-pub(crate) type Remarks = Vec<(&'static str, String)>;
+/// Remarks, each with severity and text.
+pub(crate) type RemarkList = Vec<(&'static str, String)>;
 
-pub(crate) fn remarks<'a>(notes: impl IntoIterator<Item = &'a Note>) -> Remarks {
-    let one = |note: &Note| {
+/// Notes of the library in the spelling of Python.
+pub(crate) fn remarks<'a>(notes: impl IntoIterator<Item = &'a RecordingNote>) -> RemarkList {
+    let one = |note: &RecordingNote| {
         let severity = match note.severity {
-            Severity::Warning => "warning",
-            Severity::Info => "info",
+            NoteSeverity::Warning => "warning",
+            NoteSeverity::Info => "info",
         };
         (severity, note.says.spell(&PythonSpelling))
     };
     notes.into_iter().map(one).collect()
 }
 
-/// Where a recording comes from: files of one run, or columns with their names.
+/// The source of a recording: files of one run, or named columns.
 #[derive(FromPyObject)]
-pub(crate) enum Source<'py> {
+pub(crate) enum PythonSource<'py> {
+    /// Paths of files.
     Files(Vec<PathBuf>),
+    /// Names and values of columns, in SI units.
     Table(Vec<(String, PyReadonlyArray1<'py, f64>)>),
 }
 
 /// A recording that was read and prepared for a model.
-#[pyclass(frozen)]
-pub(crate) struct Recorded {
-    pub(crate) recording: Arc<Recording>,
+#[pyclass(frozen, name = "Recording")]
+pub(crate) struct PythonRecording {
+    /// The recording of the library.
+    pub(crate) recording: Arc<PreparedRecording>,
 }
 
 #[pymethods]
-impl Recorded {
+impl PythonRecording {
+    /// Path of the file, or the name of the table.
     #[getter]
     fn file(&self) -> String {
         self.recording.file().to_owned()
     }
 
+    /// Remarks of the preparation.
     #[getter]
-    fn notes(&self) -> Remarks {
+    fn notes(&self) -> RemarkList {
         remarks(self.recording.notes())
     }
 
     /// Times of the prepared samples, then one list per coordinate of positions, rates, accelerations, then forces.
-    fn prepared<'py>(&self, py: Python<'py>) -> Prepared<'py> {
-        let runs = || self.recording.stretches.iter().map(|stretch| &stretch.run);
-        let joined = |of: &dyn Fn(&modelmill::recording::Run) -> &[Vec<f64>]| {
+    #[pyo3(name = "prepared")]
+    fn prepared_arrays<'py>(&self, py: Python<'py>) -> PreparedArrays<'py> {
+        let runs = || self.recording.segments.iter().map(|segment| &segment.run);
+        // Each column over all segments.
+        let joined = |of: &dyn Fn(&modelmill::recording::PreparedRun) -> &[Vec<f64>]| {
             let width = runs().next().map_or(0, |run| of(run).len());
             let column = |k: usize| {
                 let values = runs().flat_map(|run| of(run)[k].iter().copied());
@@ -72,31 +80,37 @@ impl Recorded {
     }
 }
 
-type Columns<'py> = Vec<Bound<'py, PyArray1<f64>>>;
-type Prepared<'py> = (
+/// One array for each coordinate or drive.
+type ArrayColumns<'py> = Vec<Bound<'py, PyArray1<f64>>>;
+/// Times, then columns of positions, rates and accelerations.
+type PreparedArrays<'py> = (
     Bound<'py, PyArray1<f64>>,
-    Columns<'py>,
-    Columns<'py>,
-    Columns<'py>,
+    ArrayColumns<'py>,
+    ArrayColumns<'py>,
+    ArrayColumns<'py>,
 );
 
-/// What a verb found.
-#[pyclass(frozen)]
+/// The result of a method.
+#[pyclass(frozen, name = "Result")]
 #[derive(Default)]
-pub(crate) struct Found {
-    /// As the program prints it with `--json`.
+pub(crate) struct PythonResult {
+    /// The JSON that the program prints with `--json`.
     json: String,
+    /// The text that the program prints.
     text: String,
-    /// One page of it, where there is one.
+    /// The HTML page, if the method has one.
     page: Option<String>,
-    notes: Remarks,
+    /// Remarks.
+    notes: RemarkList,
+    /// Values of the base parameters, if there are any.
     values: Vec<f64>,
-    /// The model with what was found.
+    /// The model with the result, for example with the effects that a diagnosis found.
     model: Option<CoreModel>,
 }
 
-impl Found {
-    pub(crate) fn new(json: &Value, text: &str, notes: Remarks) -> Self {
+impl PythonResult {
+    /// A result with JSON, text and remarks.
+    pub(crate) fn new(json: &Value, text: &str, notes: RemarkList) -> Self {
         Self {
             json: json.to_string(),
             text: text.to_owned(),
@@ -105,16 +119,19 @@ impl Found {
         }
     }
 
+    /// The result with an HTML page.
     pub(crate) fn with_page(mut self, page: String) -> Self {
         self.page = Some(page);
         self
     }
 
+    /// The result with values of the base parameters.
     pub(crate) fn with_values(mut self, values: Vec<f64>) -> Self {
         self.values = values;
         self
     }
 
+    /// The result with a model.
     pub(crate) fn with_model(mut self, model: Option<CoreModel>) -> Self {
         self.model = model;
         self
@@ -122,79 +139,88 @@ impl Found {
 }
 
 #[pymethods]
-impl Found {
+impl PythonResult {
+    /// The JSON that the program prints with `--json`.
     #[getter]
     fn json(&self) -> &str {
         &self.json
     }
 
+    /// The text that the program prints.
     #[getter]
     fn text(&self) -> &str {
         &self.text
     }
 
+    /// The HTML page, if there is one.
     #[getter]
     fn page(&self) -> Option<&str> {
         self.page.as_deref()
     }
 
+    /// Remarks, each with severity and text.
     #[getter]
-    fn notes(&self) -> Remarks {
+    fn notes(&self) -> RemarkList {
         self.notes.clone()
     }
 
+    /// Values of the base parameters; empty if there are none.
     #[getter]
     fn values<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_slice(py, &self.values)
     }
 
+    /// The model with the result, if there is one.
     #[getter]
     fn model(&self) -> Option<CoreModel> {
         self.model.clone()
     }
 }
 
-/// A trajectory that was found.
-#[pyclass(frozen)]
-pub(crate) struct Excited {
-    pub(crate) found: modelmill::excite::Excited,
+/// A planned trajectory.
+#[pyclass(frozen, name = "Excitation")]
+pub(crate) struct PythonExcitation {
+    /// The result of the library.
+    pub(crate) found: modelmill::excite::ExcitationResult,
 }
 
 #[pymethods]
-impl Excited {
+impl PythonExcitation {
+    /// All figures as JSON.
     #[getter]
     fn json(&self) -> String {
         self.found.json().to_string()
     }
 
+    /// The figures as text.
     #[getter]
     fn text(&self) -> String {
-        let plain = modelmill::text::style::Style::PLAIN;
+        let plain = modelmill::text::style::TerminalStyle::PLAIN;
         self.found.text(plain, &PythonSpelling)
     }
 
+    /// Remarks, each with severity and text.
     #[getter]
-    fn notes(&self) -> Remarks {
+    fn notes(&self) -> RemarkList {
         remarks(&self.found.notes)
     }
 
+    /// The picture of the trajectory as SVG.
     #[getter]
     fn picture(&self) -> &str {
         &self.found.picture
     }
 
+    /// The trajectory as CSV.
     #[getter]
     fn csv(&self) -> String {
         self.found.csv()
     }
 
     /// Times, then positions, rates and accelerations, a list per coordinate.
-    fn motion<'py>(&self, py: Python<'py>) -> Prepared<'py> {
-        let all = |columns: &[Vec<f64>]| -> Columns<'py> {
-            columns
-                .iter()
-                .map(|column| PyArray1::from_slice(py, column))
-                .collect()
+    fn motion<'py>(&self, py: Python<'py>) -> PreparedArrays<'py> {
+        let all = |columns: &[Vec<f64>]| -> ArrayColumns<'py> {
+            columns.iter().map(|column| PyArray1::from_slice(py, column)).collect()
         };
         let motion = &self.found.motion;
         (

@@ -1,4 +1,4 @@
-//! Whole machines in numbers: their recordings, and the models that they reduce to.
+//! Rigs, numeric models of complete machines: simulated recordings, and the reduction to planar models.
 
 use std::path::PathBuf;
 
@@ -7,18 +7,20 @@ use numpy::PyArray1;
 use pyo3::prelude::*;
 use serde_json::json;
 
-use crate::model::host;
-use crate::results::{Found, Remarks};
-use crate::work::work;
+use crate::model::new_host;
+use crate::results::{PythonResult, RemarkList};
+use crate::work::run_interruptible;
 
-/// What the sensors of a rig read.
-#[pyclass(frozen)]
-pub(crate) struct Simulated {
-    made: modelmill::simulate::Simulated,
+/// The recording of a simulated rig.
+#[pyclass(frozen, name = "Simulation")]
+pub(crate) struct PythonSimulation {
+    /// The simulation of the library.
+    made: modelmill::simulate::RigSimulation,
 }
 
 #[pymethods]
-impl Simulated {
+impl PythonSimulation {
+    /// Rig, number of samples, seed, columns and notes as JSON.
     #[getter]
     fn json(&self) -> String {
         let made = &self.made;
@@ -34,6 +36,7 @@ impl Simulated {
         .to_string()
     }
 
+    /// The simulation in one line.
     #[getter]
     fn text(&self) -> String {
         let made = &self.made;
@@ -42,17 +45,20 @@ impl Simulated {
         format!("{}: {samples} of {drives}, seed {}", made.rig, made.seed)
     }
 
+    /// Remarks, each with severity and text.
     #[getter]
-    fn notes(&self) -> Remarks {
+    fn notes(&self) -> RemarkList {
         let notes = self.made.notes.iter();
         notes.map(|says| ("info", says.clone())).collect()
     }
 
+    /// The recording as CSV.
     #[getter]
     fn csv(&self) -> String {
         self.made.csv()
     }
 
+    /// Names and values of the columns, in SI units.
     fn columns<'py>(&self, py: Python<'py>) -> Vec<(String, Bound<'py, PyArray1<f64>>)> {
         let columns = self.made.run.columns.iter();
         columns
@@ -61,7 +67,7 @@ impl Simulated {
     }
 }
 
-/// Drives a rig along a trajectory.
+/// Simulates a rig along a trajectory.
 #[pyfunction]
 pub(crate) fn simulate(
     py: Python<'_>,
@@ -70,30 +76,28 @@ pub(crate) fn simulate(
     columns: Vec<(String, String)>,
     seed: Option<u64>,
     progress: Option<Bound<'_, PyAny>>,
-) -> PyResult<Simulated> {
-    let (host, listener) = host(Vec::new(), false);
-    let made = work(py, &listener, progress.as_ref(), || {
+) -> PyResult<PythonSimulation> {
+    let (host, listener) = new_host(Vec::new(), false);
+    let made = run_interruptible(py, &listener, progress.as_ref(), || {
         host.simulate(&rig, &trajectory, &columns, seed)
     })?;
-    Ok(Simulated { made })
+    Ok(PythonSimulation { made })
 }
 
-/// Reduces a rig to a planar model: what was assumed, and the text of the model file.
+/// Reduces a rig to a planar model. Returns the report on all assumptions, and the text of the model file.
 #[pyfunction]
 pub(crate) fn reduce(
     py: Python<'_>,
     rig: PathBuf,
     plan: Option<PathBuf>,
     progress: Option<Bound<'_, PyAny>>,
-) -> PyResult<(Found, String)> {
-    let (host, listener) = host(Vec::new(), false);
-    let reduced = work(py, &listener, progress.as_ref(), || {
-        host.reduce(&rig, plan.as_deref())
-    })?;
+) -> PyResult<(PythonResult, String)> {
+    let (host, listener) = new_host(Vec::new(), false);
+    let reduced = run_interruptible(py, &listener, progress.as_ref(), || host.reduce(&rig, plan.as_deref()))?;
     let mut object = reduced.json("");
     if let Some(object) = object.as_object_mut() {
         object.shift_remove("out");
     }
-    let found = Found::new(&object, &reduced.text(), Remarks::new());
+    let found = PythonResult::new(&object, &reduced.text(), RemarkList::new());
     Ok((found, reduced.reduction.model))
 }

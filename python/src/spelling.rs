@@ -1,14 +1,14 @@
-//! How a notebook asks for what the library advises.
+//! Spelling of the library's advice for Python: options as keywords, commands as methods.
 
 use std::fmt::Write as _;
 
 use modelmill::Model;
-use modelmill::diagnose::{Named, Separation};
+use modelmill::diagnose::{NamedEffect, SeparationProposal};
 use modelmill::edit::NewEffect;
 use modelmill::print::{CommandName, OptionName, OptionSetting, RemedySpelling, StepSpelling};
 use pyo3::prelude::*;
 
-/// Keywords, and calls of methods of a model `m`.
+/// Spells advice as keywords and as calls of methods of a model `m`.
 pub(crate) struct PythonSpelling;
 
 impl RemedySpelling for PythonSpelling {
@@ -38,19 +38,19 @@ impl StepSpelling for PythonSpelling {
         "m.identify(data)".to_owned()
     }
 
-    fn spell_separation(&self, _: &Model, separation: &Separation) -> Option<String> {
-        let mut call = format!("m.excite(separate={:?}", named(&separation.effect));
+    fn spell_separation(&self, _: &Model, separation: &SeparationProposal) -> Option<String> {
+        let mut call = format!("m.excite(separate={:?}", effect_argument(&separation.effect));
         let rivals = separation.rivals.iter().map(|effect| {
             let effect = effect.clone();
-            named(&Named {
+            effect_argument(&NamedEffect {
                 effect,
                 values: Vec::new(),
             })
         });
         let list = |all: Vec<String>| format!("{all:?}");
         let _ = write!(call, ", apart_from={}", list(rivals.collect()));
-        if !separation.beside.is_empty() {
-            let beside = separation.beside.iter().map(named).collect();
+        if !separation.common_effects.is_empty() {
+            let beside = separation.common_effects.iter().map(effect_argument).collect();
             let _ = write!(call, ", beside={}", list(beside));
         }
         if let Some(noise) = separation.noise {
@@ -60,6 +60,7 @@ impl StepSpelling for PythonSpelling {
     }
 }
 
+/// The places of an effect as an argument: a text for one, a list for several.
 fn places(at: &[String]) -> String {
     match at {
         [one] => format!("{one:?}"),
@@ -67,8 +68,8 @@ fn places(at: &[String]) -> String {
     }
 }
 
-/// An effect as `excite` takes it: `kind@place,place:name=value`.
-fn named(effect: &Named) -> String {
+/// An effect as an argument of `excite`: `kind@place,place:name=value`.
+fn effect_argument(effect: &NamedEffect) -> String {
     let mut text = format!("{}@{}", effect.effect.kind, effect.effect.at.join(","));
     for (name, value) in &effect.values {
         let _ = write!(text, ":{name}={value}");
@@ -76,14 +77,15 @@ fn named(effect: &Named) -> String {
     text
 }
 
-/// What an option of the library is in Python.
+/// The name of an option of the library in Python.
 enum PythonName {
     /// A keyword of a function or method.
     Keyword(&'static str),
-    /// A method of its own, which takes the value.
+    /// A separate method, with the value as argument.
     Method(&'static str),
 }
 
+/// The keyword or method of an option.
 fn spelled_option(option: OptionName) -> PythonName {
     match option {
         OptionName::From => PythonName::Keyword("apart_from"),
@@ -93,6 +95,7 @@ fn spelled_option(option: OptionName) -> PythonName {
     }
 }
 
+/// The method of a command.
 fn method_of_command(command: CommandName) -> &'static str {
     match command {
         CommandName::Evaluate => "inverse_dynamics",
@@ -130,10 +133,7 @@ fn argument(setting: &OptionSetting) -> String {
 #[pyfunction]
 pub(crate) fn advised_names() -> (Vec<&'static str>, Vec<&'static str>) {
     let mut keywords = Vec::new();
-    let mut methods: Vec<&str> = CommandName::ALL
-        .iter()
-        .map(|c| method_of_command(*c))
-        .collect();
+    let mut methods: Vec<&str> = CommandName::ALL.iter().map(|c| method_of_command(*c)).collect();
     for option in OptionName::ALL {
         match spelled_option(*option) {
             PythonName::Keyword(keyword) => keywords.push(keyword),

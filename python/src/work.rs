@@ -1,5 +1,5 @@
-//! Long work beside Python: the interpreter lock is given back, an interrupt stops the work, progress is told, and a panic becomes
-//! an exception.
+//! Runs long work in a separate thread: the interpreter lock is released, an interrupt stops the work, progress is
+//! reported, and a panic becomes an exception.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -9,87 +9,94 @@ use std::thread;
 use std::time::Duration;
 
 use modelmill::Outcome;
-use modelmill::progress::{Job, Progress};
+use modelmill::progress::{JobHandle, ProgressListener};
 use pyo3::prelude::*;
 
-use crate::errors::{of_library, refused};
+use crate::errors::{input_error, library_error};
 
-/// How often an interrupt is looked for and progress is told.
+/// Interval at which interrupts are checked and progress is reported.
 const TICK: Duration = Duration::from_millis(50);
 
-/// Hears which jobs of a model go on, and stops them.
+/// Listens to the running jobs of a model, and cancels them on request.
 #[derive(Default)]
-pub(crate) struct Listener(Mutex<Heard>);
+pub(crate) struct JobListener(Mutex<ListenerState>);
 
+/// The state of a listener.
 #[derive(Default)]
-struct Heard {
-    jobs: Vec<(String, usize, Arc<Job>)>,
+struct ListenerState {
+    /// Running jobs, the last one started last: name, number of steps, handle.
+    jobs: Vec<(String, usize, Arc<JobHandle>)>,
+    /// Whether jobs are cancelled, also those that start later.
     stops: bool,
 }
 
-impl Progress for Listener {
-    fn begins(&self, what: &str, total: usize, job: &Arc<Job>) {
-        let mut heard = self.heard();
+impl ProgressListener for JobListener {
+    fn on_job_start(&self, what: &str, total: usize, job: &Arc<JobHandle>) {
+        let mut heard = self.lock_state();
         if heard.stops {
             job.cancel();
         }
         heard.jobs.push((what.to_owned(), total, Arc::clone(job)));
     }
 
-    fn ends(&self) {
-        self.heard().jobs.pop();
+    fn on_job_end(&self) {
+        self.lock_state().jobs.pop();
     }
 }
 
-impl Listener {
-    fn heard(&self) -> MutexGuard<'_, Heard> {
-        // What a panic leaves behind is a list of jobs, which is as good as before.
+impl JobListener {
+    /// Access to the state.
+    fn lock_state(&self) -> MutexGuard<'_, ListenerState> {
+        // A panic of another thread leaves a valid list of jobs.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Cancels all jobs, also those that start later.
     fn stop(&self) {
-        let mut heard = self.heard();
+        let mut heard = self.lock_state();
         heard.stops = true;
         for (_, _, job) in &heard.jobs {
             job.cancel();
         }
     }
 
-    fn forget(&self) {
-        *self.heard() = Heard::default();
+    /// Forgets all jobs and permits new ones.
+    fn reset(&self) {
+        *self.lock_state() = ListenerState::default();
     }
 
-    /// The job that began last: what it is, steps done, steps in all (0 if nobody knows).
-    fn now(&self) -> Option<(String, u64, usize)> {
-        let heard = self.heard();
+    /// The job that started last: its name, steps done, number of steps (0 if unknown).
+    fn current_job(&self) -> Option<(String, u64, usize)> {
+        let heard = self.lock_state();
         let (what, total, job) = heard.jobs.last()?;
         Some((what.clone(), job.done(), *total))
     }
 }
 
-/// Does work in a thread of its own while this one listens for interrupts and tells `progress` what goes on:
-/// `progress(what, done, total)`.
-pub(crate) fn work<T: Send>(
+/// Runs work in a separate thread, while this one checks for interrupts and reports progress by `progress(what, done,
+/// total)`.
+pub(crate) fn run_interruptible<T: Send>(
     py: Python<'_>,
-    listener: &Listener,
+    listener: &JobListener,
     progress: Option<&Bound<'_, PyAny>>,
     work: impl FnOnce() -> Outcome<T> + Send,
 ) -> PyResult<T> {
     let (sender, mut receiver) = channel::<()>();
     let (found, stopped) = thread::scope(|scope| {
+        // The work runs in another thread.
         let worker = scope.spawn(move || {
-            // Dropped at the end, however it comes.
+            // Dropped when the work ends, also by a panic; this wakes the waiting thread.
             let _ends = sender;
             work()
         });
         let mut stopped: Option<PyErr> = None;
         loop {
             let receiver = &mut receiver;
-            let Err(RecvTimeoutError::Timeout) = py.detach(move || receiver.recv_timeout(TICK))
-            else {
+            let Err(RecvTimeoutError::Timeout) = py.detach(move || receiver.recv_timeout(TICK)) else {
                 break;
             };
-            let told = match (progress, listener.now()) {
+            // Progress is reported until the work is stopped.
+            let told = match (progress, listener.current_job()) {
                 (Some(progress), Some(now)) if stopped.is_none() => progress.call1(now).map(|_| ()),
                 _ => Ok(()),
             };
@@ -100,34 +107,32 @@ pub(crate) fn work<T: Send>(
         }
         (worker.join(), stopped)
     });
+    // The next call must not be cancelled.
     if stopped.is_some() {
-        listener.forget();
+        listener.reset();
     }
     match (stopped, found) {
         (Some(error), _) => Err(error),
-        (None, Ok(found)) => found.map_err(|error| of_library(py, &error)),
-        (None, Err(panic)) => Err(of_panic(py, &*panic)),
+        (None, Ok(found)) => found.map_err(|error| library_error(py, &error)),
+        (None, Err(panic)) => Err(panic_error(py, &*panic)),
     }
 }
 
-/// Does short work in this thread.
-pub(crate) fn at_once<T: Send>(
-    py: Python<'_>,
-    work: impl FnOnce() -> Outcome<T> + Send,
-) -> PyResult<T> {
+/// Runs short work in this thread.
+pub(crate) fn run_blocking<T: Send>(py: Python<'_>, work: impl FnOnce() -> Outcome<T> + Send) -> PyResult<T> {
     match catch_unwind(AssertUnwindSafe(work)) {
-        Ok(found) => found.map_err(|error| of_library(py, &error)),
-        Err(panic) => Err(of_panic(py, &*panic)),
+        Ok(found) => found.map_err(|error| library_error(py, &error)),
+        Err(panic) => Err(panic_error(py, &*panic)),
     }
 }
 
-/// A panic is a defect of the library.
-fn of_panic(py: Python<'_>, panic: &(dyn Any + Send)) -> PyErr {
+/// The exception for a panic, which is a defect of the library.
+fn panic_error(py: Python<'_>, panic: &(dyn Any + Send)) -> PyErr {
     let said = panic.downcast_ref::<&str>().copied();
     let said = said.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
     let says = format!(
-        "modelmill met a defect of its own: {}. Please report it with the model file and the call.",
+        "internal error of modelmill: {}. Please report it with the model file and the call.",
         said.unwrap_or("no message")
     );
-    refused(py, &says)
+    input_error(py, &says)
 }

@@ -170,7 +170,7 @@ def test_what_does_not_add_is_told(model: modelmill.Model, plan: str, tmp_path: 
             fleet.merge([broken])
     with pytest.raises(ValueError, match="no summaries"):
         fleet.merge([])
-    with pytest.raises(ModelmillError, match="no plan"):
+    with pytest.raises(ModelmillError, match="not a plan"):
         fleet.columns("{}")
     with pytest.raises(ModelmillError, match="nowhere"):
         fleet.plan(MODEL, [tmp_path / "nowhere.csv"])

@@ -123,7 +123,7 @@ def test_options_that_make_no_sense_are_told(m: modelmill.Model) -> None:
         ({"order": 99}, "order=99"),
         ({"cutoff_hz": "fast"}, "a number"),
         ({"trim": (1, 2, 3)}, "a number of samples"),
-        ({"decimate": 1.5}, "a whole number"),
+        ({"decimate": 1.5}, "an integer"),
         ({"smoothing": "boxcar"}, "savitzky_golay"),
         ({"source": "files"}, "positions"),
         ({"between": (3.0, 1.0)}, "between"),

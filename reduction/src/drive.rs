@@ -1,58 +1,62 @@
-//! Step 4: drives of the rig on the reduced model, and how far their lengths and directions are from the true ones.
+//! Step 4: compares the linear drives of the reduced model with those of the rig. Contact points go in; the errors of
+//! length and direction along the samples come out.
 
-use modelmill_rig::Anchor;
+use modelmill_rig::BodyAnchor;
 use nalgebra::Vector2;
 
-use crate::part::Part;
-use crate::report::{Report, Size};
-use crate::samples::{Moment, Plane, Samples};
+use crate::part::SubstitutionPart;
+use crate::report::{AssumptionSize, ReductionReport};
+use crate::samples::{MotionPlane, MotionSample, MotionSamples};
 
-/// A place as the model has it: on a part, in its frame, or in the plane.
+/// A point of the model.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Contact {
+pub(crate) struct ContactPlace {
+    /// Index of its part; none is the base.
     pub(crate) part: Option<usize>,
+    /// Position in the frame of the part, or in the plane, m.
     pub(crate) at: Vector2<f64>,
 }
 
-impl Contact {
-    pub(crate) fn place(
+impl ContactPlace {
+    /// Its position in the plane at a sample, m.
+    pub(crate) fn plane_position(
         &self,
-        parts: &[Part],
-        moment: &Moment,
-        plane: &Plane,
-        samples: &Samples,
+        parts: &[SubstitutionPart],
+        moment: &MotionSample,
+        plane: &MotionPlane,
+        samples: &MotionSamples,
     ) -> Vector2<f64> {
         self.part.map_or(self.at, |part| {
-            parts[part].placed(&self.at, moment, plane, samples)
+            parts[part].model_position(&self.at, moment, plane, samples)
         })
     }
 
-    /// The nearest place on the longitudinal axis at the same distance from the joint.
-    pub(crate) fn on_axis(self) -> Self {
+    /// The nearest point on the longitudinal axis of its part at the same distance from the joint; points of the base
+    /// stay.
+    pub(crate) fn projected_on_axis(self) -> Self {
+        // The distance from the joint is kept, on the side of the joint on which the point is.
         let at = Vector2::new(self.at.norm().copysign(self.at.x), 0.0);
-        if self.part.is_some() {
-            Self { at, ..self }
-        } else {
-            self
-        }
+        if self.part.is_some() { Self { at, ..self } } else { self }
     }
 }
 
-/// Compares a linear drive of the model with the rig's along the samples.
+/// Compares a linear drive of the model with the rig's along the samples, and reports the largest errors.
 pub(crate) fn check_linear(
     name: &str,
-    ends: [Anchor; 2],
-    contacts: [Contact; 2],
-    parts: &[Part],
-    plane: &Plane,
-    samples: &Samples,
-    report: &mut Report,
+    ends: [BodyAnchor; 2],
+    contacts: [ContactPlace; 2],
+    parts: &[SubstitutionPart],
+    plane: &MotionPlane,
+    samples: &MotionSamples,
+    report: &mut ReductionReport,
 ) {
-    let vectors = |moment: &Moment| {
-        let truth = plane.place(&moment.place(&ends[1])) - plane.place(&moment.place(&ends[0]));
-        let [from, to] = contacts.map(|contact| contact.place(parts, moment, plane, samples));
+    // Vector from the first to the second contact: projected truth, and model.
+    let vectors = |moment: &MotionSample| {
+        let truth = plane.plane_position(&moment.place(&ends[1])) - plane.plane_position(&moment.place(&ends[0]));
+        let [from, to] = contacts.map(|contact| contact.plane_position(parts, moment, plane, samples));
         (truth, to - from)
     };
+    // Errors of length and direction along the samples.
     let length = samples.largest(|moment| {
         let (truth, model) = vectors(moment);
         truth.norm() - model.norm()
@@ -61,19 +65,16 @@ pub(crate) fn check_linear(
         let (truth, model) = vectors(moment);
         truth.perp(&model).atan2(truth.dot(&model))
     });
-    let out = samples.largest(|moment| {
-        plane
-            .normal
-            .dot(&(moment.place(&ends[1]) - moment.place(&ends[0])))
-    });
+    // The drive has a component along the normal if its points are not in one plane.
+    let out = samples.largest(|moment| plane.normal.dot(&(moment.place(&ends[1]) - moment.place(&ends[0]))));
     report.add(
         4,
         name,
         "acts between the same points",
         vec![
-            Size::new("length is off by", length, "m"),
-            Size::new("direction by", direction, "rad"),
-            Size::new("leans out of the plane by", out, "m"),
+            AssumptionSize::new("error of the length", length, "m"),
+            AssumptionSize::new("error of the direction", direction, "rad"),
+            AssumptionSize::new("component out of the plane", out, "m"),
         ],
     );
 }

@@ -1,18 +1,17 @@
-//! The reduction of a full-body rig to a planar model: the strategy of the SpiderMill paper, section 2.3.
+//! The reduction of a full-body rig to a planar model, with the strategy of the SpiderMill paper, section 2.3.
 //!
-//! A rig and a plan go in; a model file comes out, with a report of everything that was assumed and how large it is.
-//! Nothing is taken on trust: the rig is moved through sampled motions, and each claim (this lies in the plane, these
-//! move alike, this only translates, this loop closes) is measured along them. The steps:
+//! A rig and a plan go in; a model file comes out, with a report of every assumption and its size. The rig is moved
+//! through sampled motions, and each assumption (a body is in the plane, bodies move alike, a body only translates, a
+//! loop closes) is measured along them. The steps:
 //!
-//! 1. planar reduction - `planar`: bodies as the plane sees them;
+//! 1. planar reduction - `planar`: projection of bodies onto the plane;
 //! 2. substitution parts and lumped masses, eq. (1) - `part`;
-//! 3. symmetry: what shares a symbol - `draft`;
+//! 3. symmetry: shared symbols - `planar_draft`;
 //! 4. drives - `drive`.
 //!
-//! Beside it, [`import`](fn@import) makes a model file of a robot description of other programs, and [`export`](fn@export) a
-//! description of a model.
+//! In addition, [`import`](fn@import) converts a robot description of other programs into a model file, and
+//! [`export`](fn@export) a model into a description.
 
-mod draft;
 mod drive;
 mod export;
 mod import;
@@ -21,6 +20,7 @@ mod part;
 mod plan;
 mod plan_for;
 mod planar;
+mod planar_draft;
 mod reduce;
 mod reduce_drives;
 mod reduce_parts;
@@ -28,13 +28,13 @@ mod report;
 mod samples;
 mod write;
 
-pub use export::{ExportError, Exported, Format as ExportFormat, export};
+pub use export::{DescriptionExport, DescriptionFormat as ExportFormat, ExportError, export};
 pub use import::{
-    ImportError, Imported, ImportedJoint, LARGEST_DESCRIPTION, Options as ImportOptions,
-    expand_includes, import,
+    DescriptionImport, ImportError, ImportedJoint, LARGEST_DESCRIPTION, Options as ImportOptions, expand_includes,
+    import,
 };
-pub use plan::{Plan, plan, plan_file, plan_file_with};
-pub use plan_for::plan_for;
-pub use reduce::{Reduction, reduce};
-pub use report::{Finding, Report, Size};
+pub use plan::{ReductionPlan, plan, plan_file, plan_file_with};
+pub use plan_for::default_plan;
+pub use reduce::{PlanarReduction, reduce};
+pub use report::{AssumptionSize, ReductionFinding, ReductionReport};
 pub use samples::sampled_forces;

@@ -1,107 +1,120 @@
 //! Step 2: groups that move alike become one substitution part; groups that only translate become point masses.
 //!
-//! That they move alike is not taken on trust: along sampled motions the bodies of a part must keep their distances
-//! up to a shift that is constant in the plane, which changes no force. Then eq. (1) of the paper gives mass, centre
-//! and inertia of all together.
+//! The motion is checked along samples: the bodies of a part must keep their positions relative to each other, up to a
+//! constant shift in the plane, which changes no force. Then eq. (1) of the paper gives mass, centre and inertia of the
+//! part.
 
-use modelmill_rig::{Anchor, Rig};
+use modelmill_rig::{BodyAnchor, Rig};
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
-use crate::planar::{Flat, flat};
-use crate::report::{Report, Size};
-use crate::samples::{Moment, Plane, Samples};
+use crate::planar::{PlanarBody, planar_body};
+use crate::report::{AssumptionSize, ReductionReport};
+use crate::samples::{MotionPlane, MotionSample, MotionSamples};
 
-/// A substitution part in the making.
+/// A substitution part: several bodies of the rig as one body of the model.
 #[derive(Clone, Debug)]
-pub(crate) struct Part {
+pub(crate) struct SubstitutionPart {
+    /// Name of the part.
     pub(crate) name: String,
-    /// Bodies of all its groups, the leading one first.
+    /// Indices of the bodies of all its groups, the leading one first.
     pub(crate) bodies: Vec<usize>,
-    /// The part that carries it.
+    /// Index of the part that carries it; none is the base.
     pub(crate) parent: Option<usize>,
-    /// Where its joint is: on its carrier, and on its leading body.
-    pub(crate) joint: [Anchor; 2],
-    /// The end of its longitudinal axis.
-    pub(crate) to: Anchor,
-    /// By how much the model shifts it in the plane.
+    /// Its joint, as a point of its carrier and of its leading body.
+    pub(crate) joint: [BodyAnchor; 2],
+    /// The end of its longitudinal axis, on the leading body.
+    pub(crate) to: BodyAnchor,
+    /// Constant shift of the part in the model relative to the rig, m.
     pub(crate) shift: Vector2<f64>,
 }
 
-impl Part {
+impl SubstitutionPart {
     /// Direction of its longitudinal axis in the nominal configuration, rad.
-    pub(crate) fn nominal_angle(&self, plane: &Plane, samples: &Samples) -> f64 {
+    pub(crate) fn nominal_angle(&self, plane: &MotionPlane, samples: &MotionSamples) -> f64 {
         let nominal = &samples.nominal;
+        // From the joint to the end of the axis, in the plane.
         let axis =
-            plane.place(&nominal.place(&self.to)) - plane.place(&nominal.place(&self.joint[1]));
+            plane.plane_position(&nominal.place(&self.to)) - plane.plane_position(&nominal.place(&self.joint[1]));
         axis.y.atan2(axis.x)
     }
 
-    /// By how much it has turned since then, rad, within half a turn.
-    pub(crate) fn turned(&self, moment: &Moment, plane: &Plane, samples: &Samples) -> f64 {
-        turned(self.bodies[0], moment, plane, samples)
+    /// Its rotation since the nominal configuration, rad, between -pi and pi.
+    pub(crate) fn rotation_angle(&self, moment: &MotionSample, plane: &MotionPlane, samples: &MotionSamples) -> f64 {
+        body_rotation(self.bodies[0], moment, plane, samples)
     }
 
-    /// A place of its leading body, in the part's frame.
-    pub(crate) fn local(&self, anchor: &Anchor, plane: &Plane, samples: &Samples) -> Vector2<f64> {
+    /// A point of its leading body in the frame of the part, m.
+    pub(crate) fn local_position(
+        &self,
+        anchor: &BodyAnchor,
+        plane: &MotionPlane,
+        samples: &MotionSamples,
+    ) -> Vector2<f64> {
         let nominal = &samples.nominal;
-        let d = plane.place(&nominal.place(anchor)) - plane.place(&nominal.place(&self.joint[1]));
+        // Relative to the joint, turned into the axes of the part.
+        let d = plane.plane_position(&nominal.place(anchor)) - plane.plane_position(&nominal.place(&self.joint[1]));
         rotation(-self.nominal_angle(plane, samples)) * d
     }
 
-    /// Where the model has a place of its frame.
-    pub(crate) fn placed(
+    /// The position in the plane, in the model, of a point of its frame at a sample, m.
+    pub(crate) fn model_position(
         &self,
         local: &Vector2<f64>,
-        moment: &Moment,
-        plane: &Plane,
-        samples: &Samples,
+        moment: &MotionSample,
+        plane: &MotionPlane,
+        samples: &MotionSamples,
     ) -> Vector2<f64> {
-        let angle = self.nominal_angle(plane, samples) + self.turned(moment, plane, samples);
-        plane.place(&moment.place(&self.joint[1])) + self.shift + rotation(angle) * local
+        let angle = self.nominal_angle(plane, samples) + self.rotation_angle(moment, plane, samples);
+        plane.plane_position(&moment.place(&self.joint[1])) + self.shift + rotation(angle) * local
     }
 }
 
-/// A rotation in the plane.
+/// The rotation matrix of the plane for an angle in rad.
 pub(crate) fn rotation(angle: f64) -> Matrix2<f64> {
     let (s, c) = angle.sin_cos();
     Matrix2::new(c, -s, s, c)
 }
 
-/// By how much a body has turned about the normal since the nominal configuration.
-fn turned(body: usize, moment: &Moment, plane: &Plane, samples: &Samples) -> f64 {
+/// The rotation of a body about the normal since the nominal configuration, rad.
+fn body_rotation(body: usize, moment: &MotionSample, plane: &MotionPlane, samples: &MotionSamples) -> f64 {
+    // The direction of the body that was along x of the plane in the nominal configuration.
     let then = samples.nominal.motion.bodies[body].R_WB.transpose() * plane.x;
-    let now = plane.flat(&(moment.motion.bodies[body].R_WB * then));
+    let now = plane.components(&(moment.motion.bodies[body].R_WB * then));
     now.y.atan2(now.x)
 }
 
-/// An angle within half a turn.
-fn wrapped(angle: f64) -> f64 {
+/// An angle between -pi and pi.
+fn wrap_angle(angle: f64) -> f64 {
     let turn = 2.0 * std::f64::consts::PI;
     angle - turn * (angle / turn).round()
 }
 
-/// Mass, centre in the part's frame and inertia of all its bodies, eq. (1); how well they move alike is reported.
+/// Mass, centre in the part's frame and inertia of all its bodies, eq. (1). Reports how closely the bodies move alike.
 pub(crate) fn substitute(
     rig: &Rig,
-    part: &Part,
-    plane: &Plane,
-    samples: &Samples,
-    report: &mut Report,
-) -> Flat {
+    part: &SubstitutionPart,
+    plane: &MotionPlane,
+    samples: &MotionSamples,
+    report: &mut ReductionReport,
+) -> PlanarBody {
+    // Each body in the frame of the part, as it moves along the samples.
     let lead = part.bodies[0];
     let angle = part.nominal_angle(plane, samples);
     let mut flats = Vec::new();
     for &body in &part.bodies {
-        let seen = flat(rig, body, plane, samples);
+        let seen = planar_body(rig, body, plane, samples);
+        // A body of the part must not rotate relative to the leading one.
         let twist = samples.largest(|moment| {
-            wrapped(turned(body, moment, plane, samples) - turned(lead, moment, plane, samples))
+            wrap_angle(body_rotation(body, moment, plane, samples) - body_rotation(lead, moment, plane, samples))
         });
-        let solid = crate::planar::solid(rig, body);
-        let at = Anchor {
+        let solid = crate::planar::spatial_body(rig, body);
+        let at = BodyAnchor {
             body: Some(body),
             at: solid.centre,
         };
-        let (arm, shift, strays) = ride(part, &at, plane, samples);
+        // Its centre of mass must move like a point of the part, up to a shift.
+        let (arm, shift, strays) = fit_carried_point(part, &at, plane, samples);
+        // The leading body defines the motion, so that it has no errors.
         if body != lead {
             report.add(
                 2,
@@ -110,38 +123,40 @@ pub(crate) fn substitute(
                     "`{}` moves like `{}`, shifted by ({}, {}) m, which changes no force",
                     rig.bodies[body].name,
                     rig.bodies[lead].name,
-                    crate::write::digits(shift.x, 6),
-                    crate::write::digits(shift.y, 6)
+                    crate::write::significant_digits(shift.x, 6),
+                    crate::write::significant_digits(shift.y, 6)
                 ),
                 vec![
-                    Size::new("angle between them changes by", twist, "rad"),
-                    Size::new("place strays by", strays, "m"),
+                    AssumptionSize::new("angle between them changes by", twist, "rad"),
+                    AssumptionSize::new("position changes by", strays, "m"),
                 ],
             );
         }
-        flats.push(Flat {
+        flats.push(PlanarBody {
             centre: rotation(-angle) * arm,
             ..seen
         });
     }
-    merge(&flats)
+    merge_bodies(&flats)
 }
 
-/// A place rides on a part if it is `joint + turn * arm + shift` at all times: arm and shift by least squares, and
-/// the largest distance from that.
-fn ride(
-    part: &Part,
-    at: &Anchor,
-    plane: &Plane,
-    samples: &Samples,
+/// Fits the motion of a point that is carried by a part, `joint + rotation * arm + shift`, by least squares. Returns
+/// arm, shift and the largest residual, m.
+fn fit_carried_point(
+    part: &SubstitutionPart,
+    at: &BodyAnchor,
+    plane: &MotionPlane,
+    samples: &MotionSamples,
 ) -> (Vector2<f64>, Vector2<f64>, f64) {
+    // Two rows per sample; the nominal configuration is the last one.
     let n = samples.moments.len() + 1;
     let mut matrix = DMatrix::zeros(2 * n, 4);
     let mut right = DVector::zeros(2 * n);
     let moments = || samples.moments.iter().chain([&samples.nominal]);
     for (i, moment) in moments().enumerate() {
-        let (s, c) = part.turned(moment, plane, samples).sin_cos();
-        let d = plane.place(&moment.place(at)) - plane.place(&moment.place(&part.joint[1]));
+        // Position relative to the joint: rotation times arm, plus shift.
+        let (s, c) = part.rotation_angle(moment, plane, samples).sin_cos();
+        let d = plane.plane_position(&moment.place(at)) - plane.plane_position(&moment.place(&part.joint[1]));
         for (row, values) in [(2 * i, [c, -s, 1.0, 0.0]), (2 * i + 1, [s, c, 0.0, 1.0])] {
             for (k, value) in values.into_iter().enumerate() {
                 matrix[(row, k)] = value;
@@ -149,98 +164,101 @@ fn ride(
             right[row] = d[row % 2];
         }
     }
-    // A place on the leading body rides without any shift, also on a part that never turns.
+    // A point of the leading body has no shift; for a part that never rotates the fit could not distinguish arm and
+    // shift.
     let solved = if at.body == Some(part.bodies[0]) {
         None
     } else {
         matrix.clone().svd(true, true).solve(&right, 1e-9).ok()
     };
-    let x = solved
-        .unwrap_or_else(|| DVector::from_vec(vec![right[2 * n - 2], right[2 * n - 1], 0.0, 0.0]));
+    // Otherwise the arm is the position in the nominal configuration, without a shift.
+    let x = solved.unwrap_or_else(|| DVector::from_vec(vec![right[2 * n - 2], right[2 * n - 1], 0.0, 0.0]));
     let strays = (matrix * &x - right).amax();
     (Vector2::new(x[0], x[1]), Vector2::new(x[2], x[3]), strays)
 }
 
-/// Eq. (1): total mass, common centre, inertia about it.
-pub(crate) fn merge(flats: &[Flat]) -> Flat {
+/// Eq. (1): total mass, common centre of mass, and inertia about it (Steiner).
+pub(crate) fn merge_bodies(flats: &[PlanarBody]) -> PlanarBody {
     let mass: f64 = flats.iter().map(|flat| flat.mass).sum();
     let moment: Vector2<f64> = flats.iter().map(|flat| flat.mass * flat.centre).sum();
-    let centre = if mass > 0.0 {
-        moment / mass
-    } else {
-        Vector2::zeros()
-    };
+    let centre = if mass > 0.0 { moment / mass } else { Vector2::zeros() };
+    // Inertias about the common centre add up.
     let inertia = flats
         .iter()
         .map(|flat| flat.inertia + flat.mass * (flat.centre - centre).norm_squared())
         .sum();
-    Flat {
-        mass,
-        centre,
-        inertia,
-    }
+    PlanarBody { mass, centre, inertia }
 }
 
-/// The three residuals of eq. (1) between what a part is and what the model says.
-pub(crate) fn residuals(whole: &Flat, said: &Flat) -> Vec<Size> {
+/// The three residuals of eq. (1) between the exact values of a part and those of the model.
+pub(crate) fn part_residuals(whole: &PlanarBody, said: &PlanarBody) -> Vec<AssumptionSize> {
     vec![
-        Size::new("eq. (1): mass", whole.mass - said.mass, "kg"),
-        Size::new("centre", (whole.centre - said.centre).norm(), "m"),
-        Size::new("inertia", whole.inertia - said.inertia, "kg m^2"),
+        AssumptionSize::new("eq. (1): mass", whole.mass - said.mass, "kg"),
+        AssumptionSize::new("centre", (whole.centre - said.centre).norm(), "m"),
+        AssumptionSize::new("inertia", whole.inertia - said.inertia, "kg m^2"),
     ]
 }
 
-/// A point mass in place of groups: residuals of eq. (1) in the nominal configuration, and whether they matter.
+/// Replaces groups by point masses, and returns the mass in kg. Reports the residuals of eq. (1) in the nominal
+/// configuration, and whether they have an effect on the forces.
 ///
-/// `points` are the places of the masses, in equal shares, on the bodies of the rig that they ride on.
-pub(crate) fn lump(
+/// `points` are the positions of the masses, in equal shares, on bodies of the rig.
+pub(crate) fn lump_mass(
     rig: &Rig,
     name: &str,
     bodies: &[usize],
-    points: &[Anchor],
-    plane: &Plane,
-    samples: &Samples,
-    report: &mut Report,
+    points: &[BodyAnchor],
+    plane: &MotionPlane,
+    samples: &MotionSamples,
+    report: &mut ReductionReport,
 ) -> f64 {
-    let flats: Vec<Flat> = bodies
+    let flats: Vec<PlanarBody> = bodies
         .iter()
-        .map(|body| flat(rig, *body, plane, samples))
+        .map(|body| planar_body(rig, *body, plane, samples))
         .collect();
-    let whole = merge(&flats);
-    let masses: Vec<Flat> = points
+    // The exact values of the groups, and those of the point masses.
+    let whole = merge_bodies(&flats);
+    let masses: Vec<PlanarBody> = points
         .iter()
-        .map(|point| Flat {
+        .map(|point| PlanarBody {
             mass: whole.mass / points.len() as f64,
-            centre: plane.place(&samples.nominal.place(point)),
+            centre: plane.plane_position(&samples.nominal.place(point)),
             inertia: 0.0,
         })
         .collect();
+    // Residuals have no effect if the bodies do not rotate and accelerate like the points.
     let turns = samples.largest(|moment| {
         bodies.iter().fold(0.0, |most: f64, b| {
             most.max(moment.motion.bodies[*b].w_WB_W.dot(&plane.normal).abs())
         })
     });
+    // The largest difference of acceleration between a body's centre and any of the points.
     let strays = samples.largest(|moment| {
         let mut most: f64 = 0.0;
         for body in bodies {
-            let centre = Anchor {
+            let centre = BodyAnchor {
                 body: Some(*body),
-                at: crate::planar::solid(rig, *body).centre,
+                at: crate::planar::spatial_body(rig, *body).centre,
             };
             for point in points {
                 let difference = moment.acceleration(&centre) - moment.acceleration(point);
-                most = most.max(plane.flat(&difference).norm());
+                most = most.max(plane.components(&difference).norm());
             }
         }
         most
     });
-    let mut sizes = residuals(&whole, &merge(&masses));
-    sizes.push(Size::new("turns at up to", turns, "rad/s"));
-    sizes.push(Size::new("accelerates otherwise by up to", strays, "m/s^2"));
-    let says = if sizes[3].is_felt() || sizes[4].is_felt() {
-        "becomes a point mass; it turns or moves otherwise than the point, so that the residuals are felt"
+    let mut sizes = part_residuals(&whole, &merge_bodies(&masses));
+    sizes.push(AssumptionSize::new("largest rate of rotation", turns, "rad/s"));
+    sizes.push(AssumptionSize::new(
+        "largest difference of acceleration",
+        strays,
+        "m/s^2",
+    ));
+    // Entries 3 and 4 are the rate of rotation and the difference of acceleration.
+    let says = if sizes[3].is_significant() || sizes[4].is_significant() {
+        "becomes a point mass; it rotates or moves differently from the point, so the residuals have an effect on the forces"
     } else {
-        "becomes a point mass; it only translates, with the point, so that its centre and inertia change no force"
+        "becomes a point mass; it only translates with the point, so its centre and inertia change no force"
     };
     report.add(2, name, says, sizes);
     whole.mass

@@ -1,38 +1,42 @@
-//! A plan for a rig that has none: every body is a part, hung on the first revolute joint that reaches it from the
-//! base; joints that are left over close loops.
+//! Generates a plan for a rig: every body becomes a part, connected by the first revolute joint that reaches it from
+//! the base. The remaining joints close loops.
 //!
-//! The plan is written as the text of a plan file over points that are added to a copy of the rig, so that it goes
-//! the same way as a plan by hand.
+//! The plan is written as the text of a plan file, with points that are added to a copy of the rig. It is then read
+//! like any plan.
 
 use std::fmt::Write as _;
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{Message, OptionName, Remedy};
-use modelmill_rig::{Anchor, Point, Rig};
+use modelmill_rig::{BodyAnchor, Rig, RigPoint};
 use nalgebra::Vector3;
 
-use crate::plan::{Plan, plan};
+use crate::plan::{ReductionPlan, plan};
 
-/// Makes a plan in which every body is a part of its own.
+/// Generates a plan in which every body is a separate part.
 ///
-/// Fails when a body cannot be reached by revolute joints; such rigs need a plan by hand.
-pub fn plan_for(rig: &Rig) -> Result<Plan, Message> {
+/// Fails if a body cannot be reached by revolute joints; such rigs need a plan written by hand.
+pub fn default_plan(rig: &Rig) -> Result<ReductionPlan, Message> {
+    // Points are added to a copy of the rig.
     let mut rig = rig.clone();
-    let hinges: Vec<(usize, [Anchor; 2])> = (0..rig.joints.len())
+    let hinges: Vec<(usize, [BodyAnchor; 2])> = (0..rig.joints.len())
         .filter_map(|j| rig.hinge(j).map(|anchors| (j, anchors)))
         .collect();
+    // All joints must be revolute.
     if let Some(other) = (0..rig.joints.len()).find(|j| rig.hinge(*j).is_none()) {
         return Err(message!(
-            "`{}` is no revolute joint: reducing this rig takes a plan ({}), in which parts and lumped masses stand \
-             for what other joints hold",
+            "`{}` is not a revolute joint, so this rig needs a plan ({}), in which parts and lumped masses replace the \
+             bodies at other joints",
             rig.joints[other].name,
             Remedy::option(OptionName::Plan)
         ));
     }
+    // Tables of the parts, and those of the loops, which stand last.
     let mut text = format!("schema = 1\nname = \"{}_reduced\"\n", rig.name);
     let mut loops = String::new();
     let mut carried = vec![false; rig.bodies.len()];
     let is_carried = |carried: &[bool], body: Option<usize>| body.is_none_or(|body| carried[body]);
+    // Grow the tree from the base: take the next joint with at least one end on a body that is already carried.
     let mut waiting = hinges.clone();
     while let Some(next) = waiting
         .iter()
@@ -41,6 +45,7 @@ pub fn plan_for(rig: &Rig) -> Result<Plan, Message> {
         let (joint, [a, b]) = waiting.remove(next);
         let name = rig.joints[joint].name.clone();
         if is_carried(&carried, a.body) && is_carried(&carried, b.body) {
+            // Both ends are in the tree already, so this joint closes a loop.
             let ends = [a, b].map(|anchor| add_point(&mut rig, &name, anchor));
             let _ = writeln!(
                 loops,
@@ -49,20 +54,15 @@ pub fn plan_for(rig: &Rig) -> Result<Plan, Message> {
             );
             continue;
         }
-        let (at, from) = if is_carried(&carried, a.body) {
-            (a, b)
-        } else {
-            (b, a)
-        };
+        // The end that is carried already is on the carrier, the other one on the new part.
+        let (at, from) = if is_carried(&carried, a.body) { (a, b) } else { (b, a) };
         let Some(body) = from.body else { continue };
         carried[body] = true;
+        // The part with its joint, the end of its axis and its coordinate.
         let end = far_end(&rig, &hinges, body, &from.at);
-        let points =
-            [at, from, Anchor { at: end, ..from }].map(|anchor| add_point(&mut rig, &name, anchor));
+        let points = [at, from, BodyAnchor { at: end, ..from }].map(|anchor| add_point(&mut rig, &name, anchor));
         let part = &rig.bodies[body].name;
-        let on = at
-            .body
-            .map_or("base", |carrier| rig.bodies[carrier].name.as_str());
+        let on = at.body.map_or("base", |carrier| rig.bodies[carrier].name.as_str());
         let coordinate = rig
             .coordinate_of_joint(joint)
             .map_or(name, |c| rig.coordinates[c].name.clone());
@@ -73,26 +73,23 @@ pub fn plan_for(rig: &Rig) -> Result<Plan, Message> {
             points[0], points[1], points[2]
         );
     }
+    // Bodies that no joint reaches.
     if let Some(body) = carried.iter().position(|reached| !reached) {
         return Err(message!(
-            "no revolute joint reaches `{}` from the base",
+            "`{}` is not connected to the base by revolute joints",
             rig.bodies[body].name
         ));
     }
     text.push_str(&loops);
-    let mut plan =
-        plan("the plan made for this rig", &text).map_err(|failure| failure.render(false))?;
+    // Read the text like the file of a plan.
+    let mut plan = plan("the plan generated for this rig", &text).map_err(|failure| failure.render(false))?;
     plan.rig = Some(Box::new(rig));
     Ok(plan)
 }
 
-/// The end of a body's longitudinal axis: its farthest other joint, else its centre of mass, else along x.
-fn far_end(
-    rig: &Rig,
-    hinges: &[(usize, [Anchor; 2])],
-    body: usize,
-    from: &Vector3<f64>,
-) -> Vector3<f64> {
+/// The end of a body's longitudinal axis: its farthest other joint, else its centre of mass, else a point along x.
+fn far_end(rig: &Rig, hinges: &[(usize, [BodyAnchor; 2])], body: usize, from: &Vector3<f64>) -> Vector3<f64> {
+    // Other joints on the body.
     let here = hinges
         .iter()
         .flat_map(|(_, anchors)| anchors)
@@ -107,18 +104,19 @@ fn far_end(
         .unwrap_or(from + Vector3::x())
 }
 
-/// The name of a point at a place: one that is there, or a new one.
-fn add_point(rig: &mut Rig, stem: &str, anchor: Anchor) -> String {
+/// The name of the point at an anchor; adds a new point if there is none.
+fn add_point(rig: &mut Rig, stem: &str, anchor: BodyAnchor) -> String {
     if let Some(point) = rig.points.iter().find(|point| point.anchor == anchor) {
         return point.name.clone();
     }
+    // The first number that gives a free name.
     let mut n = 1;
     let mut name = format!("{stem}_{n}");
     while rig.points.iter().any(|point| point.name == name) {
         n += 1;
         name = format!("{stem}_{n}");
     }
-    rig.points.push(Point {
+    rig.points.push(RigPoint {
         name: name.clone(),
         anchor,
     });

@@ -1,48 +1,50 @@
-//! The four steps in a row: a rig and a plan go in, the text of a model file and the report come out.
+//! Runs the four steps of a reduction: a rig and a plan go in, the text of a model file and the report come out.
 
-use crate::draft::Draft;
-use crate::names::Names;
-use crate::part::Part;
-use crate::plan::Plan;
-use crate::planar::{Flat, check_group, out_of_plane};
-use crate::report::{Report, Size};
-use crate::samples::{Plane, Samples};
-use crate::write::{digits, model_file};
-use modelmill_boundary::files::Memory;
-use modelmill_rig::{Failure, Log, Rig, fault};
+use crate::names::PlanNames;
+use crate::part::SubstitutionPart;
+use crate::plan::ReductionPlan;
+use crate::planar::{PlanarBody, check_group, out_of_plane_rate};
+use crate::planar_draft::PlanarDraft;
+use crate::report::{AssumptionSize, ReductionReport};
+use crate::samples::{MotionPlane, MotionSamples};
+use crate::write::{model_file, significant_digits};
+use modelmill_boundary::files::MemoryFiles;
+use modelmill_rig::{LoadFailure, Rig, RigLog, plain_error};
 
-/// What a reduction gives.
+/// The result of a reduction.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Reduction {
+pub struct PlanarReduction {
     /// The text of the model file.
     pub model: String,
-    /// What was assumed.
-    pub report: Report,
+    /// All assumptions with their sizes.
+    pub report: ReductionReport,
 }
 
-/// Rates out of the plane, gaps of joints and changes of shifts above this are no rounding.
+/// Rates out of the plane, gaps of joints and changes of shifts above this are faults, not rounding.
 pub(crate) const TOLERANCE: f64 = 1e-6;
-/// Lengths and angles below this are zero.
+/// Lengths (m), angles (rad) and accelerations (m/s^2) below this count as zero.
 pub(crate) const ZERO: f64 = 1e-12;
 
 /// Reduces a rig by a plan.
 ///
-/// Fails with every fault of the plan, each with its place: unknown names, bodies that are forgotten or used twice,
-/// bodies that leave the plane, joints that do not meet.
-pub fn reduce(rig: &Rig, plan: &Plan) -> Result<Reduction, Failure> {
-    let mut log = Log::default();
+/// Fails with every fault of the plan, each with its position: unknown names, bodies that are missing or used twice,
+/// bodies that leave the plane, joints that do not coincide.
+pub fn reduce(rig: &Rig, plan: &ReductionPlan) -> Result<PlanarReduction, LoadFailure> {
+    let mut log = RigLog::default();
+    // A result counts only if the log has no faults.
     let outcome = run(rig, plan, &mut log);
     match outcome {
         Some((draft, report)) if log.0.is_empty() => {
             let model = model_file(&draft);
-            // What comes out is a sound model file, or the plan asks for something that is none.
+            // The result is loaded like any model file; its faults come from the plan.
             let path = format!("{}.toml (reduced)", draft.name);
-            modelmill_spec::load(&path, &model, &Memory::default())?;
-            Ok(Reduction { model, report })
+            modelmill_spec::load(&path, &model, &MemoryFiles::default())?;
+            Ok(PlanarReduction { model, report })
         }
         _ => {
+            // Faults in the sequence of the plan's text.
             log.0.sort_by_key(|found| found.span.map(|span| span.start));
-            Err(Failure {
+            Err(LoadFailure {
                 diagnostics: log.0,
                 sources: plan.sources.clone(),
             })
@@ -50,41 +52,48 @@ pub fn reduce(rig: &Rig, plan: &Plan) -> Result<Reduction, Failure> {
     }
 }
 
-fn run(rig: &Rig, plan: &Plan, log: &mut Log) -> Option<(Draft, Report)> {
+/// Runs all steps; `None` if the log has faults after which the others make no sense.
+fn run(rig: &Rig, plan: &ReductionPlan, log: &mut RigLog) -> Option<(PlanarDraft, ReductionReport)> {
     let entry = &plan.entry;
-    let names = Names::new(rig, entry, log);
-    let plane = Plane::new(entry.plane.at, entry.plane.normal, entry.plane.x);
-    let samples = match Samples::new(rig, entry.samples.number, entry.samples.range) {
+    // Groups, the plane of motion, and samples of the rig's motion.
+    let names = PlanNames::new(rig, entry, log);
+    let plane = MotionPlane::new(entry.plane.at, entry.plane.normal, entry.plane.x);
+    let samples = match MotionSamples::new(rig, entry.samples.number, entry.samples.range) {
         Ok(samples) if samples.moments.len() >= 4 => samples,
+        // Too few poses for the checks.
         Ok(samples) => {
             let says = format!(
-                "{} of {} sampled poses are out of the rig's reach; lower `range` in `[samples]`",
+                "{} of {} sampled poses cannot be reached by the rig; reduce `range` in `[samples]`",
                 samples.n_out_of_reach, entry.samples.number
             );
-            log.0.push(fault(None, says));
+            log.0.push(plain_error(None, says));
             return None;
         }
         Err(error) => {
-            log.0
-                .push(fault(None, format!("the rig does not stand: {error}")));
+            log.0.push(plain_error(
+                None,
+                format!("the rig cannot be assembled in its nominal configuration: {error}"),
+            ));
             return None;
         }
     };
-    let mut work = Work {
+    // All steps work on the same state.
+    let mut work = ReductionState {
         names,
         plane,
         samples,
         parts: Vec::new(),
-        draft: Draft {
+        draft: PlanarDraft {
             name: entry.name.get_ref().clone(),
             title: entry.title.clone().unwrap_or_default(),
             origin: format!("Reduced from the rig {} by modelmill reduce.", rig.name),
-            ..Draft::default()
+            ..PlanarDraft::default()
         },
-        report: Report::default(),
-        used: Vec::new(),
-        wholes: Vec::new(),
+        report: ReductionReport::default(),
+        used_groups: Vec::new(),
+        part_totals: Vec::new(),
     };
+    // The next steps make no sense if the motion is not planar, or if parts are missing.
     work.planar_reduction(log);
     if !log.0.is_empty() {
         return None;
@@ -93,111 +102,108 @@ fn run(rig: &Rig, plan: &Plan, log: &mut Log) -> Option<(Draft, Report)> {
     if !log.0.is_empty() {
         return None;
     }
+    // The remaining steps report all faults at once.
     work.lumped_masses(log);
     work.check_equation_1();
     work.loops(log);
     work.drives(log);
     work.effects();
-    work.nothing_is_forgotten(log);
+    work.check_completeness(log);
     work.check_constants(log);
     let draft = work.draft;
     let mut report = work.report;
-    for symbols in [
-        &draft.masses,
-        &draft.centres,
-        &draft.inertias,
-        &draft.constants,
-    ] {
+    // Symbols that stand for several quantities, with the differences between their values.
+    for symbols in [&draft.masses, &draft.centres, &draft.inertias, &draft.constants] {
         symbols.report_ties(&mut report);
     }
     Some((draft, report))
 }
 
-/// A reduction in the making.
-pub(crate) struct Work<'a> {
-    pub(crate) names: Names<'a>,
-    pub(crate) plane: Plane,
-    pub(crate) samples: Samples,
-    pub(crate) parts: Vec<Part>,
-    pub(crate) draft: Draft,
-    pub(crate) report: Report,
-    /// Groups that have a place in the model.
-    pub(crate) used: Vec<String>,
-    /// What each part of the draft stands for, in words and exactly.
-    pub(crate) wholes: Vec<(String, Flat)>,
+/// The state of a reduction between its steps.
+pub(crate) struct ReductionState<'a> {
+    /// Names of the plan and the rig.
+    pub(crate) names: PlanNames<'a>,
+    /// The plane of motion.
+    pub(crate) plane: MotionPlane,
+    /// Sampled motions of the rig.
+    pub(crate) samples: MotionSamples,
+    /// Parts so far; carriers stand before what they carry.
+    pub(crate) parts: Vec<SubstitutionPart>,
+    /// The model so far.
+    pub(crate) draft: PlanarDraft,
+    /// The report so far.
+    pub(crate) report: ReductionReport,
+    /// Groups that are in the model or left out by name.
+    pub(crate) used_groups: Vec<String>,
+    /// For each part of the draft a description, and its exact mass, centre and inertia.
+    pub(crate) part_totals: Vec<(String, PlanarBody)>,
 }
 
-impl Work<'_> {
-    /// Step 1.
-    fn planar_reduction(&mut self, log: &mut Log) {
+impl ReductionState<'_> {
+    /// Step 1: checks that motion is planar, and writes gravity in the plane.
+    fn planar_reduction(&mut self, log: &mut RigLog) {
         let rig = self.names.rig;
-        let out = out_of_plane(&self.plane, &self.samples);
+        // No body may leave the plane.
+        let out = out_of_plane_rate(&self.plane, &self.samples);
         if out.is_nan() || out > TOLERANCE {
-            log.0.push(fault(
+            log.0.push(plain_error(
                 None,
                 format!(
-                    "bodies leave the plane at up to {} m/s or rad/s; give the plane of motion in `[plane]`, or model \
-                     this rig in space",
-                    digits(out, 3)
+                    "bodies leave the plane with up to {} m/s or rad/s; correct the plane of motion in `[plane]`, or write a \
+                     spatial model of this rig",
+                    significant_digits(out, 3)
                 ),
             ));
         }
         let reach = match self.samples.n_out_of_reach {
             0 => String::new(),
-            n => format!(" ({n} more are out of reach)"),
+            n => format!(" ({n} others cannot be reached)"),
         };
         let poses = self.samples.moments.len();
         self.report.add(
             1,
             "motion",
             format!("all bodies stay in the plane at {poses} sampled poses{reach}"),
-            vec![Size::new("largest rate out of it", out, "m/s or rad/s")],
+            vec![AssumptionSize::new("largest rate out of it", out, "m/s or rad/s")],
         );
+        // Gravity in the plane; the component out of it loads bearings only.
         let across = self.plane.normal.dot(&rig.gravity);
-        let flat = self.plane.flat(&rig.gravity);
+        let flat = self.plane.components(&rig.gravity);
         self.report.add(
             1,
             "gravity",
             "acts in the plane",
-            vec![Size::new("across it", across, "m/s^2")],
+            vec![AssumptionSize::new("component out of the plane", across, "m/s^2")],
         );
+        // One symbol `g` with a sign if gravity is along an axis, else two components.
         self.draft.gravity = match (flat.x.abs() > ZERO, flat.y.abs() > ZERO) {
             (false, false) => ["0", "0"].map(str::to_owned),
-            (true, true) => [("gx", flat.x), ("gy", flat.y)]
-                .map(|(name, value)| self.gravity_constant(name, value)),
+            (true, true) => [("gx", flat.x), ("gy", flat.y)].map(|(name, value)| self.gravity_constant(name, value)),
             (true, false) => [
-                signed(self.gravity_constant("g", flat.x.abs()), flat.x),
+                signed_name(self.gravity_constant("g", flat.x.abs()), flat.x),
                 "0".to_owned(),
             ],
             (false, true) => [
                 "0".to_owned(),
-                signed(self.gravity_constant("g", flat.y.abs()), flat.y),
+                signed_name(self.gravity_constant("g", flat.y.abs()), flat.y),
             ],
         };
+        // The size of what the plane neglects in each group.
         for (name, bodies) in &self.names.groups {
-            check_group(
-                rig,
-                name,
-                bodies,
-                &self.plane,
-                &self.samples,
-                &mut self.report,
-            );
+            check_group(rig, name, bodies, &self.plane, &self.samples, &mut self.report);
         }
     }
 
+    /// Adds a constant for gravity, and returns its name.
     fn gravity_constant(&mut self, name: &str, value: f64) -> String {
         self.draft
             .constants
-            .stand_for(name, "m/s^2", "acceleration of gravity", "gravity", value);
+            .add_value(name, "m/s^2", "acceleration of gravity", "gravity", value);
         name.to_owned()
     }
 }
 
-fn signed(name: String, value: f64) -> String {
-    if value < 0.0 {
-        format!("-{name}")
-    } else {
-        name
-    }
+/// The name with the sign of a value.
+fn signed_name(name: String, value: f64) -> String {
+    if value < 0.0 { format!("-{name}") } else { name }
 }

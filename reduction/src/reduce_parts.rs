@@ -1,31 +1,28 @@
-//! Step 2 of the reduction: parts hung where they belong, with frame, coordinate, mass, centre and inertia; point
-//! masses where they ride.
+//! Step 2 of the reduction: adds parts to the draft, with frame, coordinate, mass, centre and inertia, and point masses
+//! with their points.
 
-use modelmill_rig::{Anchor, Log, span};
+use modelmill_rig::{BodyAnchor, RigLog, source_span};
 use nalgebra::Vector2;
 
-use crate::draft::{DraftCoordinate, DraftPart, DraftPoint, Frame, rounded};
-use crate::drive::Contact;
-use crate::part::{Part, lump, residuals, substitute};
-use crate::plan::{Name, PartEntry};
-use crate::planar::Flat;
-use crate::reduce::{TOLERANCE, Work, ZERO};
-use crate::samples::Moment;
-use crate::write::digits;
+use crate::drive::ContactPlace;
+use crate::part::{SubstitutionPart, lump_mass, part_residuals, substitute};
+use crate::plan::{PlanName, PlanPartEntry};
+use crate::planar::PlanarBody;
+use crate::planar_draft::{DraftCoordinate, DraftFrame, DraftPart, DraftPoint, round_to_12_digits};
+use crate::reduce::{ReductionState, TOLERANCE, ZERO};
+use crate::samples::MotionSample;
+use crate::write::significant_digits;
 
-impl Work<'_> {
-    /// Step 2, parts.
-    pub(crate) fn parts(&mut self, log: &mut Log) {
+impl ReductionState<'_> {
+    /// Step 2, parts: adds each part of the plan with its frame and body.
+    pub(crate) fn parts(&mut self, log: &mut RigLog) {
+        // A part may be carried by parts before it only, so that one pass is enough.
         let plan = self.names.plan;
         for entry in &plan.part {
-            if self
-                .parts
-                .iter()
-                .any(|part| &part.name == entry.name.get_ref())
-            {
+            if self.parts.iter().any(|part| &part.name == entry.name.get_ref()) {
                 log.error(
-                    span(0, &entry.name.span()),
-                    "there are two parts of this name".to_owned(),
+                    source_span(0, &entry.name.span()),
+                    "two parts have this name".to_owned(),
                     "",
                     "rename one",
                 );
@@ -38,18 +35,20 @@ impl Work<'_> {
         }
         if plan.part.is_empty() {
             log.error(
-                span(0, &plan.name.span()),
+                source_span(0, &plan.name.span()),
                 "this plan has no part".to_owned(),
                 "",
-                "write a `[[part]]` for each body that the model is to have",
+                "write a `[[part]]` for each body of the model",
             );
         }
     }
 
-    /// A part hung where it belongs.
-    pub(crate) fn part(&self, entry: &PartEntry, log: &mut Log) -> Option<Part> {
+    /// Resolves a part and its shift. Reports points on wrong bodies, a part without length, and a joint that does not
+    /// coincide up to a constant shift.
+    pub(crate) fn part(&self, entry: &PlanPartEntry, log: &mut RigLog) -> Option<SubstitutionPart> {
+        // Bodies of the part, and the part that carries it.
         let names = &self.names;
-        let mut used = self.used.clone();
+        let mut used = self.used_groups.clone();
         let bodies = names.bodies(entry.groups.get_ref(), &mut used, log);
         let parent = match entry.on.get_ref().as_str() {
             "base" => None,
@@ -62,12 +61,13 @@ impl Work<'_> {
                     .collect();
                 let found = self.parts.iter().position(|part| part.name == on);
                 if found.is_none() {
-                    log.unknown(0, &entry.on, "part above this one", &known);
+                    log.unknown_name(0, &entry.on, "part before this one", &known);
                     return None;
                 }
                 found
             }
         };
+        // Its joint and the end of its axis, each on the right body.
         let [at, from, to] = [&entry.at, &entry.from, &entry.to].map(|name| names.point(name, log));
         let (at, from, to) = (at?, from?, to?);
         let lead = *bodies.first()?;
@@ -80,15 +80,15 @@ impl Work<'_> {
             if anchor.body != body {
                 let wanted = body.map_or("the base", |b| names.rig.bodies[b].name.as_str());
                 log.error(
-                    span(0, &name.span()),
+                    source_span(0, &name.span()),
                     format!("`{}` is not on {wanted}", name.get_ref()),
                     "expected a point of this body",
-                    "`at` is on what carries the part, `from` and `to` are on the first body of its first group",
+                    "`at` is a point of the carrier, `from` and `to` are points of the first body of its first group",
                 );
                 return None;
             }
         }
-        let mut part = Part {
+        let mut part = SubstitutionPart {
             name: entry.name.get_ref().clone(),
             bodies,
             parent,
@@ -96,35 +96,35 @@ impl Work<'_> {
             to,
             shift: Vector2::zeros(),
         };
+        // Without a length the axis has no direction.
         let length = (from.at - to.at).norm();
         if length < 1e-9 {
             log.error(
-                span(0, &entry.to.span()),
+                source_span(0, &entry.to.span()),
                 "this part has no length".to_owned(),
                 "expected another point than `from`",
                 "",
             );
             return None;
         }
-        // What the model moves in the plane: the carrier's own shift, and the gap at the joint.
+        // The shift of a part is the shift of its carrier plus the gap at the joint, which must be constant.
         let carried = parent.map_or_else(Vector2::zeros, |parent| self.parts[parent].shift);
-        let gap = |moment: &Moment| {
-            self.plane.place(&moment.place(&at)) - self.plane.place(&moment.place(&from)) + carried
+        let gap = |moment: &MotionSample| {
+            self.plane.plane_position(&moment.place(&at)) - self.plane.plane_position(&moment.place(&from)) + carried
         };
         part.shift = gap(&self.samples.nominal);
-        let strays = self
-            .samples
-            .largest(|moment| (gap(moment) - part.shift).norm());
+        // The gap changes along the samples if the points are no joint.
+        let strays = self.samples.largest(|moment| (gap(moment) - part.shift).norm());
         if strays > TOLERANCE || strays.is_nan() {
             log.error(
-                span(0, &entry.from.span()),
+                source_span(0, &entry.from.span()),
                 format!(
-                    "`{}` does not hang at `{}`: their distance changes by {} m",
+                    "`{}` is not connected at `{}`: their distance changes by {} m",
                     part.name,
                     entry.at.get_ref(),
-                    digits(strays, 3)
+                    significant_digits(strays, 3)
                 ),
-                "expected a place that keeps its distance to `at`",
+                "expected a point with a constant distance to `at`",
                 "",
             );
             return None;
@@ -132,53 +132,47 @@ impl Work<'_> {
         Some(part)
     }
 
-    /// Frame and coordinate of the part that was added last.
-    pub(crate) fn frame(&mut self, entry: &PartEntry, log: &mut Log) {
+    /// Adds frame and coordinate of the last part. A coordinate with a name of the rig is active and must be the angle
+    /// of the part up to sign and offset; others are passive.
+    pub(crate) fn frame(&mut self, entry: &PlanPartEntry, log: &mut RigLog) {
         let Some(part) = self.parts.last().cloned() else {
             return;
         };
         let carrier = part.parent.map(|parent| self.parts[parent].clone());
         let (plane, samples) = (self.plane, &self.samples);
-        let angle = |moment: &Moment| {
-            let of = |part: &Part| {
-                part.nominal_angle(&plane, samples) + part.turned(moment, &plane, samples)
+        // Angle of the part relative to its carrier.
+        let angle = |moment: &MotionSample| {
+            let of = |part: &SubstitutionPart| {
+                part.nominal_angle(&plane, samples) + part.rotation_angle(moment, &plane, samples)
             };
             of(&part) - carrier.as_ref().map_or(0.0, of)
         };
+        // Whether the rig has a coordinate with this name.
         let coordinate = entry.coordinate.get_ref();
-        let nominal = wrapped(angle(&samples.nominal));
-        let active = self
-            .names
-            .rig
-            .coordinates
-            .iter()
-            .position(|c| &c.name == coordinate);
+        let nominal = wrap_angle(angle(&samples.nominal));
+        let active = self.names.rig.coordinates.iter().position(|c| &c.name == coordinate);
         let mut expression = coordinate.clone();
         if let Some(k) = active {
+            // Largest difference between the angle and the coordinate of the rig, for each sign.
             let strays = |sign: f64| {
                 samples.largest(|moment| {
-                    wrapped(
-                        angle(moment)
-                            - nominal
-                            - sign * (moment.state.q[k] - samples.nominal.state.q[k]),
-                    )
+                    wrap_angle(angle(moment) - nominal - sign * (moment.state.q[k] - samples.nominal.state.q[k]))
                 })
             };
+            // The coordinate may count in either direction.
             let [ahead, back] = [1.0, -1.0].map(strays);
             if ahead.min(back) > TOLERANCE {
                 log.error(
-                    span(0, &entry.coordinate.span()),
-                    format!(
-                        "`{coordinate}` of the rig is not the angle of `{}`",
-                        part.name
-                    ),
+                    source_span(0, &entry.coordinate.span()),
+                    format!("`{coordinate}` of the rig is not the angle of `{}`", part.name),
                     "expected the coordinate of its joint",
-                    "another name makes a passive coordinate",
+                    "a name that the rig does not have gives a passive coordinate",
                 );
             }
+            // The angle as sign, coordinate and constant offset.
             let sign = if ahead <= back { 1.0 } else { -1.0 };
             let value = samples.nominal.state.q[k];
-            let offset = wrapped(nominal - sign * value);
+            let offset = wrap_angle(nominal - sign * value);
             expression = format!(
                 "{}{coordinate}{}",
                 if sign < 0.0 { "-" } else { "" },
@@ -186,10 +180,11 @@ impl Work<'_> {
             );
             self.draft.coordinates.push(DraftCoordinate {
                 name: coordinate.clone(),
-                nominal: rounded(value),
+                nominal: round_to_12_digits(value),
                 passive: false,
             });
         } else {
+            // A passive coordinate is determined by the loops, so that its nominal value can be rounded.
             let nominal = (nominal * 1e6).round() / 1e6;
             self.draft.coordinates.push(DraftCoordinate {
                 name: coordinate.clone(),
@@ -197,27 +192,29 @@ impl Work<'_> {
                 passive: true,
             });
         }
+        // Position of the joint in the carrier, or in the plane.
         let (on, local) = match &carrier {
             None => (
                 "base".to_owned(),
-                plane.place(&self.samples.nominal.place(&part.joint[0])),
+                plane.plane_position(&self.samples.nominal.place(&part.joint[0])),
             ),
             Some(carrier) => (
                 carrier.name.clone(),
-                carrier.local(&part.joint[0], &plane, &self.samples),
+                carrier.local_position(&part.joint[0], &plane, &self.samples),
             ),
         };
         let at = self.components(entry.at.get_ref(), &local);
+        // The model has no gap at the joint, so that the part is shifted.
         if part.shift.norm() > ZERO {
             let says = format!(
                 "is shifted by ({}, {}) m to `{}`, which changes no force",
-                digits(part.shift.x, 6),
-                digits(part.shift.y, 6),
+                significant_digits(part.shift.x, 6),
+                significant_digits(part.shift.y, 6),
                 entry.at.get_ref()
             );
             self.report.add(2, &part.name, says, Vec::new());
         }
-        self.draft.frames.push(Frame {
+        self.draft.frames.push(DraftFrame {
             name: part.name.clone(),
             on,
             at,
@@ -226,31 +223,29 @@ impl Work<'_> {
         });
     }
 
-    /// A constant angle behind a coordinate, as an expression with its sign.
+    /// A constant angle after a coordinate, as an expression with its sign: empty, a multiple of pi/12, or a constant.
     pub(crate) fn angle_offset(&mut self, coordinate: &str, offset: f64) -> String {
         if offset.abs() < 1e-9 {
             return String::new();
         }
+        // Multiples of 15 degrees are exact.
         let twelfths = offset / (std::f64::consts::PI / 12.0);
         if (twelfths - twelfths.round()).abs() < 1e-9 {
             let sign = if twelfths < 0.0 { '-' } else { '+' };
             return format!(" {sign} {}*pi/12", twelfths.round().abs());
         }
         let name = format!("{coordinate}_offset");
-        self.draft.constants.stand_for(
-            &name,
-            "rad",
-            "from the rig's zero to the part's axis",
-            &name,
-            offset,
-        );
+        self.draft
+            .constants
+            .add_value(&name, "rad", "from the rig's zero to the part's axis", &name, offset);
         format!(" + {name}")
     }
 
-    /// Expressions of a point's components: constants of the plan, or constants of their own.
+    /// Expressions of a point's components: zero, a constant of the plan, or a new constant.
     pub(crate) fn components(&mut self, point: &str, at: &Vector2<f64>) -> [String; 2] {
         let mut expressions = ["x", "y"].map(str::to_owned);
         for (axis, value) in expressions.iter_mut().zip([at.x, at.y]) {
+            // The quantity for which a constant of the plan can stand, such as `A.x`.
             let what = format!("{point}.{axis}");
             if value.abs() < ZERO {
                 "0".clone_into(axis);
@@ -264,57 +259,39 @@ impl Work<'_> {
                 .find(|(_, c)| c.is.iter().any(|is| is.get_ref() == &what));
             let own = format!("{point}_{axis}");
             let (name, note) = match named {
-                Some((name, constant)) => (
-                    name.get_ref().clone(),
-                    constant.note.clone().unwrap_or_default(),
-                ),
+                Some((name, constant)) => (name.get_ref().clone(), constant.note.clone().unwrap_or_default()),
                 None => (own, String::new()),
             };
-            let symbol = self
-                .draft
-                .constants
-                .0
-                .iter()
-                .find(|symbol| symbol.name == name);
-            if symbol.is_none_or(|symbol| symbol.stands_for.iter().all(|(known, _)| known != &what))
-            {
-                self.draft
-                    .constants
-                    .stand_for(&name, "m", &note, &what, value);
+            // A constant can stand for several quantities; each is added once.
+            let symbol = self.draft.constants.0.iter().find(|symbol| symbol.name == name);
+            if symbol.is_none_or(|symbol| symbol.stands_for.iter().all(|(known, _)| known != &what)) {
+                self.draft.constants.add_value(&name, "m", &note, &what, value);
             }
             *axis = name;
         }
         expressions
     }
 
-    /// Mass properties of the part that was added last.
-    pub(crate) fn body(&mut self, entry: &PartEntry, log: &mut Log) {
+    /// Adds the body of the last part, with symbols for mass, centre and inertia.
+    pub(crate) fn body(&mut self, entry: &PlanPartEntry, log: &mut RigLog) {
         let Some(part) = self.parts.last() else {
             return;
         };
-        self.used.extend(
-            entry
-                .groups
-                .get_ref()
-                .iter()
-                .map(|name| name.get_ref().clone()),
-        );
+        // These groups are in the model now.
+        self.used_groups
+            .extend(entry.groups.get_ref().iter().map(|name| name.get_ref().clone()));
         let name = part.name.clone();
-        let whole = substitute(
-            self.names.rig,
-            part,
-            &self.plane,
-            &self.samples,
-            &mut self.report,
-        );
+        // Exact values of the part, eq. (1).
+        let whole = substitute(self.names.rig, part, &self.plane, &self.samples, &mut self.report);
+        // Whether the plan leaves out the component of the centre across the axis.
         let drops = match entry.off_axis.as_ref().map(|s| s.get_ref().as_str()) {
             None | Some("keep") => false,
             Some("drop") => true,
             Some(_) => {
                 let range = entry.off_axis.as_ref().map_or(0..0, toml::Spanned::span);
                 log.error(
-                    span(0, &range),
-                    "this is no way to treat an offset".to_owned(),
+                    source_span(0, &range),
+                    "the value of `off_axis` is unknown".to_owned(),
                     "expected `keep` or `drop`",
                     "",
                 );
@@ -322,21 +299,21 @@ impl Work<'_> {
             }
         };
         let about = |what: &str| format!("{what} of {}", entry.note.as_deref().unwrap_or(&name));
+        // Symbols with their values; parts may share a symbol.
         let [mass, centre, across, inertia] = symbols_of(entry);
         let draft = &mut self.draft;
-        draft
-            .masses
-            .stand_for(&mass, "kg", &about("mass"), &name, whole.mass);
-        draft.inertias.stand_for(
+        draft.masses.add_value(&mass, "kg", &about("mass"), &name, whole.mass);
+        draft.inertias.add_value(
             &inertia,
             "kg m^2",
             &about("inertia about the centre of mass"),
             &name,
             whole.inertia,
         );
+        // Components of the centre that are zero get no symbol.
         let mut components = ["0", "0"].map(str::to_owned);
         if whole.centre.x.abs() > ZERO {
-            draft.centres.stand_for(
+            draft.centres.add_value(
                 &centre,
                 "m",
                 &about("centre of mass along the axis"),
@@ -346,15 +323,16 @@ impl Work<'_> {
             components[0] = centre;
         }
         if whole.centre.y.abs() > ZERO && !drops {
-            draft.centres.stand_for(
+            draft.centres.add_value(
                 &across,
                 "m",
-                &about("centre of mass beside the axis"),
+                &about("centre of mass across the axis"),
                 &name,
                 whole.centre.y,
             );
             components[1] = across;
         }
+        // The exact values go into the report with the residuals of eq. (1).
         let groups: Vec<&str> = entry
             .groups
             .get_ref()
@@ -364,9 +342,9 @@ impl Work<'_> {
         let says = format!(
             "= {}: mass {} kg, centre ({}, {}) m, inertia {} kg m^2",
             groups.join(" + "),
-            digits(whole.mass, 8),
-            digits(whole.centre.x, 8),
-            digits(
+            significant_digits(whole.mass, 8),
+            significant_digits(whole.centre.x, 8),
+            significant_digits(
                 if whole.centre.y.abs() > ZERO {
                     whole.centre.y
                 } else {
@@ -374,9 +352,9 @@ impl Work<'_> {
                 },
                 8
             ),
-            digits(whole.inertia, 8)
+            significant_digits(whole.inertia, 8)
         );
-        self.wholes.push((says, whole));
+        self.part_totals.push((says, whole));
         draft.parts.push(DraftPart {
             name: format!("{name}_body"),
             on: name,
@@ -386,31 +364,30 @@ impl Work<'_> {
         });
     }
 
-    /// Eq. (1) for every part, once all parts that share a symbol have given it their values.
+    /// Reports the residuals of eq. (1) for every part. This is possible only when all parts that share a symbol have
+    /// added their values.
     pub(crate) fn check_equation_1(&mut self) {
         let draft = &self.draft;
-        for (part, (says, whole)) in draft.parts.iter().zip(&self.wholes) {
+        for (part, (says, whole)) in draft.parts.iter().zip(&self.part_totals) {
             let value = |expression: &String| match expression.as_str() {
                 "0" => 0.0,
                 name => draft.centres.value(name),
             };
-            let said = Flat {
+            let said = PlanarBody {
                 mass: draft.masses.value(&part.mass),
                 centre: Vector2::new(value(&part.centre[0]), value(&part.centre[1])),
                 inertia: draft.inertias.value(&part.inertia),
             };
-            self.report.add(2, &part.on, says, residuals(whole, &said));
+            self.report.add(2, &part.on, says, part_residuals(whole, &said));
         }
     }
 
-    /// Step 2, lumped masses.
-    pub(crate) fn lumped_masses(&mut self, log: &mut Log) {
+    /// Step 2, lumped masses: replaces groups by point masses in equal shares.
+    pub(crate) fn lumped_masses(&mut self, log: &mut RigLog) {
         let plan = self.names.plan;
         for entry in &plan.lumped_mass {
-            let bodies = self
-                .names
-                .bodies(entry.groups.get_ref(), &mut self.used, log);
-            let points: Vec<(String, Anchor)> = entry
+            let bodies = self.names.bodies(entry.groups.get_ref(), &mut self.used_groups, log);
+            let points: Vec<(String, BodyAnchor)> = entry
                 .at
                 .get_ref()
                 .iter()
@@ -421,17 +398,18 @@ impl Work<'_> {
             }
             if points.is_empty() {
                 log.error(
-                    span(0, &entry.at.span()),
-                    "this mass is nowhere".to_owned(),
+                    source_span(0, &entry.at.span()),
+                    "this mass has no point".to_owned(),
                     "expected at least one point",
                     "",
                 );
                 continue;
             }
             let name = entry.name.get_ref();
-            let anchors: Vec<Anchor> = points.iter().map(|(_, anchor)| *anchor).collect();
+            // The mass of the groups, with a report of what the point masses neglect.
+            let anchors: Vec<BodyAnchor> = points.iter().map(|(_, anchor)| *anchor).collect();
             let (plane, samples) = (&self.plane, &self.samples);
-            let mass = lump(
+            let mass = lump_mass(
                 self.names.rig,
                 name,
                 &bodies,
@@ -441,13 +419,9 @@ impl Work<'_> {
                 &mut self.report,
             );
             let symbol = entry.symbol.clone().unwrap_or_else(|| format!("m_{name}"));
-            let note = entry
-                .note
-                .clone()
-                .unwrap_or_else(|| format!("mass of {name}"));
-            self.draft
-                .masses
-                .stand_for(&symbol, "kg", &note, name, mass);
+            let note = entry.note.clone().unwrap_or_else(|| format!("mass of {name}"));
+            self.draft.masses.add_value(&symbol, "kg", &note, name, mass);
+            // Equal shares of the mass at each point.
             for (point, _) in &points {
                 let one = if points.len() == 1 {
                     name.clone()
@@ -461,24 +435,27 @@ impl Work<'_> {
         }
     }
 
-    /// A point of the model, declared when it is first used.
-    pub(crate) fn model_point(&mut self, name: &Name, log: &mut Log) -> Option<(String, Anchor)> {
+    /// Name and anchor of a point of the model; adds the point to the draft at its first use. None after a fault.
+    pub(crate) fn model_point(&mut self, name: &PlanName, log: &mut RigLog) -> Option<(String, BodyAnchor)> {
         let anchor = self.names.point(name, log)?;
+        // The part that carries the point, and the position there.
         let part = self.names.owner(&self.parts, &anchor, name, log).ok()?;
-        let contact = self.contact(&anchor, part);
+        let contact = self.contact_place(&anchor, part);
         self.declare(name.get_ref(), contact);
         Some((name.get_ref().clone(), anchor))
     }
 
-    pub(crate) fn contact(&self, anchor: &Anchor, part: Option<usize>) -> Contact {
+    /// The position of an anchor in the frame of its part, or in the plane.
+    pub(crate) fn contact_place(&self, anchor: &BodyAnchor, part: Option<usize>) -> ContactPlace {
         let at = match part {
-            None => self.plane.place(&self.samples.nominal.place(anchor)),
-            Some(part) => self.parts[part].local(anchor, &self.plane, &self.samples),
+            None => self.plane.plane_position(&self.samples.nominal.place(anchor)),
+            Some(part) => self.parts[part].local_position(anchor, &self.plane, &self.samples),
         };
-        Contact { part, at }
+        ContactPlace { part, at }
     }
 
-    pub(crate) fn declare(&mut self, name: &str, contact: Contact) {
+    /// Adds a point to the draft, unless it is there already.
+    pub(crate) fn declare(&mut self, name: &str, contact: ContactPlace) {
         if self.draft.points.iter().any(|point| point.name == name) {
             return;
         }
@@ -494,8 +471,9 @@ impl Work<'_> {
     }
 }
 
-/// Names of a part's mass, centre along and beside its axis, and inertia.
-fn symbols_of(entry: &PartEntry) -> [String; 4] {
+/// Symbols of a part: mass, centre along and across its axis, inertia. Without a name in the plan they are made from
+/// the part's name.
+fn symbols_of(entry: &PlanPartEntry) -> [String; 4] {
     let symbols = &entry.symbols;
     let all = [
         (&symbols.mass, "m"),
@@ -510,8 +488,8 @@ fn symbols_of(entry: &PartEntry) -> [String; 4] {
     })
 }
 
-/// An angle within half a turn.
-fn wrapped(angle: f64) -> f64 {
+/// An angle between -pi and pi.
+fn wrap_angle(angle: f64) -> f64 {
     let turn = 2.0 * std::f64::consts::PI;
     angle - turn * (angle / turn).round()
 }

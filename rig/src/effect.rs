@@ -1,8 +1,8 @@
-//! Effects: what friction, rotors, springs, rods, tools and the like add to the force of a drive, in a joint, at a
-//! point, to gravity or to the reading of the forces.
+//! Effects: additions of friction, rotors, springs, rods, tools and others to the force of a drive, in a joint, at a
+//! point, to gravity or to the measured forces.
 //!
-//! A place's value, rate, acceleration and load go in, the force or torque that must be supplied there besides
-//! comes out; effects with mass are in `massive`. The kinds bear the names that model files use, and their laws are
+//! A place's value, rate, acceleration and load go in, and the additional force or torque at that place
+//! comes out. Effects with mass are in `massive`. The kinds have the names that model files use, and their laws are
 //! those of the library of effects.
 //! Sources: the laws are textbook ones, e.g. B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, "A survey of
 //! models, analysis tools and compensation methods for the control of machines with friction" (1994);
@@ -10,37 +10,37 @@
 
 use std::f64::consts::PI;
 
-use crate::dynamics::Measured;
+use crate::dynamics::ScalarMotion;
 use crate::rig::Rig;
 
-/// An effect in a rig. [`Rig::effect`] makes one from names; a program may also write it down itself.
+/// An effect in a rig. [`Rig::effect`] creates one from names; a program may also construct it directly.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Effect {
-    /// What it does.
-    pub law: Law,
-    /// Where; indices of the rig that it belongs to.
-    pub places: Vec<Place>,
+pub struct RigEffect {
+    /// The law with its values.
+    pub law: RigLaw,
+    /// The places; indices refer to the rig.
+    pub places: Vec<RigPlace>,
 }
 
-/// Where an effect acts.
+/// The place where an effect acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Place {
+pub enum RigPlace {
     /// A drive, by index.
     Drive(usize),
     /// A joint with one coordinate, by index.
     Joint(usize),
     /// A point, by index.
     Point(usize),
-    /// The base as a whole.
+    /// The complete base.
     Base,
-    /// The measured forces as a whole.
+    /// All measured forces.
     Force,
 }
 
 /// A law with its values, in SI units of the place: N and m, or N m and rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(non_snake_case, reason = "symbols as in model files")]
-pub enum Law {
+pub enum RigLaw {
     /// `Fv*rate`
     ViscousFriction {
         /// Coefficient.
@@ -84,7 +84,7 @@ pub enum Law {
     },
     /// `Ia*acceleration`
     DriveInertia {
-        /// Mass or inertia as felt at the place.
+        /// Mass or inertia that acts at the place.
         Ia: f64,
     },
     /// `F0`
@@ -96,7 +96,7 @@ pub enum Law {
     Spring {
         /// Stiffness.
         k: f64,
-        /// Where it is at rest.
+        /// Value without force.
         rest: f64,
     },
     /// `As*sin(2*pi*value/pitch) + Ac*cos(2*pi*value/pitch)`
@@ -105,7 +105,7 @@ pub enum Law {
         As: f64,
         /// Amplitude of the cosine.
         Ac: f64,
-        /// Distance after which it repeats.
+        /// Period.
         pitch: f64,
     },
     /// At each of two places, with the other's motion: `Ia*acceleration + Fv*rate + Fs*sign(rate of both)`
@@ -117,7 +117,7 @@ pub enum Law {
         /// Dry friction, by the sum of both rates.
         Fs: f64,
     },
-    /// A slender rod along a linear drive: it turns about the drive's first point and slides through the second.
+    /// A slender rod along a linear drive: it rotates about the drive's first point and slides through the second.
     RodInertia {
         /// Mass, kg.
         m: f64,
@@ -131,12 +131,12 @@ pub enum Law {
         /// Mass, kg.
         m: f64,
     },
-    /// Of two points of one body: the moments of a mass that sits at the first are taken as if it were at the second.
+    /// Of two points of one body: the moments of a mass at the first point are computed as if it were at the second.
     LumpedMassPlacement {
         /// Mass, kg.
         m: f64,
     },
-    /// The base stands turned against the vertical by this rotation vector, rad: gravity turns back by it.
+    /// The base is rotated against the vertical by this rotation vector, rad: gravity is rotated back by it.
     GravityTilt {
         /// About x.
         tx: f64,
@@ -145,25 +145,25 @@ pub enum Law {
         /// About z.
         tz: f64,
     },
-    /// All forces are read this much later than they act, s.
+    /// All forces are read with this delay, s.
     TimeDelay {
         /// Delay, s.
         T: f64,
     },
 }
 
-/// A value that a kind takes.
+/// A value of a kind of effect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ValueOfKind {
     /// Its symbol, as in model files.
     pub symbol: &'static str,
-    /// What it is where none is given; without one it must be given.
+    /// Its default; a value without a default must be given.
     pub default: Option<f64>,
-    /// Whether it must be above zero (lengths), or at least not below (masses, delays).
+    /// Whether it must be above zero (lengths), or not below zero (masses, delays).
     pub sign: ValueSign,
 }
 
-/// Which values make sense.
+/// The range of valid values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ValueSign {
     /// Any finite number.
@@ -174,7 +174,8 @@ pub enum ValueSign {
     Positive,
 }
 
-const fn any(symbol: &'static str) -> ValueOfKind {
+/// Any finite number, without a default.
+const fn any_value(symbol: &'static str) -> ValueOfKind {
     ValueOfKind {
         symbol,
         default: None,
@@ -182,7 +183,8 @@ const fn any(symbol: &'static str) -> ValueOfKind {
     }
 }
 
-const fn or_zero(symbol: &'static str) -> ValueOfKind {
+/// Any finite number; zero by default.
+const fn zero_by_default(symbol: &'static str) -> ValueOfKind {
     ValueOfKind {
         symbol,
         default: Some(0.0),
@@ -190,7 +192,8 @@ const fn or_zero(symbol: &'static str) -> ValueOfKind {
     }
 }
 
-const fn not_negative(symbol: &'static str) -> ValueOfKind {
+/// A number of at least zero, without a default.
+const fn not_negative_value(symbol: &'static str) -> ValueOfKind {
     ValueOfKind {
         symbol,
         default: None,
@@ -198,7 +201,8 @@ const fn not_negative(symbol: &'static str) -> ValueOfKind {
     }
 }
 
-const fn positive(symbol: &'static str, default: Option<f64>) -> ValueOfKind {
+/// A number above zero.
+const fn positive_value(symbol: &'static str, default: Option<f64>) -> ValueOfKind {
     ValueOfKind {
         symbol,
         default,
@@ -206,7 +210,7 @@ const fn positive(symbol: &'static str, default: Option<f64>) -> ValueOfKind {
     }
 }
 
-impl Law {
+impl RigLaw {
     /// Names of all kinds.
     pub const KINDS: [&'static str; 17] = [
         "viscous_friction",
@@ -228,30 +232,38 @@ impl Law {
         "time_delay",
     ];
 
-    /// The values that a kind takes; `None` for an unknown kind.
+    /// The values of a kind, in a fixed order; `None` for an unknown kind.
     pub fn values(kind: &str) -> Option<&'static [ValueOfKind]> {
         Some(match kind {
-            "viscous_friction" => const { &[any("Fv")] },
-            "coulomb_friction" => const { &[any("Fc")] },
-            "stribeck_friction" => const { &[any("Fs"), positive("vs", Some(0.02))] },
-            "quadratic_friction" => const { &[any("Fq")] },
-            "directional_viscous_friction" => const { &[any("Fvp"), any("Fvn")] },
-            "directional_coulomb_friction" => const { &[any("Fcp"), any("Fcn")] },
-            "load_friction" => const { &[any("mu")] },
-            "drive_inertia" => const { &[any("Ia")] },
-            "force_offset" => const { &[any("F0")] },
-            "spring" => const { &[any("k"), or_zero("rest")] },
-            "force_ripple" => const { &[or_zero("As"), or_zero("Ac"), positive("pitch", None)] },
-            "coupled_drive" => const { &[or_zero("Ia"), or_zero("Fv"), or_zero("Fs")] },
-            "rod_inertia" => const { &[not_negative("m"), any("c"), not_negative("I")] },
-            "point_mass" | "lumped_mass_placement" => const { &[any("m")] },
-            "gravity_tilt" => const { &[or_zero("tx"), or_zero("ty"), or_zero("tz")] },
-            "time_delay" => const { &[not_negative("T")] },
+            "viscous_friction" => const { &[any_value("Fv")] },
+            "coulomb_friction" => const { &[any_value("Fc")] },
+            "stribeck_friction" => const { &[any_value("Fs"), positive_value("vs", Some(0.02))] },
+            "quadratic_friction" => const { &[any_value("Fq")] },
+            "directional_viscous_friction" => const { &[any_value("Fvp"), any_value("Fvn")] },
+            "directional_coulomb_friction" => const { &[any_value("Fcp"), any_value("Fcn")] },
+            "load_friction" => const { &[any_value("mu")] },
+            "drive_inertia" => const { &[any_value("Ia")] },
+            "force_offset" => const { &[any_value("F0")] },
+            "spring" => const { &[any_value("k"), zero_by_default("rest")] },
+            "force_ripple" => {
+                const {
+                    &[
+                        zero_by_default("As"),
+                        zero_by_default("Ac"),
+                        positive_value("pitch", None),
+                    ]
+                }
+            }
+            "coupled_drive" => const { &[zero_by_default("Ia"), zero_by_default("Fv"), zero_by_default("Fs")] },
+            "rod_inertia" => const { &[not_negative_value("m"), any_value("c"), not_negative_value("I")] },
+            "point_mass" | "lumped_mass_placement" => const { &[any_value("m")] },
+            "gravity_tilt" => const { &[zero_by_default("tx"), zero_by_default("ty"), zero_by_default("tz")] },
+            "time_delay" => const { &[not_negative_value("T")] },
             _ => return None,
         })
     }
 
-    /// The law of a kind with the values of [`Law::values`] in their order; `None` for an unknown kind or another
+    /// The law of a kind with the values of [`RigLaw::values`] in their order; `None` for an unknown kind or another
     /// number of values.
     pub(crate) fn new(kind: &str, values: &[f64]) -> Option<Self> {
         Some(match (kind, values) {
@@ -259,12 +271,8 @@ impl Law {
             ("coulomb_friction", &[Fc]) => Self::CoulombFriction { Fc },
             ("stribeck_friction", &[Fs, vs]) => Self::StribeckFriction { Fs, vs },
             ("quadratic_friction", &[Fq]) => Self::QuadraticFriction { Fq },
-            ("directional_viscous_friction", &[Fvp, Fvn]) => {
-                Self::DirectionalViscousFriction { Fvp, Fvn }
-            }
-            ("directional_coulomb_friction", &[Fcp, Fcn]) => {
-                Self::DirectionalCoulombFriction { Fcp, Fcn }
-            }
+            ("directional_viscous_friction", &[Fvp, Fvn]) => Self::DirectionalViscousFriction { Fvp, Fvn },
+            ("directional_coulomb_friction", &[Fcp, Fcn]) => Self::DirectionalCoulombFriction { Fcp, Fcn },
             ("load_friction", &[mu]) => Self::LoadFriction { mu },
             ("drive_inertia", &[Ia]) => Self::DriveInertia { Ia },
             ("force_offset", &[F0]) => Self::ForceOffset { F0 },
@@ -281,18 +289,14 @@ impl Law {
     }
 
     /// The name of its kind and its values by symbol.
-    pub fn described(&self) -> (&'static str, Vec<(&'static str, f64)>) {
+    pub fn kind_and_values(&self) -> (&'static str, Vec<(&'static str, f64)>) {
         let (kind, values): (&str, Vec<f64>) = match *self {
             Self::ViscousFriction { Fv } => ("viscous_friction", vec![Fv]),
             Self::CoulombFriction { Fc } => ("coulomb_friction", vec![Fc]),
             Self::StribeckFriction { Fs, vs } => ("stribeck_friction", vec![Fs, vs]),
             Self::QuadraticFriction { Fq } => ("quadratic_friction", vec![Fq]),
-            Self::DirectionalViscousFriction { Fvp, Fvn } => {
-                ("directional_viscous_friction", vec![Fvp, Fvn])
-            }
-            Self::DirectionalCoulombFriction { Fcp, Fcn } => {
-                ("directional_coulomb_friction", vec![Fcp, Fcn])
-            }
+            Self::DirectionalViscousFriction { Fvp, Fvn } => ("directional_viscous_friction", vec![Fvp, Fvn]),
+            Self::DirectionalCoulombFriction { Fcp, Fcn } => ("directional_coulomb_friction", vec![Fcp, Fcn]),
             Self::LoadFriction { mu } => ("load_friction", vec![mu]),
             Self::DriveInertia { Ia } => ("drive_inertia", vec![Ia]),
             Self::ForceOffset { F0 } => ("force_offset", vec![F0]),
@@ -305,16 +309,13 @@ impl Law {
             Self::GravityTilt { tx, ty, tz } => ("gravity_tilt", vec![tx, ty, tz]),
             Self::TimeDelay { T } => ("time_delay", vec![T]),
         };
-        let symbols = Self::values(kind)
-            .unwrap_or(&[])
-            .iter()
-            .map(|value| value.symbol);
+        let symbols = Self::values(kind).unwrap_or(&[]).iter().map(|value| value.symbol);
         (kind, symbols.zip(values).collect())
     }
 
-    /// What must be supplied at a drive or in a joint beside the load; `other` is the other place of a coupled drive.
-    /// Effects that act elsewhere supply nothing here.
-    pub(crate) fn force(&self, at: Measured, load: f64, other: Measured) -> f64 {
+    /// The force at a drive or in a joint in addition to the load; `other` is the motion of the other place of a
+    /// coupled drive. Zero for effects that act elsewhere.
+    pub(crate) fn force(&self, at: ScalarMotion, load: f64, other: ScalarMotion) -> f64 {
         let way = sign(at.rate);
         match *self {
             Self::ViscousFriction { Fv } => Fv * at.rate,
@@ -324,13 +325,9 @@ impl Law {
                 Fs * way * libm::exp(-share * share)
             }
             Self::QuadraticFriction { Fq } => Fq * at.rate * at.rate.abs(),
-            Self::DirectionalViscousFriction { Fvp, Fvn } => {
-                at.rate * if at.rate > 0.0 { Fvp } else { Fvn }
-            }
-            // At standstill the mean of both, as the library's expression has it.
-            Self::DirectionalCoulombFriction { Fcp, Fcn } => {
-                0.5 * (Fcp * (1.0 + way) - Fcn * (1.0 - way))
-            }
+            Self::DirectionalViscousFriction { Fvp, Fvn } => at.rate * if at.rate > 0.0 { Fvp } else { Fvn },
+            // At standstill the mean of both values, as in the library's expression.
+            Self::DirectionalCoulombFriction { Fcp, Fcn } => 0.5 * (Fcp * (1.0 + way) - Fcn * (1.0 - way)),
             Self::LoadFriction { mu } => mu * load.abs() * way,
             Self::DriveInertia { Ia } => Ia * at.acceleration,
             Self::ForceOffset { F0 } => F0,
@@ -351,26 +348,22 @@ impl Law {
     }
 }
 
-impl Effect {
-    /// Forces that the effect adds at drives and in joints, each with its place; `measured` gives the motion of a
-    /// place and `load` the force of a drive before friction and the like.
+impl RigEffect {
+    /// Forces of the effect at drives and in joints, each with its place. `measured` returns the motion of a
+    /// place, and `load` the force of a drive before friction and other effects.
     pub(crate) fn forces(
         &self,
-        measured: impl Fn(Place) -> Measured,
+        measured: impl Fn(RigPlace) -> ScalarMotion,
         load: impl Fn(usize) -> f64,
-    ) -> Vec<(Place, f64)> {
+    ) -> Vec<(RigPlace, f64)> {
         let n = self.places.len();
-        let acts = |place: &Place| matches!(place, Place::Drive(_) | Place::Joint(_));
-        let places = self
-            .places
-            .iter()
-            .enumerate()
-            .filter(|(_, place)| acts(place));
+        let acts = |place: &RigPlace| matches!(place, RigPlace::Drive(_) | RigPlace::Joint(_));
+        let places = self.places.iter().enumerate().filter(|(_, place)| acts(place));
         places
             .map(|(i, place)| {
                 let other = measured(self.places[(i + 1) % n]);
                 let load = match place {
-                    Place::Drive(drive) => load(*drive),
+                    RigPlace::Drive(drive) => load(*drive),
                     _ => 0.0,
                 };
                 (*place, self.law.force(measured(*place), load, other))
@@ -379,9 +372,9 @@ impl Effect {
     }
 }
 
-impl Place {
-    /// What is measured at the place, if it is a drive or a joint with one coordinate.
-    pub(crate) fn pair(self, rig: &Rig) -> Option<&crate::pair::Pair> {
+impl RigPlace {
+    /// The quantity that is measured at the place, if it is a drive or a joint with one coordinate.
+    pub(crate) fn pair(self, rig: &Rig) -> Option<&crate::pair::PairFunction> {
         match self {
             Self::Drive(drive) => Some(&rig.drives.get(drive)?.measures),
             Self::Joint(joint) => rig.joints.get(joint)?.motion.as_ref(),
@@ -390,7 +383,7 @@ impl Place {
     }
 }
 
-/// -1, 0 or 1.
+/// The sign of a number: -1, 0 or 1.
 fn sign(x: f64) -> f64 {
     if x > 0.0 {
         1.0

@@ -1,4 +1,4 @@
-//! The tables of a rig file as types. Places are byte ranges, from which messages make lines and columns.
+//! The tables of a rig file as types. Places are byte ranges, from which messages compute lines and columns.
 //!
 //! Numbers are in SI units: m, kg, s, rad.
 
@@ -8,36 +8,42 @@ use serde::Deserialize;
 use toml::Spanned;
 
 /// Three numbers.
-pub(crate) type Triple = Spanned<[f64; 3]>;
+pub(crate) type SpannedTriple = Spanned<[f64; 3]>;
 /// A name, with its place.
-pub(crate) type Name = Spanned<String>;
+pub(crate) type RigName = Spanned<String>;
 
 /// A rig file.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RigEntry {
+    /// Version of the format; 1.
     pub(crate) schema: Spanned<i64>,
-    pub(crate) name: Name,
+    /// Name of the rig.
+    pub(crate) name: RigName,
+    /// Description in one line.
     pub(crate) title: Option<String>,
-    /// Another rig file, relative to this one: entries here replace those of the same name or join them.
-    pub(crate) extends: Option<Name>,
-    pub(crate) gravity: Option<Triple>,
+    /// Another rig file, relative to this one: entries here replace those of the same name or are added to them.
+    pub(crate) extends: Option<RigName>,
+    /// Acceleration of gravity in the base frame, m/s^2.
+    pub(crate) gravity: Option<SpannedTriple>,
+    /// Seed of the noise.
     pub(crate) seed: Option<u64>,
+    /// Sampling of the recording.
     pub(crate) sampling: Option<SamplingEntry>,
     #[serde(default)]
     pub(crate) body: Vec<BodyEntry>,
     #[serde(default)]
-    pub(crate) point: Vec<PointEntry>,
+    pub(crate) point: Vec<RigPointEntry>,
     #[serde(default)]
-    pub(crate) lumped_mass: Vec<LumpedMassEntry>,
+    pub(crate) lumped_mass: Vec<RigLumpedMassEntry>,
     #[serde(default)]
-    pub(crate) joint: Vec<JointEntry>,
+    pub(crate) joint: Vec<RigJointEntry>,
     #[serde(default)]
-    pub(crate) coordinate: Vec<CoordinateEntry>,
+    pub(crate) coordinate: Vec<RigCoordinateEntry>,
     #[serde(default)]
-    pub(crate) drive: Vec<DriveEntry>,
+    pub(crate) drive: Vec<RigDriveEntry>,
     #[serde(default)]
-    pub(crate) effect: Vec<EffectEntry>,
+    pub(crate) effect: Vec<RigEffectEntry>,
     #[serde(default)]
     pub(crate) encoder: Vec<SensorEntry>,
     #[serde(default)]
@@ -48,23 +54,27 @@ pub(crate) struct RigEntry {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct BodyEntry {
-    pub(crate) name: Name,
-    /// Origin of its frame in the base frame, nominal configuration.
-    pub(crate) at: Option<Triple>,
-    /// Roll, pitch, yaw of its frame there.
-    pub(crate) rpy: Option<Triple>,
+    /// Unique name.
+    pub(crate) name: RigName,
+    /// Origin of its frame in the base frame in the nominal configuration, m.
+    pub(crate) at: Option<SpannedTriple>,
+    /// Roll, pitch and yaw of its frame in the nominal configuration, rad.
+    pub(crate) rpy: Option<SpannedTriple>,
+    /// Mass, kg.
     pub(crate) mass: Option<Spanned<f64>>,
-    /// Centre of mass in its frame.
-    pub(crate) centre: Option<Triple>,
-    pub(crate) inertia: Option<Spanned<InertiaEntry>>,
+    /// Centre of mass in its frame, m.
+    pub(crate) centre: Option<SpannedTriple>,
+    /// Inertia about the centre of mass.
+    pub(crate) inertia: Option<Spanned<RigInertiaEntry>>,
     #[serde(rename = "note")]
     _note: Option<String>,
 }
 
-/// Inertia about the centre of mass along the body's axes; off the diagonal the negative products.
+/// Inertia about the centre of mass along the body's axes, kg m^2. Entries off the diagonal are the negative products
+/// of inertia.
 #[derive(Clone, Copy, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub(crate) struct InertiaEntry {
+pub(crate) struct RigInertiaEntry {
     pub(crate) xx: f64,
     pub(crate) yy: f64,
     pub(crate) zz: f64,
@@ -76,11 +86,13 @@ pub(crate) struct InertiaEntry {
 /// A named place on a body or on the base.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct PointEntry {
-    pub(crate) name: Name,
-    pub(crate) on: Name,
-    /// In the body's frame.
-    pub(crate) at: Triple,
+pub(crate) struct RigPointEntry {
+    /// Unique name.
+    pub(crate) name: RigName,
+    /// Body that carries it, or `base`.
+    pub(crate) on: RigName,
+    /// Place in the body's frame, m.
+    pub(crate) at: SpannedTriple,
     #[serde(rename = "note")]
     _note: Option<String>,
 }
@@ -88,12 +100,15 @@ pub(crate) struct PointEntry {
 /// A mass at a point.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct LumpedMassEntry {
-    pub(crate) name: Option<Name>,
-    pub(crate) at: Name,
+pub(crate) struct RigLumpedMassEntry {
+    /// Name, by which variants replace it.
+    pub(crate) name: Option<RigName>,
+    /// Point where it acts in the balance of forces.
+    pub(crate) at: RigName,
+    /// Mass, kg.
     pub(crate) mass: Spanned<f64>,
-    /// Point at which the balance of moments sees it.
-    pub(crate) moment_at: Option<Name>,
+    /// Point where it acts in the balance of moments, if that is another one.
+    pub(crate) moment_at: Option<RigName>,
     #[serde(rename = "note")]
     _note: Option<String>,
 }
@@ -101,16 +116,19 @@ pub(crate) struct LumpedMassEntry {
 /// A joint.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct JointEntry {
-    pub(crate) name: Name,
-    pub(crate) kind: Name,
-    pub(crate) between: Spanned<[Name; 2]>,
-    /// Place in the base frame, nominal configuration.
-    pub(crate) at: Option<Triple>,
-    /// Instead, one point, or one on each body in the order of `between`.
-    pub(crate) points: Option<Spanned<Vec<Name>>>,
-    /// Direction in the base frame, nominal configuration.
-    pub(crate) axis: Option<Triple>,
+pub(crate) struct RigJointEntry {
+    /// Unique name.
+    pub(crate) name: RigName,
+    /// Kind of joint, by name.
+    pub(crate) kind: RigName,
+    /// The two bodies that it connects.
+    pub(crate) between: Spanned<[RigName; 2]>,
+    /// Place in the base frame in the nominal configuration, m.
+    pub(crate) at: Option<SpannedTriple>,
+    /// Alternative to `at`: one point, or one on each body in the order of `between`.
+    pub(crate) points: Option<Spanned<Vec<RigName>>>,
+    /// Direction in the base frame in the nominal configuration.
+    pub(crate) axis: Option<SpannedTriple>,
     #[serde(rename = "note")]
     _note: Option<String>,
 }
@@ -118,11 +136,14 @@ pub(crate) struct JointEntry {
 /// A coordinate that trajectories prescribe.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct CoordinateEntry {
-    pub(crate) name: Name,
-    pub(crate) joint: Option<Name>,
+pub(crate) struct RigCoordinateEntry {
+    /// Unique name, which is that of its column.
+    pub(crate) name: RigName,
+    /// Joint that it measures.
+    pub(crate) joint: Option<RigName>,
+    /// Alternative to `joint`: the distance that it measures.
     pub(crate) length: Option<LengthEntry>,
-    /// Its value in the nominal configuration.
+    /// Its value in the nominal configuration, rad or m.
     pub(crate) nominal: Option<Spanned<f64>>,
     #[serde(rename = "note")]
     _note: Option<String>,
@@ -132,39 +153,47 @@ pub(crate) struct CoordinateEntry {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct LengthEntry {
-    pub(crate) from: Name,
-    pub(crate) to: Name,
+    /// First point.
+    pub(crate) from: RigName,
+    /// Second point.
+    pub(crate) to: RigName,
 }
 
 /// A drive.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct DriveEntry {
-    pub(crate) name: Name,
-    pub(crate) joint: Option<Name>,
+pub(crate) struct RigDriveEntry {
+    /// Unique name, which is that of its column.
+    pub(crate) name: RigName,
+    /// Joint in which it acts.
+    pub(crate) joint: Option<RigName>,
+    /// Alternative to `joint`: the points between which it acts.
     pub(crate) linear: Option<LengthEntry>,
     #[serde(rename = "note")]
     _note: Option<String>,
 }
 
-/// Friction and the like.
+/// Friction or another effect.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct EffectEntry {
-    pub(crate) name: Option<Name>,
-    pub(crate) kind: Name,
-    pub(crate) at: Spanned<Vec<Name>>,
+pub(crate) struct RigEffectEntry {
+    /// Name, by which variants replace it.
+    pub(crate) name: Option<RigName>,
+    /// Kind of effect, by name.
+    pub(crate) kind: RigName,
+    /// Names of its places.
+    pub(crate) at: Spanned<Vec<RigName>>,
     #[serde(default)]
-    pub(crate) values: BTreeMap<Name, Spanned<f64>>,
+    pub(crate) values: BTreeMap<RigName, Spanned<f64>>,
     #[serde(rename = "note")]
     _note: Option<String>,
 }
 
-/// When samples are taken.
+/// Sampling of the recording.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct SamplingEntry {
-    /// Samples per second.
+    /// Samples per second, Hz.
     pub(crate) rate: Option<Spanned<f64>>,
     /// Whether derivatives are written; by default they are if there is no encoder.
     pub(crate) derivatives: Option<bool>,
@@ -174,19 +203,23 @@ pub(crate) struct SamplingEntry {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct SensorEntry {
-    pub(crate) of: Spanned<Vec<Name>>,
+    /// Coordinates or drives that it measures.
+    pub(crate) of: Spanned<Vec<RigName>>,
+    /// Standard deviation of white noise, in the unit of the quantity.
     pub(crate) noise: Option<Spanned<f64>>,
+    /// Smallest step of the reading, in the unit of the quantity.
     pub(crate) resolution: Option<Spanned<f64>>,
-    /// Steps per turn of an encoder, as a power of two.
+    /// Binary logarithm of the steps per revolution of an encoder.
     pub(crate) bits: Option<Spanned<u32>>,
-    /// A force that is read as a current.
+    /// A force that is measured by a current.
     pub(crate) current: Option<CurrentEntry>,
+    /// Delay of the reading, s.
     pub(crate) delay: Option<Spanned<f64>>,
     #[serde(rename = "note")]
     _note: Option<String>,
 }
 
-/// A force that is read as a current with a resolution of its own, A.
+/// A force that is measured by a current with its own resolution.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct CurrentEntry {

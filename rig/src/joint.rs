@@ -1,27 +1,33 @@
-//! Kinds of joints: each as the functions of two bodies' poses that it holds.
+//! Kinds of joints: each is a set of functions of two bodies' poses that are constant.
 //!
 //! A place on both bodies and an axis in the base frame go in; the equations and the joint's own coordinate come
 //! out. Source: E. Haug, "Computer Aided Kinematics and Dynamics of Mechanical Systems" (1989), table 9.4.
 
 use nalgebra::Vector3;
 
-use crate::pair::{Anchor, Pair, Shape};
-use crate::pose::{BodyMotion, Pose};
+use crate::pair::{BodyAnchor, PairFunction, PairQuantity};
+use crate::pose::{BodyMotion, BodyPose};
 
-/// What a joint allows.
+/// The motion that a joint allows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Kind {
+pub(crate) enum RigJointKind {
+    /// No motion.
     Fixed,
+    /// Rotation about the axis.
     Revolute,
+    /// Displacement along the axis.
     Prismatic,
+    /// Rotation about the axis and displacement along it.
     Cylindrical,
+    /// Rotation about the place.
     Spherical,
+    /// Displacement in the plane perpendicular to the axis, and rotation about the axis.
     Planar,
-    /// A point of the second body stays on a line of the first.
+    /// A point of the second body is on a line of the first.
     PointOnLine,
 }
 
-impl Kind {
+impl RigJointKind {
     /// Names in rig files.
     pub(crate) const NAMES: [&'static str; 7] = [
         "fixed",
@@ -34,15 +40,16 @@ impl Kind {
     ];
 
     /// The kind of a name.
-    pub(crate) fn named(name: &str) -> Option<Self> {
-        const KINDS: [Kind; 7] = [
-            Kind::Fixed,
-            Kind::Revolute,
-            Kind::Prismatic,
-            Kind::Cylindrical,
-            Kind::Spherical,
-            Kind::Planar,
-            Kind::PointOnLine,
+    pub(crate) fn from_name(name: &str) -> Option<Self> {
+        // In the order of `NAMES`.
+        const KINDS: [RigJointKind; 7] = [
+            RigJointKind::Fixed,
+            RigJointKind::Revolute,
+            RigJointKind::Prismatic,
+            RigJointKind::Cylindrical,
+            RigJointKind::Spherical,
+            RigJointKind::Planar,
+            RigJointKind::PointOnLine,
         ];
         let at = Self::NAMES.iter().position(|known| *known == name)?;
         Some(KINDS[at])
@@ -53,79 +60,79 @@ impl Kind {
 ///
 /// `axis` is a unit vector in the base frame while the bodies are at `poses`.
 pub(crate) fn equations(
-    kind: Kind,
-    from: Anchor,
-    to: Anchor,
+    kind: RigJointKind,
+    from: BodyAnchor,
+    to: BodyAnchor,
     axis: &Vector3<f64>,
-    poses: [Pose; 2],
-) -> (Vec<(Pair, f64)>, Option<Pair>) {
-    let (u, v) = across(axis);
+    poses: [BodyPose; 2],
+) -> (Vec<(PairFunction, f64)>, Option<PairFunction>) {
+    let (u, v) = perpendicular_axes(axis);
+    // `on` gives a direction of the base frame in the frame of either body.
     let on = |side: usize, direction: &Vector3<f64>| poses[side].q_WB.inverse() * direction;
-    let pair = |shape| Pair { from, to, shape };
-    let coincident =
-        || [Vector3::x(), Vector3::y(), Vector3::z()].map(|n| pair(Shape::Component(n)));
-    let on_line = || [&u, &v].map(|n| pair(Shape::Along(on(0, n))));
-    let parallel = || [&u, &v].map(|n| pair(Shape::Cosine(on(0, n), on(1, axis))));
-    let locked =
-        || [(&u, &v), (&v, axis), (axis, &u)].map(|(a, b)| pair(Shape::Cosine(on(0, a), on(1, b))));
-    let mut held: Vec<Pair> = Vec::new();
+    let pair = |shape| PairFunction { from, to, shape };
+    // The two places coincide.
+    let coincident = || [Vector3::x(), Vector3::y(), Vector3::z()].map(|n| pair(PairQuantity::Component(n)));
+    // The place on the second body is on the axis of the first.
+    let on_line = || [&u, &v].map(|n| pair(PairQuantity::Along(on(0, n))));
+    // The axes of both bodies are parallel.
+    let parallel = || [&u, &v].map(|n| pair(PairQuantity::Cosine(on(0, n), on(1, axis))));
+    // The bodies do not rotate relative to each other: three pairs of perpendicular directions.
+    let locked = || [(&u, &v), (&v, axis), (axis, &u)].map(|(a, b)| pair(PairQuantity::Cosine(on(0, a), on(1, b))));
+    let mut held: Vec<PairFunction> = Vec::new();
     let mut motion = None;
     match kind {
-        Kind::Fixed => {
+        RigJointKind::Fixed => {
             held.extend(coincident());
             held.extend(locked());
         }
-        Kind::Revolute => {
+        RigJointKind::Revolute => {
             held.extend(coincident());
             held.extend(parallel());
-            motion = Some(pair(Shape::Angle {
+            motion = Some(pair(PairQuantity::Angle {
                 axis: on(0, axis),
                 x: on(0, &u),
                 x_to: on(1, &u),
                 offset: 0.0,
             }));
         }
-        Kind::Prismatic => {
+        RigJointKind::Prismatic => {
             held.extend(on_line());
             held.extend(locked());
-            motion = Some(pair(Shape::Along(on(0, axis))));
+            motion = Some(pair(PairQuantity::Along(on(0, axis))));
         }
-        Kind::Cylindrical => {
+        RigJointKind::Cylindrical => {
             held.extend(on_line());
             held.extend(parallel());
         }
-        Kind::Spherical => held.extend(coincident()),
-        Kind::Planar => {
-            held.push(pair(Shape::Along(on(0, axis))));
+        RigJointKind::Spherical => held.extend(coincident()),
+        RigJointKind::Planar => {
+            held.push(pair(PairQuantity::Along(on(0, axis))));
             held.extend(parallel());
         }
-        Kind::PointOnLine => held.extend(on_line()),
+        RigJointKind::PointOnLine => held.extend(on_line()),
     }
     (held.into_iter().map(|pair| (pair, 0.0)).collect(), motion)
 }
 
-/// Makes a joint's coordinate have a value while the bodies are at `poses`.
-pub(crate) fn set_nominal(motion: &mut Pair, nominal: f64, poses: &[Pose]) {
-    let bodies: Vec<BodyMotion> = poses
-        .iter()
-        .map(|pose| BodyMotion::at_rest(*pose))
-        .collect();
-    let base = BodyMotion::at_rest(Pose::identity());
+/// Sets the value that a joint's coordinate has while the bodies are at `poses`.
+pub(crate) fn set_nominal(motion: &mut PairFunction, nominal: f64, poses: &[BodyPose]) {
+    let bodies: Vec<BodyMotion> = poses.iter().map(|pose| BodyMotion::at_standstill(*pose)).collect();
+    let base = BodyMotion::at_standstill(BodyPose::identity());
     let value = motion.derive(&bodies, &base).value;
     match &mut motion.shape {
-        Shape::Angle { offset, .. } => *offset += nominal - value,
-        // The anchor of the second body moves along the axis, where the joint leaves it free.
-        Shape::Along(axis) => {
+        PairQuantity::Angle { offset, .. } => *offset += nominal - value,
+        // The anchor of the second body moves along the axis, in which direction the joint is not constrained.
+        PairQuantity::Along(axis) => {
             let turned = |body: Option<usize>| body.map_or(base.pose.q_WB, |b| poses[b].q_WB);
             let axis_W = turned(motion.from.body) * *axis;
             motion.to.at += turned(motion.to.body).inverse() * axis_W * (nominal - value);
         }
-        Shape::Component(_) | Shape::Cosine(..) | Shape::Distance => {}
+        PairQuantity::Component(_) | PairQuantity::Cosine(..) | PairQuantity::Distance => {}
     }
 }
 
-/// Two unit vectors across a unit vector and each other, a right-handed triad with it.
-fn across(axis: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+/// Two unit vectors that form a right-handed triad with a unit vector.
+fn perpendicular_axes(axis: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
     let mut other = Vector3::zeros();
     other[axis.iamin()] = 1.0;
     let v = axis.cross(&other).normalize();

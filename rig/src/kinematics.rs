@@ -1,42 +1,42 @@
 //! Motion of all bodies from prescribed coordinates: Gauss-Newton on the joints' equations, rates and
 //! accelerations from their derivatives.
 //!
-//! The equations may be redundant, as those of parallel cranks are: each is kept, the least-squares solution
-//! of all is taken, and a residual says that they contradict each other.
+//! The equations may be redundant, as those of parallel cranks are. All of them are kept, their least-squares solution
+//! is used, and the residual shows whether they contradict each other.
 //! Along a trajectory an inverse is kept from pose to pose and solutions are refined (chord method).
-//! The QR decomposition with column pivoting reveals whether they determine the motion at all.
+//! The QR decomposition with column pivoting shows whether they determine the motion.
 //! Source: E. Haug, "Computer Aided Kinematics and Dynamics of Mechanical Systems" (1989), sections 3.6 and 9.6.
 //!
 //! Decision: a decomposition per Newton step took most of the time of a run. Only the residual decides whether a
-//! pose is met; slow progress requests a new inverse, whose rank is checked.
+//! pose is reached; slow progress requests a new inverse, whose rank is checked.
 
 use std::fmt;
 
 use nalgebra::linalg::ColPivQR;
 use nalgebra::{DMatrix, DVector, Dyn, Vector3};
 
-use crate::pair::{Derived, Pair};
-use crate::pose::{BodyMotion, Pose};
+use crate::pair::{PairDerivatives, PairFunction};
+use crate::pose::{BodyMotion, BodyPose};
 use crate::rig::Rig;
 
-/// Steps of Gauss-Newton before a pose is given up.
+/// Largest number of Gauss-Newton steps for a pose.
 const MOST_STEPS: usize = 40;
-/// A step below this, m or rad, ends the search: convergence is quadratic, and this is rounding.
+/// A shorter step, m or rad, ends the iteration: convergence is quadratic, and the rest is rounding.
 const SMALLEST_STEP: f64 = 1e-11;
-/// A step, or a refinement, that is not shorter than this share of the one before asks for a fresh inverse.
+/// A step, or a refinement, that is not shorter than this share of the one before requires a new inverse.
 const SLOWEST: f64 = 0.2;
 /// Rates are refined until their change is below this share.
 const REFINED: f64 = 1e-13;
-/// Joints may gape by this much, m or rad.
+/// Largest residual of a closed joint, m or rad.
 const LARGEST_GAP: f64 = 1e-9;
-/// A pivot below this share of the largest says that a body can move by itself.
+/// A pivot below this share of the largest means that a body can move by itself.
 const RANK_TOLERANCE: f64 = 1e-8;
 /// Coordinates move at most this far, m or rad, between two poses of a continuation.
 const CONTINUATION_STEP: f64 = 0.04;
 
 /// Values of the coordinates with their derivatives at one time; one entry per coordinate of the rig.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct State {
+pub struct RigState {
     /// Values, rad or m.
     pub q: Vec<f64>,
     /// First derivatives.
@@ -45,66 +45,60 @@ pub struct State {
     pub qdd: Vec<f64>,
 }
 
-/// Why there is no motion for a state.
+/// Why a state has no motion.
 #[derive(Clone, Debug, PartialEq)]
-pub enum PoseError {
+pub enum RigPoseError {
     /// The joints cannot be closed with these values of the coordinates.
     OutOfReach {
-        /// The joint, or the coordinate, that gapes most.
+        /// The joint, or the coordinate, with the largest residual.
         at: String,
-        /// By how much, m or rad.
+        /// The residual, m or rad.
         gap: f64,
     },
-    /// The coordinates do not determine the motion: a singular pose, or a body that nothing holds.
+    /// The coordinates do not determine the motion: a singular pose, or a body without joints.
     Undetermined {
-        /// The body that is freest to move.
+        /// The body with the largest undetermined motion.
         body: String,
     },
-    /// There are more coordinates than the joints leave freedoms.
+    /// There are more coordinates than the joints leave degrees of freedom.
     TooManyCoordinates {
-        /// Freedoms.
+        /// Number of degrees of freedom.
         freedoms: usize,
-        /// Coordinates.
+        /// Number of coordinates.
         coordinates: usize,
     },
-    /// The drives cannot move the mechanism here: no forces of theirs balance a load.
+    /// The drives cannot balance a load at this pose.
     DrivesDeadlocked,
 }
 
-impl fmt::Display for PoseError {
+impl fmt::Display for RigPoseError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::OutOfReach { at, gap } => write!(
                 f,
-                "the joints do not close: `{at}` gapes by {gap:.2e}; keep the trajectory inside the workspace, and \
-                 check the points of this joint"
+                "the joints do not close: the gap at `{at}` is {gap:.2e}; keep the trajectory inside the workspace, \
+                 and check the points of this joint"
             ),
             Self::Undetermined { body } => write!(
                 f,
-                "joints and coordinates do not determine the motion: `{body}` is free to move; keep clear of \
-                 singular poses, or hold it by a joint"
+                "joints and coordinates do not determine the motion: `{body}` is free to move; avoid singular poses, \
+                 or fix it with a joint"
             ),
-            Self::TooManyCoordinates {
-                freedoms,
-                coordinates,
-            } => write!(
+            Self::TooManyCoordinates { freedoms, coordinates } => write!(
                 f,
                 "the joints leave fewer degrees of freedom ({freedoms}) than there are coordinates ({coordinates}); give as \
                  many coordinates and drives as there are degrees of freedom"
             ),
-            Self::DrivesDeadlocked => write!(
-                f,
-                "the drives have no leverage here: no forces of theirs balance the load; keep clear of this pose"
-            ),
+            Self::DrivesDeadlocked => write!(f, "the drives cannot balance a load at this pose; avoid this pose"),
         }
     }
 }
 
-impl std::error::Error for PoseError {}
+impl std::error::Error for RigPoseError {}
 
 /// Motion of all bodies at one time.
 #[derive(Clone, Debug)]
-pub struct Motion {
+pub struct RigMotion {
     /// One per body of the rig.
     pub bodies: Vec<BodyMotion>,
     /// Rates of all bodies per unit rate of each coordinate: column `k` is the least-squares solution of the
@@ -112,35 +106,38 @@ pub struct Motion {
     pub(crate) rates_per_coordinate: DMatrix<f64>,
 }
 
-/// Follows a rig from pose to pose.
+/// Computes the motion of a rig from pose to pose.
 #[derive(Clone, Debug)]
-pub struct Tracker<'r> {
+pub struct RigTracker<'r> {
+    /// The rig.
     rig: &'r Rig,
+    /// The base as a body at standstill.
     base: BodyMotion,
     /// The joints' equations with the names of their joints, then the coordinates.
-    equations: Vec<(Pair, f64)>,
+    equations: Vec<(PairFunction, f64)>,
+    /// Name of the joint or coordinate of every equation.
     names: Vec<&'r str>,
-    /// Where the bodies were last, and the coordinates there.
-    poses: Vec<Pose>,
+    /// Last poses of the bodies.
+    poses: Vec<BodyPose>,
+    /// Coordinates at these poses, rad or m.
     last: Vec<f64>,
-    /// Rates per unit rate of each coordinate where bodies were last, from which the next pose is guessed.
+    /// Rates per unit rate of each coordinate at the last pose, from which the next pose is predicted.
     slopes: Option<DMatrix<f64>>,
-    /// Inverse of the gradient at some pose nearby.
-    inverse: Option<Inverse>,
+    /// Inverse of the gradient at a pose nearby.
+    inverse: Option<GradientInverse>,
 }
 
-impl<'r> Tracker<'r> {
-    /// Starts at the nominal configuration, closed exactly.
+impl<'r> RigTracker<'r> {
+    /// Starts at the nominal configuration, with all joints closed.
     ///
-    /// Fails when the joints do not close there, leave too few freedoms for the coordinates, or with them do not
-    /// determine the pose.
-    pub fn new(rig: &'r Rig) -> Result<Self, PoseError> {
-        let base = BodyMotion::at_rest(Pose::identity());
-        let poses: Vec<Pose> = rig.bodies.iter().map(|body| body.nominal).collect();
-        let at_rest: Vec<BodyMotion> = poses.iter().map(|p| BodyMotion::at_rest(*p)).collect();
+    /// Fails if the joints do not close there, leave fewer degrees of freedom than coordinates, or do not determine the
+    /// pose together with these.
+    pub fn new(rig: &'r Rig) -> Result<Self, RigPoseError> {
+        let base = BodyMotion::at_standstill(BodyPose::identity());
+        let poses: Vec<BodyPose> = rig.bodies.iter().map(|body| body.nominal).collect();
+        let at_rest: Vec<BodyMotion> = poses.iter().map(|p| BodyMotion::at_standstill(*p)).collect();
         let joints = rig.joints.iter();
-        let mut equations: Vec<(Pair, f64)> =
-            joints.clone().flat_map(|j| j.equations.clone()).collect();
+        let mut equations: Vec<(PairFunction, f64)> = joints.clone().flat_map(|j| j.equations.clone()).collect();
         let mut names: Vec<&str> = joints
             .flat_map(|j| j.equations.iter().map(|_| j.name.as_str()))
             .collect();
@@ -162,18 +159,19 @@ impl<'r> Tracker<'r> {
             inverse: None,
         };
         let q = tracker.last.clone();
-        tracker.close(&q)?;
+        tracker.close_joints(&q)?;
         tracker.check_freedoms()?;
         Ok(tracker)
     }
 
-    /// More coordinates than freedoms would contradict each other as soon as the rig moves. The rank of the joints'
-    /// equations can only be lower at a special pose, so that this never refuses a sound rig.
-    fn check_freedoms(&self) -> Result<(), PoseError> {
+    /// Checks the number of coordinates: more coordinates than degrees of freedom would contradict each other as soon
+    /// as the rig moves. The rank of the joints' equations can only be lower at a special pose, so no valid rig is
+    /// refused.
+    fn check_freedoms(&self) -> Result<(), RigPoseError> {
         let n = 6 * self.rig.bodies.len();
         let coordinates = self.last.len();
         let n_joint = self.equations.len() - coordinates;
-        let bodies: Vec<BodyMotion> = self.poses.iter().map(|p| BodyMotion::at_rest(*p)).collect();
+        let bodies: Vec<BodyMotion> = self.poses.iter().map(|p| BodyMotion::at_standstill(*p)).collect();
         let mut jacobian: DMatrix<f64> = DMatrix::zeros(n_joint.max(n), n);
         for (i, (pair, _)) in self.equations[..n_joint].iter().enumerate() {
             let derived = pair.derive(&bodies, &self.base);
@@ -183,32 +181,29 @@ impl<'r> Tracker<'r> {
         let held = (0..n).filter(|i| r[(*i, *i)].abs() > RANK_TOLERANCE * r[(0, 0)].abs());
         let freedoms = n - held.count();
         if coordinates > freedoms {
-            return Err(PoseError::TooManyCoordinates {
-                freedoms,
-                coordinates,
-            });
+            return Err(RigPoseError::TooManyCoordinates { freedoms, coordinates });
         }
         Ok(())
     }
 
-    /// Values of the coordinates at the pose where the tracker stands.
+    /// Values of the coordinates at the last pose.
     pub fn coordinates(&self) -> &[f64] {
         &self.last
     }
 
-    /// The motion of all bodies for a state near the last one, or anywhere that can be reached from there
+    /// The motion of all bodies for a state near the last one, or for any state that can be reached from there
     /// along a straight line in the coordinates.
     ///
-    /// Fails when the joints cannot be closed there or do not determine the motion.
-    pub fn follow(&mut self, state: &State) -> Result<Motion, PoseError> {
+    /// Fails if the joints cannot be closed there or do not determine the motion.
+    pub fn follow(&mut self, state: &RigState) -> Result<RigMotion, RigPoseError> {
         let far = state
             .q
             .iter()
             .zip(&self.last)
             .enumerate()
-            .map(|(k, (to, from))| self.rig.coordinates[k].measures.difference(*to, *from))
+            .map(|(k, (to, from))| self.rig.coordinates[k].measures.wrapped_difference(*to, *from))
             .fold(0.0, |most: f64, step| most.max(step.abs()));
-        // Small steps keep to the assembly in which the rig is drawn.
+        // Small steps stay in the assembly mode of the nominal configuration.
         let n_steps = (far / CONTINUATION_STEP).min(1e4).ceil();
         let from = self.last.clone();
         let mut step = 1.0;
@@ -218,47 +213,44 @@ impl<'r> Tracker<'r> {
                 .zip(&state.q)
                 .enumerate()
                 .map(|(k, (from, to))| {
-                    let whole = self.rig.coordinates[k].measures.difference(*to, *from);
+                    let whole = self.rig.coordinates[k].measures.wrapped_difference(*to, *from);
                     from + whole * step / n_steps
                 })
                 .collect();
-            self.close(&q)?;
+            self.close_joints(&q)?;
             step += 1.0;
         }
-        self.close(&state.q)?;
+        self.close_joints(&state.q)?;
         let motion = self.differentiate(state)?;
         self.slopes = Some(motion.rates_per_coordinate.clone());
         Ok(motion)
     }
 
-    /// Gauss-Newton from the last poses to those where joints are closed and coordinates have values `q`.
+    /// Gauss-Newton from the last poses to the poses with closed joints and coordinates `q`.
     ///
-    /// One inverse of the gradient serves as long as steps shrink fast with it: along a trajectory that saves
-    /// nearly all decompositions, and the residual, not the inverse, says when the pose is met.
-    fn close(&mut self, q: &[f64]) -> Result<(), PoseError> {
+    /// One inverse of the gradient is used as long as steps shrink fast with it. Along a trajectory this saves
+    /// nearly all decompositions. The residual, not the inverse, decides whether the pose is reached.
+    fn close_joints(&mut self, q: &[f64]) -> Result<(), RigPoseError> {
         let n_joint = self.equations.len() - q.len();
+        // The coordinates are the last equations.
         for (equation, value) in self.equations[n_joint..].iter_mut().zip(q) {
             equation.1 = *value;
         }
-        let mut poses = self.guess(q);
+        let mut poses = self.predict_poses(q);
         let mut outcome = ("", f64::INFINITY);
         let mut last_length = f64::INFINITY;
         let mut is_fresh = false;
         for _ in 0..MOST_STEPS {
-            let bodies: Vec<BodyMotion> = poses.iter().map(|p| BodyMotion::at_rest(*p)).collect();
+            let bodies: Vec<BodyMotion> = poses.iter().map(|p| BodyMotion::at_standstill(*p)).collect();
             let derived = self.derive(&bodies);
             let mut residual = DMatrix::zeros(self.equations.len(), 1);
             for (i, ((pair, target), derived)) in self.equations.iter().zip(&derived).enumerate() {
-                residual[i] = pair.difference(derived.value, *target);
+                residual[i] = pair.wrapped_difference(derived.value, *target);
             }
             let gap = residual.iamax_full().0;
             outcome = (self.names[gap], residual[gap].abs());
-            let known = self
-                .inverse
-                .as_ref()
-                .map(|inverse| inverse.solve(&residual));
-            let shrinks =
-                |step: &DMatrix<f64>| step.amax() < SMALLEST_STEP.max(SLOWEST * last_length);
+            let known = self.inverse.as_ref().map(|inverse| inverse.solve(&residual));
+            let shrinks = |step: &DMatrix<f64>| step.amax() < SMALLEST_STEP.max(SLOWEST * last_length);
             let mut step = if let Some(step) = known.filter(shrinks) {
                 step
             } else {
@@ -274,7 +266,7 @@ impl<'r> Tracker<'r> {
             }
             if length < SMALLEST_STEP {
                 if outcome.1 > LARGEST_GAP {
-                    // An old inverse may be blind to this gap.
+                    // An old inverse may not see this residual.
                     if is_fresh {
                         break;
                     }
@@ -286,7 +278,7 @@ impl<'r> Tracker<'r> {
                 q.clone_into(&mut self.last);
                 return Ok(());
             }
-            // A step over more than half a radian leaves the region where the gradient means anything.
+            // After a step of more than half a radian the gradient is no longer valid.
             if length > 0.5 {
                 step *= 0.5 / length;
                 last_length = f64::INFINITY;
@@ -296,42 +288,39 @@ impl<'r> Tracker<'r> {
             is_fresh = false;
             displace(&mut poses, &step);
         }
-        // Whatever comes next starts afresh.
+        // The next pose starts with a new inverse.
         self.inverse = None;
-        Err(PoseError::OutOfReach {
+        Err(RigPoseError::OutOfReach {
             at: outcome.0.to_owned(),
             gap: outcome.1,
         })
     }
 
-    /// Where the bodies will be about when the coordinates are `q`.
-    fn guess(&self, q: &[f64]) -> Vec<Pose> {
+    /// Prediction of the poses at coordinates `q`, to first order.
+    fn predict_poses(&self, q: &[f64]) -> Vec<BodyPose> {
         let mut poses = self.poses.clone();
         if let Some(slopes) = &self.slopes {
             let measures = self.rig.coordinates.iter().map(|c| &c.measures);
             let steps = measures.zip(q).zip(&self.last);
-            // The sign: a correction is taken away.
+            // `displace` subtracts its step, so the sign is negative.
             let back = DMatrix::from_iterator(
                 q.len(),
                 1,
-                steps.map(|((m, to), from)| -m.difference(*to, *from)),
+                steps.map(|((m, to), from)| -m.wrapped_difference(*to, *from)),
             );
             displace(&mut poses, &(slopes * back));
         }
         poses
     }
 
-    /// Rates and accelerations at the closed pose.
-    fn differentiate(&mut self, state: &State) -> Result<Motion, PoseError> {
+    /// Rates and accelerations of all bodies at the closed pose.
+    fn differentiate(&mut self, state: &RigState) -> Result<RigMotion, RigPoseError> {
         let n_equations = self.equations.len();
         let n_dof = state.q.len();
         let n_joint = n_equations - n_dof;
-        let mut bodies: Vec<BodyMotion> = self
-            .poses
-            .iter()
-            .map(|pose| BodyMotion::at_rest(*pose))
-            .collect();
+        let mut bodies: Vec<BodyMotion> = self.poses.iter().map(|pose| BodyMotion::at_standstill(*pose)).collect();
         let derived = self.derive(&bodies);
+        // Unit rate of each coordinate, with the joints' equations constant.
         let mut unit = DMatrix::zeros(n_equations, n_dof);
         for k in 0..n_dof {
             unit[(n_joint + k, k)] = 1.0;
@@ -343,13 +332,10 @@ impl<'r> Tracker<'r> {
             body.v_WB_W = part(rates.as_slice(), 6 * b);
             body.w_WB_W = part(rates.as_slice(), 6 * b + 3);
         }
+        // Accelerations: the joints' second derivatives are zero, and the coordinates' ones are prescribed.
         let mut right = DMatrix::zeros(n_equations, 1);
         for (i, derived) in self.derive(&bodies).iter().enumerate() {
-            let prescribed = if i < n_joint {
-                0.0
-            } else {
-                state.qdd[i - n_joint]
-            };
+            let prescribed = if i < n_joint { 0.0 } else { state.qdd[i - n_joint] };
             right[i] = prescribed - derived.bias;
         }
         let accelerations = self.solve(&derived, &right)?;
@@ -357,18 +343,15 @@ impl<'r> Tracker<'r> {
             body.a_WB_W = part(accelerations.as_slice(), 6 * b);
             body.alpha_WB_W = part(accelerations.as_slice(), 6 * b + 3);
         }
-        Ok(Motion {
+        Ok(RigMotion {
             bodies,
             rates_per_coordinate,
         })
     }
 
-    /// Solves `gradient x = right` by iterative refinement with the inverse at hand; a fresh one if that is slow.
-    fn solve(
-        &mut self,
-        derived: &[Derived],
-        right: &DMatrix<f64>,
-    ) -> Result<DMatrix<f64>, PoseError> {
+    /// Solves `gradient x = right` by iterative refinement with the present inverse; with a new one if that converges
+    /// slowly.
+    fn solve(&mut self, derived: &[PairDerivatives], right: &DMatrix<f64>) -> Result<DMatrix<f64>, RigPoseError> {
         let scale = right.amax().max(f64::MIN_POSITIVE);
         if let Some(inverse) = &self.inverse {
             let mut x = inverse.solve(right);
@@ -394,7 +377,7 @@ impl<'r> Tracker<'r> {
     }
 
     /// Gradient of all equations times columns of rates.
-    fn product(&self, derived: &[Derived], x: &DMatrix<f64>) -> DMatrix<f64> {
+    fn product(&self, derived: &[PairDerivatives], x: &DMatrix<f64>) -> DMatrix<f64> {
         let mut product = DMatrix::zeros(self.equations.len(), x.ncols());
         for (i, ((pair, _), derived)) in self.equations.iter().zip(derived).enumerate() {
             for k in 0..x.ncols() {
@@ -406,16 +389,18 @@ impl<'r> Tracker<'r> {
         product
     }
 
-    fn derive(&self, bodies: &[BodyMotion]) -> Vec<Derived> {
+    /// Values and derivatives of all equations.
+    fn derive(&self, bodies: &[BodyMotion]) -> Vec<PairDerivatives> {
         self.equations
             .iter()
             .map(|(pair, _)| pair.derive(bodies, &self.base))
             .collect()
     }
 
-    fn invert(&self, derived: &[Derived]) -> Result<Inverse, PoseError> {
+    /// The inverse of the gradient; an error if the equations do not determine the motion of all bodies.
+    fn invert(&self, derived: &[PairDerivatives]) -> Result<GradientInverse, RigPoseError> {
         let n = 6 * self.rig.bodies.len();
-        // Rows of zeros complete a matrix with too few equations; its rank then tells.
+        // Rows of zeros complete a matrix with too few equations, so that its rank shows this.
         let mut jacobian: DMatrix<f64> = DMatrix::zeros(self.equations.len().max(n), n);
         for (i, ((pair, _), derived)) in self.equations.iter().zip(derived).enumerate() {
             derived.scatter(pair, |column, value| jacobian[(i, column)] += value);
@@ -431,16 +416,16 @@ impl<'r> Tracker<'r> {
                 let solvable = r.solve_upper_triangular_mut(&mut inverse);
                 debug_assert!(solvable, "the rank was checked");
                 qr.p().inv_permute_rows(&mut inverse);
-                return Ok(Inverse(inverse));
+                return Ok(GradientInverse(inverse));
             }
         }
-        Err(PoseError::Undetermined {
+        Err(RigPoseError::Undetermined {
             body: self.rig.bodies[freest_body(jacobian)].name.clone(),
         })
     }
 }
 
-/// The body that moves most in the direction that costs no equation anything.
+/// The body that moves most in the direction that violates the equations least.
 fn freest_body(jacobian: DMatrix<f64>) -> usize {
     let n = jacobian.ncols();
     if jacobian.iter().any(|x| !x.is_finite()) {
@@ -457,18 +442,18 @@ fn freest_body(jacobian: DMatrix<f64>) -> usize {
 }
 
 /// Moves all bodies by minus a step, six rows per body.
-fn displace(poses: &mut [Pose], step: &DMatrix<f64>) {
+fn displace(poses: &mut [BodyPose], step: &DMatrix<f64>) {
     for (b, pose) in poses.iter_mut().enumerate() {
         let part = |at: usize| -Vector3::new(step[at], step[at + 1], step[at + 2]);
-        *pose = pose.displaced(&part(6 * b), &part(6 * b + 3));
+        *pose = pose.displaced_by(&part(6 * b), &part(6 * b + 3));
     }
 }
 
 /// The least-squares inverse of the gradient of all equations at one pose.
 #[derive(Clone, Debug)]
-struct Inverse(DMatrix<f64>);
+struct GradientInverse(DMatrix<f64>);
 
-impl Inverse {
+impl GradientInverse {
     /// Least-squares solutions, one per column of the right-hand side.
     fn solve(&self, right: &DMatrix<f64>) -> DMatrix<f64> {
         &self.0 * right

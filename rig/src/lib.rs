@@ -1,20 +1,17 @@
-//! A machine on the bench, in numbers: a rig file and a trajectory go in, a recording comes out.
+//! Numeric simulation of a real machine: a rig file and a trajectory go in, a recording comes out.
 //!
-//! Rigs stand in for hardware: whole machines with parallel cranks, rods, friction and sensors, against which
-//! reduced models are held. So nothing of their mechanics is shared with the mill: every body moves by itself,
-//! joints are equations between bodies, and all numbers are floats. The pipeline:
+//! Rigs replace hardware: complete machines with parallel cranks, rods, friction and sensors, with which reduced
+//! models are compared. So they share no mechanics with the derivation: every body moves by itself,
+//! joints are equations between bodies, and all numbers are doubles. The pipeline:
 //!
 //! 1. [`load_file`] - a rig file, checked;
 //! 2. [`Trajectory`] - coordinates over time;
-//! 3. [`Tracker`] - poses, rates and accelerations of all bodies, redundant loops included;
-//! 4. [`forces`] - what the drives must supply, with all effects;
+//! 3. [`RigTracker`] - poses, rates and accelerations of all bodies, with redundant loops;
+//! 4. [`forces`] - forces of the drives, with all effects;
 //! 5. [`simulate`] - the readings of the sensors.
 //!
-//! A [`Plant`] is the way back: forces of the drives go in, motion comes out, for controllers.
-#![allow(
-    non_snake_case,
-    reason = "physical quantities carry their frames, as in p_WB_W"
-)]
+//! A [`RigPlant`] is the forward dynamics, for controllers: forces of the drives go in, motion comes out.
+#![allow(non_snake_case, reason = "physical quantities carry their frames, as in p_WB_W")]
 
 mod assemble;
 mod assemble_sensors;
@@ -37,20 +34,20 @@ mod sensor;
 mod simulate;
 mod trajectory;
 
-pub use dynamics::{Measured, energy};
-pub use effect::{Effect, Law, Place, ValueOfKind, ValueSign};
+pub use dynamics::{ScalarMotion, energy};
+pub use effect::{RigEffect, RigLaw, RigPlace, ValueOfKind, ValueSign};
 pub use effect_by_name::{EffectFault, EffectPart};
-pub use kinematics::{Motion, PoseError, State, Tracker};
-pub use load::{Loaded, fault, load, load_file, load_file_with, parse, span};
-pub use log::Log;
-pub use modelmill_spec::Failure;
-pub use noise::Noise;
-pub use pair::{Anchor, Pair};
-pub use plant::{Plant, PlantError};
-pub use pose::{BodyMotion, Pose};
-pub use rig::{Body, Coordinate, Drive, Joint, LumpedMass, Point, Rig};
-pub use sensor::{Channel, Sensors};
+pub use kinematics::{RigMotion, RigPoseError, RigState, RigTracker};
+pub use load::{LoadedRig, load, load_file, load_file_with, parse, plain_error, source_span};
+pub use log::RigLog;
+pub use modelmill_spec::LoadFailure;
+pub use noise::GaussianNoise;
+pub use pair::{BodyAnchor, PairFunction};
+pub use plant::{PlantError, RigPlant};
+pub use pose::{BodyMotion, BodyPose};
+pub use rig::{Rig, RigBody, RigCoordinate, RigDrive, RigJoint, RigLumpedMass, RigPoint};
+pub use sensor::{RigSensors, SensorChannel};
 pub use simulate::{
-    Instant, Run, SimulationError, forces, forces_along, measured, n_instants, simulate,
+    RigRecording, SimulatedInstant, SimulationError, forces, forces_along, n_instants, place_motion, simulate,
 };
-pub use trajectory::{Samples, Trajectory, TrajectoryError};
+pub use trajectory::{CoordinateSamples, Trajectory, TrajectoryError};

@@ -1,10 +1,11 @@
-//! Reads a rig file and those that it extends, and makes the rig that they describe.
+//! Reads a rig file and those that it extends, and assembles the rig that they describe.
 
 use std::path::{Path, PathBuf};
 
-use modelmill_boundary::files::{Disk, Files, tidy};
+use modelmill_boundary::files::{DiskFiles, FileSource, normalise_path};
 use modelmill_spec::{
-    Diagnostic, Failure, LARGEST_FILE, Severity, SourceFile, Sources, Span, read_named, read_text,
+    Diagnostic, DiagnosticSeverity, LARGEST_FILE, LoadFailure, SourceFile, SourceFiles, SourceSpan, read_referenced,
+    read_text,
 };
 
 use crate::assemble::assemble;
@@ -14,30 +15,30 @@ use crate::rig::Rig;
 /// Longest chain of variants.
 const LONGEST_CHAIN: usize = 8;
 
-/// A rig file that was read and found sound.
+/// A rig file that was read without errors.
 #[derive(Clone, Debug)]
-pub struct Loaded {
+pub struct LoadedRig {
     /// What the file describes.
     pub rig: Rig,
     /// The files that were read.
-    pub sources: Sources,
+    pub sources: SourceFiles,
 }
 
 /// Reads a rig file from disk, and those that it extends.
 ///
-/// Fails with findings about the files, each with its place and what to do.
-pub fn load_file(path: &Path) -> Result<Loaded, Failure> {
-    load_file_with(path, &Disk::default())
+/// Fails with errors in the files, each with its place and a remedy.
+pub fn load_file(path: &Path) -> Result<LoadedRig, LoadFailure> {
+    load_file_with(path, &DiskFiles::default())
 }
 
 /// Reads a rig file as [`load_file`] does, with all files from `files`.
-pub fn load_file_with(path: &Path, files: &dyn Files) -> Result<Loaded, Failure> {
+pub fn load_file_with(path: &Path, files: &dyn FileSource) -> Result<LoadedRig, LoadFailure> {
     let advice = "give the path of a rig file, such as `model-spec/rigs/spidermill-full.toml`";
     let text = read_text(files, path, advice)?;
     load(&path.to_string_lossy(), &text, files)
 }
 
-/// Reads a rig from its text; what it extends comes from `files`.
+/// Reads a rig from its text; files that it extends come from `files`.
 ///
 /// ```
 /// let text = r#"
@@ -49,16 +50,16 @@ pub fn load_file_with(path: &Path, files: &dyn Files) -> Result<Loaded, Failure>
 ///     coordinate = [{ name = "q", joint = "hinge" }]
 ///     drive = [{ name = "motor", joint = "hinge" }]
 /// "#;
-/// let files = modelmill_boundary::files::Memory::default();
+/// let files = modelmill_boundary::files::MemoryFiles::default();
 /// let rig = modelmill_rig::load("pendulum.toml", text, &files)?.rig;
-/// let mut tracker = modelmill_rig::Tracker::new(&rig)?;
-/// let state = modelmill_rig::State { q: vec![0.3], qd: vec![0.0], qdd: vec![0.0] };
+/// let mut tracker = modelmill_rig::RigTracker::new(&rig)?;
+/// let state = modelmill_rig::RigState { q: vec![0.3], qd: vec![0.0], qdd: vec![0.0] };
 /// let torque = modelmill_rig::forces(&rig, &tracker.follow(&state)?)?[0];
 /// assert!((torque - 2.0 * 9.81 * 0.5 * 0.3_f64.cos()).abs() < 1e-12);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn load(path_name: &str, text: &str, files: &dyn Files) -> Result<Loaded, Failure> {
-    let mut sources = Sources::default();
+pub fn load(path_name: &str, text: &str, files: &dyn FileSource) -> Result<LoadedRig, LoadFailure> {
+    let mut sources = SourceFiles::default();
     let mut chain = Vec::new();
     let mut next = Some((PathBuf::from(path_name), text.to_owned()));
     while let Some((path, text)) = next.take() {
@@ -72,12 +73,12 @@ pub fn load(path_name: &str, text: &str, files: &dyn Files) -> Result<Loaded, Fa
             Err(found) => return Err(failure(sources, *found)),
         };
         if let Some(extends) = &entry.extends {
-            let span = Some(span(file, &extends.span()));
+            let span = Some(source_span(file, &extends.span()));
             let folder = path.parent().unwrap_or(Path::new(""));
-            let other = tidy(&folder.join(extends.get_ref()));
+            let other = normalise_path(&folder.join(extends.get_ref()));
             if file + 1 == LONGEST_CHAIN {
                 let help = "check whether two files extend each other".into();
-                let found = fault(span, "this chain of variants is too long");
+                let found = plain_error(span, "this chain of variants is too long");
                 return Err(failure(
                     sources,
                     Diagnostic {
@@ -86,11 +87,11 @@ pub fn load(path_name: &str, text: &str, files: &dyn Files) -> Result<Loaded, Fa
                     },
                 ));
             }
-            match read_named(files, &other, &["schema"]) {
+            match read_referenced(files, &other, &["schema"]) {
                 Ok(text) => next = Some((other, text)),
                 Err(error) => {
                     let says = format!("cannot read `{}`: {}", other.display(), error.fault);
-                    let found = fault(span, says);
+                    let found = plain_error(span, says);
                     let help = "the path is relative to the folder of this file".into();
                     return Err(failure(
                         sources,
@@ -105,27 +106,21 @@ pub fn load(path_name: &str, text: &str, files: &dyn Files) -> Result<Loaded, Fa
         chain.push((file, entry));
     }
     match assemble(chain) {
-        Ok(rig) => Ok(Loaded { rig, sources }),
-        Err(diagnostics) => Err(Failure {
-            diagnostics,
-            sources,
-        }),
+        Ok(rig) => Ok(LoadedRig { rig, sources }),
+        Err(diagnostics) => Err(LoadFailure { diagnostics, sources }),
     }
 }
 
 /// Reads the tables of a TOML file; `file` is its index among the sources.
 ///
-/// Fails with the place of what does not fit.
-pub fn parse<T: serde::de::DeserializeOwned>(
-    text: &str,
-    file: usize,
-) -> Result<T, Box<Diagnostic>> {
+/// Fails with the place of the first entry that does not have the expected form.
+pub fn parse<T: serde::de::DeserializeOwned>(text: &str, file: usize) -> Result<T, Box<Diagnostic>> {
     if text.len() > LARGEST_FILE {
-        return Err(Box::new(fault(None, "this file is too large to be meant")));
+        return Err(Box::new(plain_error(None, "this file is too large to be read")));
     }
     toml::from_str(text).map_err(|error| {
-        let place = error.span().map(|range| span(file, &range));
-        let mut found = fault(place, error.message().lines().next().unwrap_or("this is not TOML"));
+        let place = error.span().map(|range| source_span(file, &range));
+        let mut found = plain_error(place, error.message().lines().next().unwrap_or("this is not TOML"));
         let message = error.message();
         found.help.push(
             if message.contains("unknown field") {
@@ -143,26 +138,27 @@ pub fn parse<T: serde::de::DeserializeOwned>(
     })
 }
 
-fn failure(sources: Sources, found: Diagnostic) -> Failure {
-    Failure {
+/// A failure with a single error.
+fn failure(sources: SourceFiles, found: Diagnostic) -> LoadFailure {
+    LoadFailure {
         diagnostics: vec![found],
         sources,
     }
 }
 
 /// A place in a file.
-pub fn span(file: usize, range: &std::ops::Range<usize>) -> Span {
-    Span {
+pub fn source_span(file: usize, range: &std::ops::Range<usize>) -> SourceSpan {
+    SourceSpan {
         file,
         start: range.start,
         end: range.end,
     }
 }
 
-/// An error without further words.
-pub fn fault(span: Option<Span>, message: impl Into<String>) -> Diagnostic {
+/// An error with a message only: no label and no help.
+pub fn plain_error(span: Option<SourceSpan>, message: impl Into<String>) -> Diagnostic {
     Diagnostic {
-        severity: Severity::Error,
+        severity: DiagnosticSeverity::Error,
         message: message.into(),
         span,
         label: String::new(),

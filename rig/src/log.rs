@@ -1,58 +1,59 @@
-//! Findings about a rig file, and the readers of its plain values: each takes an entry with its place and gives a
-//! sound value, or a stand-in and a finding.
+//! Errors in a rig file, and readers of its plain values: each takes an entry with its place and returns a
+//! valid value, or a replacement and an error.
 
 use modelmill_boundary::text::Message;
-use modelmill_spec::{Diagnostic, Span};
+use modelmill_spec::{Diagnostic, SourceSpan};
 use nalgebra::Vector3;
 
-use crate::effect_by_name::list;
-use crate::file::{Name, Triple};
-use crate::load::{fault, span};
+use crate::effect_by_name::name_list;
+use crate::file::{RigName, SpannedTriple};
+use crate::load::{plain_error, source_span};
 
-/// An entry with the file that it stands in.
-pub(crate) struct Item<T> {
+/// An entry with the file that contains it.
+pub(crate) struct FileItem<T> {
+    /// Index of the file among the sources.
     pub(crate) file: usize,
+    /// The entry.
     pub(crate) entry: T,
 }
 
-/// Collects findings about a file.
+/// Collects errors in a file.
 #[derive(Debug, Default)]
-pub struct Log(pub Vec<Diagnostic>);
+pub struct RigLog(pub Vec<Diagnostic>);
 
-impl Log {
-    /// Takes an error at a place: what is wrong, what was expected there, what to do; the last two may be empty.
-    pub fn error(&mut self, span: Span, message: String, label: &str, help: &str) {
+impl RigLog {
+    /// Adds an error at a place: what is wrong, what was expected there, what to do. The last two may be empty.
+    pub fn error(&mut self, span: SourceSpan, message: String, label: &str, help: &str) {
         let help = Message::from(help);
         self.0.push(Diagnostic {
             label: label.to_owned(),
-            help: Some(help)
-                .filter(|help| !help.is_empty())
-                .into_iter()
-                .collect(),
-            ..fault(Some(span), message)
+            help: Some(help).filter(|help| !help.is_empty()).into_iter().collect(),
+            ..plain_error(Some(span), message)
         });
     }
 
-    /// Takes a name that leads nowhere; `what` says what it should name, `known` what there is.
-    pub fn unknown(&mut self, file: usize, name: &Name, what: &str, known: &[&str]) {
+    /// Adds an error for a name that does not exist. `what` is the kind of object that it should name, and `known`
+    /// lists the names.
+    pub fn unknown_name(&mut self, file: usize, name: &RigName, what: &str, known: &[&str]) {
         self.error(
-            span(file, &name.span()),
+            source_span(file, &name.span()),
             format!("there is no {what} `{}`", name.get_ref()),
             &format!("expected the name of a {what}"),
-            &format!("known are {}", list(known)),
+            &format!("known are {}", name_list(known)),
         );
     }
 }
 
-pub(crate) fn vector(file: usize, entry: Option<&Triple>, log: &mut Log) -> Vector3<f64> {
+/// A vector of finite numbers; zero if the entry is missing or not finite.
+pub(crate) fn vector(file: usize, entry: Option<&SpannedTriple>, log: &mut RigLog) -> Vector3<f64> {
     let Some(entry) = entry else {
         return Vector3::zeros();
     };
     let vector = Vector3::from(*entry.get_ref());
     if !vector.iter().all(|x| x.is_finite()) {
         log.error(
-            span(file, &entry.span()),
-            "this is not finite".to_owned(),
+            source_span(file, &entry.span()),
+            "this vector is not finite".to_owned(),
             "expected finite numbers",
             "",
         );
@@ -61,18 +62,14 @@ pub(crate) fn vector(file: usize, entry: Option<&Triple>, log: &mut Log) -> Vect
     vector
 }
 
-pub(crate) fn above_zero(
-    file: usize,
-    entry: &toml::Spanned<f64>,
-    what: &str,
-    log: &mut Log,
-) -> f64 {
+/// A finite number above zero; 1 if the entry is anything else, which is an error. `what` names it in the error.
+pub(crate) fn above_zero(file: usize, entry: &toml::Spanned<f64>, what: &str, log: &mut RigLog) -> f64 {
     let value = *entry.get_ref();
     if value.is_finite() && value > 0.0 {
         return value;
     }
     log.error(
-        span(file, &entry.span()),
+        source_span(file, &entry.span()),
         format!("{what} cannot be {value}"),
         "expected a finite number above zero",
         "",
@@ -80,12 +77,8 @@ pub(crate) fn above_zero(
     1.0
 }
 
-pub(crate) fn not_negative(
-    file: usize,
-    entry: Option<&toml::Spanned<f64>>,
-    what: &str,
-    log: &mut Log,
-) -> f64 {
+/// A finite number of at least zero; 0 if the entry is missing, or anything else, which is an error.
+pub(crate) fn not_negative(file: usize, entry: Option<&toml::Spanned<f64>>, what: &str, log: &mut RigLog) -> f64 {
     let Some(entry) = entry else {
         return 0.0;
     };
@@ -94,7 +87,7 @@ pub(crate) fn not_negative(
         return value;
     }
     log.error(
-        span(file, &entry.span()),
+        source_span(file, &entry.span()),
         format!("{what} cannot be {value}"),
         "expected a finite number, not below zero",
         "",

@@ -1,7 +1,7 @@
-//! Effects with mass: rods along drives, masses at points, masses that moments see elsewhere, and a tilted base.
+//! Effects with mass: rods along drives, masses at points, masses with another place in the moments, and a tilted base.
 //!
-//! The motion of the bodies goes in; forces and moments that the bodies must supply besides come out, or gravity.
-//! Source: Newton and Euler's equations of a slender rod that a pivot holds at one point and a slide across itself
+//! The motion of the bodies goes in. The additional forces and moments on the bodies, or gravity, come out.
+//! Source: Newton and Euler's equations of a slender rod with a pivot at one point and a guide along the rod
 //! at another.
 //!
 //! Decision: a rod, a tool or a tilted base acts on the bodies here and is no term at a drive, so that friction by
@@ -9,83 +9,78 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::dynamics::base;
-use crate::effect::{Effect, Law, Place};
-use crate::kinematics::Motion;
-use crate::pair::Anchor;
+use crate::dynamics::base_motion;
+use crate::effect::{RigEffect, RigLaw, RigPlace};
+use crate::kinematics::RigMotion;
+use crate::pair::BodyAnchor;
 use crate::pose::BodyMotion;
 use crate::rig::Rig;
 
-/// Gravity as the bodies of a rig with all its effects feel it, m/s^2.
+/// Gravity that acts on the bodies of a rig with all its effects, in the base frame, m/s^2.
 pub(crate) fn gravity(rig: &Rig) -> Vector3<f64> {
     let mut gravity = rig.gravity;
     for effect in &rig.effects {
-        if let Law::GravityTilt { tx, ty, tz } = effect.law {
-            gravity = turn(Vector3::new(tx, ty, tz)).transpose() * gravity;
+        if let RigLaw::GravityTilt { tx, ty, tz } = effect.law {
+            gravity = rotation_from_vector(Vector3::new(tx, ty, tz)).transpose() * gravity;
         }
     }
     gravity
 }
 
-/// The rotation of a rotation vector (O. Rodrigues 1840).
-fn turn(by: Vector3<f64>) -> Matrix3<f64> {
+/// The rotation matrix of a rotation vector (O. Rodrigues 1840).
+fn rotation_from_vector(by: Vector3<f64>) -> Matrix3<f64> {
     let angle = by.norm();
     if angle == 0.0 {
+        // R = 1 + K sin(angle) + K^2 (1 - cos(angle)), with K the cross-product matrix of the unit axis.
         return Matrix3::identity();
     }
     let k = (by / angle).cross_matrix();
     Matrix3::identity() + k * libm::sin(angle) + k * k * (1.0 - libm::cos(angle))
 }
 
-/// Calls `add` with each body, a force on it and its moment about the body's origin, which an effect needs for the
-/// motion of its masses.
-pub(crate) fn supply(
+/// Calls `add` with each body, a force on it in N and its moment about the body's origin in N m, which an effect needs
+/// for the motion of its masses.
+pub(crate) fn inertial_forces(
     rig: &Rig,
-    effect: &Effect,
-    motion: &Motion,
+    effect: &RigEffect,
+    motion: &RigMotion,
     gravity: &Vector3<f64>,
     add: &mut impl FnMut(usize, Vector3<f64>, Vector3<f64>),
 ) {
-    let mut push = |anchor: &Anchor, force: Vector3<f64>| {
+    // A force at a place of a body acts on the body with its moment about the body's origin; the base takes any force.
+    let mut push = |anchor: &BodyAnchor, force: Vector3<f64>| {
         if let Some(body) = anchor.body {
-            add(
-                body,
-                force,
-                (motion.bodies[body].R_WB * anchor.at).cross(&force),
-            );
+            add(body, force, (motion.bodies[body].R_WB * anchor.at).cross(&force));
         }
     };
     match effect.law {
-        Law::PointMass { m } => {
+        RigLaw::PointMass { m } => {
             for place in &effect.places {
-                if let Some(anchor) = point(rig, *place) {
-                    let a = moves(motion, &anchor).acceleration(&anchor.at);
+                // Newton: m (a - g) at each place.
+                if let Some(anchor) = point_anchor(rig, *place) {
+                    let a = anchor_motion(motion, &anchor).point_acceleration(&anchor.at);
                     push(&anchor, m * (a - gravity));
                 }
             }
         }
-        Law::LumpedMassPlacement { m } => {
+        RigLaw::LumpedMassPlacement { m } => {
             let [true_place, seen] = effect.places[..] else {
                 return;
             };
-            if let (Some(from), Some(to)) = (point(rig, true_place), point(rig, seen))
+            // The force stays the same; only its moment is that of the mass at the second point instead of the first.
+            if let (Some(from), Some(to)) = (point_anchor(rig, true_place), point_anchor(rig, seen))
                 && let Some(body) = from.body
             {
                 let moves = &motion.bodies[body];
-                let moment = |at: &Vector3<f64>| {
-                    (moves.R_WB * at).cross(&(moves.acceleration(at) - gravity))
-                };
-                add(
-                    body,
-                    Vector3::zeros(),
-                    m * (moment(&to.at) - moment(&from.at)),
-                );
+                let moment = |at: &Vector3<f64>| (moves.R_WB * at).cross(&(moves.point_acceleration(at) - gravity));
+                add(body, Vector3::zeros(), m * (moment(&to.at) - moment(&from.at)));
             }
         }
-        Law::RodInertia { m, c, I } => {
+        RigLaw::RodInertia { m, c, I } => {
             for place in &effect.places {
+                // A rod goes from the first point of a drive to the second.
                 if let Some(pair) = place.pair(rig) {
-                    let [pivot, slide] = rod(motion, [&pair.from, &pair.to], m, c, I, gravity);
+                    let [pivot, slide] = rod_forces(motion, [&pair.from, &pair.to], m, c, I, gravity);
                     push(&pair.from, pivot);
                     push(&pair.to, slide);
                 }
@@ -95,23 +90,24 @@ pub(crate) fn supply(
     }
 }
 
-/// Forces that a rod needs at its pivot and, across itself, at its slide.
-fn rod(
-    motion: &Motion,
-    ends: [&Anchor; 2],
+/// Forces that a rod needs at its pivot and, perpendicular to itself, at its guide, N.
+fn rod_forces(
+    motion: &RigMotion,
+    ends: [&BodyAnchor; 2],
     m: f64,
     c: f64,
     inertia: f64,
     gravity: &Vector3<f64>,
 ) -> [Vector3<f64>; 2] {
     let [one, two] = ends.map(|anchor| {
-        let moves = moves(motion, anchor);
+        let moves = anchor_motion(motion, anchor);
         [
-            moves.place(&anchor.at),
-            moves.velocity(&anchor.at),
-            moves.acceleration(&anchor.at),
+            moves.point_position(&anchor.at),
+            moves.point_velocity(&anchor.at),
+            moves.point_acceleration(&anchor.at),
         ]
     });
+    // Vector from the pivot to the guide, with its rate and acceleration.
     let [d, dd, ddd] = [0, 1, 2].map(|k| two[k] - one[k]);
     let length = d.norm();
     if length == 0.0 {
@@ -123,51 +119,56 @@ fn rod(
     let ud = (dd - rate * u) / length;
     let acceleration = ud.dot(&dd) + u.dot(&ddd);
     let udd = (ddd - acceleration * u - 2.0 * rate * ud) / length;
-    // The rod does not turn about itself, so that its angular acceleration is u x u''.
+    // The rod does not rotate about itself, so its angular acceleration is u x u''.
     let alpha = u.cross(&udd);
+    // Newton's equation for the centre, at distance c from the pivot, and Euler's equation about the pivot.
     let force = m * (one[2] + c * udd - gravity);
     let moment = c * u.cross(&force) + inertia * alpha;
+    // The guide balances the moment by a force perpendicular to the rod; the pivot takes the rest of the force.
     let slide = moment.cross(&u) / length;
     [force - slide, slide]
 }
 
-fn moves(motion: &Motion, anchor: &Anchor) -> BodyMotion {
-    anchor.body.map_or_else(base, |body| motion.bodies[body])
+/// The motion of the body that carries a place.
+fn anchor_motion(motion: &RigMotion, anchor: &BodyAnchor) -> BodyMotion {
+    anchor.body.map_or_else(base_motion, |body| motion.bodies[body])
 }
 
-fn point(rig: &Rig, place: Place) -> Option<Anchor> {
+/// The place of a point; `None` for other places and unknown indices.
+fn point_anchor(rig: &Rig, place: RigPlace) -> Option<BodyAnchor> {
     match place {
-        Place::Point(at) => Some(rig.points.get(at)?.anchor),
+        RigPlace::Point(at) => Some(rig.points.get(at)?.anchor),
         _ => None,
     }
 }
 
-/// Energy of all masses that effects add, J, beside the potential zero at the base frame's origin.
-pub(crate) fn energy(rig: &Rig, motion: &Motion, gravity: &Vector3<f64>) -> f64 {
+/// Energy of all masses of effects, J; the potential energy is zero at the base frame's origin.
+pub(crate) fn energy(rig: &Rig, motion: &RigMotion, gravity: &Vector3<f64>) -> f64 {
     let mut sum = 0.0;
     for effect in &rig.effects {
         for place in &effect.places {
             match effect.law {
-                Law::PointMass { m } => {
-                    if let Some(anchor) = point(rig, *place) {
-                        let moves = moves(motion, &anchor);
+                RigLaw::PointMass { m } => {
+                    if let Some(anchor) = point_anchor(rig, *place) {
+                        let moves = anchor_motion(motion, &anchor);
+                        // Kinetic energy minus the potential of gravity.
                         sum += m
-                            * (0.5 * moves.velocity(&anchor.at).norm_squared()
-                                - gravity.dot(&moves.place(&anchor.at)));
+                            * (0.5 * moves.point_velocity(&anchor.at).norm_squared()
+                                - gravity.dot(&moves.point_position(&anchor.at)));
                     }
                 }
-                Law::RodInertia { m, c, I } => {
+                RigLaw::RodInertia { m, c, I } => {
                     if let Some(pair) = place.pair(rig) {
                         let [one, two] = [&pair.from, &pair.to].map(|anchor| {
-                            let moves = moves(motion, anchor);
-                            [moves.place(&anchor.at), moves.velocity(&anchor.at)]
+                            let moves = anchor_motion(motion, anchor);
+                            [moves.point_position(&anchor.at), moves.point_velocity(&anchor.at)]
                         });
+                        // Direction of the rod and its rate.
                         let d = two[0] - one[0];
                         let u = d / d.norm();
                         let dd = two[1] - one[1];
                         let ud = (dd - u.dot(&dd) * u) / d.norm();
-                        sum += 0.5 * m * (one[1] + c * ud).norm_squared()
-                            + 0.5 * I * ud.norm_squared()
+                        sum += 0.5 * m * (one[1] + c * ud).norm_squared() + 0.5 * I * ud.norm_squared()
                             - m * gravity.dot(&(one[0] + c * u));
                     }
                 }

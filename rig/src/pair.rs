@@ -1,4 +1,4 @@
-//! Scalar functions of the poses of two bodies: of these joints, coordinates and drives are made.
+//! Scalar functions of the poses of two bodies, of which joints, coordinates and drives consist.
 //!
 //! The motion of two bodies goes in; the function's value, its gradient with respect to the rates of both,
 //! and the part of its second derivative that does not depend on accelerations come out.
@@ -11,16 +11,16 @@ use crate::pose::BodyMotion;
 
 /// A place fixed to a body, or to the base.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Anchor {
+pub struct BodyAnchor {
     /// Index of the body; `None` is the base.
     pub body: Option<usize>,
-    /// Where in the body's frame, m.
+    /// Place in the body's frame, m.
     pub at: Vector3<f64>,
 }
 
-/// What is measured between two bodies; directions are unit vectors in the frame of their body.
+/// The quantity that is measured between two bodies; directions are unit vectors in the frame of their body.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Shape {
+pub(crate) enum PairQuantity {
     /// A component, along a direction of the base frame, of the vector between the anchors.
     Component(Vector3<f64>),
     /// The same along a direction fixed to the first body.
@@ -29,8 +29,11 @@ pub(crate) enum Shape {
     Cosine(Vector3<f64>, Vector3<f64>),
     /// Angle about `axis`, from `x` of the first body to `x_to` of the second; counted from `offset`.
     Angle {
+        /// Axis, in the frame of the first body.
         axis: Vector3<f64>,
+        /// Direction of angle zero, in the frame of the first body.
         x: Vector3<f64>,
+        /// Direction that is measured, in the frame of the second body.
         x_to: Vector3<f64>,
         offset: f64,
     },
@@ -40,54 +43,55 @@ pub(crate) enum Shape {
 
 /// A scalar function of the poses of two bodies.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pair {
-    pub(crate) from: Anchor,
-    pub(crate) to: Anchor,
-    pub(crate) shape: Shape,
+pub struct PairFunction {
+    /// Place on the first body.
+    pub(crate) from: BodyAnchor,
+    /// Place on the second body.
+    pub(crate) to: BodyAnchor,
+    /// The quantity.
+    pub(crate) shape: PairQuantity,
 }
 
-/// Value and derivatives of a [`Pair`]: `second derivative = gradient . accelerations + bias`.
+/// Value and derivatives of a [`PairFunction`]: `second derivative = gradient . accelerations + bias`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Derived {
+pub(crate) struct PairDerivatives {
     pub(crate) value: f64,
     /// With respect to velocity and angular velocity of the first body, then of the second.
     pub(crate) gradient: [Vector3<f64>; 4],
     pub(crate) bias: f64,
 }
 
-impl Pair {
+impl PairFunction {
     /// Value, gradient and bias; `bodies` have poses and rates.
-    pub(crate) fn derive(&self, bodies: &[BodyMotion], base: &BodyMotion) -> Derived {
-        let motion = |anchor: &Anchor| anchor.body.map_or(base, |body| &bodies[body]);
+    pub(crate) fn derive(&self, bodies: &[BodyMotion], base: &BodyMotion) -> PairDerivatives {
+        let motion = |anchor: &BodyAnchor| anchor.body.map_or(base, |body| &bodies[body]);
         let (one, two) = (motion(&self.from), motion(&self.to));
         let (r1, r2) = (one.R_WB * self.from.at, two.R_WB * self.to.at);
         let d = two.pose.p_WB_W + r2 - one.pose.p_WB_W - r1;
         let dd = two.v_WB_W + two.w_WB_W.cross(&r2) - one.v_WB_W - one.w_WB_W.cross(&r1);
         let bias_of_d = two.centripetal(&r2) - one.centripetal(&r1);
-        // Gradient of `n . d` with n at rest.
+        // Gradient of `n . d` for a constant n.
         let along = |n: &Vector3<f64>| [-n, -r1.cross(n), *n, r2.cross(n)];
         match &self.shape {
-            Shape::Component(n) => Derived {
+            PairQuantity::Component(n) => PairDerivatives {
                 value: n.dot(&d),
                 gradient: along(n),
                 bias: n.dot(&bias_of_d),
             },
-            Shape::Along(n) => {
+            PairQuantity::Along(n) => {
                 let n = one.R_WB * n;
                 let mut gradient = along(&n);
                 gradient[1] += n.cross(&d);
-                Derived {
+                PairDerivatives {
                     value: n.dot(&d),
                     gradient,
-                    bias: one.centripetal(&n).dot(&d)
-                        + 2.0 * one.w_WB_W.cross(&n).dot(&dd)
-                        + n.dot(&bias_of_d),
+                    bias: one.centripetal(&n).dot(&d) + 2.0 * one.w_WB_W.cross(&n).dot(&dd) + n.dot(&bias_of_d),
                 }
             }
-            Shape::Cosine(a, b) => {
+            PairQuantity::Cosine(a, b) => {
                 let (a, b) = (one.R_WB * a, two.R_WB * b);
                 let turn = b.cross(&a);
-                Derived {
+                PairDerivatives {
                     value: a.dot(&b),
                     gradient: [Vector3::zeros(), -turn, Vector3::zeros(), turn],
                     bias: one.centripetal(&a).dot(&b)
@@ -95,28 +99,23 @@ impl Pair {
                         + a.dot(&two.centripetal(&b)),
                 }
             }
-            Shape::Angle {
-                axis,
-                x,
-                x_to,
-                offset,
-            } => {
-                // Exact where both axes agree, which the joint's own equations see to:
-                // there the axis' own rotation drops out of the second derivative.
+            PairQuantity::Angle { axis, x, x_to, offset } => {
+                // Exact if both axes agree, as the joint's own equations require:
+                // then the axis' own rotation has no effect on the second derivative.
                 let y = one.R_WB * axis.cross(x);
                 let (x, x_to, axis) = (one.R_WB * x, two.R_WB * x_to, one.R_WB * axis);
-                Derived {
+                PairDerivatives {
                     value: offset + libm::atan2(y.dot(&x_to), x.dot(&x_to)),
                     gradient: [Vector3::zeros(), -axis, Vector3::zeros(), axis],
                     bias: one.w_WB_W.cross(&axis).dot(&(two.w_WB_W - one.w_WB_W)),
                 }
             }
-            Shape::Distance => {
+            PairQuantity::Distance => {
                 let length = d.norm();
-                // At length zero there is no direction; zero gradient shows up as a missing rank.
+                // A distance of zero has no direction; its zero gradient appears as a missing rank.
                 let n = if length > 0.0 { d / length } else { d };
                 let rate = n.dot(&dd);
-                Derived {
+                PairDerivatives {
                     value: length,
                     gradient: along(&n),
                     bias: n.dot(&bias_of_d)
@@ -132,18 +131,18 @@ impl Pair {
 
     /// Whether this is the distance of two points.
     pub(crate) fn is_distance(&self) -> bool {
-        matches!(self.shape, Shape::Distance)
+        matches!(self.shape, PairQuantity::Distance)
     }
 
     /// Whether this is an angle.
     pub(crate) fn is_angle(&self) -> bool {
-        matches!(self.shape, Shape::Angle { .. })
+        matches!(self.shape, PairQuantity::Angle { .. })
     }
 
-    /// Wraps a difference of values: angles into half a turn to either side.
-    pub(crate) fn difference(&self, value: f64, target: f64) -> f64 {
+    /// Difference of two values; for angles between -pi and pi.
+    pub(crate) fn wrapped_difference(&self, value: f64, target: f64) -> f64 {
         let difference = value - target;
-        if matches!(self.shape, Shape::Angle { .. }) {
+        if matches!(self.shape, PairQuantity::Angle { .. }) {
             let turn = 2.0 * std::f64::consts::PI;
             difference - turn * libm::round(difference / turn)
         } else {
@@ -152,9 +151,9 @@ impl Pair {
     }
 }
 
-impl Derived {
+impl PairDerivatives {
     /// Adds `factor` times the gradient to a vector of all bodies' rates, six per body.
-    pub(crate) fn scatter(&self, pair: &Pair, mut put: impl FnMut(usize, f64)) {
+    pub(crate) fn scatter(&self, pair: &PairFunction, mut put: impl FnMut(usize, f64)) {
         for (anchor, k) in [(&pair.from, 0), (&pair.to, 2)] {
             if let Some(body) = anchor.body {
                 for i in 0..3 {

@@ -1,9 +1,9 @@
-//! The rig moved by its drives: forces go in, motion comes out, as a controller sees a machine.
+//! The rig moved by its drives: forces go in, and motion comes out, as a controller experiences a machine.
 //!
-//! The forces of a motion are known (`forces`), and they are affine in the accelerations but for friction that grows with
-//! the load; so accelerations for given forces are found by Newton's method with one column per coordinate. Time goes on
-//! by the classical rule of Runge and Kutta, with forces held during a step, in the coordinates alone: joints stay closed
-//! because every pose is solved.
+//! The forces of a motion are known (`forces`). They are affine in the accelerations, except for friction that depends
+//! on the load. So the accelerations for given forces are computed by Newton's method with one column per coordinate.
+//! Time is integrated by the classical Runge-Kutta method, with constant forces during a step, in the coordinates
+//! alone. Joints stay closed, because every pose is solved.
 //!
 //! Decision: forward dynamics is Newton's method on the inverse dynamics, so that every effect has one definition
 //! for both directions.
@@ -12,37 +12,41 @@ use std::fmt;
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::kinematics::{Motion, PoseError, State, Tracker};
+use crate::kinematics::{RigMotion, RigPoseError, RigState, RigTracker};
 use crate::rig::Rig;
 use crate::simulate::forces;
 
-/// Steps of Newton's method before it is given up; one is enough without friction by load.
+/// Largest number of Newton steps; one is sufficient without load-dependent friction.
 const MOST_STEPS: usize = 20;
-/// Forces agree to this share of their size.
+/// Relative accuracy of the forces.
 const TOLERANCE: f64 = 1e-10;
 
 /// A rig in motion.
 #[derive(Debug)]
-pub struct Plant<'r> {
+pub struct RigPlant<'r> {
+    /// The rig.
     rig: &'r Rig,
-    tracker: Tracker<'r>,
+    /// Motion of its bodies.
+    tracker: RigTracker<'r>,
+    /// Coordinates, rad or m.
     q: Vec<f64>,
+    /// Their rates, rad/s or m/s.
     qd: Vec<f64>,
 }
 
-/// Why a rig cannot move on.
+/// Why a rig cannot move further.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PlantError {
     /// As many numbers as coordinates or drives are expected.
     Count {
-        /// How many there are.
+        /// Number of values.
         found: usize,
-        /// How many are expected.
+        /// Expected number.
         expected: usize,
     },
-    /// It cannot be where it moved.
-    Pose(PoseError),
-    /// No accelerations go with the forces: a freedom without mass, or friction that jams.
+    /// It cannot be at the pose that it reached.
+    Pose(RigPoseError),
+    /// The forces determine no accelerations: a degree of freedom without mass, or self-locking friction.
     NoAcceleration,
 }
 
@@ -51,12 +55,13 @@ impl fmt::Display for PlantError {
         match self {
             Self::Count { found, expected } => write!(
                 f,
-                "there are {found} numbers where one is expected for each of {expected} coordinates or drives"
+                "found {found} numbers, but expected one for each of {expected} coordinates or drives"
             ),
             Self::Pose(reason) => reason.fmt(f),
             Self::NoAcceleration => write!(
                 f,
-                "no accelerations go with these forces; give every freedom a mass, and keep friction by load below what jams"
+                "these forces determine no accelerations; give every degree of freedom a mass, and keep \
+                 load-dependent friction below self-locking"
             ),
         }
     }
@@ -64,10 +69,10 @@ impl fmt::Display for PlantError {
 
 impl std::error::Error for PlantError {}
 
-impl<'r> Plant<'r> {
+impl<'r> RigPlant<'r> {
     /// A rig with given coordinates and rates.
     ///
-    /// Fails where it cannot be.
+    /// Fails if the rig cannot be at this pose.
     pub fn new(rig: &'r Rig, q: &[f64], qd: &[f64]) -> Result<Self, PlantError> {
         let expected = rig.coordinates.len();
         for found in [q.len(), qd.len()] {
@@ -77,7 +82,7 @@ impl<'r> Plant<'r> {
         }
         let mut plant = Self {
             rig,
-            tracker: Tracker::new(rig).map_err(PlantError::Pose)?,
+            tracker: RigTracker::new(rig).map_err(PlantError::Pose)?,
             q: q.to_vec(),
             qd: qd.to_vec(),
         };
@@ -90,34 +95,32 @@ impl<'r> Plant<'r> {
         &self.q
     }
 
-    /// Their rates.
+    /// Their rates, rad/s or m/s.
     pub fn qd(&self) -> &[f64] {
         &self.qd
     }
 
     /// Motion of all bodies, with given accelerations of the coordinates.
     ///
-    /// Fails where the rig cannot be.
-    pub fn motion(&mut self, qdd: &[f64]) -> Result<Motion, PlantError> {
+    /// Fails if the rig cannot be at this pose.
+    pub fn motion(&mut self, qdd: &[f64]) -> Result<RigMotion, PlantError> {
         let (q, qd) = (self.q.clone(), self.qd.clone());
         self.motion_at(&q, &qd, qdd)
     }
 
     /// Accelerations of the coordinates under forces of the drives, N or N m.
     ///
-    /// Fails where no accelerations go with them.
+    /// Fails if the forces determine no accelerations.
     pub fn accelerations(&mut self, drives: &[f64]) -> Result<Vec<f64>, PlantError> {
         let (q, qd) = (self.q.clone(), self.qd.clone());
         self.accelerations_at(&q, &qd, drives)
     }
 
-    /// Moves on by `dt` seconds with forces of the drives held, N or N m.
+    /// Moves forward by `dt` seconds with constant forces of the drives, N or N m.
     ///
-    /// Fails where the rig cannot move on; it stays where it was then.
+    /// Fails if the rig cannot move further; its state is then unchanged.
     pub fn step(&mut self, drives: &[f64], dt: f64) -> Result<(), PlantError> {
-        let moved = |x: &[f64], by: &[f64], h: f64| -> Vec<f64> {
-            x.iter().zip(by).map(|(x, d)| x + h * d).collect()
-        };
+        let moved = |x: &[f64], by: &[f64], h: f64| -> Vec<f64> { x.iter().zip(by).map(|(x, d)| x + h * d).collect() };
         let (q, qd) = (self.q.clone(), self.qd.clone());
         let mut slopes: Vec<(Vec<f64>, Vec<f64>)> = Vec::new();
         for share in [0.0, 0.5, 0.5, 1.0] {
@@ -138,18 +141,15 @@ impl<'r> Plant<'r> {
         Ok(())
     }
 
-    fn motion_at(&mut self, q: &[f64], qd: &[f64], qdd: &[f64]) -> Result<Motion, PlantError> {
+    /// Motion of all bodies in a state.
+    fn motion_at(&mut self, q: &[f64], qd: &[f64], qdd: &[f64]) -> Result<RigMotion, PlantError> {
         let [q, qd, qdd] = [q, qd, qdd].map(<[f64]>::to_vec);
-        let state = State { q, qd, qdd };
+        let state = RigState { q, qd, qdd };
         self.tracker.follow(&state).map_err(PlantError::Pose)
     }
 
-    fn accelerations_at(
-        &mut self,
-        q: &[f64],
-        qd: &[f64],
-        drives: &[f64],
-    ) -> Result<Vec<f64>, PlantError> {
+    /// Accelerations in a state, by Newton's method on the inverse dynamics.
+    fn accelerations_at(&mut self, q: &[f64], qd: &[f64], drives: &[f64]) -> Result<Vec<f64>, PlantError> {
         let (n, expected) = (q.len(), self.rig.drives.len());
         if drives.len() != expected {
             let found = drives.len();
@@ -170,7 +170,7 @@ impl<'r> Plant<'r> {
             per_acceleration.set_column(k, &(needed(self, &unit)? - &found));
         }
         let decomposed = per_acceleration.lu();
-        // What may cancel, as where a rig falls freely, says how well zero can be met.
+        // The magnitude of terms that may cancel, as in free fall, limits how accurately zero can be reached.
         let size = given.amax().max(found.amax()).max(f64::MIN_POSITIVE);
         for _ in 0..MOST_STEPS {
             let missing = &given - &found;

@@ -1,21 +1,21 @@
-//! Where a body is, how it moves and how it accelerates, each body by itself: maximal coordinates.
+//! Poses, rates and accelerations of bodies, each body by itself: maximal coordinates.
 //!
-//! An orientation is a unit quaternion; a step turns it by half the rotation vector, which is exact to first
-//! order and needs a square root only, so that every machine gets the same bits.
-//! Source: R. Featherstone, "Rigid Body Dynamics Algorithms" (2008), section 2 (rates of points of a body).
+//! An orientation is a unit quaternion. A step adds half the rotation vector times the quaternion, which is exact to
+//! first order and needs only a square root, so that every machine computes the same bits. Source: R. Featherstone,
+//! "Rigid Body Dynamics Algorithms" (2008), section 2 (rates of points of a body).
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
 /// Position of a body's frame in the base frame W: origin, m, and orientation.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pose {
+pub struct BodyPose {
     /// The frame's origin.
     pub p_WB_W: Vector3<f64>,
-    /// Turns vectors of the body into the base frame.
+    /// Rotates vectors of the body into the base frame.
     pub q_WB: UnitQuaternion<f64>,
 }
 
-impl Pose {
+impl BodyPose {
     /// The base frame itself.
     pub fn identity() -> Self {
         Self {
@@ -38,7 +38,7 @@ impl Pose {
     }
 
     /// The pose after a small displacement of the origin and a small rotation, both in the base frame.
-    pub(crate) fn displaced(&self, by: &Vector3<f64>, turn: &Vector3<f64>) -> Self {
+    pub(crate) fn displaced_by(&self, by: &Vector3<f64>, turn: &Vector3<f64>) -> Self {
         let half = Quaternion::from_parts(0.0, turn * 0.5);
         let q = self.q_WB.into_inner();
         Self {
@@ -51,8 +51,8 @@ impl Pose {
 /// A body in motion, all in the base frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BodyMotion {
-    /// Where it is.
-    pub pose: Pose,
+    /// Pose.
+    pub pose: BodyPose,
     /// Orientation as a matrix.
     pub R_WB: Matrix3<f64>,
     /// Velocity of the frame's origin, m/s.
@@ -66,8 +66,8 @@ pub struct BodyMotion {
 }
 
 impl BodyMotion {
-    /// A body at rest.
-    pub(crate) fn at_rest(pose: Pose) -> Self {
+    /// A body at standstill.
+    pub(crate) fn at_standstill(pose: BodyPose) -> Self {
         Self {
             pose,
             R_WB: pose.q_WB.to_rotation_matrix().into_inner(),
@@ -78,23 +78,23 @@ impl BodyMotion {
         }
     }
 
-    /// Place of a point that the body's frame has at `p`.
-    pub fn place(&self, p: &Vector3<f64>) -> Vector3<f64> {
+    /// Position in the base frame of a point with position `p` in the body's frame, m.
+    pub fn point_position(&self, p: &Vector3<f64>) -> Vector3<f64> {
         self.pose.p_WB_W + self.R_WB * p
     }
 
-    /// Velocity of a point that the body's frame has at `p`.
-    pub fn velocity(&self, p: &Vector3<f64>) -> Vector3<f64> {
+    /// Velocity in the base frame of a point with position `p` in the body's frame, m/s.
+    pub fn point_velocity(&self, p: &Vector3<f64>) -> Vector3<f64> {
         self.v_WB_W + self.w_WB_W.cross(&(self.R_WB * p))
     }
 
-    /// Acceleration of a point that the body's frame has at `p`.
-    pub fn acceleration(&self, p: &Vector3<f64>) -> Vector3<f64> {
+    /// Acceleration in the base frame of a point with position `p` in the body's frame, m/s^2.
+    pub fn point_acceleration(&self, p: &Vector3<f64>) -> Vector3<f64> {
         let arm = self.R_WB * p;
         self.a_WB_W + self.alpha_WB_W.cross(&arm) + self.centripetal(&arm)
     }
 
-    /// What the angular velocity adds to the acceleration at the end of an arm.
+    /// The part of the acceleration at the end of an arm that depends on the angular velocity.
     pub(crate) fn centripetal(&self, arm: &Vector3<f64>) -> Vector3<f64> {
         self.w_WB_W.cross(&self.w_WB_W.cross(arm))
     }

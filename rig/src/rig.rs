@@ -1,13 +1,13 @@
-//! A rig: bodies, joints, drives, effects and sensors, checked and ready to move.
+//! A rig: bodies, joints, drives, effects and sensors, checked and ready for simulation.
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::effect::Effect;
-use crate::pair::{Anchor, Pair};
-use crate::pose::Pose;
-use crate::sensor::Sensors;
+use crate::effect::RigEffect;
+use crate::pair::{BodyAnchor, PairFunction};
+use crate::pose::BodyPose;
+use crate::sensor::RigSensors;
 
-/// A full-body description of a machine. Made by [`crate::load`].
+/// A full-body description of a machine. [`crate::load`] reads one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rig {
     /// Name.
@@ -17,34 +17,34 @@ pub struct Rig {
     /// Acceleration of gravity in the base frame, m/s^2.
     pub gravity: Vector3<f64>,
     /// Bodies.
-    pub bodies: Vec<Body>,
+    pub bodies: Vec<RigBody>,
     /// Named places on bodies and on the base.
-    pub points: Vec<Point>,
+    pub points: Vec<RigPoint>,
     /// Masses concentrated at points.
-    pub lumped_masses: Vec<LumpedMass>,
+    pub lumped_masses: Vec<RigLumpedMass>,
     /// Joints.
-    pub joints: Vec<Joint>,
+    pub joints: Vec<RigJoint>,
     /// Coordinates that the trajectory prescribes, one per degree of freedom.
-    pub coordinates: Vec<Coordinate>,
+    pub coordinates: Vec<RigCoordinate>,
     /// Drives, one per degree of freedom.
-    pub drives: Vec<Drive>,
-    /// Friction and the like.
-    pub effects: Vec<Effect>,
-    /// What is measured, and how well.
-    pub sensors: Sensors,
-    /// Seed of the noise where the user gives none.
+    pub drives: Vec<RigDrive>,
+    /// Friction and other effects.
+    pub effects: Vec<RigEffect>,
+    /// Sampling and errors of the sensors.
+    pub sensors: RigSensors,
+    /// Seed of the noise, if the user requests none.
     pub seed: u64,
 }
 
 impl Rig {
-    /// The two points that a linear drive pushes apart; `None` for a drive in a joint.
-    pub fn ends_of_drive(&self, drive: usize) -> Option<[Anchor; 2]> {
+    /// The two points between which a linear drive acts; `None` for a drive in a joint.
+    pub fn ends_of_drive(&self, drive: usize) -> Option<[BodyAnchor; 2]> {
         let pair = &self.drives.get(drive)?.measures;
         pair.is_distance().then_some([pair.from, pair.to])
     }
 
-    /// Where a revolute joint is on its two bodies; `None` for a joint of another kind.
-    pub fn hinge(&self, joint: usize) -> Option<[Anchor; 2]> {
+    /// The places of a revolute joint on its two bodies; `None` for other joints.
+    pub fn hinge(&self, joint: usize) -> Option<[BodyAnchor; 2]> {
         let pair = self.joints.get(joint)?.motion.as_ref()?;
         pair.is_angle().then_some([pair.from, pair.to])
     }
@@ -64,11 +64,11 @@ impl Rig {
 
 /// A rigid body.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Body {
+pub struct RigBody {
     /// Name.
     pub name: String,
-    /// Where its frame is in the nominal configuration.
-    pub nominal: Pose,
+    /// Pose of its frame in the nominal configuration.
+    pub nominal: BodyPose,
     /// Mass, kg.
     pub mass: f64,
     /// Centre of mass in the body's frame, m.
@@ -77,52 +77,52 @@ pub struct Body {
     pub inertia: Matrix3<f64>,
 }
 
-/// A named place.
+/// A named place on a body or on the base.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Point {
+pub struct RigPoint {
     /// Name.
     pub name: String,
-    /// Where it is.
-    pub anchor: Anchor,
+    /// The place.
+    pub anchor: BodyAnchor,
 }
 
 /// A mass at a point of a body.
 #[derive(Clone, Debug, PartialEq)]
-pub struct LumpedMass {
+pub struct RigLumpedMass {
     /// Mass, kg.
     pub mass: f64,
-    /// Where the balance of forces sees it.
-    pub at: Anchor,
-    /// Where the balance of moments about the body's frame sees it, in the body's frame; a real mass is seen
-    /// at one place by both. Some reduced models split the two, and a rig can copy them.
+    /// The place where it acts in the balance of forces.
+    pub at: BodyAnchor,
+    /// The place, in the body's frame, m, where it acts in the balance of moments about the body's frame. For a real
+    /// mass both places are the same. Some reduced models use two places, and a rig can copy them.
     pub moment_at: Vector3<f64>,
 }
 
-/// A joint as the equations that it holds.
+/// A joint as the equations that it imposes.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Joint {
+pub struct RigJoint {
     /// Name.
     pub name: String,
-    /// Functions of the poses, each with the value that it keeps.
-    pub(crate) equations: Vec<(Pair, f64)>,
-    /// Its coordinate, where it has exactly one: an angle or a displacement.
-    pub(crate) motion: Option<Pair>,
+    /// Functions of the poses, each with its constant value.
+    pub(crate) equations: Vec<(PairFunction, f64)>,
+    /// Its coordinate, if it has exactly one: an angle or a displacement.
+    pub(crate) motion: Option<PairFunction>,
 }
 
 /// A coordinate that the trajectory prescribes.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Coordinate {
+pub struct RigCoordinate {
     /// Name, which is that of its column.
     pub name: String,
     /// What it measures.
-    pub(crate) measures: Pair,
+    pub(crate) measures: PairFunction,
 }
 
 /// A drive.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Drive {
+pub struct RigDrive {
     /// Name, which is that of its column.
     pub name: String,
     /// Its own length or angle; a positive force or torque increases it.
-    pub(crate) measures: Pair,
+    pub(crate) measures: PairFunction,
 }

@@ -7,7 +7,7 @@
 
 use std::fmt;
 
-use crate::kinematics::State;
+use crate::kinematics::RigState;
 
 /// Samples that a finite difference needs.
 const STENCIL: usize = 5;
@@ -15,22 +15,24 @@ const STENCIL: usize = 5;
 /// A prescribed motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trajectory {
+    /// Times, s, increasing.
     time: Vec<f64>,
-    coordinates: Vec<Samples>,
+    /// Samples of every coordinate, with all derivatives.
+    coordinates: Vec<CoordinateSamples>,
 }
 
 /// One coordinate along the trajectory, as long as the times.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Samples {
+pub struct CoordinateSamples {
     /// Values, rad or m.
     pub q: Vec<f64>,
-    /// Rates; differences of the values if there are none.
+    /// Rates; if missing, finite differences of the values are used.
     pub qd: Option<Vec<f64>>,
-    /// Accelerations; differences of the rates, or of the values, if there are none.
+    /// Accelerations; if missing, finite differences of the rates, or else of the values, are used.
     pub qdd: Option<Vec<f64>>,
 }
 
-/// Why columns make no trajectory.
+/// Why columns do not form a trajectory.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TrajectoryError {
     /// There is no sample.
@@ -45,7 +47,7 @@ pub enum TrajectoryError {
         /// Index of the coordinate.
         coordinate: usize,
     },
-    /// Derivatives are missing and there are too few samples to find them.
+    /// Derivatives are missing, and there are too few samples to compute them.
     TooShort,
 }
 
@@ -60,13 +62,13 @@ impl fmt::Display for TrajectoryError {
             ),
             Self::Faulty { coordinate } => write!(
                 f,
-                "the columns of coordinate {} are not finite numbers, one per time",
+                "the columns of coordinate {} do not have one finite number per time",
                 coordinate + 1
             ),
             Self::TooShort => write!(
                 f,
-                "derivatives are missing, and finding them takes at least {STENCIL} samples; give the columns with \
-                 `_d` and `_dd`"
+                "derivatives are missing, and computing them takes at least {STENCIL} samples; add samples, or the \
+                 columns with `_d` and `_dd`"
             ),
         }
     }
@@ -77,8 +79,8 @@ impl std::error::Error for TrajectoryError {}
 impl Trajectory {
     /// From times, s, and one entry per coordinate.
     ///
-    /// Fails when times do not grow, lengths differ, or derivatives cannot be found.
-    pub fn new(time: Vec<f64>, coordinates: Vec<Samples>) -> Result<Self, TrajectoryError> {
+    /// Fails if times do not increase, lengths differ, or derivatives cannot be computed.
+    pub fn new(time: Vec<f64>, coordinates: Vec<CoordinateSamples>) -> Result<Self, TrajectoryError> {
         if time.is_empty() {
             return Err(TrajectoryError::Empty);
         }
@@ -86,8 +88,7 @@ impl Trajectory {
         if let Some(at) = time.windows(2).position(|pair| !grows(pair)) {
             return Err(TrajectoryError::TimeGoesBack { sample: at + 1 });
         }
-        let sound =
-            |column: &[f64]| column.len() == time.len() && column.iter().all(|x| x.is_finite());
+        let sound = |column: &[f64]| column.len() == time.len() && column.iter().all(|x| x.is_finite());
         let mut complete = Vec::new();
         for (k, given) in coordinates.into_iter().enumerate() {
             let columns = [Some(&given.q), given.qd.as_ref(), given.qdd.as_ref()];
@@ -102,7 +103,7 @@ impl Trajectory {
                 None => differences(&time, &given.q, 2),
             });
             let qd = given.qd.unwrap_or_else(|| differences(&time, &given.q, 1));
-            complete.push(Samples {
+            complete.push(CoordinateSamples {
                 q: given.q,
                 qd: Some(qd),
                 qdd: Some(qdd),
@@ -114,22 +115,16 @@ impl Trajectory {
         })
     }
 
-    /// From times, s, and a function that gives the state at each; a Fourier series, say.
+    /// From times, s, and a function that returns the state at each, for example a Fourier series.
     ///
-    /// Fails when times do not grow or a state is not finite.
-    pub fn from_function(
-        time: Vec<f64>,
-        state: impl Fn(f64) -> State,
-    ) -> Result<Self, TrajectoryError> {
-        let states: Vec<State> = time.iter().map(|t| state(*t)).collect();
+    /// Fails if times do not increase or a state is not finite.
+    pub fn from_function(time: Vec<f64>, state: impl Fn(f64) -> RigState) -> Result<Self, TrajectoryError> {
+        let states: Vec<RigState> = time.iter().map(|t| state(*t)).collect();
         let n = states.first().map_or(0, |state| state.q.len());
-        let column = |of: fn(&State) -> &Vec<f64>, k: usize| -> Vec<f64> {
-            states
-                .iter()
-                .filter_map(|state| of(state).get(k).copied())
-                .collect()
+        let column = |of: fn(&RigState) -> &Vec<f64>, k: usize| -> Vec<f64> {
+            states.iter().filter_map(|state| of(state).get(k).copied()).collect()
         };
-        let samples = (0..n).map(|k| Samples {
+        let samples = (0..n).map(|k| CoordinateSamples {
             q: column(|state| &state.q, k),
             qd: Some(column(|state| &state.qd, k)),
             qdd: Some(column(|state| &state.qdd, k)),
@@ -138,7 +133,7 @@ impl Trajectory {
         Self::new(time, samples)
     }
 
-    /// Times of the samples, s; at least one, growing.
+    /// Times of the samples, s; at least one, increasing.
     pub fn time(&self) -> &[f64] {
         &self.time
     }
@@ -148,11 +143,11 @@ impl Trajectory {
         self.coordinates.len()
     }
 
-    /// The state at a time; before the first and after the last sample the outermost polynomial goes on.
-    pub fn at(&self, t: f64) -> State {
+    /// The state at a time; before the first and after the last sample the nearest polynomial is continued.
+    pub fn state_at(&self, t: f64) -> RigState {
         let n = self.time.len();
         let after = self.time.partition_point(|sample| *sample <= t);
-        // At a sample its own numbers are the answer, bit for bit.
+        // At a sample its own numbers are returned, bit for bit.
         if after > 0 && self.time[after - 1].to_bits() == t.to_bits() {
             return self.sample(after - 1);
         }
@@ -162,10 +157,10 @@ impl Trajectory {
         let i = after.clamp(1, n - 1) - 1;
         let (left, right) = (self.sample(i), self.sample(i + 1));
         let h = self.time[i + 1] - self.time[i];
-        let mut state = State::default();
+        let mut state = RigState::default();
         for k in 0..self.coordinates.len() {
-            let ends = |s: &State| [s.q[k], h * s.qd[k], h * h * s.qdd[k]];
-            let [q, qd, qdd] = quintic(ends(&left), ends(&right), (t - self.time[i]) / h);
+            let ends = |s: &RigState| [s.q[k], h * s.qd[k], h * h * s.qdd[k]];
+            let [q, qd, qdd] = quintic_hermite(ends(&left), ends(&right), (t - self.time[i]) / h);
             state.q.push(q);
             state.qd.push(qd / h);
             state.qdd.push(qdd / (h * h));
@@ -173,9 +168,10 @@ impl Trajectory {
         state
     }
 
-    fn sample(&self, i: usize) -> State {
+    /// The state at sample `i`.
+    fn sample(&self, i: usize) -> RigState {
         let of = |column: &Option<Vec<f64>>| column.as_ref().map_or(0.0, |column| column[i]);
-        State {
+        RigState {
             q: self.coordinates.iter().map(|c| c.q[i]).collect(),
             qd: self.coordinates.iter().map(|c| of(&c.qd)).collect(),
             qdd: self.coordinates.iter().map(|c| of(&c.qdd)).collect(),
@@ -183,9 +179,9 @@ impl Trajectory {
     }
 }
 
-/// Value and two derivatives, at `s` between 0 and 1, of the polynomial with given ones at both ends.
-fn quintic(left: [f64; 3], right: [f64; 3], s: f64) -> [f64; 3] {
-    // Around the left end: c0..c2 are its own, c3..c5 meet the right end.
+/// Value and two derivatives, at `s` between 0 and 1, of the polynomial of degree five with given ones at both ends.
+fn quintic_hermite(left: [f64; 3], right: [f64; 3], s: f64) -> [f64; 3] {
+    // Around the left end: c0..c2 are its values, and c3..c5 are determined by the right end.
     let [c0, c1, c2] = [left[0], left[1], 0.5 * left[2]];
     let value = right[0] - c0 - c1 - c2;
     let rate = right[1] - c1 - 2.0 * c2;
@@ -205,7 +201,7 @@ fn differences(time: &[f64], values: &[f64], order: usize) -> Vec<f64> {
     (0..time.len())
         .map(|i| {
             let first = i.saturating_sub(STENCIL / 2).min(time.len() - STENCIL);
-            let weights = fornberg(time[i], &time[first..first + STENCIL], order);
+            let weights = fornberg_weights(time[i], &time[first..first + STENCIL], order);
             // Differences to the middle value: constants drop out exactly.
             weights
                 .iter()
@@ -217,7 +213,7 @@ fn differences(time: &[f64], values: &[f64], order: usize) -> Vec<f64> {
 }
 
 /// Fornberg's weights of a derivative at `z` from samples at `x`.
-fn fornberg(z: f64, x: &[f64], order: usize) -> Vec<f64> {
+fn fornberg_weights(z: f64, x: &[f64], order: usize) -> Vec<f64> {
     let mut c = vec![vec![0.0; order + 1]; x.len()];
     c[0][0] = 1.0;
     let mut c1 = 1.0;
@@ -248,7 +244,7 @@ fn fornberg(z: f64, x: &[f64], order: usize) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Samples, Trajectory, TrajectoryError};
+    use super::{CoordinateSamples, Trajectory, TrajectoryError};
 
     const TIME: [f64; 7] = [0.0, 0.1, 0.25, 0.3, 0.45, 0.6, 0.7];
 
@@ -259,14 +255,10 @@ mod tests {
     #[test]
     fn polynomials_of_degree_four_are_differentiated_exactly() {
         let q = along(|t| 1.0 - t + 2.0 * t * t - t.powi(4));
-        let only = Samples {
-            q,
-            qd: None,
-            qdd: None,
-        };
+        let only = CoordinateSamples { q, qd: None, qdd: None };
         let trajectory = Trajectory::new(TIME.to_vec(), vec![only]).expect("enough samples");
         for t in TIME {
-            let state = trajectory.at(t);
+            let state = trajectory.state_at(t);
             assert!((state.qd[0] - (-1.0 + 4.0 * t - 4.0 * t.powi(3))).abs() < 1e-11);
             assert!((state.qdd[0] - (4.0 - 12.0 * t * t)).abs() < 1e-10);
         }
@@ -274,14 +266,14 @@ mod tests {
 
     #[test]
     fn polynomials_of_degree_five_are_met_between_samples() {
-        let samples = Samples {
+        let samples = CoordinateSamples {
             q: along(|t| t.powi(5)),
             qd: Some(along(|t| 5.0 * t.powi(4))),
             qdd: Some(along(|t| 20.0 * t.powi(3))),
         };
         let trajectory = Trajectory::new(TIME.to_vec(), vec![samples]).expect("sound");
         for t in [0.05_f64, 0.27, 0.69, 0.75] {
-            let state = trajectory.at(t);
+            let state = trajectory.state_at(t);
             assert!((state.q[0] - t.powi(5)).abs() < 1e-14);
             assert!((state.qd[0] - 5.0 * t.powi(4)).abs() < 1e-12);
             assert!((state.qdd[0] - 20.0 * t.powi(3)).abs() < 1e-11);
@@ -291,7 +283,7 @@ mod tests {
     #[test]
     fn faults_are_named() {
         let one = |q: &[f64]| {
-            vec![Samples {
+            vec![CoordinateSamples {
                 q: q.to_vec(),
                 qd: None,
                 qdd: None,
@@ -303,10 +295,7 @@ mod tests {
             new(&[0.0, 0.1, 0.1], &[0.0; 3]),
             TrajectoryError::TimeGoesBack { sample: 2 }
         );
-        assert_eq!(
-            new(&[0.0, 0.1], &[0.0; 3]),
-            TrajectoryError::Faulty { coordinate: 0 }
-        );
+        assert_eq!(new(&[0.0, 0.1], &[0.0; 3]), TrajectoryError::Faulty { coordinate: 0 });
         assert_eq!(new(&[0.0, 0.1], &[0.0; 2]), TrajectoryError::TooShort);
     }
 }

@@ -1,31 +1,26 @@
 //! Variables of an emitted program, so that it reads as its equations do: `0.5 * r_x + r_y * x1`.
 //!
-//! A product waits until something is done with it: added to something else, both become one instruction where the machine
-//! has such and rounds once.
+//! A product is kept unevaluated until its next operation. If it is added to something, both become one instruction
+//! where the machine has a fused multiply-add, which rounds once.
 
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
 use crate::Real;
 
-/// What a variable holds: one number, or as many as a vector of the machine.
-pub trait Value:
-    Copy
-    + Add<Output = Self>
-    + Sub<Output = Self>
-    + Mul<Output = Self>
-    + Div<Output = Self>
-    + Neg<Output = Self>
+/// Type of a variable: one number, or as many as a vector register of the machine takes.
+pub trait ProgramValue:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
 {
     /// A number as a value like `self`.
     #[must_use]
-    fn like(self, x: f64) -> Self;
+    fn number_like(self, x: f64) -> Self;
     /// Square root.
     #[must_use]
     fn sqrt(self) -> Self;
     /// Absolute value.
     #[must_use]
     fn abs(self) -> Self;
-    /// -1, 0 or 1; what is no number stays what it is.
+    /// -1, 0 or 1; NaN stays NaN.
     #[must_use]
     fn sign(self) -> Self;
     /// Hyperbolic tangent.
@@ -62,9 +57,9 @@ pub trait Value:
 }
 
 #[allow(clippy::inline_always, reason = "each is an instruction or a call")]
-impl<T: Real> Value for T {
+impl<T: Real> ProgramValue for T {
     #[inline(always)]
-    fn like(self, x: f64) -> Self {
+    fn number_like(self, x: f64) -> Self {
         T::from_f64(x)
     }
     #[inline(always)]
@@ -97,11 +92,11 @@ impl<T: Real> Value for T {
 #[derive(Clone, Copy, Debug)]
 pub struct Var<V>(pub V);
 
-/// A product of two variables that waits for what is done with it.
+/// A product of two variables that is kept unevaluated until its next operation.
 #[derive(Clone, Copy, Debug)]
-pub struct Product<V>(V, V);
+pub struct DeferredProduct<V>(V, V);
 
-/// A variable, or what has been made of some.
+/// An operand of the arithmetic: a variable, or an expression of variables.
 pub trait Term<V>: Copy {
     /// Its value.
     fn get(self) -> V;
@@ -122,7 +117,7 @@ impl<V: Copy> Term<V> for Var<V> {
 }
 
 #[allow(clippy::inline_always, reason = "one instruction")]
-impl<V: Value> Term<V> for Product<V> {
+impl<V: ProgramValue> Term<V> for DeferredProduct<V> {
     #[inline(always)]
     fn get(self) -> V {
         self.0 * self.1
@@ -143,7 +138,7 @@ macro_rules! functions {
 
 macro_rules! terms {
     ($($term:ident)*) => {$(
-        impl<V: Value> $term<V> {
+        impl<V: ProgramValue> $term<V> {
             /// Its value.
             #[allow(clippy::inline_always, reason = "an instruction at most")]
             #[inline(always)]
@@ -154,7 +149,7 @@ macro_rules! terms {
             functions! {
                 sqrt "Square root."
                 abs "Absolute value."
-                sign "-1, 0 or 1; what is no number stays what it is."
+                sign "-1, 0 or 1; NaN stays NaN."
                 tanh "Hyperbolic tangent."
                 exp "Exponential."
             }
@@ -168,7 +163,7 @@ macro_rules! terms {
         }
 
         #[allow(clippy::inline_always, reason = "one instruction")]
-        impl<V: Value> Neg for $term<V> {
+        impl<V: ProgramValue> Neg for $term<V> {
             type Output = Var<V>;
             #[inline(always)]
             fn neg(self) -> Var<V> {
@@ -177,13 +172,13 @@ macro_rules! terms {
         }
     )*};
 }
-terms! { Var Product }
+terms! { Var DeferredProduct }
 
 /// `left operator right` for terms, where `a` and `b` are both.
 macro_rules! operators {
     ($($left:ident $operator:ident::$method:ident $right:ident = $output:ident, |$a:ident, $b:ident| $result:expr;)*) => {$(
         #[allow(clippy::inline_always, reason = "an instruction or two")]
-        impl<V: Value> $operator<$right<V>> for $left<V> {
+        impl<V: ProgramValue> $operator<$right<V>> for $left<V> {
             type Output = $output<V>;
             #[inline(always)]
             fn $method(self, other: $right<V>) -> $output<V> {
@@ -195,60 +190,60 @@ macro_rules! operators {
 }
 operators! {
     Var Add::add Var = Var, |a, b| Var(a.0 + b.0);
-    Var Add::add Product = Var, |a, b| Var(a.0.plus_product(b.0, b.1));
-    Product Add::add Var = Var, |a, b| Var(b.0.plus_product(a.0, a.1));
-    Product Add::add Product = Var, |a, b| Var(a.get().plus_product(b.0, b.1));
+    Var Add::add DeferredProduct = Var, |a, b| Var(a.0.plus_product(b.0, b.1));
+    DeferredProduct Add::add Var = Var, |a, b| Var(b.0.plus_product(a.0, a.1));
+    DeferredProduct Add::add DeferredProduct = Var, |a, b| Var(a.get().plus_product(b.0, b.1));
     Var Sub::sub Var = Var, |a, b| Var(a.0 - b.0);
-    Var Sub::sub Product = Var, |a, b| Var(a.0.less_product(b.0, b.1));
-    Product Sub::sub Var = Var, |a, b| Var(b.0.product_less(a.0, a.1));
-    Product Sub::sub Product = Var, |a, b| Var(a.get().less_product(b.0, b.1));
-    Var Mul::mul Var = Product, |a, b| Product(a.0, b.0);
-    Var Mul::mul Product = Product, |a, b| Product(a.0, b.get());
-    Product Mul::mul Var = Product, |a, b| Product(a.get(), b.0);
-    Product Mul::mul Product = Product, |a, b| Product(a.get(), b.get());
+    Var Sub::sub DeferredProduct = Var, |a, b| Var(a.0.less_product(b.0, b.1));
+    DeferredProduct Sub::sub Var = Var, |a, b| Var(b.0.product_less(a.0, a.1));
+    DeferredProduct Sub::sub DeferredProduct = Var, |a, b| Var(a.get().less_product(b.0, b.1));
+    Var Mul::mul Var = DeferredProduct, |a, b| DeferredProduct(a.0, b.0);
+    Var Mul::mul DeferredProduct = DeferredProduct, |a, b| DeferredProduct(a.0, b.get());
+    DeferredProduct Mul::mul Var = DeferredProduct, |a, b| DeferredProduct(a.get(), b.0);
+    DeferredProduct Mul::mul DeferredProduct = DeferredProduct, |a, b| DeferredProduct(a.get(), b.get());
     Var Div::div Var = Var, |a, b| Var(a.0 / b.0);
-    Var Div::div Product = Var, |a, b| Var(a.0 / b.get());
-    Product Div::div Var = Var, |a, b| Var(a.get() / b.0);
-    Product Div::div Product = Var, |a, b| Var(a.get() / b.get());
+    Var Div::div DeferredProduct = Var, |a, b| Var(a.0 / b.get());
+    DeferredProduct Div::div Var = Var, |a, b| Var(a.get() / b.0);
+    DeferredProduct Div::div DeferredProduct = Var, |a, b| Var(a.get() / b.get());
 }
 
-/// The same where one side is a number that stands in the program.
+/// The same where one side is a literal number of the program.
 macro_rules! with_numbers {
     ($($term:ident)*) => {$(
         with_numbers! { $term Add::add = Var, |a, b| a + b }
         with_numbers! { $term Sub::sub = Var, |a, b| a - b }
-        with_numbers! { $term Mul::mul = Product, |a, b| a * b }
+        with_numbers! { $term Mul::mul = DeferredProduct, |a, b| a * b }
         with_numbers! { $term Div::div = Var, |a, b| a / b }
     )*};
     ($term:ident $operator:ident::$method:ident = $output:ident, |$a:ident, $b:ident| $result:expr) => {
         #[allow(clippy::inline_always, reason = "an instruction or two")]
-        impl<V: Value> $operator<f64> for $term<V> {
+        impl<V: ProgramValue> $operator<f64> for $term<V> {
             type Output = $output<V>;
             #[inline(always)]
             fn $method(self, other: f64) -> $output<V> {
-                let ($a, $b) = (self, Var(self.0.like(other)));
+                let ($a, $b) = (self, Var(self.0.number_like(other)));
                 $result
             }
         }
 
         #[allow(clippy::inline_always, reason = "an instruction or two")]
-        impl<V: Value> $operator<$term<V>> for f64 {
+        impl<V: ProgramValue> $operator<$term<V>> for f64 {
             type Output = $output<V>;
             #[inline(always)]
             fn $method(self, other: $term<V>) -> $output<V> {
-                let ($a, $b) = (Var(other.0.like(self)), other);
+                let ($a, $b) = (Var(other.0.number_like(self)), other);
                 $result
             }
         }
     };
 }
-with_numbers! { Var Product }
+with_numbers! { Var DeferredProduct }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Every operator on every pair of terms, beside plain arithmetic; all results are exact.
+    /// Every operator on every pair of terms agrees with plain arithmetic; all results are exact.
     #[test]
     fn terms_compute_as_numbers_do() {
         let [a, b, c, d] = [3.0, 5.0, 7.0, 11.0_f64];
@@ -284,9 +279,6 @@ mod tests {
     #[test]
     fn single_precision_takes_the_same_numbers() {
         let x = Var(3.0_f32);
-        assert_eq!(
-            (0.5 * x + 0.1).get().to_bits(),
-            (0.5 * 3.0_f32 + 0.1).to_bits()
-        );
+        assert_eq!((0.5 * x + 0.1).get().to_bits(), (0.5 * 3.0_f32 + 0.1).to_bits());
     }
 }

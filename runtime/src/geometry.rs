@@ -1,14 +1,14 @@
-//! Geometries for which base parameters are not what they are for others.
+//! Special geometries, for which the base parameters of a model are not valid.
 
 use core::fmt;
 
 use crate::Real;
 use crate::arithmetic::Term;
 
-/// A geometry at which base parameters divide by nothing, or by what rounding leaves.
+/// A special geometry: a denominator of the base parameters is zero, or as small as rounding.
 ///
-/// Base parameters are written for general values of the constants. Where a denominator of theirs vanishes, columns of the
-/// regressor coincide that are independent elsewhere.
+/// Base parameters are written for general values of the constants. Where a denominator of theirs vanishes, columns of
+/// the regressor coincide that are independent elsewhere.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SpecialGeometry {
     /// The denominator, in the constants of the model file.
@@ -27,16 +27,16 @@ impl fmt::Display for SpecialGeometry {
 
 impl core::error::Error for SpecialGeometry {}
 
-/// Asks that a denominator does not vanish beside the sum of its terms' magnitudes; see [`Real::singular`].
+/// Checks that a denominator is not zero relative to the sum of its terms' magnitudes; see [`Real::singular`].
 ///
 /// # Errors
-/// [`SpecialGeometry`] with its text, also where it is no number.
+/// [`SpecialGeometry`] with the expression of the denominator, also if its value is NaN.
 pub fn divisor<T: Real>(
     denominator: &'static str,
     value: impl Term<T>,
     size: impl Term<T>,
 ) -> Result<(), SpecialGeometry> {
-    // Written so that what is no number fails as well.
+    // Written so that NaN fails as well.
     if Real::abs(value.get()) > T::singular() * size.get() {
         Ok(())
     } else {
@@ -51,9 +51,7 @@ mod tests {
 
     #[test]
     fn differences_that_rounding_leaves_are_no_divisors() {
-        let vanishes = Err(SpecialGeometry {
-            denominator: "a - b",
-        });
+        let vanishes = Err(SpecialGeometry { denominator: "a - b" });
         let difference = |a: f64, b: f64| divisor("a - b", Var(a - b), Var(a.abs() + b.abs()));
         assert_eq!(difference(0.3, 0.300_000_1), Ok(()));
         assert_eq!(difference(0.300_000_000_000_000_04, 0.3), vanishes);

@@ -1,10 +1,10 @@
-//! Sine and cosine of many angles at once: arrays go in, arrays come out, without a branch or a call inside the loop, so
-//! that the compiler turns it into vectors of whatever width the caller is compiled for.
+//! Sine and cosine of many angles at once: arrays in, arrays out, without a branch or a call inside the loop, so that
+//! the compiler can vectorise it for any width.
 //!
 //! Argument reduction in three parts of pi/2 and polynomials on [-pi/4, pi/4] after K. C. Ng's `k_sin.c`, `k_cos.c` and
-//! `e_rem_pio2.c` of FDLIBM 5.3 (Sun Microsystems, 1993; freely distributable). The error stays below 1 ulp for angles up
-//! to [`LARGEST_ANGLE`]; arrays with a larger one, or with one that is no finite number, go through
-//! [`Real::sin_cos`](crate::Real::sin_cos) one by one.
+//! `e_rem_pio2.c` of FDLIBM 5.3 (Sun Microsystems, 1993; freely distributable). The error stays below 1 ulp for angles
+//! up to [`LARGEST_ANGLE`]; arrays with a larger or non-finite angle go through [`Real::sin_cos`](crate::Real::sin_cos)
+//! one by one.
 //!
 //! Decision: one sine and cosine serve single numbers and vectors, with and without the standard library.
 //! Polynomials are summed in pairs of terms (G. Estrin), which shortens the dependent chain. One state computes
@@ -12,7 +12,7 @@
 //! vectors compute each at its place, because the results of all would not fit into registers.
 
 use crate::Real;
-use crate::arithmetic::Value;
+use crate::arithmetic::ProgramValue;
 
 /// Largest angle, rad, for which the reduction in three parts is exact enough: 2^16 quarters of a turn.
 pub const LARGEST_ANGLE: f64 = 102_943.0;
@@ -39,7 +39,8 @@ pub fn sin_cos_lanes<const N: usize>(angle: &[f64; N], sin: &mut [f64; N], cos: 
     }
 }
 
-/// Sines and cosines of several angles, rad: one branch for all of them, and pairs in the vectors that every machine has.
+/// Sines and cosines of several angles, rad: one branch for all of them, and pairs in the vectors that every machine
+/// has.
 #[inline]
 pub(crate) fn sin_cos_each<const N: usize>(angles: [f64; N]) -> ([f64; N], [f64; N]) {
     let (mut sin, mut cos) = ([0.0; N], [0.0; N]);
@@ -58,15 +59,15 @@ pub(crate) fn sin_cos_once(angle: f64) -> (f64, f64) {
 }
 
 /// A number, or a vector of numbers, that the kernel below works on.
-pub(crate) trait Angle: Value {
-    /// Sine and cosine after as many quarter turns as stand in the lowest bits of `shifted`.
-    fn turned(shifted: Self, sin: Self, cos: Self) -> (Self, Self);
+pub(crate) trait LaneAngle: ProgramValue {
+    /// Sine and cosine after a rotation by the number of quarter turns in the lowest bits of `shifted`.
+    fn rotate_by_quarters(shifted: Self, sin: Self, cos: Self) -> (Self, Self);
 }
 
 #[allow(clippy::inline_always, reason = "as above")]
-impl Angle for f64 {
+impl LaneAngle for f64 {
     #[inline(always)]
-    fn turned(shifted: Self, sin: Self, cos: Self) -> (Self, Self) {
+    fn rotate_by_quarters(shifted: Self, sin: Self, cos: Self) -> (Self, Self) {
         let quarter = shifted.to_bits();
         let swap = 0u64.wrapping_sub(quarter & 1);
         let (s, c) = (sin.to_bits(), cos.to_bits());
@@ -74,10 +75,7 @@ impl Angle for f64 {
         let cos = (c & !swap) | (s & swap);
         let sin_sign = (quarter & 2) << 62;
         let cos_sign = (quarter.wrapping_add(1) & 2) << 62;
-        (
-            Self::from_bits(sin ^ sin_sign),
-            Self::from_bits(cos ^ cos_sign),
-        )
+        (Self::from_bits(sin ^ sin_sign), Self::from_bits(cos ^ cos_sign))
     }
 }
 
@@ -88,30 +86,30 @@ impl Angle for f64 {
     reason = "as printed in the sources; the nearest doubles are meant"
 )]
 #[inline(always)]
-pub(crate) fn reduced_sin_cos<A: Angle>(x: A) -> (A, A) {
-    // Adding and subtracting 1.5 * 2^52 rounds to a whole number, which then stands in the lowest bits.
+pub(crate) fn reduced_sin_cos<A: LaneAngle>(x: A) -> (A, A) {
+    // Adding and subtracting 1.5 * 2^52 rounds to an integer, which is then in the lowest bits.
     const ROUND: f64 = 6_755_399_441_055_744.0;
     const PIO2_1: f64 = 1.570_796_326_734_125_614_17;
     const PIO2_2: f64 = 6.077_100_506_303_965_976_60e-11;
     const PIO2_2T: f64 = 2.022_266_248_795_950_631_54e-21;
     let shifted = x
-        .like(ROUND)
-        .plus_product(x, x.like(core::f64::consts::FRAC_2_PI));
-    let turns = shifted - x.like(ROUND);
+        .number_like(ROUND)
+        .plus_product(x, x.number_like(core::f64::consts::FRAC_2_PI));
+    let turns = shifted - x.number_like(ROUND);
     // The first product is exact, and so is the difference; what the second one loses goes into the tail.
-    let first = x.less_product(turns, x.like(PIO2_1));
-    let y = first.less_product(turns, x.like(PIO2_2));
-    let lost = (first - y).less_product(turns, x.like(PIO2_2));
-    let tail = lost.less_product(turns, x.like(PIO2_2T));
-    let (s, c) = kernel(y, tail);
-    A::turned(shifted, s, c)
+    let first = x.less_product(turns, x.number_like(PIO2_1));
+    let y = first.less_product(turns, x.number_like(PIO2_2));
+    let lost = (first - y).less_product(turns, x.number_like(PIO2_2));
+    let tail = lost.less_product(turns, x.number_like(PIO2_2T));
+    let (s, c) = sin_cos_kernel(y, tail);
+    A::rotate_by_quarters(shifted, s, c)
 }
 
 /// Sine and cosine of `x + tail` within an eighth of a turn.
 #[allow(clippy::inline_always, reason = "as above")]
 #[allow(clippy::excessive_precision, reason = "as above")]
 #[inline(always)]
-fn kernel<A: Angle>(x: A, tail: A) -> (A, A) {
+fn sin_cos_kernel<A: LaneAngle>(x: A, tail: A) -> (A, A) {
     const S1: f64 = -1.666_666_666_666_663_243_48e-1;
     const S2: f64 = 8.333_333_333_322_489_461_24e-3;
     const S3: f64 = -1.984_126_982_985_794_931_34e-4;
@@ -125,22 +123,22 @@ fn kernel<A: Angle>(x: A, tail: A) -> (A, A) {
     const C5: f64 = 2.087_572_321_298_174_827_90e-9;
     const C6: f64 = -1.135_964_755_778_819_482_65e-11;
     let z = x * x;
-    let half = x.like(0.5) * z;
-    let one = x.like(1.0);
+    let half = x.number_like(0.5) * z;
+    let one = x.number_like(1.0);
     let lead = one - half;
 
     // Terms in pairs, as G. Estrin adds them up: half of the operations wait for no other.
     let (zz, zx) = (z * z, z * x);
     let zzzz = zz * zz;
-    let s1 = x.like(S1).plus_product(z, x.like(S2));
-    let s3 = x.like(S3).plus_product(z, x.like(S4));
-    let s5 = x.like(S5).plus_product(z, x.like(S6));
+    let s1 = x.number_like(S1).plus_product(z, x.number_like(S2));
+    let s3 = x.number_like(S3).plus_product(z, x.number_like(S4));
+    let s5 = x.number_like(S5).plus_product(z, x.number_like(S6));
     let s = s1.plus_product(zz, s3).plus_product(zzzz, s5);
     let sin = x + (tail * lead).plus_product(zx, s);
 
-    let c1 = x.like(C1).plus_product(z, x.like(C2));
-    let c3 = x.like(C3).plus_product(z, x.like(C4));
-    let c5 = x.like(C5).plus_product(z, x.like(C6));
+    let c1 = x.number_like(C1).plus_product(z, x.number_like(C2));
+    let c3 = x.number_like(C3).plus_product(z, x.number_like(C4));
+    let c5 = x.number_like(C5).plus_product(z, x.number_like(C6));
     let c = c1.plus_product(zz, c3).plus_product(zzzz, c5);
     let rest = ((one - lead) - half).less_product(x, tail);
     let cos = lead + rest.plus_product(zz, c);
@@ -202,23 +200,16 @@ mod tests {
     #[test]
     fn several_angles_are_one_by_one() {
         for scale in [1e-3, 3.0, 1e3, 1e5, 1e7] {
-            let angles: [f64; 7] = core::array::from_fn(|k| {
-                scale * (0.37 + 0.21 * f64::from(u8::try_from(k).unwrap_or(0)))
-            });
+            let angles: [f64; 7] =
+                core::array::from_fn(|k| scale * (0.37 + 0.21 * f64::from(u8::try_from(k).unwrap_or(0))));
             let (sin, cos) = Real::sin_cos_all(angles);
             let single: [f32; 7] = angles.map(Real::from_f64);
             let (sin32, cos32) = Real::sin_cos_all(single);
             for k in 0..7 {
                 let (s, c) = Real::sin_cos(angles[k]);
-                assert_eq!(
-                    (sin[k].to_bits(), cos[k].to_bits()),
-                    (s.to_bits(), c.to_bits())
-                );
+                assert_eq!((sin[k].to_bits(), cos[k].to_bits()), (s.to_bits(), c.to_bits()));
                 let (s, c) = Real::sin_cos(single[k]);
-                assert_eq!(
-                    (sin32[k].to_bits(), cos32[k].to_bits()),
-                    (s.to_bits(), c.to_bits())
-                );
+                assert_eq!((sin32[k].to_bits(), cos32[k].to_bits()), (s.to_bits(), c.to_bits()));
             }
         }
     }
@@ -228,10 +219,7 @@ mod tests {
         let (mut s, mut c) = ([0.0; 4], [0.0; 4]);
         sin_cos_lanes(&[1e20, 0.3, f64::NAN, f64::INFINITY], &mut s, &mut c);
         let (sin, cos) = Real::sin_cos(1e20_f64);
-        assert_eq!(
-            (s[0].to_bits(), c[0].to_bits()),
-            (sin.to_bits(), cos.to_bits())
-        );
+        assert_eq!((s[0].to_bits(), c[0].to_bits()), (sin.to_bits(), cos.to_bits()));
         assert!(s[2].is_nan() && c[3].is_nan() && ulps(s[1], Real::sin_cos(0.3_f64).0) <= 1.0);
     }
 }

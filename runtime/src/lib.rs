@@ -1,4 +1,5 @@
-//! What emitted models need at run time: a trait for `f32` and `f64`, the errors of a pose, and Newton's method on loops.
+//! What emitted models need at run time: a trait for `f32` and `f64`, the errors of a pose, and Newton's method on
+//! loops.
 //!
 //! There is no allocation and no unsafe code here, and without the feature `std` no standard library either.
 //!
@@ -16,6 +17,7 @@ mod model;
 mod numbers;
 #[cfg(feature = "rayon")]
 mod parallel;
+mod random;
 mod reactions;
 mod real;
 mod self_test;
@@ -28,15 +30,16 @@ mod wide;
 use core::cmp::Ordering;
 use core::fmt;
 
-pub use arithmetic::{Product, Term, Value, Var};
+pub use arithmetic::{DeferredProduct, ProgramValue, Term, Var};
 pub use geometry::{SpecialGeometry, divisor};
 pub use lanes::{LARGEST_ANGLE, sin_cos_lanes};
-pub use loops::{Loops, Scales, correct, follow, settle};
+pub use loops::{Loops, Scales, correct, follow, solve_passive};
 pub use model::{
-    Assembly, Drives, Followed, Linearised, LoadedState, Passive, Run, Running, State,
-    accelerations, at, check_base, plainly, ready,
+    Assembly, ContinuationProgram, Drives, Linearisation, LoadedState, Passive, ProgramRun, Run, State, accelerations,
+    check_base, check_block_input, run_checked, run_unchecked,
 };
-pub use numbers::{Angles, Numbers, One, Outputs, Results};
+pub use numbers::{AngleBatch, Numbers, OutputSink, ScalarNumbers, ZeroedOutputs};
+pub use random::{RandomBits, scramble_bits};
 pub use reactions::{ClosedLoop, Joint, Wrench};
 pub use real::Real;
 pub use self_test::{Random, SelfTestError, ShowRows, self_test};
@@ -45,9 +48,9 @@ pub use solve::solve;
 /// What emitted modules bring into scope.
 pub mod emitted {
     pub use crate::{
-        Assembly, BaseParameter, Linearised, Loops, Numbers, One, PoseError, Quantity, Real, Run,
-        Scales, SpecialGeometry, Term, Var, accelerations, at, check_base, check_finite, divisor,
-        plainly, read, settle, values, variables,
+        Assembly, BaseParameter, Linearisation, Loops, Numbers, PoseError, Quantity, Real, Run, ScalarNumbers, Scales,
+        SpecialGeometry, Term, Var, accelerations, check_base, check_finite, divisor, read, run_checked, run_unchecked,
+        solve_passive, values, variables,
     };
 }
 
@@ -60,8 +63,8 @@ pub enum PoseError {
     Singular,
     /// A term of the model, such as an effect of its own, has no finite value there.
     Undefined,
-    /// An input is no number, or larger than [`Real::largest`]; its name in the model file, with `_d` and `_dd` for rates
-    /// and accelerations.
+    /// An input is NaN, infinite or larger than [`Real::largest`]. Contains its name in the model file, with `_d` and
+    /// `_dd` for rates and accelerations.
     NotFinite(&'static str),
 }
 
@@ -70,9 +73,9 @@ impl fmt::Display for PoseError {
         match self {
             Self::OutOfReach => f.write_str("the loops cannot close: the pose is out of reach"),
             Self::Singular => f.write_str("the pose is singular"),
-            Self::Undefined => f.write_str("a term of the model has no finite value there"),
+            Self::Undefined => f.write_str("a term of the model has no finite value at this state"),
             Self::NotFinite(input) => {
-                write!(f, "`{input}` is no number, or too large to compute with")
+                write!(f, "`{input}` is NaN, infinite or too large to compute with")
             }
         }
     }
@@ -80,10 +83,10 @@ impl fmt::Display for PoseError {
 
 impl core::error::Error for PoseError {}
 
-/// Names the first of some inputs that is no number, or larger than [`Real::largest`].
+/// Checks that inputs are finite and not larger than [`Real::largest`].
 ///
 /// # Errors
-/// [`PoseError::NotFinite`] with its name.
+/// [`PoseError::NotFinite`] with the name of the first that is not.
 #[inline]
 pub fn check_finite<T: Real>(values: &[T], names: &[&'static str]) -> Result<(), PoseError> {
     // One branch for all of them.
@@ -95,8 +98,7 @@ pub fn check_finite<T: Real>(values: &[T], names: &[&'static str]) -> Result<(),
         return Ok(());
     }
     let mut named = values.iter().zip(names);
-    let found =
-        named.find(|(value, _)| value.abs().partial_cmp(&T::largest()) != Some(Ordering::Less));
+    let found = named.find(|(value, _)| value.abs().partial_cmp(&T::largest()) != Some(Ordering::Less));
     found.map_or(Ok(()), |(_, name)| Err(PoseError::NotFinite(name)))
 }
 
@@ -135,12 +137,7 @@ pub struct BaseParameter {
 impl BaseParameter {
     /// Name, retained product, SI unit, and expression.
     #[must_use]
-    pub const fn new(
-        name: &'static str,
-        retained: &'static str,
-        unit: &'static str,
-        expression: &'static str,
-    ) -> Self {
+    pub const fn new(name: &'static str, retained: &'static str, unit: &'static str, expression: &'static str) -> Self {
         Self {
             name,
             retained,

@@ -2,7 +2,7 @@
 //!
 //! Every step must shrink to a quarter of the one before; where that fails, the motion from the known pose is divided
 //! into shorter strides, which keeps to the assembly mode (Deuflhard 2004, "Newton Methods for Nonlinear Problems",
-//! sections 2.1 and 5.1). Residuals and steps are held against scales that the loops give, so that a mechanism in
+//! sections 2.1 and 5.1). Residuals and steps are compared with scales that the loops provide, so that a mechanism in
 //! millimetres is treated like one in kilometres. Emitted models and the block evaluator share this code.
 //!
 //! Decision: there is one Newton's method. The block evaluator of `modelmill-codegen` depends on this crate for it,
@@ -15,7 +15,7 @@ const ROUNDING: f64 = 64.0;
 /// Longest stride of an active coordinate and longest step of a passive one, as a share of its scale (1 for an angle).
 const LONGEST: f64 = 0.5;
 /// After a first contraction better than this, strides grow.
-const EASY: f64 = 0.0625;
+const FAST_CONTRACTION: f64 = 0.0625;
 /// Strides for a motion: some ten thousand turns of a crank.
 const STRIDES: u32 = 200_000;
 
@@ -31,28 +31,20 @@ pub trait Loops {
     type Matrix: AsRef<[Self::Passive]> + AsMut<[Self::Passive]>;
 
     /// Residuals of the loops, and their derivatives by the passive coordinates: one row per residual.
-    fn linearise(
-        &self,
-        active: &Self::Active,
-        passive: &Self::Passive,
-    ) -> (Self::Passive, Self::Matrix);
+    fn linearise(&self, active: &Self::Active, passive: &Self::Passive) -> (Self::Passive, Self::Matrix);
 
-    /// What residuals and coordinates are held against at a pose.
-    fn scales(
-        &self,
-        active: &Self::Active,
-        passive: &Self::Passive,
-    ) -> Scales<Self::Active, Self::Passive>;
+    /// Scales at a pose with which residuals and coordinates are compared.
+    fn scales(&self, active: &Self::Active, passive: &Self::Passive) -> Scales<Self::Active, Self::Passive>;
 }
 
 /// Magnitudes at a pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scales<A, P> {
-    /// Sum of the magnitudes of what each residual adds up.
+    /// Per residual: sum of the magnitudes of its terms.
     pub residual: P,
-    /// 1 for an angle, a length of its loops for a slider.
+    /// Per passive coordinate: 1 for a revolute joint (rad), a length of its loops (m) for a prismatic one.
     pub passive: P,
-    /// The same of the active coordinates; 0 for one on which no loop depends.
+    /// The same for the active coordinates; 0 if no loop depends on the coordinate.
     pub active: A,
 }
 
@@ -61,30 +53,23 @@ pub struct Scales<A, P> {
 /// # Errors
 /// [`PoseError::OutOfReach`] if the loops do not close to rounding, [`PoseError::Singular`] if the passive coordinates
 /// are not determined.
-pub fn settle<L: Loops>(
-    loops: &L,
-    active: &L::Active,
-    guess: &L::Passive,
-) -> Result<L::Passive, PoseError> {
-    newton(loops, active, guess, &FIRST).map(|found| found.passive)
+pub fn solve_passive<L: Loops>(loops: &L, active: &L::Active, guess: &L::Passive) -> Result<L::Passive, PoseError> {
+    newton(loops, active, guess, &FIRST_POSE).map(|found| found.passive)
 }
 
 /// Passive coordinates that close the loops, from those of a pose near by.
 ///
 /// # Errors
-/// As [`settle`]; also [`PoseError::OutOfReach`] if the guess is so far away that another assembly might be found.
-pub fn correct<L: Loops>(
-    loops: &L,
-    active: &L::Active,
-    guess: &L::Passive,
-) -> Result<L::Passive, PoseError> {
-    newton(loops, active, guess, &FOLLOWED).map(|found| found.passive)
+/// As [`solve_passive`]; also [`PoseError::OutOfReach`] if the guess is so far away that another assembly might be
+/// found.
+pub fn correct<L: Loops>(loops: &L, active: &L::Active, guess: &L::Passive) -> Result<L::Passive, PoseError> {
+    newton(loops, active, guess, &NEARBY_POSE).map(|found| found.passive)
 }
 
 /// Passive coordinates that close the loops at `to`, followed in a straight line from those at `from`.
 ///
 /// # Errors
-/// As [`settle`], if the loops cannot close at some pose on the way.
+/// As [`solve_passive`], if the loops cannot close at some pose on the way.
 pub fn follow<L: Loops>(
     loops: &L,
     from: &L::Active,
@@ -103,19 +88,16 @@ pub fn follow<L: Loops>(
         one
     };
     let (mut done, mut stride, mut passive) = (zero, longest, passive.clone());
+    // The last two poses reached extrapolate the guess for the next one.
     let mut before = None;
     for _ in 0..STRIDES {
-        // What remains is not left to a stride of rounding's length.
+        // A remainder of about the length of rounding is added to the last stride.
         let remains = one - done;
         let last = stride * number(1.001) >= remains;
-        let (next, way) = if last {
-            (one, remains)
-        } else {
-            (done + stride, stride)
-        };
+        let (next, way) = if last { (one, remains) } else { (done + stride, stride) };
         let mut active = to.clone();
         if !last {
-            // What is `to` so far becomes the point on the way there.
+            // `active` starts as `to` and becomes the point on the way there.
             for (x, a) in active.as_mut().iter_mut().zip(from.as_ref()) {
                 *x = *a + next * (*x - *a);
             }
@@ -124,17 +106,18 @@ pub fn follow<L: Loops>(
         if let Some((at, earlier)) = &before {
             extrapolate::<L>(&mut guess, earlier, way / (done - *at));
         }
-        let rule = if last { FOLLOWED } else { ON_THE_WAY };
+        let rule = if last { NEARBY_POSE } else { INTERMEDIATE_POSE };
         match newton(loops, &active, &guess, &rule) {
             Ok(found) if last => return Ok(found.passive),
             Ok(found) => {
                 before = Some((done, passive));
                 (passive, done) = (found.passive, next);
                 let twice = stride + stride;
-                if found.contraction < number(EASY) {
+                if found.contraction < number(FAST_CONTRACTION) {
                     stride = if twice < longest { twice } else { longest };
                 }
             }
+            // Newton's method failed or contracted too slowly: half the stride, from the pose reached before.
             Err(error) => {
                 stride = way * number(0.5);
                 if stride <= L::Number::epsilon().sqrt() * longest {
@@ -146,14 +129,14 @@ pub fn follow<L: Loops>(
     Err(PoseError::OutOfReach)
 }
 
-/// Continues the line from `earlier` to `passive` by `share` of itself.
+/// Extrapolates the line from `earlier` to `passive` by `share` of its length.
 fn extrapolate<L: Loops>(passive: &mut L::Passive, earlier: &L::Passive, share: L::Number) {
     for (x, earlier) in passive.as_mut().iter_mut().zip(earlier.as_ref()) {
         *x = *x + share * (*x - *earlier);
     }
 }
 
-/// Largest way of an active coordinate, as a share of its scale.
+/// Largest displacement of an active coordinate, relative to its scale.
 fn distance<L: Loops>(from: &L::Active, to: &L::Active, scales: &L::Active) -> L::Number {
     let zero = L::Number::from_f64(0.0);
     let ways = from.as_ref().iter().zip(to.as_ref());
@@ -167,47 +150,52 @@ fn distance<L: Loops>(from: &L::Active, to: &L::Active, scales: &L::Active) -> L
     distance
 }
 
-/// How Newton's method is to proceed.
-struct Rule {
-    /// Most steps.
+/// Parameters of Newton's method.
+struct NewtonRule {
+    /// Maximum number of steps.
     steps: u32,
-    /// By what each step must shrink; otherwise steps are only cut to the longest.
+    /// Ratio to the previous step that each step must stay below; without it, steps are only limited to the longest.
     contraction: Option<f64>,
-    /// Steps of this size end it before the residuals are zero, on the way to another pose.
+    /// Step size, relative to the scales, below which the iteration ends even if the residuals are not zero.
     enough: f64,
 }
 
-/// Towards the first pose.
-const FIRST: Rule = Rule {
+/// For the first pose, from a guess that may be far away.
+const FIRST_POSE: NewtonRule = NewtonRule {
     steps: 50,
     contraction: None,
     enough: 0.0,
 };
-/// From a pose near by; at contraction, half of the steps suffice.
-const FOLLOWED: Rule = Rule {
+/// From a pose near by; if each step contracts as required, half of these steps suffice.
+const NEARBY_POSE: NewtonRule = NewtonRule {
     steps: 12,
     contraction: Some(0.25),
     enough: 0.0,
 };
 /// Between two poses, where only the assembly mode matters.
-const ON_THE_WAY: Rule = Rule {
+const INTERMEDIATE_POSE: NewtonRule = NewtonRule {
     enough: 1e-3,
-    ..FOLLOWED
+    ..NEARBY_POSE
 };
 
-/// What Newton's method found.
-struct Found<P, T> {
+/// Result of Newton's method.
+struct NewtonResult<P, T> {
+    /// Passive coordinates that close the loops, rad or m.
     passive: P,
     /// The second step as a share of the first; 0 if there was none.
     contraction: T,
 }
 
+/// Newton's method from a guess. It ends when the loops are closed to rounding and the step is small.
+///
+/// # Errors
+/// [`PoseError::Singular`] if the passive coordinates are not determined, else [`PoseError::OutOfReach`].
 fn newton<L: Loops>(
     loops: &L,
     active: &L::Active,
     guess: &L::Passive,
-    rule: &Rule,
-) -> Result<Found<L::Passive, L::Number>, PoseError> {
+    rule: &NewtonRule,
+) -> Result<NewtonResult<L::Passive, L::Number>, PoseError> {
     let number = L::Number::from_f64;
     let (zero, one) = (number(0.0), number(1.0));
     let tiny = L::Number::epsilon().sqrt();
@@ -219,6 +207,7 @@ fn newton<L: Loops>(
         let closed = is_closed::<L>(active, &passive, &step, &scales);
         solve(jacobian.as_mut(), step.as_mut())?;
         let mut size = zero;
+        // The size of the step is that of its largest entry relative to the scale of the coordinate.
         for (dx, scale) in step.as_ref().iter().zip(scales.passive.as_ref()) {
             if !dx.is_finite() {
                 return Err(PoseError::Singular);
@@ -238,7 +227,7 @@ fn newton<L: Loops>(
             one
         };
         if cut * size > longest {
-            // Closed loops whose passive coordinates still run away do not determine them.
+            // The loops are closed, but the steps do not shrink: the passive coordinates are not determined.
             return Err(if closed {
                 PoseError::Singular
             } else {
@@ -249,10 +238,7 @@ fn newton<L: Loops>(
             *x = *x - cut * *dx;
         }
         if closed && size <= tiny || size < number(rule.enough) {
-            return Ok(Found {
-                passive,
-                contraction,
-            });
+            return Ok(NewtonResult { passive, contraction });
         }
         if let Some(contraction) = rule.contraction {
             longest = size * number(contraction);
@@ -268,7 +254,7 @@ fn is_closed<L: Loops>(
     residuals: &L::Passive,
     scales: &Scales<L::Active, L::Passive>,
 ) -> bool {
-    // Angles of many turns bring their own rounding.
+    // Rounding errors grow with the magnitude of the coordinates, as for angles of many turns.
     let mut turns = L::Number::from_f64(1.0);
     for (xs, scales) in [
         (active.as_ref(), scales.active.as_ref()),
@@ -303,10 +289,7 @@ mod tests {
 
         fn linearise(&self, [q]: &[f64; 1], [phi, x]: &[f64; 2]) -> ([f64; 2], [[f64; 2]; 2]) {
             let ((s, c), (sp, cp)) = (q.sin_cos(), phi.sin_cos());
-            let residual = [
-                self.crank * c + self.rod * cp - x,
-                self.crank * s + self.rod * sp,
-            ];
+            let residual = [self.crank * c + self.rod * cp - x, self.crank * s + self.rod * sp];
             (residual, [[-self.rod * sp, -1.0], [self.rod * cp, 0.0]])
         }
 
@@ -322,7 +305,7 @@ mod tests {
 
     fn first(slider: &Slider) -> [f64; 2] {
         let guess = [0.2, slider.rod];
-        settle(slider, &[0.0], &guess).unwrap()
+        solve_passive(slider, &[0.0], &guess).unwrap()
     }
 
     #[test]
@@ -346,10 +329,7 @@ mod tests {
 
     #[test]
     fn a_pose_out_of_reach_is_an_error() {
-        let slider = Slider {
-            crank: 0.9,
-            rod: 0.4,
-        };
+        let slider = Slider { crank: 0.9, rod: 0.4 };
         let farthest = (0.4_f64 / 0.9).asin();
         let start = first(&slider);
         let to = |q: f64| follow(&slider, &[0.0], &start, &[q]);
@@ -357,16 +337,13 @@ mod tests {
         for q in [farthest + 1e-9, farthest + 1e-3, 1.5, 3.0] {
             assert!(to(q).is_err(), "{q}");
         }
-        assert!(settle(&slider, &[1.5], &start).is_err());
+        assert!(solve_passive(&slider, &[1.5], &start).is_err());
         assert!(correct(&slider, &[1.5], &start).is_err());
     }
 
     #[test]
     fn a_guess_leads_to_its_own_assembly_or_nowhere() {
-        let slider = Slider {
-            crank: 0.4,
-            rod: 0.9,
-        };
+        let slider = Slider { crank: 0.4, rod: 0.9 };
         let (mut found, mut refused) = (0, 0);
         for q in (0..60).map(|k| 0.1 * f64::from(k)) {
             // The rod stands upright at pi/2, where the assemblies meet.

@@ -1,9 +1,8 @@
-//! What emitted models are made of whatever they model: states, motion, and how a program is called.
+//! What all emitted models have in common: states, motion, and how a program is called.
 
-use crate::blocks::{BlockError, Program};
+use crate::blocks::{BlockError, StateProgram};
 use crate::{
-    Loops, Outputs, PoseError, Real, Results, Scales, Term, Var, check_finite, correct, follow,
-    solve,
+    Loops, OutputSink, PoseError, Real, Scales, Term, Var, ZeroedOutputs, check_finite, correct, follow, solve,
 };
 
 /// Motion of the independent coordinates, rad or m, and seconds.
@@ -19,7 +18,7 @@ pub struct State<V, const ACTIVE: usize> {
     pub qdd: [V; ACTIVE],
 }
 
-/// Motion of the independent coordinates where friction depends on what the drives carry.
+/// Motion of the independent coordinates, for models whose friction depends on the load of the drives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LoadedState<V, const ACTIVE: usize, const DRIVES: usize> {
     /// Coordinates.
@@ -39,7 +38,7 @@ pub struct Drives<T, const ACTIVE: usize, const DRIVES: usize> {
     pub coordinate: [T; DRIVES],
     /// Their rates.
     pub rate: [T; DRIVES],
-    /// Derivatives of the lengths by the independent coordinates.
+    /// Derivatives of the drive coordinates by the independent coordinates.
     pub jacobian: [[T; ACTIVE]; DRIVES],
 }
 
@@ -56,7 +55,7 @@ pub struct Passive<T, const PASSIVE: usize> {
 
 /// Some values with a Jacobian: generalised forces with that of the drives, or the gaps of loops with their own.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Linearised<T, const VALUES: usize, const ROWS: usize> {
+pub struct Linearisation<T, const VALUES: usize, const ROWS: usize> {
     /// The values.
     pub values: [T; VALUES],
     /// The Jacobian.
@@ -64,7 +63,7 @@ pub struct Linearised<T, const VALUES: usize, const ROWS: usize> {
 }
 
 #[allow(clippy::inline_always, reason = "one store")]
-impl<T, const ACTIVE: usize, const DRIVES: usize> Outputs<T> for Drives<T, ACTIVE, DRIVES> {
+impl<T, const ACTIVE: usize, const DRIVES: usize> OutputSink<T> for Drives<T, ACTIVE, DRIVES> {
     #[inline(always)]
     fn put(&mut self, k: usize, value: impl Term<T>) {
         if k < DRIVES {
@@ -77,18 +76,18 @@ impl<T, const ACTIVE: usize, const DRIVES: usize> Outputs<T> for Drives<T, ACTIV
     }
 }
 
-impl<T: Real, const ACTIVE: usize, const DRIVES: usize> Results<T> for Drives<T, ACTIVE, DRIVES> {
+impl<T: Real, const ACTIVE: usize, const DRIVES: usize> ZeroedOutputs<T> for Drives<T, ACTIVE, DRIVES> {
     fn zeros() -> Self {
         Self {
-            coordinate: Results::zeros(),
-            rate: Results::zeros(),
-            jacobian: Results::zeros(),
+            coordinate: ZeroedOutputs::zeros(),
+            rate: ZeroedOutputs::zeros(),
+            jacobian: ZeroedOutputs::zeros(),
         }
     }
 }
 
 #[allow(clippy::inline_always, reason = "one store")]
-impl<T, const PASSIVE: usize> Outputs<T> for Passive<T, PASSIVE> {
+impl<T, const PASSIVE: usize> OutputSink<T> for Passive<T, PASSIVE> {
     #[inline(always)]
     fn put(&mut self, k: usize, value: impl Term<T>) {
         if k < PASSIVE {
@@ -101,18 +100,18 @@ impl<T, const PASSIVE: usize> Outputs<T> for Passive<T, PASSIVE> {
     }
 }
 
-impl<T: Real, const PASSIVE: usize> Results<T> for Passive<T, PASSIVE> {
+impl<T: Real, const PASSIVE: usize> ZeroedOutputs<T> for Passive<T, PASSIVE> {
     fn zeros() -> Self {
         Self {
-            q: Results::zeros(),
-            qd: Results::zeros(),
-            qdd: Results::zeros(),
+            q: ZeroedOutputs::zeros(),
+            qd: ZeroedOutputs::zeros(),
+            qdd: ZeroedOutputs::zeros(),
         }
     }
 }
 
 #[allow(clippy::inline_always, reason = "one store")]
-impl<T, const VALUES: usize, const ROWS: usize> Outputs<T> for Linearised<T, VALUES, ROWS> {
+impl<T, const VALUES: usize, const ROWS: usize> OutputSink<T> for Linearisation<T, VALUES, ROWS> {
     #[inline(always)]
     fn put(&mut self, k: usize, value: impl Term<T>) {
         if k < VALUES {
@@ -123,19 +122,17 @@ impl<T, const VALUES: usize, const ROWS: usize> Outputs<T> for Linearised<T, VAL
     }
 }
 
-impl<T: Real, const VALUES: usize, const ROWS: usize> Results<T> for Linearised<T, VALUES, ROWS> {
+impl<T: Real, const VALUES: usize, const ROWS: usize> ZeroedOutputs<T> for Linearisation<T, VALUES, ROWS> {
     fn zeros() -> Self {
         Self {
-            values: Results::zeros(),
-            jacobian: Results::zeros(),
+            values: ZeroedOutputs::zeros(),
+            jacobian: ZeroedOutputs::zeros(),
         }
     }
 }
 
 #[allow(clippy::inline_always, reason = "one store")]
-impl<T, const ACTIVE: usize, const PASSIVE: usize> Outputs<T>
-    for Scales<[T; ACTIVE], [T; PASSIVE]>
-{
+impl<T, const ACTIVE: usize, const PASSIVE: usize> OutputSink<T> for Scales<[T; ACTIVE], [T; PASSIVE]> {
     #[inline(always)]
     fn put(&mut self, k: usize, value: impl Term<T>) {
         if k < PASSIVE {
@@ -148,14 +145,12 @@ impl<T, const ACTIVE: usize, const PASSIVE: usize> Outputs<T>
     }
 }
 
-impl<T: Real, const ACTIVE: usize, const PASSIVE: usize> Results<T>
-    for Scales<[T; ACTIVE], [T; PASSIVE]>
-{
+impl<T: Real, const ACTIVE: usize, const PASSIVE: usize> ZeroedOutputs<T> for Scales<[T; ACTIVE], [T; PASSIVE]> {
     fn zeros() -> Self {
         Self {
-            residual: Results::zeros(),
-            passive: Results::zeros(),
-            active: Results::zeros(),
+            residual: ZeroedOutputs::zeros(),
+            passive: ZeroedOutputs::zeros(),
+            active: ZeroedOutputs::zeros(),
         }
     }
 }
@@ -163,41 +158,38 @@ impl<T: Real, const ACTIVE: usize, const PASSIVE: usize> Results<T>
 /// Runs a program for one state.
 ///
 /// # Errors
-/// An input that is no number or too large, or what is wrong with the pose.
+/// An input that is NaN or too large, or a pose error of the model.
 #[inline]
-pub fn at<T, P, R, const INPUTS: usize, const OUTPUTS: usize>(
+pub fn run_checked<T, P, R, const INPUTS: usize, const OUTPUTS: usize>(
     program: &P,
     inputs: [T; INPUTS],
 ) -> Result<R, PoseError>
 where
     T: Real,
-    P: Program<T, INPUTS, OUTPUTS>,
-    R: Results<T>,
+    P: StateProgram<T, INPUTS, OUTPUTS>,
+    R: ZeroedOutputs<T>,
 {
     check_finite(&inputs, &P::NAMES)?;
     let mut results = R::zeros();
-    program.run(&crate::One::new(), inputs.map(Var), &mut results)?;
+    program.run(&crate::ScalarNumbers::new(), inputs.map(Var), &mut results)?;
     Ok(results)
 }
 
-/// Runs a program that asks nothing of its inputs.
+/// Runs a program that does not check its inputs.
 #[inline]
-pub fn plainly<T, P, R, const INPUTS: usize, const OUTPUTS: usize>(
-    program: &P,
-    inputs: [T; INPUTS],
-) -> R
+pub fn run_unchecked<T, P, R, const INPUTS: usize, const OUTPUTS: usize>(program: &P, inputs: [T; INPUTS]) -> R
 where
     T: Real,
-    P: Program<T, INPUTS, OUTPUTS>,
-    R: Results<T>,
+    P: StateProgram<T, INPUTS, OUTPUTS>,
+    R: ZeroedOutputs<T>,
 {
     let mut results = R::zeros();
-    // There is nothing in it that could fail.
-    _ = program.run(&crate::One::new(), inputs.map(Var), &mut results);
+    // Nothing in such a program can fail.
+    _ = program.run(&crate::ScalarNumbers::new(), inputs.map(Var), &mut results);
     results
 }
 
-/// What a program sees: its inputs and its arithmetic, and where its results go.
+/// Interface of the runtime to a program: its inputs, its arithmetic, and the destination of its results.
 pub trait Run<T: Real, const INPUTS: usize>: crate::Numbers<Scalar = T> {
     /// The inputs.
     fn inputs(&self) -> [Var<Self::Value>; INPUTS];
@@ -205,9 +197,9 @@ pub trait Run<T: Real, const INPUTS: usize>: crate::Numbers<Scalar = T> {
     fn put(&mut self, k: usize, value: impl Term<Self::Value>);
 }
 
-/// A program that runs.
+/// Inputs, arithmetic and destination of one run of a program.
 #[derive(Debug)]
-pub struct Running<'a, N: crate::Numbers, O, const INPUTS: usize> {
+pub struct ProgramRun<'a, N: crate::Numbers, O, const INPUTS: usize> {
     /// The arithmetic.
     pub numbers: &'a N,
     /// The inputs.
@@ -217,26 +209,26 @@ pub struct Running<'a, N: crate::Numbers, O, const INPUTS: usize> {
 }
 
 #[allow(clippy::inline_always, reason = "as the arithmetic itself")]
-impl<N: crate::Numbers, O, const INPUTS: usize> crate::Numbers for Running<'_, N, O, INPUTS> {
+impl<N: crate::Numbers, O, const INPUTS: usize> crate::Numbers for ProgramRun<'_, N, O, INPUTS> {
     type Scalar = N::Scalar;
     type Value = N::Value;
 
     #[inline(always)]
-    fn of(&self, x: N::Scalar) -> Var<N::Value> {
-        self.numbers.of(x)
+    fn broadcast(&self, x: N::Scalar) -> Var<N::Value> {
+        self.numbers.broadcast(x)
     }
     #[inline(always)]
     fn sin_cos(&self, angle: impl Term<N::Value>) -> (Var<N::Value>, Var<N::Value>) {
         self.numbers.sin_cos(angle)
     }
     #[inline(always)]
-    fn angles<const K: usize>(&self, angles: [Var<N::Value>; K]) -> crate::Angles<N::Value, K> {
+    fn angles<const K: usize>(&self, angles: [Var<N::Value>; K]) -> crate::AngleBatch<N::Value, K> {
         self.numbers.angles(angles)
     }
     #[inline(always)]
     fn sin_cos_of<const K: usize>(
         &self,
-        angles: &crate::Angles<N::Value, K>,
+        angles: &crate::AngleBatch<N::Value, K>,
         k: usize,
     ) -> (Var<N::Value>, Var<N::Value>) {
         self.numbers.sin_cos_of(angles, k)
@@ -256,11 +248,11 @@ impl<N: crate::Numbers, O, const INPUTS: usize> crate::Numbers for Running<'_, N
 }
 
 #[allow(clippy::inline_always, reason = "as the arithmetic itself")]
-impl<T, N, O, const INPUTS: usize> Run<T, INPUTS> for Running<'_, N, O, INPUTS>
+impl<T, N, O, const INPUTS: usize> Run<T, INPUTS> for ProgramRun<'_, N, O, INPUTS>
 where
     T: Real,
     N: crate::Numbers<Scalar = T>,
-    O: Outputs<N::Value>,
+    O: OutputSink<N::Value>,
 {
     #[inline(always)]
     fn inputs(&self) -> [Var<N::Value>; INPUTS] {
@@ -272,13 +264,13 @@ where
     }
 }
 
-/// A method of an emitted struct as a program that the runtime runs.
+/// Makes a method of an emitted struct a program that the runtime can run.
 #[macro_export]
 macro_rules! program {
     ($item:ident, $owner:ident, $method:ident, $names:expr, $inputs:expr, $outputs:expr) => {
         struct $item<'a, T>(&'a $owner<T>);
 
-        impl<T: $crate::Real> $crate::blocks::Program<T, $inputs, $outputs> for $item<'_, T> {
+        impl<T: $crate::Real> $crate::blocks::StateProgram<T, $inputs, $outputs> for $item<'_, T> {
             const NAMES: [&'static str; $inputs] = $names;
 
             #[inline(always)]
@@ -286,9 +278,9 @@ macro_rules! program {
                 &self,
                 numbers: &N,
                 inputs: [$crate::Var<N::Value>; $inputs],
-                outputs: &mut impl $crate::Outputs<N::Value>,
+                outputs: &mut impl $crate::OutputSink<N::Value>,
             ) -> Result<(), $crate::PoseError> {
-                self.0.$method(&mut $crate::Running {
+                self.0.$method(&mut $crate::ProgramRun {
                     numbers,
                     inputs,
                     outputs,
@@ -298,9 +290,10 @@ macro_rules! program {
     };
 }
 
-/// A struct of named quantities with the table of their names, units and values in the model file, which are its default.
+/// A struct of named quantities with the table of their names, units and values in the model file, which are its
+/// default.
 ///
-/// `as` gives the name in the model file where Rust cannot have it.
+/// `as` gives the name in the model file where that name is not a valid Rust identifier.
 #[macro_export]
 macro_rules! record {
     ($(#[$doc:meta])* $record:ident, $table:ident:) => {
@@ -346,15 +339,15 @@ macro_rules! record {
 
         #[allow(dead_code)]
         impl<T: $crate::Real> $record<T> {
-            /// Names the first that is no number, or too large to compute with.
+            /// Returns an error with the name of the first value that is NaN or too large to compute with.
             fn check(&self) -> Result<(), $crate::PoseError> {
                 $crate::check_finite(&[$(self.$field),+], &$table.map(|quantity| quantity.name))
             }
 
             /// The same as variables of a program.
             #[inline(always)]
-            fn on<N: $crate::Numbers<Scalar = T>>(&self, n: &N) -> $record<$crate::Var<N::Value>> {
-                $record { $($field: n.of(self.$field)),+ }
+            fn as_variables<N: $crate::Numbers<Scalar = T>>(&self, n: &N) -> $record<$crate::Var<N::Value>> {
+                $record { $($field: n.broadcast(self.$field)),+ }
             }
         }
     };
@@ -370,7 +363,7 @@ macro_rules! record {
 #[macro_export]
 macro_rules! read {
     ($n:ident, $array:expr; $($name:ident = $k:literal),+ $(,)?) => {
-        $(let $name = $n.of($array[$k]);)+
+        $(let $name = $n.broadcast($array[$k]);)+
     };
 }
 
@@ -382,7 +375,7 @@ macro_rules! values {
     };
 }
 
-/// Variables of what a program computed, in an array.
+/// Variables of computed values, in an array.
 #[macro_export]
 macro_rules! variables {
     ($($term:expr),* $(,)?) => {
@@ -393,10 +386,10 @@ macro_rules! variables {
 /// Accelerations of the independent coordinates: `M q'' = J' f - bias`.
 ///
 /// # Errors
-/// A force that is no number or too large, or a mass matrix that is singular.
+/// A force that is NaN or too large, or a mass matrix that is singular.
 pub fn accelerations<T: Real, const ACTIVE: usize, const DRIVES: usize>(
     mut mass_matrix: [[T; ACTIVE]; ACTIVE],
-    bias: &Linearised<T, ACTIVE, DRIVES>,
+    bias: &Linearisation<T, ACTIVE, DRIVES>,
     forces: &[T; DRIVES],
     drives: &[&'static str; DRIVES],
 ) -> Result<[T; ACTIVE], PoseError> {
@@ -414,7 +407,7 @@ pub fn accelerations<T: Real, const ACTIVE: usize, const DRIVES: usize>(
     Ok(accelerations)
 }
 
-/// A model whose passive coordinates are found by Newton's method.
+/// A model whose passive coordinates are computed by Newton's method.
 pub trait Assembly: Loops {
     /// How many passive coordinates there are.
     const N_PASSIVE: usize;
@@ -425,17 +418,18 @@ pub trait Assembly: Loops {
     /// Passive coordinates of the nominal pose.
     ///
     /// # Errors
-    /// A geometry that is no number, or cannot be put together.
+    /// A geometry that is not finite, or whose loops cannot be closed.
     fn nominal_passive(&self) -> Result<Self::Passive, PoseError>;
 
     /// Names of the independent coordinates.
     fn names(&self) -> &'static [&'static str];
 
-    /// Passive coordinates of a pose, in the assembly mode of the nominal pose, followed from there in a straight line of
-    /// the independent coordinates: three to five steps of Newton's method for every half radian.
+    /// Passive coordinates of a pose, in the assembly mode of the nominal pose. They are followed from there along a
+    /// straight line of the independent coordinates, with three to five steps of Newton's method for every half radian.
     ///
     /// # Errors
-    /// A pose that is out of reach, or cannot be followed from the nominal one, or is singular, or is no number.
+    /// A pose that is out of reach, that cannot be followed from the nominal one, that is singular, or that is not
+    /// finite.
     fn passive_position(&self, q: &Self::Active) -> Result<Self::Passive, PoseError>
     where
         Self: Sized,
@@ -445,17 +439,13 @@ pub trait Assembly: Loops {
         follow(self, &self.nominal_active(), &nominal, q)
     }
 
-    /// Passive coordinates of a pose, from those of a pose near by: for control, of the last cycle. Two or three steps of
-    /// Newton's method for a motion of some hundredths of a radian. If the guess is too far away to be sure of the assembly
-    /// mode, the pose is followed from the nominal one.
+    /// Passive coordinates of a pose, starting from those of a pose near by; in a controller, from those of the last
+    /// cycle. A motion of some hundredths of a radian takes two or three steps of Newton's method. If the guess is too
+    /// far away to guarantee the assembly mode, the pose is followed from the nominal one.
     ///
     /// # Errors
     /// As [`Self::passive_position`].
-    fn passive_position_near(
-        &self,
-        q: &Self::Active,
-        guess: &Self::Passive,
-    ) -> Result<Self::Passive, PoseError>
+    fn passive_position_near(&self, q: &Self::Active, guess: &Self::Passive) -> Result<Self::Passive, PoseError>
     where
         Self: Sized,
     {
@@ -467,13 +457,13 @@ pub trait Assembly: Loops {
 
 /// A program whose last inputs are the passive coordinates of a model, which are followed from state to state.
 #[derive(Clone, Copy, Debug)]
-pub struct Followed<'a, P, M>(pub P, pub &'a M);
+pub struct ContinuationProgram<'a, P, M>(pub P, pub &'a M);
 
-impl<T, P, M, const INPUTS: usize, const OUTPUTS: usize> Program<T, INPUTS, OUTPUTS>
-    for Followed<'_, P, M>
+impl<T, P, M, const INPUTS: usize, const OUTPUTS: usize> StateProgram<T, INPUTS, OUTPUTS>
+    for ContinuationProgram<'_, P, M>
 where
     T: Real,
-    P: Program<T, INPUTS, OUTPUTS>,
+    P: StateProgram<T, INPUTS, OUTPUTS>,
     M: Assembly<Number = T>,
 {
     const NAMES: [&'static str; INPUTS] = P::NAMES;
@@ -485,16 +475,12 @@ where
         &self,
         numbers: &N,
         inputs: [Var<N::Value>; INPUTS],
-        outputs: &mut impl Outputs<N::Value>,
+        outputs: &mut impl OutputSink<N::Value>,
     ) -> Result<(), PoseError> {
         self.0.run(numbers, inputs, outputs)
     }
 
-    fn complete(
-        &self,
-        inputs: &mut [T; INPUTS],
-        last: Option<&[T; INPUTS]>,
-    ) -> Result<(), PoseError> {
+    fn complete(&self, inputs: &mut [T; INPUTS], last: Option<&[T; INPUTS]>) -> Result<(), PoseError> {
         let model = self.1;
         let active = |from: &[T; INPUTS]| {
             let mut q = model.nominal_active();
@@ -505,7 +491,7 @@ where
         };
         let given = INPUTS.saturating_sub(M::N_PASSIVE);
         let q = active(inputs);
-        // Followed from the state before, in a straight line; where that fails, from the nominal pose.
+        // Followed from the previous state in a straight line; if that fails, from the nominal pose.
         let near = last.and_then(|last| {
             let mut passive = model.nominal_passive().ok()?;
             for (to, from) in passive.as_mut().iter_mut().zip(last.iter().skip(given)) {
@@ -524,10 +510,10 @@ where
     }
 }
 
-/// What is wrong with base parameters.
+/// Checks base parameters.
 ///
 /// # Errors
-/// [`PoseError::NotFinite`] with the name of the first that is no number, or too large to compute with.
+/// [`PoseError::NotFinite`] with the name of the first that is NaN or too large to compute with.
 pub fn check_base<T: Real, const N: usize>(
     values: &[T; N],
     parameters: &[crate::BaseParameter; N],
@@ -535,30 +521,32 @@ pub fn check_base<T: Real, const N: usize>(
     check_finite(values, &parameters.map(|parameter| parameter.name))
 }
 
-/// What is wrong with the inputs of a model, as many states tell it.
+/// Converts an input error of a model into the error of an evaluation over many states.
 ///
 /// # Errors
-/// The same at the first state.
-pub fn ready(input: Result<(), PoseError>) -> Result<(), BlockError> {
+/// The same error, reported at the first state.
+pub fn check_block_input(input: Result<(), PoseError>) -> Result<(), BlockError> {
     input.map_err(|reason| BlockError::At { sample: 0, reason })
 }
 
 /// The methods of an emitted `InverseDynamics` over many states.
 ///
-/// In scope are `States`, `inputs`, `N_DRIVES` and the program `Forces`; with `followed` passive coordinates are found first.
+/// In scope are `States`, `inputs`, `N_DRIVES` and the program `Forces`. With `followed`, passive coordinates are
+/// computed first.
 #[macro_export]
 macro_rules! forces_of_many {
     () => {
         $crate::forces_of_many!(@ |model| Forces(model), inputs);
     };
     (followed) => {
-        $crate::forces_of_many!(@ |model| $crate::Followed(Forces(model), &model.model), {
+        $crate::forces_of_many!(@ |model| $crate::ContinuationProgram(Forces(model), &model.model), {
             |states: &States<'a, T>| inputs_with_passive(states, &[&[]; N_PASSIVE])
         });
     };
     (@ |$model:ident| $program:expr, $inputs:tt) => {
-        impl<T: $crate::blocks::Blocks> InverseDynamics<T> {
-            /// [`Self::forces`] at many states, in the widest vectors of the machine if the runtime has its feature `std`.
+        impl<T: $crate::blocks::BlockScalar> InverseDynamics<T> {
+            /// [`Self::forces`] at many states, in the widest vectors of the machine if the runtime has its feature
+            /// `std`.
             ///
             /// One array per drive, as long as those of the states.
             ///
@@ -570,7 +558,7 @@ macro_rules! forces_of_many {
                 states: &States<'a, T>,
                 outputs: &mut [&mut [T]; N_DRIVES],
             ) -> Result<(), $crate::blocks::BlockError> {
-                $crate::ready(self.input)?;
+                $crate::check_block_input(self.input)?;
                 let $model = self;
                 $crate::blocks::fill_columns(&$program, &$inputs(states), outputs)
             }
@@ -587,23 +575,24 @@ macro_rules! forces_of_many {
             where
                 T: Send + Sync,
             {
-                $crate::ready(self.input)?;
+                $crate::check_block_input(self.input)?;
                 let $model = self;
                 $crate::blocks::fill_columns_in_parallel(&$program, &$inputs(states), outputs)
             }
 
-            /// [`Self::forces`] at many states, shown block by block; nothing is kept between blocks.
+            /// [`Self::forces`] at many states, passed on block by block; nothing is kept between blocks.
             ///
             /// Output `d` of a block belongs to drive `d`.
             ///
             /// # Errors
-            /// Arrays of different lengths; else the first state without an answer, after all before it have been shown.
+            /// Arrays of different lengths; else the first state without an answer, after all blocks before it have
+            /// been passed on.
             pub fn forces_in_blocks<'a>(
                 &self,
                 states: &States<'a, T>,
-                visit: impl FnMut($crate::blocks::Block<'_, T::Line, N_DRIVES>),
+                visit: impl FnMut($crate::blocks::StateBlock<'_, T::Line, N_DRIVES>),
             ) -> Result<(), $crate::blocks::BlockError> {
-                $crate::ready(self.input)?;
+                $crate::check_block_input(self.input)?;
                 let $model = self;
                 $crate::blocks::visit_blocks(&$program, &$inputs(states), visit)
             }
@@ -613,20 +602,20 @@ macro_rules! forces_of_many {
 
 /// The methods of an emitted `Model` over many states.
 ///
-/// In scope are `States`, `inputs`, `N_DRIVES`, `N_BASE` and the program `Regressor`; with `followed` passive coordinates are
-/// found first.
+/// In scope are `States`, `inputs`, `N_DRIVES`, `N_BASE` and the program `Regressor`. With `followed`, passive
+/// coordinates are computed first.
 #[macro_export]
 macro_rules! regressor_of_many {
     () => {
         $crate::regressor_of_many!(@ |model| Regressor(model), inputs);
     };
     (followed) => {
-        $crate::regressor_of_many!(@ |model| $crate::Followed(Regressor(model), model), {
+        $crate::regressor_of_many!(@ |model| $crate::ContinuationProgram(Regressor(model), model), {
             |states: &States<'a, T>| inputs_with_passive(states, &[&[]; N_PASSIVE])
         });
     };
     (@ |$model:ident| $program:expr, $inputs:tt) => {
-        impl<T: $crate::blocks::Blocks> Model<T> {
+        impl<T: $crate::blocks::BlockScalar> Model<T> {
             /// [`Self::regressor`] at many states, in the widest vectors of the machine if the runtime has its feature
             /// `std`.
             ///
@@ -640,7 +629,7 @@ macro_rules! regressor_of_many {
                 states: &States<'a, T>,
                 outputs: &mut [T],
             ) -> Result<(), $crate::blocks::BlockError> {
-                $crate::ready(self.input)?;
+                $crate::check_block_input(self.input)?;
                 let ($model, inputs) = (self, $inputs(states));
                 let n = $crate::blocks::n_states(&$program, &inputs)?;
                 let mut columns = $crate::blocks::columns_of(outputs, n)?;
@@ -659,25 +648,26 @@ macro_rules! regressor_of_many {
             where
                 T: Send + Sync,
             {
-                $crate::ready(self.input)?;
+                $crate::check_block_input(self.input)?;
                 let ($model, inputs) = (self, $inputs(states));
                 let n = $crate::blocks::n_states(&$program, &inputs)?;
                 let mut columns = $crate::blocks::columns_of(outputs, n)?;
                 $crate::blocks::fill_columns_in_parallel(&$program, &inputs, &mut columns)
             }
 
-            /// [`Self::regressor`] at many states, shown block by block; nothing is kept between blocks.
+            /// [`Self::regressor`] at many states, passed on block by block; nothing is kept between blocks.
             ///
             /// Output `d * N_BASE + b` of a block belongs to drive `d` and base parameter `b`.
             ///
             /// # Errors
-            /// Arrays of different lengths; else the first state without an answer, after all before it have been shown.
+            /// Arrays of different lengths; else the first state without an answer, after all blocks before it have
+            /// been passed on.
             pub fn regressor_in_blocks<'a>(
                 &self,
                 states: &States<'a, T>,
-                visit: impl FnMut($crate::blocks::Block<'_, T::Line, { N_DRIVES * N_BASE }>),
+                visit: impl FnMut($crate::blocks::StateBlock<'_, T::Line, { N_DRIVES * N_BASE }>),
             ) -> Result<(), $crate::blocks::BlockError> {
-                $crate::ready(self.input)?;
+                $crate::check_block_input(self.input)?;
                 let $model = self;
                 $crate::blocks::visit_blocks(&$program, &$inputs(states), visit)
             }

@@ -1,7 +1,7 @@
-//! What an emitted program computes with: one number, or as many as a vector of the machine holds.
+//! The arithmetic of an emitted program: one number at a time, or as many as a vector register of the machine takes.
 //!
-//! A program is written once, for [`Numbers`]. With [`One`] it is the function of one state; with the vectors of
-//! [`crate::blocks`] it runs over many states at once.
+//! A program is written once, for [`Numbers`]. With [`ScalarNumbers`] it is the function of one state; with the vectors
+//! of [`crate::blocks`] it runs over many states at once.
 //!
 //! Decision: an emitted program is generic over what computes, so that vectors cost no second copy to parse and
 //! check. They are instantiated where a user calls them; `modelmill-generated` compiles no vector code. The Panda's
@@ -10,33 +10,33 @@
 
 use core::marker::PhantomData;
 
-use crate::arithmetic::{Term, Value, Var};
+use crate::arithmetic::{ProgramValue, Term, Var};
 use crate::{PoseError, Real};
 
-/// Arithmetic of a program: whatever needs more than what its variables know themselves.
+/// Arithmetic of a program: constants, sines and cosines, and the checks that may fail.
 pub trait Numbers {
     /// The numbers of the model: `f32` or `f64`.
     type Scalar: Real;
-    /// What a variable of the program holds.
-    type Value: Value;
+    /// Type of a variable: one number or a vector of them.
+    type Value: ProgramValue;
 
     /// A value that is the same at every state.
-    fn of(&self, x: Self::Scalar) -> Var<Self::Value>;
-    /// A number that stands in the program.
+    fn broadcast(&self, x: Self::Scalar) -> Var<Self::Value>;
+    /// A literal number of the program.
     #[allow(clippy::inline_always, reason = "nothing at all")]
     #[inline(always)]
     fn number(&self, x: f64) -> Var<Self::Value> {
-        self.of(Self::Scalar::from_f64(x))
+        self.broadcast(Self::Scalar::from_f64(x))
     }
     /// Sine and cosine of an angle in rad.
     fn sin_cos(&self, angle: impl Term<Self::Value>) -> (Var<Self::Value>, Var<Self::Value>);
-    /// Angles in rad whose sines and cosines [`Self::sin_cos_of`] gives later. One number computes all of them here, which
-    /// takes less time than one by one; vectors wait, since they lack the registers to hold the results, and look only
-    /// whether one is too large.
+    /// Prepares angles in rad, whose sines and cosines [`Self::sin_cos_of`] returns later. For one number all of them
+    /// are computed here, which takes less time than one by one. Vectors have too few registers for the results, so
+    /// they compute later and only check here whether an angle is too large.
     #[allow(clippy::inline_always, reason = "nothing at all")]
     #[inline(always)]
-    fn angles<const N: usize>(&self, angles: [Var<Self::Value>; N]) -> Angles<Self::Value, N> {
-        Angles {
+    fn angles<const N: usize>(&self, angles: [Var<Self::Value>; N]) -> AngleBatch<Self::Value, N> {
+        AngleBatch {
             sines: angles,
             cosines: angles,
         }
@@ -46,45 +46,42 @@ pub trait Numbers {
     #[inline(always)]
     fn sin_cos_of<const N: usize>(
         &self,
-        angles: &Angles<Self::Value, N>,
+        angles: &AngleBatch<Self::Value, N>,
         k: usize,
     ) -> (Var<Self::Value>, Var<Self::Value>) {
         self.sin_cos(angles.sines[k])
     }
 
-    /// Asks that a value is not negative.
+    /// Checks that a value is not negative.
     ///
     /// # Errors
-    /// [`PoseError::OutOfReach`] for one number; a block remembers it and is looked at one by one.
+    /// [`PoseError::OutOfReach`] for one number. A block records the failure and evaluates its states one by one.
     fn reachable(&self, x: impl Term<Self::Value>) -> Result<(), PoseError>;
-    /// Asks that a determinant does not vanish beside the magnitude of its terms; see [`Real::singular`].
+    /// Checks that a determinant is not zero relative to the magnitude of its terms; see [`Real::singular`].
     ///
     /// # Errors
-    /// [`PoseError::Singular`] for one number; a block remembers it and is looked at one by one.
-    fn regular(
-        &self,
-        x: impl Term<Self::Value>,
-        size: impl Term<Self::Value>,
-    ) -> Result<(), PoseError>;
-    /// Asks that a value is a finite number.
+    /// [`PoseError::Singular`] for one number. A block records the failure and evaluates its states one by one.
+    fn regular(&self, x: impl Term<Self::Value>, size: impl Term<Self::Value>) -> Result<(), PoseError>;
+    /// Checks that a value is a finite number.
     ///
     /// # Errors
-    /// [`PoseError::Undefined`] for one number; a block remembers it and is looked at one by one.
+    /// [`PoseError::Undefined`] for one number. A block records the failure and evaluates its states one by one.
     fn finite(&self, x: impl Term<Self::Value>) -> Result<(), PoseError>;
 }
 
-/// Angles whose sines and cosines are asked for later: both, or the angles themselves where these are not computed yet.
+/// Angles whose sines and cosines are needed later: the sines and cosines, or the angles where those are not computed
+/// yet.
 #[derive(Clone, Copy, Debug)]
-pub struct Angles<V, const N: usize> {
+pub struct AngleBatch<V, const N: usize> {
     pub(crate) sines: [Var<V>; N],
     pub(crate) cosines: [Var<V>; N],
 }
 
 /// One number at a time.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct One<T>(PhantomData<T>);
+pub struct ScalarNumbers<T>(PhantomData<T>);
 
-impl<T> One<T> {
+impl<T> ScalarNumbers<T> {
     /// The arithmetic of `T`.
     #[must_use]
     pub const fn new() -> Self {
@@ -96,12 +93,12 @@ impl<T> One<T> {
     clippy::inline_always,
     reason = "each is an instruction or a call; without optimisation a program would be thousands of calls"
 )]
-impl<T: Real> Numbers for One<T> {
+impl<T: Real> Numbers for ScalarNumbers<T> {
     type Scalar = T;
     type Value = T;
 
     #[inline(always)]
-    fn of(&self, x: T) -> Var<T> {
+    fn broadcast(&self, x: T) -> Var<T> {
         Var(x)
     }
     #[inline(always)]
@@ -110,18 +107,18 @@ impl<T: Real> Numbers for One<T> {
         (Var(sin), Var(cos))
     }
     #[inline(always)]
-    fn angles<const N: usize>(&self, angles: [Var<T>; N]) -> Angles<T, N> {
+    fn angles<const N: usize>(&self, angles: [Var<T>; N]) -> AngleBatch<T, N> {
         let (sines, cosines) = T::sin_cos_all(angles.map(|angle| angle.0));
-        Angles {
+        AngleBatch {
             sines: sines.map(Var),
             cosines: cosines.map(Var),
         }
     }
     #[inline(always)]
-    fn sin_cos_of<const N: usize>(&self, angles: &Angles<T, N>, k: usize) -> (Var<T>, Var<T>) {
+    fn sin_cos_of<const N: usize>(&self, angles: &AngleBatch<T, N>, k: usize) -> (Var<T>, Var<T>) {
         (angles.sines[k], angles.cosines[k])
     }
-    // Each is written so that what is no number fails as well.
+    // The comparisons are written so that NaN fails as well.
     #[inline(always)]
     fn reachable(&self, x: impl Term<T>) -> Result<(), PoseError> {
         if x.get() >= T::from_f64(0.0) {
@@ -148,20 +145,20 @@ impl<T: Real> Numbers for One<T> {
     }
 }
 
-/// Where a program leaves its results.
-pub trait Outputs<V> {
+/// Destination of the results of a program.
+pub trait OutputSink<V> {
     /// Takes output `k`.
     fn put(&mut self, k: usize, value: impl Term<V>);
 }
 
 /// Results that begin as zeros.
-pub trait Results<T>: Outputs<T> {
+pub trait ZeroedOutputs<T>: OutputSink<T> {
     /// All of them zero.
     fn zeros() -> Self;
 }
 
 #[allow(clippy::inline_always, reason = "as above")]
-impl<V, const N: usize> Outputs<V> for [V; N] {
+impl<V, const N: usize> OutputSink<V> for [V; N] {
     #[inline(always)]
     fn put(&mut self, k: usize, value: impl Term<V>) {
         self[k] = value.get();
@@ -170,20 +167,20 @@ impl<V, const N: usize> Outputs<V> for [V; N] {
 
 /// Outputs row by row.
 #[allow(clippy::inline_always, reason = "as above")]
-impl<V, const ROWS: usize, const COLUMNS: usize> Outputs<V> for [[V; COLUMNS]; ROWS] {
+impl<V, const ROWS: usize, const COLUMNS: usize> OutputSink<V> for [[V; COLUMNS]; ROWS] {
     #[inline(always)]
     fn put(&mut self, k: usize, value: impl Term<V>) {
         self[k / COLUMNS][k % COLUMNS] = value.get();
     }
 }
 
-impl<T: Real, const N: usize> Results<T> for [T; N] {
+impl<T: Real, const N: usize> ZeroedOutputs<T> for [T; N] {
     fn zeros() -> Self {
         [T::from_f64(0.0); N]
     }
 }
 
-impl<T: Real, const ROWS: usize, const COLUMNS: usize> Results<T> for [[T; COLUMNS]; ROWS] {
+impl<T: Real, const ROWS: usize, const COLUMNS: usize> ZeroedOutputs<T> for [[T; COLUMNS]; ROWS] {
     fn zeros() -> Self {
         [[T::from_f64(0.0); COLUMNS]; ROWS]
     }
@@ -193,14 +190,14 @@ impl<T: Real, const ROWS: usize, const COLUMNS: usize> Results<T> for [[T; COLUM
 mod tests {
     use super::*;
 
-    /// A determinant of terms of size 100 counts as zero below 1e-7 where numbers have 16 digits, and where they have 7,
-    /// below ten times what rounding leaves.
+    /// A determinant of terms of size 100 counts as zero below 1e-7 where numbers have 16 digits, and where they have
+    /// 7, below ten times what rounding leaves.
     #[test]
     fn singular_poses_are_told_by_the_digits_that_there_are() {
-        let double = |x| One::<f64>::new().regular(Var(x), Var(100.0));
+        let double = |x| ScalarNumbers::<f64>::new().regular(Var(x), Var(100.0));
         assert_eq!(double(0.9e-7), Err(PoseError::Singular));
         assert_eq!(double(-1.1e-7), Ok(()));
-        let single = |x| One::<f32>::new().regular(Var(x), Var(100.0));
+        let single = |x| ScalarNumbers::<f32>::new().regular(Var(x), Var(100.0));
         assert_eq!(single(1e-4), Err(PoseError::Singular));
         assert_eq!(single(-1.3e-4), Ok(()));
         assert_eq!(single(f32::NAN), Err(PoseError::Singular));

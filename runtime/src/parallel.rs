@@ -1,20 +1,20 @@
 //! Blocks on all cores: states are halved until a part is small enough, and the parts run side by side.
 
-use crate::blocks::{BlockError, Blocks, Program, fill_columns};
+use crate::blocks::{BlockError, BlockScalar, StateProgram, fill_columns};
 
 /// States per part: enough work to outweigh a task of `rayon`.
 const PART: usize = 2048;
 
 /// Fills columns of equal lengths `n`.
-pub(crate) fn fill<T, P, const INPUTS: usize, const OUTPUTS: usize>(
+pub(crate) fn fill_in_parallel<T, P, const INPUTS: usize, const OUTPUTS: usize>(
     program: &P,
     inputs: &[&[T]; INPUTS],
     outputs: &mut [&mut [T]; OUTPUTS],
     n: usize,
 ) -> Result<(), BlockError>
 where
-    T: Blocks + Send + Sync,
-    P: Program<T, INPUTS, OUTPUTS> + Sync,
+    T: BlockScalar + Send + Sync,
+    P: StateProgram<T, INPUTS, OUTPUTS> + Sync,
 {
     if n <= PART {
         return fill_columns(program, inputs, outputs);
@@ -30,8 +30,8 @@ where
         (front_outputs[k], back_outputs[k]) = output.split_at_mut(half);
     }
     let (first, second) = rayon::join(
-        || fill(program, &front, &mut front_outputs, half),
-        || fill(program, &back, &mut back_outputs, n - half),
+        || fill_in_parallel(program, &front, &mut front_outputs, half),
+        || fill_in_parallel(program, &back, &mut back_outputs, n - half),
     );
     first?;
     second.map_err(|error| match error {

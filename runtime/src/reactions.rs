@@ -1,17 +1,17 @@
-//! What joints transmit, as emitted models tell it.
+//! Reactions of joints and loops, as emitted models return them.
 
-/// A joint whose reaction a model tells.
+/// A joint whose reaction a model computes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Joint {
     /// Name of its frame in the model file, followed by the coordinate where the frame has several joints.
     pub name: &'static str,
     /// Coordinates that move it.
     pub coordinates: &'static [&'static str],
-    /// The axis, `x`, `y` or `z`, about or along which it moves, of the axes in which its reaction is given.
+    /// Axis of motion, `x`, `y` or `z`, in the axes in which the reaction is given.
     pub axis: char,
 }
 
-/// A closed loop whose force a model tells.
+/// A closed loop whose force a model computes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ClosedLoop {
     /// Its name in the model file.
@@ -20,8 +20,8 @@ pub struct ClosedLoop {
     pub axes: &'static str,
 }
 
-/// A force and a moment, component by component; `None` is what the equations of motion do not determine, because the
-/// mechanism is held there more often than once.
+/// A force and a moment, component by component. `None` marks a component that the equations of motion do not
+/// determine, because the mechanism is overconstrained there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wrench<T> {
     /// Force, N.

@@ -3,7 +3,7 @@
 use core::fmt::Debug;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
-/// What an emitted model asks of its numbers; `f32` and `f64` have it.
+/// What an emitted model requires of its numbers; implemented for `f32` and `f64`.
 pub trait Real:
     Copy
     + Debug
@@ -20,22 +20,22 @@ pub trait Real:
     fn to_f64(self) -> f64;
     /// Distance from 1 to the next larger number.
     fn epsilon() -> Self;
-    /// What inputs must stay below, whatever their unit: then their powers are finite up to the fifth, or for `f32` up to
-    /// the third. Products of more of them may still overflow.
+    /// Upper limit of inputs, in any unit. Below it, powers up to the fifth are finite, or for `f32` up to the
+    /// third. Products of more inputs may still overflow.
     #[inline]
     #[must_use]
     fn largest() -> Self {
         let single = Self::epsilon().to_f64() > 1e-12;
         Self::from_f64(if single { 1e12 } else { 1e60 })
     }
-    /// What a determinant must exceed, as a share of the magnitude of its terms: 1e-9, but not less than ten times what
-    /// rounding leaves of them in this type.
+    /// Smallest regular determinant, relative to the magnitude of its terms: 1e-9, but not less than ten times the
+    /// rounding error of those terms in this type.
     #[inline]
     #[must_use]
     fn singular() -> Self {
         Self::from_f64((10.0 * Self::epsilon().to_f64()).max(1e-9))
     }
-    /// Whether it is a number and finite.
+    /// Whether it is finite and not NaN.
     fn is_finite(self) -> bool;
     /// Sine and cosine of an angle in rad.
     fn sin_cos(self) -> (Self, Self);
@@ -62,7 +62,7 @@ pub trait Real:
     #[must_use]
     fn exp(self) -> Self;
 
-    /// -1, 0 or 1; what is no number stays what it is.
+    /// -1, 0 or 1; NaN stays NaN.
     #[must_use]
     fn sign(self) -> Self {
         let zero = Self::from_f64(0.0);
@@ -196,14 +196,7 @@ real!(
     libm::tanh,
     libm::exp
 );
-real!(
-    f32,
-    sin_cos_single,
-    libm::sqrtf,
-    libm::atan2f,
-    libm::tanhf,
-    libm::expf
-);
+real!(f32, sin_cos_single, libm::sqrtf, libm::atan2f, libm::tanhf, libm::expf);
 
 #[cfg(test)]
 mod tests {

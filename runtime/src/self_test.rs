@@ -1,7 +1,7 @@
-//! A test that emitted models bring along: do the base parameters hold all of the parameters, and none too many?
+//! Self-test of an emitted model: are the base parameters complete, and is none of them redundant?
 //!
-//! At random states the rows of H and of H_min go into triangles, whose singular values say the ranks; the forces of all
-//! parameters are held against those of the base parameters. There is no allocation here.
+//! The rows of H and of H_min at random states go into R factors, whose singular values give the ranks. The forces of
+//! all parameters are compared with those of the base parameters. The test allocates nothing.
 //!
 //! Decision: the test is emitted on request, because H for all products is as long as H_min again. Rotations give
 //! the R factor and one-sided rotations its singular values, so that it needs no allocation and no linear algebra
@@ -9,62 +9,56 @@
 
 use core::fmt;
 
-use crate::{PoseError, Real};
+use crate::{PoseError, RandomBits, Real};
 
-/// A singular value below this share of the largest counts as zero, columns of length 1; forces differ by rounding if by
-/// less than this share of their terms.
-const NOTHING: f64 = 1e-9;
+/// With columns of length 1, a singular value below this share of the largest counts as zero. Forces agree if they
+/// differ by less than this share of their terms.
+const ZERO_SHARE: f64 = 1e-9;
 
-/// Random numbers that are the same on every machine (`SplitMix64`; Steele, Lea and Flood 2014).
+/// Random numbers around those of a model, the same on every machine.
 #[derive(Clone, Copy, Debug)]
-pub struct Random(u64);
+pub struct Random(RandomBits);
 
 impl Random {
     /// A stream that starts from a seed.
     pub fn new(seed: u64) -> Self {
-        Self(seed)
+        Self(RandomBits::new(seed))
     }
 
     /// Uniform between two numbers.
-    pub fn between(&mut self, low: f64, high: f64) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^= z >> 31;
-        let unit = (z >> 11) as f64 / (1_u64 << 53) as f64;
-        low + unit * (high - low)
+    pub fn uniform(&mut self, low: f64, high: f64) -> f64 {
+        low + self.0.below_one() * (high - low)
     }
 
-    /// A number of the same sign and some other size; any where there was none.
-    pub fn near(&mut self, value: f64) -> f64 {
-        let factor = self.between(0.5, 1.5);
+    /// The value times a random factor of 0.5 to 1.5; the factor itself if the value is 0.
+    pub fn perturb(&mut self, value: f64) -> f64 {
+        let factor = self.uniform(0.5, 1.5);
         if value == 0.0 { factor } else { value * factor }
     }
 }
 
-/// What is wrong with the base parameters of an emitted model.
+/// Why the self-test of an emitted model failed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SelfTestError {
-    /// Too few random states around the nominal pose have an answer.
+    /// The model can be evaluated at too few random states around the nominal pose.
     TooFewStates {
-        /// How many have one.
+        /// Number of states at which it can be evaluated.
         found: usize,
-        /// How many were asked for.
+        /// Number of states required.
         needed: usize,
-        /// Why the last one had none.
+        /// Error at the last state that failed.
         last: PoseError,
     },
-    /// The columns of a regressor are not as independent as they should be.
+    /// The rank of a regressor is not the number of base parameters.
     Rank {
-        /// Which one: `H` for all products of parameters, or `H_min`.
+        /// Which regressor: `H` for all products of parameters, or `H_min`.
         of: &'static str,
         /// Rank by singular values.
         found: usize,
         /// Number of base parameters.
         expected: usize,
     },
-    /// The geometry is special: base parameters divide by what vanishes there.
+    /// The geometry is special: a denominator of the base parameters is zero.
     Geometry(crate::SpecialGeometry),
     /// Base parameters do not give the forces of all parameters.
     Forces {
@@ -87,30 +81,18 @@ impl fmt::Display for SelfTestError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Geometry(special) => special.fmt(f),
-            Self::TooFewStates {
-                found,
-                needed,
-                last,
-            } => write!(
+            Self::TooFewStates { found, needed, last } => write!(
                 f,
-                "only {found} of {needed} random states around the nominal pose have an answer; the last one had none \
-                 because {last}"
+                "the model can be evaluated at only {found} of {needed} random states around the nominal pose; the \
+                 last failure was: {last}"
             ),
-            Self::Rank {
-                of,
-                found,
-                expected,
-            } => write!(
+            Self::Rank { of, found, expected } => write!(
                 f,
                 "{of} has rank {found} at random states, but the model has {expected} base parameters"
             ),
-            Self::Forces {
-                of,
-                expected,
-                found,
-            } => write!(
+            Self::Forces { of, expected, found } => write!(
                 f,
-                "{of} is {found} where all parameters together give {expected}"
+                "{of} gives a force of {found}, but all parameters together give {expected}"
             ),
         }
     }
@@ -118,7 +100,7 @@ impl fmt::Display for SelfTestError {
 
 impl core::error::Error for SelfTestError {}
 
-/// Shows the rows of H, of H_min, and the force of the inverse dynamics at one random state.
+/// Receives a row of H, the row of H_min, and the force of the inverse dynamics at one random state.
 pub type ShowRows<'a, const N_PRODUCTS: usize, const N_BASE: usize> =
     dyn FnMut(&[f64; N_PRODUCTS], &[f64; N_BASE], f64) + 'a;
 
@@ -126,27 +108,24 @@ pub type ShowRows<'a, const N_PRODUCTS: usize, const N_BASE: usize> =
 /// dynamics.
 ///
 /// `products` and `base` are values of both for one set of parameters. `rows` draws a state, within the given share of
-/// its reach around the nominal pose, and shows the rows of it.
+/// its reach around the nominal pose, and passes on its rows.
 ///
 /// # Errors
-/// What is wrong.
+/// The first failure; see [`SelfTestError`].
 pub fn self_test<const N_PRODUCTS: usize, const N_BASE: usize>(
     products: &[f64; N_PRODUCTS],
     base: &[f64; N_BASE],
-    mut rows: impl FnMut(
-        &mut Random,
-        f64,
-        &mut ShowRows<'_, N_PRODUCTS, N_BASE>,
-    ) -> Result<(), PoseError>,
+    mut rows: impl FnMut(&mut Random, f64, &mut ShowRows<'_, N_PRODUCTS, N_BASE>) -> Result<(), PoseError>,
 ) -> Result<(), SelfTestError> {
-    /// How often the reach is halved before states are given up.
+    /// How often the range of the states is halved before the test fails.
     const HALVINGS: usize = 4;
     let needed = 2 * N_PRODUCTS + 20;
-    let mut all = Triangle::<N_PRODUCTS>::new();
-    let mut few = Triangle::<N_BASE>::new();
+    let mut all = GivensFactor::<N_PRODUCTS>::new();
+    let mut few = GivensFactor::<N_BASE>::new();
     let mut random = Random::new(1);
     let (mut found, mut reach, mut last) = (0, 1.0, PoseError::OutOfReach);
     let mut worst: Option<SelfTestError> = None;
+    // States are drawn from a smaller and smaller range until enough of them can be evaluated.
     for _ in 0..=HALVINGS {
         for _ in 0..needed {
             if found == needed {
@@ -155,18 +134,14 @@ pub fn self_test<const N_PRODUCTS: usize, const N_BASE: usize>(
             let shown = rows(&mut random, reach, &mut |h, h_min, force| {
                 all.add(*h);
                 few.add(*h_min);
-                let (expected, size) = sum(h, products);
-                let (reduced, reduced_size) = sum(h_min, base);
-                let limit = NOTHING * (size + reduced_size);
+                let (expected, size) = product_and_magnitude(h, products);
+                let (reduced, reduced_size) = product_and_magnitude(h_min, base);
+                let limit = ZERO_SHARE * (size + reduced_size);
                 for (of, found) in [("H_min p_min", reduced), ("the inverse dynamics", force)] {
-                    // What is no number is wrong too.
+                    // Written so that NaN fails as well.
                     let holds = Real::abs(found - expected) <= limit;
                     if worst.is_none() && !holds {
-                        worst = Some(SelfTestError::Forces {
-                            of,
-                            expected,
-                            found,
-                        });
+                        worst = Some(SelfTestError::Forces { of, expected, found });
                     }
                 }
             });
@@ -178,12 +153,9 @@ pub fn self_test<const N_PRODUCTS: usize, const N_BASE: usize>(
         reach *= 0.5;
     }
     if found < needed {
-        return Err(SelfTestError::TooFewStates {
-            found,
-            needed,
-            last,
-        });
+        return Err(SelfTestError::TooFewStates { found, needed, last });
     }
+    // Both regressors must have as many independent columns as there are base parameters.
     for (of, found) in [("H_min", few.rank()), ("H", all.rank())] {
         if found != N_BASE {
             return Err(SelfTestError::Rank {
@@ -197,21 +169,20 @@ pub fn self_test<const N_PRODUCTS: usize, const N_BASE: usize>(
 }
 
 /// A row times a column, and the sum of the magnitudes of its terms.
-fn sum<const N: usize>(row: &[f64; N], column: &[f64; N]) -> (f64, f64) {
+fn product_and_magnitude<const N: usize>(row: &[f64; N], column: &[f64; N]) -> (f64, f64) {
     let terms = row.iter().zip(column).map(|(a, b)| a * b);
-    terms.fold((0.0, 0.0), |(sum, size), term| {
-        (sum + term, size + Real::abs(term))
-    })
+    terms.fold((0.0, 0.0), |(sum, size), term| (sum + term, size + Real::abs(term)))
 }
 
-/// The triangle of a QR factorisation that takes row after row by rotations (Givens 1958).
-struct Triangle<const N: usize>([[f64; N]; N]);
+/// The R factor of a QR factorisation that takes row after row by rotations (Givens 1958).
+struct GivensFactor<const N: usize>([[f64; N]; N]);
 
-impl<const N: usize> Triangle<N> {
+impl<const N: usize> GivensFactor<N> {
     fn new() -> Self {
         Self([[0.0; N]; N])
     }
 
+    /// Adds a row by rotations that set its entries to zero one after the other.
     fn add(&mut self, mut row: [f64; N]) {
         for (k, own) in self.0.iter_mut().enumerate() {
             let (Some(a), Some(b)) = (own.get(k).copied(), row.get(k).copied()) else {
@@ -232,7 +203,7 @@ impl<const N: usize> Triangle<N> {
     fn rank(mut self) -> usize {
         const SWEEPS: usize = 30;
         const ROUNDING: f64 = 1e-15;
-        // Columns as rows, so that two of them can be turned into each other.
+        // Columns are stored as rows, so that two of them can be rotated at once.
         let mut columns = [[0.0; N]; N];
         for (i, row) in self.0.iter_mut().enumerate() {
             for (column, x) in columns.iter_mut().zip(row) {
@@ -249,6 +220,7 @@ impl<const N: usize> Triangle<N> {
                 }
             }
         }
+        // Pairs of columns are rotated until all of them are orthogonal; their lengths are then the singular values.
         for _ in 0..SWEEPS {
             let mut turned = false;
             for q in 1..N {
@@ -257,8 +229,7 @@ impl<const N: usize> Triangle<N> {
                     continue;
                 };
                 for first in before {
-                    let (a, b, mixed) =
-                        (dot(first, first), dot(second, second), dot(first, second));
+                    let (a, b, mixed) = (dot(first, first), dot(second, second), dot(first, second));
                     if Real::abs(mixed) <= ROUNDING * Real::sqrt(a * b) || a * b == 0.0 {
                         continue;
                     }
@@ -278,13 +249,12 @@ impl<const N: usize> Triangle<N> {
             }
         }
         let sizes = columns.map(|column| Real::sqrt(dot(&column, &column)));
-        let largest = sizes
-            .iter()
-            .fold(0.0, |m: f64, x| if *x > m { *x } else { m });
-        sizes.iter().filter(|x| **x > NOTHING * largest).count()
+        let largest = sizes.iter().fold(0.0, |m: f64, x| if *x > m { *x } else { m });
+        sizes.iter().filter(|x| **x > ZERO_SHARE * largest).count()
     }
 }
 
+/// Scalar product.
 fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
     a.iter().zip(b).fold(0.0, |sum, (x, y)| sum + x * y)
 }

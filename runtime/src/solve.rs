@@ -2,15 +2,13 @@
 
 use crate::{PoseError, Real};
 
-/// Solves `matrix * x = rhs` by Gaussian elimination with partial pivoting; `rhs` becomes `x`, the matrix is used up.
+/// Solves `matrix * x = rhs` by Gaussian elimination with partial pivoting; `rhs` becomes `x`, the matrix is
+/// overwritten.
 ///
 /// # Errors
-/// [`PoseError::Singular`] if a pivot is zero or no number.
-pub fn solve<T: Real, Row: AsRef<[T]> + AsMut<[T]>>(
-    matrix: &mut [Row],
-    rhs: &mut [T],
-) -> Result<(), PoseError> {
-    // Nothing is indexed, so that nothing can panic: what is not there is read as zero, and a pivot of zero is an error.
+/// [`PoseError::Singular`] if a pivot is zero or NaN.
+pub fn solve<T: Real, Row: AsRef<[T]> + AsMut<[T]>>(matrix: &mut [Row], rhs: &mut [T]) -> Result<(), PoseError> {
+    // Nothing is indexed, so that nothing can panic: a missing entry is read as zero, and a pivot of zero is an error.
     let zero = T::from_f64(0.0);
     let entry = |row: &Row, column: usize| row.as_ref().get(column).copied().unwrap_or(zero);
     let n = rhs.len();
@@ -18,7 +16,7 @@ pub fn solve<T: Real, Row: AsRef<[T]> + AsMut<[T]>>(
         let mut pivot = (column, zero);
         for (row, values) in matrix.iter().enumerate().take(n).skip(column) {
             let size = entry(values, column).abs();
-            // What is no number fails this comparison.
+            // NaN fails this comparison.
             if size > pivot.1 {
                 pivot = (row, size);
             }
@@ -83,11 +81,7 @@ mod tests {
     #[test]
     fn a_system_that_needs_pivoting_is_solved() {
         let mut x = [7.0, 3.0, 0.0];
-        solve(
-            &mut [[0.0, 2.0, 1.0], [1.0, 1.0, 0.0], [3.0, 0.0, -1.0]],
-            &mut x,
-        )
-        .unwrap();
+        solve(&mut [[0.0, 2.0, 1.0], [1.0, 1.0, 0.0], [3.0, 0.0, -1.0]], &mut x).unwrap();
         for (found, expected) in x.iter().zip([1.0, 2.0, 3.0]) {
             assert!((found - expected).abs() < 1e-12_f64);
         }
@@ -97,9 +91,6 @@ mod tests {
     fn a_singular_system_is_an_error() {
         let dependent = solve(&mut [[1.0, 2.0], [2.0, 4.0]], &mut [1.0, 1.0_f64]);
         assert_eq!(dependent, Err(PoseError::Singular));
-        assert_eq!(
-            solve(&mut [[f64::NAN]], &mut [1.0]),
-            Err(PoseError::Singular)
-        );
+        assert_eq!(solve(&mut [[f64::NAN]], &mut [1.0]), Err(PoseError::Singular));
     }
 }

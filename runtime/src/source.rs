@@ -1,7 +1,7 @@
-//! This crate's own source, for crates that are handed on in a folder of their own.
+//! This crate's own source, for crates that are passed on in a folder of their own.
 
-/// Place in the crate's folder and text of every file.
-pub const FILES: [(&str, &str); 24] = [
+/// Path inside the crate's folder and text of every file.
+pub const FILES: [(&str, &str); 25] = [
     ("Cargo.toml", MANIFEST),
     ("src/arithmetic.rs", include_str!("arithmetic.rs")),
     ("src/blocks.rs", include_str!("blocks.rs")),
@@ -20,15 +20,19 @@ pub const FILES: [(&str, &str); 24] = [
     ("src/model.rs", include_str!("model.rs")),
     ("src/numbers.rs", include_str!("numbers.rs")),
     ("src/parallel.rs", include_str!("parallel.rs")),
+    ("src/random.rs", include_str!("random.rs")),
     ("src/reactions.rs", include_str!("reactions.rs")),
     ("src/real.rs", include_str!("real.rs")),
     ("src/self_test.rs", include_str!("self_test.rs")),
     ("src/solve.rs", include_str!("solve.rs")),
-    ("src/source.rs", "//! Stays with the project.\n"),
+    (
+        "src/source.rs",
+        "//! Empty in this copy: the project keeps the texts of the sources here.\n",
+    ),
     ("src/wide.rs", include_str!("wide.rs")),
 ];
 
-/// The manifest outside of the project's workspace.
+/// The manifest for use outside of the project's workspace.
 const MANIFEST: &str = r#"[package]
 name = "modelmill-runtime"
 description = "What emitted models need at run time"

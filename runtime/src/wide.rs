@@ -1,8 +1,8 @@
-//! Programs in the widest vectors of the machine, by way of `pulp`, which asks the machine at run time and keeps the
-//! instructions behind a safe face: 512 bits with AVX-512, 256 with AVX2, 128 with NEON, else one number at a time.
+//! Programs in the widest vectors of the machine. The crate `pulp` detects the machine at run time and wraps its
+//! instructions in a safe interface: 512 bits with AVX-512, 256 with AVX2, 128 with NEON, else one number at a time.
 //!
-//! Products are fused with the sums that they go into where the machine has an instruction for that, so that results agree
-//! with those of one state, and between machines, to rounding.
+//! Products are fused with the sums that they go into where the machine has an instruction for that, so that results
+//! agree with those of one state, and between machines, to rounding.
 //!
 //! Decision: `pulp` and not arrays. The compiler leaves a loop over an array of eight in memory; values of `pulp`
 //! are registers from the start. Products are fused in vectors only: that saves a third of the instructions where
@@ -19,15 +19,16 @@ use std::sync::OnceLock;
 
 use pulp::{Arch, Simd, WithSimd};
 
-use crate::arithmetic::{Term, Value, Var};
-use crate::blocks::{BlockError, Blocks, Job, Line, Line32, Line64, Program, Vectors};
+use crate::arithmetic::{ProgramValue, Term, Var};
+use crate::blocks::{BlockError, BlockScalar, CacheLine, Line32, Line64, StateProgram, VectorJob, VectorWidth};
 use crate::lanes::{self, LARGEST_ANGLE, reduced_sin_cos};
-use crate::numbers::Angles;
-use crate::{Numbers, Outputs, PoseError, Real};
+use crate::numbers::AngleBatch;
+use crate::{Numbers, OutputSink, PoseError, Real};
 
-/// The widest vectors of the machine, or narrower ones if the environment variable `MODELMILL_VECTORS` asks for `256` bits
-/// or `none`, so that the figures of another machine can be seen on this one.
-fn vectors() -> Arch {
+/// The widest vectors of the machine. The environment variable `MODELMILL_VECTORS` reduces them to `256` bits or
+/// `none`, so that the timings of a smaller machine can be measured on this one.
+fn widest_vectors() -> Arch {
+    /// Selected at the first call.
     static CHOSEN: OnceLock<Arch> = OnceLock::new();
     *CHOSEN.get_or_init(|| match std::env::var("MODELMILL_VECTORS").as_deref() {
         Ok("none") => Arch::Scalar,
@@ -37,9 +38,11 @@ fn vectors() -> Arch {
     })
 }
 
-/// A job inside the vectors that `pulp` chose.
-struct Chosen<J, T>(J, core::marker::PhantomData<T>);
+/// Passes a job on to the vectors that `pulp` selected.
+struct DispatchedJob<J, T>(J, core::marker::PhantomData<T>);
 
+// Defines vectors, their arithmetic and the run over a line for one scalar type. Arguments: the scalar, the line, names
+// of the types to define, then the names that `pulp` gives to types and instructions for this scalar.
 macro_rules! wide {
     (
         $float:ty, $line:ident, $value:ident, $numbers:ident, $put:ident, $vectors:ident,
@@ -47,13 +50,16 @@ macro_rules! wide {
         $fused:ident, $fused_less:ident, $sqrt:ident, $abs:ident, $less:ident, $greater:ident, $at_least:ident, $and:ident, $not:ident, $first:ident,
         $select:ident, $max:ident, $of_slice:ident, $of_slice_mut:ident
     ) => {
-        /// As many numbers as a vector holds.
+        /// One vector register of numbers.
         #[derive(Clone, Copy)]
         struct $value<S: Simd> {
+            /// Token that proves that the instructions exist.
             simd: S,
+            /// The register.
             v: S::$floats,
         }
 
+        // Plain operators; products that are fused with sums are below.
         wide!(operator $value, Add, add, $add);
         wide!(operator $value, Sub, sub, $sub);
         wide!(operator $value, Mul, mul, $mul);
@@ -72,11 +78,14 @@ macro_rules! wide {
 
         /// Arithmetic of a vector, and which of its lanes are regular.
         struct $numbers<S: Simd> {
+            /// Token that proves that the instructions exist.
             simd: S,
+            /// Mask with true for each lane without an exception so far.
             regular: Cell<S::$mask>,
         }
 
         impl<S: Simd> $numbers<S> {
+            /// All lanes are regular at first: `pulp` has no constant mask, so 0 < 1 makes one.
             #[inline(always)]
             fn new(simd: S) -> Self {
                 let (zero, one) = (simd.$splat(0.0), simd.$splat(1.0));
@@ -86,32 +95,37 @@ macro_rules! wide {
                 }
             }
 
+            /// A vector as a value of the program.
             #[inline(always)]
             fn value(&self, v: S::$floats) -> $value<S> {
                 $value { simd: self.simd, v }
             }
 
+            /// Marks lanes as irregular where the mask is false.
             #[inline(always)]
-            fn hold(&self, mask: S::$mask) {
+            fn mask_lanes(&self, mask: S::$mask) {
                 self.regular.set(self.simd.$and(self.regular.get(), mask));
             }
 
+            /// Whether no lane is irregular.
             #[inline(always)]
-            fn all_regular(&self) -> bool {
+            fn is_all_regular(&self) -> bool {
                 let irregular = self.simd.$not(self.regular.get());
                 self.simd.$first(irregular) >= S::$lanes
             }
         }
 
         impl<S: Simd> $value<S> {
+            /// Another vector with the same token.
             #[inline(always)]
-            fn with(self, v: S::$floats) -> Self {
+            fn with_vector(self, v: S::$floats) -> Self {
                 Self { simd: self.simd, v }
             }
 
             /// A function that has no vector form, lane by lane.
             #[inline(always)]
-            fn each(self, f: impl Fn($float) -> $float) -> Self {
+            fn map_lanes(self, f: impl Fn($float) -> $float) -> Self {
+                // Lanes go through an array; lanes that the vector does not have stay zero.
                 let mut line = [0.0; $line::LENGTH];
                 if let Some(to) = S::$of_slice_mut(&mut line).0.first_mut() {
                     *to = self.v;
@@ -120,58 +134,60 @@ macro_rules! wide {
                     *x = f(*x);
                 }
                 let first = S::$of_slice(&line).0.first();
-                first.map_or(self, |v| self.with(*v))
+                first.map_or(self, |v| self.with_vector(*v))
             }
         }
 
-        impl<S: Simd> Value for $value<S> {
+        impl<S: Simd> ProgramValue for $value<S> {
             #[inline(always)]
-            fn like(self, x: f64) -> Self {
-                self.with(self.simd.$splat(<$float as Real>::from_f64(x)))
+            fn number_like(self, x: f64) -> Self {
+                self.with_vector(self.simd.$splat(<$float as Real>::from_f64(x)))
             }
             #[inline(always)]
             fn plus_product(self, a: Self, b: Self) -> Self {
-                self.with(self.simd.$fused(a.v, b.v, self.v))
+                self.with_vector(self.simd.$fused(a.v, b.v, self.v))
             }
             #[inline(always)]
             fn product_less(self, a: Self, b: Self) -> Self {
-                self.with(self.simd.$fused(a.v, b.v, self.simd.$neg(self.v)))
+                self.with_vector(self.simd.$fused(a.v, b.v, self.simd.$neg(self.v)))
             }
             #[inline(always)]
             fn less_product(self, a: Self, b: Self) -> Self {
-                self.with(self.simd.$fused_less(a.v, b.v, self.v))
+                self.with_vector(self.simd.$fused_less(a.v, b.v, self.v))
             }
             #[inline(always)]
             fn sqrt(self) -> Self {
-                self.with(self.simd.$sqrt(self.v))
+                self.with_vector(self.simd.$sqrt(self.v))
             }
             #[inline(always)]
             fn abs(self) -> Self {
-                self.with(self.simd.$abs(self.v))
+                self.with_vector(self.simd.$abs(self.v))
             }
             #[inline(always)]
             fn sign(self) -> Self {
                 let simd = self.simd;
                 let (zero, one) = (simd.$splat(0.0), simd.$splat(1.0));
+                // The first selection returns NaN and 0 unchanged.
                 let below = simd.$select(simd.$less(self.v, zero), simd.$splat(-1.0), self.v);
-                self.with(simd.$select(simd.$greater(self.v, zero), one, below))
+                self.with_vector(simd.$select(simd.$greater(self.v, zero), one, below))
             }
             #[inline(always)]
             fn tanh(self) -> Self {
-                self.each(Real::tanh)
+                self.map_lanes(Real::tanh)
             }
             #[inline(always)]
             fn exp(self) -> Self {
-                self.each(Real::exp)
+                self.map_lanes(Real::exp)
             }
             #[inline(always)]
             fn atan2(self, x: Self) -> Self {
+                // The other argument is read from an array, lane after lane.
                 let mut line = [0.0; $line::LENGTH];
                 if let Some(to) = S::$of_slice_mut(&mut line).0.first_mut() {
                     *to = x.v;
                 }
                 let at = Cell::new(0);
-                self.each(|y| {
+                self.map_lanes(|y| {
                     let k = at.replace(at.get() + 1);
                     Real::atan2(y, line.get(k).copied().unwrap_or_default())
                 })
@@ -183,32 +199,33 @@ macro_rules! wide {
             type Value = $value<S>;
 
             #[inline(always)]
-            fn of(&self, x: $float) -> Var<$value<S>> {
+            fn broadcast(&self, x: $float) -> Var<$value<S>> {
                 Var(self.value(self.simd.$splat(x)))
             }
             #[inline(always)]
             fn sin_cos(&self, angle: impl Term<$value<S>>) -> (Var<$value<S>>, Var<$value<S>>) {
                 let angle = angle.get();
                 let (simd, largest) = (self.simd, <$float as Real>::from_f64(LARGEST_ANGLE));
-                self.hold(simd.$less(simd.$abs(angle.v), simd.$splat(largest)));
+                // Larger angles need another reduction than the kernel has, so their states are evaluated one by one.
+                self.mask_lanes(simd.$less(simd.$abs(angle.v), simd.$splat(largest)));
                 let (sin, cos) = angle.sin_cos();
                 (Var(sin), Var(cos))
             }
             #[inline(always)]
-            fn angles<const N: usize>(&self, angles: [Var<$value<S>>; N]) -> Angles<$value<S>, N> {
+            fn angles<const N: usize>(&self, angles: [Var<$value<S>>; N]) -> AngleBatch<$value<S>, N> {
                 let (simd, largest) = (self.simd, <$float as Real>::from_f64(LARGEST_ANGLE));
-                // What is no number may be lost in the larger of two; inputs are looked at before.
+                // The maximum of two may drop NaN; inputs are therefore checked before.
                 let mut size = simd.$splat(0.0);
                 for angle in angles {
                     size = simd.$max(size, simd.$abs(angle.0.v));
                 }
-                self.hold(simd.$less(size, simd.$splat(largest)));
-                Angles { sines: angles, cosines: angles }
+                self.mask_lanes(simd.$less(size, simd.$splat(largest)));
+                AngleBatch { sines: angles, cosines: angles }
             }
             #[inline(always)]
             fn sin_cos_of<const N: usize>(
                 &self,
-                angles: &Angles<$value<S>, N>,
+                angles: &AngleBatch<$value<S>, N>,
                 k: usize,
             ) -> (Var<$value<S>>, Var<$value<S>>) {
                 let (sin, cos) = angles.sines[k].0.sin_cos();
@@ -216,32 +233,35 @@ macro_rules! wide {
             }
             #[inline(always)]
             fn reachable(&self, x: impl Term<$value<S>>) -> Result<(), PoseError> {
-                self.hold(self.simd.$at_least(x.get().v, self.simd.$splat(0.0)));
+                self.mask_lanes(self.simd.$at_least(x.get().v, self.simd.$splat(0.0)));
                 Ok(())
             }
             #[inline(always)]
             fn regular(&self, x: impl Term<$value<S>>, size: impl Term<$value<S>>) -> Result<(), PoseError> {
                 let share = self.simd.$splat(<$float as Real>::singular());
                 let limit = self.simd.$mul(share, size.get().v);
-                self.hold(self.simd.$greater(self.simd.$abs(x.get().v), limit));
+                self.mask_lanes(self.simd.$greater(self.simd.$abs(x.get().v), limit));
                 Ok(())
             }
             #[inline(always)]
             fn finite(&self, x: impl Term<$value<S>>) -> Result<(), PoseError> {
                 let infinite = self.simd.$splat(<$float>::INFINITY);
-                self.hold(self.simd.$less(self.simd.$abs(x.get().v), infinite));
+                self.mask_lanes(self.simd.$less(self.simd.$abs(x.get().v), infinite));
                 Ok(())
             }
         }
 
         /// Writes one vector of each line.
         struct $put<'a, S, const OUTPUTS: usize> {
+            /// Lines of all outputs.
             lines: &'a mut [$line; OUTPUTS],
+            /// Index of the vector in a line.
             part: usize,
+            /// Token that proves that the instructions exist.
             simd: S,
         }
 
-        impl<S: Simd, const OUTPUTS: usize> Outputs<$value<S>> for $put<'_, S, OUTPUTS> {
+        impl<S: Simd, const OUTPUTS: usize> OutputSink<$value<S>> for $put<'_, S, OUTPUTS> {
             #[inline(always)]
             fn put(&mut self, k: usize, value: impl Term<$value<S>>) {
                 let _ = self.simd;
@@ -251,12 +271,13 @@ macro_rules! wide {
             }
         }
 
+        /// Vectors of the width of the token `S`.
         #[derive(Clone, Copy)]
         struct $vectors<S>(S);
 
-        impl<S: Simd> Vectors<$float> for $vectors<S> {
+        impl<S: Simd> VectorWidth<$float> for $vectors<S> {
             #[inline(always)]
-            fn line<P, const INPUTS: usize, const OUTPUTS: usize>(
+            fn run_line<P, const INPUTS: usize, const OUTPUTS: usize>(
                 self,
                 program: &P,
                 inputs: &[&[$float]; INPUTS],
@@ -264,10 +285,11 @@ macro_rules! wide {
                 outputs: &mut [$line; OUTPUTS],
             ) -> bool
             where
-                P: Program<$float, INPUTS, OUTPUTS>,
+                P: StateProgram<$float, INPUTS, OUTPUTS>,
             {
                 let simd = self.0;
                 let mut regular = true;
+                // A line consists of one or several vectors, each of which runs the program once.
                 for part in 0..$line::LENGTH / S::$lanes {
                     let numbers = $numbers::new(simd);
                     let zero = simd.$splat(0.0);
@@ -283,28 +305,29 @@ macro_rules! wide {
                             sum = simd.$add(sum, simd.$abs(*v));
                         }
                     }
-                    numbers.hold(simd.$less(sum, simd.$splat(<$float as Real>::largest())));
+                    // Inputs that are NaN or too large make their lanes irregular.
+                    numbers.mask_lanes(simd.$less(sum, simd.$splat(<$float as Real>::largest())));
                     let lines = &mut *outputs;
                     let mut put = $put { lines, part, simd };
                     regular &= program.run(&numbers, values, &mut put).is_ok();
-                    regular &= numbers.all_regular();
+                    regular &= numbers.is_all_regular();
                 }
                 regular
             }
         }
 
-        impl<J: Job<$float>> WithSimd for Chosen<J, $float> {
+        impl<J: VectorJob<$float>> WithSimd for DispatchedJob<J, $float> {
             type Output = Result<(), BlockError>;
             #[inline(always)]
             fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
-                self.0.with($vectors(simd))
+                self.0.run_vectors($vectors(simd))
             }
         }
 
-        impl Blocks for $float {
+        impl BlockScalar for $float {
             type Line = $line;
-            fn run<J: Job<Self>>(job: J) -> Result<(), BlockError> {
-                vectors().dispatch(Chosen(job, core::marker::PhantomData))
+            fn run_job<J: VectorJob<Self>>(job: J) -> Result<(), BlockError> {
+                widest_vectors().dispatch(DispatchedJob(job, core::marker::PhantomData))
             }
         }
     };
@@ -386,21 +409,22 @@ wide!(
 );
 
 impl<S: Simd> Wide64<S> {
+    /// Sine and cosine of angles in rad below [`LARGEST_ANGLE`].
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
         reduced_sin_cos(self)
     }
 
-    /// The other one where the mask is set.
+    /// The other value where the mask is set.
     #[inline(always)]
-    fn like_or(self, mask: S::m64s, other: Self) -> Self {
+    fn select_lanes(self, mask: S::m64s, other: Self) -> Self {
         Self {
             simd: self.simd,
             v: self.simd.select_f64s(mask, other.v, self.v),
         }
     }
 
-    /// Turned around in the third and fourth quarter.
+    /// Sign changed in the third and fourth quadrant.
     #[inline(always)]
     fn with_sign(self, quarter: S::u64s) -> Self {
         let (simd, two) = (self.simd, self.simd.splat_u64s(2));
@@ -413,17 +437,18 @@ impl<S: Simd> Wide64<S> {
     }
 }
 
-impl<S: Simd> lanes::Angle for Wide64<S> {
+impl<S: Simd> lanes::LaneAngle for Wide64<S> {
     #[inline(always)]
-    fn turned(shifted: Self, sin: Self, cos: Self) -> (Self, Self) {
+    fn rotate_by_quarters(shifted: Self, sin: Self, cos: Self) -> (Self, Self) {
+        // In odd quarters sine and cosine change places; the signs depend on the quarter, one later for the cosine.
         let simd = shifted.simd;
         let one = simd.splat_u64s(1);
         let quarter = simd.transmute_u64s_f64s(shifted.v);
         let odd = simd.equal_u64s(simd.and_u64s(quarter, one), one);
         let next = simd.add_u64s(quarter, one);
         (
-            sin.like_or(odd, cos).with_sign(quarter),
-            cos.like_or(odd, sin).with_sign(next),
+            sin.select_lanes(odd, cos).with_sign(quarter),
+            cos.select_lanes(odd, sin).with_sign(next),
         )
     }
 }
@@ -439,6 +464,7 @@ impl<S: Simd> Wide32<S> {
         if let Some(to) = S::as_mut_simd_f32s(&mut line).0.first_mut() {
             *to = self.v;
         }
+        // One loop per step, so that each can be vectorised.
         for k in 0..S::F32_LANES.min(Line32::LENGTH) {
             angle[k] = f64::from(line[k]);
         }
@@ -450,10 +476,7 @@ impl<S: Simd> Wide32<S> {
         }
         let read = |line: &[f32; Line32::LENGTH]| {
             let first = S::as_simd_f32s(line).0.first();
-            first.map_or(self, |v| Self {
-                simd: self.simd,
-                v: *v,
-            })
+            first.map_or(self, |v| Self { simd: self.simd, v: *v })
         };
         (read(&sin32), read(&cos32))
     }

@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::PathBuf;
 
-use modelmill_boundary::files::Memory;
+use modelmill_boundary::files::MemoryFiles;
 use modelmill_tests::fixtures::model_file;
 use modelmill_tests::stream::Stream;
 
@@ -37,18 +37,14 @@ fn main() {
     let humanoid = fs::read_to_string(model_file("humanoid")).expect("the bundled humanoid");
     for (name, text) in [
         ("chain", tree("chain", seed, &|k| k.checked_sub(1))),
-        (
-            "tree",
-            tree("tree", seed, &|k| k.checked_sub(1).map(|k| k / 2)),
-        ),
+        ("tree", tree("tree", seed, &|k| k.checked_sub(1).map(|k| k / 2))),
         ("humanoid", humanoid),
     ] {
         let start = processor_seconds();
-        let loaded = modelmill_spec::load(name, &text, &Memory::default())
+        let loaded = modelmill_spec::load(name, &text, &MemoryFiles::default())
             .unwrap_or_else(|failure| panic!("{}", failure.render(false)));
-        let derivation = modelmill_codegen::derive(&loaded.mechanism)
-            .unwrap_or_else(|error| panic!("{name}: {error}"));
-        let module = modelmill_codegen::emit(&derivation).module();
+        let derivation = modelmill_codegen::derive(&loaded.mechanism).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let module = modelmill_emit::emit(&derivation).module();
         let seconds = processor_seconds() - start;
         println!(
             "{name:<10} {JOINTS:>7} {:>6} {seconds:>14.2} {:>10.0}",
@@ -70,16 +66,9 @@ fn tree(name: &str, seed: u64, parent: &dyn Fn(usize) -> Option<usize>) -> Strin
     let (mut constants, mut coordinates) = (String::new(), String::new());
     let (mut frames, mut parts) = (String::new(), String::new());
     for k in 0..JOINTS {
-        for (constant, unit, low, high) in [
-            ("a", "m", 0.1, 0.4),
-            ("alpha", "rad", 0.3, 1.2),
-            ("d", "m", 0.1, 0.4),
-        ] {
+        for (constant, unit, low, high) in [("a", "m", 0.1, 0.4), ("alpha", "rad", 0.3, 1.2), ("d", "m", 0.1, 0.4)] {
             let value = stream.either_side(low, high);
-            let _ = writeln!(
-                constants,
-                "{constant}{k} = {{ value = {value:.4}, unit = \"{unit}\" }}"
-            );
+            let _ = writeln!(constants, "{constant}{k} = {{ value = {value:.4}, unit = \"{unit}\" }}");
         }
         let nominal = stream.between(-1.0, 1.0);
         let _ = writeln!(coordinates, "q{k} = {{ nominal = {nominal:.3} }}");

@@ -13,7 +13,7 @@ use std::process::Command;
 use std::time::Instant;
 
 use modelmill_codegen::expr::{Atom, Unary};
-use modelmill_codegen::{Derivation, Evaluator, Op, PoseFault, Program};
+use modelmill_codegen::{Derivation, ModelEvaluator, PoseFault, ProgramOp, StraightLineProgram};
 use modelmill_identify::{LeastSquares, LeastSquaresError};
 use modelmill_tests::base_parameters;
 use modelmill_tests::fixtures::{derived, fixtures};
@@ -34,11 +34,8 @@ fn main() {
 fn run(name: &str, samples: usize, reach: f64) {
     let derivation = derived(name);
     let sample = Sample::random(&derivation.mechanism, samples, reach, &mut Stream::new(7));
-    let base = base_parameters::base(
-        &derivation,
-        &base_parameters::nominal(&derivation.mechanism),
-    );
-    let evaluator = Evaluator::new(&derivation);
+    let base = base_parameters::base(&derivation, &base_parameters::nominal(&derivation.mechanism));
+    let evaluator = ModelEvaluator::new(&derivation);
     let mut noise = Stream::new(8);
     let mut measured = evaluator
         .inverse_dynamics(&sample.states(), &base)
@@ -64,10 +61,7 @@ fn run(name: &str, samples: usize, reach: f64) {
         "{name:<14} {samples:>9} {:>15.2} Msample/s {:>15.2} Msample/s {memory:>10.1} MiB {:>10} {:>8}",
         rate(best),
         rate(best_wall),
-        numpy.map_or("absent".to_owned(), |seconds| format!(
-            "{:.3}",
-            rate(seconds)
-        )),
+        numpy.map_or("absent".to_owned(), |seconds| format!("{:.3}", rate(seconds))),
         numpy.map_or(String::new(), |seconds| format!("{:.1}", seconds / best)),
     );
 }
@@ -95,7 +89,7 @@ fn identify(derivation: &Derivation, sample: &Sample, measured: &[Vec<f64>]) -> 
     let (n, drives) = (derivation.reduction.retained.len(), measured.len());
     let mut regression = LeastSquares::with_channels(n, drives);
     let mut start = 0;
-    Evaluator::new(derivation)
+    ModelEvaluator::new(derivation)
         .regressor_blocks::<Fault>(&sample.states(), |len, columns| {
             for (drive, measured) in measured.iter().enumerate() {
                 let columns = &columns[drive * n..(drive + 1) * n];
@@ -119,9 +113,7 @@ fn processor_seconds() -> f64 {
 fn status(line: &str) -> f64 {
     let text = fs::read_to_string("/proc/self/status").expect("Linux");
     let found = text.lines().find_map(|l| l.strip_prefix(line));
-    let kib = found
-        .and_then(|l| l.split_whitespace().next())
-        .expect("a size");
+    let kib = found.and_then(|l| l.split_whitespace().next()).expect("a size");
     kib.parse::<f64>().expect("a number") / 1024.0
 }
 
@@ -132,22 +124,12 @@ fn reset_peak() -> f64 {
 }
 
 /// Seconds that numpy takes, its answer held against ours; nothing without numpy.
-fn numpy(
-    name: &str,
-    derivation: &Derivation,
-    sample: &Sample,
-    measured: &[Vec<f64>],
-    values: &[f64],
-) -> Option<f64> {
+fn numpy(name: &str, derivation: &Derivation, sample: &Sample, measured: &[Vec<f64>], values: &[f64]) -> Option<f64> {
     let python = std::env::var("MODELMILL_PYTHON").unwrap_or_else(|_| "python3".to_owned());
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("estimation-{name}"));
     fs::create_dir_all(&folder).expect("the target folder can be written");
     let write = |file: &str, columns: &[Vec<f64>]| {
-        let bytes: Vec<u8> = columns
-            .iter()
-            .flatten()
-            .flat_map(|x| x.to_le_bytes())
-            .collect();
+        let bytes: Vec<u8> = columns.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
         fs::write(folder.join(file), bytes).expect("the target folder can be written");
     };
     write("q", &sample.q);
@@ -164,10 +146,7 @@ fn numpy(
         .output()
         .ok()?;
     if !output.status.success() {
-        eprintln!(
-            "{python}: {}",
-            String::from_utf8_lossy(&output.stderr).trim()
-        );
+        eprintln!("{python}: {}", String::from_utf8_lossy(&output.stderr).trim());
         return None;
     }
     let text = String::from_utf8_lossy(&output.stdout);
@@ -186,7 +165,7 @@ fn numpy(
 
 /// The regressor's straight-line program as a numpy function of blocks of states.
 fn source(derivation: &Derivation) -> String {
-    let program: &Program = &derivation.programs.regressor;
+    let program: &StraightLineProgram = &derivation.programs.regressor;
     let mechanism = &derivation.mechanism;
     let active: Vec<usize> = (0..mechanism.coordinates.len())
         .filter(|i| !mechanism.coordinates[*i].passive)
@@ -196,32 +175,30 @@ fn source(derivation: &Derivation) -> String {
     for (i, op) in program.ops.iter().enumerate() {
         let v = |id: &modelmill_codegen::ValueId| format!("v{}", id.index());
         let value = match op {
-            Op::Number(number) => format!("{:?}", number.to_f64()),
-            Op::Input(Atom::Coordinate(c)) => format!("q[{}]", place(*c)),
-            Op::Input(Atom::Rate(c)) => format!("qd[{}]", place(*c)),
-            Op::Input(Atom::Acceleration(c)) => format!("qdd[{}]", place(*c)),
-            Op::Input(Atom::Constant(c)) => format!("{:?}", mechanism.constants[*c].value),
-            Op::Input(Atom::Pi) => "np.pi".to_owned(),
-            Op::Input(other) => unreachable!("no input of these models: {other:?}"),
-            Op::Add(a, b) => format!("{} + {}", v(a), v(b)),
-            Op::Sub(a, b) => format!("{} - {}", v(a), v(b)),
-            Op::Mul(a, b) => format!("{} * {}", v(a), v(b)),
-            Op::Div(a, b) => format!("{} / {}", v(a), v(b)),
-            Op::Atan2(a, b) => format!("np.arctan2({}, {})", v(a), v(b)),
-            Op::Neg(a) => format!("-{}", v(a)),
-            Op::Sin(a) => format!("np.sin({})", v(a)),
-            Op::Cos(a) => format!("np.cos({})", v(a)),
-            Op::Unary(Unary::Sqrt, a) => format!("np.sqrt({})", v(a)),
-            Op::Unary(Unary::Abs, a) => format!("np.abs({})", v(a)),
-            Op::Unary(function, _) => unreachable!("no function of these models: {function:?}"),
+            ProgramOp::Number(number) => format!("{:?}", number.to_f64()),
+            ProgramOp::Input(Atom::Coordinate(c)) => format!("q[{}]", place(*c)),
+            ProgramOp::Input(Atom::Rate(c)) => format!("qd[{}]", place(*c)),
+            ProgramOp::Input(Atom::Acceleration(c)) => format!("qdd[{}]", place(*c)),
+            ProgramOp::Input(Atom::Constant(c)) => format!("{:?}", mechanism.constants[*c].value),
+            ProgramOp::Input(Atom::Pi) => "np.pi".to_owned(),
+            ProgramOp::Input(other) => unreachable!("no input of these models: {other:?}"),
+            ProgramOp::Add(a, b) => format!("{} + {}", v(a), v(b)),
+            ProgramOp::Sub(a, b) => format!("{} - {}", v(a), v(b)),
+            ProgramOp::Mul(a, b) => format!("{} * {}", v(a), v(b)),
+            ProgramOp::Div(a, b) => format!("{} / {}", v(a), v(b)),
+            ProgramOp::Atan2(a, b) => format!("np.arctan2({}, {})", v(a), v(b)),
+            ProgramOp::Neg(a) => format!("-{}", v(a)),
+            ProgramOp::Sin(a) => format!("np.sin({})", v(a)),
+            ProgramOp::Cos(a) => format!("np.cos({})", v(a)),
+            ProgramOp::Unary(Unary::Sqrt, a) => format!("np.sqrt({})", v(a)),
+            ProgramOp::Unary(Unary::Abs, a) => format!("np.abs({})", v(a)),
+            ProgramOp::Unary(function, _) => {
+                unreachable!("no function of these models: {function:?}")
+            }
         };
         writeln!(text, "    v{i} = {value}").expect("a string");
     }
-    let outputs: Vec<String> = program
-        .outputs
-        .iter()
-        .map(|o| format!("v{}", o.index()))
-        .collect();
+    let outputs: Vec<String> = program.outputs.iter().map(|o| format!("v{}", o.index())).collect();
     writeln!(text, "    return [{}]", outputs.join(", ")).expect("a string");
     text
 }

@@ -8,7 +8,7 @@
 use std::hint::black_box;
 use std::process::{Command, ExitCode};
 
-use modelmill_codegen::{Evaluator, Program, Stage};
+use modelmill_codegen::{ModelEvaluator, ProgramStage, StraightLineProgram};
 use modelmill_tests::base_parameters;
 use modelmill_tests::fixtures::{derive, derived, model};
 use modelmill_tests::sample::Sample;
@@ -44,26 +44,17 @@ fn main() -> ExitCode {
 /// Prints the table, running this program under valgrind for every figure.
 fn report(wanted: Option<&str>) -> ExitCode {
     if Command::new("valgrind").arg("--version").output().is_err() {
-        println!(
-            "instruction counts need valgrind, which is not on this machine: nothing was measured"
-        );
+        println!("instruction counts need valgrind, which is not on this machine: nothing was measured");
         return ExitCode::SUCCESS;
     }
-    println!(
-        "instructions per call, per sample of a block, or per model generated (valgrind, callgrind)"
-    );
-    println!(
-        "additions + multiplications (divisions, roots, sine-cosine pairs) as printed with the model"
-    );
+    println!("instructions per call, per sample of a block, or per model generated (valgrind, callgrind)");
+    println!("additions + multiplications (divisions, roots, sine-cosine pairs) as printed with the model");
     println!(
         "{:<18} {:<24} {:>20} {:>15}",
         "model", "function", "operations", "instructions"
     );
     let mut empty = None;
-    for name in MODELS
-        .iter()
-        .filter(|name| wanted.is_none_or(|w| name.contains(w)))
-    {
+    for name in MODELS.iter().filter(|name| wanted.is_none_or(|w| name.contains(w))) {
         let programs = derived(name).programs;
         let near = (*name == "three_rrr").then_some(NEAR);
         for (function, calls, states) in FUNCTIONS.into_iter().chain(near) {
@@ -92,8 +83,8 @@ fn report(wanted: Option<&str>) -> ExitCode {
     ExitCode::SUCCESS
 }
 
-fn operations(program: &Program) -> String {
-    let c = program.count(Stage::State);
+fn operations(program: &StraightLineProgram) -> String {
+    let c = program.count_operations(ProgramStage::State);
     format!("{} ({}, {}, {})", c.add + c.mul, c.div, c.sqrt, c.sincos)
 }
 
@@ -128,14 +119,13 @@ fn measured_by_name(name: &str, function: &str, calls: usize) {
             let mechanism = model(name);
             repeat_calls(calls, &mut |_| {
                 let derivation = derive(black_box(&mechanism));
-                black_box(modelmill_codegen::emit(&derivation).module());
+                black_box(modelmill_emit::emit(&derivation).module());
             });
         }
         "H_min, block" | "inverse dynamics, block" => {
             let derivation = derived(name);
-            let evaluator = Evaluator::new(&derivation);
-            let sample =
-                Sample::random(&derivation.mechanism, 4 * STATES, 0.2, &mut Stream::new(5));
+            let evaluator = ModelEvaluator::new(&derivation);
+            let sample = Sample::random(&derivation.mechanism, 4 * STATES, 0.2, &mut Stream::new(5));
             let sample = sample.reachable(&evaluator).filtered(|i| i < STATES);
             assert_eq!(sample.len(), STATES);
             let states = sample.states();

@@ -6,7 +6,7 @@
 
 use std::process::ExitCode;
 
-use modelmill_codegen::{Program, Stage};
+use modelmill_codegen::{ProgramStage, StraightLineProgram};
 use modelmill_tests::counts::{best_known, text};
 use modelmill_tests::fixtures::derived;
 
@@ -24,9 +24,7 @@ const MODELS: [&str; 8] = [
 
 fn main() -> ExitCode {
     let wanted = std::env::args().skip(1).find(|a| !a.starts_with('-'));
-    let models = MODELS
-        .iter()
-        .filter(|name| wanted.as_ref().is_none_or(|w| w == *name));
+    let models = MODELS.iter().filter(|name| wanted.as_ref().is_none_or(|w| w == *name));
     let mut found = false;
     for name in models {
         found = true;
@@ -53,8 +51,8 @@ fn table(name: &str) -> Result<(), modelmill_codegen::DeriveError> {
     let [a, b] = best_known(name).map(|n| n.map_or("-".to_owned(), |n| n.to_string()));
     println!("  {a:>22}  {b:>22}  best known of other tools");
     let dynamics = derivation.dynamics()?;
-    let of = |what: &str, program: &Program| {
-        println!("  {:>22}  {what}", text(&program.count(Stage::State)));
+    let of = |what: &str, program: &StraightLineProgram| {
+        println!("  {:>22}  {what}", text(&program.count_operations(ProgramStage::State)));
     };
     of("mass matrix", &dynamics.mass_matrix);
     of("centrifugal and Coriolis forces", &dynamics.coriolis);

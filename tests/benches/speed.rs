@@ -8,7 +8,7 @@ use std::hint::black_box;
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
-use modelmill_codegen::{Derivation, Evaluator, Stage};
+use modelmill_codegen::{Derivation, ModelEvaluator, ProgramStage};
 use modelmill_tests::base_parameters;
 use modelmill_tests::fixtures::{derive, derived, model, model_file};
 use modelmill_tests::sample::Sample;
@@ -53,23 +53,20 @@ fn print_counts() {
     );
     for name in MODELS {
         let programs = derived(name).programs;
-        let text = |program: &modelmill_codegen::Program| {
-            let c = program.count(Stage::State);
+        let text = |program: &modelmill_codegen::StraightLineProgram| {
+            let c = program.count_operations(ProgramStage::State);
             let total = c.add + c.mul;
             format!("{total} ({}, {}, {})", c.div, c.sqrt, c.sincos)
         };
         let (dynamics, regressor) = (text(&programs.inverse_dynamics), text(&programs.regressor));
-        println!(
-            "{name:<18} {dynamics:>30} {regressor:>30}   {}",
-            best_known(name)
-        );
+        println!("{name:<18} {dynamics:>30} {regressor:>30}   {}", best_known(name));
     }
 }
 
 /// States near the nominal pose.
 fn states(derivation: &Derivation) -> Sample {
     let drawn = Sample::random(&derivation.mechanism, 2 * STATES, 0.25, &mut Stream::new(5));
-    let reachable = drawn.reachable(&Evaluator::new(derivation));
+    let reachable = drawn.reachable(&ModelEvaluator::new(derivation));
     let sample = reachable.filtered(|i| i < STATES);
     assert_eq!(sample.len(), STATES);
     sample
@@ -93,19 +90,17 @@ mod generation {
     #[divan::bench(args = MODELS, sample_count = 10)]
     fn from_file_to_source(name: &str) -> usize {
         let derivation = derive(&model(name));
-        black_box(modelmill_codegen::emit(&derivation).module()).len()
+        black_box(modelmill_emit::emit(&derivation).module()).len()
     }
 }
 
 mod evaluator {
-    use super::{
-        Bencher, Evaluator, ItemsCount, MODELS, STATES, base_parameters, black_box, derived, states,
-    };
+    use super::{Bencher, ItemsCount, MODELS, ModelEvaluator, STATES, base_parameters, black_box, derived, states};
 
     #[divan::bench(args = MODELS, sample_count = 20)]
     fn regressor(bencher: Bencher, name: &str) {
         let derivation = derived(name);
-        let (evaluator, sample) = (Evaluator::new(&derivation), states(&derivation));
+        let (evaluator, sample) = (ModelEvaluator::new(&derivation), states(&derivation));
         let states = sample.states();
         bencher
             .counter(ItemsCount::new(STATES))
@@ -115,11 +110,8 @@ mod evaluator {
     #[divan::bench(args = MODELS, sample_count = 20)]
     fn inverse_dynamics(bencher: Bencher, name: &str) {
         let derivation = derived(name);
-        let (evaluator, sample) = (Evaluator::new(&derivation), states(&derivation));
-        let base = base_parameters::base(
-            &derivation,
-            &base_parameters::nominal(&derivation.mechanism),
-        );
+        let (evaluator, sample) = (ModelEvaluator::new(&derivation), states(&derivation));
+        let base = base_parameters::base(&derivation, &base_parameters::nominal(&derivation.mechanism));
         let states = sample.states();
         bencher
             .counter(ItemsCount::new(STATES))

@@ -25,11 +25,7 @@ pub fn base(derivation: &Derivation, parameters: &[f64]) -> Vec<f64> {
     let products = products(derivation, parameters);
     let reduction = &derivation.reduction;
     let mut base: Vec<f64> = reduction.retained.iter().map(|k| products[*k]).collect();
-    for (line, factors) in reduction
-        .dependencies
-        .iter()
-        .zip(reduction.factors(&constants))
-    {
+    for (line, factors) in reduction.dependencies.iter().zip(reduction.factors(&constants)) {
         for (k, factor) in factors {
             base[k] += factor * products[line.product];
         }
@@ -38,11 +34,7 @@ pub fn base(derivation: &Derivation, parameters: &[f64]) -> Vec<f64> {
 }
 
 /// The factor of a product in a base parameter, both by their text; `None` if the product is not regrouped into it.
-pub fn factor<'a>(
-    derivation: &'a Derivation,
-    product: &str,
-    retained: &str,
-) -> Option<&'a RationalFunction> {
+pub fn factor<'a>(derivation: &'a Derivation, product: &str, retained: &str) -> Option<&'a RationalFunction> {
     let reduction = &derivation.reduction;
     let text = |k: usize| reduction.products[k].text(&derivation.mechanism);
     let line = reduction

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use modelmill_codegen::{Derivation, OperationCount, Program, Stage};
+use modelmill_codegen::{Derivation, OperationCount, ProgramStage, StraightLineProgram};
 
 use crate::fixtures::model_file;
 
@@ -52,7 +52,7 @@ pub fn text(count: &OperationCount) -> String {
 pub fn row(name: &str, derivation: &Derivation) -> Vec<String> {
     let (mechanism, reduction) = (&derivation.mechanism, &derivation.reduction);
     let passive = mechanism.coordinates.iter().filter(|c| c.passive).count();
-    let of = |program: &Program| text(&program.count(Stage::State));
+    let of = |program: &StraightLineProgram| text(&program.count_operations(ProgramStage::State));
     let known = best_known(name).map(|n| n.map_or_else(|| "-".to_owned(), |n| n.to_string()));
     let [known_forces, known_columns] = known;
     let programs = &derivation.programs;

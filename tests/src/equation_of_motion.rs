@@ -1,6 +1,6 @@
 //! Laws of mass matrix, velocity terms, gravity, effects and forward dynamics.
 
-use modelmill_codegen::{Dynamics, Evaluator, PoseFault};
+use modelmill_codegen::{DynamicsPrograms, ModelEvaluator, PoseFault};
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use crate::base_parameters::{base, nominal};
@@ -22,8 +22,8 @@ pub struct Terms {
 
 /// Evaluates all terms at the only state of a sample.
 pub fn terms(
-    evaluator: &Evaluator<'_>,
-    dynamics: &Dynamics,
+    evaluator: &ModelEvaluator<'_>,
+    dynamics: &DynamicsPrograms,
     one: &Sample,
     p_min: &[f64],
 ) -> Result<Terms, PoseFault> {
@@ -43,24 +43,18 @@ impl Case {
     /// `J' f = M q'' + c + g + e` with the inverse dynamics' forces f, whatever accelerations the terms are shown; with
     /// them forward dynamics gives the accelerations back. Returns the largest relative error of the equation.
     pub fn equation_of_motion_is_the_inverse_dynamics(&self) -> Result<f64, String> {
-        let evaluator = Evaluator::new(&self.derivation);
-        let dynamics = self
-            .derivation
-            .dynamics()
-            .map_err(|e| self.breach(&e.to_string()))?;
+        let evaluator = ModelEvaluator::new(&self.derivation);
+        let dynamics = self.derivation.dynamics().map_err(|e| self.breach(&e.to_string()))?;
         let p_min = base(&self.derivation, &nominal(self.mechanism()));
         let fault = |e: PoseFault| self.breach(&e.to_string());
         let mut worst: f64 = 0.0;
         for i in 0..self.sample.len().min(10) {
             let one = self.sample.only(i);
             let n = one.q.len();
-            let forces = evaluator
-                .inverse_dynamics(&one.states(), &p_min)
-                .map_err(fault)?;
-            let drives = evaluator.drives(&one.states()).map_err(fault)?;
+            let forces = evaluator.inverse_dynamics(&one.states(), &p_min).map_err(fault)?;
+            let drives = evaluator.drive_motion(&one.states()).map_err(fault)?;
             let n_drives = forces.len();
-            let jacobian =
-                DMatrix::from_fn(n_drives, n, |d, a| drives[2 * n_drives + d * n + a][0]);
+            let jacobian = DMatrix::from_fn(n_drives, n, |d, a| drives[2 * n_drives + d * n + a][0]);
             let f = DVector::from_iterator(n_drives, forces.iter().map(|f| f[0]));
             let qdd = DVector::from_iterator(n, one.qdd.iter().map(|x| x[0]));
             let mut other = one.clone();
@@ -108,16 +102,10 @@ impl Case {
     }
 
     /// The mass matrix is what d'Alembert's principle says, body by body; it is symmetric, and positive for real bodies.
-    pub fn mass_matrix_is_that_of_bodies_by_themselves(
-        &self,
-        is_physical: bool,
-    ) -> Result<f64, String> {
+    pub fn mass_matrix_is_that_of_bodies_by_themselves(&self, is_physical: bool) -> Result<f64, String> {
         let mechanism = self.mechanism();
-        let evaluator = Evaluator::new(&self.derivation);
-        let dynamics = self
-            .derivation
-            .dynamics()
-            .map_err(|e| self.breach(&e.to_string()))?;
+        let evaluator = ModelEvaluator::new(&self.derivation);
+        let dynamics = self.derivation.dynamics().map_err(|e| self.breach(&e.to_string()))?;
         let parameters = nominal(mechanism);
         let p_min = base(&self.derivation, &parameters);
         let numbers = Numbers::new(mechanism, parameters);
@@ -126,8 +114,7 @@ impl Case {
             let one = self.sample.only(i);
             let load: Vec<f64> = one.load.iter().map(|l| l[0]).collect();
             let n = one.q.len();
-            let found = terms(&evaluator, &dynamics, &one, &p_min)
-                .map_err(|e| self.breach(&e.to_string()))?;
+            let found = terms(&evaluator, &dynamics, &one, &p_min).map_err(|e| self.breach(&e.to_string()))?;
             let pose = coordinates(&evaluator, mechanism, &one);
             let accelerated = |by: Option<&[f64]>| -> Vec<Jet> {
                 pose.iter()

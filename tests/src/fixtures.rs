@@ -15,15 +15,11 @@ pub fn fixtures() -> PathBuf {
 pub fn model_file(name: &str) -> PathBuf {
     let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("../model-spec/models");
     let file = format!("{name}.toml");
-    [
-        shipped,
-        fixtures().join("emitted"),
-        fixtures().join("variants"),
-    ]
-    .map(|folder| folder.join(&file))
-    .into_iter()
-    .find(|path| path.exists())
-    .unwrap_or_else(|| panic!("there is no model file {file}"))
+    [shipped, fixtures().join("emitted"), fixtures().join("variants")]
+        .map(|folder| folder.join(&file))
+        .into_iter()
+        .find(|path| path.exists())
+        .unwrap_or_else(|| panic!("there is no model file {file}"))
 }
 
 /// Loads a model or a variant by the name of its file.
@@ -41,8 +37,7 @@ pub fn derived(name: &str) -> Derivation {
 
 /// Derives a mechanism that must have a derivation.
 pub fn derive(mechanism: &Mechanism) -> Derivation {
-    modelmill_codegen::derive(mechanism)
-        .unwrap_or_else(|error| panic!("{}: {error}", mechanism.name))
+    modelmill_codegen::derive(mechanism).unwrap_or_else(|error| panic!("{}: {error}", mechanism.name))
 }
 
 /// A table of numbers with named columns.
@@ -57,14 +52,8 @@ impl Table {
     /// Reads `fixtures/reference/<name>.csv`.
     pub fn reference(name: &str) -> Self {
         let path = fixtures().join("reference").join(format!("{name}.csv"));
-        let mut reader = csv::Reader::from_path(&path)
-            .unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-        let names: Vec<String> = reader
-            .headers()
-            .expect("a header")
-            .iter()
-            .map(str::to_owned)
-            .collect();
+        let mut reader = csv::Reader::from_path(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        let names: Vec<String> = reader.headers().expect("a header").iter().map(str::to_owned).collect();
         let mut columns: Vec<Vec<f64>> = vec![Vec::new(); names.len()];
         let mut n_rows = 0;
         for record in reader.records() {

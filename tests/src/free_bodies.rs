@@ -4,7 +4,7 @@
 //! Wrenches are in the axes of the base, moments about its origin. Nothing is shared with the mill: motion comes from
 //! Taylor series of poses, inertia from pseudo-inertias, and no equation is projected.
 
-use modelmill_codegen::{Evaluator, Reactions};
+use modelmill_codegen::{ModelEvaluator, ReactionPrograms};
 use modelmill_spec::{DriveKind, FrameIdx, Mechanism, PointIdx};
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix4, Vector3};
 
@@ -63,8 +63,7 @@ fn inertial(numbers: &Numbers<'_>, poses: &[[Matrix4<f64>; 3]]) -> Vec<Wrench> {
     }
     for (frame, mass, force_at, moment_at) in numbers.lumps() {
         let [x, _, a] = poses[frame];
-        let lifted =
-            |at: [f64; 3]| -> Vector3<f64> { (a * Vector3::from(at).push(1.0)).xyz() - gravity };
+        let lifted = |at: [f64; 3]| -> Vector3<f64> { (a * Vector3::from(at).push(1.0)).xyz() - gravity };
         let force = mass * lifted(force_at);
         let rotation: Matrix3<f64> = x.fixed_view::<3, 3>(0, 0).into();
         let origin: Vector3<f64> = x.fixed_view::<3, 1>(0, 3).into();
@@ -76,21 +75,14 @@ fn inertial(numbers: &Numbers<'_>, poses: &[[Matrix4<f64>; 3]]) -> Vec<Wrench> {
 }
 
 /// What rods need at their ends, as particles along them: the drive, and the forces at its two points.
-fn rods(
-    numbers: &Numbers<'_>,
-    mechanism: &Mechanism,
-    motion: &[Jet],
-) -> Vec<(PointIdx, Vector3<f64>)> {
+fn rods(numbers: &Numbers<'_>, mechanism: &Mechanism, motion: &[Jet]) -> Vec<(PointIdx, Vector3<f64>)> {
     let gravity = numbers.gravity();
     let mut forces = Vec::new();
     for (drive, [second, first, mass]) in numbers.rods() {
         let DriveKind::Linear { from, to } = mechanism.drives[drive].kind else {
             panic!("a rod lies along a linear drive");
         };
-        let (a, b) = (
-            numbers.point_motion(motion, from),
-            numbers.point_motion(motion, to),
-        );
+        let (a, b) = (numbers.point_motion(motion, from), numbers.point_motion(motion, to));
         let d: [Jet; 3] = std::array::from_fn(|i| b[i] - a[i]);
         let square = (0..3).fold(Jet::constant(0.0), |sum, i| sum + d[i] * d[i]);
         let per_length = square.sqrt().recip();
@@ -257,14 +249,7 @@ impl Balances {
         }
         couplings_carry(mechanism, couplings, &mut matrix);
         let effects = numbers.effects_on_joints(motion);
-        joints_give_way(
-            mechanism,
-            &twists,
-            &effects,
-            drives,
-            &mut matrix,
-            &mut needed,
-        );
+        joints_give_way(mechanism, &twists, &effects, drives, &mut matrix, &mut needed);
         Self {
             matrix,
             needed,
@@ -277,10 +262,7 @@ impl Balances {
     fn solve(&self) -> (DVector<f64>, Vec<DVector<f64>>) {
         let (rows, columns) = self.matrix.shape();
         let padded = self.matrix.clone().resize(rows.max(columns), columns, 0.0);
-        let needed = self
-            .needed
-            .clone()
-            .resize_vertically(rows.max(columns), 0.0);
+        let needed = self.needed.clone().resize_vertically(rows.max(columns), 0.0);
         let svd = padded.svd(true, true);
         let limit = NOTHING * svd.singular_values.amax();
         let mut solution = svd.solve(&needed, limit).expect("both factors");
@@ -315,9 +297,7 @@ fn pin(
     // Of three singular values at most, one must be zero and two not.
     let sizes: Vec<f64> = svd.singular_values.iter().copied().collect();
     let largest = sizes.iter().copied().fold(0.0, f64::max);
-    let regular: Vec<usize> = (0..sizes.len())
-        .filter(|k| sizes[*k] > NOTHING * largest)
-        .collect();
+    let regular: Vec<usize> = (0..sizes.len()).filter(|k| sizes[*k] > NOTHING * largest).collect();
     let [a, b] = regular[..] else {
         return Vec::new();
     };
@@ -328,11 +308,7 @@ fn pin(
         let relative = of[frames[0]].1 - of[frames[1]].1;
         relative.cross(&normal).norm() <= NOTHING
     });
-    if turns_in_plane {
-        axes.to_vec()
-    } else {
-        Vec::new()
-    }
+    if turns_in_plane { axes.to_vec() } else { Vec::new() }
 }
 
 /// What was found on a mechanism.
@@ -350,11 +326,8 @@ impl Case {
     /// Reactions are those of bodies by themselves; what is told is all that these determine, and nothing else.
     pub fn reactions_hold_every_body(&self) -> Result<Found, String> {
         let mechanism = self.mechanism();
-        let reactions = self
-            .derivation
-            .reactions()
-            .map_err(|e| self.breach(&e.to_string()))?;
-        let evaluator = Evaluator::new(&self.derivation);
+        let reactions = self.derivation.reactions().map_err(|e| self.breach(&e.to_string()))?;
+        let evaluator = ModelEvaluator::new(&self.derivation);
         let numbers = Numbers::new(mechanism, nominal(mechanism));
         let p_min = base(&self.derivation, &nominal(mechanism));
         let mut found = Found::default();
@@ -392,12 +365,9 @@ impl Case {
                 moved[k] = moved[k].max(free);
                 let Some(place) = place else { continue };
                 if free > 1e-6 {
-                    return Err(
-                        self.breach(&format!("{what} is told but not determined ({free:.1e})"))
-                    );
+                    return Err(self.breach(&format!("{what} is told but not determined ({free:.1e})")));
                 }
-                let error =
-                    (row.dot(&solution) - values[*place][0]).abs() / (scale * size.max(1.0));
+                let error = (row.dot(&solution) - values[*place][0]).abs() / (scale * size.max(1.0));
                 found.error = found.error.max(error);
                 if error.is_nan() || error > 100.0 * ACCURACY {
                     let expected = row.dot(&solution);
@@ -414,9 +384,7 @@ impl Case {
             }
             for ((what, place, _), free) in components.iter().zip(&moved) {
                 if place.is_none() && *free < 1e-7 {
-                    return Err(
-                        self.breach(&format!("{what} is determined but not told ({free:.1e})"))
-                    );
+                    return Err(self.breach(&format!("{what} is determined but not told ({free:.1e})")));
                 }
             }
         }
@@ -429,7 +397,7 @@ fn components(
     mechanism: &Mechanism,
     numbers: &Numbers<'_>,
     motion: &[Jet],
-    reactions: &Reactions,
+    reactions: &ReactionPrograms,
     balances: &Balances,
 ) -> Vec<(String, Option<usize>, DVector<f64>)> {
     let n = balances.matrix.ncols();

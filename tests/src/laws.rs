@@ -1,8 +1,9 @@
 //! Laws that hold for every mechanism, checked on one; a breach says where and by how much.
 
-use modelmill_codegen::{Derivation, Evaluator};
+use modelmill_codegen::{Derivation, ModelEvaluator};
 use modelmill_spec::{
-    Angle, Axis, Constant, ConstantIdx, Exact, FrameIdx, Function, Mechanism, Step, Symbol,
+    ConstantIdx, ExactAngle, ExactExpression, ExactFunction, FrameAxis, FrameIdx, FrameStep, Mechanism, ModelConstant,
+    ModelSymbol,
 };
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -33,29 +34,20 @@ pub struct Case {
 impl Case {
     /// Derives a mechanism and draws `n` regular states.
     pub fn new(mechanism: &Mechanism, n: usize, reach: f64) -> Result<Self, String> {
-        let derivation = modelmill_codegen::derive(mechanism)
-            .map_err(|error| format!("{}: {error}", mechanism.name))?;
+        let derivation =
+            modelmill_codegen::derive(mechanism).map_err(|error| format!("{}: {error}", mechanism.name))?;
         let sample = {
-            let evaluator = Evaluator::new(&derivation);
+            let evaluator = ModelEvaluator::new(&derivation);
             let mut stream = Stream::new(mechanism.name.len() as u64 + 77);
             let drawn = Sample::random(mechanism, 4 * n, reach, &mut stream).reachable(&evaluator);
             let full: Vec<bool> = (0..drawn.len())
-                .map(|i| {
-                    is_regular(
-                        mechanism,
-                        &coordinates(&evaluator, mechanism, &drawn.only(i)),
-                    )
-                })
+                .map(|i| is_regular(mechanism, &coordinates(&evaluator, mechanism, &drawn.only(i))))
                 .collect();
             let regular = drawn.filtered(|i| full[i]);
             regular.filtered(|i| i < n)
         };
         if sample.len() < n / 4 {
-            return Err(format!(
-                "{}: only {} regular states",
-                mechanism.name,
-                sample.len()
-            ));
+            return Err(format!("{}: only {} regular states", mechanism.name, sample.len()));
         }
         Ok(Self { derivation, sample })
     }
@@ -63,11 +55,11 @@ impl Case {
     /// Derives a mechanism and draws `n` states near its nominal pose, which must be regular; drives may act on passive
     /// coordinates.
     pub fn near_nominal(mechanism: &Mechanism, n: usize, reach: f64) -> Result<Self, String> {
-        let derivation = modelmill_codegen::derive(mechanism)
-            .map_err(|error| format!("{}: {error}", mechanism.name))?;
+        let derivation =
+            modelmill_codegen::derive(mechanism).map_err(|error| format!("{}: {error}", mechanism.name))?;
         let mut stream = Stream::new(mechanism.name.len() as u64 + 78);
         let drawn = Sample::random(mechanism, n, reach, &mut stream);
-        let sample = drawn.reachable(&Evaluator::new(&derivation));
+        let sample = drawn.reachable(&ModelEvaluator::new(&derivation));
         if sample.len() < n / 2 {
             let n = sample.len();
             return Err(format!("{}: only {n} states in reach", mechanism.name));
@@ -85,13 +77,12 @@ impl Case {
 
     /// The exact rank is the rank of a large sample; returns the gap of the singular values.
     pub fn exact_rank_is_numeric_rank(&self) -> Result<f64, String> {
-        let evaluator = Evaluator::new(&self.derivation);
+        let evaluator = ModelEvaluator::new(&self.derivation);
         let exact = self.derivation.reduction.retained.len();
         if self.derivation.reduction.products.is_empty() {
             return Ok(f64::INFINITY);
         }
-        let rank =
-            rank_of_products(&evaluator, &self.sample).map_err(|e| self.breach(&e.to_string()))?;
+        let rank = rank_of_products(&evaluator, &self.sample).map_err(|e| self.breach(&e.to_string()))?;
         if rank.rank != exact && rank.gap > BELIEVED_GAP {
             return Err(self.breach(&format!(
                 "exact rank {exact}, numeric rank {} with gap {:.1e}: {:?}",
@@ -109,7 +100,7 @@ impl Case {
 
     /// `H p_g = H_min p_min`, and the inverse dynamics is that force; errors relative to the row's largest terms.
     pub fn reduction_keeps_the_forces(&self) -> Result<f64, String> {
-        let evaluator = Evaluator::new(&self.derivation);
+        let evaluator = ModelEvaluator::new(&self.derivation);
         let states = self.sample.states();
         let fault = |e: modelmill_codegen::PoseFault| self.breach(&e.to_string());
         let parameters = nominal(self.mechanism());
@@ -128,12 +119,7 @@ impl Case {
         let mut worst: f64 = 0.0;
         for row in 0..h.nrows() {
             let magnitude = |matrix: &DMatrix<f64>, p: &[f64]| -> f64 {
-                matrix
-                    .row(row)
-                    .iter()
-                    .zip(p)
-                    .map(|(a, b)| (a * b).abs())
-                    .sum()
+                matrix.row(row).iter().zip(p).map(|(a, b)| (a * b).abs()).sum()
             };
             let scale = magnitude(&h, &p_g).max(magnitude(&h_min, &p_min)).max(1e-9);
             let force = forces[row % n_drives][row / n_drives];
@@ -144,9 +130,7 @@ impl Case {
                 let error = error.abs() / scale;
                 worst = worst.max(error);
                 if error.is_nan() || error > ACCURACY {
-                    return Err(
-                        self.breach(&format!("{what} = {error:.1e} of {scale} in row {row}"))
-                    );
+                    return Err(self.breach(&format!("{what} = {error:.1e} of {scale} in row {row}")));
                 }
             }
         }
@@ -159,24 +143,16 @@ impl Case {
     }
 
     /// The same to an accuracy of one's own.
-    pub fn forces_satisfy_dalembert_to(
-        &self,
-        accuracy: f64,
-        n_states: usize,
-    ) -> Result<f64, String> {
+    pub fn forces_satisfy_dalembert_to(&self, accuracy: f64, n_states: usize) -> Result<f64, String> {
         let (worst, says) = self.worst_beside_dalembert(n_states)?;
         // What is no number is no accuracy.
-        if worst <= accuracy {
-            Ok(worst)
-        } else {
-            Err(says)
-        }
+        if worst <= accuracy { Ok(worst) } else { Err(says) }
     }
 
     /// The largest error with where it is, or the first that is no number.
     fn worst_beside_dalembert(&self, n_states: usize) -> Result<(f64, String), String> {
         let mechanism = self.mechanism();
-        let evaluator = Evaluator::new(&self.derivation);
+        let evaluator = ModelEvaluator::new(&self.derivation);
         let parameters = nominal(mechanism);
         let p_min = base(&self.derivation, &parameters);
         let numbers = Numbers::new(mechanism, parameters);
@@ -195,11 +171,7 @@ impl Case {
                     .map(|(q, d)| Jet([q.0[0], *d, 0.0]))
                     .collect();
                 let rates = numbers.drives(&moved);
-                let supplied: Vec<f64> = forces
-                    .iter()
-                    .zip(&rates)
-                    .map(|(f, l)| f[0] * l.0[1])
-                    .collect();
+                let supplied: Vec<f64> = forces.iter().zip(&rates).map(|(f, l)| f[0] * l.0[1]).collect();
                 let needed = numbers.virtual_power(&motion, &direction, &load);
                 let scale = needed.magnitude + supplied.iter().map(|x| x.abs()).sum::<f64>() + 1e-9;
                 let error = (supplied.iter().sum::<f64>() - needed.value).abs() / scale;
@@ -220,7 +192,7 @@ impl Case {
     /// The points that loops join coincide, and so do their velocities and accelerations.
     pub fn loops_stay_closed(&self) -> Result<f64, String> {
         let mechanism = self.mechanism();
-        let evaluator = Evaluator::new(&self.derivation);
+        let evaluator = ModelEvaluator::new(&self.derivation);
         let numbers = Numbers::new(mechanism, nominal(mechanism));
         let mut worst: f64 = 0.0;
         for i in 0..self.sample.len().min(30) {
@@ -245,11 +217,8 @@ impl Case {
     /// the best of three steps: long ones suffer where the motion bends sharply, short ones from rounding.
     pub fn power_is_the_rate_of_energy(&self) -> Result<f64, String> {
         let mechanism = self.mechanism();
-        assert!(
-            mechanism.effects.is_empty(),
-            "friction turns power into heat"
-        );
-        let evaluator = Evaluator::new(&self.derivation);
+        assert!(mechanism.effects.is_empty(), "friction turns power into heat");
+        let evaluator = ModelEvaluator::new(&self.derivation);
         let parameters = nominal(mechanism);
         let p_min = base(&self.derivation, &parameters);
         let numbers = Numbers::new(mechanism, parameters);
@@ -264,12 +233,10 @@ impl Case {
                     later.q[k][0] = q + v * t + 0.5 * a * t * t;
                     later.qd[k][0] = v + a * t;
                 }
-                evaluator.passive(&later.states()).map_err(fault)?;
+                evaluator.passive_motion(&later.states()).map_err(fault)?;
                 Ok(numbers.energy(&motion(&evaluator, mechanism, &later)))
             };
-            let forces = evaluator
-                .inverse_dynamics(&one.states(), &p_min)
-                .map_err(fault)?;
+            let forces = evaluator.inverse_dynamics(&one.states(), &p_min).map_err(fault)?;
             let rates = numbers.drives(&motion(&evaluator, mechanism, &one));
             let powers = || forces.iter().zip(&rates).map(|(f, l)| f[0] * l.0[1]);
             let power: f64 = powers().sum();
@@ -290,9 +257,7 @@ impl Case {
             }
             worst = worst.max(best);
             if best > 1e-6 {
-                return Err(self.breach(&format!(
-                    "power {power} misses the rate of energy by {best:.1e}"
-                )));
+                return Err(self.breach(&format!("power {power} misses the rate of energy by {best:.1e}")));
             }
             checked += 1;
             if checked == 4 {
@@ -305,7 +270,7 @@ impl Case {
     /// The mass matrix, taken from the regressor at rest, is symmetric and positive definite.
     pub fn mass_matrix_is_symmetric_and_positive_definite(&self) -> Result<f64, String> {
         let mechanism = self.mechanism();
-        let evaluator = Evaluator::new(&self.derivation);
+        let evaluator = ModelEvaluator::new(&self.derivation);
         let p_min = DVector::from_vec(base(&self.derivation, &nominal(mechanism)));
         let numbers = Numbers::new(mechanism, nominal(mechanism));
         let fault = |e: modelmill_codegen::PoseFault| self.breach(&e.to_string());
@@ -321,9 +286,7 @@ impl Case {
             }
             // Forces of the drives become forces on the coordinates by the drives' Jacobian.
             let pose = coordinates(&evaluator, mechanism, &rest);
-            let jacobian = DMatrix::from_fn(n, n, |d, a| {
-                numbers.drives(&along(&pose, active[a]))[d].0[1]
-            });
+            let jacobian = DMatrix::from_fn(n, n, |d, a| numbers.drives(&along(&pose, active[a]))[d].0[1]);
             let mut forces = |accelerated: Option<usize>| -> Result<DVector<f64>, String> {
                 for (k, acceleration) in rest.qdd.iter_mut().enumerate() {
                     acceleration[0] = f64::from(u8::from(accelerated == Some(k)));
@@ -359,7 +322,7 @@ impl Case {
         let parameters = nominal(self.mechanism());
         let states = self.sample.states();
         let forces = |derivation: &Derivation| {
-            Evaluator::new(derivation)
+            ModelEvaluator::new(derivation)
                 .inverse_dynamics(&states, &base(derivation, &parameters))
                 .map_err(|e| self.breach(&e.to_string()))
         };
@@ -380,20 +343,13 @@ impl Case {
 }
 
 /// All coordinates at a single state, passive ones from the evaluator.
-pub(crate) fn coordinates(
-    evaluator: &Evaluator<'_>,
-    mechanism: &Mechanism,
-    one: &Sample,
-) -> Vec<f64> {
-    motion(evaluator, mechanism, one)
-        .iter()
-        .map(|q| q.0[0])
-        .collect()
+pub(crate) fn coordinates(evaluator: &ModelEvaluator<'_>, mechanism: &Mechanism, one: &Sample) -> Vec<f64> {
+    motion(evaluator, mechanism, one).iter().map(|q| q.0[0]).collect()
 }
 
 /// All coordinates with rates and accelerations at a single state, passive ones from the evaluator.
-pub fn motion(evaluator: &Evaluator<'_>, mechanism: &Mechanism, one: &Sample) -> Vec<Jet> {
-    let passive = evaluator.passive(&one.states()).expect("a reachable state");
+pub fn motion(evaluator: &ModelEvaluator<'_>, mechanism: &Mechanism, one: &Sample) -> Vec<Jet> {
+    let passive = evaluator.passive_motion(&one.states()).expect("a reachable state");
     let n_passive = passive.len() / 3;
     let (mut a, mut p) = (0, 0);
     mechanism
@@ -402,9 +358,7 @@ pub fn motion(evaluator: &Evaluator<'_>, mechanism: &Mechanism, one: &Sample) ->
         .map(|coordinate| {
             if coordinate.passive {
                 p += 1;
-                Jet(std::array::from_fn(|order| {
-                    passive[order * n_passive + p - 1][0]
-                }))
+                Jet(std::array::from_fn(|order| passive[order * n_passive + p - 1][0]))
             } else {
                 a += 1;
                 Jet([one.q[a - 1][0], one.qd[a - 1][0], one.qdd[a - 1][0]])
@@ -423,15 +377,10 @@ fn is_regular(mechanism: &Mechanism, coordinates: &[f64]) -> bool {
 }
 
 /// One motion per degree of freedom that keeps the loops closed, and the actual one.
-pub(crate) fn directions(
-    mechanism: &Mechanism,
-    numbers: &Numbers<'_>,
-    motion: &[Jet],
-) -> Vec<Vec<f64>> {
+pub(crate) fn directions(mechanism: &Mechanism, numbers: &Numbers<'_>, motion: &[Jet]) -> Vec<Vec<f64>> {
     let n = motion.len();
     let position: Vec<f64> = motion.iter().map(|q| q.0[0]).collect();
-    let (passive, active): (Vec<usize>, Vec<usize>) =
-        (0..n).partition(|i| mechanism.coordinates[*i].passive);
+    let (passive, active): (Vec<usize>, Vec<usize>) = (0..n).partition(|i| mechanism.coordinates[*i].passive);
     let mut directions: Vec<Vec<f64>> = vec![motion.iter().map(|q| q.0[1]).collect()];
     let jacobian = (!passive.is_empty()).then(|| numbers.gap_jacobian(&position));
     for a in &active {
@@ -458,7 +407,7 @@ fn with_turned_base(mechanism: &Mechanism) -> Mechanism {
     let mut turned = mechanism.clone();
     turned.name = format!("{}_turned", mechanism.name);
     let angle = ConstantIdx(turned.constants.len());
-    turned.constants.push(Constant {
+    turned.constants.push(ModelConstant {
         name: "turn".to_owned(),
         value: 0.7,
         unit: "rad".to_owned(),
@@ -467,38 +416,38 @@ fn with_turned_base(mechanism: &Mechanism) -> Mechanism {
     });
     let integer = |n: i64| num_rational::BigRational::from_integer(n.into());
     let half = num_rational::BigRational::new(1.into(), 2.into());
-    let mut steps = vec![Step::Rotate(
-        Axis::Z,
-        Angle {
+    let mut steps = vec![FrameStep::Rotate(
+        FrameAxis::Z,
+        ExactAngle {
             pi: integer(0),
-            terms: vec![(Symbol::Constant(angle), 1)],
+            terms: vec![(ModelSymbol::Constant(angle), 1)],
         },
     )];
     let [x, y, z] = mechanism.gravity.clone();
     let (tilted, is_tree) = (
-        [x.clone(), Exact::Negative(Box::new(z.clone())), y.clone()],
+        [x.clone(), ExactExpression::Negative(Box::new(z.clone())), y.clone()],
         mechanism.loops.is_empty(),
     );
     let [x, y, z] = if is_tree { tilted } else { [x, y, z] };
     if is_tree {
-        steps.push(Step::Rotate(
-            Axis::X,
-            Angle {
+        steps.push(FrameStep::Rotate(
+            FrameAxis::X,
+            ExactAngle {
                 pi: half,
                 terms: Vec::new(),
             },
         ));
     }
-    let symbol = || Box::new(Exact::Symbol(Symbol::Constant(angle)));
-    let cos = Exact::Apply(Function::Cos, symbol());
-    let sin = Exact::Apply(Function::Sin, symbol());
-    let times = |a: &Exact, b: &Exact| Exact::Product(vec![a.clone(), b.clone()]);
+    let symbol = || Box::new(ExactExpression::Symbol(ModelSymbol::Constant(angle)));
+    let cos = ExactExpression::Apply(ExactFunction::Cos, symbol());
+    let sin = ExactExpression::Apply(ExactFunction::Sin, symbol());
+    let times = |a: &ExactExpression, b: &ExactExpression| ExactExpression::Product(vec![a.clone(), b.clone()]);
     turned.gravity = [
-        Exact::Sum(vec![
+        ExactExpression::Sum(vec![
             times(&cos, &x),
-            Exact::Negative(Box::new(times(&sin, &y))),
+            ExactExpression::Negative(Box::new(times(&sin, &y))),
         ]),
-        Exact::Sum(vec![times(&sin, &x), times(&cos, &y)]),
+        ExactExpression::Sum(vec![times(&sin, &x), times(&cos, &y)]),
         z,
     ];
     // The new frame comes right after the base; everything else moves up by one.

@@ -7,8 +7,8 @@
 use std::ops::{Add, Mul, Neg, Sub};
 
 use modelmill_spec::{
-    Axis, DriveKind, Exact, FreeBody, Function, Inertial, LumpedMass, Mechanics, Mechanism, Place,
-    PlaceQuantity, PointIdx, Step, Symbol, TwistAxes,
+    DriveKind, EffectPlace, ExactExpression, ExactFunction, FrameAxis, FrameStep, FreeBody, LumpedMass, Mechanics,
+    Mechanism, ModelSymbol, PartInertia, PlaceQuantity, PointIdx, TwistAxes,
 };
 use nalgebra::{DMatrix, Matrix3, Matrix4, Quaternion, UnitQuaternion, Vector3};
 
@@ -95,22 +95,18 @@ impl Pose {
     fn then(&self, other: &Self) -> Self {
         Self(std::array::from_fn(|i| {
             std::array::from_fn(|j| {
-                let moved = if j == 3 {
-                    self.0[i][3]
-                } else {
-                    Jet::constant(0.0)
-                };
+                let moved = if j == 3 { self.0[i][3] } else { Jet::constant(0.0) };
                 (0..3).fold(moved, |sum, k| sum + self.0[i][k] * other.0[k][j])
             })
         }))
     }
 
-    fn rotation(axis: Axis, angle: Jet) -> Self {
+    fn rotation(axis: FrameAxis, angle: Jet) -> Self {
         let mut pose = Self::identity();
         let (j, k) = match axis {
-            Axis::X => (1, 2),
-            Axis::Y => (2, 0),
-            Axis::Z => (0, 1),
+            FrameAxis::X => (1, 2),
+            FrameAxis::Y => (2, 0),
+            FrameAxis::Z => (0, 1),
         };
         let (c, s) = (angle.cos(), angle.sin());
         pose.0[j][j] = c;
@@ -120,7 +116,7 @@ impl Pose {
         pose
     }
 
-    fn translation(axis: Axis, length: Jet) -> Self {
+    fn translation(axis: FrameAxis, length: Jet) -> Self {
         let mut pose = Self::identity();
         pose.0[axis as usize][3] = length;
         pose
@@ -132,20 +128,14 @@ impl Pose {
         let [w, x, y, z] = body.quaternion.map(|i| of(i, 0));
         let turn = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
         let turn: Matrix3<f64> = turn.to_rotation_matrix().into_inner();
-        let vector = |all: &[modelmill_spec::CoordinateIdx], order: usize| {
-            Vector3::from_fn(|k, _| of(all[k], order))
-        };
+        let vector = |all: &[modelmill_spec::CoordinateIdx], order: usize| Vector3::from_fn(|k, _| of(all[k], order));
         let angular = |order: usize| match body.angular {
             TwistAxes::Body => vector(&body.quaternion[1..], order),
             TwistAxes::World => turn.transpose() * vector(&body.quaternion[1..], order),
         };
         let (omega, alpha) = (angular(1), angular(2));
         let skew = omega.cross_matrix();
-        let orders = [
-            turn,
-            turn * skew,
-            turn * (skew * skew + alpha.cross_matrix()),
-        ];
+        let orders = [turn, turn * skew, turn * (skew * skew + alpha.cross_matrix())];
         let [velocity, change] = [1, 2].map(|order| vector(&body.position, order));
         let (velocity, acceleration) = match body.linear {
             TwistAxes::World => (velocity, change),
@@ -155,22 +145,14 @@ impl Pose {
         Self(std::array::from_fn(|i| {
             std::array::from_fn(|j| {
                 Jet(std::array::from_fn(|k| {
-                    if j == 3 {
-                        place[k][i]
-                    } else {
-                        orders[k][(i, j)]
-                    }
+                    if j == 3 { place[k][i] } else { orders[k][(i, j)] }
                 }))
             })
         }))
     }
 
     fn point(&self, at: [f64; 3]) -> [Jet; 3] {
-        std::array::from_fn(|i| {
-            (0..3).fold(self.0[i][3], |sum, k| {
-                sum + self.0[i][k] * Jet::constant(at[k])
-            })
-        })
+        std::array::from_fn(|i| (0..3).fold(self.0[i][3], |sum, k| sum + self.0[i][k] * Jet::constant(at[k])))
     }
 
     /// The derivative of the given order as a 4x4 matrix.
@@ -217,44 +199,42 @@ impl<'a> Numbers<'a> {
     }
 
     /// Value of an expression over constants and parameters.
-    pub fn value(&self, exact: &Exact) -> f64 {
-        self.value_at(exact, &|_| {
-            unreachable!("no quantity of a place stands here")
-        })
+    pub fn value(&self, exact: &ExactExpression) -> f64 {
+        self.value_at(exact, &|_| unreachable!("no quantity of a place stands here"))
     }
 
-    fn value_at(&self, exact: &Exact, place: &dyn Fn(PlaceQuantity) -> f64) -> f64 {
-        let value = |e: &Exact| self.value_at(e, place);
+    fn value_at(&self, exact: &ExactExpression, place: &dyn Fn(PlaceQuantity) -> f64) -> f64 {
+        let value = |e: &ExactExpression| self.value_at(e, place);
         match exact {
-            Exact::Rational(r) => rational(r),
-            Exact::Pi => std::f64::consts::PI,
-            Exact::Symbol(Symbol::Constant(i)) => self.constants[i.0],
-            Exact::Symbol(Symbol::Parameter(i)) => self.parameters[i.0],
-            Exact::Symbol(Symbol::Coordinate(_)) => {
+            ExactExpression::Rational(r) => rational(r),
+            ExactExpression::Pi => std::f64::consts::PI,
+            ExactExpression::Symbol(ModelSymbol::Constant(i)) => self.constants[i.0],
+            ExactExpression::Symbol(ModelSymbol::Parameter(i)) => self.parameters[i.0],
+            ExactExpression::Symbol(ModelSymbol::Coordinate(_)) => {
                 unreachable!("coordinates stand in steps alone")
             }
-            Exact::Symbol(Symbol::Place(quantity)) => place(*quantity),
-            Exact::Sum(operands) => operands.iter().map(value).sum(),
-            Exact::Product(operands) => operands.iter().map(value).product(),
-            Exact::Quotient(a, b) => value(a) / value(b),
-            Exact::Negative(a) => -value(a),
-            Exact::Power(a, n) => value(a).powi(*n),
-            Exact::Apply(function, a) => {
+            ExactExpression::Symbol(ModelSymbol::Place(quantity)) => place(*quantity),
+            ExactExpression::Sum(operands) => operands.iter().map(value).sum(),
+            ExactExpression::Product(operands) => operands.iter().map(value).product(),
+            ExactExpression::Quotient(a, b) => value(a) / value(b),
+            ExactExpression::Negative(a) => -value(a),
+            ExactExpression::Power(a, n) => value(a).powi(*n),
+            ExactExpression::Apply(function, a) => {
                 let a = value(a);
                 match function {
-                    Function::Sin => a.sin(),
-                    Function::Cos => a.cos(),
-                    Function::Sqrt => a.sqrt(),
-                    Function::Abs => a.abs(),
-                    Function::Sign => f64::from(i8::from(a > 0.0) - i8::from(a < 0.0)),
-                    Function::Tanh => a.tanh(),
-                    Function::Exp => a.exp(),
+                    ExactFunction::Sin => a.sin(),
+                    ExactFunction::Cos => a.cos(),
+                    ExactFunction::Sqrt => a.sqrt(),
+                    ExactFunction::Abs => a.abs(),
+                    ExactFunction::Sign => f64::from(i8::from(a > 0.0) - i8::from(a < 0.0)),
+                    ExactFunction::Tanh => a.tanh(),
+                    ExactFunction::Exp => a.exp(),
                 }
             }
         }
     }
 
-    fn vector(&self, exact: &[Exact; 3]) -> [f64; 3] {
+    fn vector(&self, exact: &[ExactExpression; 3]) -> [f64; 3] {
         std::array::from_fn(|i| self.value(&exact[i]))
     }
 
@@ -265,22 +245,22 @@ impl<'a> Numbers<'a> {
             let mut pose = poses[frame.parent.0].clone();
             for step in &frame.steps {
                 pose = pose.then(&match step {
-                    Step::Free(body) => Pose::free(body, coordinates),
-                    Step::Rotate(axis, angle) => {
+                    FrameStep::Free(body) => Pose::free(body, coordinates),
+                    FrameStep::Rotate(axis, angle) => {
                         let mut total = Jet::constant(rational(&angle.pi) * std::f64::consts::PI);
                         for (symbol, n) in &angle.terms {
                             let factor = Jet::constant(f64::from(*n));
                             total = total
                                 + factor
                                     * match symbol {
-                                        Symbol::Constant(i) => Jet::constant(self.constants[i.0]),
-                                        Symbol::Coordinate(i) => coordinates[i.0],
+                                        ModelSymbol::Constant(i) => Jet::constant(self.constants[i.0]),
+                                        ModelSymbol::Coordinate(i) => coordinates[i.0],
                                         _ => unreachable!("an angle is made of angles"),
                                     };
                         }
                         Pose::rotation(*axis, total)
                     }
-                    Step::Translate(axis, length) => {
+                    FrameStep::Translate(axis, length) => {
                         let mut total = Jet::constant(self.value(&length.offset));
                         for (i, factor) in &length.coordinates {
                             total = total + Jet::constant(rational(factor)) * coordinates[i.0];
@@ -312,34 +292,29 @@ impl<'a> Numbers<'a> {
     }
 
     /// Pose that a frame's steps reach behind the one that a coordinate moves, and behind what follows along or about z.
-    pub fn pose_behind(
-        &self,
-        coordinates: &[Jet],
-        frame: usize,
-        coordinate: usize,
-    ) -> Matrix4<f64> {
-        let moves = |step: &Step| match step {
-            Step::Rotate(_, angle) => angle
+    pub fn pose_behind(&self, coordinates: &[Jet], frame: usize, coordinate: usize) -> Matrix4<f64> {
+        let moves = |step: &FrameStep| match step {
+            FrameStep::Rotate(_, angle) => angle
                 .terms
                 .iter()
-                .any(|(s, _)| matches!(s, Symbol::Coordinate(c) if c.0 == coordinate)),
-            Step::Translate(_, length) => length.coordinates.iter().any(|(c, _)| c.0 == coordinate),
-            Step::Free(body) => {
+                .any(|(s, _)| matches!(s, ModelSymbol::Coordinate(c) if c.0 == coordinate)),
+            FrameStep::Translate(_, length) => length.coordinates.iter().any(|(c, _)| c.0 == coordinate),
+            FrameStep::Free(body) => {
                 let mut all = body.position.iter().chain(&body.quaternion);
                 all.any(|c| c.0 == coordinate)
             }
         };
-        let axis = |step: &Step| match step {
-            Step::Rotate(axis, _) | Step::Translate(axis, _) => *axis,
+        let axis = |step: &FrameStep| match step {
+            FrameStep::Rotate(axis, _) | FrameStep::Translate(axis, _) => *axis,
             // Nothing follows along or about an axis of its own.
-            Step::Free(_) => Axis::X,
+            FrameStep::Free(_) => FrameAxis::X,
         };
         let mut behind = self.mechanism.clone();
         let steps = &mut behind.frames[frame].steps;
         let joint = steps.iter().rposition(moves).expect("a joint of it");
         let mut end = joint + 1;
-        if axis(&steps[joint]) == Axis::Z {
-            let more = steps[end..].iter().take_while(|s| axis(s) == Axis::Z);
+        if axis(&steps[joint]) == FrameAxis::Z {
+            let more = steps[end..].iter().take_while(|s| axis(s) == FrameAxis::Z);
             end += more.count();
         }
         steps.truncate(end);
@@ -353,7 +328,7 @@ impl<'a> Numbers<'a> {
 
     /// Frames and pseudo-inertias of all bodies but lumped masses.
     pub fn bodies(&self) -> Vec<(usize, Matrix4<f64>)> {
-        let mut parts: Vec<&modelmill_spec::Part> = self.mechanism.parts.iter().collect();
+        let mut parts: Vec<&modelmill_spec::ModelPart> = self.mechanism.parts.iter().collect();
         let mut points = Vec::new();
         for effect in &self.mechanism.effects {
             parts.extend(&effect.bodies.parts);
@@ -361,7 +336,9 @@ impl<'a> Numbers<'a> {
                 continue;
             }
             for place in &effect.places {
-                let Place::Point(p) = place else { continue };
+                let EffectPlace::Point(p) = place else {
+                    continue;
+                };
                 let point = &self.mechanism.points[p.0];
                 for term in &effect.terms {
                     let mass = self.parameters[term.parameter.0] * self.value(&term.expression);
@@ -397,13 +374,13 @@ impl<'a> Numbers<'a> {
         for effect in &self.mechanism.effects {
             let motions: Vec<Option<Jet>> = (effect.places.iter())
                 .map(|place| match place {
-                    Place::Drive(d) => Some(drives[d.0]),
-                    Place::Coordinate(i) => Some(coordinates[i.0]),
+                    EffectPlace::Drive(d) => Some(drives[d.0]),
+                    EffectPlace::Coordinate(i) => Some(coordinates[i.0]),
                     _ => None,
                 })
                 .collect();
             for (p, place) in effect.places.iter().enumerate() {
-                let Place::Coordinate(i) = place else {
+                let EffectPlace::Coordinate(i) = place else {
                     continue;
                 };
                 let other = motions[(p + 1) % motions.len()];
@@ -423,7 +400,7 @@ impl<'a> Numbers<'a> {
         let mut rods = Vec::new();
         for effect in &self.mechanism.effects {
             for place in &effect.places {
-                if let (Some(Mechanics::Rod), Place::Drive(d)) = (effect.mechanics, place) {
+                if let (Some(Mechanics::Rod), EffectPlace::Drive(d)) = (effect.mechanics, place) {
                     let moments = |k: usize| self.parameters[effect.terms[k].parameter.0];
                     rods.push((d.0, [0, 1, 2].map(moments)));
                 }
@@ -445,7 +422,7 @@ impl<'a> Numbers<'a> {
             let [a, b] = l.joins.map(|p| self.point(&poses, p));
             std::array::from_fn::<Jet, 3, _>(|i| a[i] - b[i])
         });
-        let value = |exact: &Exact| exact.evaluate(&|symbol| self.mechanism.symbol_nominal(symbol));
+        let value = |exact: &ExactExpression| exact.evaluate(&|symbol| self.mechanism.symbol_nominal(symbol));
         let of_couplings = self.mechanism.couplings.iter().map(|coupling| {
             let own = coordinates[coupling.coordinate.0] - Jet::constant(value(&coupling.offset));
             coupling.terms.iter().fold(own, |off, (i, factor)| {
@@ -474,9 +451,7 @@ impl<'a> Numbers<'a> {
                 DriveKind::Linear { from, to } => {
                     let (a, b) = (self.point(&poses, from), self.point(&poses, to));
                     (0..3)
-                        .fold(Jet::constant(0.0), |sum, i| {
-                            sum + (b[i] - a[i]) * (b[i] - a[i])
-                        })
+                        .fold(Jet::constant(0.0), |sum, i| sum + (b[i] - a[i]) * (b[i] - a[i]))
                         .sqrt()
                 }
             })
@@ -520,7 +495,7 @@ impl<'a> Numbers<'a> {
                 let (pose, change) = (&poses[lump.frame.0], &displaced[lump.frame.0]);
                 self.add_lump(&mut balance, pose, change, lump, &gravity);
             }
-            if let (Some(Mechanics::Strut), [Place::Point(a), Place::Point(b)]) =
+            if let (Some(Mechanics::Strut), [EffectPlace::Point(a), EffectPlace::Point(b)]) =
                 (effect.mechanics, effect.places.as_slice())
             {
                 let ends = self.ends([*a, *b], [&poses, &displaced]);
@@ -529,17 +504,16 @@ impl<'a> Numbers<'a> {
             }
             let motions: Vec<Option<Jet>> = (effect.places.iter())
                 .map(|place| match place {
-                    Place::Drive(d) => Some(drives[d.0]),
-                    Place::Coordinate(i) => Some(coordinates[i.0]),
+                    EffectPlace::Drive(d) => Some(drives[d.0]),
+                    EffectPlace::Coordinate(i) => Some(coordinates[i.0]),
                     _ => None,
                 })
                 .collect();
             for (p, place) in effect.places.iter().enumerate() {
                 let other = motions[(p + 1) % motions.len()];
                 let other = other.unwrap_or(Jet::constant(f64::NAN));
-                if let (Some(Mechanics::Rod), Place::Drive(d)) = (effect.mechanics, place) {
-                    let [second, first, mass] =
-                        [0, 1, 2].map(|i| self.parameters[effect.terms[i].parameter.0]);
+                if let (Some(Mechanics::Rod), EffectPlace::Drive(d)) = (effect.mechanics, place) {
+                    let [second, first, mass] = [0, 1, 2].map(|i| self.parameters[effect.terms[i].parameter.0]);
                     let DriveKind::Linear { from, to } = self.mechanism.drives[d.0].kind else {
                         panic!("a rod lies along a linear drive");
                     };
@@ -552,25 +526,24 @@ impl<'a> Numbers<'a> {
                 for term in &effect.terms {
                     let parameter = self.parameters[term.parameter.0];
                     match place {
-                        Place::Point(p) => {
+                        EffectPlace::Point(p) => {
                             let point = &self.mechanism.points[p.0];
                             let factor = self.value(&term.expression);
-                            let inertia =
-                                point_mass(parameter * factor, self.vector(&point.at).into());
+                            let inertia = point_mass(parameter * factor, self.vector(&point.at).into());
                             let (pose, change) = (&poses[point.frame.0], &displaced[point.frame.0]);
                             add_body(&mut balance, pose, change, &inertia, &gravity);
                         }
-                        Place::Drive(d) => {
+                        EffectPlace::Drive(d) => {
                             let quantity = quantity(drives[d.0], load[d.0], other);
                             let force = parameter * self.value_at(&term.expression, &quantity);
                             balance.add(force * drive_rates[d.0].0[1]);
                         }
-                        Place::Coordinate(i) => {
+                        EffectPlace::Coordinate(i) => {
                             let quantity = quantity(coordinates[i.0], f64::NAN, other);
                             let force = parameter * self.value_at(&term.expression, &quantity);
                             balance.add(force * direction[i.0]);
                         }
-                        Place::Part(_) | Place::Base | Place::Force => {}
+                        EffectPlace::Part(_) | EffectPlace::Base | EffectPlace::Force => {}
                     }
                 }
             }
@@ -595,7 +568,7 @@ impl<'a> Numbers<'a> {
         }
         for effect in &self.mechanism.effects {
             for place in &effect.places {
-                if let Place::Point(p) = place {
+                if let EffectPlace::Point(p) = place {
                     let point = &self.mechanism.points[p.0];
                     for term in &effect.terms {
                         let mass = self.parameters[term.parameter.0] * self.value(&term.expression);
@@ -627,14 +600,7 @@ impl<'a> Numbers<'a> {
         })
     }
 
-    fn add_lump(
-        &self,
-        balance: &mut Balance,
-        pose: &Pose,
-        change: &Pose,
-        lump: &LumpedMass,
-        gravity: &Vector3<f64>,
-    ) {
+    fn add_lump(&self, balance: &mut Balance, pose: &Pose, change: &Pose, lump: &LumpedMass, gravity: &Vector3<f64>) {
         let mass = self.value(&lump.mass) * rational(&lump.share);
         let acceleration = |at: [f64; 3]| -> Vector3<f64> {
             let point = pose.point(at);
@@ -652,9 +618,9 @@ impl<'a> Numbers<'a> {
         balance.add(mass * turn.dot(&arm.cross(&acceleration(moment_at))));
     }
 
-    fn pseudo_inertia(&self, inertial: &Inertial) -> Matrix4<f64> {
+    fn pseudo_inertia(&self, inertial: &PartInertia) -> Matrix4<f64> {
         match inertial {
-            Inertial::Linear {
+            PartInertia::Linear {
                 mass,
                 first_moment,
                 inertia,
@@ -669,11 +635,7 @@ impl<'a> Numbers<'a> {
                 j[(3, 3)] = self.value(mass);
                 j
             }
-            Inertial::AboutCentre {
-                mass,
-                centre,
-                inertia,
-            } => {
+            PartInertia::AboutCentre { mass, centre, inertia } => {
                 let inertia: [f64; 6] = std::array::from_fn(|i| self.value(&inertia[i]));
                 spread(inertia) + point_mass(self.value(mass), self.vector(centre).into())
             }
@@ -719,16 +681,10 @@ fn add_rod(
 }
 
 /// The virtual work of what pulls two points together by a constant, by their distance and by its rate.
-fn add_strut(
-    balance: &mut Balance,
-    motions: &[[[Jet; 3]; 2]; 2],
-    [constant, stiffness, damping]: [f64; 3],
-) {
+fn add_strut(balance: &mut Balance, motions: &[[[Jet; 3]; 2]; 2], [constant, stiffness, damping]: [f64; 3]) {
     let [moves, change] = motions.each_ref().map(|[a, b]| {
         let d: [Jet; 3] = std::array::from_fn(|i| b[i] - a[i]);
-        (0..3)
-            .fold(Jet::constant(0.0), |sum, i| sum + d[i] * d[i])
-            .sqrt()
+        (0..3).fold(Jet::constant(0.0), |sum, i| sum + d[i] * d[i]).sqrt()
     });
     let pull = constant + stiffness * moves.0[0] + damping * moves.0[1];
     balance.add(pull * change.0[1]);
@@ -746,13 +702,7 @@ fn quantity(motion: Jet, load: f64, other: Jet) -> impl Fn(PlaceQuantity) -> f64
     }
 }
 
-fn add_body(
-    balance: &mut Balance,
-    pose: &Pose,
-    change: &Pose,
-    inertia: &Matrix4<f64>,
-    gravity: &Vector3<f64>,
-) {
+fn add_body(balance: &mut Balance, pose: &Pose, change: &Pose, inertia: &Matrix4<f64>, gravity: &Vector3<f64>) {
     let (a, d) = (pose.derivative(2), change.derivative(1));
     let product = d * inertia * a.transpose();
     for i in 0..3 {

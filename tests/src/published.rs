@@ -6,8 +6,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use modelmill_codegen::expr::Rational;
-use modelmill_codegen::field::{Element, Stream};
-use modelmill_codegen::{Derivation, RationalFunction, Reduction, Variable};
+use modelmill_codegen::field::{FieldElement, RandomStream};
+use modelmill_codegen::{BaseReduction, Derivation, FactorVariable, RationalFunction};
 use modelmill_spec::{Mechanism, ParameterIdx};
 
 /// A product of powers of names.
@@ -90,13 +90,13 @@ impl Fraction {
 
     /// A factor of the mill, with the names of the file.
     pub fn of_mill(function: &RationalFunction, mechanism: &Mechanism) -> Self {
-        let name = |variable: &Variable| match variable {
-            Variable::Constant(i) => mechanism.constants[*i].name.clone(),
-            Variable::Cos(i) => format!("cos({})", mechanism.constants[*i].name),
-            Variable::Sin(i) => format!("sin({})", mechanism.constants[*i].name),
-            Variable::Root(n) => format!("sqrt({n})"),
+        let name = |variable: &FactorVariable| match variable {
+            FactorVariable::Constant(i) => mechanism.constants[*i].name.clone(),
+            FactorVariable::Cos(i) => format!("cos({})", mechanism.constants[*i].name),
+            FactorVariable::Sin(i) => format!("sin({})", mechanism.constants[*i].name),
+            FactorVariable::Root(n) => format!("sqrt({n})"),
         };
-        let convert = |p: &BTreeMap<Vec<(Variable, u32)>, Rational>| -> Polynomial {
+        let convert = |p: &BTreeMap<Vec<(FactorVariable, u32)>, Rational>| -> Polynomial {
             p.iter()
                 .map(|(powers, k)| {
                     let powers = powers.iter().map(|(v, n)| (name(v), *n)).collect();
@@ -146,12 +146,12 @@ impl Fraction {
         }
     }
 
-    fn value(&self, values: &BTreeMap<String, Element>) -> Option<Element> {
-        let evaluate = |p: &Polynomial| -> Option<Element> {
-            p.iter().try_fold(Element::ZERO, |sum, (powers, k)| {
+    fn value(&self, values: &BTreeMap<String, FieldElement>) -> Option<FieldElement> {
+        let evaluate = |p: &Polynomial| -> Option<FieldElement> {
+            p.iter().try_fold(FieldElement::ZERO, |sum, (powers, k)| {
                 let term = powers
                     .iter()
-                    .try_fold(Element::from_rational(k)?, |product, (name, n)| {
+                    .try_fold(FieldElement::from_rational(k)?, |product, (name, n)| {
                         Some(product * values.get(name)?.power(u64::from(*n)))
                     })?;
                 Some(sum + term)
@@ -282,10 +282,7 @@ impl Map {
                 definitions.insert(name.trim().to_owned(), value);
             } else {
                 for name in line.split_whitespace() {
-                    rows.push((
-                        name.to_owned(),
-                        by_product(&Fraction::name(name), mechanism),
-                    ));
+                    rows.push((name.to_owned(), by_product(&Fraction::name(name), mechanism)));
                 }
             }
         }
@@ -296,7 +293,7 @@ impl Map {
 
     /// The map that the mill found.
     pub fn of_mill(derivation: &Derivation) -> Self {
-        let Reduction {
+        let BaseReduction {
             products,
             retained,
             dependencies,
@@ -342,22 +339,13 @@ impl Map {
 
     /// Asserts that two maps agree row by row and factor by factor, as rational functions.
     pub fn assert_equals(&self, other: &Self) {
-        let names = |map: &Self| -> BTreeSet<String> {
-            map.rows.iter().map(|(name, _)| name.clone()).collect()
-        };
+        let names = |map: &Self| -> BTreeSet<String> { map.rows.iter().map(|(name, _)| name.clone()).collect() };
         assert_eq!(names(self), names(other), "other parameters are retained");
         for (name, row) in &self.rows {
-            let (_, there) = other
-                .rows
-                .iter()
-                .find(|(n, _)| n == name)
-                .expect("the same names");
+            let (_, there) = other.rows.iter().find(|(n, _)| n == name).expect("the same names");
             let zero = Fraction::number(Rational::ZERO);
             for product in row.keys().chain(there.keys()) {
-                let (a, b) = (
-                    row.get(product).unwrap_or(&zero),
-                    there.get(product).unwrap_or(&zero),
-                );
+                let (a, b) = (row.get(product).unwrap_or(&zero), there.get(product).unwrap_or(&zero));
                 assert!(
                     a == b,
                     "the factor of {product} in {name} is {a:?} here and {b:?} there"
@@ -377,12 +365,12 @@ impl Map {
             .chain(&other.rows)
             .flat_map(|(_, row)| row.keys().cloned())
             .collect();
-        let mut stream = Stream::new(0x5052_4F44);
+        let mut stream = RandomStream::new(0x5052_4F44);
         for _ in 0..5 {
-            let constants: BTreeMap<String, Element> = mechanism
+            let constants: BTreeMap<String, FieldElement> = mechanism
                 .constants
                 .iter()
-                .map(|c| (c.name.clone(), stream.element()))
+                .map(|c| (c.name.clone(), stream.next_element()))
                 .collect();
             let (a, b) = (
                 self.reduced_rows(&products, &constants),
@@ -397,25 +385,24 @@ impl Map {
     fn reduced_rows(
         &self,
         products: &BTreeSet<String>,
-        constants: &BTreeMap<String, Element>,
-    ) -> Vec<Vec<Element>> {
-        let mut rows: Vec<Vec<Element>> = self
+        constants: &BTreeMap<String, FieldElement>,
+    ) -> Vec<Vec<FieldElement>> {
+        let mut rows: Vec<Vec<FieldElement>> = self
             .rows
             .iter()
             .map(|(_, row)| {
                 products
                     .iter()
                     .map(|product| {
-                        row.get(product).map_or(Element::ZERO, |f| {
-                            f.value(constants).expect("a regular value")
-                        })
+                        row.get(product)
+                            .map_or(FieldElement::ZERO, |f| f.value(constants).expect("a regular value"))
                     })
                     .collect()
             })
             .collect();
         let mut rank = 0;
         for column in 0..products.len() {
-            let Some(pivot) = (rank..rows.len()).find(|r| rows[*r][column] != Element::ZERO) else {
+            let Some(pivot) = (rank..rows.len()).find(|r| rows[*r][column] != FieldElement::ZERO) else {
                 continue;
             };
             rows.swap(rank, pivot);
@@ -426,7 +413,7 @@ impl Map {
             let pivot_row = rows[rank].clone();
             for (r, row) in rows.iter_mut().enumerate() {
                 let factor = row[column];
-                if r != rank && factor != Element::ZERO {
+                if r != rank && factor != FieldElement::ZERO {
                     for (x, p) in row.iter_mut().zip(&pivot_row) {
                         *x = *x - factor * *p;
                     }

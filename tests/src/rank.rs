@@ -1,6 +1,6 @@
 //! Rank of eq. (9) on a sample, safe against columns that are nothing but rounding.
 
-use modelmill_codegen::{Evaluator, PoseFault};
+use modelmill_codegen::{ModelEvaluator, PoseFault};
 use modelmill_identify::estimate::{RegressorRank, numeric_rank};
 use nalgebra::DMatrix;
 
@@ -23,9 +23,6 @@ pub fn rank(mut w: DMatrix<f64>) -> RegressorRank {
 }
 
 /// The numeric rank of all products' columns at some states.
-pub fn rank_of_products(
-    evaluator: &Evaluator<'_>,
-    sample: &Sample,
-) -> Result<RegressorRank, PoseFault> {
+pub fn rank_of_products(evaluator: &ModelEvaluator<'_>, sample: &Sample) -> Result<RegressorRank, PoseFault> {
     evaluator.full_regressor(&sample.states()).map(rank)
 }

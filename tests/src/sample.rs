@@ -1,6 +1,6 @@
 //! States of motion to evaluate a model at.
 
-use modelmill_codegen::{Evaluator, States};
+use modelmill_codegen::{ModelEvaluator, MotionStates};
 use modelmill_spec::Mechanism;
 
 use crate::fixtures::Table;
@@ -30,17 +30,13 @@ impl Sample {
                 0.5 * reach
             };
             let mut draw = |centre: f64, reach: f64| -> Vec<f64> {
-                (0..n)
-                    .map(|_| centre + stream.between(-reach, reach))
-                    .collect()
+                (0..n).map(|_| centre + stream.between(-reach, reach)).collect()
             };
             sample.q.push(draw(coordinate.nominal, reach));
             let (rates, accelerations) = (draw(0.0, 2.0), draw(0.0, 8.0));
             let moved = f64::from(u8::from(coordinate.motion.has_rate()));
             sample.qd.push(rates.iter().map(|x| moved * x).collect());
-            sample
-                .qdd
-                .push(accelerations.iter().map(|x| moved * x).collect());
+            sample.qdd.push(accelerations.iter().map(|x| moved * x).collect());
         }
         for _ in &mechanism.drives {
             let mut draw = || (0..n).map(|_| stream.between(-50.0, 50.0)).collect();
@@ -62,8 +58,8 @@ impl Sample {
     }
 
     /// As the evaluator takes them.
-    pub fn states(&self) -> States<'_> {
-        States {
+    pub fn states(&self) -> MotionStates<'_> {
+        MotionStates {
             q: self.q.iter().map(Vec::as_slice).collect(),
             qd: self.qd.iter().map(Vec::as_slice).collect(),
             qdd: self.qdd.iter().map(Vec::as_slice).collect(),
@@ -84,12 +80,7 @@ impl Sample {
     #[must_use]
     pub fn filtered(&self, keep: impl Fn(usize) -> bool) -> Self {
         let kept: Vec<usize> = (0..self.len()).filter(|i| keep(*i)).collect();
-        let filter = |columns: &[Vec<f64>]| {
-            columns
-                .iter()
-                .map(|c| kept.iter().map(|i| c[*i]).collect())
-                .collect()
-        };
+        let filter = |columns: &[Vec<f64>]| columns.iter().map(|c| kept.iter().map(|i| c[*i]).collect()).collect();
         Self {
             q: filter(&self.q),
             qd: filter(&self.qd),
@@ -106,7 +97,7 @@ impl Sample {
 
     /// The states that the mechanism can take, away from singular ones.
     #[must_use]
-    pub fn reachable(&self, evaluator: &Evaluator<'_>) -> Self {
+    pub fn reachable(&self, evaluator: &ModelEvaluator<'_>) -> Self {
         self.filtered(|i| {
             let one = self.only(i);
             evaluator.full_regressor(&one.states()).is_ok()

@@ -1,5 +1,5 @@
-// How the page asks where it has the mill in itself: one worker answers, another one diagnoses, so that the text stays alive
-// meanwhile; what takes too long is stopped by ending its worker.
+// Requests of a page that contains the program: one worker answers, another one diagnoses, so that the editor stays responsive.
+// Work that takes too long is stopped by ending its worker.
 (() => {
   'use strict';
   const by = (id) => document.getElementById(id);
@@ -13,12 +13,12 @@
   const bundle = unpacked('bundle').then((bytes) => JSON.parse(new TextDecoder().decode(bytes)));
   const encode = (words) => new TextEncoder().encode(words);
 
-  // What lies on the desk: the model file as saved, its last text that was answered, recordings.
+  // The open files: the model file as saved, its last text that was derived, recordings.
   const desk = { model: '', saved: '', text: '', runs: [], others: [] };
-  // Counts go on where another sitting begins; the text has no other editor.
+  // Counts continue in the next session; the text has no other editor.
   let count = 0, revision = 0;
 
-  // A worker with everything of the desk before it.
+  // Starts a worker, which gets all open files.
   const hired = (heard) => {
     const worker = new Worker(source);
     const waiting = new Map();
@@ -34,8 +34,8 @@
       if (data.fault) {
         one.isOver = true;
         worker.terminate();
-        if (reject) reject(new Error(`a fault of the program, which is none of yours (${data.fault}); the text is kept`));
-        fail('the mill begins anew');
+        if (reject) reject(new Error(`internal error of the program, not of your input (${data.fault}); the text is kept`));
+        fail('the program is started again');
       } else if (resolve) resolve(data.answer);
     };
     worker.onerror = (event) => { one.isOver = true; fail(event.message); };
@@ -52,8 +52,8 @@
     const one = {
       isOver: false,
       ask,
-      end: () => { one.isOver = true; worker.terminate(); fail('it was stopped'); },
-      // The text as it was saved, then as it stands.
+      end: () => { one.isOver = true; worker.terminate(); fail('the work was stopped'); },
+      // Opens the saved text, then the current one.
       open: async () => {
         await send({ module: await module });
         for (const { name, bytes } of [...desk.others, ...desk.runs]) await send({ name, bytes });
@@ -88,7 +88,7 @@
     if (awaited) awaited(told);
     awaited = null;
   };
-  // Another model or other recordings: a sitting of its own, which the page hears of as news.
+  // Starts a new session for another model or other recordings, and notifies the page.
   const anew = () => {
     if (answering) answering.end();
     diagnosis.forget();
@@ -96,9 +96,9 @@
     return begun().then(tell, () => {});
   };
 
-  // ---- long work, each kind in a worker of its own
+  // ---- long work, each kind in a separate worker
 
-  // `question` is asked there; the worker is ended to cancel, and kept for what is asked about the answer.
+  // Sends `question` to the worker. The worker is ended to cancel, and kept for later requests about the answer.
   const long = (question, words) => {
     let worker = null, asked = { number: 0 };
     const told = () => ({
@@ -112,8 +112,8 @@
     return {
       told,
       begin: async (body) => {
-        if (asked.going) throw new Error(`${words} goes on; wait for it, or cancel it`);
-        const mine = { number: ++count, text: desk.text, going: { what: 'beginning', done: 0, total: 0 }, since: performance.now() };
+        if (asked.going) throw new Error(`${words} is running; wait until it ends, or cancel it`);
+        const mine = { number: ++count, text: desk.text, going: { what: 'starting', done: 0, total: 0 }, since: performance.now() };
         asked = mine;
         if (worker) worker.end();
         worker = hired((goes) => { mine.going = goes; });
@@ -148,7 +148,7 @@
   // The text with a finding, by the same edit as `add`.
   const edit = async ({ text, did }) => heard(await answering.ask('edit', { base: revision, text, did }));
   const add = async ({ entry }) => {
-    const finding = diagnosis.holder('there is no such finding; diagnose again');
+    const finding = diagnosis.holder('there is no such finding; run the diagnosis again');
     const { kind, at } = diagnosis.told().found.entries[entry];
     const theirs = await finding.ask('view');
     await finding.ask('edit', { base: theirs.revision, text: desk.text });
@@ -175,28 +175,28 @@
     await begun();
     if (question in own) return own[question](body);
     const told = heard(await answering.ask(question, body));
-    // A rung may have come to the ladder.
+    // The comparison may have added a step to the session.
     if (question === 'compare') answering.ask('view').then(heard).then(tell, () => {});
     return told;
   };
-  // The first view at once, a later one as soon as something else stands.
+  // The first view at once, a later one after the next change.
   const news = async (version) => {
     if (!version) return ready.then(() => ask('view'));
     return fresh && fresh.version > version ? fresh : new Promise((done) => { awaited = done; });
   };
 
-  // ---- what is put on the desk
+  // ---- open files
 
   const runs = () => {
     by('runs').replaceChildren(...desk.runs.map((run, k) => {
       const item = document.createElement('li');
       const use = document.createElement('select');
-      use.setAttribute('aria-label', `What ${run.name} is for`);
-      for (const words of ['fit', 'check']) use.append(new Option(words, words, false, run.isCheck === (words === 'check')));
+      use.setAttribute('aria-label', `Use of ${run.name}`);
+      for (const [words, isCheck] of [['fit', false], ['validation', true]]) use.append(new Option(words, isCheck ? 'check' : 'fit', false, run.isCheck === isCheck));
       use.addEventListener('change', () => { run.isCheck = use.value === 'check'; anew(); });
       const away = document.createElement('button');
       Object.assign(away, { type: 'button', textContent: '\u00d7' });
-      away.setAttribute('aria-label', `Take ${run.name} away`);
+      away.setAttribute('aria-label', `Remove ${run.name}`);
       away.addEventListener('click', () => { desk.runs.splice(k, 1); runs(); anew(); });
       item.append(run.name, ' ', use, ' ', away);
       return item;
@@ -212,7 +212,7 @@
     });
     runs();
   };
-  const isSafe = () => desk.text === desk.saved || confirm(`${desk.model} has changes that are not saved. Put another model in its place?`);
+  const isSafe = () => desk.text === desk.saved || confirm(`${desk.model} has unsaved changes. Open another model and lose them?`);
   const take = async (files) => {
     let isNew = false;
     for (const file of files) {
@@ -252,10 +252,10 @@
     });
     by('stop').addEventListener('click', () => answering.end());
   });
-  // What takes its time may be stopped.
+  // The user can stop a derivation that takes long.
   window.mill = {
     ask, news,
     slow: (isSlow) => { by('stop').hidden = !isSlow; },
-    hint: 'No recording is here yet: drop one on the page (CSV, Parquet, MCAP, HDF5, \u2026), or choose a file above.',
+    hint: 'No recording is open: drop one on the page (CSV, Parquet, MCAP, HDF5, \u2026), or choose a file above.',
   };
 })();

@@ -1,7 +1,7 @@
-//! What a page may ask of a sitting, by name and with a body of JSON, wherever the sitting takes place.
+//! The requests of a page to a session. A name and a JSON body go in; JSON, SVG, HTML or a refusal comes out.
 //!
 //! Decision: the page sends a name and a JSON body and does not know whether a server or a worker answers. So there
-//! is one page, and what is tested on a server holds for both.
+//! is one page, and tests with a server are valid for both.
 
 use std::sync::Arc;
 
@@ -9,30 +9,33 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use crate::sitting::{Keeping, Seeing, Sitting};
+use crate::session::{KeepTrajectoryRequest, PictureRequest, WorkbenchSession};
 
-/// What a page gets.
-pub(crate) enum Answer {
+/// A response to a page.
+pub(crate) enum PageResponse {
+    /// Data for the scripts of the page.
     Json(Value),
+    /// A picture.
     Svg(String),
+    /// A part of a page.
     Html(String),
 }
 
-/// Why it gets none.
+/// Kind of a refusal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Fault {
-    /// Nothing of that name can be asked.
+pub(crate) enum RequestFault {
+    /// There is no request with this name.
     Unknown,
-    /// The body is none of this question.
+    /// The body does not fit the request.
     Malformed,
-    /// The text was changed meanwhile.
+    /// The text was changed since the revision that the request refers to.
     Conflict,
-    /// It cannot be done.
+    /// The request is valid but cannot be fulfilled.
     Refused,
 }
 
-impl Fault {
-    /// As HTTP counts it.
+impl RequestFault {
+    /// The HTTP status code.
     pub(crate) fn status(self) -> u16 {
         match self {
             Self::Unknown => 404,
@@ -43,105 +46,118 @@ impl Fault {
     }
 }
 
-/// No answer, with a sentence that says why.
-pub(crate) struct Refusal(pub(crate) Fault, pub(crate) String);
+/// A refusal: its kind, and a sentence with the reason.
+pub(crate) struct RequestRefusal(pub(crate) RequestFault, pub(crate) String);
 
-impl From<String> for Refusal {
+impl From<String> for RequestRefusal {
     fn from(says: String) -> Self {
-        Self(Fault::Refused, says)
+        Self(RequestFault::Refused, says)
     }
 }
 
+/// Body of `edit`.
 #[derive(Deserialize)]
-struct Edit {
-    /// The revision that the text was made of.
+struct EditRequest {
+    /// The revision that was edited.
     base: u64,
+    /// The complete new text.
     text: String,
-    /// What it does, in words.
+    /// Name of the step for the pane *Ladder*, if the edit is a step.
     #[serde(default)]
     did: Option<String>,
 }
 
+/// Body of `choose`, which resolves a conflict between two texts.
 #[derive(Deserialize)]
-struct Choice {
+struct ConflictRequest {
+    /// Whether the text of the other program replaces that of the page.
     theirs: bool,
 }
 
+/// Body of `compare`.
 #[derive(Deserialize)]
-struct Comparing {
-    /// Whether to look where the error lives.
+struct CompareRequest {
+    /// Whether to search for the regions with the largest error.
     places: bool,
     /// Whether to read the recordings again.
     afresh: bool,
 }
 
+/// Body of `curves`.
 #[derive(Deserialize)]
-struct Curves {
-    /// With identified values rather than those of the file.
+struct CurvesRequest {
+    /// Whether to use identified values instead of those of the file.
     identified: bool,
 }
 
+/// Body of `variant`.
 #[derive(Deserialize)]
-struct Variant {
-    /// The model that is held beside the text, as `models` names it; the text as it was saved if there is none.
+struct VariantRequest {
+    /// The model to compare with, by its name in `models`; none for the saved text.
     beside: Option<String>,
 }
 
+/// Body of `add`.
 #[derive(Deserialize)]
-struct Add {
+struct AddEffectRequest {
+    /// Index of the effect among the findings of the last diagnosis.
     entry: usize,
 }
 
-/// Answers a question about a sitting.
-pub(crate) fn answer(
-    sitting: &Arc<Sitting>,
+/// Answers a request to a session.
+pub(crate) fn answer_request(
+    session: &Arc<WorkbenchSession>,
     question: &str,
     body: &[u8],
-) -> Result<Answer, Refusal> {
-    Ok(Answer::Json(match question {
-        "view" => sitting.view(),
+) -> Result<PageResponse, RequestRefusal> {
+    Ok(PageResponse::Json(match question {
+        "view" => session.view(),
         "edit" => {
-            let Edit { base, text, did } = read(body)?;
-            let told = sitting.edit(base, &text, did.as_deref());
-            told.ok_or_else(|| {
-                let says = "the text was changed elsewhere meanwhile";
-                Refusal(Fault::Conflict, says.to_owned())
+            let EditRequest { base, text, did } = parse_body(body)?;
+            let view_json = session.edit(base, &text, did.as_deref());
+            view_json.ok_or_else(|| {
+                let says = "the text was changed in another window";
+                RequestRefusal(RequestFault::Conflict, says.to_owned())
             })?
         }
-        "save" => sitting.save()?,
-        "choose" => sitting.choose(read::<Choice>(body)?.theirs),
-        "picture" => return Ok(Answer::Svg(sitting.picture(&read::<Seeing>(body)?)?)),
-        "equations" => return Ok(Answer::Html(sitting.equations()?)),
+        "save" => session.save()?,
+        "choose" => session.resolve_conflict(parse_body::<ConflictRequest>(body)?.theirs),
+        "picture" => {
+            return Ok(PageResponse::Svg(
+                session.picture(&parse_body::<PictureRequest>(body)?)?,
+            ));
+        }
+        "equations" => return Ok(PageResponse::Html(session.equations()?)),
         "compare" => {
-            let Comparing { places, afresh } = read(body)?;
-            sitting.compare(places, afresh)?
+            let CompareRequest { places, afresh } = parse_body(body)?;
+            session.compare(places, afresh)?
         }
         "curves" => {
-            let Curves { identified } = read(body)?;
-            return Ok(Answer::Html(sitting.curves(identified)?));
+            let CurvesRequest { identified } = parse_body(body)?;
+            return Ok(PageResponse::Html(session.curves(identified)?));
         }
-        "motion" => sitting.motion()?,
-        "models" => sitting.models(),
-        "variant" => sitting.variant(read::<Variant>(body)?.beside.as_deref())?,
-        "diagnosis" => sitting.diagnosis(),
-        "diagnose" => sitting.diagnose()?,
-        "cancel" => sitting.cancel(),
-        "add" => sitting.add(read::<Add>(body)?.entry)?,
-        "words" => sitting.words()?,
-        "limits" => sitting.limits()?,
-        "excite" => sitting.excite(read(body)?)?,
-        "excitation" => sitting.excitation(),
-        "stop_excitation" => sitting.stop_excitation(),
-        "trajectory" => sitting.trajectory()?,
-        "keep_trajectory" => sitting.keep_trajectory(&read::<Keeping>(body)?)?,
+        "motion" => session.motion()?,
+        "models" => session.models(),
+        "variant" => session.variant(parse_body::<VariantRequest>(body)?.beside.as_deref())?,
+        "diagnosis" => session.diagnosis(),
+        "diagnose" => session.diagnose()?,
+        "cancel" => session.cancel(),
+        "add" => session.add(parse_body::<AddEffectRequest>(body)?.entry)?,
+        "words" => session.completions()?,
+        "limits" => session.limits()?,
+        "excite" => session.excite(parse_body(body)?)?,
+        "excitation" => session.excitation(),
+        "stop_excitation" => session.stop_excitation(),
+        "trajectory" => session.trajectory()?,
+        "keep_trajectory" => session.keep_trajectory(&parse_body::<KeepTrajectoryRequest>(body)?)?,
         other => {
-            let says = format!("nothing called `{other}` can be asked");
-            return Err(Refusal(Fault::Unknown, says));
+            let says = format!("there is no request `{other}`");
+            return Err(RequestRefusal(RequestFault::Unknown, says));
         }
     }))
 }
 
-/// A body of JSON.
-pub(crate) fn read<T: DeserializeOwned>(body: &[u8]) -> Result<T, Refusal> {
-    serde_json::from_slice(body).map_err(|error| Refusal(Fault::Malformed, error.to_string()))
+/// Reads a JSON body; refuses one that does not fit the request.
+pub(crate) fn parse_body<T: DeserializeOwned>(body: &[u8]) -> Result<T, RequestRefusal> {
+    serde_json::from_slice(body).map_err(|error| RequestRefusal(RequestFault::Malformed, error.to_string()))
 }

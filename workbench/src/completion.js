@@ -1,5 +1,5 @@
-// What may stand where the caret is: keys and values of the schema of model files, kinds of effects, and names of the text itself.
-// It opens while one types or by Ctrl+Space; arrows choose, Enter or Tab takes, Escape closes.
+// Completions at the caret: keys and values of the schema of model files, kinds of effects, and names of the text itself.
+// The list opens while the user types or with Ctrl+Space; arrows choose, Enter or Tab inserts, Escape closes.
 (() => {
   'use strict';
   const { ask } = window.mill;
@@ -17,7 +17,7 @@
   // ---- where the caret is
 
   const HEAD = /^\s*(\[\[?)\s*([A-Za-z0-9_.\s]+?)\s*\]\]?\s*(#.*)?$/;
-  // The table that a line stands in: its path, and the lines of it.
+  // The table that contains a line: its path, and its lines.
   const tableOf = (lines, at) => {
     let from = at;
     while (from >= 0 && !HEAD.test(lines[from])) from--;
@@ -26,7 +26,7 @@
     const path = from >= 0 ? HEAD.exec(lines[from])[2].split('.').map((one) => one.trim()) : [];
     return { path, lines: lines.slice(from + 1, to) };
   };
-  // What stands on a line before the caret: keys that lead there, the word that is begun, whether a value is expected.
+  // The part of a line before the caret: keys that lead there, the unfinished word, whether a value is expected.
   const before = (words) => {
     const path = [];
     let key = '', isValue = false, quote = '', start = 0, depth = 0;
@@ -46,7 +46,7 @@
       else if (c === ',') { if (!depth) { isValue = false; key = ''; } start = i + 1; }
       else if (/[\s*/+\-^()]/.test(c) && (isValue || start === i)) start = i + 1;
     }
-    // Within quotes an expression has words of its own.
+    // Within quotes an expression consists of several words.
     if (quote) {
       const inner = words.slice(start);
       start += inner.length - /[A-Za-z0-9_]*$/.exec(inner)[0].length;
@@ -54,7 +54,7 @@
     return { path, key: isValue ? key : '', isValue, quote, start, word: words.slice(start) };
   };
 
-  // ---- what the schema says of it
+  // ---- definitions of the schema
 
   const resolved = (one) => {
     for (let steps = 0; one && one.$ref && steps < 9; steps++) one = { ...schema.$defs[one.$ref.split('/').pop()], ...(one.description ? { description: one.description } : {}) };
@@ -78,7 +78,7 @@
     return (one && one.properties) || {};
   };
 
-  // ---- names that the text gives
+  // ---- names that the text defines
 
   const named = () => {
     const names = { frame: ['base'], point: [], part: [], lumped_mass: [], drive: [], loop: [], coordinates: [], constants: [], parameters: [] };
@@ -109,7 +109,7 @@
     return all.filter((one, k) => all.findIndex((other) => other.name === one.name) === k);
   };
 
-  // Names that a value is expected to be one of; `null` where the schema alone knows.
+  // Names that are possible for a value; `null` if only the schema determines them.
   const values = (table, path, key, lines) => {
     const names = named();
     const where = [...table, ...path];
@@ -134,7 +134,7 @@
     return null;
   };
 
-  // All that may stand at the caret, with where it would begin and what surrounds it.
+  // All completions at the caret, with the range of the text that they replace.
   const wanted = () => {
     const caret = text.selectionStart;
     if (caret !== text.selectionEnd || !schema) return null;
@@ -150,14 +150,14 @@
       return {
         start, word: head[1],
         all: heads.map(([name, one, own]) => ({ name, says: own.description || one.description || '', put: one.type === 'array' ? `[[${name}]]` : `[${name}]` })),
-        // A bracket that closes already is written over.
+        // A closing bracket that is already there is replaced.
         end: caret + (/^\]{0,2}/.exec(text.value.slice(caret))[0].length),
       };
     }
     const at = before(line);
     if (!at) return null;
     const table = tableOf(lines, row);
-    // Definitions of a variant are those whose fields may all be left away.
+    // All fields of a variant are optional.
     let one = { properties: schema.properties };
     for (const name of [...table.path, ...at.path]) one = one && within(one, name);
     const start = caret - line.length + at.start;
@@ -167,7 +167,7 @@
       const here = properties(one);
       const there = at.path.length ? line.slice(line.lastIndexOf('{')) : table.lines.join('\n');
       const isThere = (name) => new RegExp(`(^|[\\n{,])\\s*${name}\\s*=`).test(there);
-      // Tables of the file itself begin with a bracket.
+      // Tables at the top level of the file begin with a bracket, so they are not offered as keys.
       const isTable = (of) => !table.path.length && !at.path.length && (properties(of).name || (resolved(of) || {}).type === 'object');
       const all = special || Object.entries(here).filter(([, of]) => !isTable(of)).map(([name, of]) => ({ name, says: (resolved(of) || {}).description || '' }));
       return { ...rest, all: all.filter((offer) => offer.name === at.word || !isThere(offer.name)).map((offer) => ({ ...offer, put: `${offer.name} = ` })) };
@@ -185,7 +185,7 @@
 
   // ---- the list
 
-  // Where a place of the text is on the screen; all letters are of one width.
+  // Position of a character on the screen, px.
   const spot = (index) => {
     const style = getComputedStyle(text);
     const pen = spot.pen = spot.pen || document.createElement('canvas').getContext('2d');
@@ -235,7 +235,7 @@
     settle();
     mark(0);
   };
-  // The list stands below its word, or above it where there is no room.
+  // Places the list below its word, or above it if there is no room.
   const settle = () => {
     const { x, y, height } = spot(place.start);
     const box = list.getBoundingClientRect();
@@ -268,7 +268,7 @@
     const isShorter = event.inputType === 'deleteContentBackward' && !list.hidden;
     if (!isWord && !isShorter) { if (!list.hidden) close(); return; }
     open();
-    // One letter alone may be a beginning of anything; names that are asked for come at once.
+    // After one letter there are too many completions; after a quote the possible names are shown at once.
     if (isWord && event.data !== '"' && place && !place.word.slice(1)) close();
   });
   text.addEventListener('blur', close);

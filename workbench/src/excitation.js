@@ -1,4 +1,4 @@
-// The pane that plans a motion: limits that it keeps, a search with its progress, its picture, and the file.
+// The pane that plans a motion: its limits, a search with its progress, its picture, and the file.
 (() => {
   'use strict';
   const { ask, make, number, cell, amount, say, tried, others, send, told_command, view, animate, heard } = window.workbench;
@@ -23,7 +23,7 @@
     });
     row.insertCell().append(input);
   };
-  // What was typed here stays as long as the coordinates do.
+  // Typed values stay as long as the coordinates are the same.
   const limits = () => tried(async () => {
     if (!isOpen || !view() || !view().valid || derived === view().derived) return;
     derived = view().derived;
@@ -36,8 +36,8 @@
       const [low, high] = one.position || [];
       field(row, `${one.name}, from`, low, !one.position);
       field(row, `${one.name}, to`, high, !one.position);
-      field(row, `${one.name}, rate up to`, one.rate ? one.rate[1] : undefined);
-      field(row, `${one.name}, acceleration up to`, one.acceleration ? one.acceleration[1] : undefined);
+      field(row, `${one.name}, largest rate`, one.rate ? one.rate[1] : undefined);
+      field(row, `${one.name}, largest acceleration`, one.acceleration ? one.acceleration[1] : undefined);
       return row;
     }));
     for (const input of by('limits').querySelectorAll('input')) {
@@ -46,14 +46,14 @@
     }
     window.enlivenTables(by('limits'));
   }, 'limits');
-  // Limits that differ from those of the model file, as the program takes them.
+  // Limits that differ from those of the model file, in the form of the option `--limits`.
   const given = () => {
     const all = [];
     for (const row of by('limits').tBodies[0].rows) {
       const [low, high, rate, acceleration] = [...row.querySelectorAll('input')];
       const { name } = row.dataset;
       if (low.value.trim() === '' || high.value.trim() === '')
-        throw new Error(`${name} has no limits; give it a least and a largest position here, or under [limits.coordinates] in the model file`);
+        throw new Error(`${name} has no limits; enter the smallest and the largest position here, or under [limits.coordinates] in the model file`);
       const isNew = (input) => input.value.trim() !== input.dataset.was;
       if (isNew(low) || isNew(high)) all.push(`${name}=${low.value.trim()}:${high.value.trim()}`);
       for (const [input, [, ending]] of [[rate, KINDS[1]], [acceleration, KINDS[2]]])
@@ -62,7 +62,7 @@
     return all;
   };
 
-  // ---- what was found
+  // ---- the result
 
   const found = (told) => {
     const box = by('planned');
@@ -71,12 +71,12 @@
     if (told.failed) box.append(make('p', told.failed, 'alias'));
     const plan = told.found;
     if (!plan) return;
-    if (!told.of_this_text) box.append(make('p', 'The text was changed since; search again.', 'alias'));
+    if (!told.of_this_text) box.append(make('p', 'This result is of an earlier text. Search again for the current text.', 'alias'));
     box.append(make('p', plan.says, 'verdict'));
     for (const note of plan.notes) box.append(make('p', note.says));
     const table = make('table');
     const head = table.createTHead().insertRow();
-    for (const [words, cls] of [['limit', ''], ['part of it that is used', 'number'], ['how it was looked at', '']]) {
+    for (const [words, cls] of [['limit', ''], ['used', 'number'], ['checked', '']]) {
       const one = head.appendChild(make('th', words, cls));
       one.scope = 'col';
     }
@@ -85,7 +85,7 @@
       const row = body.insertRow();
       cell(row, limit.name);
       amount(row, limit.used === null ? '\u2014' : `${number(100 * limit.used)} %`, limit.used);
-      cell(row, limit.proven ? 'at all times' : 'at fine steps');
+      cell(row, limit.proven ? 'at all times' : 'at fine time steps');
     }
     const file = make('p');
     const name = make('input');
@@ -108,12 +108,12 @@
       link.click();
       URL.revokeObjectURL(link.href);
     });
-    if (window.mill.keeps) button('Save beside the model', async () => {
+    if (window.mill.keeps) button('Save next to the model', async () => {
       const { path } = await ask('keep_trajectory', { name: name.value });
       say(`${path} is written.`);
     });
     const run = { file: 'planned motion', time: plan.time, q: plan.q };
-    button('Show the mechanism moving', async () => animate(plan.names, run, true)).id = 'animate';
+    button('Show the motion of the mechanism', async () => animate(plan.names, run, true)).id = 'animate';
     const figure = make('figure');
     figure.innerHTML = plan.picture;
     box.append(file, figure, table);

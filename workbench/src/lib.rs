@@ -1,28 +1,30 @@
-//! The workbench: one model file in the browser, on the user's own machine, with its picture, equations, errors along recordings
-//! and diagnosis beside the text.
+//! The workbench: one model file in the browser, on the user's own machine, with its picture, equations, errors along
+//! recordings and diagnosis next to the text.
 //!
-//! `options` is what is put on it, `draft` the text beside what the disk holds, `readings` recordings as a model reads them,
-//! `surroundings` what a sitting needs of where it takes place, `watch` the progress of a diagnosis; `sitting` is the text with
-//! what was derived of it and asked about it, `variant` the model that it is held beside, `told` the answers as JSON, `answers` what a page may ask, `page` the page.
+//! `options` has the files and settings, `document` the edited document and the text on disk, `readings` the cache of
+//! recordings, `surrounding_files` the environment of a session (files, clock, threads), `watch` the progress of a job.
+//! `session` is the session: the text, the derived model, and the jobs. `variant` is the model that the text is
+//! compared with, `view` the JSON views, `answers` the requests of a page, `page` the page.
 //!
-//! It takes place on this machine, where `machine` has the disk behind a `fence` and a `server` lets the page ask; or on a
-//! `desk` in memory (its files on a `shelf`), which WebAssembly carries into the page itself. All of the work is the library's:
-//! this crate derives, compares and diagnoses nothing by itself.
+//! A session runs on this machine: `machine` gives access to the disk through the file access policy of `file_access`, and
+//! `server` receives the requests of the page. Or it runs in memory: `request_handler` is the request handler and `memory_store` the
+//! memory store, compiled to WebAssembly as part of the page. The library does the work: this crate does not derive,
+//! compare or diagnose by itself.
 
 mod answers;
-mod desk;
-mod draft;
+mod document;
+mod memory_store;
 mod options;
 mod readings;
-mod shelf;
-mod sitting;
-mod surroundings;
-mod told;
+mod request_handler;
+mod session;
+mod surrounding_files;
 mod variant;
+mod view;
 mod watch;
 
 #[cfg(not(target_family = "wasm"))]
-mod fence;
+mod file_access;
 #[cfg(not(target_family = "wasm"))]
 mod machine;
 #[cfg(not(target_family = "wasm"))]
@@ -30,25 +32,28 @@ mod page;
 #[cfg(not(target_family = "wasm"))]
 mod server;
 
-pub use desk::Desk;
-pub use options::{Commands, Excitation, Options, Step};
+pub use options::{ExcitationSettings, Options, WorkbenchCommands, WorkbenchStep};
 #[cfg(not(target_family = "wasm"))]
-pub use page::{Bundle, alone};
+pub use page::{PageBundle, standalone_page};
+pub use request_handler::RequestHandler;
 
-/// Serves the workbench on the loopback address until the program is stopped; `opened` gets the link as soon as it answers.
+/// Serves the workbench on the loopback address until the program is stopped; `opened` gets the link once the server
+/// listens.
 ///
-/// `host` gives libraries of effects and how models are derived; files come through a fence of the workbench's own.
-/// Fails when the model file cannot be read, or the port is taken. A model file that has no meaning is no failure: it is what
-/// the workbench is for.
+/// `host` gives libraries of effects and options for deriving models; files are read through the workbench's file
+/// access policy. Fails if the model file cannot be read, or the port is in use. A model file with faults is no
+/// failure: the page shows the faults.
 #[cfg(not(target_family = "wasm"))]
 pub fn serve(
     host: &modelmill::Host,
     options: Options,
-    commands: std::sync::Arc<dyn Commands>,
+    commands: std::sync::Arc<dyn WorkbenchCommands>,
     opened: impl FnOnce(&str),
 ) -> modelmill::Outcome {
     let port = options.port;
-    let machine = std::sync::Arc::new(machine::Machine::new(fence::Fence::opened(host, &options)));
-    let sitting = sitting::Sitting::open(host, options, commands, machine.clone())?;
-    server::serve(std::sync::Arc::new(sitting), machine, port, opened)
+    let machine = std::sync::Arc::new(machine::LocalMachine::new(file_access::FileAccessPolicy::for_session(
+        host, &options,
+    )));
+    let session = session::WorkbenchSession::open(host, options, commands, machine.clone())?;
+    server::serve(std::sync::Arc::new(session), machine, port, opened)
 }

@@ -1,67 +1,68 @@
-//! What is put on the workbench, and the words in which its steps are said.
+//! Options of the workbench: files and settings, and the commands that do the same without it.
 
 use std::path::{Path, PathBuf};
 
-use modelmill::excite::Request;
+use modelmill::excite::ExcitationRequest;
 use modelmill::print::StepSpelling;
-use modelmill::recording::Reading;
+use modelmill::recording::RecordingOptions;
 use serde::Deserialize;
 
-/// What is put on the workbench.
+/// The files of a session, and how they are read and served.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
     /// The model file.
     pub model: PathBuf,
-    /// Recordings to fit to and to compare with, each of one or several files that are joined on time.
+    /// Recordings to fit and to compare with, each of one or several files that are joined on time.
     pub data: Vec<Vec<PathBuf>>,
-    /// Recordings that a fit does not see.
+    /// Recordings for validation, not used in a fit.
     pub check: Vec<Vec<PathBuf>>,
-    /// A model file beside the model, which may lie in another folder.
+    /// A model file to compare with, which may be in another folder.
     pub beside: Option<PathBuf>,
     /// How recordings are read.
-    pub reading: Reading,
-    /// What revisions and versions are counted from, so that a page which opens one sitting after the other never takes one's
-    /// answers for the other's.
+    pub reading: RecordingOptions,
+    /// Value before the first revision and version. A page that opens several sessions in sequence thus never confuses
+    /// their responses.
     pub first: u64,
-    /// The port on the loopback address; 0 takes one that is free.
+    /// The port on the loopback address; 0 selects a free one.
     pub port: u16,
 }
 
-/// What a reader is told that does the same without the workbench.
-pub trait Commands: StepSpelling + Send + Sync {
-    /// Does what a pane of the workbench does; `None` where nothing else does.
-    fn same(&self, step: Step) -> Option<String>;
+/// Commands that the page shows, which do the same as its panes without the workbench.
+pub trait WorkbenchCommands: StepSpelling + Send + Sync {
+    /// The command for a pane; `None` if there is no command line.
+    fn step_command(&self, step: WorkbenchStep) -> Option<String>;
 
-    /// Holds the model of the workbench against another model file, as it was before.
-    fn variant(&self, before: &Path) -> Option<String>;
+    /// The command that compares the model of the workbench with an earlier or other model file `before`; `None` if
+    /// there is no command line.
+    fn variant_command(&self, before: &Path) -> Option<String>;
 
-    /// Plans the motion that was asked for; `None` where nothing else does.
-    fn excite(&self, asked: &Excitation) -> Option<String>;
+    /// The command that plans the requested motion; `None` if there is no command line.
+    fn excite_command(&self, asked: &ExcitationSettings) -> Option<String>;
 }
 
-/// What is asked of an excitation; what is not named is as `excite` has it.
+/// Settings of a search for an excitation. Missing fields have the defaults of `excite`.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Excitation {
+pub struct ExcitationSettings {
     /// Harmonics of each coordinate's series.
     pub harmonics: usize,
     /// Period, s.
     pub period: f64,
-    /// Random trajectories that are tried first.
+    /// Number of random trajectories that are tried first.
     pub random: usize,
-    /// How many of them the search starts from.
+    /// Number of the best random trajectories from which the search starts.
     pub starts: usize,
-    /// The same seed gives the same trajectory.
+    /// Seed of the random numbers; the same seed gives the same trajectory.
     pub seed: u64,
-    /// Samples per second of the file, Hz.
+    /// Sampling rate of the file, Hz.
     pub rate: f64,
-    /// Limits beside those of the model file, or in their place, such as `theta1=1.5:2.1`.
+    /// Limits that add to those of the model file or replace them, such as `theta1=1.5:2.1`.
     pub limits: Vec<String>,
 }
 
-impl Default for Excitation {
+impl Default for ExcitationSettings {
     fn default() -> Self {
-        let usual = Request::default();
+        let usual = ExcitationRequest::default();
         Self {
             harmonics: usual.options.harmonics,
             period: usual.options.period,
@@ -74,17 +75,17 @@ impl Default for Excitation {
     }
 }
 
-/// What a pane of the workbench does.
+/// A step of the workbench, which one command does as well.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Step {
+pub enum WorkbenchStep {
     /// Draws the mechanism.
     Picture,
-    /// Derives the model and writes out its equations.
+    /// Derives the model and writes its equations.
     Equations,
-    /// Holds it against the recordings.
+    /// Compares it with the recordings.
     Compare,
     /// Identifies its base parameters.
     Identify,
-    /// Asks what it lacks.
+    /// Searches for effects that it lacks.
     Diagnose,
 }

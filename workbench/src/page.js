@@ -1,5 +1,5 @@
-// The workbench: what is typed goes to the mill, what it makes of it comes back. One edit is on its way at a time, and the
-// last text waits for it, so that no more is derived than can be. Who answers, `window.mill` knows.
+// The workbench: sends the edited text to the program and shows the results. Only one edit is sent at a time; the last text waits,
+// so that no more texts are derived than the program can. `window.mill` sends requests to a server or to a worker.
 (() => {
   'use strict';
   const { ask, news } = window.mill;
@@ -8,7 +8,7 @@
   let view = null, pane = 'mechanism', version = 0;
   let base = 0, sent = null, isSending = false, isTyped = false, opened = null;
 
-  // A sentence above the panes; what follows the text by itself takes back no more than what it said itself.
+  // Shows a sentence above the panes. A caller that updates automatically (`who`) removes only its own sentence.
   const say = (words, who) => {
     const box = by('says');
     if (!words && who && box.dataset.who !== who) return;
@@ -17,7 +17,7 @@
     box.hidden = !words;
   };
 
-  // Runs what may fail; what it says then stands above the panes.
+  // Runs work that may fail; shows its error above the panes.
   const tried = async (work, who) => {
     try {
       await work();
@@ -37,7 +37,7 @@
   const number = (v) => (v === null || v === undefined ? '\u2014' : Number(v.toPrecision(6)).toString().replace('-', '\u2212'));
   const percent = (v) => (v === null || v === undefined ? '\u2014' : `${Number((100 * v).toPrecision(3))} %`);
   const cell = (row, words, cls) => row.appendChild(make('td', words, cls));
-  // A number of a table, all digits of which can be copied.
+  // A number in a table; a click copies all of its digits.
   const amount = (row, words, value) => {
     const one = cell(row, words, 'number');
     if (value !== null && value !== undefined) one.dataset.value = value;
@@ -54,7 +54,7 @@
     return at;
   };
 
-  // Puts a text in the place of the old one by an edit that the browser can undo, of what differs only.
+  // Replaces the text by an edit that the browser can undo; only the part that differs is edited.
   const replace = (words) => {
     const old = text.value, top = text.scrollTop;
     words = plain(words);
@@ -82,7 +82,7 @@
     gutter.scrollTop = text.scrollTop;
   };
 
-  // The first line with words of what was put in at an offset.
+  // The first nonempty line of a text that was inserted at an offset.
   const line_of = (start) => {
     const ahead = text.value.slice(start).search(/\S/);
     return text.value.slice(0, start + Math.max(ahead, 0)).split('\n').length;
@@ -119,7 +119,7 @@
   };
 
   const slow = window.mill.slow || (() => {});
-  // Sends the text as it stands, and once more if it was changed meanwhile.
+  // Sends the current text, and again if it was changed meanwhile.
   const send = async () => {
     if (isSending || !view) return;
     isSending = true;
@@ -133,12 +133,12 @@
         show(told);
       } catch (error) {
         if (error.status === 409) {
-          // Another window was faster: its text is followed unless something was typed here that is not there.
+          // Another window sent a text first: it is loaded, unless this window has typed text that was not sent.
           const told = await news(0).catch(() => null);
           if (!told) { say(error.message); break; }
           if (isTyped) {
             base = told.revision;
-            say('The text was changed in another window while you typed; what you typed here stays.');
+            say('The text was changed in another window while you typed. This window keeps your text.');
           } else follow(told);
           continue;
         }
@@ -161,7 +161,7 @@
     show(told);
   };
 
-  // ---- what stands
+  // ---- the view
 
   const show = (told) => {
     if (told.version < version) return;
@@ -176,7 +176,7 @@
     by('save').disabled = !view.changed;
     by('banner').hidden = !view.conflict;
     by('banner').firstElementChild.textContent =
-      'Another program changed the file while this text had changes of its own. Nothing is written before you choose.';
+      'Another program changed the file, and this text has unsaved changes. Nothing is written until you choose one of the two texts.';
     lines();
     faults();
     for (const one of document.querySelectorAll('.pane')) one.classList.toggle('stale', !view.valid);
@@ -188,7 +188,7 @@
     if (view.valid && view.derived === view.revision) refresh();
   };
 
-  // Commands of panes that have a script of their own.
+  // Commands of panes that have a separate script.
   const others = {};
   const command = () => {
     const { commands } = view;
@@ -201,7 +201,7 @@
     by('command').textContent = words || '';
     by('command').parentElement.hidden = !words;
   };
-  // Another model or other recordings than before.
+  // Another model or other recordings were opened.
   const brought = () => {
     say('');
     errors = motion = recorded = planned = null;
@@ -216,7 +216,7 @@
   const equations = () => {
     const { model } = view;
     by('made').textContent =
-      `${model.products} products with an effect on the drives, ${model.base.length} base parameters; derived in ${(1000 * view.seconds).toFixed(0)} ms.`;
+      `${model.products} products of parameters with an effect on the drives, ${model.base.length} base parameters (combinations that can be identified); derived in ${(1000 * view.seconds).toFixed(0)} ms.`;
     by('base').tBodies[0].replaceChildren(...model.base.map((one) => {
       const row = make('tr', undefined, one.change);
       cell(row, one.name);
@@ -242,15 +242,15 @@
     const rows = view.ladder.map((one) => row(one.what, one.errors));
     if (errors && errors.revision === view.revision) {
       const brief = (f) => ({ fit: f.fit && f.fit.nrms, check: f.check && f.check.nrms });
-      rows.push(row('now', { nominal: brief(errors.nominal), identified: brief(errors.identified) }));
+      rows.push(row('current text', { nominal: brief(errors.nominal), identified: brief(errors.identified) }));
     }
     by('rungs').tBodies[0].replaceChildren(...rows);
     window.enlivenTables(by('rungs'));
   };
 
-  // ---- panes that ask
+  // ---- panes that send requests
 
-  // One question of a kind is on its way at a time; the last one waits for it.
+  // Only one request of a kind is sent at a time; the last one waits.
   const asker = (who, work) => {
     let isGoing = false, isWanted = false;
     return async () => {
@@ -283,7 +283,7 @@
     if (!view || !view.valid || !view.data) return;
     if (errors && errors.revision === view.revision) return;
     compared(await ask('compare', { places: false, afresh: false }));
-    // Remarks on the recordings may know values: they come when typing rests.
+    // Remarks on the recordings may depend on values: they are updated when typing stops.
     clearTimeout(rest);
     if (!errors.afresh) rest = setTimeout(again, 700);
   });
@@ -302,14 +302,14 @@
     say('', 'errors');
   };
 
-  // What was asked for by a button stays until it is asked for again, and says so once the text is another one.
+  // Results of a button stay until the button is used again; a note says that the text has changed since.
   const mark_stale = (id) => {
     const one = by(id);
     const isOld = one.childElementCount > 0 && one.dataset.revision !== String(view.revision);
     one.classList.toggle('stale', isOld);
     const told = one.previousElementSibling;
     const isTold = told.classList.contains('of-before');
-    if (isOld && !isTold) one.before(make('p', 'The text was changed since: this is of the text before. Ask again for the text as it stands.', 'alias of-before'));
+    if (isOld && !isTold) one.before(make('p', 'This result is of an earlier text. Use the button again for the current text.', 'alias of-before'));
     if (!isOld && isTold) told.remove();
   };
   const made_of = (id, revision) => { by(id).dataset.revision = revision; mark_stale(id); };
@@ -324,7 +324,7 @@
   const figures = (told) => {
     const table = make('table');
     const head = table.createTHead().insertRow();
-    for (const words of ['error relative to the force', 'fit', 'check', 'identified, fit', 'identified, check'])
+    for (const words of ['error relative to the force', 'fit', 'validation', 'identified, fit', 'identified, validation'])
       head.appendChild(make('th', words, words.startsWith('error') ? '' : 'number')).scope = 'col';
     const all = [told.nominal.fit, told.nominal.check, told.identified.fit, told.identified.check];
     const body = table.createTBody();
@@ -368,7 +368,7 @@
   for (const id of ['azimuth', 'elevation']) by(id).addEventListener('input', () => turn(...angles()));
   by('flat').addEventListener('click', () => { from = null; draw(); });
   for (const id of ['names', 'frames', 'shadow']) by(id).addEventListener('change', draw);
-  // Dragging turns the view; all else is as with every picture.
+  // Dragging rotates the view; zooming is the same as for every picture.
   const looked = {
     ...window.seen(() => by('picture').querySelector('svg')),
     turn: (dx, dy) => turn(angles()[0] + 200 * dx, angles()[1] - 200 * dy),
@@ -378,10 +378,10 @@
 
   // ---- along a recording
 
-  // Recordings, and a trajectory that was planned.
+  // Recordings, and a planned trajectory.
   let motion = null, recorded = null, planned = null, playing = null;
   const chosen = () => motion.runs[by('run').selectedIndex];
-  // The last place of a rising list that is not behind a value.
+  // Index of the last element of an increasing list that is not larger than a value.
   const place = (all, value) => {
     let [low, high] = [0, all.length - 1];
     while (low < high) {
@@ -391,9 +391,9 @@
     return low;
   };
   const largest = (all) => Math.max(...all.map((one) => one.reduce((most, v) => Math.max(most, Math.abs(v)), 0)), 1e-300);
-  // An error of this share of the largest force is shown as far off.
+  // An error of this share of the largest force has the full colour.
   const FAR_OFF = 0.2;
-  // Forces at a time as shares of the largest of the run, and errors as shares of what is far off.
+  // Forces at a time as shares of the largest of the run, and errors as shares of the error with full colour.
   const shares = (run, time) => {
     if (!run.forces || !by('forces').checked) return [];
     run.largest = run.largest || largest(run.forces.measured);
@@ -430,7 +430,7 @@
     recorded = await ask('motion', {});
     offer();
   });
-  // Errors are those of the text as it stands, once typing rests.
+  // Errors are updated to the current text when typing stops.
   const errors_of_now = () => {
     if (!recorded || shown_of === view.derived || pane !== 'mechanism' || !by('forces').checked) return;
     clearTimeout(waiting);
@@ -483,7 +483,7 @@
   by('places').addEventListener('click', () => tried(async () => {
     const told = await ask('compare', { places: true, afresh: true });
     const places = told.compared.where;
-    by('where').replaceChildren(...(places.length ? places : [{ says: 'No region of coordinates, rates, loads or time stands out' }])
+    by('where').replaceChildren(...(places.length ? places : [{ says: 'No region of coordinates, rates, loads or time has a larger error than the rest' }])
       .map((one) => make('li', `${one.says}.`)));
     made_of('where', told.revision);
     say('');
@@ -516,7 +516,7 @@
         button.disabled = true;
         try {
           const before = text.value;
-          // The text may arrive as that of another window, too, before the answer does.
+          // The new text may arrive by a notification before the response does.
           follow(await ask('add', { entry: k }));
           say('');
           go(line_of(differs_at(before, text.value)));
@@ -528,13 +528,13 @@
     for (const effect of found.effects) {
       if (!effect.indistinguishable_from.length) continue;
       const others = effect.indistinguishable_from.map((o) => `${o.kind.replaceAll('_', ' ')} (${o.at.join(', ')})`).join(', ');
-      box.append(make('p', `These recordings cannot tell ${effect.kind.replaceAll('_', ' ')} from ${others}. ${effect.separate_by || ''}`));
+      box.append(make('p', `These recordings cannot distinguish ${effect.kind.replaceAll('_', ' ')} from ${others}. ${effect.separate_by || ''}`));
       if (effect.separate_command) box.append(make('code', effect.separate_command));
     }
-    for (const one of found.disturbances) box.append(make('p', `In the recordings: ${one.says}.`));
+    for (const one of found.disturbances) box.append(make('p', `Disturbance in the recordings: ${one.says}.`));
     const figure = make('figure', undefined, 'still');
     figure.innerHTML = found.ladder;
-    figure.prepend(make('figcaption', `Error relative to the force, judged ${found.judged}`));
+    figure.prepend(make('figcaption', `Error relative to the force ${found.judged}`));
     box.append(figure);
     window.enlivenPictures(box);
     const list = make('ul');
@@ -580,7 +580,7 @@
   by('mine').addEventListener('click', () => tried(async () => show(await ask('choose', { theirs: false }))));
   by('copy').addEventListener('click', () => window.copied(by('command').textContent, 'the command'));
   const open = (name) => {
-    // What a pane says of its own is not for another one.
+    // A message of one pane is not for another one.
     if (pane !== name) say('');
     pane = name;
     for (const one of document.querySelectorAll('.pane')) one.hidden = one.id !== pane;
@@ -601,11 +601,11 @@
   text.addEventListener('scroll', () => { by('lines').scrollTop = text.scrollTop; });
   window.addEventListener('beforeunload', (event) => { if (view && (view.changed || sent !== text.value)) event.preventDefault(); });
 
-  // What scripts of single panes need of the page.
+  // Functions for the scripts of single panes.
   window.workbench = {
     ask, make, number, percent, cell, amount, asker, say, tried, others, send, told_command,
     view: () => view,
-    // A trajectory that the mechanism can be moved along; `true` plays it.
+    // Adds a trajectory along which the mechanism can be moved; `true` plays it.
     animate: (names, run, isShown) => {
       planned = { names, runs: [run] };
       offer();
@@ -623,14 +623,14 @@
       try {
         const told = await news(version);
         if (told.version <= version || isSending) {
-          // What is on its way brings the rest; until then it is asked again.
+          // The response that is awaited has the new view; until then the request is repeated.
           if (isSending) await new Promise((done) => setTimeout(done, 50));
           continue;
         }
         if (told.revision !== base) follow(told); else show(told);
         follow_diagnosis().catch(() => {});
       } catch (error) {
-        by('state').textContent = `the program does not answer (${error.message}); keep this page open, what you typed is here`;
+        by('state').textContent = `the program does not answer (${error.message}). Keep this page open: it still has your text`;
         await new Promise((done) => setTimeout(done, 2000));
       }
     }

@@ -1,7 +1,8 @@
-//! The page: one file that needs no other, in the style of all pages. It asks a server, or the mill that it carries.
+//! The page: one self-contained HTML file in the style of all pages. It sends requests to a server, or to the program
+//! that it contains as WebAssembly.
 //!
-//! Decision: the editor is a plain text field. Undo, selection and input methods are the browser's own, and
-//! findings are inserted by an edit that it can undo. An editor in JavaScript would need a bundler.
+//! Decision: the editor is a plain text field. Undo, selection and input methods are the browser's own, and findings
+//! are inserted by an edit that it can undo. An editor in JavaScript would need a bundler.
 
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -13,24 +14,24 @@ use flate2::write::GzEncoder;
 use modelmill::report;
 use serde::Serialize;
 
-/// Models and recordings that a page brings along.
+/// Models and recordings that a page contains.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct Bundle {
-    /// Model files: names and texts. They may name each other.
+pub struct PageBundle {
+    /// Model files: names and texts. They may include each other.
     pub models: Vec<(String, String)>,
-    /// Recordings that belong to a model: its name, the recording's, its text, and whether it is kept from the fit.
+    /// Recordings of a model: name of the model, name and text of the recording, and whether it is a validation run.
     pub recordings: Vec<(String, String, String, bool)>,
 }
 
-/// The page that a server sends; `nonce` is what lets its scripts run, and no other.
-pub(crate) fn page(nonce: &str) -> String {
+/// The page that a server sends; only scripts with `nonce` run.
+pub(crate) fn served_page(nonce: &str) -> String {
     let who = include_str!("served.js");
-    written("", &format!(" nonce=\"{nonce}\""), "", who)
+    render_page("", &format!(" nonce=\"{nonce}\""), "", who)
 }
 
-/// The page that has the mill in itself and needs neither server nor network. `module` is the mill as WebAssembly, with the
-/// functions and the imports of `in-browser`; nothing that the page is given leaves it, which its policy says.
-pub fn alone(module: &[u8], bundle: &Bundle) -> String {
+/// The page that contains the program and needs neither server nor network. `module` is the program as WebAssembly,
+/// with the exports and imports of `in-browser`. The page's policy forbids all connections, so no data leave it.
+pub fn standalone_page(module: &[u8], bundle: &PageBundle) -> String {
     let policy = "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; \
                   script-src 'unsafe-inline' 'wasm-unsafe-eval' blob:; worker-src blob:; style-src 'unsafe-inline'; \
                   img-src data:; base-uri 'none'; form-action 'none'\">\n";
@@ -40,7 +41,7 @@ pub fn alone(module: &[u8], bundle: &Bundle) -> String {
         let _ = writeln!(
             carried,
             "<script type=\"application/gzip\" id=\"{id}\">{}</script>",
-            packed(bytes)
+            compress_to_base64(bytes)
         );
     }
     let worker = include_str!("worker.js");
@@ -48,18 +49,18 @@ pub fn alone(module: &[u8], bundle: &Bundle) -> String {
         carried,
         "<script type=\"text/plain\" id=\"worker\">\n{worker}</script>\n"
     );
-    written(policy, "", &carried, include_str!("alone.js"))
+    render_page(policy, "", &carried, include_str!("alone.js"))
 }
 
-/// Gzip in Base64.
-fn packed(bytes: &[u8]) -> String {
+/// Compresses with gzip and encodes in Base64.
+fn compress_to_base64(bytes: &[u8]) -> String {
     let mut packer = GzEncoder::new(Vec::new(), Compression::best());
-    // Memory takes whatever is written to it.
+    // Writing to memory does not fail.
     let _ = packer.write_all(bytes);
     STANDARD.encode(packer.finish().unwrap_or_default())
 }
 
-/// Scripts of the workbench alone, in the order in which they run.
+/// Scripts that only the workbench has, in the order in which they run.
 const SCRIPTS: [&str; 4] = [
     include_str!("page.js"),
     include_str!("completion.js"),
@@ -67,8 +68,9 @@ const SCRIPTS: [&str; 4] = [
     include_str!("variant.js"),
 ];
 
-/// `who` is the script that knows who answers.
-fn written(head: &str, attributes: &str, carried: &str, who: &'static str) -> String {
+/// Assembles the page. `who` is the script that sends requests: to a server, or to a worker. `attributes` go into each
+/// script tag, `carried` is data inside the page.
+fn render_page(head: &str, attributes: &str, carried: &str, who: &'static str) -> String {
     let mut page = format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n{head}\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\

@@ -1,51 +1,54 @@
-//! Recordings as a model reads them, kept while the text changes nothing on which reading depends: that is all of the mechanism
-//! but the values of its parameters. States and regressors are the same then; only remarks on a recording may know values, so
-//! who wants these reads afresh.
+//! A cache of prepared recordings. They depend on the mechanism but not on the values of its parameters, so they are
+//! kept while only values change: states and regressors are then the same. Remarks on a recording may depend on values;
+//! a caller that needs these reads afresh.
 //!
-//! Decision: reading and checking a recording takes four times as long as everything else between a keystroke and
-//! the error. It is repeated when typing stops, because remarks on a recording may depend on values.
+//! Decision: reading and checking a recording takes four times as long as everything else between a keystroke and the
+//! error. It is repeated when typing stops, because remarks on a recording may depend on values.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use modelmill::recording::Recording;
+use modelmill::recording::PreparedRecording;
 use modelmill::{Model, Outcome};
 
-/// Recordings of fit and check.
-pub(crate) type Read = [Vec<Recording>; 2];
+/// Recordings for the fit and for validation, in this order.
+pub(crate) type SessionRecordings = [Vec<PreparedRecording>; 2];
 
 /// The recordings as they were last read.
 #[derive(Default)]
-pub(crate) struct Readings {
-    kept: Mutex<Option<(String, Arc<Read>)>>,
+pub(crate) struct RecordingCache {
+    /// Key of the mechanism for which they were read, and the recordings.
+    kept: Mutex<Option<(String, Arc<SessionRecordings>)>>,
 }
 
-impl Readings {
-    /// Recordings as `model` reads them, and whether they were read for this model itself; `read` does it.
-    pub(crate) fn of(
+impl RecordingCache {
+    /// Recordings for `model`, and whether they were read now. `read` reads them if the cache has none or `is_afresh`
+    /// is set.
+    pub(crate) fn recordings_for(
         &self,
         model: &Model,
         is_afresh: bool,
-        read: impl FnOnce() -> Outcome<Read>,
-    ) -> Outcome<(Arc<Read>, bool)> {
-        let mechanism = but_for_values(model);
-        let known = self.kept().clone();
+        read: impl FnOnce() -> Outcome<SessionRecordings>,
+    ) -> Outcome<(Arc<SessionRecordings>, bool)> {
+        let mechanism = mechanism_key(model);
+        let known = self.lock_cache().clone();
         match known {
             Some((same, kept)) if same == mechanism && !is_afresh => Ok((kept, false)),
             _ => {
                 let read = Arc::new(read()?);
-                *self.kept() = Some((mechanism, Arc::clone(&read)));
+                *self.lock_cache() = Some((mechanism, Arc::clone(&read)));
                 Ok((read, true))
             }
         }
     }
 
-    fn kept(&self) -> MutexGuard<'_, Option<(String, Arc<Read>)>> {
+    /// The contents of the cache; a panic of another thread does not lose them.
+    fn lock_cache(&self) -> MutexGuard<'_, Option<(String, Arc<SessionRecordings>)>> {
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// A mechanism in words, complete but for the values of its parameters.
-fn but_for_values(model: &Model) -> String {
+/// A text that is equal for two models if they differ in values of parameters only.
+fn mechanism_key(model: &Model) -> String {
     let mut mechanism = model.derivation.mechanism.clone();
     for parameter in &mut mechanism.parameters {
         parameter.nominal = 0.0;
@@ -62,12 +65,12 @@ mod tests {
     fn only_values_of_parameters_leave_a_reading_as_it_is() {
         let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../model-spec/models/");
         let text = std::fs::read_to_string(format!("{folder}spidermill.toml")).unwrap();
-        let readings = Readings::default();
+        let readings = RecordingCache::default();
         let is_new = |from: &str, to: &str| {
             assert!(text.contains(from), "{from}");
             let model = Model::from_text("a.toml", &text.replace(from, to)).unwrap();
             let read = || Ok([Vec::new(), Vec::new()]);
-            readings.of(&model, false, read).unwrap().1
+            readings.recordings_for(&model, false, read).unwrap().1
         };
         assert!(is_new("schema", "schema"));
         assert!(!is_new("12.4560", "22.4560") && !is_new("0.565", "0.6"));
@@ -76,8 +79,8 @@ mod tests {
         assert!(is_new("spindle_left", "left"));
         let model = Model::from_text("a.toml", &text).unwrap();
         let read = || Ok([Vec::new(), Vec::new()]);
-        assert!(readings.of(&model, false, read).unwrap().1);
-        assert!(!readings.of(&model, false, read).unwrap().1);
-        assert!(readings.of(&model, true, read).unwrap().1);
+        assert!(readings.recordings_for(&model, false, read).unwrap().1);
+        assert!(!readings.recordings_for(&model, false, read).unwrap().1);
+        assert!(readings.recordings_for(&model, true, read).unwrap().1);
     }
 }

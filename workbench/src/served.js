@@ -1,4 +1,4 @@
-// How the page asks: a server, which shows the token of the link.
+// Requests to a server, with the token of the link.
 (() => {
   'use strict';
   const token = new URLSearchParams(location.search).get('token');
@@ -13,6 +13,6 @@
     if (answer.ok) return told;
     throw Object.assign(new Error(isJson ? told.says : told), { status: answer.status });
   };
-  // What stands, as soon as it is another version.
-  window.mill = { ask, news: (version) => ask(`view?since=${version}`), keeps: true, hint: 'No recording is open: give one with --data.' };
+  // `news` returns the view once its version differs.
+  window.mill = { ask, news: (version) => ask(`view?since=${version}`), keeps: true, hint: 'No recording is open: start the workbench with --data.' };
 })();

@@ -1,12 +1,13 @@
-//! The server: it listens on the loopback address alone, and answers only who has the token of the link, asks under its own name,
-//! and comes from its own page.
+//! The server. It listens on the loopback address only. It accepts requests with the token of the link, under its own
+//! name, from its own page.
 //!
-//! A page of any other site may send requests to the loopback address; the name in `Host` keeps out sites whose name was made to
-//! lead here (DNS rebinding), `Origin` those that ask openly, and the token all others.
+//! A page of any other site can send requests to the loopback address. The check of `Host` refuses sites whose name
+//! resolves to this machine (DNS rebinding), the check of `Origin` refuses pages of other sites, and the token refuses
+//! all others.
 //!
 //! Decision: HTTP is axum on hyper and tokio without macros, forms or sockets, because a parser of browser requests
-//! should be maintained by a project of its own. It costs half a minute of one core to build. The page runs no
-//! script but its own (a nonce), and texts of models and recordings enter as text.
+//! should be maintained by a project of its own. It costs half a minute of one core to build. The page runs no script
+//! but its own (a nonce), and texts of models and recordings enter as text.
 
 use std::net::{Ipv4Addr, SocketAddr};
 use std::sync::Arc;
@@ -16,8 +17,8 @@ use axum::body::Bytes;
 use axum::extract::{DefaultBodyLimit, Path, Query, Request, State};
 use axum::http::StatusCode;
 use axum::http::header::{
-    CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, HOST, HeaderName, HeaderValue, ORIGIN,
-    REFERRER_POLICY, X_CONTENT_TYPE_OPTIONS, X_FRAME_OPTIONS,
+    CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, HOST, HeaderName, HeaderValue, ORIGIN, REFERRER_POLICY,
+    X_CONTENT_TYPE_OPTIONS, X_FRAME_OPTIONS,
 };
 use axum::middleware::{self, Next};
 use axum::response::{Html, IntoResponse, Response};
@@ -28,32 +29,37 @@ use serde::Deserialize;
 use serde_json::json;
 use tokio::net::TcpListener;
 
-use crate::answers::{Answer, Refusal, answer};
-use crate::machine::{Machine, STACK};
+use crate::answers::{PageResponse, RequestRefusal, answer_request};
+use crate::machine::{LocalMachine, STACK};
 use crate::page;
-use crate::sitting::{LONGEST, Sitting};
+use crate::session::{LONGEST, WorkbenchSession};
 
-/// How the page shows that it is the one that was opened with the link.
+/// Header with the token, by which the page proves that it was opened with the link.
 const TOKEN: HeaderName = HeaderName::from_static("x-modelmill-token");
-/// How often the disk is looked at. Files are read rather than watched for notices of the system: a model is short, and notices
-/// do not come from every disk, nor for every way in which editors put a new file in the place of an old one.
-const LOOK: Duration = Duration::from_millis(250);
-/// How long a page waits for news before it asks again.
-const NEWS: Duration = Duration::from_secs(20);
+/// Interval at which files are read and compared. Notifications of the system are not used: a model is short, and
+/// notifications are missing on some disks and for some ways in which editors replace a file.
+const POLL_INTERVAL: Duration = Duration::from_millis(250);
+/// Time after which a request for changes is answered even without a change.
+const NEWS_TIMEOUT: Duration = Duration::from_secs(20);
 
-struct App {
-    sitting: Arc<Sitting>,
-    machine: Arc<Machine>,
+/// State that all handlers share.
+struct ServerState {
+    /// The session of the model file.
+    session: Arc<WorkbenchSession>,
+    /// This machine; it signals changes to waiting pages.
+    machine: Arc<LocalMachine>,
+    /// Token of the link, 32 hexadecimal digits.
     token: String,
+    /// Port on the loopback address.
     port: u16,
 }
 
-/// Serves a sitting until the program is stopped; `opened` gets the link.
+/// Serves a session until the program is stopped; `opened` gets the link.
 ///
-/// Fails when the port cannot be had.
+/// Fails if the port is in use.
 pub(crate) fn serve(
-    sitting: Arc<Sitting>,
-    machine: Arc<Machine>,
+    session: Arc<WorkbenchSession>,
+    machine: Arc<LocalMachine>,
     port: u16,
     opened: impl FnOnce(&str),
 ) -> Outcome {
@@ -62,21 +68,21 @@ pub(crate) fn serve(
         .thread_stack_size(STACK)
         .enable_all()
         .build()
-        .map_err(|error| Error::input(format!("no server can be made: {error}")))?;
+        .map_err(|error| Error::input(format!("the server cannot be started: {error}")))?;
     runtime.block_on(async {
         let address = SocketAddr::from((Ipv4Addr::LOCALHOST, port));
         let taken = |error| {
             Error::input(format!(
-                "{address} cannot be listened on: {error}; choose another port, or none"
+                "the server cannot listen on {address}: {error}; choose another port, or give no port"
             ))
         };
         let listener = TcpListener::bind(address).await.map_err(taken)?;
         let port = listener.local_addr().map_err(taken)?.port();
-        let token = random().map_err(Error::input)?;
+        let token = random_token().map_err(Error::input)?;
         let link = format!("http://127.0.0.1:{port}/?token={token}");
-        tokio::spawn(look(Arc::clone(&sitting)));
-        let app = Arc::new(App {
-            sitting,
+        tokio::spawn(poll_files(Arc::clone(&session)));
+        let app = Arc::new(ServerState {
+            session,
             machine,
             token,
             port,
@@ -89,40 +95,40 @@ pub(crate) fn serve(
 }
 
 /// 128 random bits in hexadecimal digits.
-fn random() -> Result<String, String> {
+fn random_token() -> Result<String, String> {
     let mut bytes = [0_u8; 16];
-    getrandom::fill(&mut bytes).map_err(|error| format!("no token can be drawn: {error}"))?;
+    getrandom::fill(&mut bytes).map_err(|error| format!("no random token is available: {error}"))?;
     Ok(format!("{:032x}", u128::from_le_bytes(bytes)))
 }
 
-async fn look(sitting: Arc<Sitting>) {
+/// Checks the files for changes by other programs, as long as the server runs.
+async fn poll_files(session: Arc<WorkbenchSession>) {
     loop {
-        tokio::time::sleep(LOOK).await;
-        let sitting = Arc::clone(&sitting);
-        // What fails once is tried again.
-        let _ = tokio::task::spawn_blocking(move || sitting.look()).await;
+        tokio::time::sleep(POLL_INTERVAL).await;
+        let session = Arc::clone(&session);
+        // A failure is ignored here: the next check repeats it.
+        let _ = tokio::task::spawn_blocking(move || session.check_disk()).await;
     }
 }
 
-fn router(app: Arc<App>) -> Router {
+/// The routes of page and requests; each passes the checks of [`guard`] first.
+fn router(app: Arc<ServerState>) -> Router {
+    // Escapes of JSON make a text longer than its file.
     let most = usize::try_from(8 * LONGEST).unwrap_or(usize::MAX);
     Router::new()
-        .route("/", get(start))
+        .route("/", get(serve_page))
         .route("/api/view", get(view))
-        .route("/api/{question}", post(asked))
+        .route("/api/{question}", post(handle_request))
         .layer(DefaultBodyLimit::max(most))
         .layer(middleware::from_fn_with_state(Arc::clone(&app), guard))
         .with_state(app)
 }
 
-/// Refuses what does not come from the page that was opened with the link.
-async fn guard(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
+/// Refuses requests that do not come from the page that was opened with the link.
+async fn guard(State(app): State<Arc<ServerState>>, request: Request, next: Next) -> Response {
     let headers = request.headers();
     let refused = |says: &'static str| (StatusCode::FORBIDDEN, says).into_response();
-    let names = [
-        format!("127.0.0.1:{}", app.port),
-        format!("localhost:{}", app.port),
-    ];
+    let names = [format!("127.0.0.1:{}", app.port), format!("localhost:{}", app.port)];
     let text = |name: HeaderName| headers.get(name).and_then(|value| value.to_str().ok());
     if !text(HOST).is_some_and(|host| names.iter().any(|name| name == host)) {
         return refused("This server answers under 127.0.0.1 only.\n");
@@ -133,23 +139,20 @@ async fn guard(State(app): State<Arc<App>>, request: Request, next: Next) -> Res
             name.is_some_and(|name| names.iter().any(|own| own == name))
         };
         if !text(ORIGIN).is_some_and(is_own) {
-            return refused("Pages of other sites get no answer.\n");
+            return refused("Requests from pages of other sites are refused.\n");
         }
     }
+    // The link has the token in its query; requests of the page have it in a header, which other sites cannot set.
     let is_page = request.uri().path() == "/";
     let given = if is_page {
         let query = request.uri().query().unwrap_or_default();
         let mut pairs = query.split('&').filter_map(|pair| pair.split_once('='));
-        pairs
-            .find(|(name, _)| *name == "token")
-            .map(|(_, value)| value)
+        pairs.find(|(name, _)| *name == "token").map(|(_, value)| value)
     } else {
         text(TOKEN)
     };
-    if !given.is_some_and(|given| is_same(given, &app.token)) {
-        return refused(
-            "Open the link that `modelmill work` printed; its token is missing here.\n",
-        );
+    if !given.is_some_and(|given| is_same_token(given, &app.token)) {
+        return refused("The token is missing or wrong. Open the link that `modelmill work` printed.\n");
     }
     let mut response = next.run(request).await;
     let own = [
@@ -165,53 +168,54 @@ async fn guard(State(app): State<Arc<App>>, request: Request, next: Next) -> Res
     response
 }
 
-/// Compares without telling by its time how much was right.
-fn is_same(given: &str, token: &str) -> bool {
+/// Compares in constant time, so that the duration does not reveal how many characters are right.
+fn is_same_token(given: &str, token: &str) -> bool {
     let pairs = given.bytes().zip(token.bytes());
     given.len() == token.len() && pairs.fold(0, |differs, (a, b)| differs | (a ^ b)) == 0
 }
 
-/// What a handler answers, or why it does not.
-type Reply = Result<Response, Refused>;
+/// The response of a handler, or its refusal.
+type HandlerResult = Result<Response, HttpRefusal>;
 
-/// Why there is no answer.
-struct Refused(StatusCode, String);
+/// A refusal: HTTP status, and a sentence with the reason.
+struct HttpRefusal(StatusCode, String);
 
-impl IntoResponse for Refused {
+impl IntoResponse for HttpRefusal {
     fn into_response(self) -> Response {
         (self.0, Json(json!({ "says": self.1 }))).into_response()
     }
 }
 
-impl From<Refusal> for Refused {
-    fn from(Refusal(fault, says): Refusal) -> Self {
+impl From<RequestRefusal> for HttpRefusal {
+    fn from(RequestRefusal(fault, says): RequestRefusal) -> Self {
         let status = StatusCode::from_u16(fault.status());
         Self(status.unwrap_or(StatusCode::UNPROCESSABLE_ENTITY), says)
     }
 }
 
-/// Does work that takes its time where it keeps nobody else waiting.
-async fn worked<T: Send + 'static>(
-    app: &App,
-    work: impl FnOnce(&Arc<Sitting>) -> T + Send + 'static,
-) -> Result<T, Refused> {
-    let sitting = Arc::clone(&app.sitting);
-    let done = tokio::task::spawn_blocking(move || work(&sitting)).await;
+/// Does long work on a separate thread, so that other requests do not wait. A panic becomes status 500.
+async fn run_blocking<T: Send + 'static>(
+    app: &ServerState,
+    work: impl FnOnce(&Arc<WorkbenchSession>) -> T + Send + 'static,
+) -> Result<T, HttpRefusal> {
+    let session = Arc::clone(&app.session);
+    let done = tokio::task::spawn_blocking(move || work(&session)).await;
     done.map_err(|_| {
-        Refused(
+        HttpRefusal(
             StatusCode::INTERNAL_SERVER_ERROR,
-            "a fault of the program, which is none of yours; the text is kept".to_owned(),
+            "internal error of the program, not of your input; the text is kept".to_owned(),
         )
     })
 }
 
-async fn start() -> Reply {
-    let nonce = random().map_err(Refusal::from)?;
+/// Sends the page with a policy that permits only its own scripts (by a nonce) and no other connections.
+async fn serve_page() -> HandlerResult {
+    let nonce = random_token().map_err(RequestRefusal::from)?;
     let policy = format!(
         "default-src 'none'; script-src 'nonce-{nonce}'; style-src 'unsafe-inline'; img-src data:; connect-src 'self'; \
          base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
     );
-    let mut response = Html(page::page(&nonce)).into_response();
+    let mut response = Html(page::served_page(&nonce)).into_response();
     if let Ok(policy) = HeaderValue::from_str(&policy) {
         let headers = response.headers_mut();
         headers.insert(CONTENT_SECURITY_POLICY, policy);
@@ -219,30 +223,35 @@ async fn start() -> Reply {
     Ok(response)
 }
 
+/// Query of `/api/view`.
 #[derive(Deserialize)]
-struct Since {
+struct SinceQuery {
     /// The version that the page has.
     #[serde(default)]
     since: u64,
 }
 
-/// What stands, as soon as it is news.
-async fn view(State(app): State<Arc<App>>, Query(Since { since }): Query<Since>) -> Reply {
+/// Sends the current view once its version differs from that of the page, or after [`NEWS_TIMEOUT`].
+async fn view(State(app): State<Arc<ServerState>>, Query(SinceQuery { since }): Query<SinceQuery>) -> HandlerResult {
     let mut changes = app.machine.changes();
     let news = changes.wait_for(|version| *version != since);
-    // Without news it is told once more.
-    let _ = tokio::time::timeout(NEWS, news).await;
-    let told = worked(&app, |sitting| sitting.view()).await?;
-    Ok(Json(told).into_response())
+    // After the timeout the page gets the view that it already has, and requests the next one.
+    let _ = tokio::time::timeout(NEWS_TIMEOUT, news).await;
+    let view_json = run_blocking(&app, |session| session.view()).await?;
+    Ok(Json(view_json).into_response())
 }
 
-/// Anything else.
-async fn asked(State(app): State<Arc<App>>, Path(question): Path<String>, body: Bytes) -> Reply {
-    let found = worked(&app, move |sitting| answer(sitting, &question, &body)).await?;
+/// Answers all other requests, by their names.
+async fn handle_request(
+    State(app): State<Arc<ServerState>>,
+    Path(question): Path<String>,
+    body: Bytes,
+) -> HandlerResult {
+    let found = run_blocking(&app, move |session| answer_request(session, &question, &body)).await?;
     Ok(match found? {
-        Answer::Json(told) => Json(told).into_response(),
-        Answer::Svg(svg) => ([(CONTENT_TYPE, "image/svg+xml")], svg).into_response(),
-        Answer::Html(html) => Html(html).into_response(),
+        PageResponse::Json(view_json) => Json(view_json).into_response(),
+        PageResponse::Svg(svg) => ([(CONTENT_TYPE, "image/svg+xml")], svg).into_response(),
+        PageResponse::Html(html) => Html(html).into_response(),
     })
 }
 
@@ -252,8 +261,10 @@ mod tests {
 
     #[test]
     fn tokens_are_long_and_differ() {
-        let [a, b] = [(); 2].map(|()| random().unwrap());
+        let [a, b] = [(); 2].map(|()| random_token().unwrap());
         assert!(a.len() == 32 && a != b);
-        assert!(is_same(&a, &a) && !is_same(&a, &b) && !is_same("", &a) && !is_same(&a[1..], &a));
+        assert!(
+            is_same_token(&a, &a) && !is_same_token(&a, &b) && !is_same_token("", &a) && !is_same_token(&a[1..], &a)
+        );
     }
 }

@@ -1,5 +1,5 @@
-// The pane that holds the text beside the file as saved, or beside another model: both mechanisms over each other, what
-// changed, and what that costs along the recordings.
+// The pane that compares the text with the saved file, or with another model: both mechanisms over each other, the changes, and
+// their cost along the recordings.
 (() => {
   'use strict';
   const { ask, make, number, percent, cell, asker, say, others, told_command } = window.workbench;
@@ -16,7 +16,7 @@
     box.createTBody().append(...rows);
     return box;
   };
-  // Four digits are enough to look at.
+  // Four digits are enough for a comparison.
   const short = (v) => (v === null || v === undefined ? '\u2014' : Number(v.toPrecision(4)).toString().replace('-', '\u2212'));
   const signed = (v) => (v < 0 ? `\u2212${percent(-v)}` : `+${percent(v)}`);
   const is_same = (a, b) => a === b || Math.abs(b - a) < 5e-6 * Math.abs(a);
@@ -27,11 +27,11 @@
     return box;
   };
 
-  // ---- a drive: what it gives before and after, and what makes the difference
+  // ---- a drive: force, power and work before and after, and the terms of the difference
 
   const FIGURES = [
     ['peak force', 'peak', true], ['rms force', 'rms', true], ['peak power', 'peak_power', 'W'], ['rms power', 'rms_power', 'W'],
-    ['work given', 'work', 'J'], ['net work', 'net_work', 'J'],
+    ['positive work', 'work', 'J'], ['net work', 'net_work', 'J'],
   ];
   const efforts = (one) => table(`${one.drive}`, ['', 'before', 'after', 'change'], FIGURES.map(([words, figure, unit]) => {
     const [before, after] = [one.before[figure], one.after[figure]];
@@ -49,12 +49,12 @@
   const by_column = (term) => {
     const by_ = term.share - term.by_value;
     if (Math.abs(by_) <= 0.01 * Math.abs(term.share)) return '';
-    return term.by_value === 0 ? ', by its column alone' : `, ${signed(term.by_value)} by its value, ${signed(by_)} by its column`;
+    return term.by_value === 0 ? ', from the changed geometry' : `, ${signed(term.by_value)} from the new value, ${signed(by_)} from the changed geometry`;
   };
   const value = ({ before, after, unit }) => {
     const of = unit === '1' ? '' : ` ${unit}`;
     if (before === null) return `new, ${number(after)}${of}`;
-    if (after === null) return `${number(before)}${of}, then gone`;
+    if (after === null) return `${number(before)}${of}, removed`;
     return before === after ? `${number(after)}${of}` : `${number(before)} \u2192 ${number(after)}${of}`;
   };
   const shares = (one) => {
@@ -90,15 +90,15 @@
     return box;
   };
 
-  // ---- both models as wholes
+  // ---- both models in total
 
-  // Close to the limit more digits say on which side.
+  // Close to the limit more digits show on which side the value is.
   const part = (used) => {
     if (used === null) return '\u2014';
     return `${Number((100 * used).toPrecision(Math.abs(used - 1) < 0.01 ? 6 : 3))} %`;
   };
   const limits = (all) => {
-    const says = { now_exceeded: 'now exceeded', still_exceeded: 'exceeded by both', no_longer_exceeded: 'no longer exceeded', kept: 'kept' };
+    const says = { now_exceeded: 'now exceeded', still_exceeded: 'exceeded by both', no_longer_exceeded: 'no longer exceeded', kept: 'not exceeded' };
     const order = Object.keys(says);
     const marks = { now_exceeded: 'worse', no_longer_exceeded: 'better' };
     const rows = [...all].sort((a, b) => order.indexOf(a.crossing) - order.indexOf(b.crossing)).map((one) => {
@@ -109,7 +109,7 @@
       for (const side of [one.before, one.after]) cell(row, part(side.used), 'number');
       return row;
     });
-    return table('What is used of the limits', ['limit', 'before', 'after'], rows);
+    return table('Use of the limits', ['limit', 'before', 'after'], rows);
   };
 
   const errors = ({ before, after }) => {
@@ -140,14 +140,14 @@
       const row = make('tr');
       cell(row, one.name);
       cell(row, one.before === null ? 'new' : one.before);
-      cell(row, one.after === null ? 'gone' : one.after);
+      cell(row, one.after === null ? 'removed' : one.after);
       return row;
     });
     list.createTBody().append(...rows);
     return rows.length ? [list] : [];
   };
 
-  // ---- what is asked
+  // ---- requests
 
   others.variant = () => command;
   const footer = () => { if (stands && stands.pane === 'variant') told_command(); };
@@ -164,7 +164,7 @@
   const draw = async (beside) => {
     const { at, from } = stands.seen;
     by('both').innerHTML = await ask('picture', { at, from, names: true, frames: false, shadow: true, beside });
-    for (const one of by('both').querySelectorAll('svg')) one.setAttribute('aria-label', 'The mechanism, the one before as a shadow');
+    for (const one of by('both').querySelectorAll('svg')) one.setAttribute('aria-label', 'Both mechanisms; the one before is drawn as a shadow');
   };
 
   const compare = asker('variant', async () => {
@@ -183,7 +183,7 @@
       const told = await ask('variant', { beside });
       const { along } = told;
       const pieces = [];
-      if (told.same) pieces.push(make('p', 'Both texts are the same: what you edit shows here.'));
+      if (told.same) pieces.push(make('p', 'Both texts are the same. Edit the text to see what the edit changes.'));
       if (told.refused) pieces.push(make('p', told.refused, 'alias'));
       if (along) {
         for (const note of along.notes) pieces.push(make('p', note.says, note.severity === 'warning' ? 'alias' : ''));
@@ -209,7 +209,7 @@
 
   by('beside').addEventListener('change', compare);
   document.addEventListener('stands', ({ detail }) => {
-    // Another program may have changed the other model while nobody looked.
+    // Another program may have changed the other model while this pane was closed.
     if (!stands || stands.pane !== detail.pane) shown = null;
     stands = detail;
     footer();

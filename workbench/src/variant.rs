@@ -1,49 +1,54 @@
-//! The variant that the text is held beside: the model as it was saved, or another model file, with what changed between both
-//! and what it costs along the recordings.
+//! The comparison of the text with a variant: the saved model, or another model file. Two models go in; the changes
+//! between them come out, with forces, power and errors along the recordings.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use modelmill::model::Changes;
+use modelmill::model::ModelChanges;
 use modelmill::print::RemedySpelling;
-use modelmill::recording::Recording;
-use modelmill::variants::Variants;
+use modelmill::recording::PreparedRecording;
+use modelmill::variants::VariantComparison;
 use modelmill::{Error, Host, Model, Outcome};
 use serde_json::{Value, json};
 
-use crate::readings::{Read, Readings};
+use crate::readings::{RecordingCache, SessionRecordings};
 
-/// Longest model file that is held beside the text, bytes.
+/// Longest model file that is compared with the text, bytes.
 const LONGEST: u64 = 4 << 20;
 
-/// What was read and derived of variants, kept while nothing changes on which it depends.
+/// A cache of the other model and of its recordings, valid while the files do not change.
 #[derive(Default)]
-pub(crate) struct Variant {
-    kept: Mutex<Option<Kept>>,
-    readings: Readings,
+pub(crate) struct VariantCache {
+    /// The last other model.
+    kept: Mutex<Option<CachedVariant>>,
+    /// Recordings as the other model reads them.
+    readings: RecordingCache,
 }
 
-/// The other model, with its files as they were.
+/// A derived model, with the contents of its files at that time.
 #[derive(Clone)]
-struct Kept {
+struct CachedVariant {
+    /// Path of the model file.
     path: PathBuf,
+    /// Contents of all files of the model; `None` for a file that could not be read.
     files: Vec<Option<Vec<u8>>>,
+    /// The derived model.
     model: Model,
 }
 
-impl Variant {
-    /// A model file beside the text, derived anew when any file of it has changed.
+impl VariantCache {
+    /// The model of another file, derived again if any of its files has changed.
     pub(crate) fn model(&self, host: &Host, path: &Path) -> Outcome<Model> {
-        let known = self.kept().clone();
+        let known = self.lock_cache().clone();
         if let Some(known) = known
             && known.path == path
-            && known.files == contents(host, &known.model)
+            && known.files == file_contents(host, &known.model)
         {
             return Ok(known.model);
         }
         let model = host.model(path)?;
-        let files = contents(host, &model);
-        *self.kept() = Some(Kept {
+        let files = file_contents(host, &model);
+        *self.lock_cache() = Some(CachedVariant {
             path: path.to_owned(),
             files,
             model: model.clone(),
@@ -51,43 +56,44 @@ impl Variant {
         Ok(model)
     }
 
-    fn kept(&self) -> MutexGuard<'_, Option<Kept>> {
+    /// The contents of the cache; a panic of another thread does not lose them.
+    fn lock_cache(&self) -> MutexGuard<'_, Option<CachedVariant>> {
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// What changes from `before` to `after`, and along recordings, if there are any: `read` reads them for `before`, `after`
-    /// has read them. Where both cannot be held beside each other, `refused` says why.
-    pub(crate) fn told(
+    /// View of the changes from `before` to `after`, also along recordings if there are any. `read` reads recordings
+    /// for `before`, `after_read` gives those of `after`. If the models cannot be compared along recordings, `refused`
+    /// has the reason.
+    pub(crate) fn comparison_view(
         &self,
         before: &Model,
         after: &Model,
         spelling: &dyn RemedySpelling,
-        read: impl FnOnce() -> Outcome<Read>,
-        after_read: impl FnOnce() -> Outcome<Arc<Read>>,
+        read: impl FnOnce() -> Outcome<SessionRecordings>,
+        after_read: impl FnOnce() -> Outcome<Arc<SessionRecordings>>,
     ) -> Outcome<Value> {
-        let mut told = Changes::between(before, after).json(before, after);
+        let mut view_json = ModelChanges::from_models(before, after).json(before, after);
         let along = (|| {
-            Variants::check([before, after])?;
-            let first = self.readings.of(before, false, read)?.0;
+            VariantComparison::check([before, after])?;
+            let first = self.readings.recordings_for(before, false, read)?.0;
             let second = after_read()?;
-            let runs =
-                [&first, &second].map(|read| read.iter().flatten().collect::<Vec<&Recording>>());
+            let runs = [&first, &second].map(|read| read.iter().flatten().collect::<Vec<&PreparedRecording>>());
             if runs[0].is_empty() {
                 return Ok(Value::Null);
             }
-            Ok(Variants::along([before, after], [&runs[0], &runs[1]])?.json(spelling))
+            Ok(VariantComparison::along_recordings([before, after], [&runs[0], &runs[1]])?.json(spelling))
         })();
         match along {
-            Ok(along) => told["along"] = along,
+            Ok(along) => view_json["along"] = along,
             Err(Error::Cancelled) => return Err(Error::Cancelled),
-            Err(error) => told["refused"] = json!(error.spell(spelling)),
+            Err(error) => view_json["refused"] = json!(error.spell(spelling)),
         }
-        Ok(told)
+        Ok(view_json)
     }
 }
 
-/// Names of the model files in the folder of a model, without its own.
-pub(crate) fn models_near(host: &Host, model: &Path) -> Vec<String> {
+/// Names of the other model files in the folder of a model, those that can be loaded.
+pub(crate) fn models_in_folder(host: &Host, model: &Path) -> Vec<String> {
     let folder = match model.parent() {
         Some(parent) if parent != Path::new("") => parent,
         _ => Path::new("."),
@@ -102,10 +108,8 @@ pub(crate) fn models_near(host: &Host, model: &Path) -> Vec<String> {
         .collect()
 }
 
-/// What stands in the files that a model is made of.
-fn contents(host: &Host, model: &Model) -> Vec<Option<Vec<u8>>> {
+/// Contents of all files of a model; `None` for a file that cannot be read.
+fn file_contents(host: &Host, model: &Model) -> Vec<Option<Vec<u8>>> {
     let paths = model.files();
-    paths
-        .map(|path| host.files().read(path, LONGEST).ok())
-        .collect()
+    paths.map(|path| host.files().read(path, LONGEST).ok()).collect()
 }

@@ -1,30 +1,36 @@
-//! A job of the library as the page sees it: what goes on, how far it is, and that it is to stop.
+//! Watches the jobs of the library for a page: their names, their progress, and requests to cancel.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use modelmill::progress::{Job, Progress};
+use modelmill::progress::{JobHandle, ProgressListener};
 use serde_json::{Value, json};
 
-use crate::surroundings::Surroundings;
+use crate::surrounding_files::SessionEnvironment;
 
-/// Watches the jobs of one verb.
-pub(crate) struct Watch {
-    surroundings: Arc<dyn Surroundings>,
-    jobs: Mutex<Vec<Going>>,
+/// Watches the jobs of one diagnosis or search.
+pub(crate) struct JobWatch {
+    /// Receives the progress.
+    surroundings: Arc<dyn SessionEnvironment>,
+    /// The running jobs, outer ones first.
+    jobs: Mutex<Vec<RunningJob>>,
+    /// Whether the user cancelled; jobs that start later are cancelled at once.
     is_cancelled: AtomicBool,
 }
 
-/// A job that goes on.
-struct Going {
+/// A running job.
+struct RunningJob {
+    /// What the job does, in words.
     what: String,
+    /// Number of its steps; 0 if unknown.
     total: usize,
-    job: Arc<Job>,
+    /// Its progress, and the switch that cancels it.
+    job: Arc<JobHandle>,
 }
 
-impl Watch {
-    /// Nothing goes on yet; the surroundings hear of every job.
-    pub(crate) fn new(surroundings: Arc<dyn Surroundings>) -> Self {
+impl JobWatch {
+    /// A watch without jobs; `surroundings` gets the progress of each job.
+    pub(crate) fn new(surroundings: Arc<dyn SessionEnvironment>) -> Self {
         Self {
             surroundings,
             jobs: Mutex::default(),
@@ -32,7 +38,7 @@ impl Watch {
         }
     }
 
-    /// Asks all jobs to stop, those too that have not begun.
+    /// Requests all jobs to stop, also those that have not started.
     pub(crate) fn cancel(&self) {
         self.is_cancelled.store(true, Ordering::Relaxed);
         for going in self.jobs().iter() {
@@ -40,39 +46,40 @@ impl Watch {
         }
     }
 
-    /// What goes on: the outermost job that counts its steps, or else the innermost one.
-    pub(crate) fn told(&self) -> Value {
+    /// View of the progress: of the outermost job that counts its steps, or else of the innermost one.
+    pub(crate) fn progress_view(&self) -> Value {
         let jobs = self.jobs();
         let counting = jobs.iter().find(|going| going.total > 0);
         match counting.or(jobs.last()) {
             Some(going) => {
                 json!({ "what": going.what, "done": going.job.done(), "total": going.total })
             }
-            None => json!({ "what": "beginning", "done": 0, "total": 0 }),
+            None => json!({ "what": "starting", "done": 0, "total": 0 }),
         }
     }
 
-    fn jobs(&self) -> std::sync::MutexGuard<'_, Vec<Going>> {
+    /// The running jobs; a panic of another thread does not lose them.
+    fn jobs(&self) -> std::sync::MutexGuard<'_, Vec<RunningJob>> {
         self.jobs.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Progress for Watch {
-    fn begins(&self, what: &str, total: usize, job: &Arc<Job>) {
+impl ProgressListener for JobWatch {
+    fn on_job_start(&self, what: &str, total: usize, job: &Arc<JobHandle>) {
         let mut jobs = self.jobs();
         if self.is_cancelled.load(Ordering::Relaxed) {
             job.cancel();
         }
-        jobs.push(Going {
+        jobs.push(RunningJob {
             what: what.to_owned(),
             total,
             job: Arc::clone(job),
         });
         drop(jobs);
-        self.surroundings.goes_on(&self.told());
+        self.surroundings.report_progress(&self.progress_view());
     }
 
-    fn ends(&self) {
+    fn on_job_end(&self) {
         self.jobs().pop();
     }
 }
@@ -80,22 +87,22 @@ impl Progress for Watch {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shelf::Shelf;
+    use crate::memory_store::MemoryStore;
 
     #[test]
     fn what_is_cancelled_stops_every_job() {
-        let watch = Watch::new(Arc::new(Shelf::new(|| 0.0, |_| {})));
-        let [outer, inner, later] = [(); 3].map(|()| Arc::new(Job::default()));
-        watch.begins("searching", 10, &outer);
-        watch.begins("fitting", 0, &inner);
+        let watch = JobWatch::new(Arc::new(MemoryStore::new(|| 0.0, |_| {})));
+        let [outer, inner, later] = [(); 3].map(|()| Arc::new(JobHandle::default()));
+        watch.on_job_start("searching", 10, &outer);
+        watch.on_job_start("fitting", 0, &inner);
         outer.add(3);
         assert_eq!(
-            watch.told(),
+            watch.progress_view(),
             json!({ "what": "searching", "done": 3, "total": 10 })
         );
         watch.cancel();
-        watch.ends();
-        watch.begins("judging", 0, &later);
+        watch.on_job_end();
+        watch.on_job_start("judging", 0, &later);
         assert!(outer.is_cancelled() && inner.is_cancelled() && later.is_cancelled());
     }
 }

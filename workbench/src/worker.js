@@ -1,4 +1,4 @@
-// A worker with a mill of its own: it answers one question after the other, and may be ended at any time.
+// A worker with its own instance of the program: it answers one request after the other, and may be ended at any time.
 let mill = null, last = Promise.resolve();
 const encode = (words) => new TextEncoder().encode(words);
 const text = (start, length) => new TextDecoder().decode(new Uint8Array(mill.memory.buffer, start, length));

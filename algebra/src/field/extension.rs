@@ -1,43 +1,44 @@
-//! The quadratic extension of a prime field: pairs `re + im i` with `i^2 = -1`, which is no square in the fields that
-//! are used.
+//! The quadratic extension of a prime field: pairs `re + im i` with `i^2 = -1`, where -1 is no square in the prime
+//! fields used here.
 //!
-//! Every element of the prime field has a root here. A loop that takes its roots of a pose drawn in the prime field
-//! therefore closes at every draw, however many roots there are: six legs with two each would otherwise need four
+//! Every element of the prime field has a square root here. So the loops of a pose that is drawn in the prime field
+//! close at every draw, however many roots there are. Six legs with two roots each would otherwise need four
 //! thousand draws for one pose.
 //!
-//! Decision: each equation counts twice here. The factors lie in the prime field, so real and imaginary parts obey
+//! Decision: each equation counts twice here. The factors lie in the prime field, so real and imaginary parts satisfy
 //! the same relations.
 
 use std::ops::{Add, Mul, Neg, Sub};
 
-use super::{Element, MODULUS, Number, Stream};
+use super::{FieldElement, FieldNumber, MODULUS, RandomStream};
 use crate::Rational;
 
-/// `re + im i`
+/// The number `re + im i`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Default)]
-pub struct Extended<const P: u64 = MODULUS> {
+pub struct ExtensionElement<const P: u64 = MODULUS> {
     /// The part in the prime field.
-    pub re: Element<P>,
+    pub re: FieldElement<P>,
     /// The factor of `i`.
-    pub im: Element<P>,
+    pub im: FieldElement<P>,
 }
 
-impl<const P: u64> From<Element<P>> for Extended<P> {
-    fn from(re: Element<P>) -> Self {
-        let im = Element::ZERO;
+impl<const P: u64> From<FieldElement<P>> for ExtensionElement<P> {
+    fn from(re: FieldElement<P>) -> Self {
+        let im = FieldElement::ZERO;
         Self { re, im }
     }
 }
 
-impl<const P: u64> Extended<P> {
-    /// `re^2 + im^2`, which is zero for zero alone.
-    fn norm(self) -> Element<P> {
+impl<const P: u64> ExtensionElement<P> {
+    /// `re^2 + im^2`, which is zero only for zero.
+    fn norm(self) -> FieldElement<P> {
         self.re * self.re + self.im * self.im
     }
 }
 
-impl<const P: u64> Add for Extended<P> {
+impl<const P: u64> Add for ExtensionElement<P> {
     type Output = Self;
+    #[inline]
     fn add(self, other: Self) -> Self {
         Self {
             re: self.re + other.re,
@@ -46,15 +47,17 @@ impl<const P: u64> Add for Extended<P> {
     }
 }
 
-impl<const P: u64> Sub for Extended<P> {
+impl<const P: u64> Sub for ExtensionElement<P> {
     type Output = Self;
+    #[inline]
     fn sub(self, other: Self) -> Self {
         self + -other
     }
 }
 
-impl<const P: u64> Neg for Extended<P> {
+impl<const P: u64> Neg for ExtensionElement<P> {
     type Output = Self;
+    #[inline]
     fn neg(self) -> Self {
         Self {
             re: -self.re,
@@ -63,43 +66,33 @@ impl<const P: u64> Neg for Extended<P> {
     }
 }
 
-impl<const P: u64> Mul for Extended<P> {
+impl<const P: u64> Mul for ExtensionElement<P> {
     type Output = Self;
+    #[inline]
     fn mul(self, other: Self) -> Self {
-        // Most values stay in the prime field.
-        match (self.im == Element::ZERO, other.im == Element::ZERO) {
-            (true, true) => (self.re * other.re).into(),
-            (true, false) => Self {
-                re: self.re * other.re,
-                im: self.re * other.im,
-            },
-            (false, true) => Self {
-                re: self.re * other.re,
-                im: self.im * other.re,
-            },
-            (false, false) => Self {
-                re: self.re * other.re - self.im * other.im,
-                im: self.re * other.im + self.im * other.re,
-            },
+        Self {
+            re: FieldElement::sum_of_products([self.re, other.re], [-self.im, other.im]),
+            im: FieldElement::sum_of_products([self.re, other.im], [self.im, other.re]),
         }
     }
 }
 
-impl<const P: u64> Number for Extended<P> {
+impl<const P: u64> FieldNumber for ExtensionElement<P> {
     const ZERO: Self = Self {
-        re: Element::ZERO,
-        im: Element::ZERO,
+        re: FieldElement::ZERO,
+        im: FieldElement::ZERO,
     };
     const ONE: Self = Self {
-        re: Element::ONE,
-        im: Element::ZERO,
+        re: FieldElement::ONE,
+        im: FieldElement::ZERO,
     };
 
     fn from_rational(value: &Rational) -> Option<Self> {
-        Element::from_rational(value).map(Self::from)
+        FieldElement::from_rational(value).map(Self::from)
     }
 
     fn inverse(self) -> Option<Self> {
+        // 1/(re + im i) = (re - im i)/norm
         let norm = self.norm().inverse()?;
         Some(Self {
             re: self.re * norm,
@@ -108,17 +101,19 @@ impl<const P: u64> Number for Extended<P> {
     }
 
     fn square_root(self) -> Option<Self> {
-        if self.im == Element::ZERO {
+        // An element of the prime field, or its negative, is a square there.
+        if self.im == FieldElement::ZERO {
             let re = self.re;
             return re.square_root().map(Self::from).or_else(|| {
                 let im = (-re).square_root()?;
-                let re = Element::ZERO;
+                let re = FieldElement::ZERO;
                 Some(Self { re, im })
             });
         }
-        // (u + v i)^2 = re + im i gives u^2 = (re + s)/2 with s^2 the norm; of the two signs of s one makes a square.
+        // (u + v i)^2 = re + im i gives u^2 = (re + s)/2, where s^2 is the norm. For one of the two signs of s this is
+        // a square. The norm must have a root in the prime field.
         let root = self.norm().square_root()?;
-        let half = Element::from_i64(2).inverse()?;
+        let half = FieldElement::from_i64(2).inverse()?;
         let u = ((self.re + root) * half)
             .square_root()
             .or_else(|| ((self.re - root) * half).square_root())?;
@@ -126,27 +121,29 @@ impl<const P: u64> Number for Extended<P> {
         Some(Self { re: u, im })
     }
 
-    fn hashed(self, seed: u64) -> Self {
-        if self.im == Element::ZERO {
-            return self.re.hashed(seed).into();
+    fn hash_with_seed(self, seed: u64) -> Self {
+        // Elements of the prime field must have the same value as there.
+        if self.im == FieldElement::ZERO {
+            return self.re.hash_with_seed(seed).into();
         }
-        let part = self.im.hashed(seed).representative();
+        // Both parts depend on both parts of the number.
+        let part = self.im.hash_with_seed(seed).representative();
         Self {
-            re: self.re.hashed(seed ^ part),
-            im: self.re.hashed(!(seed ^ part)),
+            re: self.re.hash_with_seed(seed ^ part),
+            im: self.re.hash_with_seed(!(seed ^ part)),
         }
     }
 
-    fn bits(self, seed: u64) -> u64 {
-        self.hashed(seed).re.representative()
+    fn hash_bits(self, seed: u64) -> u64 {
+        self.hash_with_seed(seed).re.representative()
     }
 
-    fn draw(stream: &mut Stream) -> Self {
-        stream.element().into()
+    fn draw(stream: &mut RandomStream) -> Self {
+        stream.next_element().into()
     }
 
-    fn draw_circle(stream: &mut Stream) -> (Self, Self) {
-        let (c, s) = stream.circle();
+    fn draw_circle(stream: &mut RandomStream) -> (Self, Self) {
+        let (c, s) = stream.next_circle_point();
         (c.into(), s.into())
     }
 }
@@ -155,30 +152,30 @@ impl<const P: u64> Number for Extended<P> {
 mod tests {
     use super::*;
 
-    fn any(stream: &mut Stream) -> Extended {
-        Extended {
-            re: stream.element(),
-            im: stream.element(),
+    fn any(stream: &mut RandomStream) -> ExtensionElement {
+        ExtensionElement {
+            re: stream.next_element(),
+            im: stream.next_element(),
         }
     }
 
     #[test]
     fn it_is_a_field() {
-        let mut stream = Stream::new(11);
+        let mut stream = RandomStream::new(11);
         for _ in 0..500 {
             let (a, b, c) = (any(&mut stream), any(&mut stream), any(&mut stream));
             assert_eq!(a * (b + c), a * b + a * c);
             assert_eq!((a * b) * c, a * (b * c));
-            assert_eq!(a * a.inverse().unwrap(), Extended::ONE);
+            assert_eq!(a * a.inverse().unwrap(), ExtensionElement::ONE);
             assert_eq!((a - b) + b, a);
-            assert_eq!(a.integer_power(-3).unwrap() * a * a * a, Extended::ONE);
+            assert_eq!(a.integer_power(-3).unwrap() * a * a * a, ExtensionElement::ONE);
         }
-        assert_eq!(Extended::<MODULUS>::ZERO.inverse(), None);
+        assert_eq!(ExtensionElement::<MODULUS>::ZERO.inverse(), None);
     }
 
     #[test]
     fn half_of_its_numbers_are_squares_and_all_of_the_prime_field() {
-        let mut stream = Stream::new(12);
+        let mut stream = RandomStream::new(12);
         let mut squares = 0;
         for _ in 0..400 {
             let a = any(&mut stream);
@@ -187,7 +184,7 @@ mod tests {
                 assert_eq!(root * root, a);
                 squares += 1;
             }
-            let inside = Extended::from(a.re);
+            let inside = ExtensionElement::from(a.re);
             assert_eq!(inside.square_root().map(|r| r * r), Some(inside));
         }
         assert!((120..280).contains(&squares), "{squares}");
@@ -195,17 +192,23 @@ mod tests {
 
     #[test]
     fn opaque_values_of_the_prime_field_are_those_that_the_prime_field_gives() {
-        let mut stream = Stream::new(13);
+        let mut stream = RandomStream::new(13);
         for seed in 0..50 {
-            let a: Element = stream.element();
-            assert_eq!(Extended::from(a).hashed(seed), a.hashed(seed).into());
-            assert_eq!(Extended::from(a).bits(seed), Number::bits(a, seed));
-            let b = Extended {
+            let a: FieldElement = stream.next_element();
+            assert_eq!(
+                ExtensionElement::from(a).hash_with_seed(seed),
+                a.hash_with_seed(seed).into()
+            );
+            assert_eq!(
+                ExtensionElement::from(a).hash_bits(seed),
+                FieldNumber::hash_bits(a, seed)
+            );
+            let b = ExtensionElement {
                 re: a,
-                im: stream.element(),
+                im: stream.next_element(),
             };
-            assert_eq!(b.hashed(seed), b.hashed(seed));
-            assert_ne!(b.hashed(seed), (-b).hashed(seed));
+            assert_eq!(b.hash_with_seed(seed), b.hash_with_seed(seed));
+            assert_ne!(b.hash_with_seed(seed), (-b).hash_with_seed(seed));
         }
     }
 }

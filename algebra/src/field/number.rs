@@ -1,12 +1,12 @@
-//! What the prime field and its quadratic extension have in common: points of motion are drawn over either.
+//! Operations that the prime field and its quadratic extension have in common: points of motion are drawn over either.
 
 use std::ops::{Add, Mul, Neg, Sub};
 
-use super::{Element, Stream, hashed};
+use super::{FieldElement, RandomStream, hash_element};
 use crate::Rational;
 
 /// A number of a field in which expressions are evaluated.
-pub trait Number:
+pub trait FieldNumber:
     Copy
     + Ord
     + Default
@@ -27,24 +27,25 @@ pub trait Number:
     /// Multiplicative inverse; `None` for 0.
     fn inverse(self) -> Option<Self>;
 
-    /// A square root if there is one.
+    /// A square root, if there is one.
     fn square_root(self) -> Option<Self>;
 
-    /// A value that depends on `self` and `seed` alone and otherwise looks random; of the prime field for its elements.
+    /// A pseudorandom number that depends on `self` and `seed` alone; in the prime field for its elements.
     #[must_use]
-    fn hashed(self, seed: u64) -> Self;
+    fn hash_with_seed(self, seed: u64) -> Self;
 
-    /// 64 bits that depend on `self` and `seed` alone and otherwise look random.
-    fn bits(self, seed: u64) -> u64;
+    /// 64 pseudorandom bits that depend on `self` and `seed` alone.
+    fn hash_bits(self, seed: u64) -> u64;
 
     /// A random number of the prime field.
-    fn draw(stream: &mut Stream) -> Self;
+    fn draw(stream: &mut RandomStream) -> Self;
 
     /// A random rational point (cosine, sine) of the unit circle over the prime field.
-    fn draw_circle(stream: &mut Stream) -> (Self, Self);
+    fn draw_circle(stream: &mut RandomStream) -> (Self, Self);
 
     /// Integer power; `None` for a negative power of 0.
     fn integer_power(self, exponent: i32) -> Option<Self> {
+        // Repeated squaring of the number or of its inverse.
         let mut base = if exponent < 0 { self.inverse()? } else { self };
         let mut left = exponent.unsigned_abs();
         let mut result = Self::ONE;
@@ -61,7 +62,7 @@ pub trait Number:
     }
 }
 
-impl<const P: u64> Number for Element<P> {
+impl<const P: u64> FieldNumber for FieldElement<P> {
     const ZERO: Self = Self::ZERO;
     const ONE: Self = Self::ONE;
 
@@ -77,19 +78,19 @@ impl<const P: u64> Number for Element<P> {
         self.square_root()
     }
 
-    fn hashed(self, seed: u64) -> Self {
-        hashed(seed, self)
+    fn hash_with_seed(self, seed: u64) -> Self {
+        hash_element(seed, self)
     }
 
-    fn bits(self, seed: u64) -> u64 {
-        hashed(seed, self).representative()
+    fn hash_bits(self, seed: u64) -> u64 {
+        hash_element(seed, self).representative()
     }
 
-    fn draw(stream: &mut Stream) -> Self {
-        stream.element()
+    fn draw(stream: &mut RandomStream) -> Self {
+        stream.next_element()
     }
 
-    fn draw_circle(stream: &mut Stream) -> (Self, Self) {
-        stream.circle()
+    fn draw_circle(stream: &mut RandomStream) -> (Self, Self) {
+        stream.next_circle_point()
     }
 }

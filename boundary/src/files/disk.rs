@@ -1,10 +1,10 @@
-//! Files on a disk, and what else a path may lead to.
+//! Files on a disk, and other things that a path may lead to.
 //!
-//! - An ordinary file is read up to the cap.
-//! - Standard input and pipes that were handed over by a shell (`/dev/stdin`, `<(zcat run.csv.gz)`) are read up to the
-//!   cap; whoever writes is waited for, since the shell started it together with us.
-//! - A named pipe is waited for as long as [`Disk::patience`] says, at its opening and between its bytes: there may be
-//!   nobody at its other end.
+//! - An ordinary file is read up to the limit.
+//! - Standard input and pipes of a shell (`/dev/stdin`, `<(zcat run.csv.gz)`) are read up to the limit. There is no
+//!   timeout, because the shell has started the writer together with this program.
+//! - A named pipe has the timeout [`DiskFiles::pipe_timeout`] for its opening and between its bytes, because it may
+//!   have no writer.
 //! - Devices and sockets are refused, unless one is standard input.
 
 use std::fs::{File, Metadata};
@@ -14,69 +14,71 @@ use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use super::{FileError, FileFault, Files, Kind, Opened, write};
+use super::{FileError, FileFault, FileSource, OpenFile, PathKind, write};
 
-/// The files of this machine; clones remember together what was read.
+/// The files of this machine. Clones share the list of files that were read.
 #[derive(Clone, Debug)]
-pub struct Disk {
-    /// How long a named pipe is waited for.
-    pub patience: Duration,
-    /// What was read, so that it is never overwritten.
-    read: Arc<Mutex<Vec<Identity>>>,
+pub struct DiskFiles {
+    /// Longest time without bytes from a named pipe.
+    pub pipe_timeout: Duration,
+    /// Files that were read, which are therefore never overwritten.
+    read: Arc<Mutex<Vec<FileIdentity>>>,
 }
 
-/// What makes two paths one file, be it through links.
+/// The identity of a file, independent of links.
 #[derive(Clone, Debug, PartialEq, Eq)]
-enum Identity {
-    /// Device and number on it: a hard link is the same file under a path of its own.
+enum FileIdentity {
+    /// Number of the device and of the file on it; hard links have the same numbers.
     #[cfg(unix)]
     Number(u64, u64),
-    /// The path without links.
+    /// The path after all links are resolved.
     #[cfg(not(unix))]
     Path(PathBuf),
 }
 
-impl Default for Disk {
+impl Default for DiskFiles {
     fn default() -> Self {
         Self {
-            patience: Duration::from_secs(10),
+            pipe_timeout: Duration::from_secs(10),
             read: Arc::default(),
         }
     }
 }
 
-impl Disk {
-    /// Whether a path leads to a file that was read here, however both are reached.
-    pub fn was_read(&self, path: &Path) -> bool {
-        identity(path).is_some_and(|found| self.known().contains(&found))
+impl DiskFiles {
+    /// Whether a path leads to a file that was read here, also through links.
+    pub fn has_read(&self, path: &Path) -> bool {
+        identity(path).is_some_and(|found| self.lock_read_identities().contains(&found))
     }
 
-    /// Writes a file as a whole (see [`write()`]); fails when it is one that was read here.
+    /// Writes a file atomically (see [`write()`]). Fails when it is a file that was read here.
     pub fn write(&self, path: &Path, bytes: &[u8]) -> Result<(), FileError> {
-        if self.was_read(path) {
+        if self.has_read(path) {
             return Err(FileError::new(path, FileFault::Input));
         }
         write(path, bytes)
     }
 
-    /// Writes a file as a whole over one that was read, as an edit in place does.
+    /// Writes a file atomically over one that was read, for edits in place.
     pub fn replace(&self, path: &Path, bytes: &[u8]) -> Result<(), FileError> {
         let old = identity(path);
         write(path, bytes)?;
-        // The old file is no more; its number may be given to another one.
-        let mut known = self.known();
+        // The old file is gone, and its number may be used for another one.
+        let mut known = self.lock_read_identities();
         known.retain(|one| Some(one) != old.as_ref());
         known.extend(identity(path));
         Ok(())
     }
 
-    fn known(&self) -> std::sync::MutexGuard<'_, Vec<Identity>> {
+    /// The files that were read; a lock of a thread that panicked is still valid.
+    fn lock_read_identities(&self) -> std::sync::MutexGuard<'_, Vec<FileIdentity>> {
         self.read.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn remember(&self, path: &Path) {
+    /// Adds a file to those that were read.
+    fn record_read(&self, path: &Path) {
         if let Some(found) = identity(path) {
-            let mut known = self.known();
+            let mut known = self.lock_read_identities();
             if !known.contains(&found) {
                 known.push(found);
             }
@@ -84,23 +86,24 @@ impl Disk {
     }
 }
 
-impl Files for Disk {
+impl FileSource for DiskFiles {
     fn read(&self, path: &Path, most: u64) -> Result<Vec<u8>, FileError> {
         match self.open(path, most)? {
-            Opened::File(file) => capped(file, path, most),
-            Opened::Memory(bytes) => Ok(Arc::unwrap_or_clone(bytes)),
+            OpenFile::File(file) => read_capped(file, path, most),
+            OpenFile::Memory(bytes) => Ok(Arc::unwrap_or_clone(bytes)),
         }
     }
 
-    fn kind(&self, path: &Path) -> Kind {
+    fn kind(&self, path: &Path) -> PathKind {
         match path.metadata() {
             Ok(found) => kind_of(&found, path),
-            Err(_) => Kind::Missing,
+            Err(_) => PathKind::Missing,
         }
     }
 
     fn list(&self, folder: &Path) -> Result<Vec<PathBuf>, FileError> {
-        let fail = |error: io::Error| FileError::system(folder, &error);
+        // Entries are sorted, because the order of a disk is arbitrary.
+        let fail = |error: io::Error| FileError::from_io_error(folder, &error);
         let entries = std::fs::read_dir(folder).map_err(fail)?;
         let mut found = entries
             .map(|entry| entry.map(|entry| entry.path()))
@@ -110,88 +113,95 @@ impl Files for Disk {
         Ok(found)
     }
 
-    fn open(&self, path: &Path, most: u64) -> Result<Opened, FileError> {
-        let fail = |error: io::Error| FileError::system(path, &error);
+    // What the path leads to decides how it is opened.
+    fn open(&self, path: &Path, most: u64) -> Result<OpenFile, FileError> {
+        let fail = |error: io::Error| FileError::from_io_error(path, &error);
         let found = path.metadata().map_err(fail)?;
         let opened = match kind_of(&found, path) {
-            Kind::File => Opened::File(File::open(path).map_err(fail)?),
-            Kind::Stream if is_standard_input(path) => {
-                Opened::Memory(capped(io::stdin().lock(), path, most)?.into())
+            PathKind::File => OpenFile::File(File::open(path).map_err(fail)?),
+            PathKind::Stream if is_standard_input(path) => {
+                OpenFile::Memory(read_capped(io::stdin().lock(), path, most)?.into())
             }
-            Kind::Stream if is_handed_over(path) => {
+            PathKind::Stream if is_handed_over(path) => {
                 let file = File::open(path).map_err(fail)?;
-                Opened::Memory(capped(file, path, most)?.into())
+                OpenFile::Memory(read_capped(file, path, most)?.into())
             }
-            Kind::Stream => Opened::Memory(patiently(path, most, self.patience)?.into()),
-            Kind::Folder => return Err(FileError::new(path, FileFault::Folder)),
-            Kind::Device | Kind::Missing => return Err(FileError::new(path, FileFault::Device)),
+            PathKind::Stream => OpenFile::Memory(read_pipe_with_timeout(path, most, self.pipe_timeout)?.into()),
+            PathKind::Folder => return Err(FileError::new(path, FileFault::Folder)),
+            PathKind::Device | PathKind::Missing => {
+                return Err(FileError::new(path, FileFault::Device));
+            }
         };
-        self.remember(path);
+        // Only files that could be opened are protected from being overwritten.
+        self.record_read(path);
         Ok(opened)
     }
 }
 
-/// What a path leads to that is there.
-fn kind_of(found: &Metadata, path: &Path) -> Kind {
+/// What an existing path leads to.
+fn kind_of(found: &Metadata, path: &Path) -> PathKind {
     if found.is_file() {
-        return Kind::File;
+        return PathKind::File;
     }
     if found.is_dir() {
-        return Kind::Folder;
+        return PathKind::Folder;
     }
     #[cfg(unix)]
     if std::os::unix::fs::FileTypeExt::is_fifo(&found.file_type()) {
-        return Kind::Stream;
+        return PathKind::Stream;
     }
+    // Anything else that the shell has opened is read as a stream, too.
     if is_handed_over(path) {
-        Kind::Stream
+        PathKind::Stream
     } else {
-        Kind::Device
+        PathKind::Device
     }
 }
 
-/// Whether a path names standard input.
+/// Whether a path is a name of standard input.
 fn is_standard_input(path: &Path) -> bool {
     ["/dev/stdin", "/dev/fd/0", "/proc/self/fd/0"]
         .iter()
         .any(|name| path == Path::new(name))
 }
 
-/// Whether a path names what a shell has opened for us.
+/// Whether a path is a descriptor that the shell has opened.
 fn is_handed_over(path: &Path) -> bool {
-    path == Path::new("/dev/stdin")
-        || path.starts_with("/dev/fd")
-        || path.starts_with("/proc/self/fd")
+    path == Path::new("/dev/stdin") || path.starts_with("/dev/fd") || path.starts_with("/proc/self/fd")
 }
 
-/// All bytes of a stream, unless there are more than `most`.
-fn capped(stream: impl Read, path: &Path, most: u64) -> Result<Vec<u8>, FileError> {
+/// All bytes of a stream; fails when there are more than `most`.
+fn read_capped(stream: impl Read, path: &Path, most: u64) -> Result<Vec<u8>, FileError> {
+    // One byte more than allowed shows that the stream is too long.
     let mut bytes = Vec::new();
     stream
         .take(most.saturating_add(1))
         .read_to_end(&mut bytes)
-        .map_err(|error| FileError::system(path, &error))?;
+        .map_err(|error| FileError::from_io_error(path, &error))?;
     if bytes.len() as u64 > most {
         return Err(FileError::new(path, FileFault::TooLarge { most }));
     }
-    // What was read by doubling may take up twice its room.
+    // A vector that grew by doubling may use up to twice the memory.
     bytes.shrink_to_fit();
     Ok(bytes)
 }
 
-/// All bytes of a named pipe. A thread waits for them; if none come, it is left waiting.
-fn patiently(path: &Path, most: u64, patience: Duration) -> Result<Vec<u8>, FileError> {
+/// All bytes of a named pipe. A thread reads them; without a writer that thread waits forever.
+///
+/// Fails after `patience` without bytes, or when there are more than `most`.
+fn read_pipe_with_timeout(path: &Path, most: u64, patience: Duration) -> Result<Vec<u8>, FileError> {
+    // The channel is short, so that the thread cannot read far ahead.
     let (sender, receiver) = sync_channel(4);
     let pipe = path.to_owned();
     std::thread::Builder::new()
         .name("reads a named pipe".to_owned())
-        .spawn(move || hand_on(&pipe, &sender))
-        .map_err(|error| FileError::system(path, &error))?;
+        .spawn(move || forward_pipe(&pipe, &sender))
+        .map_err(|error| FileError::from_io_error(path, &error))?;
     let mut bytes = Vec::new();
     loop {
         match receiver.recv_timeout(patience) {
             Ok(Ok(more)) => bytes.extend_from_slice(&more),
-            Ok(Err(error)) => return Err(FileError::system(path, &error)),
+            Ok(Err(error)) => return Err(FileError::from_io_error(path, &error)),
             Err(RecvTimeoutError::Disconnected) => {
                 bytes.shrink_to_fit();
                 return Ok(bytes);
@@ -207,8 +217,8 @@ fn patiently(path: &Path, most: u64, patience: Duration) -> Result<Vec<u8>, File
     }
 }
 
-/// Sends what comes through a pipe until it ends or nobody takes it any more.
-fn hand_on(pipe: &Path, to: &SyncSender<io::Result<Vec<u8>>>) {
+/// Sends the bytes of a pipe until it ends or the receiver is gone.
+fn forward_pipe(pipe: &Path, to: &SyncSender<io::Result<Vec<u8>>>) {
     let mut stream = match File::open(pipe) {
         Ok(stream) => stream,
         Err(error) => return drop(to.send(Err(error))),
@@ -227,19 +237,18 @@ fn hand_on(pipe: &Path, to: &SyncSender<io::Result<Vec<u8>>>) {
     }
 }
 
+/// The identity of an ordinary file; `None` for anything else.
 #[cfg(unix)]
-fn identity(path: &Path) -> Option<Identity> {
+fn identity(path: &Path) -> Option<FileIdentity> {
     use std::os::unix::fs::MetadataExt;
     let found = path.metadata().ok()?;
-    // Terminals and the like may be read and written at once.
-    found
-        .is_file()
-        .then(|| Identity::Number(found.dev(), found.ino()))
+    // Terminals and similar devices may be read and written at the same time.
+    found.is_file().then(|| FileIdentity::Number(found.dev(), found.ino()))
 }
 
 #[cfg(not(unix))]
-fn identity(path: &Path) -> Option<Identity> {
-    path.canonicalize().ok().map(Identity::Path)
+fn identity(path: &Path) -> Option<FileIdentity> {
+    path.canonicalize().ok().map(FileIdentity::Path)
 }
 
 #[cfg(all(test, unix))]
@@ -261,18 +270,12 @@ mod tests {
 
         fn pipe(&self) -> PathBuf {
             let path = self.0.join("pipe");
-            assert!(
-                Command::new("mkfifo")
-                    .arg(&path)
-                    .status()
-                    .unwrap()
-                    .success()
-            );
+            assert!(Command::new("mkfifo").arg(&path).status().unwrap().success());
             path
         }
 
         fn names(&self) -> Vec<String> {
-            let listed = Disk::default().list(&self.0).unwrap();
+            let listed = DiskFiles::default().list(&self.0).unwrap();
             let name = |path: &PathBuf| path.file_name().unwrap().to_string_lossy().into_owned();
             listed.iter().map(name).collect()
         }
@@ -284,10 +287,10 @@ mod tests {
         }
     }
 
-    fn hasty() -> Disk {
-        Disk {
-            patience: Duration::from_millis(200),
-            ..Disk::default()
+    fn hasty() -> DiskFiles {
+        DiskFiles {
+            pipe_timeout: Duration::from_millis(200),
+            ..DiskFiles::default()
         }
     }
 
@@ -308,7 +311,7 @@ mod tests {
             .arg(&pipe)
             .spawn()
             .unwrap();
-        let disk = Disk::default();
+        let disk = DiskFiles::default();
         let found = disk.read(&pipe, 100_000).unwrap_err().fault;
         let _ = endless.kill();
         let _ = endless.wait();
@@ -324,7 +327,7 @@ mod tests {
             .arg(&pipe)
             .spawn()
             .unwrap();
-        let bytes = Disk::default().read(&pipe, 1 << 20).unwrap();
+        let bytes = DiskFiles::default().read(&pipe, 1 << 20).unwrap();
         writer.wait().unwrap();
         assert_eq!(bytes.len(), 200_000);
     }
@@ -336,7 +339,7 @@ mod tests {
         std::fs::write(at("model"), "old").unwrap();
         std::os::unix::fs::symlink("model", at("soft")).unwrap();
         std::fs::hard_link(at("model"), at("hard")).unwrap();
-        let disk = Disk::default();
+        let disk = DiskFiles::default();
         assert_eq!(disk.read(&at("model"), 100).unwrap(), b"old");
         for name in ["model", "soft", "hard", "../x/model"] {
             let name = name.replace('x', &folder.0.file_name().unwrap().to_string_lossy());
@@ -347,7 +350,7 @@ mod tests {
         disk.replace(&at("soft"), b"edited").unwrap();
         assert_eq!(std::fs::read(at("model")).unwrap(), b"edited");
         assert!(at("soft").is_symlink());
-        assert!(disk.was_read(&at("model")));
+        assert!(disk.has_read(&at("model")));
         assert_eq!(folder.names(), ["hard", "model", "other", "soft"]);
     }
 
@@ -376,7 +379,7 @@ mod tests {
     #[test]
     fn devices_are_written_to_as_they_are() {
         write(Path::new("/dev/null"), b"gone").unwrap();
-        assert_eq!(Disk::default().kind(Path::new("/dev/null")), Kind::Device);
+        assert_eq!(DiskFiles::default().kind(Path::new("/dev/null")), PathKind::Device);
         #[cfg(target_os = "linux")]
         {
             let full = write(Path::new("/dev/full"), b"none").unwrap_err();

@@ -1,56 +1,56 @@
-//! Why a file cannot be read or written, as data with a remedy.
+//! Faults of files as data, each with a remedy.
 
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// A file that cannot be read or written, and why.
+/// A file that cannot be read or written.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FileError {
     /// The path as it was given.
     pub path: PathBuf,
-    /// What is wrong with it.
+    /// The reason.
     pub fault: FileFault,
 }
 
-/// What is wrong with a file.
+/// Why a file cannot be read or written.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FileFault {
-    /// There is nothing of that name.
+    /// Nothing has this path.
     Missing,
-    /// A folder stands where a file is expected.
+    /// The path leads to a folder.
     Folder,
-    /// A device or a socket, which might never end.
+    /// The path leads to a device or a socket, which might never end.
     Device,
-    /// More bytes than `most` were there.
+    /// The file is too large.
     TooLarge {
-        /// The most bytes that would have been read.
+        /// The limit in bytes.
         most: u64,
     },
-    /// Nothing came through a named pipe.
+    /// A named pipe gave no bytes in time.
     Silent {
-        /// How long it was waited for, s.
+        /// The timeout, s.
         seconds: u64,
     },
-    /// The bytes are no text in UTF-8.
+    /// The bytes are not UTF-8.
     NoText {
-        /// Place of the first byte that is not.
+        /// Position of the first invalid byte.
         at: usize,
     },
-    /// The file holds something else than what it is named for.
+    /// The file has other contents than expected.
     OtherKind {
-        /// Keys of which it has none.
+        /// The keys of which it has none.
         lacks: String,
     },
     /// Folders cannot be listed here.
     NoList,
-    /// The file is one that was read, and would be lost.
+    /// The file was read by this program and would be overwritten.
     Input,
-    /// What the system says otherwise.
+    /// Any other error of the operating system.
     System {
         /// The kind of error.
         kind: io::ErrorKind,
-        /// In the system's words.
+        /// Its message.
         says: String,
     },
 }
@@ -64,8 +64,8 @@ impl FileError {
         }
     }
 
-    /// What the system says of this file.
-    pub fn system(path: &Path, error: &io::Error) -> Self {
+    /// The fault for an error of the operating system on this file.
+    pub fn from_io_error(path: &Path, error: &io::Error) -> Self {
         let fault = match error.kind() {
             io::ErrorKind::NotFound => FileFault::Missing,
             io::ErrorKind::IsADirectory => FileFault::Folder,
@@ -79,25 +79,23 @@ impl FileError {
 }
 
 impl FileFault {
-    /// What to do about it.
+    /// What to do, as the end of a sentence.
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::Missing => "check the path",
             Self::Folder => "name a file in it",
             Self::Device => "give an ordinary file, or a pipe that ends",
-            Self::TooLarge { .. } => {
-                "check that this is the file that is meant, and that what is piped in ends"
-            }
+            Self::TooLarge { .. } => "check that this is the intended file, and that the pipe ends",
             Self::Silent { .. } => "start the program that writes into the pipe first",
             Self::NoText { .. } => "save it as UTF-8",
             Self::OtherKind { .. } => "name a file that was written for this",
             Self::NoList => "name the files one by one",
             Self::Input => "choose another name",
             Self::System { kind, .. } => match kind {
-                io::ErrorKind::PermissionDenied => "check who may read and write it and its folder",
-                io::ErrorKind::StorageFull
-                | io::ErrorKind::QuotaExceeded
-                | io::ErrorKind::FileTooLarge => "make room, or choose another place",
+                io::ErrorKind::PermissionDenied => "check the permissions of the file and its folder",
+                io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded | io::ErrorKind::FileTooLarge => {
+                    "make room, or choose another place"
+                }
                 _ => "check that the folder exists and may be read and written to",
             },
         }
@@ -110,11 +108,11 @@ impl fmt::Display for FileFault {
             Self::Missing => f.write_str("no such file"),
             Self::Folder => f.write_str("it is a folder, not a file"),
             Self::Device => f.write_str("it is a device, not a file"),
-            Self::TooLarge { most } => write!(f, "it holds more than {most} bytes"),
+            Self::TooLarge { most } => write!(f, "it has more than {most} bytes"),
             Self::Silent { seconds } => {
                 write!(f, "nothing came through this pipe for {seconds} s")
             }
-            Self::NoText { at } => write!(f, "byte {at} is no text in UTF-8"),
+            Self::NoText { at } => write!(f, "byte {at} is not UTF-8 text"),
             Self::OtherKind { lacks } => {
                 write!(f, "it is something else: it has no `{lacks}` at its top")
             }

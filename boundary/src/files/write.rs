@@ -1,7 +1,7 @@
-//! Files are written as a whole or not at all.
+//! Atomic writing: a file is written completely or not at all.
 //!
-//! The bytes go into a new file in the same folder, from there to the disk, and only then does the new file take the
-//! place of the old one: whoever stops the program, or the disk that is full, leaves the old file as it was.
+//! The bytes are written to a new file in the same folder and flushed to the disk. Then the new file replaces the old
+//! one. If the program is stopped or the disk is full, the old file stays unchanged.
 
 use std::fs::{File, Metadata, OpenOptions};
 use std::io::{self, Write};
@@ -10,17 +10,17 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use super::{FileError, FileFault};
 
-/// Links that lead on to others are followed so far.
+/// Most links that are followed one after another.
 const MOST_LINKS: usize = 40;
 
-/// Writes a file as a whole.
+/// Writes a file atomically.
 ///
-/// Links are followed to the file that they lead to, and its permissions are kept, its owner too where that is allowed.
-/// A file under several names (hard links) is replaced under this one. What is no ordinary file, such as
-/// `/dev/stdout`, is written to as it is. Fails with the file as it was, and without a trace, when there is no room or no
-/// permission; who stops the program on the way leaves a file `.NAME.….part` beside it.
+/// Links are followed to their file. Its permissions are kept, and its owner where that is allowed. A file with
+/// several names (hard links) is replaced under this name only. Devices and pipes, such as `/dev/stdout`, are written
+/// to directly. Without room or permission it fails, and the old file stays unchanged. If the program is stopped
+/// during writing, a file `.NAME.….part` remains next to it.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
-    let fail = |error: io::Error| FileError::system(path, &error);
+    let fail = |error: io::Error| FileError::from_io_error(path, &error);
     let old = match path.metadata() {
         Ok(found) if found.is_dir() => return Err(FileError::new(path, FileFault::Folder)),
         Ok(found) if !found.is_file() => {
@@ -28,23 +28,24 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
             return stream.write_all(bytes).map_err(fail);
         }
         Ok(found) => {
-            // A file that may not be written to is not replaced either, though its folder would allow it.
+            // A write-protected file is not replaced, even if its folder would allow that.
             OpenOptions::new().write(true).open(path).map_err(fail)?;
             Some(found)
         }
         Err(_) => None,
     };
-    let target = followed(path).map_err(fail)?;
-    let part = Part::beside(&target).map_err(fail)?;
+    // Write next to the target, so that renaming stays on one disk.
+    let target = resolve_links(path).map_err(fail)?;
+    let part = PartialFile::create_next_to(&target).map_err(fail)?;
     part.fill(bytes, old.as_ref()).map_err(fail)?;
     std::fs::rename(&part.path, &target).map_err(fail)?;
     part.keep();
-    to_disk(&target);
+    sync_folder(&target);
     Ok(())
 }
 
-/// Where the links end that a path leads to, whether something is there or not.
-fn followed(path: &Path) -> io::Result<PathBuf> {
+/// The path at the end of all links, whether it exists or not.
+fn resolve_links(path: &Path) -> io::Result<PathBuf> {
     let mut path = path.to_owned();
     for _ in 0..MOST_LINKS {
         match path.read_link() {
@@ -52,22 +53,25 @@ fn followed(path: &Path) -> io::Result<PathBuf> {
             Err(_) => return Ok(path),
         }
     }
-    Err(io::Error::other("too many links lead on to one another"))
+    Err(io::Error::other("too many symbolic links lead to each other"))
 }
 
-/// A file that is gone again unless it is kept.
-struct Part {
+/// A new file that is removed again unless it is kept.
+struct PartialFile {
+    /// The open file.
     file: File,
+    /// Its path.
     path: PathBuf,
+    /// Whether it has replaced its target.
     is_kept: bool,
 }
 
-impl Part {
-    /// A new file in the folder of another one.
-    fn beside(target: &Path) -> io::Result<Self> {
+impl PartialFile {
+    /// Creates a file with a new name in the folder of another one.
+    fn create_next_to(target: &Path) -> io::Result<Self> {
         static COUNT: AtomicU32 = AtomicU32::new(0);
         let name = target.file_name().unwrap_or_default().to_string_lossy();
-        // A name may be as long as the system allows, so only its start comes in.
+        // The name of the target may be as long as the system allows, so only its start is used.
         let name: String = name.chars().take(40).collect();
         loop {
             let count = COUNT.fetch_add(1, Ordering::Relaxed);
@@ -81,21 +85,21 @@ impl Part {
                         is_kept: false,
                     });
                 }
-                // One of that name is left from a program that was stopped.
+                // A file of that name remains from a program that was stopped.
                 Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
                 Err(error) => return Err(error),
             }
         }
     }
 
-    /// Writes the bytes through to the disk, with owner and permissions of the old file.
+    /// Writes the bytes and flushes them to the disk, with owner and permissions of the old file.
     fn fill(&self, bytes: &[u8], old: Option<&Metadata>) -> io::Result<()> {
         (&self.file).write_all(bytes)?;
         if let Some(old) = old {
             #[cfg(unix)]
             {
                 use std::os::unix::fs::{MetadataExt, fchown};
-                // Only a superuser may give files away; to others they belong already, or it does not matter.
+                // Only the superuser can change the owner; without that right the owner stays the current user.
                 let _ = fchown(&self.file, Some(old.uid()), Some(old.gid()));
             }
             self.file.set_permissions(old.permissions())?;
@@ -103,12 +107,13 @@ impl Part {
         self.file.sync_all()
     }
 
+    /// Keeps the file under its new name.
     fn keep(mut self) {
         self.is_kept = true;
     }
 }
 
-impl Drop for Part {
+impl Drop for PartialFile {
     fn drop(&mut self) {
         if !self.is_kept {
             let _ = std::fs::remove_file(&self.path);
@@ -116,8 +121,8 @@ impl Drop for Part {
     }
 }
 
-/// That a file has another name now goes to the disk as well, where the system allows it.
-fn to_disk(target: &Path) {
+/// Flushes the folder, so that the renaming is on the disk, too; not all systems allow that.
+fn sync_folder(target: &Path) {
     let folder = target.parent().filter(|folder| *folder != Path::new(""));
     if let Ok(folder) = File::open(folder.unwrap_or(Path::new("."))) {
         let _ = folder.sync_all();

@@ -1,13 +1,13 @@
-//! What each kind of output takes for a sign of its own.
+//! Escapes free text for each kind of output, so that it has no special meaning there.
 
 use std::borrow::Cow;
 use std::fmt::Write;
 
 use super::plain;
 
-/// Text of an HTML page, in an element or in an attribute between double quotes; lines stay lines.
+/// Text of an HTML page, in an element or in an attribute in double quotes; line ends are kept.
 pub fn html(text: &str) -> Cow<'_, str> {
-    escaped(super::lines(text), |c, out| match c {
+    escape_characters(super::lines(text), |c, out| match c {
         '&' => out.push_str("&amp;"),
         '<' => out.push_str("&lt;"),
         '>' => out.push_str("&gt;"),
@@ -16,30 +16,28 @@ pub fn html(text: &str) -> Cow<'_, str> {
     })
 }
 
-/// Text of a Markdown paragraph, heading or table cell: no links, images, formulas, tags or marks.
+/// Text of a Markdown paragraph, heading or table cell; links, images, formulas, tags and marks are escaped.
 ///
 /// ```
 /// use modelmill_boundary::text::markdown;
 /// assert_eq!(markdown("[a](javascript:b)"), r"\[a\](javascript:b)");
 /// ```
 pub fn markdown(text: &str) -> Cow<'_, str> {
-    escaped(plain(text), |c, out| {
-        if matches!(
-            c,
-            '\\' | '`' | '*' | '_' | '|' | '<' | '$' | '[' | ']' | '&' | '~'
-        ) {
+    escape_characters(plain(text), |c, out| {
+        if matches!(c, '\\' | '`' | '*' | '_' | '|' | '<' | '$' | '[' | ']' | '&' | '~') {
             out.push('\\');
         }
         out.push(c);
     })
 }
 
-/// Text as code within a line of Markdown, with its fences; fit for a table's cell.
+/// Text as code in a line of Markdown, with its backquotes; it can be used in a table cell.
 pub fn code_in_markdown(text: &str) -> String {
     let text = plain(text).replace('|', "\\|");
+    // The fence must be longer than any run of backquotes in the text.
     let longest = text.split(|c| c != '`').map(str::len).max().unwrap_or(0);
     let fence = "`".repeat(longest + 1);
-    // A grave accent at an end would be taken for the fence.
+    // A backquote at an end would join the fence.
     let blank = if text.starts_with('`') || text.ends_with('`') {
         " "
     } else {
@@ -48,9 +46,9 @@ pub fn code_in_markdown(text: &str) -> String {
     format!("{fence}{blank}{text}{blank}{fence}")
 }
 
-/// Text of a LaTeX document; characters that the plain fonts lack become question marks.
+/// Text of a LaTeX document; characters that are not in the plain fonts become question marks.
 pub fn latex(text: &str) -> Cow<'_, str> {
-    escaped(plain(text), |c, out| match c {
+    escape_characters(plain(text), |c, out| match c {
         '\\' => out.push_str("\\textbackslash{}"),
         '^' => out.push_str("\\textasciicircum{}"),
         '~' => out.push_str("\\textasciitilde{}"),
@@ -63,11 +61,11 @@ pub fn latex(text: &str) -> Cow<'_, str> {
     })
 }
 
-/// Text of a comment in C, Rust or Python, whichever sort: it neither ends the comment nor begins one in it, joins no
-/// lines, ends no documentation string, and is neither tag nor link where `rustdoc` makes a page of it.
+/// Text of a comment in C, Rust or Python of any style. It neither ends the comment nor begins one in it, joins no
+/// lines, and ends no documentation string. On a page of `rustdoc` it makes neither a tag nor a link.
 ///
-/// A backslash joins lines at their end and begins escapes in a Python string, and three signs stand for one in C
-/// (`??/`); a backslash becomes a slash, and a blank goes between the others.
+/// A backslash at the end of a line joins lines and begins escapes in a Python string, and three characters can stand
+/// for one in C (`??/`). Therefore a backslash becomes a slash, and the other characters are separated by a blank.
 ///
 /// ```
 /// use modelmill_boundary::text::comment;
@@ -76,8 +74,9 @@ pub fn latex(text: &str) -> Cow<'_, str> {
 /// ```
 pub fn comment(text: &str) -> Cow<'_, str> {
     let mut before = '\0';
-    escaped(plain(text), |c, out| {
+    escape_characters(plain(text), |c, out| {
         let c = if c == '\\' { '/' } else { c };
+        // Pairs of characters with a meaning in one of the languages.
         let joins = match before {
             '*' => c == '/',
             '/' => c == '*',
@@ -89,13 +88,13 @@ pub fn comment(text: &str) -> Cow<'_, str> {
         if joins {
             out.push(' ');
         }
-        // Three of them end a documentation string, whatever stands behind.
+        // Three of them end a documentation string.
         out.push(if c == '"' && before == '"' { '\'' } else { c });
         before = c;
     })
 }
 
-/// A field of CSV text, in quotes where it needs them; a spreadsheet does not take it for a formula.
+/// A field of CSV text, in quotes if needed; spreadsheets do not read it as a formula.
 ///
 /// ```
 /// use modelmill_boundary::text::{csv_field, csv_name};
@@ -104,7 +103,8 @@ pub fn comment(text: &str) -> Cow<'_, str> {
 /// ```
 pub fn csv_field(text: &str) -> Cow<'_, str> {
     let text = plain(text);
-    let is_formula = begins_formula(&text) && text.parse::<f64>().is_err();
+    // Numbers with a sign are not formulas.
+    let is_formula = is_spreadsheet_formula(&text) && text.parse::<f64>().is_err();
     if !is_formula && !text.contains(['"', ',', ';']) && text.trim() == text {
         return text;
     }
@@ -112,27 +112,25 @@ pub fn csv_field(text: &str) -> Cow<'_, str> {
     Cow::Owned(format!("\"{mark}{}\"", text.replace('"', "\"\"")))
 }
 
-/// A name as [`csv_field`] was given it, of a field without its quotes.
+/// The original name of a field that [`csv_field`] wrote, without quotes.
 pub fn csv_name(field: &str) -> &str {
     let unmarked = field.strip_prefix('\'');
-    unmarked
-        .filter(|text| begins_formula(text))
-        .unwrap_or(field)
+    unmarked.filter(|text| is_spreadsheet_formula(text)).unwrap_or(field)
 }
 
-/// Whether a spreadsheet would take a text for a formula, or such a text is marked already.
-fn begins_formula(text: &str) -> bool {
-    text.trim_start_matches('\'')
-        .starts_with(['=', '+', '-', '@'])
+/// Whether a spreadsheet would read a text as a formula, or such a text is marked already.
+fn is_spreadsheet_formula(text: &str) -> bool {
+    text.trim_start_matches('\'').starts_with(['=', '+', '-', '@'])
 }
 
-/// JSON as a terminal may show it: what does harm within its strings is written as `\u` and four digits, which means the
-/// same.
+/// JSON that a terminal can show: harmful characters in strings are written as `\u` and four digits, with the same
+/// meaning.
 pub fn json(text: &str) -> Cow<'_, str> {
-    escaped(Cow::Borrowed(text), |c, out| {
-        if c == '\n' || !super::does_harm(c) {
+    escape_characters(Cow::Borrowed(text), |c, out| {
+        if c == '\n' || !super::is_harmful(c) {
             return out.push(c);
         }
+        // Characters outside of the basic plane need two units.
         let mut units = [0; 2];
         for unit in c.encode_utf16(&mut units) {
             let _ = write!(out, "\\u{unit:04x}");
@@ -140,8 +138,8 @@ pub fn json(text: &str) -> Cow<'_, str> {
     })
 }
 
-/// The text with each character written as `write` does; not copied where that changes nothing.
-fn escaped(text: Cow<'_, str>, mut write: impl FnMut(char, &mut String)) -> Cow<'_, str> {
+/// The text with each character written by `write`; not copied if nothing changes.
+fn escape_characters(text: Cow<'_, str>, mut write: impl FnMut(char, &mut String)) -> Cow<'_, str> {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
         write(c, &mut out);

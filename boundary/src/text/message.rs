@@ -1,11 +1,11 @@
-//! Messages: plain text with typed remedies in between, which each front end spells in its own words.
+//! Messages: plain text with typed remedies in it, which each front end spells in its own words.
 //!
-//! The library names what helps by a value (an option, a command, an entry of the model file) and never by words that a program
-//! has to find in a finished sentence. So a program changes remedies only: names of files, columns and snippets of a user
-//! are plain text, whatever they hold.
+//! The library states a remedy as a value (an option, a command, an entry of the model file), so that no program must
+//! find it in a finished sentence. A front end changes remedies only. Names of files and columns and texts of users
+//! are plain text, whatever they contain.
 //!
-//! A message and a remedy have no `Display`. Who formats one into a text has to say in whose words, or makes a message of the
-//! whole by [`message!`](crate::message), which keeps remedies as they are.
+//! A message and a remedy have no `Display`. Code that formats one into a text must choose a spelling, or make a
+//! message of the complete text by [`message!`](crate::message), which keeps remedies.
 
 use std::cell::RefCell;
 use std::fmt::{self, Write as _};
@@ -13,7 +13,7 @@ use std::fmt::{self, Write as _};
 use super::remedy::{LibrarySpelling, Remedy, RemedySpelling};
 use crate::files::FileError;
 
-/// A text for people with typed remedies in it.
+/// A text for users with typed remedies in it.
 ///
 /// ```
 /// use modelmill_boundary::message;
@@ -25,16 +25,16 @@ use crate::files::FileError;
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Message {
-    /// Pieces in their order, no two texts side by side.
+    /// Pieces in order; two texts never follow each other.
     pieces: Vec<MessagePiece>,
 }
 
 /// A piece of a message.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum MessagePiece {
-    /// Words that stay as they are.
+    /// Text that stays unchanged.
     Text(String),
-    /// What each front end spells.
+    /// A remedy, which each front end spells.
     Remedy(Remedy),
 }
 
@@ -44,7 +44,7 @@ impl Message {
         Self::default()
     }
 
-    /// Whether there is nothing in it.
+    /// Whether it has neither text nor remedies.
     pub fn is_empty(&self) -> bool {
         self.pieces.is_empty()
     }
@@ -73,7 +73,7 @@ impl Message {
         }
     }
 
-    /// Messages one after the other, with a text between each two.
+    /// Joins messages, with a text between each two of them.
     pub fn join(messages: impl IntoIterator<Item = Self>, between: &str) -> Self {
         let mut all = Self::new();
         for (k, message) in messages.into_iter().enumerate() {
@@ -85,7 +85,7 @@ impl Message {
         all
     }
 
-    /// The text in the words of whoever reads it.
+    /// The text with remedies spelled for the reader's front end.
     pub fn spell(&self, spelling: &dyn RemedySpelling) -> String {
         let mut text = String::new();
         for piece in &self.pieces {
@@ -97,7 +97,7 @@ impl Message {
         text
     }
 
-    /// The text in the words of the library, for those who call it.
+    /// The text with remedies spelled for the library.
     pub fn in_library_words(&self) -> String {
         self.spell(&LibrarySpelling)
     }
@@ -137,8 +137,8 @@ impl From<Remedy> for Message {
     }
 }
 
-/// Makes a [`Message`](crate::text::Message) as `format!` makes a text. Arguments behind the text may be messages and remedies,
-/// which keep what they are; all else, also what stands inside of braces, is plain text.
+/// Makes a [`Message`](crate::text::Message) as `format!` makes a text. Arguments behind the text may be messages and
+/// remedies, which are kept as such. All others, and names in braces, become plain text.
 #[macro_export]
 macro_rules! message {
     ($format:literal $(, $argument:expr)* $(,)?) => {{
@@ -148,31 +148,32 @@ macro_rules! message {
     }};
 }
 
-/// Collects a message while its text is formatted; for [`message!`](crate::message).
+/// Collects a message while its text is formatted, for [`message!`](crate::message).
 #[doc(hidden)]
 #[derive(Debug, Default)]
 pub struct MessageSink {
+    /// A cell, because formatting has only shared access.
     message: RefCell<Message>,
 }
 
 impl MessageSink {
-    /// Formats a text whose slots put messages and remedies here in their turn.
+    /// Formats a text; arguments that are messages or remedies append themselves.
     ///
     /// # Panics
     ///
-    /// When a value refuses to be formatted, as `format!` does.
+    /// When the formatting of a value fails, as with `format!`.
     pub fn write(&self, arguments: fmt::Arguments<'_>) {
         let written = TextEnd(self).write_fmt(arguments);
         written.expect("a value that is formatted returns no error");
     }
 
-    /// The message.
+    /// The collected message.
     pub fn into_message(self) -> Message {
         self.message.into_inner()
     }
 }
 
-/// Where plain text goes that is formatted.
+/// Appends formatted plain text to a sink.
 struct TextEnd<'a>(&'a MessageSink);
 
 impl fmt::Write for TextEnd<'_> {
@@ -182,15 +183,17 @@ impl fmt::Write for TextEnd<'_> {
     }
 }
 
-/// An argument of [`message!`](crate::message) in its place.
+/// An argument of [`message!`](crate::message) at its position in the text.
 #[doc(hidden)]
 pub struct MessageSlot<'a, T: ?Sized> {
+    /// The sink of the message.
     sink: &'a MessageSink,
+    /// The argument.
     argument: &'a T,
 }
 
 impl<'a, T: ?Sized> MessageSlot<'a, T> {
-    /// A slot of the message that goes into a sink.
+    /// An argument for a message that is collected in a sink.
     pub fn new(sink: &'a MessageSink, argument: &'a T) -> Self {
         Self { sink, argument }
     }
@@ -208,13 +211,14 @@ impl<T: fmt::Debug + ?Sized> fmt::Debug for MessageSlot<'_, T> {
     }
 }
 
-/// What may stand behind the text of [`message!`](crate::message).
+/// Types of arguments of [`message!`](crate::message).
 #[doc(hidden)]
 pub trait MessageArgument {
-    /// Puts the argument into the sink, text by way of the formatter.
+    /// Appends the argument to the sink; plain text goes through the formatter.
     fn write(&self, sink: &MessageSink, formatter: &mut fmt::Formatter<'_>) -> fmt::Result;
 }
 
+// Anything with `Display` is plain text; `Message` and `Remedy` have no `Display`.
 impl<T: fmt::Display + ?Sized> MessageArgument for T {
     fn write(&self, _: &MessageSink, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.fmt(formatter)
@@ -274,14 +278,11 @@ mod tests {
             0.125,
             "option `prior`"
         );
-        let expected =
-            format!("{file}: give <identify> with BETWEEN(1,2), 0.12 of \"option `prior`\"");
+        let expected = format!("{file}: give <identify> with BETWEEN(1,2), 0.12 of \"option `prior`\"");
         assert_eq!(message.spell(&UpperCase), expected);
         assert_eq!(
             message.in_library_words(),
-            format!(
-                "{file}: give verb `identify` with option `between` = `1,2`, 0.12 of \"option `prior`\""
-            )
+            format!("{file}: give verb `identify` with option `between` = `1,2`, 0.12 of \"option `prior`\"")
         );
     }
 

@@ -1,8 +1,8 @@
-//! Free text of users (titles, notes, headers of recordings, names of files) on its way out.
+//! Free text of users (titles, notes, headers of recordings, names of files) for output.
 //!
-//! What comes from a file may hold anything: sequences that move a terminal's cursor, marks that turn the direction of
-//! writing, the end of a comment. Each output has one function that leaves ordinary text as it is and makes the rest
-//! harmless. [`Message`] is text of the program's own, with typed remedies in it.
+//! Text from a file may contain anything: control sequences of terminals, marks that change the direction of writing,
+//! the end of a comment. Each kind of output has one function that keeps ordinary text and makes the rest harmless.
+//! [`Message`] is text of the program with typed remedies.
 
 mod escape;
 mod message;
@@ -16,8 +16,8 @@ pub use message::Message;
 pub use message::{MessageArgument, MessageSink, MessageSlot};
 pub use remedy::{CommandName, LibrarySpelling, OptionName, OptionSetting, Remedy, RemedySpelling};
 
-/// Text on one line: line ends and tabs become blanks, and what steers a terminal or the direction of writing becomes
-/// the replacement character.
+/// Text on one line. Line ends and tabs become blanks. Control characters of terminals and of the direction of
+/// writing become the replacement character.
 ///
 /// ```
 /// use modelmill_boundary::text::plain;
@@ -25,25 +25,26 @@ pub use remedy::{CommandName, LibrarySpelling, OptionName, OptionSetting, Remedy
 /// assert_eq!(plain("two\r\nlines\u{1b}[2J"), "two lines\u{fffd}[2J");
 /// ```
 pub fn plain(text: &str) -> Cow<'_, str> {
-    filtered(text, &[])
+    filter_characters(text, &[])
 }
 
-/// As [`plain`], but lines stay lines and tabs stay tabs; line ends of other systems become line feeds.
+/// Like [`plain`], but line ends and tabs are kept; line ends of other systems become line feeds.
 pub fn lines(text: &str) -> Cow<'_, str> {
-    filtered(text, &['\n', '\t'])
+    filter_characters(text, &['\n', '\t'])
 }
 
-/// Text for a terminal or standard output: as [`lines`], and where it is `coloured`, what marks text as bold, dim or
-/// coloured stays.
+/// Text for a terminal or standard output. It is treated as by [`lines`], but if `coloured`, marks for bold, dim or
+/// coloured text are kept.
 pub fn terminal(text: &str, coloured: bool) -> Cow<'_, str> {
     if !coloured || !text.contains('\u{1b}') {
         return lines(text);
     }
     let mut out = String::with_capacity(text.len());
+    // Escape characters that do not start an allowed mark are replaced.
     let mut rest = text;
     while let Some(at) = rest.find('\u{1b}') {
         out.push_str(&lines(&rest[..at]));
-        let mark = colour(&rest[at..]).unwrap_or(0);
+        let mark = colour_mark_length(&rest[at..]).unwrap_or(0);
         if mark == 0 {
             out.push(char::REPLACEMENT_CHARACTER);
         }
@@ -54,26 +55,29 @@ pub fn terminal(text: &str, coloured: bool) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
-/// Length of the mark of bold, dim or coloured text that a text begins with: `ESC [ numbers m`, none of them hiding text.
-fn colour(text: &str) -> Option<usize> {
+/// Length of the mark for bold, dim or coloured text at the start of a text: `ESC [ numbers m`. Marks that hide text
+/// do not count.
+fn colour_mark_length(text: &str) -> Option<usize> {
     let numbers = text.strip_prefix("\u{1b}[")?;
     let end = numbers.find(|c: char| !c.is_ascii_digit() && c != ';')?;
-    let is_shown = numbers[..end].split(';').all(|n| {
-        matches!(n.parse::<u8>(), Ok(0..=4 | 22..=24 | 30..=39 | 90..=97)) || n.is_empty()
-    });
+    // Allowed are styles that show the text, and the usual colours.
+    let is_shown = numbers[..end]
+        .split(';')
+        .all(|n| matches!(n.parse::<u8>(), Ok(0..=4 | 22..=24 | 30..=39 | 90..=97)) || n.is_empty());
     (numbers[end..].starts_with('m') && is_shown).then_some(2 + end + 1)
 }
 
-/// The text without what does harm, but for the characters to be kept.
-fn filtered<'a>(text: &'a str, kept: &[char]) -> Cow<'a, str> {
-    if text.chars().all(|c| kept.contains(&c) || !does_harm(c)) {
+/// Replaces harmful characters, except for those in `kept`.
+fn filter_characters<'a>(text: &'a str, kept: &[char]) -> Cow<'a, str> {
+    if text.chars().all(|c| kept.contains(&c) || !is_harmful(c)) {
         return Cow::Borrowed(text);
     }
     let mut out = String::with_capacity(text.len());
     let mut chars = text.chars().peekable();
     while let Some(c) = chars.next() {
         out.push(match c {
-            c if kept.contains(&c) || !does_harm(c) => c,
+            c if kept.contains(&c) || !is_harmful(c) => c,
+            // The carriage return of a pair is dropped, and the line feed becomes a blank.
             '\r' if chars.peek() == Some(&'\n') => continue,
             '\r' | '\n' | '\t' | '\u{b}' | '\u{c}' | '\u{85}' | '\u{2028}' | '\u{2029}' => ' ',
             _ => char::REPLACEMENT_CHARACTER,
@@ -82,13 +86,13 @@ fn filtered<'a>(text: &'a str, kept: &[char]) -> Cow<'a, str> {
     Cow::Owned(out)
 }
 
-/// Whether a character moves a cursor, begins a line, turns the direction of writing, or speaks to programs only.
-fn does_harm(c: char) -> bool {
-    c.is_control() || steers_writing(c) || matches!(c, '\u{2028}' | '\u{2029}')
+/// Whether a character moves a cursor, ends a line, changes the direction of writing, or is invisible.
+fn is_harmful(c: char) -> bool {
+    c.is_control() || is_direction_control(c) || matches!(c, '\u{2028}' | '\u{2029}')
 }
 
-/// Whether a character turns the direction of writing, or is not to be seen and says something to programs only.
-fn steers_writing(c: char) -> bool {
+/// Whether a character changes the direction of writing, or is invisible and has a meaning for programs only.
+fn is_direction_control(c: char) -> bool {
     matches!(
         c,
         '\u{61c}'
@@ -126,7 +130,7 @@ mod tests {
             csv_field(HOSTILE),
             json(HOSTILE),
         ] {
-            let left = one.chars().find(|c| does_harm(*c));
+            let left = one.chars().find(|c| is_harmful(*c));
             assert_eq!(left, None, "{one:?}");
         }
     }
@@ -135,10 +139,7 @@ mod tests {
     fn colours_reach_a_terminal_that_wants_them_and_nothing_else_does() {
         let red = "\u{1b}[1;31mred\u{1b}[0m\tnext\r\nline";
         assert_eq!(terminal(red, true), "\u{1b}[1;31mred\u{1b}[0m\tnext\nline");
-        assert_eq!(
-            terminal(red, false),
-            "\u{fffd}[1;31mred\u{fffd}[0m\tnext\nline"
-        );
+        assert_eq!(terminal(red, false), "\u{fffd}[1;31mred\u{fffd}[0m\tnext\nline");
         for other in [
             "\u{1b}[8mhidden",
             "\u{1b}[2Jcleared",
@@ -152,10 +153,7 @@ mod tests {
 
     #[test]
     fn ordinary_text_is_not_even_copied() {
-        for text in [
-            "",
-            "m1 = 3 kg, \u{3b8}\u{307} \u{2013} \u{65e5}\u{672c} \u{1f980}",
-        ] {
+        for text in ["", "m1 = 3 kg, \u{3b8}\u{307} \u{2013} \u{65e5}\u{672c} \u{1f980}"] {
             assert!(matches!(plain(text), Cow::Borrowed(_)));
             assert!(matches!(html(text), Cow::Borrowed(_)));
             assert!(matches!(comment(text), Cow::Borrowed(_)));

@@ -1,6 +1,6 @@
-//! What the library advises: options, commands and entries of a model file, as values that each front end spells.
+//! Remedies: options, commands and entries of a model file that the library recommends, as values.
 
-/// Makes an enum of names that are written in one way only.
+/// Declares an enum whose variants each have one name.
 macro_rules! names {
     ($(#[$about:meta])* $type:ident { $($(#[$doc:meta])* $variant:ident => $name:literal,)+ }) => {
         $(#[$about])*
@@ -10,10 +10,10 @@ macro_rules! names {
         }
 
         impl $type {
-            /// All there are.
+            /// All variants.
             pub const ALL: &[Self] = &[$(Self::$variant,)+];
 
-            /// The library's own name.
+            /// The name in the library.
             pub fn name(self) -> &'static str {
                 match self {
                     $(Self::$variant => $name,)+
@@ -24,15 +24,15 @@ macro_rules! names {
 }
 
 names! {
-    /// Options that messages advise. A front end that has no such option does not compile or fails a test of its own.
+    /// Options in messages. A front end without such an option does not compile or fails a test of its own.
     OptionName {
-        /// Effects that are present in either case, while others are distinguished.
+        /// Effects that the model has when others are distinguished.
         Beside => "beside",
-        /// Which part of a recording is read, by its times.
+        /// The time interval of a recording that is read.
         Between => "between",
-        /// Validation runs, which a fit does not use.
+        /// Validation recordings, which a fit does not use.
         Check => "check",
-        /// Maps columns of a recording to names of the model.
+        /// Names of the model for columns of a recording.
         Columns => "columns",
         /// Cut-off of the low-pass on positions.
         CutoffHz => "cutoff_hz",
@@ -40,9 +40,9 @@ names! {
         Data => "data",
         /// Keeps every n-th sample.
         Decimate => "decimate",
-        /// Removes parameters that a recording does not determine.
+        /// Drops parameters that a recording does not need.
         Essential => "essential",
-        /// Effects that one effect may be confused with.
+        /// Effects from which one is distinguished.
         From => "from",
         /// Fixes parameters at their nominal values.
         Held => "held",
@@ -58,39 +58,39 @@ names! {
         Noise => "noise",
         /// Order of the low-pass.
         Order => "order",
-        /// The file that a result is written to.
+        /// The file for a result.
         Out => "out",
         /// Values of the base parameters.
         Parameters => "parameters",
         /// Period of a motion.
         Period => "period",
-        /// Restricts parameters to bodies that are physically possible.
+        /// Parameters that are physically possible.
         Physical => "physical",
         /// A picture of the mechanism.
         Picture => "picture",
         /// The plan of a reduction.
         Plan => "plan",
-        /// Uses nominal values as measurements with a standard deviation.
+        /// Nominal values that count as measurements.
         Prior => "prior",
         /// Samples per second.
         Rate => "rate",
-        /// Reduces the weight of outliers (Huber).
+        /// Weights that limit the effect of outliers.
         Robust => "robust",
-        /// Rounds angles that nearly are whole fractions of a revolution.
+        /// Rounds angles that are near simple fractions of a turn.
         RoundAngles => "round_angles",
-        /// An effect that a planned motion distinguishes from others.
+        /// An effect that a motion distinguishes from others.
         Separate => "separate",
-        /// Skips samples with missing or non-finite values.
+        /// Leaves out samples without a number.
         SkipBadSamples => "skip_bad_samples",
         /// How positions are smoothed.
         Smoothing => "smoothing",
-        /// The source of rates and accelerations: columns or differentiated positions.
+        /// The source of rates and accelerations.
         Source => "source",
-        /// Excludes equations of drives at standstill.
+        /// Leaves out equations of drives at standstill.
         Standstill => "standstill",
-        /// Numbers of samples removed at the start and at the end.
+        /// Samples dropped at both ends.
         Trim => "trim",
-        /// Physical parameters that are computed from base parameters.
+        /// Parameters that are solved for.
         Unknown => "unknown",
         /// Weights of equations.
         Weights => "weights",
@@ -98,15 +98,15 @@ names! {
 }
 
 names! {
-    /// Commands that messages advise.
+    /// Commands in messages.
     CommandName {
         /// Writes a fit into a model file.
         Adopt => "adopt",
-        /// Validates a model file.
+        /// Checks whether a model is consistent.
         Check => "check",
-        /// Reports which effects a model lacks.
+        /// Finds the effects that a model lacks.
         Diagnose => "diagnose",
-        /// Computes the forces of a model along a motion.
+        /// Forces of a model along a motion.
         Evaluate => "evaluate",
         /// Plans a motion.
         Excite => "excite",
@@ -115,12 +115,12 @@ names! {
     }
 }
 
-/// An option, with its value where one is advised.
+/// An option, with a value if one is recommended.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct OptionSetting {
     /// The option.
     pub name: OptionName,
-    /// Its value; `None` where any would do, or it takes none.
+    /// Its value; `None` if any value is possible, or the option has none.
     pub value: Option<String>,
 }
 
@@ -134,24 +134,24 @@ impl OptionSetting {
     }
 }
 
-/// One piece of advice to a reader.
+/// A recommendation to the reader.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Remedy {
-    /// Options to be given together, or left out.
+    /// Options to be given together, or to be omitted.
     Options(Vec<OptionSetting>),
     /// A command to be run.
     Command(CommandName),
-    /// An entry of the model file to be looked at or written, such as `gravity` or `[limits.coordinates]`.
+    /// An entry of the model file to be checked or written, such as `gravity` or `[limits.coordinates]`.
     Edit(&'static str),
 }
 
 impl Remedy {
-    /// An option.
+    /// An option without a value.
     pub fn option(name: OptionName) -> Self {
         Self::Options(vec![OptionSetting { name, value: None }])
     }
 
-    /// Options with their values, side by side.
+    /// Several options with their values.
     pub fn options(settings: impl IntoIterator<Item = OptionSetting>) -> Self {
         Self::Options(settings.into_iter().collect())
     }
@@ -166,7 +166,7 @@ impl Remedy {
         Self::Edit(entry)
     }
 
-    /// Gives the last option a value.
+    /// Sets the value of the last option; other remedies stay unchanged.
     #[must_use]
     pub fn with_value(mut self, value: impl Into<String>) -> Self {
         if let Self::Options(settings) = &mut self
@@ -177,7 +177,7 @@ impl Remedy {
         self
     }
 
-    /// The remedy in the words of whoever reads it.
+    /// The remedy spelled for the reader's front end.
     pub fn spell(&self, spelling: &dyn RemedySpelling) -> String {
         match self {
             Self::Options(settings) => spelling.spell_options(settings),
@@ -187,21 +187,21 @@ impl Remedy {
     }
 }
 
-/// How a front end asks for what messages advise: flags and commands of the program, keywords and methods of a notebook.
+/// How a front end writes remedies: flags and commands of the program, keywords and methods of a notebook.
 pub trait RemedySpelling {
-    /// Options that are given together.
+    /// Writes options that are given together.
     fn spell_options(&self, settings: &[OptionSetting]) -> String;
 
-    /// A command.
+    /// Writes a command.
     fn spell_command(&self, command: CommandName) -> String;
 
-    /// An entry of the model file.
+    /// Writes an entry of the model file.
     fn spell_edit(&self, entry: &str) -> String {
         format!("`{entry}` in the model file")
     }
 }
 
-/// The words of the library, for those who call it from Rust.
+/// The spelling of the library, for callers from Rust.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LibrarySpelling;
 

@@ -1,10 +1,10 @@
-//! Arguments of what is made of a model: equations and code.
+//! Arguments of `equations`, `generate` and `atlas`: what is written out of a model.
 
 use std::path::PathBuf;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
-use modelmill::generate::{Language, LanguageForm};
+use modelmill::generate::{CodeLanguage, LanguageForm};
 
 /// How equations are printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -43,42 +43,43 @@ pub(crate) struct GenerateArgs {
     /// Model file (TOML)
     pub(crate) model: PathBuf,
     /// Write the source to this file instead of standard output; with --language c99, c or python, files to this folder
-    #[arg(long, value_name = "FILE.rs|DIR", required_if_eq_any(in_folders()))]
+    #[arg(long, value_name = "FILE.rs|DIR", required_if_eq_any(languages_in_folders()))]
     pub(crate) out: Option<PathBuf>,
     /// With the equation of motion: mass matrix, velocity terms, gravity, forward dynamics
     #[arg(long)]
     pub(crate) dynamics: bool,
-    /// With what the joints transmit: forces and moments in all joints, and the forces that close loops
+    /// With reactions: forces and moments in all joints, and the forces that close loops
     #[arg(long)]
     pub(crate) reactions: bool,
-    /// With a function `self_test` that holds base parameters against all parameters, for a test of your own
+    /// With a function `self_test` that compares the model in base parameters with the model in all parameters, for
+    /// your own tests
     #[arg(long)]
     pub(crate) self_test: bool,
-    /// What to make: a Rust module, sources of plain C99, or a crate that builds a C library with its header or a Python module
-    #[arg(long, value_parser = languages(), default_value = Language::default().name())]
-    pub(crate) language: Language,
+    /// What to write: a Rust module, sources in plain C99, or a crate that builds a C library with its header or a
+    /// Python module
+    #[arg(long, value_parser = languages(), default_value = CodeLanguage::default().name())]
+    pub(crate) language: CodeLanguage,
 }
 
-/// The languages by their names.
-fn languages() -> impl TypedValueParser<Value = Language> {
-    let all = Language::all();
+/// Parser of `--language`: names of the languages, with their descriptions for the help.
+fn languages() -> impl TypedValueParser<Value = CodeLanguage> {
+    let all = CodeLanguage::all();
     let values = all.map(|language| PossibleValue::new(language.name()).help(language.about()));
     let parser = PossibleValuesParser::new(values);
-    parser.map(|name| Language::named(&name).expect("the parser knows these names alone"))
+    parser.map(|name| CodeLanguage::from_name(&name).expect("the parser knows these names alone"))
 }
 
-/// Languages whose files need a folder.
-fn in_folders() -> Vec<(&'static str, &'static str)> {
-    let others = Language::all().filter(|language| language.form() != LanguageForm::Module);
-    others
-        .map(|language| ("language", language.name()))
-        .collect()
+/// Languages that write several files, as pairs of option and value. With these `--out` is required.
+fn languages_in_folders() -> Vec<(&'static str, &'static str)> {
+    let others = CodeLanguage::all().filter(|language| language.form() != LanguageForm::Module);
+    others.map(|language| ("language", language.name())).collect()
 }
 
 /// `atlas`.
 #[derive(Debug, Args)]
 pub(crate) struct AtlasArgs {
-    /// Model files, and robot descriptions (URDF, MJCF, SDF), which get a line and a picture
+    /// Model files, and robot descriptions (URDF, MJCF, SDF). A robot description gets a line and a picture, but no
+    /// page
     #[arg(required = true)]
     pub(crate) models: Vec<PathBuf>,
     /// Write `atlas.md`, `atlas.html` and the folder `atlas` into this folder

@@ -1,14 +1,14 @@
-//! Arguments of what works on recordings and fits.
+//! Arguments of the commands that work on recordings and fits.
 
 use std::path::PathBuf;
 
 use clap::Args;
-use modelmill::model::Values;
+use modelmill::model::BaseParameterValues;
 use modelmill::{Host, Model};
 
 use crate::args::estimation::{EstimatorArgs, StandstillArgs};
 use crate::args::preparation::PreparationArgs;
-use crate::failure::Outcome;
+use crate::failure::CommandOutcome;
 use crate::terminal;
 
 /// Where the values of the base parameters come from.
@@ -38,12 +38,13 @@ impl ParameterSource {
         }
     }
 
-    /// The values of the base parameters of a model, with remarks.
-    pub(crate) fn values(&self, host: &Host, model: &Model) -> Outcome<Vec<f64>> {
-        Ok(self.told(host, model)?.values)
+    /// The values of the base parameters of a model. Remarks go to standard error.
+    pub(crate) fn values(&self, host: &Host, model: &Model) -> CommandOutcome<Vec<f64>> {
+        Ok(self.load_values(host, model)?.values)
     }
 
-    fn told(&self, host: &Host, model: &Model) -> Outcome<Values> {
+    /// Values with their origin, for [`Self::values`] and [`Self::apply_to`]. Prints the remarks.
+    fn load_values(&self, host: &Host, model: &Model) -> CommandOutcome<BaseParameterValues> {
         let values = match self {
             Self::Nominal => model.nominal_values(),
             Self::Fit(path) => {
@@ -51,6 +52,7 @@ impl ParameterSource {
                 model.values_of(&fit, &path.display().to_string())?
             }
         };
+        // For example a parameter without a nominal value.
         for note in &values.notes {
             terminal::remark(note);
         }
@@ -58,14 +60,14 @@ impl ParameterSource {
     }
 
     /// The model with these values in the place of the file's.
-    pub(crate) fn in_model(&self, host: &Host, model: Model) -> Outcome<Model> {
+    pub(crate) fn apply_to(&self, host: &Host, model: Model) -> CommandOutcome<Model> {
         Ok(match self {
             Self::Nominal => model,
-            Self::Fit(_) => model.with_fit(&self.told(host, &model)?),
+            Self::Fit(_) => model.with_fit(&self.load_values(host, &model)?),
         })
     }
 
-    /// What the JSON calls it.
+    /// Its name in JSON and text: `nominal`, or the path of the fit.
     pub(crate) fn name(&self) -> String {
         match self {
             Self::Nominal => "nominal".to_owned(),
@@ -79,14 +81,14 @@ impl ParameterSource {
 pub(crate) struct EvaluateArgs {
     /// Model file (TOML)
     pub(crate) model: PathBuf,
-    /// Recording whose states are taken
+    /// Recording with the states (positions, rates, accelerations) at which forces are computed
     #[arg(long, value_name = "RUN")]
     pub(crate) data: PathBuf,
     /// Values of the base parameters: `nominal`, or a file that `identify` wrote
     #[arg(long, value_name = "nominal|FIT.json", default_value = "nominal", value_parser = ParameterSource::parse)]
     pub(crate) parameters: ParameterSource,
-    /// What the joints transmit instead of the drives' forces: forces (N) and moments (N m) in all joints, and the forces
-    /// that close loops; for the nominal values of all parameters, since base parameters do not say
+    /// Compute reactions instead of the drives' forces: forces (N) and moments (N m) in all joints, and the forces that
+    /// close loops. They need the nominal values of all parameters; base parameters do not determine them
     #[arg(long)]
     pub(crate) reactions: bool,
     /// Write the forces to this file instead of standard output
@@ -101,14 +103,14 @@ pub(crate) struct EvaluateArgs {
 pub(crate) struct IdentifyArgs {
     /// Model file (TOML)
     pub(crate) model: PathBuf,
-    /// Recordings (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2) to identify from; may be repeated; files of one run that are to be
-    /// joined on time have a `+` between them
+    /// Recordings (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2) to identify from; may be repeated; `a.csv+b.csv` joins
+    /// files of one run on time
     #[arg(long, value_name = "RUN", required = true, num_args = 1..)]
     pub(crate) data: Vec<PathBuf>,
-    /// Recordings to check the result on, which the fit does not see; may be repeated
+    /// Recordings for validation, not used in the fit; may be repeated
     #[arg(long, value_name = "RUN", num_args = 1..)]
     pub(crate) check: Vec<PathBuf>,
-    /// Write the result as JSON to this file, for `--parameters`
+    /// Write the fit as JSON to this file, for `--parameters` of other commands
     #[arg(long, value_name = "FIT.json")]
     pub(crate) out: Option<PathBuf>,
     /// Print one JSON object on standard output
@@ -156,7 +158,8 @@ pub(crate) struct RecordingsArgs {
 pub(crate) struct CompareArgs {
     /// Model file (TOML)
     pub(crate) model: PathBuf,
-    /// Recordings (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2); may be repeated; `a.csv+b.csv` joins files of one run on time
+    /// Recordings (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2); may be repeated; `a.csv+b.csv` joins files of one run on
+    /// time
     #[arg(long, value_name = "RUN", required = true, num_args = 1..)]
     pub(crate) data: Vec<PathBuf>,
     /// Values of the base parameters: `nominal`, or a file that `identify` wrote
@@ -169,21 +172,23 @@ pub(crate) struct CompareArgs {
     pub(crate) preparation: PreparationArgs,
 }
 
-/// What is diagnosed, for the commands that do.
+/// Arguments that `diagnose` and `report` share.
 #[derive(Debug, Args)]
-pub(crate) struct AskArgs {
+pub(crate) struct DiagnosisArgs {
     /// Model file (TOML)
     pub(crate) model: PathBuf,
-    /// Recordings to find it in (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2); may be repeated
+    /// Recordings in which missing effects are searched (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2); may be repeated
     #[arg(long, value_name = "RUN", required = true, num_args = 1..)]
     pub(crate) data: Vec<PathBuf>,
-    /// Recordings that decide what is believed; without any, blocks of --data take turns
+    /// Recordings for validation: an effect is accepted only if it lowers the error there. Without any, --data is split
+    /// into blocks (cross-validation)
     #[arg(long, value_name = "RUN", num_args = 1..)]
     pub(crate) check: Vec<PathBuf>,
-    /// Hold all parameters at their nominal values, so that what is wrong with them shows too
+    /// Do not estimate parameters: fix them at nominal values, so that wrong nominal values show up as well
     #[arg(long)]
     pub(crate) held: bool,
-    /// What takes the place of the nominal values, and is held: a file that `identify` wrote, as of a run without a load
+    /// Fix the base parameters at these values instead of the nominal ones: a file that `identify` wrote, for example
+    /// from a run without a load
     #[arg(long, value_name = "nominal|FIT.json", default_value = "nominal", value_parser = ParameterSource::parse)]
     pub(crate) parameters: ParameterSource,
     #[command(flatten)]
@@ -194,7 +199,7 @@ pub(crate) struct AskArgs {
 #[derive(Debug, Args)]
 pub(crate) struct DiagnoseArgs {
     #[command(flatten)]
-    pub(crate) ask: AskArgs,
+    pub(crate) diagnosis: DiagnosisArgs,
     /// Print one JSON object on standard output
     #[arg(long, help_heading = None)]
     pub(crate) json: bool,
@@ -204,7 +209,7 @@ pub(crate) struct DiagnoseArgs {
 #[derive(Debug, Args)]
 pub(crate) struct ReportArgs {
     #[command(flatten)]
-    pub(crate) ask: AskArgs,
+    pub(crate) diagnosis: DiagnosisArgs,
     /// Write the page `report.html` into this folder
     #[arg(long, value_name = "DIR", help_heading = None)]
     pub(crate) out: PathBuf,
@@ -213,7 +218,7 @@ pub(crate) struct ReportArgs {
 /// `interpret`.
 #[derive(Debug, Args)]
 pub(crate) struct InterpretArgs {
-    /// Model file (TOML); all parameters that are not unknown keep its nominal values
+    /// Model file (TOML); parameters that are not in --unknown keep its nominal values
     pub(crate) model: PathBuf,
     /// Identified base parameters: a file that `identify` wrote
     #[arg(long, value_name = "FIT.json")]

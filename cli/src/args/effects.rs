@@ -1,16 +1,16 @@
-//! The command line of `effects` and `add`.
+//! Arguments of `effects` and `add`.
 
 use std::path::PathBuf;
 
 use clap::Args;
-use modelmill::add::{Said, Setting};
+use modelmill::add::{EffectSetting, SettingValue};
 
 /// `effects`.
 #[derive(Debug, Args)]
 pub(crate) struct EffectsArgs {
-    /// Explain this kind
+    /// Explain this kind of effect; without it all kinds are listed
     pub(crate) kind: Option<String>,
-    /// Besides the library, the kinds of this model file (TOML)
+    /// Include the kinds that this model file (TOML) defines
     #[arg(long, value_name = "MODEL")]
     pub(crate) model: Option<PathBuf>,
     /// Print one JSON object on standard output
@@ -25,15 +25,15 @@ pub(crate) struct AddArgs {
     pub(crate) model: PathBuf,
     /// Kind of the effect; `modelmill effects` lists them
     pub(crate) kind: String,
-    /// Where it acts: drives, coordinates, points, a part, `base` or `force`, as the kind has it; several share its
-    /// parameters
+    /// Where the effect acts: drives, coordinates, points, a part, `base` or `force`, depending on the kind; several
+    /// places share its parameters
     #[arg(long, value_name = "PLACE,...", required = true, value_delimiter = ',')]
     pub(crate) at: Vec<String>,
-    /// Nominal value of a parameter (`Fc=25.9`) or its name (`Fc.name=Fc_left`), or the value of a constant (`vs=0.02`),
-    /// in SI units; may be repeated
+    /// Nominal value of a parameter (`Fc=25.9`) or its name (`Fc.name=Fc_left`), or the value of a constant
+    /// (`vs=0.02`), in SI units; may be repeated
     #[arg(long, value_name = "NAME=VALUE", value_parser = parse_setting, allow_hyphen_values = true)]
-    pub(crate) set: Vec<Setting>,
-    /// A remark that stands above the effect
+    pub(crate) set: Vec<EffectSetting>,
+    /// Comment to write above the effect
     #[arg(long, value_name = "TEXT")]
     pub(crate) comment: Option<String>,
     /// Write the result into the model file itself
@@ -48,24 +48,24 @@ pub(crate) struct AddArgs {
 }
 
 /// Reads `NAME=VALUE` or `NAME.name=NAME`.
-fn parse_setting(text: &str) -> Result<Setting, String> {
+fn parse_setting(text: &str) -> Result<EffectSetting, String> {
     let (left, right) = text
         .split_once('=')
         .ok_or("expected NAME=VALUE, such as Fc=25.9 or Fc.name=Fc_left")?;
     let (left, right) = (left.trim(), right.trim());
     if let Some(symbol) = left.strip_suffix(".name") {
-        return Ok(Setting {
+        return Ok(EffectSetting {
             symbol: symbol.to_owned(),
-            said: Said::Name(right.to_owned()),
+            value: SettingValue::Name(right.to_owned()),
         });
     }
     match right.parse::<f64>() {
-        Ok(value) if value.is_finite() => Ok(Setting {
+        Ok(value) if value.is_finite() => Ok(EffectSetting {
             symbol: left.to_owned(),
-            said: Said::Value(value),
+            value: SettingValue::Value(value),
         }),
         _ => Err(format!(
-            "`{right}` is no finite number; to name a parameter write {left}.name={right}"
+            "`{right}` is not a finite number; to name a parameter write {left}.name={right}"
         )),
     }
 }

@@ -1,34 +1,38 @@
-//! Options that say how parameters are estimated.
+//! Options of the estimator of `identify`: weights, robustness, constraints, instruments.
 
 use clap::{Args, ValueEnum};
-use modelmill::identify::{Estimation, HUBER_BOUND, Refinement, Weights};
+use modelmill::identify::{EquationWeights, EstimateRefinement, EstimatorOptions, HUBER_BOUND};
 
 use super::preparation::parse_map;
 
-/// How parameters are estimated from the rows.
+/// How parameters are estimated from the rows of the regressor.
 #[derive(Debug, Clone, Default, Args)]
-#[command(next_help_heading = "Estimating")]
+#[command(next_help_heading = "Estimation")]
 pub(crate) struct EstimatorArgs {
-    /// What each equation counts: `channels` divides each drive's by the standard deviation of its residuals (iterated),
-    /// `variance` each sample's by that of the recording's columns `DRIVE_var`
+    /// How equations are weighted: `channels` divides the equations of each drive by the standard deviation of its
+    /// residuals (iterated), `variance` divides each sample by the standard deviation from the recording's columns
+    /// `DRIVE_var`
     #[arg(long, value_enum, default_value = "auto")]
     pub(crate) weights: WeightsArg,
-    /// Huber's robust estimate: residuals beyond BOUND standard deviations (taken from their median) count less
+    /// Huber's robust estimate: residuals beyond BOUND standard deviations (estimated from their median) get a lower
+    /// weight
     #[arg(long, value_name = "BOUND", num_args = 0..=1, default_missing_value = "1.345",
         allow_negative_numbers = true, value_parser = parse_positive)]
     pub(crate) robust: Option<f64>,
     /// Nominal values as soft constraints, with this relative standard deviation of each product of parameters
     #[arg(long, value_name = "SIGMA", allow_negative_numbers = true, value_parser = parse_positive)]
     pub(crate) prior: Option<f64>,
-    /// Only parameters that bodies can have (positive definite pseudo-inertias), nearest to the nominal ones; also returns
-    /// every physical parameter
+    /// Allow only physically possible parameters (positive definite pseudo-inertias), nearest to the nominal ones; also
+    /// returns every physical parameter
     #[arg(long, conflicts_with_all = ["prior", "essential"])]
     pub(crate) physical: bool,
-    /// Leave out base parameters that the recordings do not support, one by one, while none of them is missed
+    /// Leave out base parameters that the recordings do not support, one by one, until leaving them out would be
+    /// statistically significant (Wald test)
     #[arg(long, conflicts_with = "prior")]
     pub(crate) essential: bool,
-    /// Instrumental variables against noise that runs through the controller: recordings of the motion that was asked for
-    /// (one for each --data, in step with it), or `period=SECONDS` to take the states one period later
+    /// Instrumental variables, against the bias from noise that is fed back through the controller: recordings of the
+    /// reference motion (one for each --data, with the same samples), or `period=SECONDS` to use the states one period
+    /// later
     #[arg(long, value_name = "REF|period=SECONDS", num_args = 1..,
         conflicts_with_all = ["robust", "prior", "physical", "essential"])]
     pub(crate) instruments: Vec<String>,
@@ -37,59 +41,62 @@ pub(crate) struct EstimatorArgs {
     pub(crate) instrument_map: Vec<(String, String)>,
 }
 
-/// What each equation counts.
+/// How equations are weighted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub(crate) enum WeightsArg {
-    /// By the residuals of each drive where drives have different units, and where cut-off and decimation are chosen
+    /// `channels` if the drives have different units or if cut-off and decimation are chosen automatically, else `none`
     #[default]
     Auto,
-    /// All the same
+    /// Equal weights
     None,
-    /// By the residuals of each drive
+    /// By the standard deviation of each drive's residuals
     Channels,
-    /// By the recording's columns
+    /// By the variances in the recording's columns `DRIVE_var`
     Variance,
 }
 
-/// What is left out of a fit.
+/// Equations that are left out of a fit.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Leaving out equations")]
 pub(crate) struct StandstillArgs {
-    /// Leave an equation out of the fit while its drive is slower than this part of its fastest, for at rest the
-    /// friction takes any value; 0.01 is usual
-    #[arg(long, value_name = "PART", value_parser = parse_part)]
+    /// Leave an equation out while its drive is slower than this fraction of its maximum speed; 0.01 is usual. Static
+    /// friction at standstill is unknown
+    #[arg(long, value_name = "PART", value_parser = parse_fraction)]
     pub(crate) standstill: Option<f64>,
 }
 
 impl EstimatorArgs {
-    /// As the library wants it.
-    pub(crate) fn options(&self, standstill: &StandstillArgs) -> Estimation {
-        Estimation {
+    /// The same as options of the library.
+    pub(crate) fn options(&self, standstill: &StandstillArgs) -> EstimatorOptions {
+        EstimatorOptions {
             weights: match self.weights {
-                WeightsArg::Auto => Weights::Automatic,
-                WeightsArg::None => Weights::None,
-                WeightsArg::Channels => Weights::Channels,
-                WeightsArg::Variance => Weights::Variance,
+                WeightsArg::Auto => EquationWeights::Automatic,
+                WeightsArg::None => EquationWeights::None,
+                WeightsArg::Channels => EquationWeights::Channels,
+                WeightsArg::Variance => EquationWeights::Variance,
             },
             robust: self.robust,
+            // The command line excludes combinations of these three.
             refinement: match self.prior {
-                Some(sigma) => Refinement::Prior(sigma),
-                None if self.physical => Refinement::Physical,
-                None if self.essential => Refinement::Essential,
-                None => Refinement::None,
+                Some(sigma) => EstimateRefinement::Prior(sigma),
+                None if self.physical => EstimateRefinement::Physical,
+                None if self.essential => EstimateRefinement::Essential,
+                None => EstimateRefinement::None,
             },
             standstill: standstill.standstill,
         }
     }
 }
 
-fn parse_part(text: &str) -> Result<f64, String> {
+/// Reads a number between 0 and 1, both excluded.
+fn parse_fraction(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(part) if part > 0.0 && part < 1.0 => Ok(part),
         _ => Err("expected a number between 0 and 1, such as 0.01".to_owned()),
     }
 }
 
+/// Reads a finite number above 0.
 fn parse_positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value > 0.0 && value.is_finite() => Ok(value),

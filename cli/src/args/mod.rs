@@ -5,11 +5,14 @@ pub(crate) mod data;
 pub(crate) mod drawing;
 pub(crate) mod effects;
 pub(crate) mod estimation;
+#[cfg(feature = "experiment")]
+mod experiment;
 mod motion;
 pub(crate) mod preparation;
 mod rig;
 pub(crate) mod runs;
 pub(crate) mod separate;
+#[cfg(feature = "workbench")]
 pub(crate) mod work;
 
 use std::path::PathBuf;
@@ -20,14 +23,17 @@ use drawing::DrawingArgs;
 use effects::{AddArgs, EffectsArgs};
 use preparation::PreparationArgs;
 use runs::RunsArgs;
+#[cfg(feature = "workbench")]
 use work::WorkArgs;
 
 pub(crate) use code::{AtlasArgs, EquationsArgs, EquationsFormat, GenerateArgs};
 pub(crate) use data::{
-    AdoptArgs, AskArgs, CompareArgs, DiagnoseArgs, EvaluateArgs, IdentifyArgs, InterpretArgs,
-    ParameterSource, RecordingsArgs, ReportArgs,
+    AdoptArgs, CompareArgs, DiagnoseArgs, DiagnosisArgs, EvaluateArgs, IdentifyArgs, InterpretArgs, ParameterSource,
+    RecordingsArgs, ReportArgs,
 };
-pub(crate) use motion::{CriterionArg, ExciteArgs, ExperimentArgs, SimulateArgs};
+#[cfg(feature = "experiment")]
+pub(crate) use experiment::ExperimentArgs;
+pub(crate) use motion::{CriterionArg, ExciteArgs, SimulateArgs};
 pub(crate) use rig::{ExportArgs, ImportArgs, ReduceArgs};
 
 /// From a model file to base parameters, equations, fast Rust, and parameters from measurements.
@@ -37,18 +43,18 @@ pub(crate) use rig::{ExportArgs, ImportArgs, ReduceArgs};
     version,
     about,
     after_help = "Start here:\n  \
-        modelmill tour                              the whole story on bundled recordings\n  \
+        modelmill tour                              all main steps on bundled recordings\n  \
         modelmill help COMMAND                       options and examples of one command\n\n\
         Exit status: 0 done, 1 the input is at fault (with the place and what to do), 2 wrong usage."
 )]
-pub(crate) struct Cli {
-    /// What to do.
+pub(crate) struct CommandLine {
+    /// The command to run.
     #[command(subcommand)]
-    pub(crate) command: Command,
-    /// A library of further kinds of effects (TOML), for every model that is read; may be repeated
+    pub(crate) command: ProgramCommand,
+    /// A library of additional kinds of effects (TOML), for every model that is read; may be repeated
     #[arg(long, global = true, value_name = "FILE")]
     pub(crate) library: Vec<PathBuf>,
-    /// Derive models for their files' values alone: constants stand as numbers, so that fewer base parameters remain where
+    /// Derive models only for the values of their files: constants become numbers. Fewer base parameters remain if
     /// lengths are zero or equal, and emitted code has no geometry to change
     #[arg(long, global = true)]
     pub(crate) at_values: bool,
@@ -56,24 +62,24 @@ pub(crate) struct Cli {
 
 /// The commands.
 #[derive(Debug, Subcommand)]
-pub(crate) enum Command {
+pub(crate) enum ProgramCommand {
     /// Validate a model file and print a summary
     #[command(
         after_help = "The numeric rank, eq. (9), is that of the regressor at random states with the file's values. Its gap is the \
-        ratio of the last singular value that counts to the next, or to the level of rounding; below 1000 the rank is a matter \
-        of opinion, and a warning says so.\n\n\
+        ratio of the last nonzero singular value to the next, or to the level of rounding. Below 1000 the rank is uncertain, and a \
+        warning is printed.\n\n\
         Examples (from the project's root):\n  modelmill check model-spec/models/spidermill.toml\n  \
         modelmill check model-spec/models/spidermill.toml --json\n  \
         modelmill check model-spec/models/panda.toml --picture panda.svg --at q2=0.6,q4=-1.2 --view 60,20"
     )]
     Check(CheckArgs),
-    /// Say what a variant changes: entries, p_g, dependencies, p_min, operation counts; along recordings what it costs: forces,
-    /// power, work, limits, error
+    /// Report what a variant changes: entries, p_g, dependencies, p_min, operation counts; along recordings also
+    /// forces, power, work, limits and error
     #[command(
-        after_help = "With --data both models move as the first one reads the recordings, each with the values of its file. \
-        A share is what a summand of p_min projects on the whole difference of a drive's force: shares add up to 100 %, and one \
-        that works against the difference is negative. Its column changes where geometry does. Forces need not be recorded; \
-        where they are, each model's error is that of `compare`.\n\n\
+        after_help = "With --data both models follow the motion as the first one reads it, each with the values of its file. \
+        A share is the projection of one term of p_min on the total difference of a drive's force. Shares add up to 100 %; a term \
+        that reduces the difference has a negative share. A column of the regressor changes if the geometry does. Forces need not \
+        be recorded; if they are, each model's error is that of `compare`.\n\n\
         Examples (from the project's root):\n  \
         modelmill diff model-spec/models/spidermill.toml model-spec/models/spidermill-paper.toml\n  \
         modelmill diff model-spec/models/spidermill.toml model-spec/models/spidermill-paper.toml \\\n      \
@@ -96,12 +102,12 @@ pub(crate) enum Command {
         --at R3m,R3m_right --set m.name=m4\n\n\
         Places in one --at share the effect's parameters. Without --in-place or --out nothing is written.")]
     Add(AddArgs),
-    /// Write a fit into a model file, in the place of its nominal values, and print the difference
+    /// Replace the nominal values of a model file by those of a fit, and print the difference
     #[command(after_help = "Examples:\n  \
         modelmill identify arm.toml --data run.csv --physical --out fit.json\n  \
         modelmill adopt arm.toml fit.json --in-place\n\n\
-        A fit of --physical becomes values of parameters, which bodies can have; any other one values of base parameters, \
-        which say nothing of single bodies. Without --in-place or --out nothing is written.")]
+        A fit of --physical gives values of parameters, physically possible for each body. Any other fit gives values of base \
+        parameters, which do not determine single bodies. Without --in-place or --out nothing is written.")]
     Adopt(AdoptArgs),
     /// Print the reduced model as equations: p_g, dependencies, p_min, intermediate variables, counts
     #[command(
@@ -110,7 +116,7 @@ pub(crate) enum Command {
         modelmill equations model-spec/models/panda.toml --format json | jq .rank"
     )]
     Equations(EquationsArgs),
-    /// Write the model as Rust source, the same that `cargo build` makes, or as a crate for C or Python
+    /// Write the model as Rust source, the same that `cargo build` generates, or as a crate for C or Python
     #[command(after_help = "Examples (from the project's root):\n  \
         modelmill generate model-spec/models/scara.toml --out scara.rs\n  \
         modelmill generate model-spec/models/panda.toml --language c99 --out panda-c99\n  \
@@ -126,7 +132,7 @@ pub(crate) enum Command {
         modelmill evaluate model-spec/models/spidermill.toml --reactions \\\n      \
         --data recordings/spidermill-mbs/plain-check.csv --out reactions.csv")]
     Evaluate(EvaluateArgs),
-    /// Find the base parameters from recordings by least squares
+    /// Estimate the base parameters from recordings by least squares
     #[command(after_help = "Examples (from the project's root):\n  \
         modelmill identify model-spec/models/spidermill.toml \\\n      \
         --data recordings/spidermill-mbs/with-rods-fit.csv \\\n      \
@@ -134,23 +140,23 @@ pub(crate) enum Command {
         modelmill identify model-spec/models/emps.toml --data emps_train.csv \\\n      \
         --order 4 --cutoff 100 --trim 49 --decimate 10\n  \
         modelmill identify arm.toml --data a.csv --data b.csv --map t=time_s --map q1=pos_1\n\n\
-        Estimating (see the options below --weights):\n  \
+        Estimation (see the options below --weights):\n  \
         modelmill identify arm.toml --data run.csv --weights channels --robust\n  \
         modelmill identify arm.toml --data mean.csv --weights variance --map shoulder_var=var_tau1 --map elbow_var=var_tau2\n  \
-        modelmill identify arm.toml --data run.csv --prior 0.2        nominal values count, to 20 % each\n  \
-        modelmill identify arm.toml --data run.csv --physical         only what bodies can have\n  \
-        modelmill identify arm.toml --data run.csv --essential        only what the recording supports\n  \
+        modelmill identify arm.toml --data run.csv --prior 0.2        nominal values as priors, 20 % standard deviation each\n  \
+        modelmill identify arm.toml --data run.csv --physical         only physically possible parameters\n  \
+        modelmill identify arm.toml --data run.csv --essential        only parameters that the recording supports\n  \
         modelmill identify arm.toml --data run.csv --instruments run.csv --instrument-map q1=q1_reference\n  \
         modelmill identify arm.toml --data run.csv --instruments period=7.29")]
     Identify(IdentifyArgs),
-    /// List what recordings hold: tables or topics, columns, types, samples, rates
+    /// List the contents of recordings: tables or topics, columns, types, samples, rates
     #[command(after_help = "Examples (from the project's root):\n  \
         modelmill recordings recordings/spidermill-mbs/plain-fit.csv\n  \
         modelmill recordings run.mcap --json\n\n\
         A joint of sensor_msgs/JointState is read as, for example, --map q1=joint_states.position.shoulder \
         --map motor1=joint_states.effort.shoulder.")]
     Recordings(RecordingsArgs),
-    /// Hold the model against recordings: error figures, and where the error lives
+    /// Compare the model with recordings: error figures, and where the error is largest
     #[command(after_help = "Examples (from the project's root):\n  \
         modelmill compare model-spec/models/spidermill.toml \\\n      \
         --data recordings/spidermill-mbs/with-rods-check.csv\n  \
@@ -163,19 +169,21 @@ pub(crate) enum Command {
         --data recordings/spidermill-mbs/with-rods-fit.csv \\\n      \
         --check recordings/spidermill-mbs/with-rods-check.csv")]
     Diagnose(DiagnoseArgs),
-    /// Tell what a model lacks as one self-contained page: ladder, curves, error maps, candidates, parameters, equations
+    /// Write a diagnosis as one self-contained page: error after each added effect, curves, error maps, candidates,
+    /// parameters, equations
     #[command(after_help = "Examples (from the project's root):\n  \
         modelmill report model-spec/models/spidermill.toml \\\n      \
         --data recordings/spidermill-mbs/with-rods-fit.csv \\\n      \
         --check recordings/spidermill-mbs/with-rods-check.csv --out report")]
     Report(ReportArgs),
-    /// Open a workbench in the browser: edit the model file, see mechanism, equations, error and findings follow
+    #[cfg(feature = "workbench")]
+    /// Open a workbench in the browser: edit the model file; mechanism, equations, error and findings are updated
     #[command(after_help = work::HELP)]
     Work(WorkArgs),
-    /// Drive a full-body rig along a trajectory and record what its sensors read
+    /// Simulate a full-body rig along a trajectory and record its sensors
     #[command(
-        after_help = "The trajectory (CSV) has a column t and one per coordinate of the rig; its rates and \
-        accelerations are taken from columns with _d and _dd, or else found by differences over five samples. \
+        after_help = "The trajectory (CSV) has a column t and one per coordinate of the rig. Rates and accelerations are read from \
+        columns with _d and _dd; if there are none, they are computed by differences over five samples. \
         Effects, noise, resolution, delay and sampling rate are those of the rig file.\n\n\
         Examples (from the project's root):\n  \
         modelmill simulate model-spec/rigs/spidermill-full.toml \\\n      \
@@ -183,21 +191,21 @@ pub(crate) enum Command {
         modelmill simulate rig.toml --trajectory traj.csv --out run.csv --seed 7"
     )]
     Simulate(SimulateArgs),
-    /// Reduce a full-body rig to a planar model file, and say the size of every approximation
+    /// Reduce a full-body rig to a planar model file, and report the size of every approximation
     #[command(
         after_help = "The plan (TOML) names the plane, the bodies that become one part, those that become point \
-        masses, and the symbols that parts share; without one every body becomes a part of its own. Every claim is \
-        measured along sampled motions of the rig, and the model's forces are held against the rig's.\n\n\
+        masses, and the symbols that parts share; without a plan every body becomes a separate part. Every approximation is \
+        measured along sampled motions of the rig, and the model's forces are compared with the rig's.\n\n\
         Examples (from the project's root):\n  \
         modelmill reduce model-spec/rigs/spidermill-full.toml \\\n      \
         --plan model-spec/rigs/spidermill-plan.toml --out reduced.toml\n  \
         modelmill reduce linkage.toml --out model.toml --json"
     )]
     Reduce(ReduceArgs),
-    /// Make a model file of a URDF, MJCF or SDF, as a starting point
+    /// Convert a URDF, MJCF or SDF into a model file, as a starting point
     #[command(
-        after_help = "Macros (xacro) must be expanded first. Links behind fixed joints join the body that carries \
-        them; every body gets its ten linear parameters.\n\n\
+        after_help = "Expand macros (xacro) first. Links with fixed joints are merged into the body that carries \
+        them. Every body gets its ten linear parameters.\n\n\
         Examples:\n  \
         modelmill import robot.urdf --out robot.toml\n  \
         modelmill check robot.toml"
@@ -206,7 +214,7 @@ pub(crate) enum Command {
     /// Write a model as a URDF or MJCF, for simulators
     #[command(
         after_help = "Bodies have the nominal values of the file, or with --parameters the physical ones of a fit made by `identify --physical`. \
-        What the format cannot say is told: loops and drives between two points need MJCF.\n\n\
+        What the format cannot express is reported: loops and drives between two points need MJCF.\n\n\
         Examples (from the project's root):\n  \
         modelmill export model-spec/models/panda.toml --out panda.urdf\n  \
         modelmill export model-spec/models/five_bar.toml --out five_bar.xml"
@@ -214,11 +222,12 @@ pub(crate) enum Command {
     Export(ExportArgs),
     /// Write an atlas of mechanisms: picture, joints, loops, base parameters with and without gravity, operations
     #[command(
-        after_help = "Base parameters are counted for the bodies alone; a page of its own for each mechanism has them as expressions.\n\n\
+        after_help = "Base parameters are counted for the bodies alone. Each mechanism has a separate page with their expressions.\n\n\
         Example (from the project's root):\n  modelmill atlas model-spec/models/*.toml --out docs"
     )]
     Atlas(AtlasArgs),
-    /// Say what changed between runs of one machine: load, friction, offset, scale of a force, clock, encoders, pushes
+    /// Report what changed between runs of one machine: load, friction, offset, scale of a force, clock, encoders,
+    /// pushes
     #[command(after_help = runs::HELP)]
     Runs(RunsArgs),
     /// Solve identified base parameters for physical ones, as in Table 1 of the paper: all real solutions
@@ -226,20 +235,21 @@ pub(crate) enum Command {
         modelmill interpret model-spec/models/spidermill-paper.toml --fit fit.json \\\n      \
         --unknown m2,m4,dc3,Ic12,Ic32")]
     Interpret(InterpretArgs),
-    /// Search for the periodic trajectory, within limits, that tells the base parameters apart best
+    /// Search for the periodic trajectory, within limits, that determines the base parameters best
     #[command(after_help = "Examples (from the project's root):\n  \
         modelmill excite model-spec/models/spidermill.toml --out trajectory.csv\n  \
         modelmill excite model-spec/models/two_link.toml --harmonics 5 --period 10 \\\n      \
         --limits q1=-1:1 --limits q1_d=2 --limits q2=-1.5:1.5 --limits q2_d=3 --out trajectory.csv\n  \
         modelmill excite model-spec/models/spidermill.toml --separate coulomb_friction@spindle_left:Fc=12 \\\n      \
-        --from load_friction@spindle_left --noise 1 --out separate.csv   motion that tells two effects apart\n\n\
-        Limits stand in the model file's `[limits]`; --limits adds to them or replaces them. `diagnose` prints the \
-        command that separates what its recordings cannot tell apart.")]
+        --from load_friction@spindle_left --noise 1 --out separate.csv   motion that distinguishes two effects\n\n\
+        Limits are read from `[limits]` of the model file; --limits adds to them or replaces them. For effects that its \
+        recordings cannot distinguish, `diagnose` prints the command for a motion that does.")]
     Excite(ExciteArgs),
     /// Reproduce the experiment of the paper on the bundled rig, and explain its errors, as one page
+    #[cfg(feature = "experiment")]
     #[command(
-        after_help = "Writes experiment.html: excitation, runs of the whole robot, Tables 1 and 2 beside the paper's, \
-        and where the errors come from. Needs no files; the same options give the same bytes.\n\n\
+        after_help = "Writes experiment.html: excitation, runs of the complete robot, Tables 1 and 2 next to the paper's, \
+        and the causes of the errors. Needs no files; the same options give the same bytes.\n\n\
         Examples:\n  modelmill experiment --out docs                     the page that comes with the project\n  \
         modelmill experiment --out /tmp --random 100 --starts 1 --json"
     )]
@@ -250,11 +260,9 @@ pub(crate) enum Command {
         modelmill completions zsh > ~/.zfunc/_modelmill\n  \
         modelmill completions fish > ~/.config/fish/completions/modelmill.fish")]
     Completions(CompletionsArgs),
-    /// Tell the whole story on bundled recordings: derive, compare, find what is missing, add it, watch the error fall
-    #[command(
-        after_help = "Examples:\n  modelmill tour\n  modelmill tour --out tour\n\n\
-        Models, recordings and pages are written into the folder, so that each command of the story can be repeated."
-    )]
+    /// Show all main steps on bundled recordings: derive, compare, find the missing effect, add it, identify again
+    #[command(after_help = "Examples:\n  modelmill tour\n  modelmill tour --out tour\n\n\
+        Models, recordings and pages are written into the folder, so that each command of the tour can be repeated.")]
     Tour(TourArgs),
 }
 
@@ -277,7 +285,7 @@ pub(crate) struct DiffArgs {
     pub(crate) before: PathBuf,
     /// Model file as it is now
     pub(crate) after: PathBuf,
-    /// Recordings along which both are held beside each other (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2); may be repeated
+    /// Recordings along which both models are compared (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2); may be repeated
     #[arg(long, value_name = "RUN", num_args = 1..)]
     pub(crate) data: Vec<PathBuf>,
     #[command(flatten)]
@@ -292,14 +300,14 @@ pub(crate) struct DiffArgs {
 /// `completions`.
 #[derive(Debug, Args)]
 pub(crate) struct CompletionsArgs {
-    /// Shell
+    /// Shell for which the script is written
     pub(crate) shell: clap_complete::Shell,
 }
 
 /// `tour`.
 #[derive(Debug, Args)]
 pub(crate) struct TourArgs {
-    /// Write models, recordings and pages into this folder; `modelmill-tour` in the folder for temporary files if not given
+    /// Write models, recordings and pages into this folder. Default: `modelmill-tour` in the folder for temporary files
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
 }

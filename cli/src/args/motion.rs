@@ -1,9 +1,9 @@
-//! Arguments of what plans and runs motions.
+//! Arguments of `simulate`, `excite` and `experiment`, which plan and simulate motions.
 
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use modelmill::excite::Limit;
+use modelmill::excite::TrajectoryLimit;
 
 use crate::args::data::ParameterSource;
 use crate::args::preparation;
@@ -14,7 +14,7 @@ use crate::args::separate::SeparateArgs;
 pub(crate) struct SimulateArgs {
     /// Rig file (TOML)
     pub(crate) rig: PathBuf,
-    /// Trajectory (CSV): t and the coordinates, with or without derivatives
+    /// Trajectory (CSV): time t and the coordinates, with or without derivatives
     #[arg(long, value_name = "TRAJ.csv")]
     pub(crate) trajectory: PathBuf,
     /// Write the recording to this file
@@ -23,7 +23,7 @@ pub(crate) struct SimulateArgs {
     /// Seed of the noise; the rig's own if not given
     #[arg(long, value_name = "N")]
     pub(crate) seed: Option<u64>,
-    /// The trajectory calls our column by another name, e.g. `--map theta1=pos_left`; may be repeated
+    /// Column of the trajectory for a name of the rig, e.g. `--map theta1=pos_left`; may be repeated
     #[arg(long, value_name = "OURS=THEIRS", value_parser = preparation::parse_map)]
     pub(crate) map: Vec<(String, String)>,
     /// Print one JSON object on standard output
@@ -31,12 +31,12 @@ pub(crate) struct SimulateArgs {
     pub(crate) json: bool,
 }
 
-/// What excitation makes small.
+/// What the search for an excitation minimises.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum CriterionArg {
     /// The condition number of the regressor in SI units, as in eq. (13) of the paper
     Condition,
-    /// The logarithm of the determinant of W'W/N, negative: the volume of the parameters' uncertainty
+    /// The negative logarithm of the determinant of W'W/N (D-optimality): the volume of the parameters' uncertainty
     LogDet,
 }
 
@@ -51,15 +51,15 @@ pub(crate) struct ExciteArgs {
     /// Period of the trajectory, s
     #[arg(long, value_name = "S", default_value_t = 7.29, value_parser = parse_period)]
     pub(crate) period: f64,
-    /// Limits beside those of the model file, or in their place: a coordinate (`theta1=1.5:2.1`), its rate
+    /// Limits that add to those of the model file or replace them: a coordinate (`theta1=1.5:2.1`), its rate
     /// (`theta1_d=1.2`) or acceleration (`theta1_dd=4`), the force of a drive (`spindle_left=1500`), a point
     /// (`R3m.x=0.2:0.7`), or `singularity=0.3`; may be repeated
-    #[arg(long, value_name = "NAME=RANGE", value_delimiter = ',', value_parser = Limit::parse, allow_hyphen_values = true)]
-    pub(crate) limits: Vec<Limit>,
-    /// What is made small
+    #[arg(long, value_name = "NAME=RANGE", value_delimiter = ',', value_parser = TrajectoryLimit::parse, allow_hyphen_values = true)]
+    pub(crate) limits: Vec<TrajectoryLimit>,
+    /// Criterion that is minimised
     #[arg(long, value_enum, default_value = "condition")]
     pub(crate) criterion: CriterionArg,
-    /// Values of the base parameters, from which forces along the motion follow: `nominal`, or a file that `identify` wrote
+    /// Values of the base parameters for the forces along the motion: `nominal`, or a file that `identify` wrote
     #[arg(long, value_name = "nominal|FIT.json", default_value = "nominal", value_parser = ParameterSource::parse)]
     pub(crate) parameters: ParameterSource,
     /// Random trajectories within the limits that are tried first
@@ -68,7 +68,7 @@ pub(crate) struct ExciteArgs {
     /// How many of the best random trajectories the search starts from
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = parse_count)]
     pub(crate) starts: usize,
-    /// The same seed gives the same trajectory
+    /// Seed of the search; the same seed gives the same trajectory
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub(crate) seed: u64,
     /// Samples per second in the file
@@ -77,7 +77,7 @@ pub(crate) struct ExciteArgs {
     /// Write one period of the trajectory to this file: `t`, coordinates, rates, accelerations
     #[arg(long, value_name = "TRAJ.csv")]
     pub(crate) out: PathBuf,
-    /// Write its picture to this file; beside the trajectory if not given
+    /// Write its picture to this file; if not given, next to the trajectory with the ending .svg
     #[arg(long, value_name = "FILE.svg")]
     pub(crate) figure: Option<PathBuf>,
     /// Print one JSON object on standard output
@@ -87,43 +87,23 @@ pub(crate) struct ExciteArgs {
     pub(crate) separate: SeparateArgs,
 }
 
-/// `experiment`.
-#[derive(Debug, Args)]
-pub(crate) struct ExperimentArgs {
-    /// Write the page `experiment.html` into this folder
-    #[arg(long, value_name = "DIR")]
-    pub(crate) out: PathBuf,
-    /// Random trajectories within the limits that the search for the excitation tries first
-    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = parse_count)]
-    pub(crate) random: usize,
-    /// How many of the best random trajectories the search starts from
-    #[arg(long, value_name = "N", default_value_t = 4, value_parser = parse_count)]
-    pub(crate) starts: usize,
-    /// Seed of the search and of the test trajectory
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    pub(crate) seed: u64,
-    /// Samples per second of the runs
-    #[arg(long, value_name = "HZ", default_value_t = 200.0, value_parser = parse_rate)]
-    pub(crate) rate: f64,
-    /// Print one JSON object on standard output
-    #[arg(long)]
-    pub(crate) json: bool,
-}
-
+/// Reads a number of harmonics, 1 to 50.
 fn parse_harmonics(text: &str) -> Result<usize, String> {
     match text.parse::<usize>() {
         Ok(value) if (1..=50).contains(&value) => Ok(value),
-        _ => Err("expected a whole number from 1 to 50".to_owned()),
+        _ => Err("expected an integer from 1 to 50".to_owned()),
     }
 }
 
-fn parse_count(text: &str) -> Result<usize, String> {
+/// Reads a number of trajectories, 1 to 1000000.
+pub(super) fn parse_count(text: &str) -> Result<usize, String> {
     match text.parse::<usize>() {
         Ok(value) if (1..=1_000_000).contains(&value) => Ok(value),
-        _ => Err("expected a whole number from 1 to 1000000".to_owned()),
+        _ => Err("expected an integer from 1 to 1000000".to_owned()),
     }
 }
 
+/// Reads a period in s, 0.001 to 10000.
 fn parse_period(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if (1e-3..=1e4).contains(&value) => Ok(value),
@@ -131,7 +111,8 @@ fn parse_period(text: &str) -> Result<f64, String> {
     }
 }
 
-fn parse_rate(text: &str) -> Result<f64, String> {
+/// Reads a sampling rate in samples per second, 1 to 100000.
+pub(super) fn parse_rate(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if (1.0..=1e5).contains(&value) => Ok(value),
         _ => Err("expected samples per second between 1 and 100000, such as 500".to_owned()),

@@ -1,57 +1,57 @@
-//! Options that say how recordings are read and prepared, shared by all commands that read them.
+//! Options for reading and preparing recordings, shared by all commands that read them.
 
 use std::fmt::Write as _;
 
 use clap::{Args, ValueEnum};
-use modelmill::recording::{DerivativeSource, MAX_FILTER_ORDER, Preparation, Reading, Smoothing};
+use modelmill::recording::{DerivativeSource, MAX_FILTER_ORDER, RecordingOptions, SmoothingMethod, StatePreparation};
 
-use crate::flags::quoted;
+use crate::flags::quote_word;
 
-/// Order of the low-pass where none is asked for.
+/// Order of the low-pass without `--order`.
 const USUAL_ORDER: usize = 4;
 
 /// How recordings are read and states are prepared.
 #[derive(Debug, Clone, PartialEq, Args)]
 #[command(next_help_heading = "Reading and preparing recordings")]
 pub(crate) struct PreparationArgs {
-    /// The recording calls our column by another name, e.g. `--map theta1=pos_left`, or ours is a
-    /// sum of its columns, in other units perhaps: `--map "q6=(pos6 - pos5)/32 - 90 [deg]"`; may be
-    /// repeated. Ours are `t`, a coordinate, a coordinate with `_d` or `_dd`, a drive, and a drive
-    /// with `_var` for the variance of its force
+    /// Column of the recording for a name of the model, e.g. `--map theta1=pos_left`, or a sum of columns with a unit
+    /// if it is not SI: `--map "q6=(pos6 - pos5)/32 - 90 [deg]"`; may be repeated. Names of the model are `t`, a
+    /// coordinate, a coordinate with `_d` or `_dd`, a drive, and a drive with `_var` for the variance of its force
     #[arg(long, value_name = "OURS=THEIRS", value_parser = parse_map)]
     pub(crate) map: Vec<(String, String)>,
-    /// Cut-off of the low-pass on positions, Hz; chosen by what is left of the forces on held-out time if not given, or from
-    /// the positions where no forces are
+    /// Cut-off of the low-pass on positions, Hz. Default: chosen by cross-validation on the forces; without forces,
+    /// from the positions
     #[arg(long, value_name = "HZ", value_parser = parse_cutoff, allow_negative_numbers = true)]
     pub(crate) cutoff: Option<f64>,
     /// Order of the Butterworth low-pass, which runs forwards and backwards [default: 4]
     #[arg(long, value_name = "N", value_parser = parse_order, allow_negative_numbers = true)]
     pub(crate) order: Option<usize>,
-    /// Samples dropped at the start and at the end, once derivatives are made; a single number
-    /// counts for both ends
+    /// Samples dropped at the start and at the end, after derivatives are computed; a single number applies to both
+    /// ends
     #[arg(long, value_name = "N[,N]", value_parser = parse_trim, allow_hyphen_values = true)]
     pub(crate) trim: Option<(usize, usize)>,
-    /// Keep every n-th sample, after a low-pass on forces and regressor alike; chosen with the cut-off where neither that nor
-    /// the smoothing nor this is given
+    /// Keep every n-th sample, after the same low-pass on forces and regressor. Chosen together with the cut-off if
+    /// neither
+    /// --cutoff nor --smoothing nor --decimate is given
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = parse_decimate, allow_negative_numbers = true)]
     pub(crate) decimate: usize,
-    /// Which rates and accelerations are taken
+    /// Source of rates and accelerations
     #[arg(long, value_enum, default_value = "recorded")]
     pub(crate) derivatives: DerivativesArg,
     /// How positions are smoothed and differentiated
     #[arg(long, value_enum, default_value = "auto")]
     pub(crate) smoothing: SmoothingArg,
-    /// Period of the motion, s, for `--smoothing fourier`, which it asks for; found from the positions if not given
+    /// Period of the motion, s; selects `--smoothing fourier`. Determined from the positions if not given
     #[arg(long, value_name = "S", value_parser = parse_period)]
     pub(crate) period: Option<f64>,
-    /// Up to which frequency measured and model force are compared beside the raw figures, Hz; the cut-off, or what the motion
-    /// reaches, if not given
+    /// Frequency up to which measured and model force are also compared, Hz, in addition to the unfiltered figures.
+    /// Default: the cut-off, or the highest frequency of the motion
     #[arg(long, value_name = "HZ", value_parser = parse_cutoff, allow_negative_numbers = true)]
     pub(crate) band: Option<f64>,
     /// Leave out samples with NaN, infinite or empty fields instead of refusing the recording
     #[arg(long)]
     pub(crate) skip_bad_samples: bool,
-    /// Leave out the forces of contacts and pushes, intervals of time in which no parameters explain them
+    /// Leave out the forces of contacts and pushes: intervals in which no parameters explain the forces
     #[arg(long)]
     pub(crate) leave_out_events: bool,
     /// Read only the samples between these times, s
@@ -62,30 +62,30 @@ pub(crate) struct PreparationArgs {
 /// Where derivatives come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum DerivativesArg {
-    /// Recorded columns where there are any, the others from positions
+    /// Recorded columns if the file has them; the others are computed from positions
     Recorded,
-    /// All from positions, whatever the file holds
+    /// All computed from positions, even if the file has columns for them
     Positions,
 }
 
 /// How positions are smoothed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum SmoothingArg {
-    /// A Fourier series where the run is periodic and the series leaves nothing but noise, unless --cutoff is given;
-    /// otherwise Butterworth's low-pass
+    /// A Fourier series if the run is periodic and only noise remains as residual, unless --cutoff is given; otherwise
+    /// a Butterworth low-pass
     Auto,
-    /// Butterworth's low-pass run both ways, then central differences
+    /// A Butterworth low-pass, forwards and backwards, then central differences
     Butterworth,
-    /// Polynomials of degree 4 over windows that suit the cut-off
+    /// Polynomials of degree 4 over windows that match the cut-off
     SavitzkyGolay,
     /// A Fourier series up to the cut-off, for periodic motions
     Fourier,
 }
 
 impl PreparationArgs {
-    /// As the library wants it.
-    pub(crate) fn reading(&self) -> Reading {
-        Reading {
+    /// The same as options of the library.
+    pub(crate) fn reading(&self) -> RecordingOptions {
+        RecordingOptions {
             columns: self.map.clone(),
             preparation: self.preparation(),
             skip_bad_samples: self.skip_bad_samples,
@@ -94,12 +94,16 @@ impl PreparationArgs {
         }
     }
 
-    /// The options that were given, as the command line has them, each with a space before it.
-    pub(crate) fn spelled(&self) -> String {
+    /// The options that differ from their defaults, as text for a command line, each with a space before it.
+    #[cfg_attr(
+        not(feature = "workbench"),
+        expect(dead_code, reason = "only the workbench prints them")
+    )]
+    pub(crate) fn to_flags(&self) -> String {
         let mut all = String::new();
         let mut option = |name: &str, value: Option<String>| {
             if let Some(value) = value {
-                let _ = write!(all, " --{name} {}", quoted(&value));
+                let _ = write!(all, " --{name} {}", quote_word(&value));
             }
         };
         for (ours, theirs) in &self.map {
@@ -108,32 +112,18 @@ impl PreparationArgs {
         let number = |value: Option<f64>| value.map(|value| value.to_string());
         option("cutoff", number(self.cutoff));
         option("order", self.order.map(|order| order.to_string()));
-        option(
-            "trim",
-            self.trim.map(|(start, end)| format!("{start},{end}")),
-        );
-        option(
-            "decimate",
-            (self.decimate > 1).then(|| self.decimate.to_string()),
-        );
+        option("trim", self.trim.map(|(start, end)| format!("{start},{end}")));
+        option("decimate", (self.decimate > 1).then(|| self.decimate.to_string()));
+        // Values of enumerations by their names, except the defaults.
         let choice = |value: Option<clap::builder::PossibleValue>, usual: &str| {
             let name = value.map(|value| value.get_name().to_owned());
             name.filter(|name| name != usual)
         };
-        option(
-            "derivatives",
-            choice(self.derivatives.to_possible_value(), "recorded"),
-        );
-        option(
-            "smoothing",
-            choice(self.smoothing.to_possible_value(), "auto"),
-        );
+        option("derivatives", choice(self.derivatives.to_possible_value(), "recorded"));
+        option("smoothing", choice(self.smoothing.to_possible_value(), "auto"));
         option("period", number(self.period));
         option("band", number(self.band));
-        option(
-            "between",
-            self.between.map(|(from, to)| format!("{from},{to}")),
-        );
+        option("between", self.between.map(|(from, to)| format!("{from},{to}")));
         if self.skip_bad_samples {
             all.push_str(" --skip-bad-samples");
         }
@@ -143,8 +133,9 @@ impl PreparationArgs {
         all
     }
 
-    fn preparation(&self) -> Preparation {
-        Preparation {
+    /// Filters and derivatives as the library's options.
+    fn preparation(&self) -> StatePreparation {
+        StatePreparation {
             cutoff_hz: self.cutoff,
             order: self.order.unwrap_or(USUAL_ORDER),
             trim: self.trim,
@@ -155,21 +146,21 @@ impl PreparationArgs {
                 DerivativesArg::Positions => DerivativeSource::Positions,
             },
             smoothing: match self.smoothing {
+                // A given period implies a Fourier series.
                 SmoothingArg::Auto => match self.period {
-                    None => Smoothing::Automatic,
-                    period => Smoothing::Fourier { period },
+                    None => SmoothingMethod::Automatic,
+                    period => SmoothingMethod::Fourier { period },
                 },
-                SmoothingArg::Butterworth => Smoothing::Butterworth,
-                SmoothingArg::SavitzkyGolay => Smoothing::SavitzkyGolay,
-                SmoothingArg::Fourier => Smoothing::Fourier {
-                    period: self.period,
-                },
+                SmoothingArg::Butterworth => SmoothingMethod::Butterworth,
+                SmoothingArg::SavitzkyGolay => SmoothingMethod::SavitzkyGolay,
+                SmoothingArg::Fourier => SmoothingMethod::Fourier { period: self.period },
             },
-            ..Preparation::default()
+            ..StatePreparation::default()
         }
     }
 }
 
+/// Reads `OURS=THEIRS`: a name of the model and an expression of columns.
 pub(crate) fn parse_map(text: &str) -> Result<(String, String), String> {
     match text.split_once('=') {
         Some((ours, theirs)) if !ours.trim().is_empty() && !theirs.trim().is_empty() => {
@@ -179,6 +170,7 @@ pub(crate) fn parse_map(text: &str) -> Result<(String, String), String> {
     }
 }
 
+/// Reads a frequency above 0 in Hz.
 fn parse_cutoff(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
@@ -186,6 +178,7 @@ fn parse_cutoff(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Reads a period above 0 in s.
 fn parse_period(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
@@ -193,20 +186,20 @@ fn parse_period(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Reads the order of a low-pass, from 1 to `MAX_FILTER_ORDER`.
 fn parse_order(text: &str) -> Result<usize, String> {
     match text.parse::<usize>() {
         Ok(order) if (1..=MAX_FILTER_ORDER).contains(&order) => Ok(order),
-        _ => Err(format!(
-            "expected an order from 1 to {MAX_FILTER_ORDER}; 4 is usual"
-        )),
+        _ => Err(format!("expected an order from 1 to {MAX_FILTER_ORDER}; 4 is usual")),
     }
 }
 
+/// Reads `N` for both ends or `START,END`, numbers of samples.
 fn parse_trim(text: &str) -> Result<(usize, usize), String> {
     let count = |text: &str| {
-        text.trim().parse::<usize>().map_err(|_| {
-            "expected a number of samples, such as 49, or two of them, such as 49,10".to_owned()
-        })
+        text.trim()
+            .parse::<usize>()
+            .map_err(|_| "expected a number of samples, such as 49, or two of them, such as 49,10".to_owned())
     };
     match text.split_once(',') {
         Some((start, end)) => Ok((count(start)?, count(end)?)),
@@ -214,6 +207,7 @@ fn parse_trim(text: &str) -> Result<(usize, usize), String> {
     }
 }
 
+/// Reads `FROM,TO`, two increasing times in s.
 fn parse_between(text: &str) -> Result<(f64, f64), String> {
     let times = text.split_once(',').map(|(from, to)| {
         let time = |text: &str| text.trim().parse::<f64>().ok().filter(|t| t.is_finite());
@@ -225,9 +219,10 @@ fn parse_between(text: &str) -> Result<(f64, f64), String> {
     }
 }
 
+/// Reads a decimation factor, at least 1.
 fn parse_decimate(text: &str) -> Result<usize, String> {
     match text.parse::<usize>() {
         Ok(value) if value > 0 => Ok(value),
-        _ => Err("expected a whole number from 1 on; 1 keeps all samples".to_owned()),
+        _ => Err("expected an integer of at least 1; 1 keeps all samples".to_owned()),
     }
 }

@@ -1,59 +1,61 @@
-//! The part of the command line of `excite` that asks for motion along which effects differ.
+//! Options of `excite` for a motion that distinguishes effects.
 
 use std::path::PathBuf;
 
 use clap::Args;
-use modelmill::diagnose::Named;
-use modelmill::excite::Separate;
-use modelmill::recording::Reading;
+use modelmill::diagnose::NamedEffect;
+use modelmill::excite::SeparationRequest;
+use modelmill::recording::RecordingOptions;
 
-/// Which effects are to be told apart.
+/// The effects that the motion has to distinguish.
 #[derive(Debug, Args)]
-#[command(next_help_heading = "Telling effects apart")]
+#[command(next_help_heading = "Distinguishing effects")]
 pub(crate) struct SeparateArgs {
-    /// Instead of exciting the base parameters, make this effect differ most from those of --from. Values of its
-    /// parameters and constants in SI units follow the places: `coulomb_friction@motor:Fc=25.9`
-    #[arg(long, value_name = "KIND@PLACE,...[:NAME=VALUE]", value_parser = Named::parse, requires = "from",
+    /// Instead of exciting the base parameters, search for a motion in which this effect differs most from those of
+    /// --from. Values of its parameters and constants in SI units follow the places: `coulomb_friction@motor:Fc=25.9`
+    #[arg(long, value_name = "KIND@PLACE,...[:NAME=VALUE]", value_parser = NamedEffect::parse, requires = "from",
           conflicts_with = "criterion")]
-    pub(crate) separate: Option<Named>,
-    /// What it may be taken for; may be repeated. Constants without a value are fitted like parameters
-    #[arg(long, value_name = "KIND@PLACE,...", value_parser = Named::parse, requires = "separate")]
-    pub(crate) from: Vec<Named>,
-    /// An effect that is there in either case and that the model file lacks; may be repeated
-    #[arg(long, value_name = "KIND@PLACE,...[:NAME=VALUE]", value_parser = Named::parse, requires = "separate")]
-    pub(crate) beside: Vec<Named>,
-    /// Standard deviation of the noise in the forces, in N or N m, against which the difference is held
+    pub(crate) separate: Option<NamedEffect>,
+    /// The effect it could be confused with; may be repeated. Constants without a value are estimated like parameters
+    #[arg(long, value_name = "KIND@PLACE,...", value_parser = NamedEffect::parse, requires = "separate")]
+    pub(crate) from: Vec<NamedEffect>,
+    /// An effect that is present in both cases and that the model file lacks; may be repeated
+    #[arg(long, value_name = "KIND@PLACE,...[:NAME=VALUE]", value_parser = NamedEffect::parse, requires = "separate")]
+    pub(crate) beside: Vec<NamedEffect>,
+    /// Standard deviation of the noise in the forces, in N or N m, with which the difference is compared
     #[arg(long, value_name = "SIZE", value_parser = parse_noise, requires = "separate", allow_negative_numbers = true)]
     pub(crate) noise: Option<f64>,
-    /// Recordings to compare with, of one motion; they give the size of the effect and the noise too, where these are not
-    /// given
+    /// Recordings of one motion to compare with; they also give the size of the effect and the noise if these are not
+    /// specified
     #[arg(long, value_name = "RUN", num_args = 1.., requires = "separate")]
     pub(crate) data: Vec<PathBuf>,
-    /// The recordings call our column by another name, e.g. `--map theta1=pos_left`; may be repeated
+    /// Column of the recordings for a name of the model, e.g. `--map theta1=pos_left`; may be repeated
     #[arg(long, value_name = "OURS=THEIRS", value_parser = super::preparation::parse_map, requires = "data")]
     pub(crate) map: Vec<(String, String)>,
 }
 
 impl SeparateArgs {
-    /// What is to be told apart, if anything is.
-    pub(crate) fn asked(&self) -> Option<Separate> {
-        Some(Separate {
+    /// The effects to distinguish, if `--separate` is given.
+    pub(crate) fn separation_request(&self) -> Option<SeparationRequest> {
+        // Without --separate the command excites the base parameters.
+        Some(SeparationRequest {
             effect: self.separate.clone()?,
             from: self.from.clone(),
-            beside: self.beside.clone(),
+            common_effects: self.beside.clone(),
             noise: self.noise,
         })
     }
 
-    /// How the recordings are read.
-    pub(crate) fn reading(&self) -> Reading {
-        Reading {
+    /// How the recordings of `--data` are read.
+    pub(crate) fn reading(&self) -> RecordingOptions {
+        RecordingOptions {
             columns: self.map.clone(),
-            ..Reading::default()
+            ..RecordingOptions::default()
         }
     }
 }
 
+/// Reads a standard deviation above 0.
 fn parse_noise(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value > 0.0 && value.is_finite() => Ok(value),

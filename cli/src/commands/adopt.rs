@@ -1,4 +1,4 @@
-//! `adopt`: a fit goes into a model file; the difference is shown.
+//! `adopt`: replaces nominal values of a model file by those of a fit. The difference of the text comes out.
 
 use std::path::Path;
 
@@ -7,33 +7,34 @@ use modelmill::print::edit;
 use serde_json::json;
 
 use crate::args::AdoptArgs;
-use crate::failure::Outcome;
-use crate::output::{self, Target};
+use crate::failure::CommandOutcome;
+use crate::output::{self, OutputFile};
 use crate::{commands, terminal};
 
-/// Edits the model file, prints the difference, and writes the result where the user asks for it.
-pub(crate) fn run(host: &Host, args: &AdoptArgs) -> Outcome {
+/// Edits the model file, prints the difference, and writes the result to `--out` or, with `--in-place`, to the model
+/// file.
+pub(crate) fn run(host: &Host, args: &AdoptArgs) -> CommandOutcome {
     let model = commands::model(host, &args.model)?;
-    let inputs = model
-        .files()
-        .chain(std::iter::once::<&Path>(args.fit.as_ref()));
+    let inputs = model.files().chain(std::iter::once::<&Path>(args.fit.as_ref()));
     let target = args
         .out
         .as_ref()
-        .map(|path| Target::new(path, inputs))
+        .map(|path| OutputFile::new(path, inputs))
         .transpose()?;
+    // The fit is matched to the model by the expressions of its base parameters.
     let fit = host.fit(&args.fit)?;
     let adoption = model.adopt(&fit, &args.fit.display().to_string())?;
     for note in &adoption.notes {
         terminal::remark(note);
     }
     let path = args.model.display().to_string();
-    // What is written must be sound where it is written: paths in it start from its folder.
+    // The new text must be valid at its target, since relative paths in it start from the folder of the file.
     let loaded = match &target {
         Some(target) => host.load_text(target.path(), &adoption.text)?,
         None => adoption.loaded,
     };
-    commands::derived(host, &path, loaded)?;
+    commands::derive_model(host, &path, loaded)?;
+    // Nothing is written without --out or --in-place, so the command can be used to preview a change.
     let written = match (&target, args.in_place) {
         (Some(target), _) => {
             target.write(&adoption.text)?;
@@ -46,6 +47,7 @@ pub(crate) fn run(host: &Host, args: &AdoptArgs) -> Outcome {
         (None, false) => None,
     };
     let name = written.as_deref().unwrap_or(&path);
+    // The difference has the names of the file before and after.
     let difference = edit::difference(model.text(), &adoption.text, [&path, name]);
     if args.json {
         return terminal::print_json(&json!({
@@ -56,10 +58,12 @@ pub(crate) fn run(host: &Host, args: &AdoptArgs) -> Outcome {
             "written": written,
         }));
     }
-    terminal::print(&edit::coloured(&difference, terminal::style()))?;
+    terminal::print(&edit::colour_diff(&difference, terminal::style()))?;
     terminal::note(&match written {
-        Some(name) => format!("{name} is written; its nominal values are those of the fit now"),
-        None => "nothing is written; add --in-place to change the model file, or --out FILE to write another one".to_owned(),
+        Some(name) => format!("{name} is written; its nominal values are now those of the fit"),
+        None => {
+            "nothing is written; add --in-place to change the model file, or --out FILE to write another one".to_owned()
+        }
     });
     Ok(())
 }

@@ -1,26 +1,23 @@
-//! `check`: validates a model file and says what is in it.
+//! `check`: validates a model file and prints a summary of its contents.
 
 use modelmill::{Error, Host, print};
 
 use crate::args::CheckArgs;
-use crate::failure::{Failure, Outcome};
+use crate::failure::{CommandFailure, CommandOutcome};
 use crate::flags::FlagSpelling;
 use crate::{commands, terminal};
 
 /// Validates and derives the model, and prints a summary.
-pub(crate) fn run(host: &Host, args: &CheckArgs) -> Outcome {
+pub(crate) fn run(host: &Host, args: &CheckArgs) -> CommandOutcome {
     let model = match commands::model(host, &args.model) {
-        Err(Failure::Library(fault)) if args.json && !matches!(fault, Error::Cancelled) => {
-            // What is wrong goes to standard output as well, for editors.
+        Err(CommandFailure::Library(fault)) if args.json && !matches!(fault, Error::Cancelled) => {
+            // Editors read faults as JSON from standard output, in addition to the text on standard error.
             let told = match &fault {
                 Error::Model(faults) => print::faults(faults, &FlagSpelling),
-                fault => print::refusal(
-                    &fault.spell(&FlagSpelling),
-                    &args.model.display().to_string(),
-                ),
+                fault => print::refusal(&fault.spell(&FlagSpelling), &args.model.display().to_string()),
             };
             terminal::print_json(&told)?;
-            return Err(Failure::Library(fault));
+            return Err(CommandFailure::Library(fault));
         }
         model => model?,
     };

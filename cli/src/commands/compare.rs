@@ -1,18 +1,19 @@
-//! `compare`: how far the model is off along recordings, and where.
+//! `compare`: errors of the model along recordings, and the regions of the motion where they are largest.
 
 use modelmill::Host;
 
 use crate::args::CompareArgs;
-use crate::failure::Outcome;
+use crate::failure::CommandOutcome;
 use crate::flags::FlagSpelling;
 use crate::{commands, terminal};
 
-/// Prints error figures and the regions where the error lives.
-pub(crate) fn run(host: &Host, args: &CompareArgs) -> Outcome {
+/// Prints error figures and the regions where the error is largest.
+pub(crate) fn run(host: &Host, args: &CompareArgs) -> CommandOutcome {
     let model = commands::model(host, &args.model)?;
     let values = args.parameters.values(host, &model)?;
     let data = commands::recordings(&model, &args.data, &args.preparation.reading())?;
     let compared = model.compare(&data.iter().collect::<Vec<_>>(), &values)?;
+    // The name states in the output which values were used.
     let name = args.parameters.name();
     if args.json {
         return terminal::print_json(&compared.json(&name, &FlagSpelling)?);

@@ -2,13 +2,13 @@
 
 use clap::CommandFactory;
 
-use crate::args::{Cli, CompletionsArgs};
-use crate::failure::Outcome;
+use crate::args::{CommandLine, CompletionsArgs};
+use crate::failure::CommandOutcome;
 use crate::terminal;
 
 /// Prints the script.
-pub(crate) fn run(args: &CompletionsArgs) -> Outcome {
+pub(crate) fn run(args: &CompletionsArgs) -> CommandOutcome {
     let mut script = Vec::new();
-    clap_complete::generate(args.shell, &mut Cli::command(), "modelmill", &mut script);
+    clap_complete::generate(args.shell, &mut CommandLine::command(), "modelmill", &mut script);
     terminal::print(&String::from_utf8_lossy(&script))
 }

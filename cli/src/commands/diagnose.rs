@@ -1,22 +1,22 @@
-//! `diagnose`: which effect is missing, and what speaks for it.
+//! `diagnose`: which effect the model lacks, and the evidence for it.
 
 use modelmill::Host;
-use modelmill::diagnose::Question;
+use modelmill::diagnose::DiagnosisOptions;
 
 use crate::args::DiagnoseArgs;
 use crate::commands;
-use crate::failure::Outcome;
+use crate::failure::CommandOutcome;
 use crate::flags::CommandLineSpelling;
 use crate::terminal;
 
-/// Prints what is missing, or that nothing is, or that nothing known explains it.
-pub(crate) fn run(host: &Host, args: &DiagnoseArgs) -> Outcome {
-    let flags = CommandLineSpelling::from_args(&args.ask);
-    let question = Question {
-        held: args.ask.held(),
-        ..Question::default()
+/// Prints the missing effects, or that none is missing, or that no known effect explains the error.
+pub(crate) fn run(host: &Host, args: &DiagnoseArgs) -> CommandOutcome {
+    let flags = CommandLineSpelling::from_args(&args.diagnosis);
+    let question = DiagnosisOptions {
+        fixed: args.diagnosis.fixed_parameters(),
+        ..DiagnosisOptions::default()
     };
-    let findings = commands::diagnose(host, &args.ask, question)?;
+    let findings = commands::diagnose(host, &args.diagnosis, question)?;
     if args.json {
         return terminal::print_json(&findings.json(&flags));
     }

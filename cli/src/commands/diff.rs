@@ -1,28 +1,30 @@
-//! `diff`: what a variant changes, for people who review it; along recordings, what it costs.
+//! `diff`: reports what a variant of a model changes; along recordings also changes of forces, power, work and error.
 
 use std::sync::Arc;
 
-use modelmill::model::Changes;
-use modelmill::recording::Recording;
-use modelmill::variants::Variants;
-use modelmill::{Host, Model, Note};
+use modelmill::model::ModelChanges;
+use modelmill::recording::PreparedRecording;
+use modelmill::variants::VariantComparison;
+use modelmill::{Host, Model, RecordingNote};
 
 use crate::args::DiffArgs;
-use crate::failure::Outcome;
+use crate::failure::CommandOutcome;
 use crate::flags::FlagSpelling;
-use crate::terminal::progress::WithoutRemarks;
+use crate::terminal::progress::ProgressWithoutRemarks;
 use crate::{commands, terminal};
 
-/// Prints what changed between two models.
-pub(crate) fn run(host: &Host, args: &DiffArgs) -> Outcome {
+/// Prints the changes between two models, and draws both into one picture if requested.
+pub(crate) fn run(host: &Host, args: &DiffArgs) -> CommandOutcome {
     let before = commands::model(host, &args.before)?;
-    let quiet = host.clone().with_progress(Arc::new(WithoutRemarks::new()));
+    // Remarks on the second model would repeat those on the first; the listener drops them.
+    let quiet = host.clone().with_progress(Arc::new(ProgressWithoutRemarks::new()));
     let after = commands::model(&quiet, &args.after)?;
     let inputs = before.files().chain(after.files());
     if let Some(target) = args.drawing.target(inputs)? {
         args.drawing.draw(&target, &after, Some(&before))?;
     }
-    let changes = Changes::between(&before, &after);
+    // Changes of the models themselves need no recording.
+    let changes = ModelChanges::from_models(&before, &after);
     let variants = variants(args, &before, &after)?;
     if args.json {
         let mut object = changes.json(&before, &after);
@@ -39,24 +41,25 @@ pub(crate) fn run(host: &Host, args: &DiffArgs) -> Outcome {
     terminal::print(&text)
 }
 
-/// Both models along the recordings, if there are any.
-fn variants(args: &DiffArgs, before: &Model, after: &Model) -> Outcome<Option<Variants>> {
+/// Compares both models along the recordings; none without `--data`.
+fn variants(args: &DiffArgs, before: &Model, after: &Model) -> CommandOutcome<Option<VariantComparison>> {
     if args.data.is_empty() {
         return Ok(None);
     }
-    Variants::check([before, after])?;
+    VariantComparison::check([before, after])?;
     let reading = args.preparation.reading();
     let first = commands::recordings(before, &args.data, &reading)?;
     let second = commands::recordings(after, &args.data, &reading)?;
-    // What both models find odd about a recording is told once.
-    let told: Vec<&Note> = first.iter().flat_map(Recording::notes).collect();
-    for note in second.iter().flat_map(Recording::notes) {
+    // A remark on a recording that both models produce is printed once.
+    let told: Vec<&RecordingNote> = first.iter().flat_map(PreparedRecording::notes).collect();
+    for note in second.iter().flat_map(PreparedRecording::notes) {
         if !told.contains(&note) {
             terminal::remark(note);
         }
     }
+    // Both models follow the same motion, each with its own prepared recordings.
     let [first, second] = [&first, &second].map(|runs| runs.iter().collect::<Vec<_>>());
-    let variants = Variants::along([before, after], [&first, &second])?;
+    let variants = VariantComparison::along_recordings([before, after], [&first, &second])?;
     for note in &variants.notes {
         terminal::remark(note);
     }

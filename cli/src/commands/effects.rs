@@ -1,14 +1,15 @@
-//! `effects`: the library of effects, as a list or one kind in words.
+//! `effects`: the library of effects, as a list, or the description of one kind.
 
 use modelmill::Host;
 use modelmill::print::effects;
 
 use crate::args::effects::EffectsArgs;
-use crate::failure::Outcome;
+use crate::failure::CommandOutcome;
 use crate::{commands, terminal};
 
-/// Prints the kinds, or one of them.
-pub(crate) fn run(host: &Host, args: &EffectsArgs) -> Outcome {
+/// Prints all kinds as a table, or one kind with its equation and parameters.
+pub(crate) fn run(host: &Host, args: &EffectsArgs) -> CommandOutcome {
+    // A model file can define kinds in addition to those of the libraries.
     let mut kinds = match &args.model {
         Some(path) => commands::load(host, path)?.kinds,
         None => host.kinds()?,
@@ -16,18 +17,15 @@ pub(crate) fn run(host: &Host, args: &EffectsArgs) -> Outcome {
     if let Some(name) = &args.kind {
         let kind = effects::kind(&kinds, name)?.clone();
         if !args.json {
-            return terminal::print(&effects::explained(&kind, terminal::style()));
+            return terminal::print(&effects::kind_text(&kind, terminal::style()));
         }
         kinds = vec![kind];
     }
     if args.json {
         return terminal::print_json(&effects::json(&kinds));
     }
-    let mut lines = effects::listed(&kinds);
+    let mut lines = effects::kind_table(&kinds);
     lines.push(String::new());
-    lines.push(
-        "`modelmill effects KIND` explains one; `modelmill add MODEL KIND --at PLACE` adds it."
-            .to_owned(),
-    );
+    lines.push("`modelmill effects KIND` explains one; `modelmill add MODEL KIND --at PLACE` adds it.".to_owned());
     terminal::print(&lines.join("\n"))
 }

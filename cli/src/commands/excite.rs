@@ -1,33 +1,32 @@
-//! `excite`: the periodic trajectory that tells the base parameters apart best, eq. (14), (15) and (17), or that tells an
-//! effect from what it may be taken for.
+//! `excite`: searches for the periodic trajectory that determines the base parameters best, eq. (14), (15) and (17), or
+//! that distinguishes an effect from its alternatives.
 
 use std::path::PathBuf;
 
 use modelmill::Host;
-use modelmill::excite::{Criterion, Options, Request};
+use modelmill::excite::{ExcitationCriterion, ExcitationRequest, Options};
 use modelmill::text::table::count;
 
 use crate::args::{CriterionArg, ExciteArgs};
-use crate::failure::{Failure, Outcome};
+use crate::failure::{CommandFailure, CommandOutcome};
 use crate::flags::FlagSpelling;
-use crate::output::Target;
+use crate::output::OutputFile;
 use crate::{commands, terminal};
 
-/// Searches, and writes the trajectory and its picture.
-pub(crate) fn run(host: &Host, args: &ExciteArgs) -> Outcome {
-    let model = args
-        .parameters
-        .in_model(host, commands::model(host, &args.model)?)?;
-    let target = Target::new(&args.out, model.files())?;
-    let figure = Target::new(&figure_path(args), model.files())?;
+/// Searches for the trajectory, and writes it (CSV) and its picture (SVG).
+pub(crate) fn run(host: &Host, args: &ExciteArgs) -> CommandOutcome {
+    let model = args.parameters.apply_to(host, commands::model(host, &args.model)?)?;
+    let target = OutputFile::new(&args.out, model.files())?;
+    let figure = OutputFile::new(&figure_path(args), model.files())?;
     if figure.path() == target.path() {
-        return Err(Failure::Usage(
-            "--out and --figure name the same file; the trajectory is CSV, the picture SVG"
-                .to_owned(),
+        return Err(CommandFailure::Usage(
+            "--out and --figure name the same file; the trajectory is CSV, the picture SVG".to_owned(),
         ));
     }
+    // Recordings are needed only for --separate, to estimate effect and noise.
     let data = commands::recordings(&model, &args.separate.data, &args.separate.reading())?;
     let found = model.excite(&args.request(), &data.iter().collect::<Vec<_>>())?;
+    // Files are written before the text, so that they exist even if standard output is closed.
     target.write(&found.csv())?;
     figure.write(&found.picture)?;
     if args.json {
@@ -44,22 +43,21 @@ pub(crate) fn run(host: &Host, args: &ExciteArgs) -> Outcome {
     Ok(())
 }
 
-/// Where the picture goes: beside the trajectory if nothing is said.
+/// Path of the picture: `--figure`, or the path of the trajectory with the ending `.svg`.
 fn figure_path(args: &ExciteArgs) -> PathBuf {
-    args.figure
-        .clone()
-        .unwrap_or_else(|| args.out.with_extension("svg"))
+    args.figure.clone().unwrap_or_else(|| args.out.with_extension("svg"))
 }
 
 impl ExciteArgs {
-    fn request(&self) -> Request {
-        Request {
+    /// The same as a request of the library.
+    fn request(&self) -> ExcitationRequest {
+        ExcitationRequest {
             options: Options {
                 harmonics: self.harmonics,
                 period: self.period,
                 criterion: match self.criterion {
-                    CriterionArg::Condition => Criterion::Condition,
-                    CriterionArg::LogDet => Criterion::LogDet,
+                    CriterionArg::Condition => ExcitationCriterion::Condition,
+                    CriterionArg::LogDet => ExcitationCriterion::LogDet,
                 },
                 random: self.random,
                 starts: self.starts,
@@ -68,7 +66,7 @@ impl ExciteArgs {
             },
             rate: self.rate,
             limits: self.limits.clone(),
-            separate: self.separate.asked(),
+            separate: self.separate.separation_request(),
         }
     }
 }

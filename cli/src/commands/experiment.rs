@@ -1,10 +1,10 @@
-//! `experiment`: the paper's experiment on the bundled rig, as one page.
+//! `experiment`: reproduces the paper's experiment on the bundled rig and writes one page.
 
 use modelmill::Host;
-use modelmill_paper_experiment::{Experiment, Request};
+use modelmill_paper_experiment::{ExperimentRequest, PaperExperiment};
 
 use crate::args::ExperimentArgs;
-use crate::failure::Outcome;
+use crate::failure::CommandOutcome;
 use crate::output;
 use crate::terminal;
 
@@ -12,11 +12,12 @@ use crate::terminal;
 const PAGE: &str = "experiment.html";
 
 /// Runs the experiment and writes the page.
-pub(crate) fn run(host: &Host, args: &ExperimentArgs) -> Outcome {
+pub(crate) fn run(host: &Host, args: &ExperimentArgs) -> CommandOutcome {
     output::make_folder(&args.out)?;
-    let experiment = Experiment::new(
+    // Excitation, simulation, identification and comparison run here; this takes most of the time.
+    let experiment = PaperExperiment::new(
         host,
-        &Request {
+        &ExperimentRequest {
             random: args.random,
             starts: args.starts,
             seed: args.seed,

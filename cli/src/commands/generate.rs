@@ -1,64 +1,65 @@
-//! `generate`: the model as Rust source, or as a crate that brings it to C or Python.
+//! `generate`: writes the model as Rust source, as C99 sources, or as a crate that builds a C library or a Python
+//! module.
 
 use std::path::Path;
 
 use modelmill::Host;
-use modelmill::files::{Disk, Files};
-use modelmill::generate::{Code, EmittedFile, Language, LanguageForm};
+use modelmill::files::{DiskFiles, FileSource};
+use modelmill::generate::{CodeLanguage, CodeOptions, EmittedFile, LanguageForm};
 use modelmill::text::table::count;
 
 use crate::args::GenerateArgs;
-use crate::failure::{Failure, Outcome};
-use crate::output::{Target, refuse_dash, write};
+use crate::failure::{CommandFailure, CommandOutcome};
+use crate::output::{OutputFile, refuse_dash, write};
 use crate::{commands, terminal};
 
-/// Writes the source that `cargo build` makes of the model, or the folder of a crate.
-pub(crate) fn run(host: &Host, args: &GenerateArgs) -> Outcome {
-    let more = [
-        ("--reactions", args.reactions),
-        ("--self-test", args.self_test),
-    ];
+/// Writes the source that `cargo build` generates from the model, or a folder of sources, or a crate.
+pub(crate) fn run(host: &Host, args: &GenerateArgs) -> CommandOutcome {
+    let more = [("--reactions", args.reactions), ("--self-test", args.self_test)];
+    // Some parts of the code exist for Rust only.
     if let Some((flag, _)) = more.iter().find(|(_, asked)| *asked)
         && !args.language.has_all()
     {
-        let able = Language::all().filter(|language| language.has_all());
-        let able: Vec<&str> = able.map(Language::name).collect();
-        return Err(Failure::Usage(format!(
-            "{flag} goes with --language {} only; leave it out, or leave --language out",
+        let able = CodeLanguage::all().filter(|language| language.has_all());
+        let able: Vec<&str> = able.map(CodeLanguage::name).collect();
+        return Err(CommandFailure::Usage(format!(
+            "{flag} is available with --language {} only; remove it, or remove --language",
             able.join(" and ")
         )));
     }
     let model = commands::model(host, &args.model)?;
     let form = args.language.form();
     let target = match (&args.out, form) {
-        (Some(path), LanguageForm::Module) => Some(Target::new(path, model.files())?),
+        (Some(path), LanguageForm::Module) => Some(OutputFile::new(path, model.files())?),
         _ => None,
     };
-    let files = model.generate(&Code {
+    // The library returns files as texts; this command only decides where they go.
+    let files = model.generate(&CodeOptions {
         language: args.language,
         dynamics: args.dynamics,
         reactions: args.reactions,
         self_test: args.self_test,
     })?;
+    // A module goes to a file or to standard output, sources and crates go to a folder.
     let makes = match form {
-        LanguageForm::Module => return module(target.as_ref(), &files),
+        LanguageForm::Module => return write_module(target.as_ref(), &files),
         LanguageForm::Sources => {
-            return sources(args, &model.files().collect::<Vec<&Path>>(), &files);
+            return write_sources(args, &model.files().collect::<Vec<&Path>>(), &files);
         }
         LanguageForm::Crate { makes } => makes,
     };
     let Some(folder) = &args.out else {
-        return Err(Failure::Usage(
-            "--out names the folder of the crate".to_owned(),
+        return Err(CommandFailure::Usage(
+            "--out is missing; give the folder of the crate".to_owned(),
         ));
     };
     write_crate(folder, &files)?;
-    terminal::note(&format!("{}: a crate that makes {makes}", folder.display()));
+    terminal::note(&format!("{}: a crate that builds {makes}", folder.display()));
     Ok(())
 }
 
-/// Writes or prints the one module.
-fn module(target: Option<&Target>, files: &[EmittedFile]) -> Outcome {
+/// Writes the module to the target, or prints it.
+fn write_module(target: Option<&OutputFile>, files: &[EmittedFile]) -> CommandOutcome {
     for file in files {
         let Some(target) = target else {
             return terminal::print(&file.text);
@@ -74,22 +75,18 @@ fn module(target: Option<&Target>, files: &[EmittedFile]) -> Outcome {
     Ok(())
 }
 
-/// Writes source files into a folder.
-fn sources(args: &GenerateArgs, inputs: &[&Path], files: &[EmittedFile]) -> Outcome {
+/// Writes source files into the folder of `--out`; refuses to write over `inputs`.
+fn write_sources(args: &GenerateArgs, inputs: &[&Path], files: &[EmittedFile]) -> CommandOutcome {
     let Some(folder) = &args.out else {
-        return Err(Failure::Usage(
-            "--out names the folder of the sources".to_owned(),
+        return Err(CommandFailure::Usage(
+            "--out is missing; give the folder of the sources".to_owned(),
         ));
     };
     refuse_dash("--out", folder)?;
-    std::fs::create_dir_all(folder).map_err(|error| {
-        Failure::Input(format!(
-            "folder {} cannot be made: {error}",
-            folder.display()
-        ))
-    })?;
+    std::fs::create_dir_all(folder)
+        .map_err(|error| CommandFailure::Input(format!("folder {} cannot be created: {error}", folder.display())))?;
     for file in files {
-        Target::new(&folder.join(&file.path), inputs.iter().copied())?.write(&file.text)?;
+        OutputFile::new(&folder.join(&file.path), inputs.iter().copied())?.write(&file.text)?;
     }
     let names = files.iter().map(|file| file.path.as_str());
     terminal::note(&format!(
@@ -100,32 +97,30 @@ fn sources(args: &GenerateArgs, inputs: &[&Path], files: &[EmittedFile]) -> Outc
     Ok(())
 }
 
-/// The first line of a manifest that this program wrote.
-const OURS: &str = "# Written by modelmill.";
+/// The first line of each manifest that this program writes; it marks a folder that may be written over.
+const MANIFEST_HEADER: &str = "# Written by modelmill.";
 
-/// Writes a crate; only over a crate of the same kind.
-fn write_crate(folder: &Path, files: &[EmittedFile]) -> Outcome {
+/// Writes a crate. A folder with other contents than an earlier crate of this program is refused.
+fn write_crate(folder: &Path, files: &[EmittedFile]) -> CommandOutcome {
     refuse_dash("--out", folder)?;
     let manifest = folder.join("Cargo.toml");
-    let ours = Disk::default()
+    let ours = DiskFiles::default()
         .read_text(&manifest, 1 << 20)
-        .is_ok_and(|text| text.starts_with(OURS));
-    let occupied = folder.is_file()
-        || std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
+        .is_ok_and(|text| text.starts_with(MANIFEST_HEADER));
+    // A new or empty folder is accepted, and one with a manifest of this program.
+    let occupied = folder.is_file() || std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
     if occupied && !ours {
-        return Err(Failure::Usage(format!(
-            "--out {}: something else is there; give the name of a new folder",
+        return Err(CommandFailure::Usage(format!(
+            "--out {}: the folder has files that modelmill did not write; give the name of a new folder",
             folder.display()
         )));
     }
+    // Files of a crate may be in subfolders, which are created as needed.
     for file in files {
         let path = folder.join(&file.path);
         let parent = path.parent().unwrap_or(folder);
         std::fs::create_dir_all(parent).map_err(|error| {
-            Failure::Input(format!(
-                "folder {} cannot be made: {error}",
-                parent.display()
-            ))
+            CommandFailure::Input(format!("folder {} cannot be created: {error}", parent.display()))
         })?;
         write(&path, &file.text)?;
     }

@@ -1,52 +1,50 @@
-//! `identify`: base parameters from recordings by least squares.
+//! `identify`: estimates base parameters from recordings by least squares.
 
 use std::path::{Path, PathBuf};
 
 use modelmill::Host;
 use modelmill::identify::Instruments;
-use modelmill::recording::{Reading, Recording};
+use modelmill::recording::{PreparedRecording, RecordingOptions};
 
 use crate::args::IdentifyArgs;
-use crate::failure::{Failure, Outcome};
+use crate::failure::{CommandFailure, CommandOutcome};
 use crate::flags::FlagSpelling;
-use crate::output::Target;
+use crate::output::OutputFile;
 use crate::{commands, terminal};
 
-/// Identifies, prints and perhaps writes the fit.
-pub(crate) fn run(host: &Host, args: &IdentifyArgs) -> Outcome {
+/// Estimates the parameters, prints the fit, and writes it to `--out` if given.
+pub(crate) fn run(host: &Host, args: &IdentifyArgs) -> CommandOutcome {
     let model = commands::model(host, &args.model)?;
+    // Instruments are files or `period=SECONDS`; only files are inputs that must not be written over.
     let files = args.estimators.instruments.iter().map(PathBuf::from);
     let instruments: Vec<PathBuf> = files.filter(|file| file.exists()).collect();
-    let inputs = model.files().chain(
-        (args.data.iter().chain(&args.check).chain(&instruments)).map(AsRef::<Path>::as_ref),
-    );
+    let inputs = model
+        .files()
+        .chain((args.data.iter().chain(&args.check).chain(&instruments)).map(AsRef::<Path>::as_ref));
     let target = args
         .out
         .as_ref()
-        .map(|path| Target::new(path, inputs))
+        .map(|path| OutputFile::new(path, inputs))
         .transpose()?;
     let reading = args.preparation.reading();
     let data = commands::recordings(&model, &args.data, &reading)?;
     let check = commands::recordings(&model, &args.check, &reading)?;
+    // The options of the estimator are separate from those for reading.
     let options = args.estimators.options(&args.standstill);
-    let reading = Reading {
+    let reading = RecordingOptions {
         columns: args.estimators.instrument_map.clone(),
         ..reading
     };
+    // Instruments from recordings are read like the data, but with columns of their own.
     let period = period(&args.estimators.instruments)?;
     let recorded = match period {
         Some(_) => Vec::new(),
         None => {
-            let files: Vec<PathBuf> = args
-                .estimators
-                .instruments
-                .iter()
-                .map(PathBuf::from)
-                .collect();
+            let files: Vec<PathBuf> = args.estimators.instruments.iter().map(PathBuf::from).collect();
             commands::recordings(&model, &files, &reading)?
         }
     };
-    let recorded: Vec<&Recording> = recorded.iter().collect();
+    let recorded: Vec<&PreparedRecording> = recorded.iter().collect();
     let instruments = match period {
         Some(period) => Instruments::Period(period),
         None if recorded.is_empty() => Instruments::None,
@@ -54,6 +52,7 @@ pub(crate) fn run(host: &Host, args: &IdentifyArgs) -> Outcome {
     };
     let [data, check] = [&data, &check].map(|all| all.iter().collect::<Vec<_>>());
     let found = model.identify_with(&data, &instruments, &check, &options)?;
+    // The file and --json have the same object.
     let object = found.json(&model, &FlagSpelling)?;
     if let Some(target) = &target {
         target.write(&format!("{object:#}\n"))?;
@@ -71,8 +70,8 @@ pub(crate) fn run(host: &Host, args: &IdentifyArgs) -> Outcome {
     Ok(())
 }
 
-/// The period of `period=SECONDS`, if that is what instruments are.
-fn period(instruments: &[String]) -> Outcome<Option<f64>> {
+/// The period in s of `--instruments period=SECONDS`; none if the instruments are recordings.
+fn period(instruments: &[String]) -> CommandOutcome<Option<f64>> {
     let [one] = instruments else {
         return Ok(None);
     };
@@ -81,7 +80,7 @@ fn period(instruments: &[String]) -> Outcome<Option<f64>> {
     };
     match seconds.parse::<f64>() {
         Ok(period) if period > 0.0 && period.is_finite() => Ok(Some(period)),
-        _ => Err(Failure::Usage(format!(
+        _ => Err(CommandFailure::Usage(format!(
             "--instruments {one}: expected seconds, as in period=7.29"
         ))),
     }

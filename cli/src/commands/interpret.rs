@@ -1,14 +1,15 @@
-//! `interpret`: physical parameters from identified base parameters, the others held at their nominal values.
+//! `interpret`: solves identified base parameters for physical parameters; the others are fixed at their nominal
+//! values.
 
 use modelmill::Host;
 
 use crate::args::InterpretArgs;
-use crate::failure::Outcome;
+use crate::failure::CommandOutcome;
 use crate::flags::FlagSpelling;
 use crate::{commands, terminal};
 
-/// Solves, and prints the solutions or what is not determined.
-pub(crate) fn run(host: &Host, args: &InterpretArgs) -> Outcome {
+/// Prints all real solutions, or which of the unknowns are not determined.
+pub(crate) fn run(host: &Host, args: &InterpretArgs) -> CommandOutcome {
     let model = commands::model(host, &args.model)?;
     let fit = host.fit(&args.fit)?;
     let found = model.interpret(&fit, &args.fit.display().to_string(), &args.unknown)?;

@@ -1,4 +1,4 @@
-//! One file per command; what they share: reading models and recordings, and asking for a diagnosis.
+//! One file per command, and the functions that they share: reading models and recordings, and running a diagnosis.
 
 pub(crate) mod add;
 pub(crate) mod adopt;
@@ -12,6 +12,7 @@ pub(crate) mod effects;
 pub(crate) mod equations;
 pub(crate) mod evaluate;
 pub(crate) mod excite;
+#[cfg(feature = "experiment")]
 pub(crate) mod experiment;
 pub(crate) mod export;
 pub(crate) mod generate;
@@ -24,28 +25,29 @@ pub(crate) mod report;
 pub(crate) mod runs;
 pub(crate) mod simulate;
 pub(crate) mod tour;
+#[cfg(feature = "workbench")]
 pub(crate) mod work;
 
 use std::path::{Path, PathBuf};
 
-use modelmill::diagnose::{Findings, Held, Question};
-use modelmill::files::{Disk, Files, Kind};
-use modelmill::model::Loaded;
-use modelmill::recording::{Reading, Recording};
+use modelmill::diagnose::{DiagnosisFindings, DiagnosisOptions, FixedParameters};
+use modelmill::files::{DiskFiles, FileSource, PathKind};
+use modelmill::model::LoadedModel;
+use modelmill::recording::{PreparedRecording, RecordingOptions};
 use modelmill::{Host, Model};
 
-use crate::args::{AskArgs, ParameterSource};
-use crate::failure::{Failure, Outcome};
+use crate::args::{DiagnosisArgs, ParameterSource};
+use crate::failure::{CommandFailure, CommandOutcome};
 use crate::flags::FlagSpelling;
 use crate::terminal;
 
 /// Reads and derives a model file; warnings go to standard error.
-pub(crate) fn model(host: &Host, path: &Path) -> Outcome<Model> {
-    derived(host, &path.display().to_string(), load(host, path)?)
+pub(crate) fn model(host: &Host, path: &Path) -> CommandOutcome<Model> {
+    derive_model(host, &path.display().to_string(), load(host, path)?)
 }
 
 /// Derives a model that was read from `path`; warnings go to standard error.
-pub(crate) fn derived(host: &Host, path: &str, loaded: Loaded) -> Outcome<Model> {
+pub(crate) fn derive_model(host: &Host, path: &str, loaded: LoadedModel) -> CommandOutcome<Model> {
     let model = host.derive(path, loaded)?;
     for note in &model.notes {
         terminal::remark(note);
@@ -54,26 +56,27 @@ pub(crate) fn derived(host: &Host, path: &str, loaded: Loaded) -> Outcome<Model>
 }
 
 /// Reads a model file; warnings go to standard error.
-pub(crate) fn load(host: &Host, path: &Path) -> Outcome<Loaded> {
+pub(crate) fn load(host: &Host, path: &Path) -> CommandOutcome<LoadedModel> {
     let loaded = load_quietly(host, path)?;
     if !loaded.warnings.is_empty() {
-        let text = loaded.render_spelled(terminal::errors_in_colour(), &FlagSpelling);
-        terminal::say(text.trim_end());
+        let text = loaded.render_spelled(terminal::is_stderr_coloured(), &FlagSpelling);
+        terminal::print_to_stderr(text.trim_end());
     }
     Ok(loaded)
 }
 
-/// Reads a model file and keeps its warnings.
-pub(crate) fn load_quietly(host: &Host, path: &Path) -> Outcome<Loaded> {
+/// Reads a model file without printing its warnings. If the path is no file, the error lists model files nearby.
+pub(crate) fn load_quietly(host: &Host, path: &Path) -> CommandOutcome<LoadedModel> {
     if path.is_dir() {
-        return Err(Failure::Input(format!(
+        return Err(CommandFailure::Input(format!(
             "{} is a folder; a model file is expected{}",
             path.display(),
-            nearby(path)
+            nearby_models_hint(path)
         )));
     }
+    // The error lists model files nearby, because a wrong folder is the usual reason.
     if !path.exists() {
-        return Err(Failure::Input(format!(
+        return Err(CommandFailure::Input(format!(
             "there is no file {}; the path of a model file (TOML) is expected{}{}",
             path.display(),
             if path == Path::new("-") {
@@ -81,7 +84,7 @@ pub(crate) fn load_quietly(host: &Host, path: &Path) -> Outcome<Loaded> {
             } else {
                 ""
             },
-            nearby(path)
+            nearby_models_hint(path)
         )));
     }
     Ok(host.load(path)?)
@@ -90,9 +93,8 @@ pub(crate) fn load_quietly(host: &Host, path: &Path) -> Outcome<Loaded> {
 /// The files of one run: a path, or several with `+` between them.
 pub(crate) fn files_of(path: &Path) -> Vec<PathBuf> {
     match path.to_str() {
-        Some(text) if text.contains('+') && !path.exists() => {
-            text.split('+').map(PathBuf::from).collect()
-        }
+        // A file whose name contains a plus is one file.
+        Some(text) if text.contains('+') && !path.exists() => text.split('+').map(PathBuf::from).collect(),
         _ => vec![path.to_owned()],
     }
 }
@@ -101,25 +103,29 @@ pub(crate) fn files_of(path: &Path) -> Vec<PathBuf> {
 pub(crate) fn recordings(
     model: &Model,
     paths: &[PathBuf],
-    reading: &Reading,
-) -> Outcome<Vec<Recording>> {
+    reading: &RecordingOptions,
+) -> CommandOutcome<Vec<PreparedRecording>> {
     let each = paths.iter();
     each.map(|path| recording(model, path, reading)).collect()
 }
 
-fn recording(model: &Model, path: &Path, reading: &Reading) -> Outcome<Recording> {
+/// Reads one run and prepares it: positions, rates, accelerations and forces.
+fn recording(model: &Model, path: &Path, reading: &RecordingOptions) -> CommandOutcome<PreparedRecording> {
     let files = files_of(path);
     let files: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
     Ok(model.recording_of(&files, reading)?)
 }
 
-/// Diagnoses what the command line names.
-pub(crate) fn diagnose(host: &Host, args: &AskArgs, question: Question) -> Outcome<Findings> {
-    let model = args
-        .parameters
-        .in_model(host, self::model(host, &args.model)?)?;
+/// Runs the diagnosis of the command line: reads model and recordings, then searches for missing effects.
+pub(crate) fn diagnose(
+    host: &Host,
+    args: &DiagnosisArgs,
+    question: DiagnosisOptions,
+) -> CommandOutcome<DiagnosisFindings> {
+    let model = args.parameters.apply_to(host, self::model(host, &args.model)?)?;
     let reading = args.preparation.reading();
-    let read = |paths: &[PathBuf]| -> Outcome<Vec<Recording>> {
+    // Reads recordings and prepares them for a diagnosis.
+    let read = |paths: &[PathBuf]| -> CommandOutcome<Vec<PreparedRecording>> {
         let each = paths.iter().map(|path| {
             let read = recording(&model, path, &reading)?;
             Ok(read.for_diagnosis(&model)?)
@@ -131,31 +137,28 @@ pub(crate) fn diagnose(host: &Host, args: &AskArgs, question: Question) -> Outco
     Ok(model.diagnose(&fit, &check, &question)?)
 }
 
-impl AskArgs {
-    /// Which parameters are held: with those of a fit, what is different from then is asked for, and free ones would take it up.
-    pub(crate) fn held(&self) -> Held {
+impl DiagnosisArgs {
+    /// Which parameters are fixed. With the values of a fit all are: the question is what changed since the fit, and
+    /// estimated parameters would absorb the change.
+    pub(crate) fn fixed_parameters(&self) -> FixedParameters {
         let is_fit = matches!(self.parameters, ParameterSource::Fit(_));
         if self.held || is_fit {
-            Held::All
+            FixedParameters::All
         } else {
-            Held::Known
+            FixedParameters::Known
         }
     }
 }
 
-/// Model files around a path that led nowhere, as a sentence for the end of a message.
-fn nearby(path: &Path) -> String {
+/// Model files near a path that is no model file, as a clause for the end of a message.
+fn nearby_models_hint(path: &Path) -> String {
     let own = if path.is_dir() {
         path
     } else {
         path.parent().unwrap_or(Path::new(""))
     };
-    let folders = [
-        own,
-        Path::new("models"),
-        Path::new("model-spec/models"),
-        Path::new(""),
-    ];
+    // The folder of the path first, then the usual folders of a project, then the current one.
+    let folders = [own, Path::new("models"), Path::new("model-spec/models"), Path::new("")];
     for folder in folders {
         let here = if folder.as_os_str().is_empty() {
             Path::new(".")
@@ -174,6 +177,7 @@ fn nearby(path: &Path) -> String {
             continue;
         }
         found.sort();
+        // A long list is cut off.
         let more = found.len().saturating_sub(24);
         found.truncate(24);
         let more = if more > 0 {
@@ -183,14 +187,14 @@ fn nearby(path: &Path) -> String {
         };
         return format!("; model files nearby:\n  {}{more}", found.join("\n  "));
     }
-    "; `modelmill tour` shows what a model file gives".to_owned()
+    "; `modelmill tour` shows an example".to_owned()
 }
 
-/// Whether a file looks like a model: TOML with a line that gives the version of the schema.
+/// Whether a file looks like a model: TOML with a line `schema = ...`.
 fn is_model(path: &Path) -> bool {
-    let disk = Disk::default();
+    let disk = DiskFiles::default();
     path.extension().is_some_and(|e| e == "toml")
-        && disk.kind(path) == Kind::File
+        && disk.kind(path) == PathKind::File
         && disk.read_text(path, 1 << 20).is_ok_and(|text| {
             text.lines()
                 .filter_map(|line| line.split_once('='))

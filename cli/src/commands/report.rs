@@ -1,38 +1,36 @@
-//! `report`: what a model lacks, as one self-contained page.
+//! `report`: writes a diagnosis as one self-contained page.
 
 use std::path::PathBuf;
 
 use modelmill::Host;
-use modelmill::diagnose::{Question, words};
+use modelmill::diagnose::{DiagnosisOptions, words};
 use modelmill::report::page;
 
 use crate::args::ReportArgs;
 use crate::commands;
-use crate::failure::Outcome;
+use crate::failure::CommandOutcome;
 use crate::flags::CommandLineSpelling;
-use crate::output::{self, Target};
+use crate::output::{self, OutputFile};
 use crate::terminal;
 
 /// Name of the page in its folder.
 pub(crate) const PAGE: &str = "report.html";
 
-/// Diagnoses and writes the page.
-pub(crate) fn run(host: &Host, args: &ReportArgs) -> Outcome {
+/// Runs the diagnosis, writes the page and prints the verdict.
+pub(crate) fn run(host: &Host, args: &ReportArgs) -> CommandOutcome {
     output::make_folder(&args.out)?;
     let path = args.out.join(PAGE);
-    let ask = &args.ask;
+    let ask = &args.diagnosis;
+    // The page must not be written over an input.
     let inputs = [&ask.model].into_iter().chain(&ask.data).chain(&ask.check);
-    let target = Target::new(&path, inputs.map(PathBuf::as_path))?;
-    let question = Question {
-        held: args.ask.held(),
-        again_with_nominal: false,
+    let target = OutputFile::new(&path, inputs.map(PathBuf::as_path))?;
+    let question = DiagnosisOptions {
+        fixed: args.diagnosis.fixed_parameters(),
+        repeat_with_nominal: false,
     };
-    let findings = commands::diagnose(host, &args.ask, question)?;
-    target.write(&page(
-        &findings,
-        &CommandLineSpelling::from_args(&args.ask),
-    )?)?;
-    let says = words::verdict(&findings.diagnosis, findings.channels(), findings.judged);
+    let findings = commands::diagnose(host, &args.diagnosis, question)?;
+    target.write(&page(&findings, &CommandLineSpelling::from_args(&args.diagnosis))?)?;
+    let says = words::verdict(&findings.diagnosis, findings.channels(), findings.validation);
     terminal::print(&format!(
         "{}\n\nThe page is {}.",
         words::lines(&says, 100).join("\n"),

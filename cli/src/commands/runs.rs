@@ -1,61 +1,59 @@
-//! `runs`: what changed between recordings of one machine.
+//! `runs`: reports what changed between recordings of one machine.
 
 use std::path::{Path, PathBuf};
 
 use modelmill::Host;
-use modelmill::recording::has_ending_of_a_recording;
+use modelmill::recording::has_recording_extension;
 use modelmill::report::runs_page;
-use modelmill::runs::Unread;
+use modelmill::runs::UnreadRun;
 
 use crate::args::runs::RunsArgs;
-use crate::failure::{Failure, Outcome};
+use crate::failure::{CommandFailure, CommandOutcome};
 use crate::flags::FlagSpelling;
-use crate::output::{self, Target};
+use crate::output::{self, OutputFile};
 use crate::{commands, terminal};
 
 /// Name of the page in its folder.
 const PAGE: &str = "runs.html";
 
-/// What is written to a file.
-enum Form {
+/// Format of the file of `--out`.
+enum RunsFileFormat {
+    /// The page `runs.html` in a folder.
     Page,
+    /// All results as one JSON object.
     Json,
 }
 
-/// Prints what changed against the first run, and over all of them.
-pub(crate) fn run(host: &Host, args: &RunsArgs) -> Outcome {
-    let data = expanded(&args.data)?;
+/// Prints the changes relative to the first run and over all runs, and writes page or JSON if requested.
+pub(crate) fn run(host: &Host, args: &RunsArgs) -> CommandOutcome {
+    let data = expand_paths(&args.data)?;
     let inputs = || [&args.model].into_iter().chain(&data).map(PathBuf::as_path);
+    // The ending of --out decides between JSON and a page; the target is checked before the long computation.
     let written = match &args.out {
-        Some(out)
-            if out
-                .extension()
-                .is_some_and(|e| e.eq_ignore_ascii_case("json")) =>
-        {
-            Some((Target::new(out, inputs())?, Form::Json))
+        Some(out) if out.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) => {
+            Some((OutputFile::new(out, inputs())?, RunsFileFormat::Json))
         }
         Some(out) => {
             output::make_folder(out)?;
-            Some((Target::new(&out.join(PAGE), inputs())?, Form::Page))
+            Some((OutputFile::new(&out.join(PAGE), inputs())?, RunsFileFormat::Page))
         }
         None => None,
     };
     let model = commands::model(host, &args.model)?;
     let reading = args.preparation.reading();
+    // A run that cannot be read is passed on with its error; the library decides whether the others are sufficient.
     let recordings = data.iter().map(|path| {
         let files = commands::files_of(path);
         let files: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
-        model
-            .recording_of(&files, &reading)
-            .map_err(|error| Unread {
-                file: path.display().to_string(),
-                error,
-            })
+        model.recording_of(&files, &reading).map_err(|error| UnreadRun {
+            file: path.display().to_string(),
+            error,
+        })
     });
-    let found = model.runs(recordings, &args.asked())?;
+    let found = model.runs(recordings, &args.runs_options())?;
     match &written {
-        Some((target, Form::Page)) => target.write(&runs_page(&found, &FlagSpelling))?,
-        Some((target, Form::Json)) => {
+        Some((target, RunsFileFormat::Page)) => target.write(&runs_page(&found, &FlagSpelling))?,
+        Some((target, RunsFileFormat::Json)) => {
             target.write(&format!("{:#}\n", found.json(&FlagSpelling)))?;
         }
         None => {}
@@ -70,51 +68,49 @@ pub(crate) fn run(host: &Host, args: &RunsArgs) -> Outcome {
     }
 }
 
-/// Folders and patterns become the recordings in them, in the order of their names, in which numbers count as such.
-fn expanded(paths: &[PathBuf]) -> Outcome<Vec<PathBuf>> {
+/// Replaces folders and patterns by the recordings in them, in the order of [`natural_sort_key`].
+/// Fails if a folder or a pattern has no recording.
+fn expand_paths(paths: &[PathBuf]) -> CommandOutcome<Vec<PathBuf>> {
     let mut all = Vec::new();
     for path in paths {
         let text = path.to_string_lossy();
+        // A folder gives its files with the ending of a recording, a pattern gives all files that match.
         let mut found: Vec<PathBuf> = if path.is_dir() {
-            let entries = std::fs::read_dir(path).map_err(|error| {
-                Failure::Input(format!("the folder {text} cannot be read: {error}"))
-            })?;
+            let entries = std::fs::read_dir(path)
+                .map_err(|error| CommandFailure::Input(format!("the folder {text} cannot be read: {error}")))?;
             let files = entries.flatten().map(|entry| entry.path());
             files
-                .filter(|file| file.is_file() && has_ending_of_a_recording(file))
+                .filter(|file| file.is_file() && has_recording_extension(file))
                 .collect()
         } else if text.contains(['*', '?']) && !path.exists() {
-            let matching = glob::glob(&text)
-                .map_err(|error| Failure::Input(format!("--data {text}: {}", error.msg)))?;
+            let matching =
+                glob::glob(&text).map_err(|error| CommandFailure::Input(format!("--data {text}: {}", error.msg)))?;
             matching.flatten().filter(|file| file.is_file()).collect()
         } else {
             all.push(path.clone());
             continue;
         };
         if found.is_empty() {
-            return Err(Failure::Input(format!(
-                "--data {text}: there is no recording; a folder is searched for files whose names end as those of recordings do \
-                 (.csv, .parquet, .mat, .h5, .mcap, .db3, .gz, .zst), a pattern for files of any name"
+            return Err(CommandFailure::Input(format!(
+                "--data {text}: no recording was found; from a folder, files that end in .csv, .parquet, .mat, .h5, .mcap, .db3, \
+                 .gz or .zst are read; a pattern with * or ? matches files of any name"
             )));
         }
-        found.sort_by_cached_key(|file| in_order(&file.to_string_lossy()));
+        found.sort_by_cached_key(|file| natural_sort_key(&file.to_string_lossy()));
         all.extend(found);
     }
     Ok(all)
 }
 
 /// A name as pieces of text and numbers: `run9` comes before `run10`.
-fn in_order(name: &str) -> Vec<(String, u64)> {
+fn natural_sort_key(name: &str) -> Vec<(String, u64)> {
     let mut pieces = Vec::new();
     let mut rest = name;
     while !rest.is_empty() {
-        let text = rest
-            .find(|c: char| c.is_ascii_digit())
-            .unwrap_or(rest.len());
+        // Each piece is a text without digits and the number after it.
+        let text = rest.find(|c: char| c.is_ascii_digit()).unwrap_or(rest.len());
         let (before, after) = rest.split_at(text);
-        let digits = after
-            .find(|c: char| !c.is_ascii_digit())
-            .unwrap_or(after.len());
+        let digits = after.find(|c: char| !c.is_ascii_digit()).unwrap_or(after.len());
         let (number, left) = after.split_at(digits);
         // Digits that are too many for a number stay in the order of their text.
         let value = number.parse().unwrap_or(u64::MAX);
@@ -126,15 +122,12 @@ fn in_order(name: &str) -> Vec<(String, u64)> {
 
 #[cfg(test)]
 mod tests {
-    use super::in_order;
+    use super::natural_sort_key;
 
     #[test]
     fn numbers_in_names_count_as_numbers() {
         let mut names = ["run10.csv", "run9.csv", "run9a.csv", "a.csv", "run010.csv"];
-        names.sort_by_cached_key(|name| in_order(name));
-        assert_eq!(
-            names,
-            ["a.csv", "run9.csv", "run9a.csv", "run10.csv", "run010.csv"]
-        );
+        names.sort_by_cached_key(|name| natural_sort_key(name));
+        assert_eq!(names, ["a.csv", "run9.csv", "run9a.csv", "run10.csv", "run010.csv"]);
     }
 }

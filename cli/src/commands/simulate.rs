@@ -1,4 +1,4 @@
-//! `simulate`: a rig driven along a trajectory, as a recording.
+//! `simulate`: simulates a rig along a trajectory and writes the recording of its sensors.
 
 use std::path::Path;
 
@@ -7,16 +7,17 @@ use modelmill::text::table::count;
 use serde_json::json;
 
 use crate::args::SimulateArgs;
-use crate::failure::Outcome;
-use crate::output::Target;
+use crate::failure::CommandOutcome;
+use crate::output::OutputFile;
 use crate::terminal;
 
 /// Writes `t`, the coordinates and one column per drive.
-pub(crate) fn run(host: &Host, args: &SimulateArgs) -> Outcome {
+pub(crate) fn run(host: &Host, args: &SimulateArgs) -> CommandOutcome {
     let loaded = host.rig(&args.rig)?;
     let mut inputs: Vec<&Path> = loaded.sources.paths().collect();
     inputs.push(&args.trajectory);
-    let target = Target::new(&args.out, inputs)?;
+    let target = OutputFile::new(&args.out, inputs)?;
+    // The seed of the rig file is used without --seed.
     let made = host.simulate(&args.rig, &args.trajectory, &args.map, args.seed)?;
     target.write(&made.csv())?;
     if args.json {

@@ -4,40 +4,42 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use modelmill::diagnose::Separation;
+use modelmill::diagnose::SeparationProposal;
 use modelmill::edit::NewEffect;
-use modelmill::files::Kind;
+use modelmill::files::PathKind;
 use modelmill::print::{CommandName, OptionSetting, RemedySpelling, StepSpelling};
 use modelmill::{Host, Model};
-use modelmill_workbench::{Commands, Excitation, Options, Step, serve};
+use modelmill_workbench::{ExcitationSettings, Options, WorkbenchCommands, WorkbenchStep, serve};
 use serde_json::json;
 
 use crate::args::work::WorkArgs;
 use crate::commands;
-use crate::failure::{Failure, Outcome};
-use crate::flags::{CommandLineSpelling, libraries, quoted};
+use crate::failure::{CommandFailure, CommandOutcome};
+use crate::flags::{CommandLineSpelling, library_flags, quote_word};
 use crate::terminal;
 
 /// Serves the page until the program is stopped.
-pub(crate) fn run(host: &Host, args: &WorkArgs) -> Outcome {
+pub(crate) fn run(host: &Host, args: &WorkArgs) -> CommandOutcome {
     if !args.model.is_file() {
-        // This says what is wrong with the path, and which models are near.
+        // The error of this call has the reason and lists model files nearby.
         commands::load_quietly(host, &args.model)?;
     }
     if let Some(beside) = &args.beside {
         commands::load_quietly(host, beside)?;
     }
-    let files = |paths: &[PathBuf]| -> Outcome<Vec<Vec<PathBuf>>> {
+    // Each run is a list of files to join on time; all must exist before the server starts.
+    let files = |paths: &[PathBuf]| -> CommandOutcome<Vec<Vec<PathBuf>>> {
         let runs = paths.iter().map(|path| commands::files_of(path));
         let is_there = |file: &PathBuf| {
+            // Recordings are read again after each edit, so pipes and devices cannot be used.
             let says = match host.files().kind(file) {
-                Kind::File | Kind::Folder => return Ok(()),
-                Kind::Missing => "there is no such file; the path of a recording is expected",
-                Kind::Stream | Kind::Device => {
-                    "this is no file on a disk; recordings are read again after each edit, so write it to a file first"
+                PathKind::File | PathKind::Folder => return Ok(()),
+                PathKind::Missing => "there is no such file; the path of a recording is expected",
+                PathKind::Stream | PathKind::Device => {
+                    "this is not a file on a disk; recordings are read again after each edit, so write it to a file first"
                 }
             };
-            Err(Failure::Input(format!("{}: {says}", file.display())))
+            Err(CommandFailure::Input(format!("{}: {says}", file.display())))
         };
         runs.map(|files| files.iter().try_for_each(is_there).map(|()| files))
             .collect()
@@ -51,58 +53,63 @@ pub(crate) fn run(host: &Host, args: &WorkArgs) -> Outcome {
         port: args.port,
         first: 0,
     };
-    let spelled = Spelled::new(host, args);
+    let spelled = WorkbenchAdvice::new(host, args);
     serve(host, options, Arc::new(spelled), |link| {
-        // Who does not read standard output has the link from nowhere else, but may still ask for it by port and token.
+        // If standard output is closed, the server continues: a browser that has the link can still use it.
         let _ = if args.json {
             terminal::print_json(&json!({ "url": link }))
         } else {
-            terminal::print(&format!(
-                "The workbench is open:\n  {link}\nCtrl+C ends it."
-            ))
+            terminal::print(&format!("The workbench is open:\n  {link}\nPress Ctrl+C to stop it."))
         };
     })?;
     Ok(())
 }
 
-/// The workbench's steps as command lines.
-struct Spelled {
+/// Spells the steps of the workbench as command lines. All fields are quoted for a shell; flags begin with a space.
+struct WorkbenchAdvice {
+    /// Spelling of the advice of a diagnosis.
     flags: CommandLineSpelling,
+    /// Path of the model file.
     model: String,
+    /// Flags `--data`.
     data: String,
+    /// Flags `--check`.
     check: String,
-    /// The recordings of both as data, where all count alike.
+    /// Recordings of `--data` and `--check`, all as `--data`.
     all: String,
-    /// How recordings are read.
+    /// Flags for reading and preparing recordings.
     reading: String,
-    /// How models are read.
+    /// Flags for reading models.
     libraries: String,
 }
 
-impl Spelled {
+impl WorkbenchAdvice {
+    /// Takes the flags from the arguments of `work`, so that each command reads the same recordings in the same way.
     fn new(host: &Host, args: &WorkArgs) -> Self {
         let named = |option: &str, paths: &[PathBuf]| -> String {
-            let path = |path: &PathBuf| format!(" --{option} {}", name(path));
+            let path = |path: &PathBuf| format!(" --{option} {}", quoted_path(path));
             paths.iter().map(path).collect()
         };
         Self {
             flags: CommandLineSpelling::new(&args.data, &args.check, &args.preparation.reading()),
-            model: name(&args.model),
+            model: quoted_path(&args.model),
             data: named("data", &args.data),
             check: named("check", &args.check),
             all: named("data", &[&*args.data, &*args.check].concat()),
-            reading: args.preparation.spelled(),
-            libraries: libraries(host),
+            reading: args.preparation.to_flags(),
+            libraries: library_flags(host),
         }
     }
 }
 
-fn name(path: &Path) -> String {
-    quoted(&path.display().to_string())
+/// A path, quoted for a shell.
+fn quoted_path(path: &Path) -> String {
+    quote_word(&path.display().to_string())
 }
 
-impl Commands for Spelled {
-    fn same(&self, step: Step) -> Option<String> {
+impl WorkbenchCommands for WorkbenchAdvice {
+    /// The command of a pane, on the recordings of the workbench.
+    fn step_command(&self, step: WorkbenchStep) -> Option<String> {
         let Self {
             model,
             data,
@@ -112,21 +119,26 @@ impl Commands for Spelled {
             ..
         } = self;
         Some(match step {
-            Step::Picture => format!("modelmill check {model} --picture picture.svg{libraries}"),
-            Step::Equations => {
+            WorkbenchStep::Picture => {
+                format!("modelmill check {model} --picture picture.svg{libraries}")
+            }
+            WorkbenchStep::Equations => {
                 format!("modelmill equations {model} --format html --out equations.html{libraries}")
             }
-            Step::Compare => format!("modelmill compare {model}{data}{reading}{libraries}"),
-            Step::Identify => {
+            WorkbenchStep::Compare => {
+                format!("modelmill compare {model}{data}{reading}{libraries}")
+            }
+            WorkbenchStep::Identify => {
                 format!("modelmill identify {model}{data}{check}{reading}{libraries}")
             }
-            Step::Diagnose => {
+            WorkbenchStep::Diagnose => {
                 format!("modelmill diagnose {model}{data}{check}{reading}{libraries}")
             }
         })
     }
 
-    fn variant(&self, before: &Path) -> Option<String> {
+    /// `modelmill diff`; all recordings are given as --data, because both models only follow their motion.
+    fn variant_command(&self, before: &Path) -> Option<String> {
         let Self {
             model,
             all,
@@ -134,44 +146,41 @@ impl Commands for Spelled {
             libraries,
             ..
         } = self;
-        let before = name(before);
-        Some(format!(
-            "modelmill diff {before} {model}{all}{reading}{libraries}"
-        ))
+        let before = quoted_path(before);
+        Some(format!("modelmill diff {before} {model}{all}{reading}{libraries}"))
     }
 
-    fn excite(&self, asked: &Excitation) -> Option<String> {
-        let usual = Excitation::default();
+    /// `modelmill excite` with the settings of the page.
+    fn excite_command(&self, asked: &ExcitationSettings) -> Option<String> {
+        let usual = ExcitationSettings::default();
         let mut words = format!("modelmill excite {}", self.model);
+        // Name, value, and default of each setting.
         let options = [
-            (
-                "harmonics",
-                asked.harmonics.to_string(),
-                usual.harmonics.to_string(),
-            ),
+            ("harmonics", asked.harmonics.to_string(), usual.harmonics.to_string()),
             ("period", asked.period.to_string(), usual.period.to_string()),
             ("random", asked.random.to_string(), usual.random.to_string()),
             ("starts", asked.starts.to_string(), usual.starts.to_string()),
             ("seed", asked.seed.to_string(), usual.seed.to_string()),
             ("rate", asked.rate.to_string(), usual.rate.to_string()),
         ];
+        // Only settings that differ from their defaults become flags.
         for (name, value, usual) in options {
             if value != usual {
                 let _ = write!(words, " --{name} {value}");
             }
         }
         if !asked.limits.is_empty() {
-            let _ = write!(words, " --limits {}", quoted(&asked.limits.join(",")));
+            let _ = write!(words, " --limits {}", quote_word(&asked.limits.join(",")));
         }
         let _ = write!(words, " --out {TRAJECTORY}{}", self.libraries);
         Some(words)
     }
 }
 
-/// Where the commands of the page let a trajectory go.
+/// File of the trajectory in the commands that the page shows.
 const TRAJECTORY: &str = "excitation.csv";
 
-impl RemedySpelling for Spelled {
+impl RemedySpelling for WorkbenchAdvice {
     fn spell_options(&self, settings: &[OptionSetting]) -> String {
         self.flags.spell_options(settings)
     }
@@ -181,7 +190,7 @@ impl RemedySpelling for Spelled {
     }
 }
 
-impl StepSpelling for Spelled {
+impl StepSpelling for WorkbenchAdvice {
     fn spell_effect(&self, model: &Model, effect: &NewEffect) -> String {
         self.flags.spell_effect(model, effect)
     }
@@ -194,7 +203,7 @@ impl StepSpelling for Spelled {
         self.flags.spell_identification(model)
     }
 
-    fn spell_separation(&self, model: &Model, separation: &Separation) -> Option<String> {
+    fn spell_separation(&self, model: &Model, separation: &SeparationProposal) -> Option<String> {
         self.flags.spell_separation(model, separation)
     }
 }
@@ -204,9 +213,9 @@ mod tests {
     use clap::Parser;
 
     use super::*;
-    use crate::args::{Cli, Command};
+    use crate::args::{CommandLine, ProgramCommand};
 
-    /// What the page shows is understood, and asks for the same recordings read in the same way.
+    /// Commands that the page shows are valid, and read the same recordings in the same way.
     #[test]
     fn commands_of_the_page_are_understood() {
         let line = "modelmill work arm.toml --data a.csv b.csv --check c.csv --map 'q=x [deg]' --trim 5 --smoothing fourier \
@@ -224,53 +233,48 @@ mod tests {
             words.retain(|word| !word.is_empty());
             words
         };
-        let cli = Cli::try_parse_from(words(line)).unwrap();
+        let cli = CommandLine::try_parse_from(words(line)).unwrap();
         let host = Host::new().with_libraries(cli.library);
-        let Command::Work(args) = &cli.command else {
+        let ProgramCommand::Work(args) = &cli.command else {
             panic!("another command");
         };
-        let spelled = Spelled::new(&host, args);
-        let asked = Excitation {
+        let spelled = WorkbenchAdvice::new(&host, args);
+        let asked = ExcitationSettings {
             harmonics: 3,
             period: 2.5,
             limits: vec!["q=-1:2".to_owned(), "q_d=3".to_owned()],
-            ..Excitation::default()
+            ..ExcitationSettings::default()
         };
-        let command = spelled.excite(&asked).unwrap();
-        let excite = Cli::try_parse_from(words(&command)).unwrap();
-        let Command::Excite(excite) = &excite.command else {
+        let command = spelled.excite_command(&asked).unwrap();
+        let excite = CommandLine::try_parse_from(words(&command)).unwrap();
+        let ProgramCommand::Excite(excite) = &excite.command else {
             panic!("another command");
         };
-        let told = (
-            excite.harmonics,
-            excite.period,
-            excite.limits.len(),
-            excite.starts,
-        );
+        let told = (excite.harmonics, excite.period, excite.limits.len(), excite.starts);
         assert_eq!(told, (3, 2.5, 2, asked.starts), "{command}");
         for step in [
-            Step::Picture,
-            Step::Equations,
-            Step::Compare,
-            Step::Identify,
-            Step::Diagnose,
+            WorkbenchStep::Picture,
+            WorkbenchStep::Equations,
+            WorkbenchStep::Compare,
+            WorkbenchStep::Identify,
+            WorkbenchStep::Diagnose,
         ] {
-            let command = spelled.same(step).unwrap();
-            let cli = Cli::try_parse_from(words(&command));
+            let command = spelled.step_command(step).unwrap();
+            let cli = CommandLine::try_parse_from(words(&command));
             let cli = cli.unwrap_or_else(|error| panic!("{command}: {error}"));
             assert_eq!(cli.library, [PathBuf::from("my.toml")]);
             let (data, preparation) = match &cli.command {
-                Command::Compare(other) => (&other.data, &other.preparation),
-                Command::Identify(other) => (&other.data, &other.preparation),
-                Command::Diagnose(other) => (&other.ask.data, &other.ask.preparation),
+                ProgramCommand::Compare(other) => (&other.data, &other.preparation),
+                ProgramCommand::Identify(other) => (&other.data, &other.preparation),
+                ProgramCommand::Diagnose(other) => (&other.diagnosis.data, &other.diagnosis.preparation),
                 _ => continue,
             };
             assert_eq!((data, preparation), (&args.data, &args.preparation));
         }
-        let command = spelled.variant(Path::new("before this.toml")).unwrap();
-        let cli = Cli::try_parse_from(words(&command));
+        let command = spelled.variant_command(Path::new("before this.toml")).unwrap();
+        let cli = CommandLine::try_parse_from(words(&command));
         let cli = cli.unwrap_or_else(|error| panic!("{command}: {error}"));
-        let Command::Diff(other) = &cli.command else {
+        let ProgramCommand::Diff(other) = &cli.command else {
             panic!("{command}");
         };
         assert_eq!(

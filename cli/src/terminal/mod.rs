@@ -1,90 +1,92 @@
-//! Standard output and standard error: colours only on a terminal, warnings beside the result,
-//! quiet when the reader goes away.
+//! Standard output and standard error. Results go to standard output, warnings and notes to standard error.
+//! Colours are used on a terminal only. A closed output is not an error.
 
 pub(crate) mod plot;
 pub(crate) mod progress;
 
 use std::io::{self, ErrorKind, IsTerminal, Write};
 
-use modelmill::text::Style;
-use modelmill::{Note, Severity};
+use modelmill::text::TerminalStyle;
+use modelmill::{NoteSeverity, RecordingNote};
 use modelmill_boundary::text;
 
-use crate::failure::{Failure, Outcome};
+use crate::failure::{CommandFailure, CommandOutcome};
 use crate::flags::FlagSpelling;
 
 /// Whether the user allows colours at all: `NO_COLOR` (no-color.org) and dumb terminals forbid them.
-fn colours_allowed() -> bool {
+fn is_colour_allowed() -> bool {
     let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty());
     set("NO_COLOR").is_none() && set("TERM").is_none_or(|term| term != "dumb")
 }
 
 /// Colours for what goes to standard output.
-pub(crate) fn style() -> Style {
-    marked(colours_allowed() && io::stdout().is_terminal())
+pub(crate) fn style() -> TerminalStyle {
+    style_for(is_colour_allowed() && io::stdout().is_terminal())
 }
 
-fn marked(in_colour: bool) -> Style {
+/// The style with or without colours.
+fn style_for(in_colour: bool) -> TerminalStyle {
     if in_colour {
-        Style::COLOURED
+        TerminalStyle::COLOURED
     } else {
-        Style::PLAIN
+        TerminalStyle::PLAIN
     }
 }
 
 /// Whether messages on standard error may be coloured.
-pub(crate) fn errors_in_colour() -> bool {
-    colours_allowed() && io::stderr().is_terminal()
+pub(crate) fn is_stderr_coloured() -> bool {
+    is_colour_allowed() && io::stderr().is_terminal()
 }
 
 /// Writes the result of a command to standard output, with one line feed at its end.
-pub(crate) fn print(text: &str) -> Outcome {
-    let text = text::terminal(text, colours_allowed() && io::stdout().is_terminal());
+pub(crate) fn print(text: &str) -> CommandOutcome {
+    // Names from files may contain control characters; these must not reach the terminal.
+    let text = text::terminal(text, is_colour_allowed() && io::stdout().is_terminal());
     let mut out = io::stdout().lock();
     let end = if text.ends_with('\n') { "" } else { "\n" };
     out.write_all(text.as_bytes())
         .and_then(|()| out.write_all(end.as_bytes()))
         .and_then(|()| out.flush())
         .map_err(|error| match error.kind() {
-            ErrorKind::BrokenPipe => Failure::BrokenPipe,
-            _ => Failure::Input(format!("standard output cannot be written: {error}")),
+            ErrorKind::BrokenPipe => CommandFailure::BrokenPipe,
+            _ => CommandFailure::Input(format!("standard output cannot be written: {error}")),
         })
 }
 
 /// Prints one JSON object to standard output.
-pub(crate) fn print_json(value: &serde_json::Value) -> Outcome {
+pub(crate) fn print_json(value: &serde_json::Value) -> CommandOutcome {
     print(&text::json(&format!("{value:#}")))
 }
 
-/// Writes to standard error; who does not read it is not bothered.
-pub(crate) fn say(text: &str) {
-    let text = text::terminal(text, errors_in_colour());
+/// Writes to standard error; a closed standard error is ignored.
+pub(crate) fn print_to_stderr(text: &str) {
+    let text = text::terminal(text, is_stderr_coloured());
     let _ = writeln!(io::stderr(), "{text}");
 }
 
 /// A warning on standard error.
 pub(crate) fn warn(text: &str) {
-    let style = marked(errors_in_colour());
-    say(&format!("{} {text}", style.yellow("warning:")));
+    let style = style_for(is_stderr_coloured());
+    print_to_stderr(&format!("{} {text}", style.yellow("warning:")));
 }
 
 /// A remark on standard error.
 pub(crate) fn note(text: &str) {
-    let style = marked(errors_in_colour());
-    say(&format!("{} {text}", style.bold("note:")));
+    let style = style_for(is_stderr_coloured());
+    print_to_stderr(&format!("{} {text}", style.bold("note:")));
 }
 
 /// A remark of the library on standard error.
-pub(crate) fn remark(note: &Note) {
+pub(crate) fn remark(note: &RecordingNote) {
     let says = note.says.spell(&FlagSpelling);
     match note.severity {
-        Severity::Warning => warn(&says),
-        Severity::Info => self::note(&says),
+        NoteSeverity::Warning => warn(&says),
+        NoteSeverity::Info => self::note(&says),
     }
 }
 
 /// An error on standard error.
 pub(crate) fn error(text: &str) {
-    let style = marked(errors_in_colour());
-    say(&format!("{} {text}", style.bold_red("error:")));
+    let style = style_for(is_stderr_coloured());
+    print_to_stderr(&format!("{} {text}", style.bold_red("error:")));
 }

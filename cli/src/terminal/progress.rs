@@ -1,4 +1,5 @@
-//! Progress on standard error for whatever takes longer than a second, on a terminal only; remarks as they come up.
+//! Progress on standard error for jobs that take longer than a second, on a terminal only. Remarks are printed as they
+//! occur.
 
 use std::io::IsTerminal;
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
@@ -7,33 +8,38 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use modelmill::Note;
-use modelmill::progress::{Job, Progress};
+use modelmill::RecordingNote;
+use modelmill::progress::{JobHandle, ProgressListener};
 use modelmill_boundary::text;
 
 use crate::terminal;
 
-/// How long the program may be silent before anything is shown.
+/// Time after the start of the program before the first progress line.
 const PATIENCE: Duration = Duration::from_secs(1);
-/// How long a single job may be silent once the program's patience is over.
+/// Time after the start of a job before its line, once [`PATIENCE`] is over.
 const SHORT_PATIENCE: Duration = Duration::from_millis(300);
+/// Interval between updates of the line.
 const TICK: Duration = Duration::from_millis(100);
 
-/// Watches the library's jobs: once the program has been busy for a second on a terminal, a line says what is going on, with
-/// a bar if the job counts its steps and a spinner if it does not.
-pub(crate) struct Terminal {
+/// Shows the library's jobs on a terminal once the program has run for a second: a line with the name of the job and a
+/// bar, or a spinner if the job does not count its steps.
+pub(crate) struct TerminalProgress {
+    /// Start of the program.
     start: Instant,
-    watchers: Mutex<Vec<Option<Watcher>>>,
+    /// One entry per running job, outer jobs first; `None` for jobs without a line.
+    watchers: Mutex<Vec<Option<JobWatcher>>>,
 }
 
-/// A thread that looks at a job until it is told to stop.
-struct Watcher {
-    /// Dropped when the job ends.
-    going_on: Sender<()>,
+/// A thread that shows a job until it ends.
+struct JobWatcher {
+    /// Dropped when the job ends, which stops the thread.
+    keep_alive: Sender<()>,
+    /// The thread, joined when the job ends.
     thread: JoinHandle<()>,
 }
 
-impl Terminal {
+impl TerminalProgress {
+    /// Starts the clock of the program.
     pub(crate) fn new() -> Self {
         Self {
             start: Instant::now(),
@@ -42,20 +48,20 @@ impl Terminal {
     }
 }
 
-impl Progress for Terminal {
-    fn begins(&self, what: &str, total: usize, job: &Arc<Job>) {
+impl ProgressListener for TerminalProgress {
+    fn on_job_start(&self, what: &str, total: usize, job: &Arc<JobHandle>) {
         let mut watchers = self.watchers.lock().unwrap_or_else(PoisonError::into_inner);
-        // Of jobs within jobs the outer one has its line.
+        // If jobs are nested, only the outer one has a line.
         let is_watched = watchers.iter().any(Option::is_some);
         if is_watched || !std::io::stderr().is_terminal() {
             watchers.push(None);
             return;
         }
-        let first_look = PATIENCE
-            .saturating_sub(self.start.elapsed())
-            .max(SHORT_PATIENCE);
+        // The first job waits for the rest of the program's patience, later ones only for the short one.
+        let first_look = PATIENCE.saturating_sub(self.start.elapsed()).max(SHORT_PATIENCE);
         let (going_on, waiting) = channel::<()>();
         let (what, job) = (what.to_owned(), Arc::clone(job));
+        // The thread polls the job; the end of the channel is the end of the job.
         let thread = std::thread::spawn(move || {
             let mut bar: Option<ProgressBar> = None;
             loop {
@@ -73,42 +79,51 @@ impl Progress for Terminal {
                 bar.finish_and_clear();
             }
         });
-        watchers.push(Some(Watcher { going_on, thread }));
+        watchers.push(Some(JobWatcher {
+            keep_alive: going_on,
+            thread,
+        }));
     }
 
-    fn ends(&self) {
+    fn on_job_end(&self) {
         let mut watchers = self.watchers.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(Some(Watcher { going_on, thread })) = watchers.pop() {
+        if let Some(Some(JobWatcher {
+            keep_alive: going_on,
+            thread,
+        })) = watchers.pop()
+        {
             drop(going_on);
-            // A watcher that panicked has shown nothing that is missed.
+            // A panic of the watcher concerns the line only, not the result.
             let _ = thread.join();
         }
     }
 
-    fn notes(&self, note: &Note) {
+    fn on_note(&self, note: &RecordingNote) {
         terminal::remark(note);
     }
 }
 
-/// As [`Terminal`], for whoever tells remarks at another time.
-pub(crate) struct WithoutRemarks(Terminal);
+/// As [`TerminalProgress`], but drops remarks; for callers that print them later.
+pub(crate) struct ProgressWithoutRemarks(TerminalProgress);
 
-impl WithoutRemarks {
+impl ProgressWithoutRemarks {
+    /// Starts a clock, as [`TerminalProgress::new`].
     pub(crate) fn new() -> Self {
-        Self(Terminal::new())
+        Self(TerminalProgress::new())
     }
 }
 
-impl Progress for WithoutRemarks {
-    fn begins(&self, what: &str, total: usize, job: &Arc<Job>) {
-        self.0.begins(what, total, job);
+impl ProgressListener for ProgressWithoutRemarks {
+    fn on_job_start(&self, what: &str, total: usize, job: &Arc<JobHandle>) {
+        self.0.on_job_start(what, total, job);
     }
 
-    fn ends(&self) {
-        self.0.ends();
+    fn on_job_end(&self) {
+        self.0.on_job_end();
     }
 }
 
+/// A bar if the number of steps is known, else a spinner.
 fn new_bar(message: &str, total: usize) -> ProgressBar {
     let target = ProgressDrawTarget::stderr();
     let (bar, template) = if total > 0 {
@@ -118,8 +133,6 @@ fn new_bar(message: &str, total: usize) -> ProgressBar {
         let bar = ProgressBar::with_draw_target(None, target);
         (bar, "{spinner} {msg}, {elapsed}")
     };
-    let style =
-        ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_spinner());
-    bar.with_style(style)
-        .with_message(text::plain(message).into_owned())
+    let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_spinner());
+    bar.with_style(style).with_message(text::plain(message).into_owned())
 }

@@ -60,9 +60,7 @@ fn every_bundled_model_is_in_the_atlas() {
 fn figures_of_the_atlas_are_those_of_the_mill() {
     let out = scratch("atlas");
     let models = models();
-    let short = models
-        .iter()
-        .filter(|(name, _)| !LONG.contains(&name.as_str()));
+    let short = models.iter().filter(|(name, _)| !LONG.contains(&name.as_str()));
     let paths: Vec<String> = short.map(|(_, path)| path.display().to_string()).collect();
     let mut command = vec!["atlas"];
     command.extend(paths.iter().map(String::as_str));
@@ -96,11 +94,7 @@ fn figures_of_imported_robots_are_those_of_the_mill() {
         let file = |ending: &&str| robots.join(name).join(format!("{name}.{ending}"));
         let files = ["urdf", "xml", "sdf"].iter().map(file);
         let mut found = files.filter(|file| file.exists());
-        found
-            .next()
-            .expect("a description")
-            .to_string_lossy()
-            .into_owned()
+        found.next().expect("a description").to_string_lossy().into_owned()
     };
     let out = scratch("atlas_of_imported");
     let files: Vec<String> = written.keys().map(description).collect();

@@ -18,9 +18,7 @@ use crate::common::model;
 
 /// A new folder for one test.
 fn folder(name: &str) -> PathBuf {
-    let path = Path::new(env!("CARGO_TARGET_TMPDIR"))
-        .join("bombs")
-        .join(name);
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("bombs").join(name);
     let _ = std::fs::remove_dir_all(&path);
     std::fs::create_dir_all(&path).expect("a folder");
     path
@@ -34,10 +32,7 @@ fn text(path: &Path) -> String {
 /// before it.
 fn confined(first: &str, args: &[&str]) -> Output {
     Command::new("sh")
-        .args([
-            "-c",
-            &format!("ulimit -v 1048576 || exit 77; {first} \"$0\" \"$@\""),
-        ])
+        .args(["-c", &format!("ulimit -v 1048576 || exit 77; {first} \"$0\" \"$@\"")])
         .arg(env!("CARGO_BIN_EXE_modelmill"))
         .args(args)
         .stdin(Stdio::null())
@@ -75,10 +70,7 @@ fn zeros(name: &str, rows: u32, stored: u32) -> Vec<u8> {
     const DOUBLE: u32 = 6;
     const BLOCK: u32 = 1 << 20;
     let mut matrix = element(6, &[DOUBLE.to_le_bytes(), [0; 4]].concat());
-    matrix.extend(element(
-        5,
-        &[rows.to_le_bytes(), 1_u32.to_le_bytes()].concat(),
-    ));
+    matrix.extend(element(5, &[rows.to_le_bytes(), 1_u32.to_le_bytes()].concat()));
     matrix.extend(element(1, name.as_bytes()));
     matrix.extend([2_u32.to_le_bytes(), stored.to_le_bytes()].concat());
     let length = u32::try_from(matrix.len()).expect("short") + stored;
@@ -135,29 +127,22 @@ fn a_matlab_file_that_unpacks_to_gigabytes_is_refused() {
         let compare = ["compare", &two_link, "--data", &path];
         refused(&confined("exec", &compare), &[name, word]);
         let piped = ["compare", &two_link, "--data", "/dev/stdin"];
-        refused(
-            &confined(&format!("cat '{path}' |"), &piped),
-            &["/dev/stdin"],
-        );
+        refused(&confined(&format!("cat '{path}' |"), &piped), &["/dev/stdin"]);
     }
 }
 
 /// A Parquet file of columns `t` and `q1` with zeros.
 fn parquet(path: &Path, rows: usize, has_dictionary: bool) {
-    let schema = parse_message_type("message run { required double t; required double q1; }")
-        .expect("a schema");
+    let schema = parse_message_type("message run { required double t; required double q1; }").expect("a schema");
     let properties = WriterProperties::builder()
-        .set_compression(parquet::basic::Compression::GZIP(
-            parquet::basic::GzipLevel::default(),
-        ))
+        .set_compression(parquet::basic::Compression::GZIP(parquet::basic::GzipLevel::default()))
         .set_dictionary_enabled(has_dictionary)
         .set_data_page_size_limit(usize::MAX)
         .set_data_page_row_count_limit(usize::MAX)
         .set_statistics_enabled(parquet::file::properties::EnabledStatistics::None)
         .build();
     let file = File::create(path).expect("a file");
-    let mut writer =
-        SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties)).expect("a writer");
+    let mut writer = SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties)).expect("a writer");
     let zeros = vec![0.0; 1 << 20];
     let mut group = writer.next_row_group().expect("a group");
     while let Some(mut column) = group.next_column().expect("a column") {
@@ -218,10 +203,7 @@ fn packed_text_that_unpacks_to_gigabytes_is_refused() {
     let head = b"t,q1,q2,joint1,joint2\n";
     std::fs::write(&path, runs_of_zstd(200_000, head, b'\n')).expect("written");
     let args = ["compare", &two_link, "--data", &text(&path)];
-    refused(
-        &confined("exec", &args),
-        &["lines.csv.zst", "two hundred times"],
-    );
+    refused(&confined("exec", &args), &["lines.csv.zst", "two hundred times"]);
 }
 
 /// A record of MCAP: kind, length, content.
@@ -234,13 +216,7 @@ fn record(kind: u8, bytes: &[u8]) -> Vec<u8> {
 fn a_log_that_lies_of_its_size_is_refused() {
     let folder = folder("mcap");
     let two_link = model("two_link.toml");
-    let text_of = |text: &[u8]| {
-        [
-            &u32::try_from(text.len()).expect("short").to_le_bytes(),
-            text,
-        ]
-        .concat()
-    };
+    let text_of = |text: &[u8]| [&u32::try_from(text.len()).expect("short").to_le_bytes(), text].concat();
     let chunk = |says: u64| {
         let packed = runs_of_zstd(1024, b"", 0);
         let fields = [
@@ -258,12 +234,8 @@ fn a_log_that_lies_of_its_size_is_refused() {
     endless.push(6);
     endless.extend((1_u64 << 60).to_le_bytes());
     for (name, bytes, word) in [
-        (
-            "many.mcap",
-            log(chunk(128 << 20).repeat(100)),
-            "two hundred times",
-        ),
-        ("more.mcap", log(chunk(1000)), "more than the file says"),
+        ("many.mcap", log(chunk(128 << 20).repeat(100)), "two hundred times"),
+        ("more.mcap", log(chunk(1000)), "more than the file declares"),
         ("long.mcap", endless, "larger than 128 MB"),
     ] {
         let path = folder.join(name);
@@ -277,10 +249,7 @@ fn a_log_that_lies_of_its_size_is_refused() {
 #[test]
 fn an_hdf5_file_that_says_to_be_large_is_refused() {
     let two_link = model("two_link.toml");
-    for (name, word) in [
-        ("bomb-long.h5", "too large"),
-        ("bomb-chunk.h5", "smaller ones"),
-    ] {
+    for (name, word) in [("bomb-long.h5", "too large"), ("bomb-chunk.h5", "smaller ones")] {
         let path = crate::common::workspace("identify/tests/fixtures").join(name);
         let args = ["compare", &two_link, "--data", &text(&path)];
         refused(&confined("exec", &args), &[name, word]);
@@ -297,13 +266,7 @@ impl Endless {
     fn new(folder: &Path, says: &str) -> Self {
         // A name of its own for each text.
         let pipe = folder.join(says.replace(|c: char| !c.is_ascii_alphanumeric(), "-") + "-pipe");
-        assert!(
-            Command::new("mkfifo")
-                .arg(&pipe)
-                .status()
-                .expect("mkfifo")
-                .success()
-        );
+        assert!(Command::new("mkfifo").arg(&pipe).status().expect("mkfifo").success());
         let writer = Command::new("sh")
             .args(["-c", "exec yes \"$1\" > \"$0\""])
             .arg(&pipe)
@@ -328,30 +291,16 @@ fn streams_without_an_end_are_refused() {
     let two_link = model("two_link.toml");
     let out = text(&folder.join("out.toml"));
     // A model, by all ways in which it can come.
-    for from in [
-        "yes |",
-        "cat /dev/zero |",
-        "exec < /dev/zero;",
-        "yes '[a]' |",
-    ] {
+    for from in ["yes |", "cat /dev/zero |", "exec < /dev/zero;", "yes '[a]' |"] {
         refused(&confined(from, &["check", "/dev/stdin"]), &["/dev/stdin"]);
     }
-    refused(
-        &confined("yes |", &["check", "-"]),
-        &["/dev/stdin is standard input"],
-    );
+    refused(&confined("yes |", &["check", "-"]), &["/dev/stdin is standard input"]);
     for (says, args) in [
         ("y", &["check", "PIPE"][..]),
         ("yy", &["generate", "PIPE"]),
-        (
-            "[[x]]",
-            &["interpret", &two_link, "--unknown", "m1", "--fit", "PIPE"],
-        ),
+        ("[[x]]", &["interpret", &two_link, "--unknown", "m1", "--fit", "PIPE"]),
         ("<robot>", &["import", "PIPE", "--out", &out]),
-        (
-            "a = 1",
-            &["simulate", "PIPE", "--trajectory", &two_link, "--out", &out],
-        ),
+        ("a = 1", &["simulate", "PIPE", "--trajectory", &two_link, "--out", &out]),
         ("# remark", &["effects", "--library", "PIPE"]),
     ] {
         let endless = Endless::new(&folder, says);
@@ -367,10 +316,7 @@ fn streams_without_an_end_are_refused() {
         let variant = folder.join(format!("{key}.toml"));
         std::fs::write(
             &variant,
-            format!(
-                "schema = 1\nname = \"variant\"\n{key} = {:?}\n",
-                text(&endless.pipe)
-            ),
+            format!("schema = 1\nname = \"variant\"\n{key} = {:?}\n", text(&endless.pipe)),
         )
         .expect("written");
         refused(

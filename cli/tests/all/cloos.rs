@@ -29,10 +29,7 @@ fn errors_on_another_motion_are_those_published() {
         let is_kept = |p: &&Value| p["status"] != "not_essential";
         all.iter().filter(is_kept).count()
     });
-    assert!(
-        kept.is_some_and(|kept| (29..=33).contains(&kept)),
-        "{kept:?}"
-    );
+    assert!(kept.is_some_and(|kept| (29..=33).contains(&kept)), "{kept:?}");
     assert!(check_errors(&essential) < mean);
     assert!((100.0 * number(&essential, "/check/channels/joint4/abs_ratio") - 16.6).abs() < 0.3);
 }
@@ -71,10 +68,7 @@ fn check_errors(fit: &Value) -> f64 {
     println!("sum|e|/sum|tau| on C: {errors:.1?} %, published {PUBLISHED:?} %; mean {mean:.2} %");
     assert!(mean <= 15.4);
     for (ours, published) in errors.iter().zip(PUBLISHED) {
-        assert!(
-            *ours < published + 2.2,
-            "{ours} % where {published} % is published"
-        );
+        assert!(*ours < published + 2.2, "{ours} % where {published} % is published");
     }
     mean
 }

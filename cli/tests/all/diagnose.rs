@@ -56,11 +56,7 @@ fn without(name: &str, effects: &[&str]) -> String {
 
 /// Effects of a six-axis arm that carry the number of their joint.
 fn on_all_joints(kinds: &[&str]) -> Vec<String> {
-    let of = |kind: &&str| {
-        (1..=6)
-            .map(move |i| format!("{kind}_{i}"))
-            .collect::<Vec<_>>()
-    };
+    let of = |kind: &&str| (1..=6).map(move |i| format!("{kind}_{i}")).collect::<Vec<_>>();
     kinds.iter().flat_map(of).collect()
 }
 
@@ -87,9 +83,7 @@ fn found(answer: &Value) -> Kinds {
 fn kinds(expected: &[(&str, &[&str])]) -> Kinds {
     let owned = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect();
     let pairs = expected.iter();
-    pairs
-        .map(|(kind, at)| ((*kind).to_owned(), owned(at)))
-        .collect()
+    pairs.map(|(kind, at)| ((*kind).to_owned(), owned(at))).collect()
 }
 
 /// The steps in words, for whoever reads a failure.
@@ -115,9 +109,7 @@ fn floor_of(recording: &str) -> f64 {
     let force = |line: &str| -> f64 {
         let fields = line.split(',').zip(&header);
         let forces = fields.filter(|(_, name)| ["spindle_left", "spindle_right"].contains(name));
-        forces
-            .map(|(x, _)| x.parse::<f64>().expect("a number").powi(2))
-            .sum()
+        forces.map(|(x, _)| x.parse::<f64>().expect("a number").powi(2)).sum()
     };
     let squares: Vec<f64> = lines.map(force).collect();
     (2.0 * squares.len() as f64 / squares.iter().sum::<f64>()).sqrt()
@@ -145,10 +137,7 @@ fn check_form(answer: &Value) {
 /// One of the practice cases, with defaults, beside the truth that lies with it.
 fn check_case(name: &str, bound: f64) -> Option<Value> {
     let [truth] = recordings("spidermill-cases", ["truth.json"])?;
-    let [fit, check] = recordings(
-        &format!("spidermill-cases/{name}"),
-        ["fit.csv", "check.csv"],
-    )?;
+    let [fit, check] = recordings(&format!("spidermill-cases/{name}"), ["fit.csv", "check.csv"])?;
     let truth = std::fs::read_to_string(truth).expect("a readable file");
     let truth: Value = serde_json::from_str(&truth).expect("JSON");
     let hidden = &truth[name]["hidden"];
@@ -272,16 +261,7 @@ fn the_ladder_of_a_real_axis_is_climbed_in_order() {
         &without("emps.toml", &["viscous", "coulomb", "offset"]),
         &fit,
         Some(&check),
-        &[
-            "--order",
-            "4",
-            "--cutoff",
-            "100",
-            "--trim",
-            "49",
-            "--decimate",
-            "10",
-        ],
+        &["--order", "4", "--cutoff", "100", "--trim", "49", "--decimate", "10"],
     );
     check_form(&answer);
     let steps = list(&answer, "steps");
@@ -304,17 +284,10 @@ fn the_ladder_of_a_real_axis_is_climbed_in_order() {
     );
     let figures = [(0, 69.5, 67.2)];
     for (step, train, pulses) in figures {
-        let [fit, check] =
-            ["fit", "check"].map(|key| 100.0 * number(&steps[step], &format!("/{key}")));
+        let [fit, check] = ["fit", "check"].map(|key| 100.0 * number(&steps[step], &format!("/{key}")));
         let near = |ours: f64, theirs: f64| (ours - theirs).abs() < 0.02 * theirs + 0.05;
-        assert!(
-            near(fit, train),
-            "step {step}: {fit} where {train} is known"
-        );
-        assert!(
-            near(check, pulses),
-            "step {step}: {check} where {pulses} is known"
-        );
+        assert!(near(fit, train), "step {step}: {fit} where {train} is known");
+        assert!(near(check, pulses), "step {step}: {check} where {pulses} is known");
     }
 }
 
@@ -341,9 +314,7 @@ fn identified(answer: &Value, bare: &str, leave_out: &str, args: &[&str]) -> Val
 
 /// Joints at which a kind was found, by itself or differing by direction.
 fn joints(found: &Kinds, kinds: &[&str]) -> BTreeSet<String> {
-    let all = found
-        .iter()
-        .filter(|(kind, _)| kinds.contains(&kind.as_str()));
+    let all = found.iter().filter(|(kind, _)| kinds.contains(&kind.as_str()));
     all.flat_map(|(_, at)| at.clone()).collect()
 }
 
@@ -368,19 +339,13 @@ fn friction_and_a_drive_inertia_of_a_real_arm_are_found() {
     check_form(&answer);
     let found = found(&answer);
     assert_eq!(joints(&found, &DRY).len(), 6, "{found:?}");
-    assert!(
-        joints(&found, &["drive_inertia"]).contains("joint6"),
-        "{found:?}"
-    );
+    assert!(joints(&found, &["drive_inertia"]).contains("joint6"), "{found:?}");
     let steps = list(&answer, "steps");
     assert!((100.0 * number(&steps[0], "/fit") - 48.0).abs() < 1.0);
     assert!((100.0 * number(&steps[0], "/check") - 46.0).abs() < 1.0);
     // Friction on all joints gives 15.3 % on A and 15.7 % on C.
     let last = &steps[steps.len() - 1];
-    assert!(
-        number(last, "/fit") < 0.155 && number(last, "/check") < 0.161,
-        "{last}"
-    );
+    assert!(number(last, "/fit") < 0.155 && number(last, "/check") < 0.161, "{last}");
     // The inertia of drive 6 takes its error on C from 25.9 to 12.6 %; without weights large joints decide on the small.
     let runs = ["--data", &fit, "--check", &check, "--weights", "channels"];
     let [with, none] = ["nothing", "drive_inertia"].map(|kind| {

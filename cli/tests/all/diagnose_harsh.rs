@@ -1,5 +1,5 @@
 //! `diagnose` on recordings with what real sensors, drives and days do to data: the model lacks nothing, and what is wrong is
-//! named. The recordings lie beside the workspace; `cargo bench -p modelmill-cli --bench harsh` scores all of them.
+//! named. The recordings lie beside the workspace; `cargo bench -p modelmill-lab --bench harsh` scores all of them.
 
 use crate::common::{json, scratch, workspace};
 
@@ -24,13 +24,9 @@ fn what_recordings_have_is_no_missing_part_of_the_model() {
         );
         return;
     }
-    let friction =
-        std::fs::read_to_string(folder.join("model-friction.toml")).expect("a model file");
+    let friction = std::fs::read_to_string(folder.join("model-friction.toml")).expect("a model file");
     let plain = workspace("model-spec/models/spidermill.toml");
-    let text = friction.replace(
-        "\"spidermill.toml\"",
-        &format!("{:?}", plain.to_string_lossy()),
-    );
+    let text = friction.replace("\"spidermill.toml\"", &format!("{:?}", plain.to_string_lossy()));
     let model = scratch("harsh-friction.toml");
     std::fs::write(&model, text).expect("a variant of the model");
     for (case, kind) in CASES {
@@ -38,32 +34,18 @@ fn what_recordings_have_is_no_missing_part_of_the_model() {
             let path = folder.join(case).join(file);
             path.to_string_lossy().into_owned()
         });
-        let answer = json(&[
-            "diagnose", &model, "--data", &fit, "--check", &check, "--json",
-        ]);
+        let answer = json(&["diagnose", &model, "--data", &fit, "--check", &check, "--json"]);
         assert_eq!(answer["verdict"], "adequate", "{case}: {answer:#}");
-        assert_eq!(
-            answer["effects"].as_array().map(Vec::len),
-            Some(0),
-            "{case}"
-        );
+        assert_eq!(answer["effects"].as_array().map(Vec::len), Some(0), "{case}");
         let named = answer["disturbances"].as_array().expect("a list");
         match kind {
-            Some(kind) => assert!(
-                named.iter().any(|one| one["kind"] == kind),
-                "{case}: {named:?}"
-            ),
+            Some(kind) => assert!(named.iter().any(|one| one["kind"] == kind), "{case}: {named:?}"),
             None => assert!(named.is_empty(), "{case}: {named:?}"),
         }
         for (drive, budget) in answer["budget"].as_object().expect("an object") {
             let parts = ["noise", "not_repeating", "model"].map(|part| budget[part].as_f64());
-            let sound = parts
-                .iter()
-                .all(|p| p.is_some_and(|p| (0.0..0.5).contains(&p)));
-            assert!(
-                sound && budget["rms"].as_f64() > Some(1.0),
-                "{case}, {drive}: {budget}"
-            );
+            let sound = parts.iter().all(|p| p.is_some_and(|p| (0.0..0.5).contains(&p)));
+            assert!(sound && budget["rms"].as_f64() > Some(1.0), "{case}, {drive}: {budget}");
         }
     }
 }

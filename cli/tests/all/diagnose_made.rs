@@ -7,22 +7,19 @@ use std::f64::consts::TAU;
 use std::fmt::Write as _;
 
 use crate::common::{json, model, number, printed, run, scratch};
+use modelmill_runtime::RandomBits;
 use serde_json::Value;
 
 const DRIVES: [&str; 2] = ["spindle_left", "spindle_right"];
 /// Standard deviation of the noise on forces of a few hundred newtons, N.
 const NOISE: f64 = 0.5;
 
-/// SplitMix64, as a normal distribution by Box and Muller.
-struct Noise(u64);
+/// A normal distribution by Box and Muller.
+struct Noise(RandomBits);
 
 impl Noise {
     fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        (((z ^ (z >> 31)) >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
+        ((self.0.bits() >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
     }
 
     fn next(&mut self) -> f64 {
@@ -45,21 +42,19 @@ fn recorded(name: &str, truth: &str, motion: &str, seed: u64) -> String {
     let ((named, forces), (header, motion)) = (rows(&forces), rows(&motion));
     assert_eq!(forces.len(), motion.len());
     let at = DRIVES.map(|drive| named.iter().position(|n| *n == drive).expect("a force"));
-    let mut noise = Noise(seed);
+    let mut noise = Noise(RandomBits::new(seed));
     let mut text = header.join(",") + "\n";
     for (state, force) in motion.iter().zip(&forces) {
         let fields: Vec<String> = header
             .iter()
             .zip(state)
-            .map(
-                |(name, field)| match DRIVES.iter().position(|d| d == name) {
-                    Some(drive) => {
-                        let force: f64 = force[at[drive]].parse().expect("a number");
-                        (force + NOISE * noise.next()).to_string()
-                    }
-                    None => (*field).to_owned(),
-                },
-            )
+            .map(|(name, field)| match DRIVES.iter().position(|d| d == name) {
+                Some(drive) => {
+                    let force: f64 = force[at[drive]].parse().expect("a number");
+                    (force + NOISE * noise.next()).to_string()
+                }
+                None => (*field).to_owned(),
+            })
             .collect();
         writeln!(text, "{}", fields.join(",")).expect("a string takes it");
     }
@@ -76,9 +71,7 @@ fn diagnosed(name: &str, more: &str, args: &[&str]) -> Value {
     std::fs::write(&truth, text).expect("a variant");
     let fit = recorded(name, &truth, &run("plain-fit.csv"), 1);
     let check = recorded(name, &truth, &run("plain-check.csv"), 2);
-    let mut all = vec![
-        "diagnose", &bare, "--data", &fit, "--check", &check, "--json",
-    ];
+    let mut all = vec!["diagnose", &bare, "--data", &fit, "--check", &check, "--json"];
     all.extend(args);
     json(&all)
 }
@@ -108,27 +101,19 @@ fn value(effect: &Value, name: &str) -> f64 {
 
 #[track_caller]
 fn near(found: f64, truth: f64, share: f64) {
-    assert!(
-        (found - truth).abs() <= share * truth.abs(),
-        "{found}, not {truth}"
-    );
+    assert!((found - truth).abs() <= share * truth.abs(), "{found}, not {truth}");
 }
 
 #[test]
 fn a_tilt_is_found_while_parameters_are_held() {
     let tilt = "[[effect]]\nkind = \"gravity_tilt\"\nat = [\"base\"]\nconstants = { tz = 0.05 }\n";
     let answer = diagnosed("tilt", tilt, &["--held"]);
-    near(
-        value(only(&answer, "gravity_tilt", &["base"]), "tz"),
-        0.05,
-        0.01,
-    );
+    near(value(only(&answer, "gravity_tilt", &["base"]), "tz"), 0.05, 0.01);
 }
 
 #[test]
 fn a_constant_that_places_share_is_found() {
-    let friction =
-        "[[effect]]\nkind = \"stribeck_friction\"\nat = [\"spindle_left\", \"spindle_right\"]
+    let friction = "[[effect]]\nkind = \"stribeck_friction\"\nat = [\"spindle_left\", \"spindle_right\"]
 parameters = { Fs = { nominal = 20.0 } }\nconstants = { vs = 0.01 }\n";
     let answer = diagnosed("shared", friction, &[]);
     let effect = only(&answer, "stribeck_friction", &DRIVES);

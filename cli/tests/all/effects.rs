@@ -26,7 +26,7 @@ fn the_library_is_listed_and_explained() {
         assert!(kinds.iter().any(|one| one["name"] == kind), "{kind}");
         let says = ran(&["effects", kind]);
         assert_eq!(says.status, 0, "{}", says.err);
-        assert!(says.out.contains("told from its doubles"), "{kind}");
+        assert!(says.out.contains("what it can be confused with"), "{kind}");
     }
     let unknown = ran(&["effects", "magic"]);
     assert_eq!(unknown.status, 1);
@@ -43,40 +43,18 @@ fn adding_shows_the_difference_and_writes_only_when_asked() {
     assert_eq!(drive["valid"], true);
     let text = |path: &str| std::fs::read_to_string(path).expect("a file");
     let place = first_drive(&original);
-    let shown = ran(&[
-        "add",
-        &file,
-        "coulomb_friction",
-        coordinate,
-        &place,
-        "--set",
-        "Fc=25.9",
-    ]);
+    let shown = ran(&["add", &file, "coulomb_friction", coordinate, &place, "--set", "Fc=25.9"]);
     assert_eq!(shown.status, 0, "{}", shown.err);
-    assert!(
-        shown.out.contains("\n+kind = \"coulomb_friction\"\n"),
-        "{}",
-        shown.out
-    );
+    assert!(shown.out.contains("\n+kind = \"coulomb_friction\"\n"), "{}", shown.out);
     assert!(shown.err.contains("nothing is written"));
     assert_eq!(text(&file), original);
-    let args = [
-        "add",
-        &file,
-        "stribeck_friction",
-        "--at",
-        &place,
-        "--set",
-        "vs=0.05",
-    ];
+    let args = ["add", &file, "stribeck_friction", "--at", &place, "--set", "vs=0.05"];
     let more = ["--set", "Fs.name=Fs_here", "--set", "Fs=3", "--in-place"];
     let written = ran(&[&args[..], &more[..]].concat());
     assert_eq!(written.status, 0, "{}", written.err);
     let new = text(&file);
     assert!(new.starts_with(original.trim_end()));
-    assert!(new.contains(
-        "parameters = { Fs = { name = \"Fs_here\", nominal = 3.0 } }\nconstants = { vs = 0.05 }\n"
-    ));
+    assert!(new.contains("parameters = { Fs = { name = \"Fs_here\", nominal = 3.0 } }\nconstants = { vs = 0.05 }\n"));
     let again = ran(&[&args[..], &more[..]].concat());
     assert_eq!(again.status, 1);
     assert!(
@@ -115,28 +93,13 @@ fn adding_what_cannot_be_is_refused() {
         (
             &["spring", "--at", "spindle_left", "--set", "k=stiff"][..],
             2,
-            "no finite number",
+            "not a finite number",
         ),
-        (
-            &["spring", "--at", "spindle_left", "--set", "k"][..],
-            2,
-            "NAME=VALUE",
-        ),
+        (&["spring", "--at", "spindle_left", "--set", "k"][..], 2, "NAME=VALUE"),
         (&["spring"][..], 2, "--at"),
+        (&["lumped_mass_placement", "--at", "R3m"][..], 1, "no lumped mass here"),
         (
-            &["lumped_mass_placement", "--at", "R3m"][..],
-            1,
-            "no lumped mass here",
-        ),
-        (
-            &[
-                "spring",
-                "--at",
-                "spindle_left",
-                "--in-place",
-                "--out",
-                "x.toml",
-            ][..],
+            &["spring", "--at", "spindle_left", "--in-place", "--out", "x.toml"][..],
             2,
             "cannot be used with",
         ),
@@ -174,11 +137,7 @@ fn a_library_of_ones_own_is_tried_and_kept() {
     assert!(add(&[], &spidermill).err.contains("unknown kind"));
     let tried = add(&["--library", &library], &spidermill);
     assert_eq!(tried.status, 0, "{}", tried.err);
-    assert_eq!(
-        ran(&["check", &out]).status,
-        1,
-        "the kind is not in the file"
-    );
+    assert_eq!(ran(&["check", &out]).status, 1, "the kind is not in the file");
     assert_eq!(ran(&["check", &out, "--library", &library]).status, 0);
     // Named by the model file itself, relative to it, no option is needed.
     let named = scratch("named.toml");
@@ -206,14 +165,7 @@ fn late_forces_are_held_against_earlier_states() {
     let text = head(whole.to_str().expect("a path")) + "values = { T = 0.0053 }\n";
     std::fs::write(&rig, text).expect("a file");
     let (data, trajectory) = (scratch("late.csv"), run("plain-check.csv"));
-    let made = ran(&[
-        "simulate",
-        &rig,
-        "--trajectory",
-        &trajectory,
-        "--out",
-        &data,
-    ]);
+    let made = ran(&["simulate", &rig, "--trajectory", &trajectory, "--out", &data]);
     assert_eq!(made.status, 0, "{}", made.err);
     let file = scratch("late.toml");
     let text = head(&model("spidermill.toml")) + "constants = { T = 0.0053 }\n";
@@ -231,22 +183,13 @@ fn late_forces_are_held_against_earlier_states() {
     let (with, fewer, notes) = error(&file);
     assert!(without > 0.01 && with < 4e-4, "{without} {with}");
     assert_eq!(fewer, samples.map(|n| n - 3), "three samples at 500 Hz");
-    assert!(
-        notes.contains("the first 3 samples have no states"),
-        "{notes}"
-    );
+    assert!(notes.contains("the first 3 samples have no states"), "{notes}");
     let forces = |model: &str, name: &str| {
         let out = scratch(name);
-        assert_eq!(
-            ran(&["evaluate", model, "--data", &data, "--out", &out]).status,
-            0
-        );
+        assert_eq!(ran(&["evaluate", model, "--data", &data, "--out", &out]).status, 0);
         std::fs::read_to_string(out).expect("forces")
     };
-    assert_eq!(
-        forces(&file, "a.csv"),
-        forces(&model("spidermill.toml"), "b.csv")
-    );
+    assert_eq!(forces(&file, "a.csv"), forces(&model("spidermill.toml"), "b.csv"));
 }
 
 /// What the recordings with swinging rods need: found from the data, with rods as one effect on both drives.
@@ -255,22 +198,12 @@ fn rods_are_identified_from_a_recording_with_rods() {
     let file = scratch("rods.toml");
     let both = "spindle_left,spindle_right";
     let spidermill = model("spidermill.toml");
-    let added = ran(&[
-        "add",
-        &spidermill,
-        "rod_inertia",
-        "--at",
-        both,
-        "--out",
-        &file,
-    ]);
+    let added = ran(&["add", &spidermill, "rod_inertia", "--at", both, "--out", &file]);
     // The model extends nothing, so that it may stand anywhere.
     assert_eq!(added.status, 0, "{}", added.err);
     let (fit, check) = (run("with-rods-fit.csv"), run("with-rods-check.csv"));
     let error = |model: &str| {
-        let found = json(&[
-            "identify", model, "--data", &fit, "--check", &check, "--json",
-        ]);
+        let found = json(&["identify", model, "--data", &fit, "--check", &check, "--json"]);
         found["check"]["nrms"].as_f64().expect("a figure")
     };
     let (without, with) = (error(&spidermill), error(&file));

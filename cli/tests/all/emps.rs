@@ -10,9 +10,7 @@ fn identified(name: &str) -> Option<Value> {
     let folder = workspace("../shared/data/emps");
     let path = |name: &str| folder.join(name).to_str().expect("plain text").to_owned();
     if !folder.join("emps_train.csv").is_file() {
-        println!(
-            "EMPS is not tested: there are no recordings in ../shared/data/emps beside the workspace."
-        );
+        println!("EMPS is not tested: there are no recordings in ../shared/data/emps beside the workspace.");
         return None;
     }
     Some(json(&[
@@ -50,12 +48,7 @@ fn the_published_four_parameters_come_out() {
     };
     check_parameters(
         &fit,
-        &[
-            ("M", 95.1089),
-            ("Fv", 203.5034),
-            ("Fc", 20.3935),
-            ("offset", -3.1648),
-        ],
+        &[("M", 95.1089), ("Fv", 203.5034), ("Fc", 20.3935), ("offset", -3.1648)],
     );
     assert!((number(&fit, "/condition_number") - 25.99).abs() < 0.1);
     assert!((100.0 * number(&fit, "/fit/rows/nrms") - 4.083).abs() < 0.15);

@@ -27,12 +27,7 @@ fn at(one: &Value, period: f64, t: f64) -> [f64; 3] {
 fn columns(path: &str) -> (Vec<String>, Vec<Vec<f64>>) {
     let text = std::fs::read_to_string(path).unwrap();
     let mut lines = text.lines();
-    let names = lines
-        .next()
-        .unwrap()
-        .split(',')
-        .map(str::to_owned)
-        .collect();
+    let names = lines.next().unwrap().split(',').map(str::to_owned).collect();
     let rows = lines.map(|line| line.split(',').map(|x| x.parse().unwrap()).collect());
     (names, rows.collect())
 }
@@ -50,10 +45,7 @@ fn beats_the_best_of_a_thousand_random_trajectories_without_leaving_the_limits()
         &out,
         "--json",
     ]);
-    let (start, condition) = (
-        number(&found, "/start"),
-        number(&found, "/condition_number"),
-    );
+    let (start, condition) = (number(&found, "/start"), number(&found, "/condition_number"));
     println!(
         "condition number {condition:.3}, best of 1000 random ones {start:.3}: {:.2} times better",
         start / condition
@@ -105,10 +97,7 @@ fn beats_the_best_of_a_thousand_random_trajectories_without_leaving_the_limits()
     let recording = scratch("excite-recording.csv");
     let fit = identified(&out, &recording, true);
     let seen = number(&fit, "/condition_number");
-    assert!(
-        (seen / condition - 1.0).abs() < 1e-3,
-        "{seen} against {condition}"
-    );
+    assert!((seen / condition - 1.0).abs() < 1e-3, "{seen} against {condition}");
 
     // From positions alone, with encoders of 20 bits and 1 N of noise in the forces.
     let fit = identified(&out, &recording, false);
@@ -125,14 +114,7 @@ fn beats_the_best_of_a_thousand_random_trajectories_without_leaving_the_limits()
 fn identified(trajectory: &str, recording: &str, exact: bool) -> Value {
     let spidermill = model("spidermill.toml");
     let forces = scratch("excite-forces.csv");
-    printed(&[
-        "evaluate",
-        &spidermill,
-        "--data",
-        trajectory,
-        "--out",
-        &forces,
-    ]);
+    printed(&["evaluate", &spidermill, "--data", trajectory, "--out", &forces]);
     let ((names, states), (_, forces)) = (columns(trajectory), columns(&forces));
     let kept = if exact { names.len() } else { 3 };
     let step = 2.0 * PI / f64::from(1 << 20);
@@ -151,11 +133,7 @@ fn identified(trajectory: &str, recording: &str, exact: bool) -> Value {
     for (state, force) in states.iter().zip(&forces) {
         let _ = write!(text, "{}", state[0]);
         for value in &state[1..kept] {
-            let read = if exact {
-                *value
-            } else {
-                (value / step).round() * step
-            };
+            let read = if exact { *value } else { (value / step).round() * step };
             let _ = write!(text, ",{read}");
         }
         for value in &force[1..] {
@@ -220,12 +198,7 @@ fn passive_angles_forces_points_and_singular_poses_are_limited_too() {
         .iter()
         .map(|limit| limit["name"].as_str().unwrap())
         .collect();
-    for name in [
-        "gamma1",
-        "spindle_left",
-        "R3m.x",
-        "singularity of the loops",
-    ] {
+    for name in ["gamma1", "spindle_left", "R3m.x", "singularity of the loops"] {
         assert!(names.contains(&name), "{names:?}");
     }
     assert!(number(&tight, "/condition_number") > number(&free, "/condition_number"));
@@ -240,10 +213,7 @@ fn passive_angles_forces_points_and_singular_poses_are_limited_too() {
         let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
         let length = dx.hypot(dy);
         let height = (1.03_f64.powi(2) - 0.25 * length * length).sqrt();
-        let platform = [
-            middle[0] + height * dy / length,
-            middle[1] - height * dx / length,
-        ];
+        let platform = [middle[0] + height * dy / length, middle[1] - height * dx / length];
         left = left.min((platform[0] - 0.38).min(0.52 - platform[0]));
         let gamma = (platform[1] - a[1]).atan2(platform[0] - a[0]) - row[1];
         lowest = lowest.min((gamma + 2.75).min(-2.45 - gamma));
@@ -261,10 +231,7 @@ fn impossible_limits_are_told() {
         refused(status, &arguments)
     };
     let says = run(1, &["--limits", "spindle_left=0.001"]);
-    assert!(
-        says.contains("spindle_left") && says.contains("widen"),
-        "{says}"
-    );
+    assert!(says.contains("spindle_left") && says.contains("widen"), "{says}");
     let says = run(1, &["--limits", "theta9=1:2"]);
     assert!(says.contains("theta9") && says.contains("theta1"), "{says}");
     let says = run(1, &["--limits", "gamma1_d=1"]);
@@ -274,10 +241,7 @@ fn impossible_limits_are_told() {
     run(2, &["--period", "-1"]);
     let two_link = model("two_link.toml");
     let says = refused(1, &["excite", &two_link, "--out", &out]);
-    assert!(
-        says.contains("limits.coordinates") && says.contains("q1"),
-        "{says}"
-    );
+    assert!(says.contains("limits.coordinates") && says.contains("q1"), "{says}");
     let says = refused(2, &["excite", &spidermill, "--out", &spidermill]);
     assert!(says.contains("overwrite"), "{says}");
 }

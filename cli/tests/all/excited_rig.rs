@@ -52,8 +52,7 @@ fn one_period_of_positions_gives_every_base_parameter_to_a_fifth_of_a_per_cent()
             let fit = json(&args);
             assert!((number(&fit, "/fit/rms") - 1.0).abs() < 0.04);
             for parameter in fit["parameters"].as_array().expect("parameters") {
-                let [value, nominal, std] =
-                    ["/value", "/nominal", "/std"].map(|name| number(parameter, name));
+                let [value, nominal, std] = ["/value", "/nominal", "/std"].map(|name| number(parameter, name));
                 println!(
                     "seed {seed} {more:?}: {} off by {:.4} %, deviation {:.4} %",
                     parameter["name"],

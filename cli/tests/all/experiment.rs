@@ -48,10 +48,7 @@ fn the_error_of_the_papers_treatment_is_the_force_of_the_misplaced_mass() {
         let of = |rig: &str, path: &str| number(&found, &format!("/{rig}/{run}/{path}"));
         for drive in [0, 1] {
             // Nothing is lost by the reduction.
-            let nrms = of(
-                "spidermill_full",
-                &format!("consistent/calculated/{drive}/nrms"),
-            );
+            let nrms = of("spidermill_full", &format!("consistent/calculated/{drive}/nrms"));
             assert!(nrms < 1e-4, "{nrms}");
             // The paper's treatment is off before identification and not after.
             let nrms = of("spidermill_full", &format!("paper/calculated/{drive}/nrms"));
@@ -64,12 +61,7 @@ fn the_error_of_the_papers_treatment_is_the_force_of_the_misplaced_mass() {
             assert!(rods("paper/estimated") > 1e-3 && rods("consistent/estimated") > 1e-3);
             assert!(rods("paper/estimated") < 0.5 * rods("paper/calculated"));
             // Peaks lift the mean above the median.
-            let relative = |kind: &str| {
-                of(
-                    "spidermill_full",
-                    &format!("paper/calculated/{drive}/{kind}_relative"),
-                )
-            };
+            let relative = |kind: &str| of("spidermill_full", &format!("paper/calculated/{drive}/{kind}_relative"));
             assert!(relative("mean") > relative("median"));
         }
         let remains = of("spidermill_full", "explained/remains");
@@ -92,12 +84,7 @@ fn the_error_of_the_papers_treatment_is_the_force_of_the_misplaced_mass() {
     let consistent = base(masses, 0.515, inertias, 1.03);
     same(&found["p_min"]["consistent"], consistent, 1e-6);
     same(&found["spidermill_full"]["p_min"], consistent, 1e-4);
-    let estimated = base(
-        [50.9597, 15.9794, 14.5773, 5.9203],
-        0.833,
-        [4.9733, 0.2162],
-        0.833,
-    );
+    let estimated = base([50.9597, 15.9794, 14.5773, 5.9203], 0.833, [4.9733, 0.2162], 0.833);
     same(&found["p_min"]["paper_estimated"], estimated, 1e-9);
 
     // Every solution as in Table 1 gives the estimated base parameters back.

@@ -4,10 +4,7 @@ use crate::common::{model, printed, ran, refused, run, scratch};
 
 #[test]
 fn the_ending_says_the_format() {
-    for (ending, head) in [
-        ("urdf", "<robot name=\"panda\">"),
-        ("xml", "<mujoco model=\"panda\">"),
-    ] {
+    for (ending, head) in [("urdf", "<robot name=\"panda\">"), ("xml", "<mujoco model=\"panda\">")] {
         let out = scratch(&format!("exported.{ending}"));
         let told = ran(&["export", &model("panda.toml"), "--out", &out]);
         assert_eq!(told.status, 0, "{}", told.err);
@@ -19,19 +16,8 @@ fn the_ending_says_the_format() {
         assert_eq!(told.status, 0, "{}", told.err);
         assert!(printed(&["check", &back]).contains("43 base parameters"));
     }
-    let says = refused(
-        1,
-        &[
-            "export",
-            &model("panda.toml"),
-            "--out",
-            &scratch("exported.txt"),
-        ],
-    );
-    assert!(
-        says.contains(".urdf") && says.contains("--format"),
-        "{says}"
-    );
+    let says = refused(1, &["export", &model("panda.toml"), "--out", &scratch("exported.txt")]);
+    assert!(says.contains(".urdf") && says.contains("--format"), "{says}");
 }
 
 #[test]
@@ -41,14 +27,8 @@ fn base_parameters_are_no_bodies() {
     let data = run("with-rods-fit.csv");
     printed(&["identify", &spidermill, "--data", &data, "--out", &fit]);
     let out = scratch("exported.xml");
-    let says = refused(
-        1,
-        &["export", &spidermill, "--parameters", &fit, "--out", &out],
-    );
+    let says = refused(1, &["export", &spidermill, "--parameters", &fit, "--out", &out]);
     assert!(says.contains("--physical"), "{says}");
-    let says = refused(
-        1,
-        &["export", &model("spidermill-paper.toml"), "--out", &out],
-    );
+    let says = refused(1, &["export", &model("spidermill-paper.toml"), "--out", &out]);
     assert!(says.contains("moment_at"), "{says}");
 }

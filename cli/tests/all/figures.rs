@@ -63,12 +63,7 @@ fn evaluated_forces_are_the_recorded_ones() {
     let (forces, recording) = (read(&out), read(&run("plain-check.csv")));
     assert_eq!(forces[0], ["t", "spindle_left", "spindle_right"]);
     assert_eq!(forces.len(), recording.len());
-    let column = |name: &str| {
-        recording[0]
-            .iter()
-            .position(|c| c == name)
-            .expect("a column")
-    };
+    let column = |name: &str| recording[0].iter().position(|c| c == name).expect("a column");
     let (mut error, mut size) = (0.0_f64, 0.0_f64);
     for (model, measured) in forces.iter().zip(&recording).skip(1) {
         assert_eq!(model[0], measured[column("t")]);
@@ -151,8 +146,8 @@ fn with_rods_identification_halves_the_error_and_no_more() {
             &run("with-rods-check.csv"),
             "--json",
         ]);
-        let figures = ["/nominal/fit", "/fit", "/nominal/check", "/check"]
-            .map(|place| number(&fit, &format!("{place}/nrms")));
+        let figures =
+            ["/nominal/fit", "/fit", "/nominal/check", "/check"].map(|place| number(&fit, &format!("{place}/nrms")));
         println!(
             "{name}, with rods: fit {:.4} -> {:.4}, check {:.4} -> {:.4}",
             figures[0], figures[1], figures[2], figures[3]

@@ -21,10 +21,7 @@ fn maps(form: &str) -> Vec<String> {
             format!("joint1={tau}{one}"),
             format!("joint2={tau}{two}"),
         ];
-        pairs
-            .into_iter()
-            .flat_map(|pair| ["--map".to_owned(), pair])
-            .collect()
+        pairs.into_iter().flat_map(|pair| ["--map".to_owned(), pair]).collect()
     };
     match form {
         "plain" => columns("q_", "tau_", ["1", "2"]),
@@ -44,9 +41,7 @@ fn fit(file: &str, form: &str) -> String {
     let mut args = vec!["identify", &two_link, "--data", &data, "--out", &out];
     args.extend(maps.iter().map(String::as_str));
     printed(&args);
-    std::fs::read_to_string(&out)
-        .expect("a fit")
-        .replace(&data, "RUN")
+    std::fs::read_to_string(&out).expect("a fit").replace(&data, "RUN")
 }
 
 /// Forces of the fixture are those of no arm, which is all the same to the comparison of bytes.
@@ -89,9 +84,7 @@ fn columns_of_topics_can_be_computed_with() {
         args.extend(maps.iter().map(String::as_str));
         let found = json(&args);
         let list = found["parameters"].as_array().expect("a list").clone();
-        list.iter()
-            .map(|p| number(p, "/value"))
-            .collect::<Vec<f64>>()
+        list.iter().map(|p| number(p, "/value")).collect::<Vec<f64>>()
     };
     let (once, twice) = (values(&maps), values(&doubled));
     assert!(!once.is_empty());
@@ -109,10 +102,7 @@ fn recordings_lists_topics_and_columns() {
     assert_eq!(topic["type"], "sensor_msgs/msg/JointState");
     assert_eq!(topic["samples"], 60);
     assert!((number(topic, "/rate") - 250.0).abs() < 1e-6);
-    assert_eq!(
-        topic["columns"][3]["name"],
-        "joint_states.velocity.arm/wrist"
-    );
+    assert_eq!(topic["columns"][3]["name"], "joint_states.velocity.arm/wrist");
     let arrays = listed.pointer("/recordings/1/tables/0").expect("a table");
     assert_eq!(arrays["columns"].as_array().expect("a list").len(), 7);
     assert!((number(arrays, "/end") - 0.236).abs() < 1e-12);
@@ -138,10 +128,7 @@ fn files_of_one_run_are_joined() {
         let text: Vec<String> = lines
             .map(|(i, line)| {
                 let fields = line.split(',').enumerate();
-                let kept: Vec<&str> = fields
-                    .filter(|(j, _)| keep(i, j + 1))
-                    .map(|(_, f)| f)
-                    .collect();
+                let kept: Vec<&str> = fields.filter(|(j, _)| keep(i, j + 1)).map(|(_, f)| f).collect();
                 kept.join(",")
             })
             .collect();
@@ -152,9 +139,7 @@ fn files_of_one_run_are_joined() {
     // Columns: t, two coordinates with rates and accelerations, two forces.
     let states = part("states.csv", &|_, j| j < 8);
     let forces = part("forces.csv", &|_, j| !(2..=7).contains(&j));
-    let rare = part("rare.csv", &|i, j| {
-        (i < 1 || i % 4 == 1) && !(2..=7).contains(&j)
-    });
+    let rare = part("rare.csv", &|i, j| (i < 1 || i % 4 == 1) && !(2..=7).contains(&j));
     let spidermill = model("spidermill.toml");
     let errors = |data: &str| {
         let found = json(&["compare", &spidermill, "--data", data, "--json"]);
@@ -174,7 +159,7 @@ fn files_of_one_run_are_joined() {
     assert!((rare_n - n / 4.0).abs() <= 1.0, "{rare_n} of {n}");
     assert!(rare_error < 1e-5, "{rare_error}");
     assert!(
-        found["data"].to_string().contains("taken at their times"),
+        found["data"].to_string().contains("interpolated linearly to them"),
         "{found}"
     );
     let says = refused(
@@ -186,10 +171,7 @@ fn files_of_one_run_are_joined() {
             &format!("{states}+{}", run("plain-check.csv")),
         ],
     );
-    assert!(
-        says.contains("`theta1`") && says.contains("states.csv too"),
-        "{says}"
-    );
+    assert!(says.contains("`theta1`") && says.contains("states.csv too"), "{says}");
 }
 
 /// A fit in the model file is the fit beside it; a later one takes its place, and one of physical parameters is told by them.
@@ -227,10 +209,7 @@ fn fits_travel() {
         text.contains("parameters = { m1 = ") && !text.contains("base = ["),
         "{text}"
     );
-    let (beside, within) = (
-        error(&[&spidermill, "--parameters", &physical]),
-        error(&[&adopted]),
-    );
+    let (beside, within) = (error(&[&spidermill, "--parameters", &physical]), error(&[&adopted]));
     assert!((beside - within).abs() < 1e-9 * beside, "{beside} {within}");
     // What is held is the fit.
     let held = |args: &[&str]| {
@@ -243,11 +222,7 @@ fn fits_travel() {
     // A fit of another model is none.
     let says = refused(1, &["adopt", &model("two_link.toml"), &fit]);
     assert!(says.contains("belongs to another model"), "{says}");
-    let unknown = ran(&[
-        "adopt",
-        &adopted,
-        Path::new(&adopted).to_str().expect("text"),
-    ]);
+    let unknown = ran(&["adopt", &adopted, Path::new(&adopted).to_str().expect("text")]);
     assert_eq!(unknown.status, 1, "{}", unknown.err);
 }
 
@@ -265,24 +240,18 @@ fn columns_of_motors_are_declared() {
         args.extend(maps.iter().map(String::as_str));
         let found = json(&args);
         let list = found["parameters"].as_array().expect("a list").clone();
-        list.iter()
-            .map(|p| number(p, "/value"))
-            .collect::<Vec<f64>>()
+        list.iter().map(|p| number(p, "/value")).collect::<Vec<f64>>()
     };
     for (plain, scaled) in values(&two_link).iter().zip(values(&declared)) {
-        assert!(
-            (scaled + 5.0 * plain).abs() <= 1e-9 * plain.abs(),
-            "{plain} {scaled}"
-        );
+        assert!((scaled + 5.0 * plain).abs() <= 1e-9 * plain.abs(), "{plain} {scaled}");
     }
     for (entry, word) in [
         ("joint1 = { ratio = 0 }", "zero"),
-        ("joint1 = {}", "says nothing"),
+        ("joint1 = {}", "is empty"),
         ("q1 = { ratio = 2 }", "unknown drive"),
     ] {
         let text = std::fs::read_to_string(&two_link).expect("a model");
-        std::fs::write(&declared, format!("{text}\n[recording.torque]\n{entry}\n"))
-            .expect("written");
+        std::fs::write(&declared, format!("{text}\n[recording.torque]\n{entry}\n")).expect("written");
         let says = refused(1, &["check", &declared]);
         assert!(says.contains(word), "{says}");
     }

@@ -1,120 +1,24 @@
-//! The benchmark of hidden effects makes what it says it makes: recordings that repeat, effects of the size that is
-//! asked for, and a truth that leaves nothing but noise; and a few of them are found.
+//! A few recordings of the benchmark of hidden effects, and what is hidden in them is found.
 
 use std::path::Path;
 
-use crate::benchmark::case::{Case, class_of};
-use crate::benchmark::coloured::{Fall, noise};
-use crate::benchmark::judge::{Class, FALL, SAME, judge};
-use crate::benchmark::plant::{Along, DRIVES, Plant};
-use crate::benchmark::random::Random;
-use crate::benchmark::span::{Span, norm};
-use crate::benchmark::{columns, placed, record, span};
-
-const SEED: u64 = 3;
-
-fn plant() -> Plant {
-    Plant::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../model-spec"))
-        .expect("rig and model")
-}
-
-fn column(csv: &str, name: &str) -> Vec<f64> {
-    let mut lines = csv.lines();
-    let header = lines.next().expect("a header");
-    let at = header
-        .split(',')
-        .position(|n| n == name)
-        .expect("the column");
-    let field = |line: &str| {
-        line.split(',')
-            .nth(at)
-            .expect("a field")
-            .parse()
-            .expect("a number")
-    };
-    lines.map(field).collect()
-}
-
-#[test]
-fn classes_come_in_the_shares_that_are_promised() {
-    let of = |class| (1..=240).filter(|n| class_of(*n).0 == class).count();
-    assert_eq!(Class::ALL.map(of), [120, 48, 36, 36]);
-    assert_eq!(class_of(1), (Class::One, 0));
-    assert_eq!(class_of(21), (Class::One, 10));
-}
-
-/// The one effect of each of the first cases explains its own forces, and nothing does not.
-#[test]
-fn the_truth_explains_its_recording() {
-    let plant = plant();
-    for number in [1, 2, 3, 5] {
-        let case = Case::draw(&plant, SEED, number).expect("a case");
-        let truth = case.placed();
-        assert!(!truth.is_empty());
-        let left = case.excess(&plant, &truth).expect("columns of the library");
-        assert!(left < SAME, "{}: {left}", case.truth());
-        let nothing = case.excess(&plant, &[]).expect("no columns");
-        assert!(nothing > 100.0 * SAME, "{}: {nothing}", case.truth());
-        let [fit, _] = case.errors;
-        assert!((0.01..0.35).contains(&fit), "{}: {fit}", case.truth());
-    }
-}
-
-/// The recorded forces, minus what the model can say, are the noise that the floor is made of.
-#[test]
-fn a_recording_with_nothing_hidden_is_the_model_and_noise() {
-    let plant = plant();
-    let number = (1..100)
-        .find(|n| class_of(*n).0 == Class::None)
-        .expect("such a class");
-    let case = Case::draw(&plant, SEED, number).expect("a case");
-    let recorded = record::record(&case, SEED, 0).expect("a recording");
-    let again = record::record(&case, SEED, 0).expect("a recording");
-    assert_eq!(recorded.csv, again.csv);
-    let times = column(&recorded.csv, "t");
-    let along = Along::new(&case.rig, &case.courses[0], times).expect("the same motion");
-    let [left, right] = DRIVES.map(|drive| column(&recorded.csv, drive));
-    let measured: Vec<f64> = left
-        .into_iter()
-        .zip(right)
-        .flat_map(|(l, r)| [l, r])
-        .collect();
-    let span = Span::from_columns(along.base(&plant.derivation).expect("columns"));
-    let left = norm(&span.rest(&measured));
-    let share = left / norm(&measured) / recorded.floor;
-    assert!((share - 1.0).abs() < 2e-3, "{share}");
-    let deviation = left / (measured.len() as f64).sqrt() / case.noise;
-    assert!((deviation - 1.0).abs() < 0.05, "{deviation}");
-}
-
-/// What is outside stays outside if every column of the library is taken together.
-#[test]
-fn no_library_says_what_is_outside() {
-    let plant = plant();
-    for number in (1..100)
-        .filter(|n| class_of(*n).0 == Class::Outside)
-        .take(2)
-    {
-        let case = Case::draw(&plant, SEED, number).expect("a case");
-        let along = &case.coarse[0];
-        let forces = case.forces(along, &case.courses[0]).expect("forces");
-        let mut all = Span::from_columns(along.base(&plant.derivation).expect("columns"));
-        all.extend(columns::library(along));
-        let rest = span::rms(&all.rest(&forces));
-        assert!(rest > 1.9 * case.noise, "{}: {rest}", case.truth());
-    }
-}
+use modelmill_lab::case::HiddenCase;
+use modelmill_lab::harness::TestedProgram;
+use modelmill_lab::judge::{FALL, judge};
+use modelmill_lab::placed::PlacedEffect;
+use modelmill_lab::plant::SpidermillPlant;
+use modelmill_lab::record;
 
 /// One effect, two, none, and one that no library holds.
 #[test]
 fn hidden_effects_are_found() {
     const SEED: u64 = 1001;
-    let plant = plant();
+    let plant = SpidermillPlant::load().expect("rig and model");
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("hidden_diagnosis");
     std::fs::create_dir_all(&folder).expect("a folder for the recordings");
-    let program = Path::new(env!("CARGO_BIN_EXE_modelmill"));
+    let program = TestedProgram::new(Path::new(env!("CARGO_BIN_EXE_modelmill")));
     for number in [1, 5, 6, 12, 24, 34] {
-        let case = Case::draw(&plant, SEED, number).expect("a case");
+        let case = HiddenCase::draw(&plant, SEED, number).expect("a case");
         let mut floor = 0.0;
         let files = record::FILES.map(|file| folder.join(format!("{number}-{file}")));
         for (which, file) in files.iter().enumerate() {
@@ -122,52 +26,17 @@ fn hidden_effects_are_found() {
             floor = recorded.floor;
             std::fs::write(file, recorded.csv).expect("the recording is written");
         }
-        let (answer, _) = crate::benchmark::ask::diagnose(
-            program.as_os_str(),
-            &plant.model,
-            &files[0],
-            &files[1],
-        );
+        let (answer, _) = program.diagnose(&plant.model, &files);
         let answer = answer.unwrap_or_else(|why| panic!("{}: {why}", case.truth()));
-        let mut excess = |claims: &[placed::Placed]| {
+        let mut excess = |claims: &[PlacedEffect]| {
             let left = case.excess(&plant, claims);
             left.unwrap_or(f64::INFINITY)
         };
         let mark = judge(case.class, &case.placed(), None, &answer, &mut excess);
-        assert!(
-            mark.is_right(),
-            "{}: {}; {answer:?}",
-            case.truth(),
-            mark.says()
-        );
+        assert!(mark.is_right(), "{}: {}; {answer:?}", case.truth(), mark.in_words());
         if !case.hidden.is_empty() {
             let last = answer.steps.last().expect("a ladder").check;
-            assert!(
-                last <= FALL * floor,
-                "{}: {last} over {floor}",
-                case.truth()
-            );
+            assert!(last <= FALL * floor, "{}: {last} over {floor}", case.truth());
         }
     }
-}
-
-/// Of a low-pass of first order by the bilinear transform neighbours correlate by half of one and its pole.
-#[test]
-fn coloured_noise_has_the_size_and_the_memory_that_are_asked_for() {
-    let (rate, corner) = (250.0, 15.0);
-    let values = noise(
-        &mut Random::new(SEED, 1, 2),
-        200_000,
-        rate,
-        2.0,
-        Some((corner, Fall::Gentle)),
-    );
-    let product = |lag: usize| -> f64 {
-        let pairs = values.iter().zip(&values[lag..]);
-        pairs.map(|(a, b)| a * b).sum::<f64>() / values.len() as f64
-    };
-    let k = (std::f64::consts::PI * corner / rate).tan();
-    let neighbours = 0.5 * (1.0 + (1.0 - k) / (1.0 + k));
-    assert!((product(0).sqrt() - 2.0).abs() < 0.05, "{}", product(0));
-    assert!((product(1) / product(0) - neighbours).abs() < 0.01);
 }

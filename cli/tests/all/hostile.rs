@@ -138,11 +138,7 @@ fn model(text: &dyn Fn(usize) -> String) -> String {
     );
     for (i, name) in NAMES.iter().enumerate() {
         let value = 0.01 * (i + 1) as f64;
-        _ = writeln!(
-            out,
-            "{name} = {{ value = {value}, unit = \"m\", note = {} }}",
-            next()
-        );
+        _ = writeln!(out, "{name} = {{ value = {value}, unit = \"m\", note = {} }}", next());
     }
     let lengths = NAMES.join(" + ");
     _ = write!(
@@ -249,8 +245,7 @@ fn steers(c: char) -> bool {
 fn steers_nothing(what: &str, text: &str) {
     let found = text.find(steers);
     let line = found.map(|at| {
-        text[..at].lines().last().unwrap_or_default().to_owned()
-            + &text[at..].chars().take(20).collect::<String>()
+        text[..at].lines().last().unwrap_or_default().to_owned() + &text[at..].chars().take(20).collect::<String>()
     });
     assert_eq!(line, None, "{what}");
 }
@@ -301,8 +296,7 @@ fn hostile_texts_are_texts_in_every_output() {
     let [hostile, harmless] = [true, false].map(written);
     let [hostile, harmless] = [text(&hostile), text(&harmless)];
     printed(&["check", hostile]);
-    let told: serde_json::Value =
-        serde_json::from_str(&printed(&["check", hostile, "--json"])).unwrap();
+    let told: serde_json::Value = serde_json::from_str(&printed(&["check", hostile, "--json"])).unwrap();
     assert_eq!(told["valid"], true);
     assert_eq!(told["title"], TEXTS.join(" "), "JSON holds another title");
     printed(&["diff", harmless, hostile]);
@@ -321,9 +315,7 @@ fn hostile_texts_are_texts_in_every_output() {
     }
     let checked = [hostile, harmless].map(|model| printed(&["check", model]).lines().count());
     assert_eq!(checked[0], checked[1], "a title begins lines of its own");
-    let equations = |format: &str| {
-        [hostile, harmless].map(|model| printed(&["equations", model, "--format", format]))
-    };
+    let equations = |format: &str| [hostile, harmless].map(|model| printed(&["equations", model, "--format", format]));
     printed(&["equations", hostile, "--json"]);
     equations("text");
 
@@ -343,9 +335,9 @@ fn hostile_texts_are_texts_in_every_output() {
     assert_eq!(bad.lines().count(), good.lines().count());
     let commands = |page: &str| {
         let all = pieces(page, "\\", |c| c.is_ascii_alphabetic());
-        let commands = all.into_iter().filter(|name| {
-            !name.is_empty() && !name.starts_with("textascii") && *name != "textbackslash"
-        });
+        let commands = all
+            .into_iter()
+            .filter(|name| !name.is_empty() && !name.starts_with("textascii") && *name != "textbackslash");
         commands.map(str::to_owned).collect::<Vec<_>>()
     };
     assert_eq!(commands(&bad), commands(&good), "other commands of LaTeX");
@@ -433,9 +425,7 @@ fn code(source: &str) -> String {
         rest = &rest[rest.find("*/").expect("a comment that ends") + 2..];
     }
     out.push_str(rest);
-    let lines = out
-        .lines()
-        .filter(|line| !line.trim_start().starts_with("//"));
+    let lines = out.lines().filter(|line| !line.trim_start().starts_with("//"));
     lines.collect::<Vec<_>>().join("\n")
 }
 
@@ -443,8 +433,7 @@ fn code(source: &str) -> String {
 fn crates_of_hostile_models_compile_and_hold_no_code_of_theirs() {
     let models = [true, false].map(written);
     let all = ["--dynamics", "--reactions", "--self-test"];
-    let [bad, good] = [&models[0], &models[1]]
-        .map(|model| printed(&[&["generate", text(model)][..], &all].concat()));
+    let [bad, good] = [&models[0], &models[1]].map(|model| printed(&[&["generate", text(model)][..], &all].concat()));
     assert_eq!(code(&bad), code(&good), "other code in Rust");
     for sign in ["<script", "](javascript", "<img"] {
         assert!(!bad.contains(sign), "{sign} in documentation of Rust");
@@ -477,8 +466,8 @@ fn crates_of_hostile_models_compile_and_hold_no_code_of_theirs() {
     let place = models[0].parent().unwrap();
 
     check_module(place, &bad);
-    let compilers = [("cc", "c"), ("c++", "c++")]
-        .map(|(program, language)| there(program).then_some((program, language)));
+    let compilers =
+        [("cc", "c"), ("c++", "c++")].map(|(program, language)| there(program).then_some((program, language)));
     let c99 = crates("c99", &all);
     let c = crates("c", &["--dynamics"]);
     cargo("build", &c, &[]);
@@ -569,8 +558,6 @@ fn import(place: &Path, module: &Path) {
                   names = [n for n in dir(m) if 'evil' in n]; assert not names, names; \
                   assert m.CONSTANTS['double'] == 0.01 and m.CONSTANTS['Double'] == 0.02; \
                   assert m.COORDINATES == ['async', 'Async'] and 'H_min' in m.__doc__; print('imported')";
-    let says = run(std::process::Command::new(python)
-        .args(["-c", script])
-        .arg(&imported));
+    let says = run(std::process::Command::new(python).args(["-c", script]).arg(&imported));
     assert_eq!(says, "imported\n");
 }

@@ -53,15 +53,7 @@ fn table_1(name: &str) -> String {
 
 fn interpret(fit: &str, unknown: &str) -> Value {
     let model = model("spidermill-paper.toml");
-    json(&[
-        "interpret",
-        &model,
-        "--fit",
-        fit,
-        "--unknown",
-        unknown,
-        "--json",
-    ])
+    json(&["interpret", &model, "--fit", fit, "--unknown", unknown, "--json"])
 }
 
 #[test]
@@ -73,10 +65,7 @@ fn table_1_comes_back_with_the_second_real_solution_beside_it() {
     for (name, expected) in TABLE_1 {
         if let Some(one) = solutions[0].get(name) {
             let value = one["value"].as_f64().unwrap();
-            assert!(
-                (value - expected).abs() < 1e-9 * expected,
-                "{name} = {value}"
-            );
+            assert!((value - expected).abs() < 1e-9 * expected, "{name} = {value}");
             assert_eq!(one["plausible"], true);
             assert!(one["std"].as_f64().unwrap() > 0.0);
         }
@@ -137,22 +126,11 @@ fn fewer_unknowns_than_equations_are_fitted_with_their_residuals() {
     )
     .unwrap();
     let fit = table_1("table-1-exact.json");
-    let found = json(&[
-        "interpret",
-        &variant,
-        "--fit",
-        &fit,
-        "--unknown",
-        "m2,m4,dc3",
-        "--json",
-    ]);
+    let found = json(&["interpret", &variant, "--fit", &fit, "--unknown", "m2,m4,dc3", "--json"]);
     assert!(number(&found, "/fit/0/chi_squared") < 1e-12);
     for (name, expected) in [("m2", 15.9794), ("m4", 5.9203), ("dc3", 0.833)] {
         let value = number(&found, &format!("/solutions/0/{name}/value"));
-        assert!(
-            (value - expected).abs() < 1e-6 * expected,
-            "{name} = {value}"
-        );
+        assert!((value - expected).abs() < 1e-6 * expected, "{name} = {value}");
     }
 }
 
@@ -180,17 +158,9 @@ fn an_identified_covariance_is_propagated() {
     assert!(!ran.err.contains("no covariance"), "{}", ran.err);
     let found: Value = serde_json::from_str(&ran.out).unwrap();
     // The recording was made with the nominal parameters by another program.
-    for (name, expected) in [
-        ("m2", 7.9538),
-        ("dc3", 0.515),
-        ("Ic12", 6.3195),
-        ("Ic32", 1.6173),
-    ] {
+    for (name, expected) in [("m2", 7.9538), ("dc3", 0.515), ("Ic12", 6.3195), ("Ic32", 1.6173)] {
         let value = number(&found, &format!("/solutions/0/{name}/value"));
-        assert!(
-            (value - expected).abs() < 2e-3 * expected,
-            "{name} = {value}"
-        );
+        assert!((value - expected).abs() < 2e-3 * expected, "{name} = {value}");
     }
 }
 
@@ -198,15 +168,9 @@ fn an_identified_covariance_is_propagated() {
 fn nonsense_is_refused() {
     let fit = table_1("table-1-refused.json");
     let paper = model("spidermill-paper.toml");
-    let says = refused(
-        1,
-        &["interpret", &paper, "--fit", &fit, "--unknown", "m2,mass"],
-    );
+    let says = refused(1, &["interpret", &paper, "--fit", &fit, "--unknown", "m2,mass"]);
     assert!(says.contains("mass") && says.contains("m1, m2"), "{says}");
-    refused(
-        2,
-        &["interpret", &paper, "--fit", &fit, "--unknown", "m2,m2"],
-    );
+    refused(2, &["interpret", &paper, "--fit", &fit, "--unknown", "m2,m2"]);
     refused(2, &["interpret", &paper, "--fit", &fit]);
     let other = model("spidermill.toml");
     let says = refused(1, &["interpret", &other, "--fit", &fit, "--unknown", "m2"]);

@@ -3,9 +3,6 @@
 //! One target for all of them, since each target links the whole program anew.
 
 mod atlas;
-#[allow(dead_code, reason = "what only the run of the benchmark calls")]
-#[path = "../../benches/hidden_effects/parts.rs"]
-mod benchmark;
 #[cfg(target_os = "linux")]
 mod bombs;
 #[cfg(unix)]
@@ -28,7 +25,6 @@ mod figures;
 mod formats;
 mod guide;
 mod hidden_cases;
-mod hidden_effects;
 #[cfg(unix)]
 mod hostile;
 mod interpret;

@@ -43,10 +43,7 @@ pub(crate) fn check(browser: &mut Browser, window: &Window, what: &str) {
             let none: [&str; 0] = [];
             assert_eq!(texts(&wrong), none, "{what}, {width} wide");
             let counted = browser.run(window, "return window.faint().counted;");
-            assert!(
-                counted.as_u64().is_some_and(|n| n > 20),
-                "{what}: {counted}"
-            );
+            assert!(counted.as_u64().is_some_and(|n| n > 20), "{what}: {counted}");
             let faint = browser.run(window, &settled("window.faint().found"));
             assert_eq!(texts(&faint), none, "{what}, {medium:?}");
             let nameless = browser.run(window, "return window.nameless();");
@@ -84,9 +81,7 @@ fn written_pages_fit_every_screen_and_paper() {
     }
     let delta = model("five_bar.toml");
     printed(&["atlas", &robot, &delta, &arm, "--out", &folder]);
-    printed(&[
-        "report", &robot, "--data", &fit, "--check", &other, "--out", &folder,
-    ]);
+    printed(&["report", &robot, "--data", &fit, "--check", &other, "--out", &folder]);
     printed(&["runs", &robot, "--data", &fit, &other, "--out", &folder]);
     let small = format!("experiment --out {folder} --random 40 --starts 1 --rate 60");
     printed(&small.split(' ').collect::<Vec<_>>());
@@ -103,11 +98,7 @@ fn the_workbench_fits_every_screen_and_paper() {
         return;
     };
     let (fit, other) = (run("with-rods-fit.csv"), run("with-rods-check.csv"));
-    let bench = Workbench::open(
-        "pages-work",
-        "spidermill.toml",
-        &["--data", &fit, "--check", &other],
-    );
+    let bench = Workbench::open("pages-work", "spidermill.toml", &["--data", &fit, "--check", &other]);
     let window = browser.open(&bench.link);
     browser.run(
         &window,
@@ -127,8 +118,7 @@ fn the_workbench_fits_every_screen_and_paper() {
     assert!(panes.len() >= 5, "{panes:?}");
     for pane in panes {
         // What is being made anew is pale until it is there.
-        let ready =
-            "await until('all of it', () => !document.querySelector('#both.stale, #costs.stale'));";
+        let ready = "await until('all of it', () => !document.querySelector('#both.stale, #costs.stale'));";
         browser.run(&window, &format!("tab('{pane}'); {ready}"));
         check(&mut browser, &window, &format!("the workbench, {pane}"));
     }

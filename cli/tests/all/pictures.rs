@@ -29,10 +29,7 @@ fn a_pose_and_a_view_can_be_chosen() {
     let aside = drawn("aside.svg", &["check", &panda, "--view", "30,20"]);
     assert_ne!(
         aside,
-        drawn(
-            "above.svg",
-            &["check", &panda, "--view", "-30,80", "--frames"]
-        )
+        drawn("above.svg", &["check", &panda, "--view", "-30,80", "--frames"])
     );
 }
 
@@ -47,22 +44,14 @@ fn a_variant_lies_over_what_it_was() {
 fn what_cannot_be_drawn_is_said() {
     let spidermill = model("spidermill.toml");
     let file = scratch("never.svg");
-    let at = |value: &str| {
-        refused(
-            2,
-            &["check", &spidermill, "--picture", &file, "--at", value],
-        )
-    };
+    let at = |value: &str| refused(2, &["check", &spidermill, "--picture", &file, "--at", value]);
     let unknown = at("gamma1=1");
     assert!(
         unknown.contains("`gamma1` is no active coordinate") && unknown.contains("theta1, theta2"),
         "{unknown}"
     );
     let apart = at("theta1=-1.5");
-    assert!(
-        apart.contains("loops of spidermill cannot close"),
-        "{apart}"
-    );
+    assert!(apart.contains("loops of spidermill cannot close"), "{apart}");
     refused(2, &["check", &spidermill, "--at", "theta1=1"]);
     refused(2, &["check", &spidermill, "--picture", &spidermill]);
 }

@@ -9,17 +9,11 @@ use crate::common::{json, model, number, scratch, workspace};
 
 /// The head of a recording, as a file of its own.
 fn first(seconds: f64, name: &str) -> String {
-    let text =
-        std::fs::read_to_string(workspace("../shared/data/spidermill-cases/null").join(name))
-            .expect("readable");
+    let text = std::fs::read_to_string(workspace("../shared/data/spidermill-cases/null").join(name)).expect("readable");
     let mut lines = text.lines();
     let mut kept = format!("{}\n", lines.next().expect("a header"));
     for line in lines {
-        let t: f64 = line
-            .split(',')
-            .next()
-            .and_then(|t| t.parse().ok())
-            .expect("a time");
+        let t: f64 = line.split(',').next().and_then(|t| t.parse().ok()).expect("a time");
         if t < seconds {
             writeln!(kept, "{line}").expect("text grows");
         }
@@ -32,9 +26,7 @@ fn first(seconds: f64, name: &str) -> String {
 #[test]
 fn nothing_but_the_noise_of_the_forces_is_left() {
     if !workspace("../shared/data/spidermill-cases/null/fit.csv").is_file() {
-        println!(
-            "Preparation is not tested: there is no ../shared/data/spidermill-cases beside the workspace."
-        );
+        println!("Preparation is not tested: there is no ../shared/data/spidermill-cases beside the workspace.");
         return;
     }
     // Two periods; one; and parts of one, which is filtered.
@@ -54,18 +46,11 @@ fn nothing_but_the_noise_of_the_forces_is_left() {
             "--json",
         ]);
         let notes = found["data"].to_string();
-        assert_eq!(
-            notes.contains("a Fourier series of period 7.29"),
-            series,
-            "{notes}"
-        );
+        assert_eq!(notes.contains("a Fourier series of period 7.29"), series, "{notes}");
         for part in ["fit", "check"] {
             let rms = number(&found, &format!("/{part}/rms"));
             println!("{seconds} s, {part}: {rms:.4} N");
-            assert!(
-                (rms - 1.0).abs() < tolerance,
-                "{seconds} s, {part}: {rms} N"
-            );
+            assert!((rms - 1.0).abs() < tolerance, "{seconds} s, {part}: {rms} N");
         }
     }
 }
@@ -76,9 +61,7 @@ fn nothing_but_the_noise_of_the_forces_is_left() {
 fn a_series_is_taken_where_forces_tell_that_it_leaves_less() {
     let path = workspace("../shared/data/spidermill-cases/null/fit.csv");
     let Ok(text) = std::fs::read_to_string(path) else {
-        println!(
-            "Series are not tested: there is no ../shared/data/spidermill-cases beside the workspace."
-        );
+        println!("Series are not tested: there is no ../shared/data/spidermill-cases beside the workspace.");
         return;
     };
     let mut coarse = String::new();
@@ -108,14 +91,8 @@ fn a_series_is_taken_where_forces_tell_that_it_leaves_less() {
         (off, found["data"].to_string())
     };
     let (series, says) = off(&[]);
-    assert!(
-        says.contains("is taken for a Fourier series of period 7.29"),
-        "{says}"
-    );
+    assert!(says.contains("is fitted by a Fourier series of period 7.29"), "{says}");
     let (filtered, _) = off(&["--smoothing", "butterworth"]);
     println!("a series: {series:.4}, a low-pass: {filtered:.4}");
-    assert!(
-        series < 0.01 && 10.0 * series < filtered,
-        "{series} {filtered}"
-    );
+    assert!(series < 0.01 && 10.0 * series < filtered, "{series} {filtered}");
 }

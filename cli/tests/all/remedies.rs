@@ -32,11 +32,8 @@ fn names_of_files_stay_as_they_are() {
     assert_eq!(told["model"], "verb `add`");
     assert_eq!(told["title"], "option `columns` = `q=x` option `data`");
     let text = printed(&["check", &path]);
-    assert!(text.starts_with("verb `add`: sound"), "{text}");
-    assert!(
-        text.contains("option `columns` = `q=x` option `data`"),
-        "{text}"
-    );
+    assert!(text.starts_with("verb `add`: valid"), "{text}");
+    assert!(text.contains("option `columns` = `q=x` option `data`"), "{text}");
     let missing = path.replace("add", "` `--map");
     let says = refused(1, &["check", &missing]);
     assert!(says.contains(&missing), "{says}");
@@ -79,11 +76,7 @@ fn pushed(name: &str) -> String {
         _ => format!("{line}\n"),
     };
     let path = scratch(name);
-    std::fs::write(
-        &path,
-        text.lines().enumerate().map(push).collect::<String>(),
-    )
-    .unwrap();
+    std::fs::write(&path, text.lines().enumerate().map(push).collect::<String>()).unwrap();
     path
 }
 
@@ -169,18 +162,9 @@ fn advice_is_in_the_words_of_the_program() {
         &["interpret", arm, "--fit", degrees, "--unknown", "m"],
         &["interpret", arm, "--fit", fit, "--unknown", "nothing"],
         &["report", arm, "--data", degrees, "--out", page],
-        &[
-            "runs", mechanism, "--data", plain, nameless, plain, "--out", runs,
-        ],
+        &["runs", mechanism, "--data", plain, nameless, plain, "--out", runs],
         &["excite", arm, "--out", trajectory],
-        &[
-            "simulate",
-            arm,
-            "--trajectory",
-            degrees,
-            "--out",
-            trajectory,
-        ],
+        &["simulate", arm, "--trajectory", degrees, "--out", trajectory],
         &[
             "export",
             arm,

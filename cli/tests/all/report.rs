@@ -1,9 +1,9 @@
-//! The page that `report` writes: it holds what `diagnose` says, needs nothing else, and answers to wheel, pointer and keys
-//! in a browser.
+//! The page that `report` writes: it holds what `diagnose` says, needs nothing else, and answers to wheel, pointer and
+//! keys in a browser.
 //!
-//! Decision: a page of `report` is tested without the protocol of the developer tools. The test writes a copy with
-//! two more scripts: one that collects errors first, and one that uses wheel, pointer and keys last. It reads what
-//! they wrote from the dumped document.
+//! Decision: a page of `report` is tested without the protocol of the developer tools. The test writes a copy with two
+//! more scripts: one that collects errors first, and one that uses wheel, pointer and keys last. It reads what they
+//! wrote from the dumped document.
 
 use std::path::PathBuf;
 use std::process::Command;
@@ -61,24 +61,18 @@ fn the_page_holds_what_diagnose_says_and_needs_nothing_else() {
         }
     }
     for candidate in found["candidates"].as_array().expect("candidates") {
-        let kind = candidate["kind"]
-            .as_str()
-            .expect("a kind")
-            .replace('_', " ");
+        let kind = candidate["kind"].as_str().expect("a kind").replace('_', " ");
         let explained = holds(&page, number(candidate, "/explained"));
         assert!(page.contains(&kind) && explained, "{candidate}");
     }
     for effect in found["effects"].as_array().expect("effects") {
         let kind = effect["kind"].as_str().expect("a kind");
-        assert!(
-            page.contains(&format!("modelmill add {file} {kind} --at ")),
-            "{kind}"
-        );
+        assert!(page.contains(&format!("modelmill add {file} {kind} --at ")), "{kind}");
     }
     for part in [
         "Error maps",
-        "At which frequencies",
-        "What was done to the recordings",
+        "Spectrum of the error",
+        "Recordings and their preparation",
         "p_min",
     ] {
         assert!(page.contains(part), "{part}");
@@ -96,29 +90,20 @@ fn a_long_recording_stays_a_small_page() {
     let mut lines = text.lines();
     let mut long = format!("{}\n", lines.next().expect("a header"));
     let rows: Vec<Vec<f64>> = lines
-        .map(|line| {
-            line.split(',')
-                .map(|f| f.parse().expect("a number"))
-                .collect()
-        })
+        .map(|line| line.split(',').map(|f| f.parse().expect("a number")).collect())
         .collect();
     for pair in rows.windows(2) {
         for k in 0..7 {
             let share = f64::from(k) / 7.0;
             let between = pair[0].iter().zip(&pair[1]);
-            let row: Vec<String> = between
-                .map(|(a, b)| format!("{:e}", a + share * (b - a)))
-                .collect();
+            let row: Vec<String> = between.map(|(a, b)| format!("{:e}", a + share * (b - a))).collect();
             long.push_str(&row.join(","));
             long.push('\n');
         }
     }
     let file = scratch("long.csv");
     std::fs::write(&file, long).expect("the recording");
-    let page = page(
-        &[&model("spidermill.toml"), "--data", &file],
-        &folder("report-long"),
-    );
+    let page = page(&[&model("spidermill.toml"), "--data", &file], &folder("report-long"));
     html::check(&page);
     assert!(page.contains(">25158<"), "the number of samples");
     assert!(page.len() < 2_000_000, "{} bytes", page.len());
@@ -129,24 +114,12 @@ fn a_folder_that_cannot_be_is_said_before_anything_is_done() {
     let file = scratch("report-in-the-way");
     std::fs::write(&file, "").expect("a file");
     let (model, fit) = (model("spidermill.toml"), run("plain-fit.csv"));
-    let says = refused(
-        1,
-        &[
-            "report",
-            &model,
-            "--data",
-            &fit,
-            "--out",
-            &format!("{file}/page"),
-        ],
-    );
-    assert!(
-        says.contains("cannot be made") && says.contains("--out"),
-        "{says}"
-    );
+    let says = refused(1, &["report", &model, "--data", &fit, "--out", &format!("{file}/page")]);
+    assert!(says.contains("cannot be created") && says.contains("--out"), "{says}");
 }
 
-/// Opens a page without a network, lets `exercise.js` use it, and returns what that wrote down; `None` without a browser.
+/// Opens a page without a network, lets `exercise.js` use it, and returns what that wrote down; `None` without a
+/// browser.
 fn used(page: &str, name: &str) -> Option<Value> {
     let browser = browser::found()?;
     let listen = include_str!("../browser/listen.js");
@@ -154,11 +127,7 @@ fn used(page: &str, name: &str) -> Option<Value> {
     let policy = "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; \
                   script-src 'unsafe-inline'; style-src 'unsafe-inline'\">";
     let heard = page
-        .replacen(
-            "<head>\n",
-            &format!("<head>\n{policy}\n<script>{listen}</script>\n"),
-            1,
-        )
+        .replacen("<head>\n", &format!("<head>\n{policy}\n<script>{listen}</script>\n"), 1)
         .replacen(
             "</body>\n</html>",
             &format!("<script>{exercise}</script>\n</body>\n</html>"),
@@ -168,20 +137,10 @@ fn used(page: &str, name: &str) -> Option<Value> {
     let file = scratch(&format!("{name}.html"));
     std::fs::write(&file, heard).expect("the page");
     let profile = folder(&format!("{name}-profile"));
-    let address = workspace(&file)
-        .canonicalize()
-        .unwrap_or_else(|_| PathBuf::from(&file));
+    let address = workspace(&file).canonicalize().unwrap_or_else(|_| PathBuf::from(&file));
     let output = Command::new(browser)
-        .args([
-            "--headless",
-            "--no-sandbox",
-            "--disable-gpu",
-            "--disable-dev-shm-usage",
-        ])
-        .args([
-            "--host-resolver-rules=MAP * ~NOTFOUND",
-            "--window-size=1100,900",
-        ])
+        .args(["--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"])
+        .args(["--host-resolver-rules=MAP * ~NOTFOUND", "--window-size=1100,900"])
         .arg(format!("--user-data-dir={profile}"))
         .args(["--virtual-time-budget=60000", "--dump-dom"])
         .arg(format!("file://{}", address.display()))
@@ -198,17 +157,12 @@ fn used(page: &str, name: &str) -> Option<Value> {
             )
         })
         .0;
-    let result = result
-        .replace("&lt;", "<")
-        .replace("&gt;", ">")
-        .replace("&amp;", "&");
+    let result = result.replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&");
     Some(serde_json::from_str(&result).expect("one JSON object"))
 }
 
 fn list<'a>(value: &'a Value, key: &str) -> &'a [Value] {
-    value[key]
-        .as_array()
-        .unwrap_or_else(|| panic!("no {key} in {value}"))
+    value[key].as_array().unwrap_or_else(|| panic!("no {key} in {value}"))
 }
 
 #[test]
@@ -218,10 +172,7 @@ fn plots_are_drawn_and_answer_in_a_browser() {
         run("with-rods-fit.csv"),
         run("with-rods-check.csv"),
     );
-    let page = page(
-        &[&file, "--data", &fit, "--check", &check],
-        &folder("report-browser"),
-    );
+    let page = page(&[&file, "--data", &fit, "--check", &check], &folder("report-browser"));
     let Some(result) = used(&page, "report-browser-page") else {
         return;
     };
@@ -231,9 +182,7 @@ fn plots_are_drawn_and_answer_in_a_browser() {
     assert!(stills.len() >= 10, "{stills:?}");
     for still in stills {
         assert!(
-            number(still, "/marks") >= 1.0
-                && number(still, "/longest") >= 6.0
-                && number(still, "/height") > 50.0,
+            number(still, "/marks") >= 1.0 && number(still, "/longest") >= 6.0 && number(still, "/height") > 50.0,
             "{still}"
         );
     }
@@ -243,19 +192,10 @@ fn plots_are_drawn_and_answer_in_a_browser() {
         let whole = number(run, "/whole");
         let span = |step: &str| number(run, &format!("/{step}/span"));
         let changed = |step: &str| run[step]["changed"] == true;
-        assert!(
-            number(run, "/shortest") > 500.0 && run["curves"] == 3,
-            "{run}"
-        );
+        assert!(number(run, "/shortest") > 500.0 && run["curves"] == 3, "{run}");
         assert!(changed("wheel") && span("wheel") < 0.9 * whole, "{run}");
-        assert!(
-            changed("drag") && (span("drag") - span("wheel")).abs() < 1e-9,
-            "{run}"
-        );
-        assert!(
-            number(run, "/drag/from") < number(run, "/wheel/from"),
-            "{run}"
-        );
+        assert!(changed("drag") && (span("drag") - span("wheel")).abs() < 1e-9, "{run}");
+        assert!(number(run, "/drag/from") < number(run, "/wheel/from"), "{run}");
         assert!(
             run["readout"]
                 .as_str()
@@ -266,19 +206,10 @@ fn plots_are_drawn_and_answer_in_a_browser() {
             changed("reset") && run["same"] == true && (span("reset") - whole).abs() < 1e-9,
             "{run}"
         );
-        assert!(
-            changed("key") && (span("key") - 0.5 * whole).abs() < 1e-9,
-            "{run}"
-        );
-        assert!(
-            changed("zero") && (span("zero") - whole).abs() < 1e-9,
-            "{run}"
-        );
+        assert!(changed("key") && (span("key") - 0.5 * whole).abs() < 1e-9, "{run}");
+        assert!(changed("zero") && (span("zero") - whole).abs() < 1e-9, "{run}");
         assert!(changed("mark") && span("mark") < 0.2 * whole, "{run}");
-        assert!(
-            changed("button") && (span("button") - whole).abs() < 1e-9,
-            "{run}"
-        );
+        assert!(changed("button") && (span("button") - whole).abs() < 1e-9, "{run}");
         assert!(changed("hidden") && run["left"] == 2, "{run}");
     }
     let values = |key: &str| -> Vec<f64> {
@@ -293,10 +224,7 @@ fn plots_are_drawn_and_answer_in_a_browser() {
         "{falling:?}"
     );
     assert!(rising.windows(2).all(|w| w[0] <= w[1]), "{rising:?}");
-    assert!(
-        number(&result, "/wide") <= 0.0,
-        "the page is wider than the window"
-    );
+    assert!(number(&result, "/wide") <= 0.0, "the page is wider than the window");
 }
 
 #[test]
@@ -305,10 +233,10 @@ fn the_tour_tells_the_story_and_writes_its_files() {
     let story = printed(&["tour", "--out", &out]);
     for part in [
         "p3_min = m3*dc3 + 1/2*d3*m4",
-        "Compare: where does the model fail?",
+        "Compare: where is the error large?",
         "rod inertia (spindle_left, spindle_right)",
         "+kind = \"rod_inertia\"",
-        "Identify again, and watch the error fall",
+        "Identify again: the error falls",
         "lumped mass placement (R3m, R3m_right)",
         "32.1 %",
         "report-paper.html",
@@ -319,18 +247,12 @@ fn the_tour_tells_the_story_and_writes_its_files() {
     let edited = format!("{out}/spidermill-completed.toml");
     let fit = format!("{out}/with-rods-fit.csv");
     let check = format!("{out}/with-rods-check.csv");
-    let found = json(&[
-        "identify", &edited, "--data", &fit, "--check", &check, "--json",
-    ]);
+    let found = json(&["identify", &edited, "--data", &fit, "--check", &check, "--json"]);
     assert!(number(&found, "/check/nrms") < 1e-5, "{found}");
     // 8 kg and 0.9 m: m l^2 / 3 and m l / 2.
     for (expression, truth) in [("Jr", 2.16), ("Sr", 3.6)] {
         let all = list(&found, "parameters");
-        let of = |p: &&Value| {
-            p["expression"]
-                .as_str()
-                .is_some_and(|e| e.starts_with(expression))
-        };
+        let of = |p: &&Value| p["expression"].as_str().is_some_and(|e| e.starts_with(expression));
         let value = number(all.iter().find(of).expect(expression), "/value");
         assert!((value - truth).abs() < 1e-3 * truth, "{expression} {value}");
     }
@@ -338,12 +260,7 @@ fn the_tour_tells_the_story_and_writes_its_files() {
         let page = std::fs::read_to_string(format!("{out}/{name}")).expect(name);
         html::check(&page);
         if let Some(result) = used(&page, &format!("tour-{name}")) {
-            assert_eq!(
-                list(&result, "heard").len(),
-                0,
-                "{name}: {:?}",
-                result["heard"]
-            );
+            assert_eq!(list(&result, "heard").len(), 0, "{name}: {:?}", result["heard"]);
         }
     }
 }

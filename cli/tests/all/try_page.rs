@@ -14,17 +14,14 @@ fn page() -> Option<String> {
     if let Some(own) = std::env::var_os("MODELMILL_PAGE") {
         return Some(own.into_string().expect("a path of plain text"));
     }
-    if let Some(why) = make::lacks() {
-        assert!(
-            std::env::var_os("MODELMILL_WASM_REQUIRED").is_none(),
-            "{why}"
-        );
+    if let Some(why) = make::missing_target() {
+        assert!(std::env::var_os("MODELMILL_WASM_REQUIRED").is_none(), "{why}");
         eprintln!("skipped: {why}");
         return None;
     }
     let program = PathBuf::from(env!("CARGO_BIN_EXE_modelmill"));
     let builds = program.ancestors().nth(2).expect("a folder of builds");
-    let made = make::module("dev", builds).and_then(|module| make::page(&module));
+    let made = make::build_module("dev", builds).and_then(|module| make::build_page(&module));
     let path = scratch("try.html");
     std::fs::write(&path, made.unwrap_or_else(|says| panic!("{says}"))).expect("the page");
     Some(path)
@@ -61,10 +58,7 @@ fn the_mill_in_a_page_gives_the_figures_of_the_program() {
          await until('mended', () => !at('faults').querySelector('.error') && !document.querySelector('.pane.stale'));
          return text;",
     );
-    assert!(
-        line.as_str().is_some_and(|line| line.starts_with("m2 = [")),
-        "{line}"
-    );
+    assert!(line.as_str().is_some_and(|line| line.starts_with("m2 = [")), "{line}");
 
     // What is found, beside the program; the text can be edited meanwhile, and a diagnosis ended.
     let found = browser.run(
@@ -82,18 +76,13 @@ fn the_mill_in_a_page_gives_the_figures_of_the_program() {
     );
     let (fit, check) = (run("with-rods-fit.csv"), run("with-rods-check.csv"));
     let own = model("spidermill.toml");
-    let expected = common::json(&[
-        "diagnose", &own, "--data", &fit, "--check", &check, "--json",
-    ]);
+    let expected = common::json(&["diagnose", &own, "--data", &fit, "--check", &check, "--json"]);
     let mut numbers = 0;
     for part in ["verdict", "noise_floor", "budget", "steps", "effects"] {
         numbers += alike(&expected[part], &found[part], part);
     }
     assert!(numbers > 20, "{numbers} numbers were compared");
-    eprintln!(
-        "try.html diagnoses the robot in {:.1} s",
-        number(&found, "/seconds")
-    );
+    eprintln!("try.html diagnoses the robot in {:.1} s", number(&found, "/seconds"));
 
     // Added, the error falls.
     let errors = browser.run(
@@ -105,15 +94,10 @@ fn the_mill_in_a_page_gives_the_figures_of_the_program() {
          return [...at('rungs').tBodies[0].rows].map((row) => [row.cells[0].textContent, parseFloat(row.cells[4].textContent)]);",
     );
     assert!(
-        errors[1][0]
-            .as_str()
-            .is_some_and(|what| what.contains("rod inertia")),
+        errors[1][0].as_str().is_some_and(|what| what.contains("rod inertia")),
         "{errors}"
     );
-    assert!(
-        number(&errors, "/1/1") < 1e-3 * number(&errors, "/0/1"),
-        "{errors}"
-    );
+    assert!(number(&errors, "/1/1") < 1e-3 * number(&errors, "/0/1"), "{errors}");
 
     tells_what_the_addition_costs(&mut browser, &window);
     crate::pages::check(&mut browser, &window, "the page with the mill");
@@ -151,16 +135,8 @@ fn tells_what_the_addition_costs(browser: &mut Browser, window: &Window) {
         let share = number(&costs, &format!("/shares/{k}"));
         assert!((share - 1.0).abs() < 1e-6, "{costs}");
     }
-    assert!(
-        costs["entries"].to_string().contains("rod_inertia"),
-        "{costs}"
-    );
-    assert!(
-        costs["models"]
-            .to_string()
-            .contains("spidermill-paper.toml"),
-        "{costs}"
-    );
+    assert!(costs["entries"].to_string().contains("rod_inertia"), "{costs}");
+    assert!(costs["models"].to_string().contains("spidermill-paper.toml"), "{costs}");
 }
 
 /// Compares numbers and texts, and counts the numbers: sines come from another library in the page, and what is told of a rest

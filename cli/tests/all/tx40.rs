@@ -16,9 +16,7 @@ fn data(name: &str) -> Option<String> {
     if path.is_file() {
         return path.to_str().map(str::to_owned);
     }
-    println!(
-        "The TX40 is not tested: there are no recordings in ../shared/data/tx40 beside the workspace."
-    );
+    println!("The TX40 is not tested: there are no recordings in ../shared/data/tx40 beside the workspace.");
     None
 }
 
@@ -46,9 +44,7 @@ fn identified(more: &[&str]) -> Option<Value> {
 fn the_error_of_the_fit_is_that_of_the_ladder() {
     let Some(fit) = identified(&[]) else { return };
     let nrms = 100.0 * number(&fit, "/fit/rows/nrms");
-    println!(
-        "TX40, rigid body with friction, drive inertia and offset: {nrms:.2} % (11.9 % elsewhere)"
-    );
+    println!("TX40, rigid body with friction, drive inertia and offset: {nrms:.2} % (11.9 % elsewhere)");
     assert!(nrms < 12.2);
     assert_eq!(fit["parameters"].as_array().map(Vec::len), Some(58));
 }
@@ -165,25 +161,14 @@ fn base_parameters_are_those_of_the_reference() {
     let pseudo_inverse = groupings.transpose().svd(true, true);
     let (mut held, mut missed, mut lacking) = (Vec::new(), Vec::new(), Vec::new());
     for one in references(&path).iter().filter(|one| one.std < 5.0) {
-        let name = one
-            .expression
-            .split(' ')
-            .next()
-            .unwrap_or_default()
-            .to_owned();
+        let name = one.expression.split(' ').next().unwrap_or_default().to_owned();
         let Some(factors) = factors(&one.expression, &names) else {
             lacking.push(name);
             continue;
         };
-        let combination = pseudo_inverse
-            .solve(&factors, 1e-12)
-            .expect("an SVD with both factors");
+        let combination = pseudo_inverse.solve(&factors, 1e-12).expect("an SVD with both factors");
         let rest = (groupings.transpose() * &combination - &factors).norm();
-        assert!(
-            rest < 1e-9,
-            "{}: not a sum of our base parameters",
-            one.expression
-        );
+        assert!(rest < 1e-9, "{}: not a sum of our base parameters", one.expression);
         let ours = combination.dot(&values);
         let off = (ours / one.value - 1.0).abs();
         let allowed = f64::max(0.03 * one.std, 0.05);
@@ -195,12 +180,7 @@ fn base_parameters_are_those_of_the_reference() {
             100.0 * off,
             100.0 * allowed
         );
-        if off <= allowed {
-            &mut held
-        } else {
-            &mut missed
-        }
-        .push(name);
+        if off <= allowed { &mut held } else { &mut missed }.push(name);
     }
     println!("lacking in the model: {lacking:?}; missed: {missed:?}");
     assert_eq!(lacking, ["fvm6", "fsm6"]);

@@ -25,10 +25,7 @@ fn wrong_usage_ends_with_two() {
         &["completions", "tcsh9"],
     ] {
         let says = refused(2, args);
-        assert!(
-            says.contains("Usage") || says.contains("--help"),
-            "{args:?}: {says}"
-        );
+        assert!(says.contains("Usage") || says.contains("--help"), "{args:?}: {says}");
         // Dashes would make the number a second model file.
         assert!(!says.contains("'-- -"), "{args:?}: {says}");
     }
@@ -43,10 +40,7 @@ fn wrong_usage_ends_with_two() {
             "gamma1=theta1",
         ],
     );
-    assert!(
-        says.contains("passive") && says.contains("theta1_dd"),
-        "{says}"
-    );
+    assert!(says.contains("passive") && says.contains("theta1_dd"), "{says}");
 }
 
 #[test]
@@ -86,15 +80,10 @@ fn a_missing_model_names_those_nearby() {
         1,
         &[
             "check",
-            &crate::common::workspace("model-spec/models")
-                .display()
-                .to_string(),
+            &crate::common::workspace("model-spec/models").display().to_string(),
         ],
     );
-    assert!(
-        says.contains("is a folder") && says.contains("panda.toml"),
-        "{says}"
-    );
+    assert!(says.contains("is a folder") && says.contains("panda.toml"), "{says}");
 }
 
 #[test]
@@ -122,26 +111,13 @@ fn a_faulty_recording_is_named_with_its_line() {
         std::fs::write(&file, text).expect("written");
         refused(1, &["compare", &model("spidermill.toml"), "--data", &file])
     };
-    let says = compare(&format!(
-        "{head}0,1.8,1.34,0,0,0,0,1,2\n0.1,1.8,x,0,0,0,0,1,2\n"
-    ));
-    assert!(
-        says.contains("bad.csv, line 3") && says.contains("theta2"),
-        "{says}"
-    );
+    let says = compare(&format!("{head}0,1.8,1.34,0,0,0,0,1,2\n0.1,1.8,x,0,0,0,0,1,2\n"));
+    assert!(says.contains("bad.csv, line 3") && says.contains("theta2"), "{says}");
     let says = compare(&head.replace("theta2,", "theta_2,"));
     assert!(says.contains("bad.csv"), "{says}");
     let says = compare("");
     assert!(says.contains("empty"), "{says}");
-    let says = refused(
-        1,
-        &[
-            "compare",
-            &model("spidermill.toml"),
-            "--data",
-            "no/such.csv",
-        ],
-    );
+    let says = refused(1, &["compare", &model("spidermill.toml"), "--data", "no/such.csv"]);
     assert!(says.contains("no/such.csv"), "{says}");
     let says = refused(
         1,
@@ -185,9 +161,9 @@ fn a_pose_out_of_reach_names_time_and_line() {
 fn columns_are_found_by_mapping() {
     let text = std::fs::read_to_string(run("plain-check.csv")).expect("a recording");
     let file = scratch("renamed.csv");
-    let renamed = text
-        .replacen("t,theta1,theta2", "time,left,right", 1)
-        .replacen("theta1_d,theta2_d", "left_v,right_v", 1);
+    let renamed =
+        text.replacen("t,theta1,theta2", "time,left,right", 1)
+            .replacen("theta1_d,theta2_d", "left_v,right_v", 1);
     std::fs::write(&file, renamed).expect("written");
     let compared = json(&[
         "compare",
@@ -225,11 +201,11 @@ fn positions_alone_will_do() {
     println!("positions only: nrms {nrms:.2e}");
     assert!(nrms < 1e-2);
     let notes = compared["data"].as_array().expect("notes");
-    assert!(notes.iter().any(|n| {
-        n["says"]
-            .as_str()
-            .is_some_and(|s| s.contains("Butterworth"))
-    }));
+    assert!(
+        notes
+            .iter()
+            .any(|n| { n["says"].as_str().is_some_and(|s| s.contains("Butterworth")) })
+    );
 }
 
 #[test]
@@ -244,14 +220,7 @@ fn an_input_is_never_overwritten() {
     std::fs::copy(run("plain-fit.csv"), &data).expect("a copy");
     let says = refused(
         2,
-        &[
-            "evaluate",
-            &model("spidermill.toml"),
-            "--data",
-            &data,
-            "--out",
-            &data,
-        ],
+        &["evaluate", &model("spidermill.toml"), "--data", &data, "--out", &data],
     );
     assert!(says.contains("overwrite"), "{says}");
     let says = refused(1, &["generate", &file, "--out", "/no/such/folder/a.rs"]);
@@ -278,17 +247,10 @@ fn what_stands_in_the_wrong_place_is_named() {
         says.contains("this is a file") && says.contains("name of a folder"),
         "{says}"
     );
-    let compare = [
-        "compare",
-        &spidermill,
-        "--data",
-        &data,
-        "--parameters",
-        &data,
-    ];
+    let compare = ["compare", &spidermill, "--data", &data, "--parameters", &data];
     let says = refused(1, &compare);
     assert!(
-        says.contains("is no fit") && says.contains("recordings go to `--data`"),
+        says.contains("is not a fit") && says.contains("pass recordings to `--data`"),
         "{says}"
     );
     let out = scratch("no-rig.csv");
@@ -308,16 +270,11 @@ fn what_stands_in_the_wrong_place_is_named() {
 
 #[test]
 fn a_reader_that_goes_away_is_no_error() {
-    let mut child = modelmill(&[
-        "evaluate",
-        &model("spidermill.toml"),
-        "--data",
-        &run("plain-fit.csv"),
-    ])
-    .stdout(Stdio::piped())
-    .stderr(Stdio::piped())
-    .spawn()
-    .expect("the program starts");
+    let mut child = modelmill(&["evaluate", &model("spidermill.toml"), "--data", &run("plain-fit.csv")])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
     drop(child.stdout.take());
     let mut err = String::new();
     let mut stderr = child.stderr.take().expect("standard error");

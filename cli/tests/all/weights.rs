@@ -26,10 +26,7 @@ fn noisy() -> String {
     );
     let mut noise = noise();
     for (k, line) in lines.enumerate() {
-        let mut fields: Vec<f64> = line
-            .split(',')
-            .map(|f| f.parse().expect("a number"))
-            .collect();
+        let mut fields: Vec<f64> = line.split(',').map(|f| f.parse().expect("a number")).collect();
         let size = if k < 1800 { 200.0 } else { 0.1 };
         fields[7] += size * noise();
         fields.extend([size * size / 3.0, 0.01 / 3.0]);
@@ -59,9 +56,7 @@ fn recorded_variances_keep_noise_out() {
     let path = noisy();
     let equal = error(&path, &[]);
     let weighted = error(&path, &["--weights", "variance"]);
-    println!(
-        "largest error {equal:.2e} with equal weights, {weighted:.2e} with recorded variances"
-    );
+    println!("largest error {equal:.2e} with equal weights, {weighted:.2e} with recorded variances");
     assert!(equal > 1e-3 && weighted < 1e-4);
     // What is left out at standstill multiplies the weights, wherever they come from.
     let both = error(&path, &["--weights", "variance", "--standstill", "0.1"]);
@@ -77,34 +72,20 @@ fn recorded_variances_keep_noise_out() {
             "variance",
         ],
     );
-    assert!(
-        says.contains("`spindle_left_var`") && says.contains("--map"),
-        "{says}"
-    );
+    assert!(says.contains("`spindle_left_var`") && says.contains("--map"), "{says}");
 }
 
 #[test]
 fn equations_at_standstill_are_left_out_and_counted() {
     let model = model("spidermill.toml");
     let run = run("plain-fit.csv");
-    let fit = json(&[
-        "identify",
-        &model,
-        "--data",
-        &run,
-        "--standstill",
-        "0.1",
-        "--json",
-    ]);
+    let fit = json(&["identify", &model, "--data", &run, "--standstill", "0.1", "--json"]);
     let notes = fit["data"].to_string();
     assert!(
         notes.contains("equations of `spindle_left`") && notes.contains("--standstill"),
         "{notes}"
     );
     assert!(number(&fit, "/fit/nrms") < 1e-5);
-    let says = refused(
-        2,
-        &["identify", &model, "--data", &run, "--standstill", "3"],
-    );
+    let says = refused(2, &["identify", &model, "--data", &run, "--standstill", "3"]);
     assert!(says.contains("between 0 and 1"), "{says}");
 }

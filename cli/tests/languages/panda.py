@@ -77,7 +77,7 @@ def refused(kind, says, call):
 
 broken = q.copy()
 broken[2, 5] = math.nan
-refused(ValueError, "at sample 5: `q3` is no number, or too large to compute with", lambda: panda.regressor(broken, qd, qdd))
+refused(ValueError, "at sample 5: `q3` is NaN, infinite or too large to compute with", lambda: panda.regressor(broken, qd, qdd))
 refused(ValueError, "qd has shape [7, 39]; expected [7, 40]", lambda: panda.regressor(q, qd[:, 1:].copy(), qdd))
 refused(ValueError, "numpy.ascontiguousarray(q)", lambda: panda.regressor(table[:, :7].T, qd, qdd))
 refused(ValueError, "numpy.ascontiguousarray(qd)", lambda: panda.regressor(q, np.asfortranarray(qd), qdd))

@@ -1,29 +1,29 @@
-//! What a derivation says about its base parameters: names, expressions, units and values.
+//! Base parameters of a derivation: names, expressions, units and values.
 
 use num_rational::BigRational;
 use num_traits::One;
 
 use crate::Derivation;
 use crate::expr::Rational;
-use crate::expr::print::Formula;
+use crate::expr::print::PrintedFormula;
 use crate::reduce::base;
-use crate::tree::expressions::Monomial;
+use crate::tree::expressions::ParameterMonomial;
 
-/// One base parameter, for people and programs.
+/// One base parameter as texts.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct BaseParameter {
+pub struct BaseParameterEntry {
     /// `p1_min`, `p2_min`, ...
     pub name: String,
     /// The product whose column is retained.
     pub retained: String,
     /// Eq. (16): the parameter as an expression of dynamic parameters and constants.
     pub expression: String,
-    /// SI unit.
+    /// Its SI unit.
     pub unit: String,
 }
 
 impl Derivation {
-    /// Indices of the active and of the passive coordinates.
+    /// Indices of the active coordinates and of the passive coordinates, in the order of the model file.
     pub fn coordinates(&self) -> (Vec<usize>, Vec<usize>) {
         (
             self.equations.projection.loops.active.clone(),
@@ -32,59 +32,54 @@ impl Derivation {
     }
 
     /// The base parameters in the order of p_min.
-    pub fn base_parameters(&self) -> Vec<BaseParameter> {
+    pub fn base_parameters(&self) -> Vec<BaseParameterEntry> {
         let reduction = &self.reduction;
         (0..reduction.retained.len())
             .map(|k| {
+                // Unit and name are those of the retained product.
                 let product = &reduction.products[reduction.retained[k]];
-                BaseParameter {
-                    name: base::name(k),
+                BaseParameterEntry {
+                    name: base::base_parameter_name(k),
                     retained: product.text(&self.mechanism),
-                    expression: base::written_out(&self.mechanism, reduction, k).text(),
-                    unit: base::unit(&self.mechanism, product),
+                    expression: base::expanded_formula(&self.mechanism, reduction, k).text(),
+                    unit: base::product_unit(&self.mechanism, product),
                 }
             })
             .collect()
     }
 
-    /// Sums that base parameters refer to, with their expressions, each after those that it needs; none unless base
-    /// parameters that are written out would be too long to read.
+    /// Named sums that base parameters refer to, with their expressions, each after those that it needs. Empty unless
+    /// expanded base parameters would be too long to read.
     pub fn base_sums(&self) -> Vec<(String, String)> {
-        let sums = base::sums(&self.mechanism, &self.reduction).into_iter();
+        let sums = base::dependent_sums(&self.mechanism, &self.reduction).into_iter();
         sums.map(|(name, formula)| (name, formula.text())).collect()
     }
 
     /// Eq. (6), one line per dependent product: `h[m2] = d1*h[m1*dc1] + ...`.
     pub fn dependency_texts(&self) -> Vec<String> {
-        let column = |product: usize| {
-            format!(
-                "h[{}]",
-                self.reduction.products[product].text(&self.mechanism)
-            )
-        };
+        let column = |product: usize| format!("h[{}]", self.reduction.products[product].text(&self.mechanism));
         let lines = self.reduction.dependencies.iter().map(|line| {
+            // Retained products first, then dependent ones.
             let retained = line.equals.iter();
             let retained = retained.map(|(k, factor)| (self.reduction.retained[*k], factor));
             let via = line.via.iter().map(|(product, factor)| (*product, factor));
             let terms = retained.chain(via).map(|(product, factor)| {
-                let column = Formula::name(column(product));
-                Formula::product(Rational::ONE, [factor.formula(&self.mechanism), column])
+                let column = PrintedFormula::name(column(product));
+                PrintedFormula::product(Rational::ONE, [factor.formula(&self.mechanism), column])
             });
-            format!("{} = {}", column(line.product), Formula::sum(terms).text())
+            format!("{} = {}", column(line.product), PrintedFormula::sum(terms).text())
         });
         lines.collect()
     }
 
-    /// Values of the base parameters for given parameters and constants, both in the order of the model file.
+    /// Values of the base parameters for given parameters and constants, both in the order of the model file, in SI
+    /// units.
     pub fn base_values(&self, parameters: &[f64], constants: &[f64]) -> Vec<f64> {
         let reduction = &self.reduction;
         let value = |product: usize| reduction.products[product].value(parameters);
+        // The retained product itself, then the dependent ones with their factors.
         let mut base: Vec<f64> = reduction.retained.iter().map(|k| value(*k)).collect();
-        for (line, factors) in reduction
-            .dependencies
-            .iter()
-            .zip(reduction.factors(constants))
-        {
+        for (line, factors) in reduction.dependencies.iter().zip(reduction.factors(constants)) {
             for (k, factor) in factors {
                 base[k] += factor * value(line.product);
             }
@@ -95,13 +90,13 @@ impl Derivation {
     /// Eq. (7) for given values of the constants, in the order of the model file: each base parameter as a sum of
     /// products of dynamic parameters with exact factors. Sines, cosines and roots of constants are those of floating
     /// point.
-    pub fn base_polynomials(&self, constants: &[BigRational]) -> Vec<Vec<(Monomial, BigRational)>> {
+    pub fn base_polynomials(&self, constants: &[BigRational]) -> Vec<Vec<(ParameterMonomial, BigRational)>> {
         let reduction = &self.reduction;
         let product = |k: usize| reduction.products[k].clone();
         let retained = reduction.retained.iter();
-        let mut polynomials: Vec<Vec<(Monomial, BigRational)>> = retained
-            .map(|k| vec![(product(*k), BigRational::one())])
-            .collect();
+        let mut polynomials: Vec<Vec<(ParameterMonomial, BigRational)>> =
+            retained.map(|k| vec![(product(*k), BigRational::one())]).collect();
+        // Factors by exact values of the constants.
         let factors = reduction.factors_by(&|factor| Some(factor.value_exact(constants)));
         let factors = factors.expect("numbers have a value for everything");
         for (line, factors) in reduction.dependencies.iter().zip(factors) {
@@ -112,15 +107,10 @@ impl Derivation {
         polynomials
     }
 
-    /// Values of the base parameters for the model file's values: identified ones where it has them, by the expression of
-    /// the base parameter, or else those of the nominal parameters.
+    /// Values of the base parameters for the model file's values. Identified values are used where the file has them,
+    /// matched by expression; all others follow from the nominal parameters.
     pub fn nominal_base_values(&self) -> Vec<f64> {
-        let parameters: Vec<f64> = self
-            .mechanism
-            .parameters
-            .iter()
-            .map(|p| p.nominal)
-            .collect();
+        let parameters: Vec<f64> = self.mechanism.parameters.iter().map(|p| p.nominal).collect();
         let constants: Vec<f64> = self.mechanism.constants.iter().map(|c| c.value).collect();
         let mut values = self.base_values(&parameters, &constants);
         for (k, value) in self.identified_base() {
@@ -129,7 +119,7 @@ impl Derivation {
         values
     }
 
-    /// The identified values that the model file has of its base parameters, by their positions.
+    /// The identified values of the model file, by index of the base parameter.
     pub fn identified_base(&self) -> Vec<(usize, f64)> {
         let identified = &self.mechanism.identified_base;
         if identified.is_empty() {

@@ -1,11 +1,11 @@
-//! Numbers that a derivation must not have: values of the model file that are none, factors beyond floating point, base
-//! parameters that the file's own constants divide by zero.
+//! Checks for numbers that a derivation must not contain: factors beyond the range of floating point, and base
+//! parameters whose denominator is zero for the file's constants.
 
-use crate::lower::{Op, Program};
+use crate::lower::{ProgramOp, StraightLineProgram};
 use crate::programs::PassivePosition;
 use crate::{Derivation, DeriveError};
 
-/// That programs and nominal base parameters are made of finite numbers.
+/// Returns an error if a program or a nominal base parameter contains a number that is not finite.
 pub(crate) fn check_results(derivation: &Derivation) -> Result<(), DeriveError> {
     let programs = &derivation.programs;
     let mut all = vec![
@@ -19,12 +19,14 @@ pub(crate) fn check_results(derivation: &Derivation) -> Result<(), DeriveError> 
     if let PassivePosition::Newton(loops) = &programs.passive_position {
         all.extend([&loops.residual, &loops.scales]);
     }
-    if let Some(number) = all.into_iter().find_map(too_large) {
+    // Exact factors may be beyond the range of floating point.
+    if let Some(number) = all.into_iter().find_map(oversized_number) {
         return Err(DeriveError::NotFinite {
             what: format!("the factor {number} of the equations"),
-            todo: "write the mechanism with factors of reasonable size",
+            todo: "use factors of reasonable size in the model file",
         });
     }
+    // A denominator may be zero at the file's values only.
     let nominal = derivation.nominal_base_values();
     let Some(k) = nominal.iter().position(|value| !value.is_finite()) else {
         return Ok(());
@@ -35,14 +37,14 @@ pub(crate) fn check_results(derivation: &Derivation) -> Result<(), DeriveError> 
             "with the model file's values, the base parameter {} = {}",
             base.name, base.expression
         ),
-        todo: "see whether a constant in a denominator is zero (then retain other products) or values are too large",
+        todo: "check whether a constant in a denominator is zero (then retain other products) or values are too large",
     })
 }
 
-/// A number of a program that no floating-point number comes near.
-fn too_large(program: &Program) -> Option<String> {
+/// A number of a program that is infinite in floating point, as text.
+fn oversized_number(program: &StraightLineProgram) -> Option<String> {
     program.ops.iter().find_map(|op| match op {
-        Op::Number(number) if !number.to_f64().is_finite() => Some(number.to_big().to_string()),
+        ProgramOp::Number(number) if !number.to_f64().is_finite() => Some(number.to_big().to_string()),
         _ => None,
     })
 }

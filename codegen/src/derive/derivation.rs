@@ -1,24 +1,25 @@
-//! What a derivation holds.
+//! The result of a derivation.
 
 use modelmill_spec::Mechanism;
 
 use crate::expr::Graph;
-use crate::programs::Programs;
-use crate::programs::closing::Closing;
-use crate::reduce::Reduction;
-use crate::regressor::Equations;
+use crate::programs::ModelPrograms;
+use crate::programs::closing::PassiveClosure;
+use crate::reduce::BaseReduction;
+use crate::regressor::UnreducedEquations;
 
-/// Everything that the mill knows about a mechanism.
+/// The equations, the reduction and the programs of a mechanism.
 pub struct Derivation {
     /// The mechanism that was derived.
     pub mechanism: Mechanism,
     /// The arena of all expressions.
     pub graph: Graph,
-    /// Which products are retained and how the others follow.
-    pub reduction: Reduction,
+    /// Retained products and the dependencies of all others.
+    pub reduction: BaseReduction,
     /// Straight-line programs, ready to be emitted or evaluated.
-    pub programs: Programs,
-    pub(crate) equations: Equations,
-    /// How loops are closed: in which order they are solved, and what stands for the passive coordinates.
-    pub(crate) closing: Closing,
+    pub programs: ModelPrograms,
+    /// Tree, inertia, loops and columns before reduction.
+    pub(crate) equations: UnreducedEquations,
+    /// The solution of the loops, which replaces the passive coordinates in programs.
+    pub(crate) closing: PassiveClosure,
 }

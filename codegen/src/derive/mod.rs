@@ -1,60 +1,59 @@
-//! The mill from end to end: a mechanism goes in, and everything that is known about it comes out.
+//! The derivation from end to end: a mechanism goes in, equations, base parameters and programs come out.
 
 pub(crate) mod base;
 mod checks;
 mod derivation;
-pub(crate) mod self_test;
+mod for_code;
 
 use modelmill_spec::Mechanism;
 
 pub use derivation::Derivation;
+pub use for_code::BaseFormulas;
 
 use crate::DeriveError;
 use crate::expr::Graph;
 use crate::programs::cheapest::PASSES;
-use crate::programs::closing::Closing;
+use crate::programs::closing::PassiveClosure;
 use crate::programs::programs;
-use crate::reduce::{Reduction, reduce, unreduced};
-use crate::regressor::{Equations, equations};
+use crate::reduce::{BaseReduction, reduce, without_reduction};
+use crate::regressor::{UnreducedEquations, unreduced_equations};
 use crate::tree::checks::check_values;
-use crate::tree::expressions::Monomial;
+use crate::tree::expressions::ParameterMonomial;
 
-/// Derives the inverse dynamics of a mechanism and reduces it to base parameters, whatever these are worth at the file's
-/// values.
+/// Derives the inverse dynamics of a mechanism and reduces it to base parameters. Digits lost at the file's values are
+/// not checked here.
 pub(crate) fn derive(mechanism: &Mechanism) -> Result<Derivation, DeriveError> {
-    let derivation = derive_by(mechanism, PASSES.len(), |graph, equations| {
+    let derivation = derive_with(mechanism, PASSES.len(), |graph, equations| {
         reduce(graph, mechanism, equations)
     })?;
     checks::check_results(&derivation)?;
     Ok(derivation)
 }
 
-/// Derives the columns of H for some products of parameters alone, each by itself and without reduction: what effects add
-/// that a model may never have.
+/// Derives the columns of H for some products of parameters only, each by itself and without reduction: for effects
+/// that the model may never get.
 pub fn derive_columns(
     mechanism: &Mechanism,
-    wanted: &dyn Fn(&Monomial) -> bool,
+    wanted: &dyn Fn(&ParameterMonomial) -> bool,
 ) -> Result<Derivation, DeriveError> {
-    // Columns are made once along each recording: that takes less time than to look for cheaper forms.
-    derive_by(mechanism, 0, |_, equations| {
-        Ok(unreduced(equations, wanted))
-    })
+    // Columns are evaluated once along each recording, which takes less time than a search for cheaper forms.
+    derive_with(mechanism, 0, |_, equations| Ok(without_reduction(equations, wanted)))
 }
 
-/// The stages in their order, with `reduce` for the way from p_g to p_min and `passes` that look for cheaper forms.
-fn derive_by(
+/// The stages in their order. `reduce` goes from p_g to p_min, and `passes` is the number of passes that search for
+/// cheaper forms.
+fn derive_with(
     mechanism: &Mechanism,
     passes: usize,
-    reduce: impl FnOnce(&mut Graph, &Equations) -> Result<Reduction, DeriveError>,
+    reduce: impl FnOnce(&mut Graph, &UnreducedEquations) -> Result<BaseReduction, DeriveError>,
 ) -> Result<Derivation, DeriveError> {
     check_values(mechanism)?;
     let mut graph = Graph::new();
-    let equations = equations(&mut graph, mechanism)?;
+    // Equations, reduction, closed loops, programs.
+    let equations = unreduced_equations(&mut graph, mechanism)?;
     let reduction = reduce(&mut graph, &equations)?;
-    let closing = Closing::new(&mut graph, mechanism, &equations)?;
-    let programs = programs(
-        &mut graph, mechanism, &equations, &reduction, &closing, passes,
-    )?;
+    let closing = PassiveClosure::new(&mut graph, mechanism, &equations)?;
+    let programs = programs(&mut graph, mechanism, &equations, &reduction, &closing, passes)?;
     Ok(Derivation {
         mechanism: mechanism.clone(),
         graph,

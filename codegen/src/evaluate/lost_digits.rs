@@ -1,80 +1,80 @@
-//! How many digits the base leaves: forces from p_min go beside those from p_g, both in floating point and on the model
-//! file's own values. They are equal in exact arithmetic.
+//! Digits lost by the base: forces from p_min are compared with those from p_g, both in floating point and with the
+//! model file's values. They are equal in exact arithmetic.
 //!
-//! Retained columns are independent for general constants. At the file's values they may all but coincide; factors of
-//! eq. (6) then grow without bound, and what the forces have in common is lost when huge terms cancel. With growth `g` of the
-//! terms beside their sum the relative error of the forces is about `g` roundings of 1.1e-16 (N. J. Higham, "Accuracy and
-//! Stability of Numerical Algorithms", 2nd ed. 2002, 4.2).
+//! Retained columns are independent for general constants. At the file's values they may be almost dependent. Then the
+//! factors of eq. (6) are very large, and digits of the forces are lost when large terms cancel. If the terms are `g`
+//! times larger than their sum, the relative error of the forces is about `g` roundings of 1.1e-16 (N. J. Higham,
+//! "Accuracy and Stability of Numerical Algorithms", 2nd ed. 2002, 4.2).
 
 use modelmill_spec::Mechanism;
 use nalgebra::DMatrix;
 
-use super::{Evaluator, States};
-use crate::loops::numeric_poses::symmetric;
+use super::{ModelEvaluator, MotionStates};
+use crate::loops::numeric_poses::uniform_symmetric;
 use crate::{Derivation, DeriveError};
-use modelmill_algebra::field::Stream;
+use modelmill_algebra::field::RandomStream;
 
-/// Error of a drive's force, relative to the sum of what its products add to it, beyond which a base is refused. Errors of a
-/// millionth count as rounding of a recording's numbers elsewhere; ten of sixteen digits may be lost up to there.
+/// Largest accepted error of a drive's force, relative to the sum of the magnitudes of its terms. Elsewhere, errors of
+/// a millionth count as rounding of a recording's numbers; here up to ten of sixteen digits may be lost.
 const MOST_LOST: f64 = 1e-6;
 
-/// At how many states forces are held beside each other, and how many are tried.
+/// Number of states at which forces are compared.
 const STATES: usize = 8;
+/// Number of random states that are tried to find them.
 const TRIES: usize = 100;
 
-/// How far states lie from the nominal pose, in rad and relative to the nominal length; by what it shrinks where the
-/// mechanism cannot stand.
+/// Distance of the states from the nominal pose, in rad and relative to the nominal length.
 const REACH: f64 = 0.5;
-const SHRINKING: f64 = 0.8;
+/// Factor by which the distance shrinks after a state without a solution.
+const SHRINK_FACTOR: f64 = 0.8;
 
-/// Dependent products whose factors are nearly as large as the largest ones are named as well.
-const NEARLY: f64 = 1e-3;
+/// Products whose terms are larger than this part of the largest one are named in the message.
+const NEARLY_LARGEST: f64 = 1e-3;
 
-/// That forces from p_min agree with those from p_g. Where no state is found at which the mechanism can stand, nothing is
-/// refused.
-pub(crate) fn check(derivation: &Derivation) -> Result<(), DeriveError> {
-    match lost(derivation)? {
-        // What is no number has lost all digits.
-        Some(lost) if lost.error.is_nan() || lost.error > MOST_LOST => {
-            Err(culprits(derivation, &lost))
-        }
+/// Returns an error if forces from p_min differ from those from p_g. If no state has a solution, the base is accepted.
+pub(crate) fn check_lost_digits(derivation: &Derivation) -> Result<(), DeriveError> {
+    match largest_digit_loss(derivation)? {
+        // NaN means that all digits are lost.
+        Some(lost) if lost.error.is_nan() || lost.error > MOST_LOST => Err(lost_digits_error(derivation, &lost)),
         _ => Ok(()),
     }
 }
 
-/// What the drive loses that loses most.
-struct Lost {
-    /// Error of its force, relative to the sum of what its products add to it.
+/// The drive with the largest error.
+struct DigitLoss {
+    /// Error of its force, relative to the sum of the magnitudes of its terms.
     error: f64,
-    /// Its row of H, state by state.
+    /// Its rows of H, one per state.
     h: DMatrix<f64>,
     /// Values of the products.
     values: Vec<f64>,
 }
 
-/// Holds forces from p_min against those from p_g; `None` where nothing is regrouped or no state is found.
-fn lost(derivation: &Derivation) -> Result<Option<Lost>, DeriveError> {
+/// Compares forces from p_min with those from p_g; `None` if nothing was regrouped or no state has a solution.
+fn largest_digit_loss(derivation: &Derivation) -> Result<Option<DigitLoss>, DeriveError> {
     if derivation.reduction.dependencies.is_empty() {
         return Ok(None);
     }
+    // Products without a nominal value would hide the loss of their column.
     let mechanism = with_all_parameters(&derivation.mechanism);
     let parameters: Vec<f64> = mechanism.parameters.iter().map(|p| p.nominal).collect();
     let constants: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
     let products = &derivation.reduction.products;
     let values: Vec<f64> = products.iter().map(|p| p.value(&parameters)).collect();
-    let evaluator = Evaluator::new(derivation).with_parameters(&mechanism);
-    // Evaluator and emitted code add up eq. (7) in different orders.
+    let evaluator = ModelEvaluator::new(derivation).with_parameters(&mechanism);
+    // Evaluator and emitted code sum eq. (7) in different orders, so both are compared.
     let both = [
         derivation.base_values(&parameters, &constants),
         evaluator.base_parameters(),
     ];
-    let Some(sampled) = Sampled::new(&mechanism, &evaluator, &both)? else {
+    let Some(sampled) = ForceSamples::new(&mechanism, &evaluator, &both)? else {
         return Ok(None);
     };
     let n_drives = mechanism.drives.len();
-    let errors = (0..n_drives).map(|d| (d, sampled.error(d, n_drives, &values)));
+    // The largest error of all drives decides.
+    let errors = (0..n_drives).map(|d| (d, sampled.relative_force_error(d, n_drives, &values)));
     let worst = errors.max_by(|a, b| a.1.total_cmp(&b.1));
-    Ok(worst.map(|(drive, error)| Lost {
+    Ok(worst.map(|(drive, error)| DigitLoss {
         error,
         h: DMatrix::from_fn(sampled.n_states(), products.len(), |s, k| {
             sampled.full[(s * n_drives + drive, k)]
@@ -83,46 +83,46 @@ fn lost(derivation: &Derivation) -> Result<Option<Lost>, DeriveError> {
     }))
 }
 
-/// The mechanism with a value for every parameter: where the file gives none, the largest of the same unit stands in, or 1.
+/// The mechanism with a value for every parameter: one without gets the largest value of the same unit, or 1.
 fn with_all_parameters(mechanism: &Mechanism) -> Mechanism {
     let mut all = mechanism.clone();
     for parameter in all.parameters.iter_mut().filter(|p| p.nominal == 0.0) {
-        let alike = mechanism
-            .parameters
-            .iter()
-            .filter(|p| p.unit == parameter.unit);
+        let alike = mechanism.parameters.iter().filter(|p| p.unit == parameter.unit);
         let largest = alike.map(|p| p.nominal.abs()).fold(0.0, f64::max);
         parameter.nominal = if largest > 0.0 { largest } else { 1.0 };
     }
     all
 }
 
-/// H and forces at some states around the nominal pose.
-struct Sampled {
-    /// H, drives within states.
+/// H and forces at some states near the nominal pose.
+struct ForceSamples {
+    /// H, with one row per state and drive, states outermost.
     full: DMatrix<f64>,
-    /// Forces from p_min, `[way of adding up p_min][drive][state]`.
+    /// Forces from p_min, `[order of summation][drive][state]`.
     forces: [Vec<Vec<f64>>; 2],
 }
 
-impl Sampled {
-    /// `None` where no state is found; an error where forces are no finite numbers at any.
+impl ForceSamples {
+    /// Samples up to `STATES` states. `None` if none has a solution; an error if forces are not finite at any of them.
     fn new(
         mechanism: &Mechanism,
-        evaluator: &Evaluator<'_>,
+        evaluator: &ModelEvaluator<'_>,
         base: &[Vec<f64>; 2],
     ) -> Result<Option<Self>, DeriveError> {
-        let mut stream = Stream::new(0x6C6F_7374);
+        let mut stream = RandomStream::new(0x6C6F_7374);
         let n_drives = mechanism.drives.len();
         let mut rows: Vec<f64> = Vec::new();
         let mut forces = [vec![Vec::new(); n_drives], vec![Vec::new(); n_drives]];
+        // Numbers of usable states and of states with infinite forces, and the current distance.
         let (mut n_states, mut n_infinite, mut reach) = (0, 0, REACH);
         for _ in 0..TRIES {
+            // Enough states have been found.
             if n_states == STATES {
                 break;
             }
-            let state = State::random(mechanism, reach, &mut stream);
-            let states = state.states();
+            // H and both forces at the same state.
+            let state = NearbyState::random_near_nominal(mechanism, reach, &mut stream);
+            let states = state.as_motion_states();
             let found = evaluator.full_regressor(&states).and_then(|h| {
                 let [a, b] = base;
                 let forces = [
@@ -131,18 +131,16 @@ impl Sampled {
                 ];
                 Ok((h, forces))
             });
+            // Closer to the nominal pose, loops are more likely to close.
             let Ok((h, found)) = found else {
-                reach *= SHRINKING;
+                reach *= SHRINK_FACTOR;
                 continue;
             };
             if h.iter().any(|x| !x.is_finite()) {
                 n_infinite += 1;
                 continue;
             }
-            rows.extend(
-                h.row_iter()
-                    .flat_map(|row| row.iter().copied().collect::<Vec<_>>()),
-            );
+            rows.extend(h.row_iter().flat_map(|row| row.iter().copied().collect::<Vec<_>>()));
             for (all, found) in forces.iter_mut().zip(found) {
                 for (all, found) in all.iter_mut().zip(found) {
                     all.extend(found);
@@ -150,13 +148,14 @@ impl Sampled {
             }
             n_states += 1;
         }
+        // Without a usable state the reason decides.
         if n_states == 0 {
             return if n_infinite == 0 {
                 Ok(None)
             } else {
                 Err(DeriveError::NotFinite {
                     what: "with the model file's values, the force of a drive".to_owned(),
-                    todo: "look for constants that are too large to be squared, such as lengths beyond 1e150",
+                    todo: "check for constants that are too large to be squared, such as lengths above 1e150",
                 })
             };
         }
@@ -165,26 +164,26 @@ impl Sampled {
         Ok(Some(Self { full, forces }))
     }
 
+    /// Number of states.
     fn n_states(&self) -> usize {
         self.forces[0].first().map_or(0, Vec::len)
     }
 
-    /// Error of a drive's force, relative to the sum of what its products add to it.
-    fn error(&self, drive: usize, n_drives: usize, values: &[f64]) -> f64 {
+    /// Error of a drive's force over all states, relative to the sum of the magnitudes of its terms.
+    fn relative_force_error(&self, drive: usize, n_drives: usize, values: &[f64]) -> f64 {
         let (mut errors, mut size) = ([0.0; 2], 0.0);
         for state in 0..self.n_states() {
+            // The force from p_g, as a sum of terms.
             let row = self.full.row(state * n_drives + drive);
             let terms = row.iter().zip(values).map(|(h, p)| h * p);
-            let (sum, sizes) = terms.fold((0.0, 0.0), |(sum, size), term| {
-                (sum + term, size + term.abs())
-            });
+            let (sum, sizes) = terms.fold((0.0, 0.0), |(sum, size), term| (sum + term, size + term.abs()));
             size += sizes * sizes;
             for (error, forces) in errors.iter_mut().zip(&self.forces) {
                 *error += (forces[drive][state] - sum).powi(2);
             }
         }
         let [a, b] = errors;
-        // `max` would pass over what is no number.
+        // `f64::max` would ignore NaN.
         let worst = if a > b || a.is_nan() { a } else { b };
         if worst == 0.0 {
             return 0.0;
@@ -193,29 +192,33 @@ impl Sampled {
     }
 }
 
-/// A state near the nominal pose.
-struct State {
+/// A random state near the nominal pose.
+struct NearbyState {
+    /// Active coordinates, rad or m.
     q: Vec<f64>,
+    /// Rates, rad/s or m/s.
     qd: Vec<f64>,
+    /// Accelerations, rad/s^2 or m/s^2.
     qdd: Vec<f64>,
+    /// Forces of the drives, N or N m.
     load: Vec<f64>,
 }
 
-impl State {
-    fn random(mechanism: &Mechanism, reach: f64, stream: &mut Stream) -> Self {
-        let active: Vec<_> = (mechanism.coordinates.iter())
-            .filter(|c| !c.passive)
-            .collect();
+impl NearbyState {
+    /// Draws a state; lengths scale with their nominal value.
+    fn random_near_nominal(mechanism: &Mechanism, reach: f64, stream: &mut RandomStream) -> Self {
+        // Passive coordinates follow from the loops.
+        let active: Vec<_> = (mechanism.coordinates.iter()).filter(|c| !c.passive).collect();
         let q = active.iter().map(|c| {
             let one = if c.motion.is_angle() || c.nominal == 0.0 {
                 1.0
             } else {
                 c.nominal.abs()
             };
-            c.nominal + reach * one * symmetric(stream)
+            c.nominal + reach * one * uniform_symmetric(stream)
         });
         let q = q.collect();
-        let mut moving = |n: usize, most: f64| (0..n).map(|_| most * symmetric(stream)).collect();
+        let mut moving = |n: usize, most: f64| (0..n).map(|_| most * uniform_symmetric(stream)).collect();
         Self {
             q,
             qd: moving(active.len(), 2.0),
@@ -224,8 +227,9 @@ impl State {
         }
     }
 
-    fn states(&self) -> States<'_> {
-        States {
+    /// The state as arrays of length one.
+    fn as_motion_states(&self) -> MotionStates<'_> {
+        MotionStates {
             q: self.q.chunks(1).collect(),
             qd: self.qd.chunks(1).collect(),
             qdd: self.qdd.chunks(1).collect(),
@@ -234,14 +238,14 @@ impl State {
     }
 }
 
-/// Which products lose the digits.
-fn culprits(derivation: &Derivation, found: &Lost) -> DeriveError {
+/// The error for a base that loses digits, with the products whose terms are largest.
+fn lost_digits_error(derivation: &Derivation, found: &DigitLoss) -> DeriveError {
     let constants = derivation.mechanism.constants.iter();
     let constants: Vec<f64> = constants.map(|c| c.value).collect();
     let reduction = &derivation.reduction;
     let name = |product: usize| reduction.products[product].text(&derivation.mechanism);
     let norm = |product: usize| found.h.column(product).norm();
-    // Terms of each dependent product, by retained column.
+    // Magnitudes of the terms of each dependent product, by retained column.
     let lines: Vec<(usize, Vec<(usize, f64)>)> = reduction
         .dependencies
         .iter()
@@ -250,31 +254,21 @@ fn culprits(derivation: &Derivation, found: &Lost) -> DeriveError {
             let terms = factors.iter().map(|(k, factor)| {
                 let retained = reduction.retained[*k];
                 let term = factor * found.values[line.product] * norm(retained);
-                // What is no number is larger than any.
-                (
-                    retained,
-                    if term.is_nan() {
-                        f64::INFINITY
-                    } else {
-                        term.abs()
-                    },
-                )
+                // NaN counts as infinite.
+                (retained, if term.is_nan() { f64::INFINITY } else { term.abs() })
             });
             (line.product, terms.collect())
         })
         .collect();
+    // Lines with the largest terms, and the retained products in them.
     let largest = |terms: &[(usize, f64)]| terms.iter().map(|t| t.1).fold(0.0, f64::max);
-    let all = lines
-        .iter()
-        .map(|(_, terms)| largest(terms))
-        .fold(0.0, f64::max);
-    let worst = lines
-        .iter()
-        .filter(|(_, terms)| largest(terms) >= NEARLY * all);
+    let all = lines.iter().map(|(_, terms)| largest(terms)).fold(0.0, f64::max);
+    let worst = lines.iter().filter(|(_, terms)| largest(terms) >= NEARLY_LARGEST * all);
+    // Names for the message.
     let dependent: Vec<String> = worst.clone().map(|(product, _)| name(*product)).collect();
     let mut retained: Vec<usize> = worst
         .flat_map(|(_, terms)| terms)
-        .filter(|(_, term)| *term >= NEARLY * all)
+        .filter(|(_, term)| *term >= NEARLY_LARGEST * all)
         .map(|(retained, _)| *retained)
         .collect();
     retained.sort_unstable();
@@ -298,20 +292,16 @@ mod tests {
         let folder = env!("CARGO_MANIFEST_DIR");
         let path = format!("{folder}/../model-spec/models/{name}.toml");
         let loaded = modelmill_spec::load_file(path.as_ref());
-        loaded
-            .unwrap_or_else(|failure| panic!("{failure}"))
-            .mechanism
+        loaded.unwrap_or_else(|failure| panic!("{failure}")).mechanism
     }
 
     fn read(text: &str) -> Mechanism {
-        let files = modelmill_boundary::files::Memory::default();
+        let files = modelmill_boundary::files::MemoryFiles::default();
         let loaded = modelmill_spec::load("made.toml", text, &files);
-        loaded
-            .unwrap_or_else(|failure| panic!("{failure}"))
-            .mechanism
+        loaded.unwrap_or_else(|failure| panic!("{failure}")).mechanism
     }
 
-    /// What makes a file ask for the masses instead of the body's own products.
+    /// A line of the model file that retains the masses instead of the body's own products.
     const MASSES: &str = "retain = [\"m1\", \"m2\"]";
 
     /// A pendulum whose masses at `a` and `a + gap` are declared before the body that carries them.
@@ -357,26 +347,22 @@ mod tests {
         ))
     }
 
-    /// Error of the pendulum's torque by p_min beside the formula of a textbook, relative to its size; p_min as the evaluator
-    /// and as emitted code adds it up.
+    /// Error of the pendulum's torque from p_min compared with the textbook formula, relative to its size. p_min is
+    /// summed as in the evaluator and as in emitted code.
     fn errors_by_hand(derivation: &Derivation) -> [f64; 2] {
         let [a, b] = [0, 1].map(|k| derivation.mechanism.constants[k].value);
-        let evaluator = Evaluator::new(derivation);
-        [
-            derivation.nominal_base_values(),
-            evaluator.base_parameters(),
-        ]
-        .map(|base| {
+        let evaluator = ModelEvaluator::new(derivation);
+        [derivation.nominal_base_values(), evaluator.base_parameters()].map(|base| {
             let (mut error, mut size) = (0.0_f64, 0.0_f64);
             for k in 0..40 {
                 let (q, qdd) = (0.13 * f64::from(k), 3.0 - 0.4 * f64::from(k % 17));
-                let state = State {
+                let state = NearbyState {
                     q: vec![q],
                     qd: vec![0.7],
                     qdd: vec![qdd],
                     load: vec![0.0],
                 };
-                let found = evaluator.inverse_dynamics(&state.states(), &base).unwrap()[0][0];
+                let found = evaluator.inverse_dynamics(&state.as_motion_states(), &base).unwrap()[0][0];
                 let inertia = a * a + 2.0 * b * b + 0.35;
                 let moment = a + 2.0 * b + 1.05;
                 let expected = inertia * qdd + 9.81 * (moment * q.cos() - 0.2 * q.sin());
@@ -387,8 +373,8 @@ mod tests {
         })
     }
 
-    /// From gaps that cost nothing to gaps that leave nothing: refused is what loses more than a millionth, by a formula
-    /// that knows nothing of the reduction.
+    /// From gaps without loss to gaps that lose all digits: a base that loses more than a millionth is refused. The
+    /// formula of the comparison does not use the reduction.
     #[test]
     fn a_base_is_refused_where_its_forces_are_wrong_and_only_there() {
         for exponent in 1..=16 {
@@ -414,18 +400,14 @@ mod tests {
         }
     }
 
-    /// The evaluator's base parameters lose one rounding per growth of the factors, not two: the differences that they are
-    /// divided by are exact.
+    /// The evaluator's base parameters lose one rounding per growth of the factors, not two: the differences that they
+    /// are divided by are exact.
     #[test]
     fn differences_in_denominators_are_exact() {
         for exponent in [4, 6, 8] {
-            let derivation =
-                crate::derive::derive(&pendulum(10_f64.powi(-exponent), MASSES)).unwrap();
+            let derivation = crate::derive::derive(&pendulum(10_f64.powi(-exponent), MASSES)).unwrap();
             let [error, _] = errors_by_hand(&derivation);
-            assert!(
-                error < 10_f64.powi(exponent - 15),
-                "1e-{exponent}: {error:e}"
-            );
+            assert!(error < 10_f64.powi(exponent - 15), "1e-{exponent}: {error:e}");
         }
     }
 
@@ -433,9 +415,7 @@ mod tests {
     fn the_refusal_names_the_products_that_should_not_be_retained() {
         let mechanism = pendulum(1e-14, MASSES);
         let Err(DeriveError::DigitsLost {
-            retained,
-            dependent,
-            ..
+            retained, dependent, ..
         }) = derive(&mechanism)
         else {
             panic!("refused");
@@ -444,8 +424,8 @@ mod tests {
         assert_eq!(dependent, ["ZZ1", "MX1"]);
     }
 
-    /// The body's own products are retained, and those of masses follow without quotients; so with numbers that a reader
-    /// takes for one, as a spreadsheet writes 3 * 0.1.
+    /// The body's own products are retained, and those of masses depend on them without quotients. So it is with
+    /// numbers that differ only by rounding, such as 0.3 and 3 * 0.1.
     #[test]
     fn masses_that_coincide_do_not_stand_for_their_body() {
         for b in [0.3, 0.300_000_000_000_000_04, 0.3 + 1e-9, 0.31, 0.9] {
@@ -457,15 +437,10 @@ mod tests {
 
     /// Masses at `places` along a pendulum, and nothing else.
     fn masses(places: &[f64]) -> Mechanism {
-        let (mut constants, mut parameters, mut lumps) =
-            (String::new(), String::new(), String::new());
+        let (mut constants, mut parameters, mut lumps) = (String::new(), String::new(), String::new());
         for (i, x) in places.iter().enumerate() {
             let _ = writeln!(constants, "a{i} = {{ value = {x:?}, unit = \"m\" }}");
-            let _ = writeln!(
-                parameters,
-                "m{i} = {{ nominal = {}.0, unit = \"kg\" }}",
-                i + 1
-            );
+            let _ = writeln!(parameters, "m{i} = {{ nominal = {}.0, unit = \"kg\" }}", i + 1);
             let _ = writeln!(
                 lumps,
                 "[[lumped_mass]]\nmass = \"m{i}\"\non = \"arm\"\nat = [\"a{i}\", 0, 0]"
@@ -478,7 +453,7 @@ mod tests {
         ))
     }
 
-    /// Two of the masses make up all others: those are retained that differ.
+    /// All masses depend on two of them: two whose positions differ are retained.
     #[test]
     fn columns_that_coincide_are_not_retained_together() {
         for gap in [0.0, 1e-16, 1e-12, 1e-7, 1e-3] {
@@ -486,18 +461,16 @@ mod tests {
             let derivation = derive(&masses(&places)).unwrap_or_else(|e| panic!("{gap:e}: {e}"));
             assert_eq!(derivation.reduction.retained.len(), 2);
             let base = derivation.nominal_base_values();
-            let state = State {
+            let state = NearbyState {
                 q: vec![0.5],
                 qd: vec![0.7],
                 qdd: vec![2.0],
                 load: vec![0.0],
             };
-            let evaluator = Evaluator::new(&derivation);
-            let found = evaluator.inverse_dynamics(&state.states(), &base).unwrap()[0][0];
+            let evaluator = ModelEvaluator::new(&derivation);
+            let found = evaluator.inverse_dynamics(&state.as_motion_states(), &base).unwrap()[0][0];
             let terms = places.iter().zip([1.0, 2.0, 3.0, 4.0]);
-            let expected: f64 = terms
-                .map(|(x, m)| m * x * (2.0 * x + 9.81 * 0.5_f64.cos()))
-                .sum();
+            let expected: f64 = terms.map(|(x, m)| m * x * (2.0 * x + 9.81 * 0.5_f64.cos())).sum();
             let error = (found - expected).abs() / expected;
             assert!(error < 1e-12, "{gap:e}: {error:e}");
         }
@@ -554,17 +527,17 @@ mod tests {
     fn a_body_is_not_written_by_its_rotors() {
         for z in [[0.05, -0.05, 0.1, 0.02], [0.05; 4]] {
             let derivation = derive(&drone(z)).unwrap_or_else(|error| panic!("{error}"));
-            let lost = lost(&derivation).unwrap().unwrap().error;
+            let lost = largest_digit_loss(&derivation).unwrap().unwrap().error;
             assert!(lost < 1e-13, "{z:?}: {lost:e}");
             let lines = derivation.reduction.dependencies.iter();
-            let has_quotients = lines.flat_map(|line| &line.equals).any(|(_, factor)| {
-                factor.denominator != RationalFunction::constant(Rational::ONE).denominator
-            });
+            let has_quotients = lines
+                .flat_map(|line| &line.equals)
+                .any(|(_, factor)| factor.denominator != RationalFunction::constant(Rational::ONE).denominator);
             assert!(!has_quotients);
         }
     }
 
-    /// What parameters are worth does not hide what factors lose.
+    /// Values of parameters do not hide the digits that factors lose.
     #[test]
     fn parameters_without_values_stand_for_those_of_their_unit() {
         let mut mechanism = pendulum(1e-14, MASSES);
@@ -572,24 +545,15 @@ mod tests {
             parameter.nominal = 0.0;
         }
         let found = derive(&mechanism).map(|_| ());
-        assert!(
-            matches!(found, Err(DeriveError::DigitsLost { .. })),
-            "{found:?}"
-        );
+        assert!(matches!(found, Err(DeriveError::DigitsLost { .. })), "{found:?}");
     }
 
-    /// Numbers in, digits out: sound models lose next to none.
+    /// Consistent models lose almost no digits.
     #[test]
     fn sound_models_are_far_from_the_threshold() {
-        for name in [
-            "two_link",
-            "spidermill-paper",
-            "four_bar",
-            "stanford",
-            "tx40",
-        ] {
+        for name in ["two_link", "spidermill-paper", "four_bar", "stanford", "tx40"] {
             let derivation = derive(&model(name)).unwrap();
-            let lost = lost(&derivation).unwrap().unwrap().error;
+            let lost = largest_digit_loss(&derivation).unwrap().unwrap().error;
             assert!(lost < 1e-11, "{name}: {lost:e}");
         }
     }

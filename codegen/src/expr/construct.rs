@@ -1,17 +1,21 @@
-//! The smart constructors: the only way to make a node.
+//! The smart constructors: the only way to create a node. Operands go in, the id of the canonical node comes out.
 
 use super::{Atom, ExprId, Graph, Node, Rational, Unary};
 
-/// The root of a rational, if it is rational.
-fn whole_root(value: &Rational) -> Option<Rational> {
-    root_in_primes(value).and_then(|(root, primes)| primes.is_empty().then_some(root))
+/// The square root of a rational number, if it is rational.
+fn rational_root(value: &Rational) -> Option<Rational> {
+    prime_root_product(value).and_then(|(root, primes)| primes.is_empty().then_some(root))
 }
 
-/// Writes the root of a positive rational as a rational times the roots of different primes, so that roots of
-/// different numbers that hang together are seen to; a cofactor without small divisors counts as a prime.
-fn root_in_primes(value: &Rational) -> Option<(Rational, Vec<i64>)> {
+/// Writes the square root of a positive rational as a rational factor times the roots of different primes, so that
+/// relations such as `sqrt(8) = 2 sqrt(2)` are found. A cofactor without divisors up to 1000 counts as a prime.
+///
+/// `None` for numbers that are not positive or do not fit `i64`.
+fn prime_root_product(value: &Rational) -> Option<(Rational, Vec<i64>)> {
+    // Trial division stops here: larger prime factors are rare in model files.
     const LARGEST: i64 = 1000;
     let (n, d) = value.as_small().filter(|(n, _)| *n > 0)?;
+    // sqrt(n/d) = sqrt(n d)/d, so only the integer n d is factored.
     let mut rest = n.checked_mul(d)?;
     let (mut factor, mut primes) = (1, Vec::new());
     let mut p = 2;
@@ -26,6 +30,7 @@ fn root_in_primes(value: &Rational) -> Option<(Rational, Vec<i64>)> {
         }
         p += 1;
     }
+    // The rest has no divisor up to the limit: it is a square, or it counts as one prime.
     let whole = rest.isqrt();
     if whole * whole == rest {
         factor *= whole;
@@ -71,9 +76,10 @@ impl Graph {
         if factor.is_one() {
             return a;
         }
+        // A factor that `a` has already is merged, so that factors are never nested.
         let (base, k) = self.split_factor(a);
         let k = &k * factor;
-        self.scaled(base, k)
+        self.scaled_node(base, k)
     }
 
     /// Sum of all `terms`.
@@ -87,11 +93,13 @@ impl Graph {
     /// A term that is itself a sum stays nested, unless opening it makes something cancel.
     pub fn sum(&mut self, terms: &[(ExprId, Rational)]) -> ExprId {
         let mut flat: Vec<(ExprId, Rational)> = Vec::with_capacity(terms.len());
+        // Like terms are added first, each without its own rational factor.
         for (term, factor) in terms {
             let (base, k) = self.split_factor(*term);
             merge(&mut flat, base, &(&k * factor));
         }
         flat.retain(|(_, k)| !k.is_zero());
+        // Sums are opened one at a time, because each opened sum may make another one cancel.
         while let Some(opened) = self.open_cancelling(&flat) {
             flat = opened;
         }
@@ -115,12 +123,11 @@ impl Graph {
 
     /// Product of integer powers; a factor 0 with a negative exponent is refused by an assertion.
     pub fn product(&mut self, factors: &[(ExprId, i32)]) -> ExprId {
+        // The rational factors of all operands are collected in one number outside the product.
         let mut scale = Rational::ONE;
         let mut flat: Vec<(ExprId, i32)> = Vec::with_capacity(factors.len());
-        let push = |flat: &mut Vec<(ExprId, i32)>, base: ExprId, n: i32| match flat
-            .iter_mut()
-            .find(|f| f.0 == base)
-        {
+        // Adds an exponent to a factor that is in the list, or appends the factor.
+        let push = |flat: &mut Vec<(ExprId, i32)>, base: ExprId, n: i32| match flat.iter_mut().find(|f| f.0 == base) {
             Some(found) => found.1 += n,
             None => flat.push((base, n)),
         };
@@ -142,6 +149,7 @@ impl Graph {
                 _ => push(&mut flat, base, *n),
             }
         }
+        // A product with a factor zero is zero, however many other factors it has.
         if scale.is_zero() {
             return Self::ZERO;
         }
@@ -159,6 +167,7 @@ impl Graph {
             }
         }
         flat.retain(|(_, n)| *n != 0);
+        // An order by id makes equal products equal nodes.
         let base = match flat.as_slice() {
             [] => Self::ONE,
             [(only, 1)] => *only,
@@ -167,16 +176,20 @@ impl Graph {
                 self.intern(Node::Product(flat))
             }
         };
-        self.scaled(base, scale)
+        self.scaled_node(base, scale)
     }
 
     /// A function of one argument.
+    ///
+    /// Numbers are evaluated where the result is exact, and signs and rational factors move out of the function.
     pub fn unary(&mut self, function: Unary, a: ExprId) -> ExprId {
+        // Exact values of numbers.
         if let Node::Rational(value) = self.node(a).clone() {
             match function {
                 Unary::Sqrt if value.is_zero() || value.is_one() => return a,
+                // A rational root, or a product of roots of primes with a rational factor.
                 Unary::Sqrt => {
-                    if let Some((factor, primes)) = root_in_primes(&value)
+                    if let Some((factor, primes)) = prime_root_product(&value)
                         && (primes.len() != 1 || !factor.is_one())
                     {
                         let roots: Vec<(ExprId, i32)> = primes
@@ -191,8 +204,7 @@ impl Graph {
                     }
                 }
                 Unary::Sign => {
-                    let sign =
-                        i64::from(!value.is_zero()) * if value.is_negative() { -1 } else { 1 };
+                    let sign = i64::from(!value.is_zero()) * if value.is_negative() { -1 } else { 1 };
                     return self.integer(sign);
                 }
                 Unary::Abs => return self.rational(value.abs()),
@@ -201,6 +213,7 @@ impl Graph {
                 _ => {}
             }
         }
+        // Odd functions move a minus sign outwards; even functions drop it.
         let (base, k) = self.split_factor(a);
         match function {
             Unary::Sign | Unary::Tanh | Unary::Abs | Unary::Sin | Unary::Cos if k.is_negative() => {
@@ -212,16 +225,19 @@ impl Graph {
                     self.neg(value)
                 }
             }
+            // sign(k x) = sign(x) and abs(k x) = k abs(x) for k > 0, which is true here.
             Unary::Sign if !k.is_one() => self.unary(Unary::Sign, base),
             Unary::Abs if !k.is_one() => {
                 let value = self.unary(Unary::Abs, base);
                 self.scale(value, &k)
             }
-            Unary::Sqrt if !k.is_one() && base != Self::ONE && whole_root(&k).is_some() => {
+            // sqrt(k x) = sqrt(k) sqrt(x) where sqrt(k) is rational.
+            Unary::Sqrt if !k.is_one() && base != Self::ONE && rational_root(&k).is_some() => {
                 let value = self.unary(Unary::Sqrt, base);
-                let factor = whole_root(&k).unwrap_or(Rational::ONE);
+                let factor = rational_root(&k).unwrap_or(Rational::ONE);
                 self.scale(value, &factor)
             }
+            // sqrt(x^2) = abs(x)
             Unary::Sqrt => {
                 if let Node::Product(factors) = self.node(a)
                     && let [(inner, 2)] = factors.as_slice()
@@ -244,7 +260,8 @@ impl Graph {
         }
     }
 
-    fn scaled(&mut self, base: ExprId, factor: Rational) -> ExprId {
+    /// `factor * base` as a node, where `base` has no rational factor of its own.
+    fn scaled_node(&mut self, base: ExprId, factor: Rational) -> ExprId {
         if factor.is_zero() {
             Self::ZERO
         } else if base == Self::ONE {
@@ -256,12 +273,13 @@ impl Graph {
         }
     }
 
+    /// The sum of merged terms as a node: terms in order of their ids, and a common factor moved outwards.
     fn canonical_sum(&mut self, mut flat: Vec<(ExprId, Rational)>) -> ExprId {
         match flat.len() {
             0 => return Self::ZERO,
             1 => {
                 let (base, factor) = flat.remove(0);
-                return self.scaled(base, factor);
+                return self.scaled_node(base, factor);
             }
             _ => {}
         }
@@ -270,7 +288,8 @@ impl Graph {
         if flat[0].0 == Self::ONE {
             flat.rotate_left(1);
         }
-        // A factor that all terms share goes outwards; a mere common divisor stays, as it would only be multiplied back.
+        // A factor that all terms share goes outwards; a mere common divisor stays, as it would only be multiplied
+        // back.
         let first = flat[0].1.clone();
         let content = if flat.iter().all(|(_, k)| k.abs() == first.abs()) {
             first
@@ -286,11 +305,13 @@ impl Graph {
             }
         }
         let base = self.intern(Node::Sum(flat));
-        self.scaled(base, content)
+        self.scaled_node(base, content)
     }
 
-    /// If a nested sum holds a term that cancels against the others, the list with that sum opened.
+    /// The list with one nested sum opened, if a term of that sum cancels against the others; `None` if nothing
+    /// cancels.
     fn open_cancelling(&self, flat: &[(ExprId, Rational)]) -> Option<Vec<(ExprId, Rational)>> {
+        // Terms of a true sum; a single scaled term is not one.
         let inner_terms = |id: ExprId| match self.node(id) {
             Node::Sum(terms) if terms.len() > 1 => Some(terms),
             _ => None,
@@ -299,18 +320,14 @@ impl Graph {
             let Some(inner) = inner_terms(*id) else {
                 continue;
             };
+            // Whether a term of the inner sum is the negative of an outer term, or of a term inside another nested sum.
             let cancels = inner.iter().any(|(base, k)| {
                 let k = k * factor;
-                flat.iter()
-                    .enumerate()
-                    .filter(|(j, _)| *j != i)
-                    .any(|(_, (other, m))| {
-                        let opposite = |m: &Rational| (m + &k).is_zero();
-                        (other == base && opposite(m))
-                            || inner_terms(*other).is_some_and(|t| {
-                                t.iter().any(|(b, x)| b == base && opposite(&(x * m)))
-                            })
-                    })
+                flat.iter().enumerate().filter(|(j, _)| *j != i).any(|(_, (other, m))| {
+                    let opposite = |m: &Rational| (m + &k).is_zero();
+                    (other == base && opposite(m))
+                        || inner_terms(*other).is_some_and(|t| t.iter().any(|(b, x)| b == base && opposite(&(x * m))))
+                })
             });
             if cancels {
                 let mut opened: Vec<_> = flat
@@ -330,6 +347,7 @@ impl Graph {
     }
 }
 
+/// Adds `factor * base` to a list of terms without duplicates.
 fn merge(flat: &mut Vec<(ExprId, Rational)>, base: ExprId, factor: &Rational) {
     match flat.iter_mut().find(|(id, _)| *id == base) {
         Some((_, k)) => *k = &*k + factor,

@@ -1,4 +1,4 @@
-//! Derivatives: by an atom, and by time.
+//! Derivatives of expressions: by an atom, by time, or along any direction.
 
 use std::collections::BTreeMap;
 
@@ -7,13 +7,11 @@ use super::{Atom, ExprId, Graph, Node, Rational, Unary};
 impl Graph {
     /// Partial derivative of each root by `atom`. The sign function counts as constant.
     pub fn differentiate(&mut self, roots: &[ExprId], atom: Atom) -> Vec<ExprId> {
-        self.directional(
-            roots,
-            |_, a| if a == atom { Graph::ONE } else { Graph::ZERO },
-        )
+        self.directional(roots, |_, a| if a == atom { Graph::ONE } else { Graph::ZERO })
     }
 
-    /// Time derivative of each root: coordinates turn into rates, rates into accelerations; all else stands still.
+    /// Time derivative of each root: coordinates become rates, rates become accelerations, and all other atoms are
+    /// constant.
     pub fn time_derivative(&mut self, roots: &[ExprId]) -> Vec<ExprId> {
         self.directional(roots, |graph, atom| match atom {
             Atom::Coordinate(i) => graph.atom(Atom::Rate(i)),
@@ -22,13 +20,11 @@ impl Graph {
         })
     }
 
-    /// Derivative of each root along a direction that gives every atom its speed.
-    pub fn directional(
-        &mut self,
-        roots: &[ExprId],
-        mut speed: impl FnMut(&mut Graph, Atom) -> ExprId,
-    ) -> Vec<ExprId> {
+    /// Derivative of each root along a direction: `speed` returns the derivative of every atom.
+    pub fn directional(&mut self, roots: &[ExprId], mut speed: impl FnMut(&mut Graph, Atom) -> ExprId) -> Vec<ExprId> {
+        // Forward differentiation: operands come before the nodes that use them.
         let needed = self.reachable(roots);
+        // Derivative of every node so far.
         let mut derivative: BTreeMap<ExprId, ExprId> = BTreeMap::new();
         for (i, needed) in needed.into_iter().enumerate() {
             if !needed {
@@ -38,7 +34,9 @@ impl Graph {
             let value = match self.node(id).clone() {
                 Node::Rational(_) => Self::ZERO,
                 Node::Atom(atom) => speed(self, atom),
+                // Chain rule with the sum of the atoms' speeds as the inner derivative.
                 Node::Sin(angle) | Node::Cos(angle) => {
+                    // (sin u)' = cos u u', (cos u)' = -sin u u'
                     let is_sine = matches!(self.node(id), Node::Sin(_));
                     let mut terms = Vec::new();
                     for (atom, n) in angle.terms() {
@@ -49,13 +47,12 @@ impl Graph {
                     let outer = if is_sine { c } else { self.neg(s) };
                     self.mul(outer, rate)
                 }
+                // A sum keeps its factors.
                 Node::Sum(terms) => {
-                    let terms: Vec<_> = terms
-                        .into_iter()
-                        .map(|(child, k)| (derivative[&child], k))
-                        .collect();
+                    let terms: Vec<_> = terms.into_iter().map(|(child, k)| (derivative[&child], k)).collect();
                     self.sum(&terms)
                 }
+                // Product rule; factors that are constant along the direction contribute nothing.
                 Node::Product(factors) => {
                     let mut terms = Vec::new();
                     for (k, (base, n)) in factors.iter().enumerate() {
@@ -63,6 +60,7 @@ impl Graph {
                         if inner == Self::ZERO {
                             continue;
                         }
+                        // The exponent is reduced by one, and the derivative of the base is a further factor.
                         let mut rest = factors.clone();
                         rest[k].1 -= 1;
                         rest.push((inner, 1));
@@ -86,14 +84,17 @@ impl Graph {
         roots.iter().map(|root| derivative[root]).collect()
     }
 
+    /// Derivative of a function by its argument; `value` is the function's own node.
     fn unary_derivative(&mut self, function: Unary, argument: ExprId, value: ExprId) -> ExprId {
         match function {
+            // 1/(2 sqrt(x))
             Unary::Sqrt => {
                 let inverse = self.pow(value, -1);
                 self.scale(inverse, &Rational::new(1, 2))
             }
             Unary::Sign => Self::ZERO,
             Unary::Abs => self.unary(Unary::Sign, argument),
+            // 1 - tanh(x)^2
             Unary::Tanh => {
                 let square = self.pow(value, 2);
                 self.sub(Self::ONE, square)

@@ -24,10 +24,10 @@ use std::collections::BTreeSet;
 
 use rustc_hash::FxHashMap;
 
-pub use angle::AngleSum;
+pub use angle::AtomAngleSum;
 pub(crate) use coordinates::coordinates_of;
-pub use evaluate::{Domain, F64, FieldPoint, RationalPoint, Tape};
-pub(crate) use many_digits::DigitsPoint;
+pub use evaluate::{EvaluationDomain, EvaluationTape, FieldPoint, FloatDomain, RationalPoint};
+pub(crate) use many_digits::BigFloatPoint;
 pub use modelmill_algebra::Rational;
 pub(crate) use nominal::{nominal_of, nominal_value};
 
@@ -68,10 +68,7 @@ pub enum Atom {
 impl Atom {
     /// Whether it is known once the geometry and the parameters are.
     pub(crate) fn is_fixed(self) -> bool {
-        matches!(
-            self,
-            Self::Pi | Self::Constant(_) | Self::Parameter(_) | Self::Base(_)
-        )
+        matches!(self, Self::Pi | Self::Constant(_) | Self::Parameter(_) | Self::Base(_))
     }
 }
 
@@ -102,9 +99,9 @@ pub enum Node {
     /// An opaque quantity.
     Atom(Atom),
     /// Sine of a sum of atoms with integer factors (canonical: the first factor is positive).
-    Sin(AngleSum),
+    Sin(AtomAngleSum),
     /// Cosine of such a sum.
-    Cos(AngleSum),
+    Cos(AtomAngleSum),
     /// Linear combination; a rational term stands as a multiple of [`Graph::ONE`].
     ///
     /// Either one term whose factor is not 1, or several of which the first has a positive factor; if all factors have
@@ -126,7 +123,9 @@ impl Node {
 /// The arena of expressions.
 #[derive(Clone, Debug)]
 pub struct Graph {
+    /// Nodes by index; operands stand before the nodes that use them.
     nodes: Vec<Node>,
+    /// Index of every node, so that an equal node is found instead of being stored twice.
     ids: FxHashMap<Node, ExprId>,
 }
 
@@ -142,7 +141,7 @@ impl Graph {
     /// The number 1.
     pub const ONE: ExprId = ExprId(1);
 
-    /// A graph that holds 0 and 1.
+    /// A graph that contains only the numbers 0 and 1.
     pub fn new() -> Self {
         let mut graph = Self {
             nodes: Vec::new(),
@@ -159,12 +158,12 @@ impl Graph {
         &self.nodes[id.index()]
     }
 
-    /// How many nodes were ever made.
+    /// Number of nodes, including those that no root needs.
     pub fn len(&self) -> usize {
         self.nodes.len()
     }
 
-    /// Always false: 0 and 1 are there from the start.
+    /// Always false: every graph contains the numbers 0 and 1.
     pub fn is_empty(&self) -> bool {
         self.nodes.is_empty()
     }
@@ -175,14 +174,12 @@ impl Graph {
         for root in roots {
             seen[root.index()] = true;
         }
+        // Parents have larger indices than their operands, so one backward pass reaches everything.
         for i in (0..self.nodes.len()).rev() {
             if seen[i] {
-                self.for_each_child(
-                    ExprId(u32::try_from(i).expect("graph below 4G nodes")),
-                    |child| {
-                        seen[child.index()] = true;
-                    },
-                );
+                self.for_each_child(ExprId(u32::try_from(i).expect("graph below 4G nodes")), |child| {
+                    seen[child.index()] = true;
+                });
             }
         }
         seen
@@ -190,6 +187,7 @@ impl Graph {
 
     /// Calls `visit` for every operand of `id`.
     pub fn for_each_child(&self, id: ExprId, mut visit: impl FnMut(ExprId)) {
+        // Sines and cosines contain atoms, but no nodes.
         match self.node(id) {
             Node::Rational(_) | Node::Atom(_) | Node::Sin(_) | Node::Cos(_) => {}
             Node::Sum(terms) => terms.iter().for_each(|(child, _)| visit(*child)),
@@ -220,26 +218,21 @@ impl Graph {
         atoms
     }
 
-    /// A graph of what some roots need and nothing else, in the same order, with the roots there.
+    /// A graph with only the nodes that `roots` need, in the same order, and the ids of the roots in it.
     pub(crate) fn compacted(&self, roots: &[ExprId]) -> (Self, Vec<ExprId>) {
         let mut compact = Self::new();
+        // New id of each old node; zero and one keep their places.
         let mut new = vec![Self::ZERO; self.nodes.len()];
         new[Self::ONE.index()] = Self::ONE;
+        // The first two nodes are 0 and 1 in every graph.
         for (i, needed) in self.reachable(roots).into_iter().enumerate().skip(2) {
             if needed {
+                // The same node with the new ids of its operands.
                 let node = match self.nodes[i].clone() {
-                    Node::Sum(terms) => Node::Sum(
-                        terms
-                            .into_iter()
-                            .map(|(c, k)| (new[c.index()], k))
-                            .collect(),
-                    ),
-                    Node::Product(factors) => Node::Product(
-                        factors
-                            .into_iter()
-                            .map(|(c, n)| (new[c.index()], n))
-                            .collect(),
-                    ),
+                    Node::Sum(terms) => Node::Sum(terms.into_iter().map(|(c, k)| (new[c.index()], k)).collect()),
+                    Node::Product(factors) => {
+                        Node::Product(factors.into_iter().map(|(c, n)| (new[c.index()], n)).collect())
+                    }
                     Node::Unary(function, c) => Node::Unary(function, new[c.index()]),
                     leaf => leaf,
                 };
@@ -250,6 +243,7 @@ impl Graph {
         (compact, roots)
     }
 
+    /// The id of a node: that of the equal node that is stored already, or a new one.
     fn intern(&mut self, node: Node) -> ExprId {
         if let Some(id) = self.ids.get(&node) {
             return *id;

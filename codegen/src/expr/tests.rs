@@ -1,11 +1,12 @@
-//! Expressions against exact evaluation: whatever the constructors do to a random expression, its value stays.
+//! Expressions against exact evaluation: the constructors keep the value of every random expression.
 
-use modelmill_algebra::field::{Element, MODULUS};
+use modelmill_algebra::field::{FieldElement, MODULUS};
 
 use proptest::prelude::*;
 
 use super::{
-    AngleSum, Atom, Domain, ExprId, F64, FieldPoint, Graph, Rational, RationalPoint, Tape, Unary,
+    Atom, AtomAngleSum, EvaluationDomain, EvaluationTape, ExprId, FieldPoint, FloatDomain, Graph, Rational,
+    RationalPoint, Unary,
 };
 
 /// A random expression as a program for the constructors: each step uses values made before.
@@ -29,11 +30,7 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
     let step = prop_oneof![
         (-5i64..6, 1i64..4).prop_map(|(n, d)| Step::Number(n, d)),
         (0..3usize).prop_map(Step::Atom),
-        (
-            prop::collection::vec((0..2usize, -2i32..3), 1..3),
-            any::<bool>()
-        )
-            .prop_map(|(a, s)| Step::Angle(a, s)),
+        (prop::collection::vec((0..2usize, -2i32..3), 1..3), any::<bool>()).prop_map(|(a, s)| Step::Angle(a, s)),
         (i.clone(), i.clone()).prop_map(|(a, b)| Step::Add(a, b)),
         (i.clone(), i.clone()).prop_map(|(a, b)| Step::Sub(a, b)),
         (i.clone(), i.clone()).prop_map(|(a, b)| Step::Mul(a, b)),
@@ -50,9 +47,7 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
 fn point(seed: [i64; 3], tangents: [i64; 2]) -> RationalPoint {
     let mut point = RationalPoint::default();
     for (i, value) in seed.into_iter().enumerate() {
-        point
-            .values
-            .insert(Atom::Parameter(i), Rational::new(value, 7));
+        point.values.insert(Atom::Parameter(i), Rational::new(value, 7));
     }
     for (i, t) in tangents.into_iter().enumerate() {
         let t = Rational::new(t, 5);
@@ -64,7 +59,7 @@ fn point(seed: [i64; 3], tangents: [i64; 2]) -> RationalPoint {
     point
 }
 
-/// Builds the expressions, and beside them their values by plain rational arithmetic.
+/// Builds the expressions, and computes their values by plain rational arithmetic.
 fn build(graph: &mut Graph, steps: &[Step], point: &RationalPoint) -> (Vec<ExprId>, Vec<Rational>) {
     let mut made: Vec<(ExprId, Rational)> = vec![(Graph::ONE, Rational::ONE)];
     for step in steps {
@@ -79,7 +74,7 @@ fn build(graph: &mut Graph, steps: &[Step], point: &RationalPoint) -> (Vec<ExprI
                 point.values[&Atom::Parameter(*i)].clone(),
             ),
             Step::Angle(terms, sine) => {
-                let sum = AngleSum::new(terms.iter().map(|(i, n)| (Atom::Coordinate(*i), *n)));
+                let sum = AtomAngleSum::new(terms.iter().map(|(i, n)| (Atom::Coordinate(*i), *n)));
                 let (c, s) = graph.cos_sin(&sum, 0);
                 let (cv, sv) = point.cos_sin(&sum).expect("both angles are known");
                 if *sine { (s, sv) } else { (c, cv) }
@@ -120,23 +115,14 @@ fn build(graph: &mut Graph, steps: &[Step], point: &RationalPoint) -> (Vec<ExprI
                 (graph.unary(Unary::Sign, a), Rational::integer(sign))
             }
             Step::SumOf(terms) => {
-                let terms: Vec<_> = terms
-                    .iter()
-                    .map(|(i, k)| (get(*i), Rational::integer(*k)))
-                    .collect();
-                let value = terms
-                    .iter()
-                    .fold(Rational::ZERO, |s, ((_, x), k)| &s + &(x * k));
+                let terms: Vec<_> = terms.iter().map(|(i, k)| (get(*i), Rational::integer(*k))).collect();
+                let value = terms.iter().fold(Rational::ZERO, |s, ((_, x), k)| &s + &(x * k));
                 let terms: Vec<_> = terms.into_iter().map(|((id, _), k)| (id, k)).collect();
                 (graph.sum(&terms), value)
             }
         };
         // Numbers of hundreds of digits test nothing new.
-        if next
-            .1
-            .as_small()
-            .is_some_and(|(n, d)| n.abs() < 1 << 40 && d < 1 << 40)
-        {
+        if next.1.as_small().is_some_and(|(n, d)| n.abs() < 1 << 40 && d < 1 << 40) {
             made.push(next);
         }
     }
@@ -155,7 +141,7 @@ proptest! {
         let mut graph = Graph::new();
         let point = point(values, tangents);
         let (ids, expected) = build(&mut graph, &steps, &point);
-        let found = Tape::new(&graph, &ids).evaluate(&point);
+        let found = EvaluationTape::new(&graph, &ids).evaluate(&point);
         // A division by an expression that merely happens to vanish may be moved; then there is no value to compare.
         if let Some(found) = found {
             prop_assert_eq!(found, expected);
@@ -171,9 +157,9 @@ proptest! {
         let mut graph = Graph::new();
         let exact = point(values, tangents);
         let (ids, expected) = build(&mut graph, &steps, &exact);
-        let tape = Tape::new(&graph, &ids);
+        let tape = EvaluationTape::new(&graph, &ids);
         let angle = |i: usize| 2.0 * (tangents[i] as f64 / 5.0).atan();
-        let float = tape.evaluate(&F64(|atom: Atom| match atom {
+        let float = tape.evaluate(&FloatDomain(|atom: Atom| match atom {
             Atom::Parameter(i) => values[i] as f64 / 7.0,
             Atom::Coordinate(i) => angle(i),
             _ => f64::NAN,
@@ -187,7 +173,7 @@ proptest! {
                 prop_assert!((a - b.to_f64()).abs() <= 1e-6 * size * size, "{a} {b}");
             }
         }
-        let element = |x: &Rational| Element::<MODULUS>::from_rational(x).expect("no denominator is the modulus");
+        let element = |x: &Rational| FieldElement::<MODULUS>::from_rational(x).expect("no denominator is the modulus");
         let field = FieldPoint {
             values: exact.values.iter().map(|(a, x)| (*a, element(x))).collect(),
             angles: exact.angles.iter().map(|(a, (c, s))| (*a, (element(c), element(s)))).collect(),
@@ -208,9 +194,9 @@ proptest! {
         let exact = point(values, tangents);
         let (ids, _) = build(&mut graph, &steps, &exact);
         for atom in [Atom::Parameter(0), Atom::Coordinate(1)] {
-            let dual = Tape::new(&graph, &ids).evaluate(&Dual { point: &exact, atom });
+            let dual = EvaluationTape::new(&graph, &ids).evaluate(&Dual { point: &exact, atom });
             let derivatives = graph.differentiate(&ids, atom);
-            let found = Tape::new(&graph, &derivatives).evaluate(&exact);
+            let found = EvaluationTape::new(&graph, &derivatives).evaluate(&exact);
             if let (Some(dual), Some(found)) = (dual, found) {
                 prop_assert_eq!(found, dual.into_iter().map(|(_, d)| d).collect::<Vec<_>>());
             }
@@ -230,14 +216,14 @@ proptest! {
         let (p0, p1) = (graph.atom(Atom::Parameter(0)), graph.atom(Atom::Parameter(1)));
         let two = graph.integer(2);
         let shifted = graph.add(p1, two);
-        let zero_divisor = Tape::new(&graph, &[shifted]).evaluate(&here).is_none_or(|v| v[0].is_zero());
+        let zero_divisor = EvaluationTape::new(&graph, &[shifted]).evaluate(&here).is_none_or(|v| v[0].is_zero());
         prop_assume!(!zero_divisor);
         let mut there = here.clone();
         there.values.insert(Atom::Parameter(0), &here.values[&Atom::Parameter(1)] + &Rational::integer(2));
-        let expected = Tape::new(&graph, &ids).evaluate(&there);
+        let expected = EvaluationTape::new(&graph, &ids).evaluate(&there);
         prop_assume!(expected.is_some());
         let put = graph.substitute(&ids, &std::collections::BTreeMap::from([(p0, shifted)]));
-        if let Some(found) = Tape::new(&graph, &put).evaluate(&here) {
+        if let Some(found) = EvaluationTape::new(&graph, &put).evaluate(&here) {
             prop_assert_eq!(Some(found), expected);
         }
     }
@@ -249,7 +235,7 @@ struct Dual<'a> {
     atom: Atom,
 }
 
-impl Domain for Dual<'_> {
+impl EvaluationDomain for Dual<'_> {
     type Value = (Rational, Rational);
     fn rational(&self, value: &Rational) -> Option<Self::Value> {
         Some((value.clone(), Rational::ZERO))
@@ -283,7 +269,7 @@ impl Domain for Dual<'_> {
         };
         Some((self.point.atom(atom)?, slope))
     }
-    fn cos_sin(&self, angle: &AngleSum) -> Option<(Self::Value, Self::Value)> {
+    fn cos_sin(&self, angle: &AtomAngleSum) -> Option<(Self::Value, Self::Value)> {
         let (c, s) = self.point.cos_sin(angle)?;
         let n = angle
             .terms()
@@ -300,10 +286,10 @@ impl Domain for Dual<'_> {
 fn multiples_of_a_twelfth_of_pi_have_their_exact_sines() {
     let mut graph = Graph::new();
     for k in -30..30 {
-        let (c, s) = graph.cos_sin(&AngleSum::NONE, k);
+        let (c, s) = graph.cos_sin(&AtomAngleSum::NONE, k);
         let angle = f64::from(k) * std::f64::consts::PI / 12.0;
-        let found = Tape::new(&graph, &[c, s])
-            .evaluate(&F64(|_| f64::NAN))
+        let found = EvaluationTape::new(&graph, &[c, s])
+            .evaluate(&FloatDomain(|_| f64::NAN))
             .expect("numbers have values");
         assert!(
             (found[0] - angle.cos()).abs() < 1e-14,
@@ -316,7 +302,7 @@ fn multiples_of_a_twelfth_of_pi_have_their_exact_sines() {
             found[1]
         );
     }
-    let (c, s) = graph.cos_sin(&AngleSum::NONE, 6);
+    let (c, s) = graph.cos_sin(&AtomAngleSum::NONE, 6);
     assert_eq!((c, s), (Graph::ZERO, Graph::ONE));
 }
 

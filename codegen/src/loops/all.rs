@@ -1,4 +1,4 @@
-//! All loops of a mechanism, and which coordinates they settle.
+//! All loops of a mechanism, and the coordinates that they determine.
 //!
 //! Decision: a loop in space is cut where two points coincide. A spherical joint there needs no coordinates, a
 //! universal joint is two revolute ones, and a platform is a free body whose pose is independent or passive like
@@ -7,48 +7,50 @@
 
 use modelmill_spec::Mechanism;
 
-use super::closure::{Closure, closures};
+use super::closure::{LoopClosure, loop_closures};
 use super::coupling;
-use super::independent::{independent, sufficient};
+use super::independent::{independent_residuals, sufficient_residuals};
 use super::parallelogram;
 use crate::DeriveError;
 use crate::expr::{ExprId, Graph};
-use crate::tree::Tree;
+use crate::tree::KinematicTree;
 
-/// The loops of a mechanism with the coordinates that move it and those that follow.
+/// The loops of a mechanism with its active and passive coordinates.
 #[derive(Clone, Debug)]
-pub(crate) struct Loops {
+pub(crate) struct KinematicLoops {
+    /// Indices of the active coordinates, which move the mechanism.
     pub(crate) active: Vec<usize>,
+    /// Indices of the passive coordinates, which the loops determine.
     pub(crate) passive: Vec<usize>,
-    pub(crate) closures: Vec<Closure>,
-    /// Residuals that are independent, as many as there are passive coordinates.
+    /// All loops, then all couplings.
+    pub(crate) closures: Vec<LoopClosure>,
+    /// Independent residuals, as many as there are passive coordinates.
     pub(crate) residual: Vec<ExprId>,
-    /// Angles whose turns others make fractions of, and into how many parts the field divides them.
+    /// Angles of which others are fractions, with the number of parts into which the field divides them.
     pub(crate) divided: Vec<(usize, i64)>,
 }
 
-impl Loops {
-    pub(crate) fn new(
-        graph: &mut Graph,
-        mechanism: &Mechanism,
-        tree: &Tree,
-    ) -> Result<Self, DeriveError> {
+impl KinematicLoops {
+    /// Derives all closures, finds relations between angles, and selects independent equations.
+    ///
+    /// # Errors
+    /// [`DeriveError::LoopCount`] if the independent equations are not as many as the passive coordinates.
+    pub(crate) fn new(graph: &mut Graph, mechanism: &Mechanism, tree: &KinematicTree) -> Result<Self, DeriveError> {
         let (passive, active): (Vec<usize>, Vec<usize>) =
             (0..mechanism.coordinates.len()).partition(|i| mechanism.coordinates[*i].passive);
-        let mut closures = closures(graph, mechanism, tree)?;
+        let mut closures = loop_closures(graph, mechanism, tree)?;
         let couplings = coupling::couplings(graph, mechanism)?;
         closures.extend(couplings.closures);
-        parallelogram::find(graph, mechanism, &mut closures, &couplings.divided);
-        let residual: Vec<ExprId> = closures
-            .iter()
-            .flat_map(|c| c.residual.iter().copied())
-            .collect();
-        let mut residual = independent(graph, &residual)?;
+        parallelogram::find_relations(graph, mechanism, &mut closures, &couplings.divided);
+        let residual: Vec<ExprId> = closures.iter().flat_map(|c| c.residual.iter().copied()).collect();
+        // Dependent equations are dropped: first linear dependences, then others that show in numbers.
+        let mut residual = independent_residuals(graph, &residual)?;
         if residual.len() > passive.len()
-            && let Some(enough) = sufficient(graph, mechanism, &residual, passive.len())
+            && let Some(enough) = sufficient_residuals(graph, mechanism, &residual, passive.len())
         {
             residual = enough;
         }
+        // Each closure counts the selected equations that no closure before it has.
         let mut left = residual.clone();
         for closure in &mut closures {
             let before = left.len();
@@ -70,8 +72,8 @@ impl Loops {
         })
     }
 
-    /// How many gaps close the loops, couplings aside: eqs. (L1) to (Ln) of the page.
-    pub(crate) fn n_gaps(&self, mechanism: &Mechanism) -> usize {
+    /// Number of residuals of the loops without couplings: eqs. (L1) to (Ln) of the page.
+    pub(crate) fn n_gap_equations(&self, mechanism: &Mechanism) -> usize {
         let of_loops = self.closures.iter().take(mechanism.loops.len());
         of_loops.map(|c| c.residual.len()).sum()
     }

@@ -1,5 +1,5 @@
-//! For which coordinates loops that hang together may be solved one unknown at a time: a choice among all sets, made from
-//! which coordinates occur in which equations before anything is derived.
+//! A choice of coordinates for which connected loops can be solved one unknown at a time. Only which coordinates occur
+//! in which equations is used, before any expression is derived.
 
 use modelmill_spec::Mechanism;
 use nalgebra::DMatrix;
@@ -7,10 +7,10 @@ use nalgebra::DMatrix;
 use crate::expr::{Atom, ExprId, Graph, coordinates_of};
 use crate::loops::numeric_poses::NumericLoops;
 
-/// Sets of `size` of the `free` coordinates that settle the loops at the nominal pose and for which these look as if they
-/// could be solved together as [`crate::loops::spatial::solve`] does, seen from which coordinates occur in which equations. Sets that leave the
-/// coordinates of most equations given come first.
-pub(crate) fn promising(
+/// Sets of `size` of the `free` coordinates that determine the loops at the nominal pose and for which these can
+/// probably be solved together by [`crate::loops::spatial::solve`], judged by which coordinates occur in which
+/// equations. Sets that leave the coordinates of most equations given come first.
+pub(crate) fn promising_sets(
     graph: &mut Graph,
     mechanism: &Mechanism,
     equations: &[ExprId],
@@ -18,17 +18,20 @@ pub(crate) fn promising(
     free: &[usize],
     size: usize,
 ) -> Vec<Vec<usize>> {
-    /// More coordinates than this are not tried in all sets.
+    /// With more coordinates than this no sets are tried: they must fit into 64 bits.
     const MOST_COORDINATES: usize = 60;
-    /// Most sets that are looked at, and most that are handed out.
+    /// Largest number of sets that are tried.
     const MOST_SETS: usize = 20_000;
+    /// Largest number of sets that are returned.
     const MOST_FOUND: usize = 12;
     if free.len() > MOST_COORDINATES || size > free.len() {
         return Vec::new();
     }
+    // Sets of coordinates are bit masks.
     let bit = |c: &usize| free.iter().position(|f| f == c).map_or(0, |k| 1_u64 << k);
     let mask = |all: &[usize]| all.iter().map(bit).fold(0, |a, b| a | b);
-    // For every equation its coordinates, and the slides that are linear in it with the coordinates of their factors.
+    // For every equation its coordinates, and the prismatic coordinates that are linear in it with those of their
+    // factors.
     let known: Vec<(u64, Vec<(u64, u64)>)> = equations
         .iter()
         .map(|e| {
@@ -44,25 +47,25 @@ pub(crate) fn promising(
             (mask(&all), slides)
         })
         .collect();
+    // Coordinates of most equations stand first, so the first sets leave them given.
     let mut order: Vec<usize> = free.to_vec();
     let occurs = |c: usize| known.iter().filter(|(all, _)| all & bit(&c) != 0).count();
     order.sort_by_key(|c| std::cmp::Reverse(occurs(*c)));
     let Some(jacobian) = nominal_jacobian(graph, mechanism, residual, &order) else {
         return Vec::new();
     };
+    // A set determines the loops where its derivatives have full rank.
     let settles = |unknown: &[usize]| {
-        let values = jacobian
-            .select_columns(unknown)
-            .svd(false, false)
-            .singular_values;
+        let values = jacobian.select_columns(unknown).svd(false, false).singular_values;
         values.len() == size && values.min() > 1e-6 * values.max()
     };
     let mut found = Vec::new();
+    // Sets of given coordinates, in order; the others are the unknowns.
     let mut given: Vec<usize> = (0..order.len() - size).collect();
     for _ in 0..MOST_SETS {
         let positions: Vec<usize> = (0..order.len()).filter(|k| !given.contains(k)).collect();
         let unknown: Vec<usize> = positions.iter().map(|k| order[*k]).collect();
-        if looks_solvable(known.clone(), mask(&unknown)) && settles(&positions) {
+        if is_probably_solvable(known.clone(), mask(&unknown)) && settles(&positions) {
             found.push(unknown);
             if found.len() == MOST_FOUND {
                 break;
@@ -75,22 +78,22 @@ pub(crate) fn promising(
     found
 }
 
-/// Derivatives of residuals by coordinates at the nominal pose, lengths relative to the size of the loops.
+/// Derivatives of residuals by coordinates at the nominal pose, for lengths in units of the size of the loops.
 fn nominal_jacobian(
     graph: &mut Graph,
     mechanism: &Mechanism,
     residual: &[ExprId],
     coordinates: &[usize],
 ) -> Option<DMatrix<f64>> {
-    let loops = NumericLoops::solved_for(graph, mechanism, residual, coordinates.to_vec(), &[]);
-    let (_, mut jacobian) = loops.linearise(&loops.as_written())?;
+    let loops = NumericLoops::for_unknowns(graph, mechanism, residual, coordinates.to_vec(), &[]);
+    let (_, mut jacobian) = loops.linearise(&loops.declared_nominal_pose())?;
     for (mut column, i) in jacobian.column_iter_mut().zip(coordinates) {
-        column *= loops.unit(*i);
+        column *= loops.coordinate_unit(*i);
     }
     Some(jacobian)
 }
 
-/// Turns a set of positions below `n`, in order, into the next one; false after the last.
+/// Turns a set of increasing positions below `n` into the next one in lexicographic order; false after the last.
 fn next_set(set: &mut [usize], n: usize) -> bool {
     let k = set.len();
     let Some(i) = (0..k).rev().find(|i| set[*i] < n - k + i) else {
@@ -103,10 +106,13 @@ fn next_set(set: &mut [usize], n: usize) -> bool {
     true
 }
 
-/// Plays [`crate::loops::spatial::solve`] with the coordinates of the equations alone.
-fn looks_solvable(mut equations: Vec<(u64, Vec<(u64, u64)>)>, unknown: u64) -> bool {
+/// Simulates [`crate::loops::spatial::solve`] with the coordinates of the equations alone. Each equation is given as
+/// the mask of its coordinates, and for each of its linear prismatic coordinates the masks of that one and of its
+/// factor.
+fn is_probably_solvable(mut equations: Vec<(u64, Vec<(u64, u64)>)>, unknown: u64) -> bool {
     let mut left = unknown;
     while left != 0 {
+        // An equation with one unknown determines it.
         let single = equations
             .iter()
             .map(|(all, _)| all & left)
@@ -115,9 +121,9 @@ fn looks_solvable(mut equations: Vec<(u64, Vec<(u64, u64)>)>, unknown: u64) -> b
             left &= !single;
             continue;
         }
-        let mut order: Vec<usize> = (0..equations.len())
-            .filter(|i| equations[*i].0 & left != 0)
-            .collect();
+        // Otherwise a linear prismatic coordinate with a known factor is eliminated, from the equation with the fewest
+        // unknowns.
+        let mut order: Vec<usize> = (0..equations.len()).filter(|i| equations[*i].0 & left != 0).collect();
         order.sort_by_key(|i| (equations[*i].0 & left).count_ones());
         let chosen = order.into_iter().find_map(|i| {
             let (_, slides) = &equations[i];
@@ -130,11 +136,12 @@ fn looks_solvable(mut equations: Vec<(u64, Vec<(u64, u64)>)>, unknown: u64) -> b
             return false;
         };
         left &= !slide;
+        // The equation is used up, and its coordinates enter every equation with that prismatic coordinate.
         let (all, _) = equations.swap_remove(i);
         for (other, slides) in &mut equations {
             if *other & slide != 0 {
                 *other |= all;
-                // What the others' factors are afterwards is not known; they may stay as they are.
+                // The factors of the other coordinates after the elimination are not known; they may be unchanged.
                 slides.retain(|(own, _)| *own != slide);
             }
         }

@@ -1,82 +1,83 @@
-//! Random poses of a mechanism in the prime field: angles as rational points of the circle, loops solved by square roots
-//! in the field.
+//! Random poses of a mechanism in the prime field: angles are rational points of the circle, and loops are solved by
+//! square roots in the field.
 
-use modelmill_algebra::field::{Element, Number, Stream};
+use modelmill_algebra::field::{FieldElement, FieldNumber, RandomStream};
 use modelmill_spec::Mechanism;
 
-use super::solve_step::{Plan, SolveStep};
+use super::solve_step::{FieldSolveStep, LoopPlan};
 use crate::DeriveError;
-use crate::expr::{Atom, Domain, ExprId, FieldPoint, Graph, Node, Rational, Tape, Unary};
+use crate::expr::{Atom, EvaluationDomain, EvaluationTape, ExprId, FieldPoint, Graph, Node, Rational, Unary};
 
-/// How often a draw is repeated until all square roots exist.
+/// Largest number of draws until all square roots exist.
 pub(crate) const MOST_DRAWS: usize = 4000;
 
-/// Draws poses that a plan solves for.
-pub(crate) struct FieldPoses {
+/// Draws random poses and closes their loops by the steps of a plan.
+pub(crate) struct FieldPoseSampler {
+    /// Index of every coordinate, and whether it is an angle.
     coordinates: Vec<(usize, bool)>,
+    /// Number of constants of the mechanism.
     n_constants: usize,
-    /// Functions of constants that exist only for some of them.
-    of_constants: Tape,
-    pub(crate) steps: Vec<SolveStep>,
-    /// Angles whose turns are drawn in so many parts.
+    /// Functions of constants that do not exist for all constants of the field, such as square roots and quotients.
+    of_constants: EvaluationTape,
+    /// The steps that close the loops.
+    pub(crate) steps: Vec<FieldSolveStep>,
+    /// Angles that are drawn in parts, with the number of parts.
     divided: Vec<(usize, i64)>,
 }
 
-impl FieldPoses {
-    /// Makes a plan evaluable at constants for which also `outputs` may exist.
-    pub(crate) fn new(
-        graph: &mut Graph,
-        mechanism: &Mechanism,
-        plan: Plan,
-        outputs: &[ExprId],
-    ) -> Self {
+impl FieldPoseSampler {
+    /// Makes a plan evaluable, for constants at which `outputs` exist as well.
+    pub(crate) fn new(graph: &mut Graph, mechanism: &Mechanism, plan: LoopPlan, outputs: &[ExprId]) -> Self {
         let mut all = outputs.to_vec();
         let steps = plan
             .steps
             .into_iter()
-            .map(|step| SolveStep::new(graph, step, &mut all))
+            .map(|step| FieldSolveStep::new(graph, step, &mut all))
             .collect();
         let coordinates = mechanism.coordinates.iter().enumerate();
         Self {
             coordinates: coordinates.map(|(i, c)| (i, c.motion.is_angle())).collect(),
             n_constants: mechanism.constants.len(),
-            of_constants: functions_of_constants(graph, &all),
+            of_constants: partial_constant_functions(graph, &all),
             steps,
             divided: plan.divided,
         }
     }
 
-    /// Random constants whose functions that do not depend on the motion all exist.
-    pub(crate) fn constants<const P: u64>(
+    /// Random constants at which all functions of constants exist.
+    ///
+    /// # Errors
+    /// [`DeriveError::NoPointFound`] after [`MOST_DRAWS`] draws.
+    pub(crate) fn draw_constants<const P: u64>(
         &self,
-        stream: &mut Stream,
-    ) -> Result<FieldPoint<Element<P>>, DeriveError> {
+        stream: &mut RandomStream,
+    ) -> Result<FieldPoint<FieldElement<P>>, DeriveError> {
         (0..MOST_DRAWS)
             .find_map(|_| {
                 let mut point = FieldPoint {
-                    seed: stream.bits(),
-                    root_seed: stream.bits(),
+                    seed: stream.next_bits(),
+                    root_seed: stream.next_bits(),
                     ..FieldPoint::default()
                 };
-                point.values.insert(Atom::Pi, stream.element());
+                point.values.insert(Atom::Pi, stream.next_element());
                 for i in 0..self.n_constants {
                     let atom = Atom::Constant(i);
-                    point.values.insert(atom, stream.element());
-                    point.angles.insert(atom, stream.circle());
+                    point.values.insert(atom, stream.next_element());
+                    point.angles.insert(atom, stream.next_circle_point());
                 }
                 self.of_constants.evaluate(&point).map(|_| point)
             })
             .ok_or(DeriveError::NoPointFound { draws: MOST_DRAWS })
     }
 
-    /// Some values for all coordinates, loops still open. They lie in the prime field, over whichever field the loops
-    /// are closed.
-    pub(crate) fn open<const P: u64, N: Number + From<Element<P>>>(
+    /// Random values of all coordinates; the loops are still open. The values lie in the prime field, whichever field
+    /// the loops are closed in.
+    pub(crate) fn draw_open_point<const P: u64, N: FieldNumber + From<FieldElement<P>>>(
         &self,
-        constants: &FieldPoint<Element<P>>,
-        stream: &mut Stream,
+        constants: &FieldPoint<FieldElement<P>>,
+        stream: &mut RandomStream,
     ) -> FieldPoint<N> {
-        let mut point = constants.extended();
+        let mut point = constants.over_field();
         for (i, is_angle) in &self.coordinates {
             if *is_angle {
                 let angle = N::draw_circle(stream);
@@ -84,16 +85,17 @@ impl FieldPoses {
             }
             point.values.insert(Atom::Coordinate(*i), N::draw(stream));
         }
+        // Divided angles are multiples of an opaque part, so that other angles can be fractions of them.
         for (i, n) in &self.divided {
-            if let Some(turn) = in_parts(&point, *i, *n) {
+            if let Some(turn) = divided_angle(&point, *i, *n) {
                 point.angles.insert(Atom::Coordinate(*i), turn);
             }
         }
         point
     }
 
-    /// The loops of a point closed; `None` if they do not close for its free coordinates.
-    pub(crate) fn close<N: Number>(&self, mut point: FieldPoint<N>) -> Option<FieldPoint<N>> {
+    /// Closes the loops of a point; `None` if they cannot close for its independent coordinates.
+    pub(crate) fn close_loops<N: FieldNumber>(&self, mut point: FieldPoint<N>) -> Option<FieldPoint<N>> {
         for step in &self.steps {
             step.solve(&mut point)?;
         }
@@ -102,14 +104,13 @@ impl FieldPoses {
 }
 
 /// Cosine and sine of a coordinate as `n` times the opaque angle that is its `n`-th part.
-fn in_parts<N: Number>(point: &FieldPoint<N>, coordinate: usize, n: i64) -> Option<(N, N)> {
+fn divided_angle<N: FieldNumber>(point: &FieldPoint<N>, coordinate: usize, n: i64) -> Option<(N, N)> {
     let value = point.atom(Atom::Coordinate(coordinate))?;
     let part = value * point.rational(&Rational::new(1, n))?;
-    let mut power = (
-        point.unary(Unary::Cos, &part)?,
-        point.unary(Unary::Sin, &part)?,
-    );
+    let mut power = (point.unary(Unary::Cos, &part)?, point.unary(Unary::Sin, &part)?);
+    // Addition theorem of two angles.
     let turned = |(a, b): (N, N), (c, s): (N, N)| (a * c - b * s, a * s + b * c);
+    // Repeated squaring over the binary digits of n.
     let (mut total, mut left) = ((N::ONE, N::ZERO), n);
     while left > 0 {
         if left % 2 == 1 {
@@ -121,8 +122,9 @@ fn in_parts<N: Number>(point: &FieldPoint<N>, coordinate: usize, n: i64) -> Opti
     Some(total)
 }
 
-/// Functions under `roots` that depend on constants alone and do not exist for all of them.
-fn functions_of_constants(graph: &Graph, roots: &[ExprId]) -> Tape {
+/// Functions in `roots` that depend on constants alone and do not exist for all constants of the field.
+fn partial_constant_functions(graph: &Graph, roots: &[ExprId]) -> EvaluationTape {
+    // Per node whether it depends on anything but constants.
     let mut moves = vec![false; graph.len()];
     let mut found = Vec::new();
     for (i, needed) in graph.reachable(roots).into_iter().enumerate() {
@@ -138,6 +140,7 @@ fn functions_of_constants(graph: &Graph, roots: &[ExprId]) -> Tape {
         };
         graph.for_each_child(id, |child| moving |= moves[child.index()]);
         moves[i] = moving;
+        // Square roots and divisions need not exist.
         let partial = match graph.node(id) {
             Node::Unary(function, _) => *function == Unary::Sqrt,
             Node::Product(factors) => factors.iter().any(|(_, n)| *n < 0),
@@ -147,5 +150,5 @@ fn functions_of_constants(graph: &Graph, roots: &[ExprId]) -> Tape {
             found.push(id);
         }
     }
-    Tape::new(graph, &found)
+    EvaluationTape::new(graph, &found)
 }

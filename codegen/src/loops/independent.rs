@@ -1,10 +1,10 @@
-//! Which of the loops' equations are enough.
+//! A sufficient set of the loops' equations: residuals go in, and as many of them as needed come out.
 //!
 //! Decision: two points on one axis close a revolute joint with one equation too many, and no linear relation shows
-//! it. If there are more equations than passive coordinates, those are kept that determine them best at the nominal
-//! pose, provided that the others hold too at poses around it.
+//! it. If there are more equations than passive coordinates, those that determine them best at the nominal pose are
+//! selected, provided that the others are satisfied too at poses around it.
 
-use modelmill_algebra::field::Stream;
+use modelmill_algebra::field::RandomStream;
 use modelmill_spec::Mechanism;
 use nalgebra::DMatrix;
 
@@ -14,36 +14,46 @@ use crate::DeriveError;
 use crate::expr::independent::independent_functions;
 use crate::expr::{ExprId, Graph};
 
-/// The residuals without those that are constant combinations of others (a planar loop seen in a tilted frame).
-pub(super) fn independent(graph: &Graph, residual: &[ExprId]) -> Result<Vec<ExprId>, DeriveError> {
+/// The residuals without those that are constant combinations of others, such as those of a planar loop in a tilted
+/// frame.
+///
+/// # Errors
+/// As [`independent_functions`].
+pub(super) fn independent_residuals(graph: &Graph, residual: &[ExprId]) -> Result<Vec<ExprId>, DeriveError> {
     let columns = independent_functions(graph, residual)?;
     Ok(columns.into_iter().map(|i| residual[i]).collect())
 }
 
-/// As many residuals as there are passive coordinates, if the others follow from them: two points on the axis of a joint
-/// that both coincide with two others leave one equation too many, since their distance is the same on both sides.
+/// As many residuals as there are passive coordinates, if the others depend on them. For example, two points on the
+/// axis of a joint that both coincide with two others give one equation too many, because their distance is equal on
+/// both sides.
 ///
-/// That this is so is seen in numbers, at poses around the nominal one at which all residuals vanish. Those equations are
-/// taken that determine the passive coordinates best at the nominal pose.
-pub(super) fn sufficient(
+/// This is checked numerically, at poses around the nominal one at which all residuals vanish. The equations that
+/// determine the passive coordinates best at the nominal pose are selected.
+///
+/// `None` if the loops cannot be followed, or if no selection determines the passive coordinates at every pose.
+pub(super) fn sufficient_residuals(
     graph: &mut Graph,
     mechanism: &Mechanism,
     residual: &[ExprId],
     n_passive: usize,
 ) -> Option<Vec<ExprId>> {
-    /// Poses that are looked at besides the nominal one, and how far away, in rad or relative to the size of the loops.
+    /// Number of poses in addition to the nominal one.
     const POSES: usize = 6;
+    /// How far away these are, in rad or relative to the size of the loops.
     const REACH: f64 = 0.05;
-    /// Residuals relative to the size of the loops, and singular values relative to the largest, that count as zero.
+    /// Residuals relative to the size of the loops that count as zero.
     const CLOSED: f64 = 1e-7;
+    /// Singular values relative to the largest that count as zero.
     const SINGULAR: f64 = 1e-7;
-    let size = magnitude::at_nominal(graph, mechanism, residual);
+    let size = magnitude::nominal_magnitude(graph, mechanism, residual);
     let loops = NumericLoops::new(graph, mechanism, residual);
-    let mut stream = Stream::new(5);
-    let mut poses = vec![loops.nominal()?];
+    let mut stream = RandomStream::new(5);
+    let mut poses = vec![loops.closed_nominal_pose()?];
     for _ in 0..POSES {
-        poses.push(loops.random(REACH, &mut stream)?);
+        poses.push(loops.random_pose(REACH, &mut stream)?);
     }
+    // Full rank by the passive coordinates.
     let is_regular = |jacobian: &DMatrix<f64>| {
         let values = jacobian.clone().svd(false, false).singular_values;
         values.len() == n_passive && values.min() > SINGULAR * values.max()
@@ -51,15 +61,15 @@ pub(super) fn sufficient(
     let mut chosen: Option<Vec<usize>> = None;
     for q in &poses {
         let (gaps, mut jacobian) = loops.linearise(q)?;
-        let passive =
-            (0..mechanism.coordinates.len()).filter(|i| mechanism.coordinates[*i].passive);
+        let passive = (0..mechanism.coordinates.len()).filter(|i| mechanism.coordinates[*i].passive);
         for (mut column, i) in jacobian.column_iter_mut().zip(passive) {
-            column *= loops.unit(i);
+            column *= loops.coordinate_unit(i);
         }
         if gaps.amax() > CLOSED * size || !is_regular(&jacobian) {
             return None;
         }
-        let rows = chosen.get_or_insert_with(|| most_different_rows(&jacobian, n_passive));
+        // Rows are selected at the nominal pose and must be sufficient at all poses.
+        let rows = chosen.get_or_insert_with(|| best_conditioned_rows(&jacobian, n_passive));
         if !is_regular(&jacobian.select_rows(rows.iter())) {
             return None;
         }
@@ -67,17 +77,18 @@ pub(super) fn sufficient(
     Some(chosen?.into_iter().map(|i| residual[i]).collect())
 }
 
-/// Rows of a matrix that span its row space well: each time the one of which most is left.
-pub(crate) fn most_different_rows(matrix: &DMatrix<f64>, n: usize) -> Vec<usize> {
+/// Rows of a matrix that span its row space well, at most `n`: each time the row with the largest norm orthogonal to
+/// those before it (Gram-Schmidt with pivoting). Indices are returned in increasing order.
+pub(crate) fn best_conditioned_rows(matrix: &DMatrix<f64>, n: usize) -> Vec<usize> {
     let mut rest = matrix.clone();
     let mut chosen = Vec::new();
     for _ in 0..n.min(matrix.nrows()) {
         let norms: Vec<f64> = rest.row_iter().map(|row| row.norm()).collect();
-        let best =
-            (0..norms.len()).fold(0, |best, i| if norms[i] > norms[best] { i } else { best });
+        let best = (0..norms.len()).fold(0, |best, i| if norms[i] > norms[best] { i } else { best });
         if norms[best] <= 0.0 {
             break;
         }
+        // The chosen direction is removed from all rows.
         let direction = rest.row(best) / norms[best];
         let shares = &rest * direction.transpose();
         rest -= shares * direction;

@@ -1,5 +1,5 @@
-//! Magnitudes of loop residuals, coordinates and determinants: what Newton's method holds residuals and steps against, and
-//! what singular poses are told by, so that neither depends on the unit of length.
+//! Magnitudes of loop residuals, coordinates and determinants. Newton's method compares residuals and steps with them,
+//! and singular poses are detected by them, so that neither depends on the unit of length.
 //!
 //! Decision: a determinant counts as zero below 1e-9 of the magnitude of its terms (in `f32`: ten roundings). That
 //! magnitude is an expression in the constants alone, computed once per geometry: sine and cosine count as 1,
@@ -13,17 +13,17 @@ use modelmill_spec::Mechanism;
 use num_rational::BigRational;
 use num_traits::One;
 
-use crate::expr::{Atom, ExprId, F64, Graph, Node, Tape, Unary, nominal_of, nominal_value};
+use crate::expr::{Atom, EvaluationTape, ExprId, FloatDomain, Graph, Node, Unary, nominal_of, nominal_value};
 
-/// The sum of the magnitudes of all terms of some expressions at the nominal pose: the size of a mechanism's loops in m.
-/// It is 1 where there is none; what couples angles has no length.
-pub(crate) fn at_nominal(graph: &mut Graph, mechanism: &Mechanism, roots: &[ExprId]) -> f64 {
+/// The sum of the magnitudes of all terms of some expressions at the nominal pose: the size of a mechanism's loops, m.
+/// It is 1 if there is no such expression; couplings of angles have no length and are skipped.
+pub(crate) fn nominal_magnitude(graph: &mut Graph, mechanism: &Mechanism, roots: &[ExprId]) -> f64 {
     let mut known = HashMap::new();
     let mut lengths = roots.to_vec();
-    lengths.retain(|root| !couples_angles(graph, mechanism, *root));
+    lengths.retain(|root| !has_angle_term(graph, mechanism, *root));
     let terms: Vec<ExprId> = lengths
         .into_iter()
-        .map(|root| magnitude(graph, mechanism, &mut known, root))
+        .map(|root| expression_magnitude(graph, mechanism, &mut known, root))
         .collect();
     let total = graph.add_all(&terms);
     nominal_value(graph, mechanism, total)
@@ -31,22 +31,22 @@ pub(crate) fn at_nominal(graph: &mut Graph, mechanism: &Mechanism, roots: &[Expr
         .unwrap_or(1.0)
 }
 
-/// How large a value is at the nominal pose beside what rounding may change it by, in units of the last digit; `None` where
-/// it has no value.
+/// Magnitude of a value at the nominal pose divided by the change that rounding may cause, in units of the last digit;
+/// `None` where it has no value.
 ///
-/// For a sum that is its share of the magnitudes of its terms. A product has lost as many digits as its factors together
-/// have relative to their own sizes: it is as good as its worst factor, however many there are, while the magnitudes of all
-/// its terms, multiplied out, would count the digits of every factor.
-pub(crate) fn digits_left(graph: &Graph, mechanism: &Mechanism, root: ExprId) -> Option<f64> {
+/// For a sum this is its share of the magnitudes of its terms. For a product, the relative errors of its factors add
+/// up: it is as exact as its worst factor, however many there are. The magnitudes of all its terms, multiplied out,
+/// would count the errors of every factor.
+pub(crate) fn significant_digits(graph: &Graph, mechanism: &Mechanism, root: ExprId) -> Option<f64> {
+    // Values of all nodes, then a bound of the rounding error of each node, operands first.
     let order = operands_first(graph, root);
-    let values = Tape::new(graph, &order).evaluate(&F64(|atom| nominal_of(mechanism, atom)))?;
+    let values = EvaluationTape::new(graph, &order).evaluate(&FloatDomain(|atom| nominal_of(mechanism, atom)))?;
     let mut known: HashMap<ExprId, (f64, f64)> = HashMap::new();
     for (id, value) in order.iter().zip(values) {
         let of = |id: &ExprId| known[id];
+        // Error bounds in units of the last digit, by first-order propagation.
         let changes = match graph.node(*id) {
-            Node::Sin(_)
-            | Node::Cos(_)
-            | Node::Unary(Unary::Sign | Unary::Tanh | Unary::Sin | Unary::Cos, _) => 1.0,
+            Node::Sin(_) | Node::Cos(_) | Node::Unary(Unary::Sign | Unary::Tanh | Unary::Sin | Unary::Cos, _) => 1.0,
             Node::Atom(Atom::Coordinate(i)) if !mechanism.coordinates[*i].motion.is_length() => 1.0,
             Node::Rational(_) | Node::Atom(_) | Node::Unary(Unary::Exp, _) => value.abs(),
             Node::Unary(Unary::Abs, inner) => of(inner).1,
@@ -70,10 +70,11 @@ pub(crate) fn digits_left(graph: &Graph, mechanism: &Mechanism, root: ExprId) ->
     left.is_finite().then_some(left)
 }
 
-/// Everything that an expression is made of, itself last.
+/// All nodes that an expression consists of, operands first, itself last.
 fn operands_first(graph: &Graph, root: ExprId) -> Vec<ExprId> {
     let mut order = Vec::new();
     let mut seen = HashSet::new();
+    // A node is entered once to visit its operands, and left once they are in the list.
     let mut waiting = vec![(root, false)];
     while let Some((id, is_left)) = waiting.pop() {
         if is_left {
@@ -96,8 +97,8 @@ fn operands_first(graph: &Graph, root: ExprId) -> Vec<ExprId> {
     order
 }
 
-/// Whether an angle itself, not its sine or cosine, is a term of a sum.
-fn couples_angles(graph: &Graph, mechanism: &Mechanism, root: ExprId) -> bool {
+/// Whether an angle itself, not its sine or cosine, is a term of the expression.
+fn has_angle_term(graph: &Graph, mechanism: &Mechanism, root: ExprId) -> bool {
     let is_angle = |id: ExprId| {
         matches!(graph.node(id), Node::Atom(Atom::Coordinate(i))
             if mechanism.coordinates[*i].motion.is_angle())
@@ -108,29 +109,26 @@ fn couples_angles(graph: &Graph, mechanism: &Mechanism, root: ExprId) -> bool {
     }
 }
 
-/// The size of a mechanism's loops: the magnitudes of all lengths in them, without those that move.
+/// The size of a mechanism's loops: the sum of the magnitudes of all constant lengths in them.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Size {
-    /// A sum of magnitudes of constants, in m; 0 where there is none.
+pub(crate) struct LoopSize {
+    /// A sum of magnitudes of constants, m; zero if there is none.
     pub(crate) total: ExprId,
-    /// Its value for the mechanism's constants.
+    /// Its value for the mechanism's constants, m.
     pub(crate) nominal: f64,
 }
 
-impl Size {
-    pub(crate) fn from_residual(
-        graph: &mut Graph,
-        mechanism: &Mechanism,
-        residual: &[ExprId],
-    ) -> Self {
+impl LoopSize {
+    /// The size by the residuals of the loops; prismatic coordinates count as zero.
+    pub(crate) fn from_residual(graph: &mut Graph, mechanism: &Mechanism, residual: &[ExprId]) -> Self {
         let mut known = HashMap::new();
         let terms: Vec<ExprId> = residual
             .iter()
-            .map(|r| magnitude(graph, mechanism, &mut known, *r))
+            .map(|r| expression_magnitude(graph, mechanism, &mut known, *r))
             .collect();
-        let still = lengths(graph, mechanism, |_, _| Graph::ZERO);
+        let still = nominal_lengths(graph, mechanism, |_, _| Graph::ZERO);
         let mut terms = graph.substitute(&terms, &still);
-        // What couples coordinates has no size of its own.
+        // Couplings have no size of their own.
         terms.retain(|term| graph.atoms(&[*term]).into_iter().all(Atom::is_fixed));
         let total = graph.add_all(&terms);
         let nominal = nominal_value(graph, mechanism, total).filter(|size| size.is_normal());
@@ -143,46 +141,45 @@ impl Size {
         }
     }
 
-    /// How large these loops are beside those of the mechanism's constants; 1 for those.
-    pub(crate) fn scale(&self, graph: &mut Graph) -> ExprId {
-        self.scaled(graph, 1.0)
+    /// The size of these loops divided by that of the mechanism's own constants; 1 for those.
+    pub(crate) fn relative_scale(&self, graph: &mut Graph) -> ExprId {
+        self.scale_length(graph, 1.0)
     }
 
-    /// A length of the mechanism, longer by as much as the loops are larger.
-    fn scaled(&self, graph: &mut Graph, length: f64) -> ExprId {
+    /// A length of the mechanism, m, multiplied by the ratio of the size of these loops to the nominal one.
+    fn scale_length(&self, graph: &mut Graph, length: f64) -> ExprId {
         if self.nominal == 0.0 {
-            return number(graph, length);
+            return rounded_number(graph, length);
         }
-        let share = number(graph, length / self.nominal);
+        let share = rounded_number(graph, length / self.nominal);
         graph.mul(share, self.total)
     }
 
-    /// The sum of the magnitudes of all terms of an expression that depends on the pose: for any lengths, with sines and
-    /// cosines of 1 and slides as far out as at the nominal pose. Fractions have the values of the nominal pose, and grow
-    /// with the loops.
-    pub(crate) fn of_terms(&self, graph: &mut Graph, mechanism: &Mechanism, id: ExprId) -> ExprId {
-        let found = magnitude(graph, mechanism, &mut HashMap::new(), id);
-        let out = lengths(graph, mechanism, |graph, nominal| {
-            self.scaled(graph, nominal)
-        });
+    /// The sum of the magnitudes of all terms of an expression that depends on the pose. Sines and cosines count as 1,
+    /// and prismatic coordinates as at the nominal pose. Fractions have the values of the nominal pose and are scaled
+    /// with the size of the loops.
+    pub(crate) fn term_magnitude(&self, graph: &mut Graph, mechanism: &Mechanism, id: ExprId) -> ExprId {
+        let found = expression_magnitude(graph, mechanism, &mut HashMap::new(), id);
+        let out = nominal_lengths(graph, mechanism, |graph, nominal| self.scale_length(graph, nominal));
+        // Prismatic coordinates are replaced by their nominal values, scaled with the loops.
         let at_any_pose = graph.substitute(&[found], &out)[0];
         let is_known = graph.atoms(&[at_any_pose]).into_iter().all(Atom::is_fixed);
         let is_there = nominal_value(graph, mechanism, at_any_pose).is_some_and(f64::is_normal);
         if is_known && is_there {
             return at_any_pose;
         }
-        let nominal = at_nominal(graph, mechanism, &[id]);
-        let nominal = number(graph, nominal);
-        // Its own lengths say how large it is: drives between points have some without a loop.
+        // Fractions of the state remain: the nominal value is scaled by a power of the size.
+        let nominal = nominal_magnitude(graph, mechanism, &[id]);
+        let nominal = rounded_number(graph, nominal);
+        // Its own lengths define its size, since drives between points have lengths without a loop.
         let lengths: Vec<Atom> = graph.atoms(&[found]).into_iter().collect();
-        let is_metre =
-            |atom: &Atom| matches!(atom, Atom::Constant(i) if mechanism.constants[*i].unit == "m");
+        let is_metre = |atom: &Atom| matches!(atom, Atom::Constant(i) if mechanism.constants[*i].unit == "m");
         let lengths: Vec<Atom> = lengths.into_iter().filter(is_metre).collect();
-        let degree = degree(graph, mechanism, found, &lengths);
-        let own = Self::sum(graph, mechanism, &lengths).unwrap_or(*self);
+        let degree = length_degree(graph, mechanism, found, &lengths);
+        let own = Self::from_constants(graph, mechanism, &lengths).unwrap_or(*self);
         match degree {
             Some(degree) => {
-                let scale = own.scale(graph);
+                let scale = own.relative_scale(graph);
                 let grown = graph.pow(scale, degree);
                 graph.mul(nominal, grown)
             }
@@ -190,19 +187,20 @@ impl Size {
         }
     }
 
-    /// What a determinant is held against: the sum of the magnitudes of its terms, as [`Size::of_terms`] has it. Where the
-    /// nominal pose itself would all but count as singular by that, since the terms cancel in every factor and at every pose,
-    /// it is what rounding says that counts, which grows with the loops. What is below `singular` of its size counts as zero.
-    pub(crate) fn of_determinant(
+    /// What a determinant is compared with: the sum of the magnitudes of its terms, as by [`LoopSize::term_magnitude`].
+    /// If the nominal pose itself would nearly count as singular by that, because the terms cancel in every factor and
+    /// at every pose, the rounding error counts instead, scaled with the loops. A value below `singular` of the result
+    /// counts as zero.
+    pub(crate) fn determinant_magnitude(
         &self,
         graph: &mut Graph,
         mechanism: &Mechanism,
         id: ExprId,
         singular: f64,
     ) -> ExprId {
-        /// Determinants become smaller by this from pose to pose before they are singular.
+        /// The nominal value must exceed the limit by this factor, since determinants vary from pose to pose.
         const ROOM: f64 = 1e3;
-        let terms = self.of_terms(graph, mechanism, id);
+        let terms = self.term_magnitude(graph, mechanism, id);
         let at_nominal = |graph: &Graph, id| nominal_value(graph, mechanism, id).map(f64::abs);
         let (Some(value), Some(size)) = (at_nominal(graph, id), at_nominal(graph, terms)) else {
             return terms;
@@ -210,17 +208,18 @@ impl Size {
         if value > ROOM * singular * size {
             return terms;
         }
-        match digits_left(graph, mechanism, id) {
+        // Cancellation at every pose: the share of rounding replaces the share of terms.
+        match significant_digits(graph, mechanism, id) {
             Some(left) if left > value / size => {
-                let share = number(graph, value / left / size);
+                let share = rounded_number(graph, value / left / size);
                 graph.mul(share, terms)
             }
             _ => terms,
         }
     }
 
-    /// The size that some constants make up, if they do.
-    fn sum(graph: &mut Graph, mechanism: &Mechanism, constants: &[Atom]) -> Option<Self> {
+    /// The size that is the sum of the magnitudes of some constants; `None` if that is zero or not finite.
+    fn from_constants(graph: &mut Graph, mechanism: &Mechanism, constants: &[Atom]) -> Option<Self> {
         let terms: Vec<ExprId> = constants
             .iter()
             .map(|constant| {
@@ -234,9 +233,10 @@ impl Size {
     }
 }
 
-/// The power of the unit of length with which an expression grows, if it does so with one: `lengths` are those of its
-/// constants that are in it, besides the coordinates that slide.
-fn degree(graph: &Graph, mechanism: &Mechanism, id: ExprId, lengths: &[Atom]) -> Option<i32> {
+/// The power of the unit of length with which an expression scales, if it scales with one. `lengths` are its constants
+/// that are lengths; prismatic coordinates are lengths as well.
+fn length_degree(graph: &Graph, mechanism: &Mechanism, id: ExprId, lengths: &[Atom]) -> Option<i32> {
+    // Binary logarithm of the magnitude with all lengths multiplied by `unit`.
     let value = |unit: f64| {
         let atom = |atom: Atom| {
             let moves = matches!(atom, Atom::Coordinate(i)
@@ -244,20 +244,19 @@ fn degree(graph: &Graph, mechanism: &Mechanism, id: ExprId, lengths: &[Atom]) ->
             let is_length = moves || lengths.contains(&atom);
             nominal_of(mechanism, atom) * if is_length { unit } else { 1.0 }
         };
-        let values = Tape::new(graph, &[id]).evaluate(&F64(atom))?;
+        let values = EvaluationTape::new(graph, &[id]).evaluate(&FloatDomain(atom))?;
         Some(values[0].abs().log2()).filter(|size| size.is_finite())
     };
+    // A power gives equal integer steps for each factor of two.
     let [one, two, four] = [value(1.0)?, value(2.0)?, value(4.0)?];
     let degree = (two - one).round();
-    let is_power = [two - one, four - two]
-        .iter()
-        .all(|d| (d - degree).abs() < 1e-6);
+    let is_power = [two - one, four - two].iter().all(|d| (d - degree).abs() < 1e-6);
     #[allow(clippy::cast_possible_truncation, reason = "it is small, as just seen")]
     (is_power && degree.abs() < 100.0).then_some(degree as i32)
 }
 
-/// What stands for each coordinate that is a length, by its nominal value in m.
-fn lengths(
+/// Replacements of every prismatic coordinate, by a function of its nominal value in m.
+fn nominal_lengths(
     graph: &mut Graph,
     mechanism: &Mechanism,
     of: impl Fn(&mut Graph, f64) -> ExprId,
@@ -269,14 +268,14 @@ fn lengths(
         .collect()
 }
 
-/// A number that is exact to rounding.
-fn number(graph: &mut Graph, value: f64) -> ExprId {
+/// A double as an exact rational number; 1 if it is not finite.
+fn rounded_number(graph: &mut Graph, value: f64) -> ExprId {
     let value = BigRational::from_float(value).unwrap_or_else(BigRational::one);
     graph.rational(value.into())
 }
 
-/// An expression with every term taken by its magnitude.
-pub(crate) fn magnitude(
+/// An expression in which every term is replaced by its magnitude; `known` stores results by node.
+pub(crate) fn expression_magnitude(
     graph: &mut Graph,
     mechanism: &Mechanism,
     known: &mut HashMap<ExprId, ExprId>,
@@ -287,32 +286,30 @@ pub(crate) fn magnitude(
     }
     let found = match graph.node(id).clone() {
         Node::Rational(value) => graph.rational(value.abs()),
-        Node::Sin(_)
-        | Node::Cos(_)
-        | Node::Unary(Unary::Sign | Unary::Tanh | Unary::Sin | Unary::Cos, _) => Graph::ONE,
-        // An angle that stands for itself; its turns are known to Newton's method. Or a component of a unit quaternion.
-        Node::Atom(Atom::Coordinate(i)) if !mechanism.coordinates[i].motion.is_length() => {
-            Graph::ONE
-        }
+        Node::Sin(_) | Node::Cos(_) | Node::Unary(Unary::Sign | Unary::Tanh | Unary::Sin | Unary::Cos, _) => Graph::ONE,
+        // Angles count as 1, since Newton's method works with their sines and cosines; so do components of unit
+        // quaternions.
+        Node::Atom(Atom::Coordinate(i)) if !mechanism.coordinates[i].motion.is_length() => Graph::ONE,
         Node::Atom(_) | Node::Unary(Unary::Exp, _) => graph.unary(Unary::Abs, id),
-        Node::Unary(Unary::Abs, inner) => magnitude(graph, mechanism, known, inner),
+        Node::Unary(Unary::Abs, inner) => expression_magnitude(graph, mechanism, known, inner),
         Node::Unary(Unary::Sqrt, inner) => {
-            let inner = magnitude(graph, mechanism, known, inner);
+            let inner = expression_magnitude(graph, mechanism, known, inner);
             graph.unary(Unary::Sqrt, inner)
         }
         Node::Sum(terms) => {
             let terms: Vec<_> = terms
                 .into_iter()
-                .map(|(term, factor)| (magnitude(graph, mechanism, known, term), factor.abs()))
+                .map(|(term, factor)| (expression_magnitude(graph, mechanism, known, term), factor.abs()))
                 .collect();
             graph.sum(&terms)
         }
         Node::Product(factors) => {
             let factors: Vec<_> = factors
                 .into_iter()
+                // A divisor keeps its own magnitude: a sum of magnitudes would make the quotient too small.
                 .map(|(base, n)| {
                     let base = if n > 0 {
-                        magnitude(graph, mechanism, known, base)
+                        expression_magnitude(graph, mechanism, known, base)
                     } else {
                         graph.unary(Unary::Abs, base)
                     };

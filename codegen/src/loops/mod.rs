@@ -1,5 +1,5 @@
-//! Loops are cut for the recursion and closed again here: which coordinates follow from which, in closed form where that
-//! is known, and poses at which all loops are closed.
+//! Loops are cut for the recursion and closed again here. The mechanism and its tree go in. The closure equations come
+//! out, with passive coordinates in closed form where one is known, and poses at which all loops are closed.
 
 mod all;
 pub(crate) mod branches;
@@ -14,11 +14,11 @@ mod parallelogram;
 pub(crate) mod plan;
 mod planar;
 pub(crate) mod relation;
+pub(crate) mod segment;
 pub(crate) mod solve_step;
 pub(crate) mod solved;
 mod spatial;
-pub(crate) mod stretch;
 pub(crate) mod walk;
 mod whole_root;
 
-pub(crate) use all::Loops;
+pub(crate) use all::KinematicLoops;

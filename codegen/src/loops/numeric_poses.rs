@@ -4,24 +4,27 @@
 //! pose, because machines live on that branch only. `nalgebra` is a dependency of this crate for the linear solver
 //! with pivoting in these Newton steps.
 
-use modelmill_algebra::field::Stream;
+use modelmill_algebra::field::RandomStream;
 use modelmill_spec::Mechanism;
 use nalgebra::{DMatrix, DVector};
 
-use crate::expr::{Atom, ExprId, F64, Graph, Tape};
+use crate::expr::{Atom, EvaluationTape, ExprId, FloatDomain, Graph};
 use crate::loops::magnitude;
 
-/// Residuals of loops with their derivatives by the coordinates that close them.
+/// Residuals of loops with their derivatives by the coordinates that close them, evaluated in double precision.
 pub(crate) struct NumericLoops<'a> {
+    /// Values of constants and nominal coordinates come from here.
     mechanism: &'a Mechanism,
     /// Coordinates that the loops are solved for.
     unknown: Vec<usize>,
-    /// Coordinates that are moved, with the length in m or the angle in rad that counts as one there.
+    /// Coordinates that are moved, with the value that counts as one for each: 1 rad or the size of the loops in m.
     moved: Vec<(usize, f64)>,
+    /// Number of residuals, which come before the derivatives on the tape.
     n_residuals: usize,
-    /// What one is for each unknown: 1 rad, or the size of the loops in m.
+    /// The value that counts as one for each unknown: 1 rad, or the size of the loops in m.
     scales: Vec<f64>,
-    tape: Tape,
+    /// Residuals, then their derivatives by each unknown.
+    tape: EvaluationTape,
 }
 
 impl<'a> NumericLoops<'a> {
@@ -29,18 +32,18 @@ impl<'a> NumericLoops<'a> {
     pub(crate) fn new(graph: &mut Graph, mechanism: &'a Mechanism, residual: &[ExprId]) -> Self {
         let (unknown, moved): (Vec<usize>, Vec<usize>) =
             (0..mechanism.coordinates.len()).partition(|i| mechanism.coordinates[*i].passive);
-        Self::solved_for(graph, mechanism, residual, unknown, &moved)
+        Self::for_unknowns(graph, mechanism, residual, unknown, &moved)
     }
 
     /// Some loops, solved for `unknown` while the coordinates `moved` are given.
-    pub(crate) fn solved_for(
+    pub(crate) fn for_unknowns(
         graph: &mut Graph,
         mechanism: &'a Mechanism,
         residual: &[ExprId],
         unknown: Vec<usize>,
         moved: &[usize],
     ) -> Self {
-        let size = magnitude::at_nominal(graph, mechanism, residual);
+        let size = magnitude::nominal_magnitude(graph, mechanism, residual);
         let one = |i: usize| {
             if mechanism.coordinates[i].motion.is_angle() {
                 1.0
@@ -58,57 +61,55 @@ impl<'a> NumericLoops<'a> {
             unknown,
             moved: moved.iter().map(|i| (*i, one(*i))).collect(),
             n_residuals: residual.len(),
-            tape: Tape::new(graph, &roots),
+            tape: EvaluationTape::new(graph, &roots),
         }
     }
 
-    /// Coordinates of the nominal pose with the loops closed to rounding.
-    pub(crate) fn nominal(&self) -> Option<Vec<f64>> {
-        let mut q = self.as_written();
-        self.close(&mut q)?;
+    /// Coordinates of the nominal pose with the loops closed up to rounding; `None` if Newton's method fails.
+    pub(crate) fn closed_nominal_pose(&self) -> Option<Vec<f64>> {
+        let mut q = self.declared_nominal_pose();
+        self.close_loops(&mut q)?;
         Some(q)
     }
 
-    /// Coordinates of the nominal pose as the model file has them, loops closed by its reader.
-    pub(crate) fn as_written(&self) -> Vec<f64> {
+    /// Coordinates of the nominal pose as stated in the model file, with loops closed by its reader, rad or m.
+    pub(crate) fn declared_nominal_pose(&self) -> Vec<f64> {
         let coordinates = self.mechanism.coordinates.iter();
         coordinates.map(|c| c.nominal).collect()
     }
 
-    /// What counts as one for each coordinate: 1 rad, the size of the loops in m, or 1 m where no loop sets a size.
-    pub(crate) fn unit(&self, coordinate: usize) -> f64 {
+    /// The value that counts as one for each coordinate: 1 rad, the size of the loops in m, or 1 m where no loop
+    /// defines a size.
+    pub(crate) fn coordinate_unit(&self, coordinate: usize) -> f64 {
         let moved = self.moved.iter().copied();
-        let unknown = self
-            .unknown
-            .iter()
-            .copied()
-            .zip(self.scales.iter().copied());
+        let unknown = self.unknown.iter().copied().zip(self.scales.iter().copied());
         moved
             .chain(unknown)
             .find_map(|(i, one)| (i == coordinate).then_some(one))
             .unwrap_or(1.0)
     }
 
-    /// A pose whose moved coordinates lie within `reach` (angles in rad, lengths relative to the size of the loops) of
-    /// the nominal one, followed from there; `None` if the loops cannot be followed so far.
-    pub(crate) fn random(&self, reach: f64, stream: &mut Stream) -> Option<Vec<f64>> {
+    /// A random pose whose moved coordinates lie within `reach` of the nominal one (rad, or relative to the size of the
+    /// loops), reached in small steps; `None` if the loops cannot be followed so far.
+    pub(crate) fn random_pose(&self, reach: f64, stream: &mut RandomStream) -> Option<Vec<f64>> {
+        // Number of small steps, each of which is closed again.
         const STEPS: u32 = 8;
-        let mut q = self.as_written();
+        let mut q = self.declared_nominal_pose();
         let moves: Vec<(usize, f64)> = self
             .moved
             .iter()
-            .map(|(i, one)| (*i, one * reach * symmetric(stream) / f64::from(STEPS)))
+            .map(|(i, one)| (*i, one * reach * uniform_symmetric(stream) / f64::from(STEPS)))
             .collect();
         for _ in 0..STEPS {
             for (i, dx) in &moves {
                 q[*i] += dx;
             }
-            self.close(&mut q)?;
+            self.close_loops(&mut q)?;
         }
         Some(q)
     }
 
-    /// Residuals, and their derivatives by the unknown coordinates, one column each.
+    /// Residuals, and their derivatives by the unknown coordinates, one column each; `None` if any value is not finite.
     pub(crate) fn linearise(&self, q: &[f64]) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let value = |atom: Atom| match atom {
             Atom::Constant(i) => self.mechanism.constants[i].value,
@@ -116,8 +117,8 @@ impl<'a> NumericLoops<'a> {
             Atom::Pi => std::f64::consts::PI,
             _ => 0.0,
         };
-        let values = self.tape.evaluate(&F64(value))?;
-        // A singular value decomposition of what are no numbers comes to no end.
+        let values = self.tape.evaluate(&FloatDomain(value))?;
+        // A singular value decomposition of values that are not finite does not end.
         if !values.iter().all(|x| x.is_finite()) {
             return None;
         }
@@ -128,8 +129,9 @@ impl<'a> NumericLoops<'a> {
         ))
     }
 
-    /// Whether the loops determine the unknown coordinates at a pose.
+    /// Whether the loops determine the unknown coordinates at a pose: full rank of the scaled derivatives.
     pub(crate) fn is_regular(&self, q: &[f64]) -> bool {
+        // Least singular value relative to the largest.
         const SINGULAR: f64 = 1e-9;
         let Some((_, mut jacobian)) = self.linearise(q) else {
             return false;
@@ -141,8 +143,8 @@ impl<'a> NumericLoops<'a> {
         values.len() == self.unknown.len() && values.min() > SINGULAR * values.max()
     }
 
-    /// Closes the loops by moving the unknown coordinates.
-    fn close(&self, q: &mut [f64]) -> Option<()> {
+    /// Closes the loops by moving the unknown coordinates with Newton's method; `None` if it does not converge.
+    fn close_loops(&self, q: &mut [f64]) -> Option<()> {
         if self.unknown.is_empty() {
             return Some(());
         }
@@ -151,6 +153,7 @@ impl<'a> NumericLoops<'a> {
             for (mut column, one) in jacobian.column_iter_mut().zip(&self.scales) {
                 column *= *one;
             }
+            // Least squares with the smallest step, since equations may depend on each other.
             let svd = jacobian.svd(true, true);
             let smallest = 1e-12 * svd.singular_values.amax();
             let step = svd.solve(&residual, smallest).ok()?;
@@ -165,7 +168,7 @@ impl<'a> NumericLoops<'a> {
     }
 }
 
-/// A number between -1 and 1.
-pub(crate) fn symmetric(stream: &mut Stream) -> f64 {
-    2.0 * (stream.bits() as f64 / u64::MAX as f64) - 1.0
+/// A uniformly distributed number from -1 to 1.
+pub(crate) fn uniform_symmetric(stream: &mut RandomStream) -> f64 {
+    2.0 * (stream.next_bits() as f64 / u64::MAX as f64) - 1.0
 }

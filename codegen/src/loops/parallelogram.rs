@@ -1,8 +1,8 @@
-//! Loops in which the passive angles are integer combinations of other angles: parallelograms and their kin.
+//! Loops in which the passive angles are integer combinations of other angles: parallelograms and similar linkages.
 //!
-//! Such a loop's variety falls apart into branches (the parallelogram and the crossed linkage), so that its closed form
-//! by square roots would mix them. Which branch is meant is seen numerically around the nominal pose; that the relation
-//! then closes the loop identically is shown exactly.
+//! The variety of such a loop splits into branches (the parallelogram and the crossed linkage), and its closed form by
+//! square roots would mix them. Poses around the nominal one show numerically which branch is meant. That the relation
+//! then closes the loop identically is proved exactly.
 //!
 //! Decision: such loops are recognised one after the other, as they drive each other, and proved either for all
 //! angles of the other loops or at points of the field where these close (as in a kite whose halves share a
@@ -10,43 +10,45 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use modelmill_algebra::field::{Element, MODULUS, Stream};
+use modelmill_algebra::field::{FieldElement, MODULUS, RandomStream};
 use modelmill_spec::Mechanism;
 use nalgebra::{DMatrix, DVector};
 
 use crate::expr::{
-    AngleSum, Atom, ExprId, F64, FieldPoint, Graph, Node, Tape, coordinates_of, nominal_of,
+    Atom, AtomAngleSum, EvaluationTape, ExprId, FieldPoint, FloatDomain, Graph, Node, coordinates_of, nominal_of,
 };
-use crate::loops::all::Loops;
-use crate::loops::closure::Closure;
-use crate::loops::field_poses::FieldPoses;
+use crate::loops::all::KinematicLoops;
+use crate::loops::closure::LoopClosure;
+use crate::loops::field_poses::FieldPoseSampler;
 use crate::loops::magnitude;
-use crate::loops::numeric_poses::{NumericLoops, symmetric};
-use crate::loops::plan::{Unknowns, plan};
+use crate::loops::numeric_poses::{NumericLoops, uniform_symmetric};
+use crate::loops::plan::{SolvableCoordinates, plan};
 use crate::loops::relation::AngleRelation;
 
-/// How far known coordinates are moved from the nominal pose, in rad or relative to the size of the loop, and how exact
-/// a relation must look.
-const MOVE: f64 = 0.05;
+/// How far known coordinates are moved from the nominal pose, in rad or relative to the size of the loop.
+const PERTURBATION: f64 = 0.05;
+/// Error up to which a relation must be satisfied at all poses, rad.
 const TOLERANCE: f64 = 1e-8;
 
-/// Finds loops that are solved by relations and writes these into them.
+/// Finds loops that are solved by relations and stores the relations in them.
 ///
-/// Loops are looked at one after the other, as soon as all but as many of their coordinates are known as they have
-/// equations: a loop may be driven by another one.
-pub(crate) fn find(
+/// A loop is examined as soon as it has as many unknown coordinates as equations, since it may be driven by a loop
+/// before it.
+pub(crate) fn find_relations(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    closures: &mut [Closure],
+    closures: &mut [LoopClosure],
     divided: &[(usize, i64)],
 ) {
+    // Active coordinates are known from the start.
     let mut known: BTreeSet<usize> = (0..mechanism.coordinates.len())
         .filter(|c| !mechanism.coordinates[*c].passive)
         .collect();
+    // Relations of all loops so far, and indices of the loops that have been examined.
     let mut related: Vec<AngleRelation> = Vec::new();
     let mut solved: Vec<usize> = Vec::new();
     let mut todo: Vec<usize> = (0..closures.len()).collect();
-    let unknown_of = |closure: &Closure, known: &BTreeSet<usize>| -> Vec<usize> {
+    let unknown_of = |closure: &LoopClosure, known: &BTreeSet<usize>| -> Vec<usize> {
         let coordinates = closure.coordinates.iter().copied();
         coordinates.filter(|c| !known.contains(c)).collect()
     };
@@ -57,18 +59,20 @@ pub(crate) fn find(
         let index = todo.remove(position);
         let closure = &closures[index];
         let unknown = unknown_of(closure, &known);
+        // Angles that a relation may refer to: known ones without a relation of their own.
         let turning: Vec<usize> = (known.iter().copied())
             .filter(|c| related.iter().all(|r| r.coordinate != *c))
             .collect();
         known.extend(&unknown);
-        if closure.given().is_empty() {
-            // What is known of other loops' angles may be what makes this one a parallelogram.
-            let residual = put_in(graph, &related, &closure.residual);
+        if closure.explicit_coordinates().is_empty() {
+            // Relations of other loops may be what makes this one a parallelogram.
+            let residual = substitute_relations(graph, &related, &closure.residual);
             let relations = relations_of(graph, mechanism, &residual, &unknown).or_else(|| {
                 let before = solved.iter().map(|i| &closures[*i]);
-                let motion = Motion::new(mechanism, before, divided)?;
+                let motion = PriorLoops::new(mechanism, before, divided)?;
                 relations_along(graph, mechanism, &motion, &turning, &residual, &unknown)
             });
+            // The relations replace the equations of the loop.
             if let Some(relations) = relations {
                 let closure = &mut closures[index];
                 closure.residual = relations.iter().map(|r| r.residual(graph)).collect();
@@ -82,30 +86,31 @@ pub(crate) fn find(
     }
 }
 
-/// Loops that were solved before, by whose motion others may turn.
-struct Motion(Loops);
+/// Loops that were solved before, whose motion may drive others.
+struct PriorLoops(KinematicLoops);
 
-impl Motion {
+impl PriorLoops {
     /// `None` if there are no loops.
     fn new<'a>(
         mechanism: &Mechanism,
-        solved: impl Iterator<Item = &'a Closure>,
+        solved: impl Iterator<Item = &'a LoopClosure>,
         divided: &[(usize, i64)],
     ) -> Option<Self> {
-        let closures: Vec<Closure> = solved
+        // All equations are kept, because none has been dropped as dependent yet.
+        let closures: Vec<LoopClosure> = solved
             .cloned()
             .map(|mut closure| {
                 closure.n_independent = closure.residual.len();
                 closure
             })
             .collect();
+        // Passive coordinates that these loops determine; all others are given.
         let settled: BTreeSet<usize> = (closures.iter().flat_map(|c| &c.coordinates).copied())
             .filter(|c| mechanism.coordinates[*c].passive)
             .collect();
         (!closures.is_empty()).then(|| {
-            let (passive, active) =
-                (0..mechanism.coordinates.len()).partition(|c| settled.contains(c));
-            Self(Loops {
+            let (passive, active) = (0..mechanism.coordinates.len()).partition(|c| settled.contains(c));
+            Self(KinematicLoops {
                 active,
                 passive,
                 residual: closures.iter().flat_map(|c| c.residual.clone()).collect(),
@@ -115,105 +120,113 @@ impl Motion {
         })
     }
 
-    /// Whether expressions vanish wherever these loops close: shown at random points of the field.
-    fn makes_vanish(&self, graph: &mut Graph, mechanism: &Mechanism, closed: &[ExprId]) -> bool {
-        /// Points, and how many draws may fail to be one.
+    /// Whether expressions vanish wherever these loops close, tested at random points of the field.
+    fn is_zero_where_closed(&self, graph: &mut Graph, mechanism: &Mechanism, closed: &[ExprId]) -> bool {
+        /// Number of points.
         const POINTS: usize = 8;
+        /// Largest number of draws, since not every draw has a closed point.
         const DRAWS: usize = 400;
-        let Some(plan) = plan(graph, mechanism, &self.0, Unknowns::Any) else {
+        // A plan solves the loops for any coordinates.
+        let Some(plan) = plan(graph, mechanism, &self.0, SolvableCoordinates::Any) else {
             return false;
         };
-        let poses = FieldPoses::new(graph, mechanism, plan, closed);
-        let tape = Tape::new(graph, closed);
-        let mut stream = Stream::new(4);
-        let Ok(constants) = poses.constants::<MODULUS>(&mut stream) else {
+        let poses = FieldPoseSampler::new(graph, mechanism, plan, closed);
+        let tape = EvaluationTape::new(graph, closed);
+        let mut stream = RandomStream::new(4);
+        let Ok(constants) = poses.draw_constants::<MODULUS>(&mut stream) else {
             return false;
         };
         let points = (0..DRAWS).filter_map(|_| {
-            let open: FieldPoint<Element> = poses.open(&constants, &mut stream);
-            tape.evaluate(&poses.close(open)?)
+            let open: FieldPoint<FieldElement> = poses.draw_open_point(&constants, &mut stream);
+            tape.evaluate(&poses.close_loops(open)?)
         });
         let seen: Vec<_> = points.take(POINTS).collect();
-        seen.len() == POINTS && seen.iter().flatten().all(|left| *left == Element::ZERO)
+        seen.len() == POINTS && seen.iter().flatten().all(|left| *left == FieldElement::ZERO)
     }
 }
 
-/// Relations that hold along the motion of other loops and not without it, as those of a parallelogram of which one side is
-/// the side of a five-bar, or of a kite whose halves share a slide. They are seen in numbers, and then shown exactly; of a
-/// mechanism for its file's values alone, to the last digits of these.
+/// Relations that are true along the motion of other loops only, such as those of a parallelogram one side of which is
+/// the side of a five-bar, or of a kite whose halves share a prismatic joint. They are found numerically and then
+/// proved exactly. If the mechanism is derived for its file's values alone, they are checked to the last digits of
+/// these values.
 fn relations_along(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    motion: &Motion,
+    motion: &PriorLoops,
     turning: &[usize],
     residual: &[ExprId],
     unknown: &[usize],
 ) -> Option<Vec<AngleRelation>> {
+    // The loop and those before it, with their passive coordinates as unknowns.
     let all: Vec<ExprId> = (motion.0.residual.iter().chain(residual).copied()).collect();
     let following: Vec<usize> = (motion.0.passive.iter().chain(unknown).copied()).collect();
     let given: Vec<usize> = (0..mechanism.coordinates.len())
         .filter(|c| !following.contains(c))
         .collect();
-    let poses = poses(graph, mechanism, &all, &following, &given)?;
+    let poses = nearby_poses(graph, mechanism, &all, &following, &given)?;
     let fixed = fixed_angles(graph, residual);
+    // Candidates for every unknown angle, from the poses.
     let candidates: Vec<Vec<AngleRelation>> = unknown
         .iter()
-        .map(|p| relations(mechanism, &poses, turning, &fixed, *p))
+        .map(|p| angle_relations(mechanism, &poses, turning, &fixed, *p))
         .collect();
-    let size = magnitude::at_nominal(graph, mechanism, residual);
+    let size = magnitude::nominal_magnitude(graph, mechanism, residual);
+    // The first combination that closes the loop at all poses, and in the field.
     combinations(&candidates).find(|relations| {
-        let closed = put_in(graph, relations, residual);
-        let tape = Tape::new(graph, &closed);
-        poses.iter().all(|q| closes_at(mechanism, &tape, q, size))
-            && (mechanism.is_at_values || motion.makes_vanish(graph, mechanism, &closed))
+        let closed = substitute_relations(graph, relations, residual);
+        let tape = EvaluationTape::new(graph, &closed);
+        poses.iter().all(|q| is_loop_closed_at(mechanism, &tape, q, size))
+            && (mechanism.is_at_values || motion.is_zero_where_closed(graph, mechanism, &closed))
     })
 }
 
-/// The relations that solve a loop for `unknown`, if there are such; shown exactly.
+/// The relations that solve a loop for `unknown`, if there are such; proved exactly.
 fn relations_of(
     graph: &mut Graph,
     mechanism: &Mechanism,
     residual: &[ExprId],
     unknown: &[usize],
 ) -> Option<Vec<AngleRelation>> {
+    // All other coordinates of the loop are given.
     let given: Vec<usize> = coordinates_of(graph, residual)
         .into_iter()
         .filter(|c| !unknown.contains(c))
         .collect();
-    let poses = poses(graph, mechanism, residual, unknown, &given)?;
+    let poses = nearby_poses(graph, mechanism, residual, unknown, &given)?;
     let fixed = fixed_angles(graph, residual);
     let candidates: Vec<Vec<AngleRelation>> = unknown
         .iter()
-        .map(|p| relations(mechanism, &poses, &given, &fixed, *p))
+        .map(|p| angle_relations(mechanism, &poses, &given, &fixed, *p))
         .collect();
-    combinations(&candidates).find(|relations| closes(graph, mechanism, residual, relations))
+    combinations(&candidates).find(|relations| is_loop_closed(graph, mechanism, residual, relations))
 }
 
-/// Coordinates at the nominal pose and at some poses around it; `None` if the loop cannot be followed there.
-fn poses(
+/// Coordinates at the closed nominal pose and at some poses around it; `None` if the loop cannot be followed there.
+fn nearby_poses(
     graph: &mut Graph,
     mechanism: &Mechanism,
     residual: &[ExprId],
     unknown: &[usize],
     given: &[usize],
 ) -> Option<Vec<Vec<f64>>> {
-    /// How often the reach is halved where loops cannot be followed, as near the end of a slide.
+    /// How often the reach is halved where loops cannot be followed, for example near the end of a stroke.
     const HALVINGS: u32 = 6;
-    let loops = NumericLoops::solved_for(graph, mechanism, residual, unknown.to_vec(), given);
-    // A loop that leaves some of them free keeps to relations of many kinds.
-    let nominal = loops.nominal().filter(|q| loops.is_regular(q))?;
+    let loops = NumericLoops::for_unknowns(graph, mechanism, residual, unknown.to_vec(), given);
+    // A loop that does not determine all unknowns would satisfy many relations by chance.
+    let nominal = loops.closed_nominal_pose().filter(|q| loops.is_regular(q))?;
     (0..=HALVINGS).find_map(|k| {
-        let reach = MOVE / f64::from(1_u32 << k);
-        let mut stream = Stream::new(1);
+        let reach = PERTURBATION / f64::from(1_u32 << k);
+        let mut stream = RandomStream::new(1);
         let mut found = vec![nominal.clone()];
+        // More poses than coordinates, so that no relation fits by chance.
         for _ in 0..given.len() + unknown.len() + 4 {
-            found.push(loops.random(reach, &mut stream)?);
+            found.push(loops.random_pose(reach, &mut stream)?);
         }
         Some(found)
     })
 }
 
-/// Constants in sines and cosines.
+/// Indices of the constants in sines and cosines.
 fn fixed_angles(graph: &Graph, roots: &[ExprId]) -> Vec<usize> {
     let mut found = BTreeSet::new();
     for node in graph.nodes_of(roots) {
@@ -227,13 +240,15 @@ fn fixed_angles(graph: &Graph, roots: &[ExprId]) -> Vec<usize> {
     found.into_iter().collect()
 }
 
-/// One candidate of each list, in all combinations; only the first few.
+/// One candidate of each list, in all combinations, up to a largest number.
 fn combinations(candidates: &[Vec<AngleRelation>]) -> impl Iterator<Item = Vec<AngleRelation>> {
+    // Largest number of combinations that are tried.
     const MOST: usize = 64;
     let n = candidates
         .iter()
         .try_fold(1usize, |n, list| n.checked_mul(list.len()))
         .unwrap_or(MOST);
+    // The number k selects one candidate per list, as digits of a mixed base.
     (0..n.min(MOST)).map(move |mut k| {
         candidates
             .iter()
@@ -246,20 +261,21 @@ fn combinations(candidates: &[Vec<AngleRelation>]) -> impl Iterator<Item = Vec<A
     })
 }
 
-/// Relations that an unknown angle keeps to at all poses: with the known angles of its loop, and in its fixed part with
-/// multiples of constant angles. The simplest come first.
-fn relations(
+/// Relations that an unknown angle satisfies at all poses: with the known angles of its loop, and with multiples of
+/// constant angles and of pi/12 in its fixed part. The simplest come first.
+fn angle_relations(
     mechanism: &Mechanism,
     poses: &[Vec<f64>],
     given: &[usize],
     fixed: &[usize],
     p: usize,
 ) -> Vec<AngleRelation> {
-    let Some((turning, offset)) = turning(mechanism, poses, given, p) else {
+    let Some((turning, offset)) = co_rotating_angles(mechanism, poses, given, p) else {
         return Vec::new();
     };
     multiples(fixed.len())
         .into_iter()
+        // The fixed part without the constants must be a multiple of pi/12.
         .filter_map(|factors| {
             let rest = fixed.iter().zip(&factors).fold(offset, |rest, (c, n)| {
                 rest - f64::from(*n) * mechanism.constants[*c].value
@@ -271,7 +287,7 @@ fn relations(
             #[expect(clippy::cast_possible_truncation, reason = "small and rounded")]
             let pi12 = twelfths.round() as i32;
             let constants = fixed.iter().zip(&factors);
-            let constants = AngleSum::new(constants.map(|(c, n)| (Atom::Constant(*c), *n)));
+            let constants = AtomAngleSum::new(constants.map(|(c, n)| (Atom::Constant(*c), *n)));
             Some(AngleRelation {
                 coordinate: p,
                 sum: turning.plus(&constants, 1),
@@ -281,9 +297,9 @@ fn relations(
         .collect()
 }
 
-/// Small factors of `n` constants, sorted by size.
+/// Factors from -2 to 2 of `n` constants in all combinations, sorted by the sum of their magnitudes.
 fn multiples(n: usize) -> Vec<Vec<i32>> {
-    /// More constants than this are left out.
+    /// Further constants have the factor zero.
     const MOST: usize = 3;
     let mut found: Vec<Vec<i32>> = vec![Vec::new()];
     for k in 0..n {
@@ -303,13 +319,14 @@ fn multiples(n: usize) -> Vec<Vec<i32>> {
     found
 }
 
-/// The known angles with which an unknown one turns, and what it is beside them.
-fn turning(
+/// The known angles with which an unknown one rotates, and its constant difference to them in rad; `None` if it is no
+/// integer combination of them.
+fn co_rotating_angles(
     mechanism: &Mechanism,
     poses: &[Vec<f64>],
     given: &[usize],
     p: usize,
-) -> Option<(AngleSum, f64)> {
+) -> Option<(AtomAngleSum, f64)> {
     let others: Vec<usize> = given
         .iter()
         .copied()
@@ -318,6 +335,7 @@ fn turning(
     if !mechanism.coordinates[p].motion.is_angle() {
         return None;
     }
+    // Differences to the nominal pose, which do not contain the fixed part.
     let (nominal, moved) = poses.split_first()?;
     let a = DMatrix::from_fn(moved.len(), others.len(), |i, j| {
         moved[i][others[j]] - nominal[others[j]]
@@ -328,6 +346,7 @@ fn turning(
     } else {
         a.clone().svd(true, true).solve(&b, 1e-12).ok()?
     };
+    // Factors must be integers, and the rounded ones must fit every pose.
     let rounded: DVector<f64> = factors.map(f64::round);
     if (&factors - &rounded).iter().any(|x| x.abs() > 1e-5)
         || rounded.iter().any(|x| x.abs() > 100.0)
@@ -335,6 +354,7 @@ fn turning(
     {
         return None;
     }
+    // The fixed part is the rest at the nominal pose.
     let offset = others
         .iter()
         .zip(rounded.iter())
@@ -344,67 +364,63 @@ fn turning(
         .iter()
         .zip(rounded.iter())
         .map(|(c, n)| (Atom::Coordinate(*c), *n as i32));
-    Some((AngleSum::new(terms), offset))
+    Some((AtomAngleSum::new(terms), offset))
 }
 
-/// Whether the relations close the loop at every pose: shown at random points of the field; or, of a mechanism for its file's
-/// values alone, in numbers, since there lengths are what is left of those that were meant.
-fn closes(
-    graph: &mut Graph,
-    mechanism: &Mechanism,
-    residual: &[ExprId],
-    relations: &[AngleRelation],
-) -> bool {
-    let closed = put_in(graph, relations, residual);
-    let tape = Tape::new(graph, &closed);
+/// Whether the relations close the loop at every pose, tested at random points of the field. For a mechanism that is
+/// derived for its file's values alone, a numeric test is sufficient, because lengths in the file are rounded.
+fn is_loop_closed(graph: &mut Graph, mechanism: &Mechanism, residual: &[ExprId], relations: &[AngleRelation]) -> bool {
+    let closed = substitute_relations(graph, relations, residual);
+    let tape = EvaluationTape::new(graph, &closed);
     let atoms = graph.atoms(&closed);
-    let mut stream = Stream::new(2);
+    let mut stream = RandomStream::new(2);
+    // All atoms are drawn independently: the relations must close the loop identically.
     let closes_exactly = (0..8).all(|_| {
-        let mut point = FieldPoint::<Element>::default();
+        let mut point = FieldPoint::<FieldElement>::default();
         for atom in &atoms {
-            point.values.insert(*atom, stream.element());
-            point.angles.insert(*atom, stream.circle());
+            point.values.insert(*atom, stream.next_element());
+            point.angles.insert(*atom, stream.next_circle_point());
         }
         tape.evaluate(&point)
-            .is_some_and(|values| values.iter().all(|v| *v == Element::ZERO))
+            .is_some_and(|values| values.iter().all(|v| *v == FieldElement::ZERO))
     });
-    closes_exactly || mechanism.is_at_values && closes_in_numbers(graph, mechanism, residual, &tape)
+    closes_exactly || mechanism.is_at_values && is_loop_closed_numerically(graph, mechanism, residual, &tape)
 }
 
-/// Whether nothing but the last digits of the file's lengths is left of a loop, at any angles.
-fn closes_in_numbers(
+/// Whether a loop is closed up to the last digits of the file's lengths, at random angles.
+fn is_loop_closed_numerically(
     graph: &mut Graph,
     mechanism: &Mechanism,
     residual: &[ExprId],
-    closed: &Tape,
+    closed: &EvaluationTape,
 ) -> bool {
-    let size = magnitude::at_nominal(graph, mechanism, residual);
-    let mut stream = Stream::new(3);
+    let size = magnitude::nominal_magnitude(graph, mechanism, residual);
+    let mut stream = RandomStream::new(3);
     (0..8).all(|_| {
         let moved: Vec<f64> = (mechanism.coordinates.iter())
             .map(|c| {
                 let far = if c.motion.is_angle() { 3.0 } else { size };
-                c.nominal + far * symmetric(&mut stream)
+                c.nominal + far * uniform_symmetric(&mut stream)
             })
             .collect();
-        closes_at(mechanism, closed, &moved, size)
+        is_loop_closed_at(mechanism, closed, &moved, size)
     })
 }
 
-/// Whether nothing but the last digits of the file's lengths is left of a loop at a pose.
-fn closes_at(mechanism: &Mechanism, closed: &Tape, pose: &[f64], size: f64) -> bool {
-    /// Relative to the size of the loop: what the arithmetic of other programs leaves in lengths that they write.
+/// Whether a loop is closed up to the last digits of the file's lengths at one pose. `size` is the size of the loop, m.
+fn is_loop_closed_at(mechanism: &Mechanism, closed: &EvaluationTape, pose: &[f64], size: f64) -> bool {
+    /// Relative to the size of the loop: rounding errors of lengths that other programs wrote.
     const LAST_DIGITS: f64 = 1e-11;
     let value = |atom: Atom| match atom {
         Atom::Coordinate(i) => pose[i],
         fixed => nominal_of(mechanism, fixed),
     };
-    let left = closed.evaluate(&F64(value));
+    let left = closed.evaluate(&FloatDomain(value));
     left.is_some_and(|left| left.iter().all(|x| x.abs() <= LAST_DIGITS * size))
 }
 
-/// Replaces the related angles in sines and cosines.
-fn put_in(graph: &mut Graph, relations: &[AngleRelation], roots: &[ExprId]) -> Vec<ExprId> {
+/// Replaces angles in sines and cosines by their relations.
+fn substitute_relations(graph: &mut Graph, relations: &[AngleRelation], roots: &[ExprId]) -> Vec<ExprId> {
     let nodes: Vec<Node> = graph
         .nodes_of(roots)
         .filter(|n| matches!(n, Node::Sin(_) | Node::Cos(_)))
@@ -415,17 +431,15 @@ fn put_in(graph: &mut Graph, relations: &[AngleRelation], roots: &[ExprId]) -> V
         let (Node::Sin(angle) | Node::Cos(angle)) = &node else {
             continue;
         };
-        let (mut sum, mut pi12) = (AngleSum::NONE, 0);
+        // The angle with every related coordinate replaced.
+        let (mut sum, mut pi12) = (AtomAngleSum::NONE, 0);
         for (atom, n) in angle.terms() {
-            match relations
-                .iter()
-                .find(|r| Atom::Coordinate(r.coordinate) == *atom)
-            {
+            match relations.iter().find(|r| Atom::Coordinate(r.coordinate) == *atom) {
                 Some(relation) => {
                     sum = sum.plus(&relation.sum, *n);
                     pi12 += relation.pi12 * n;
                 }
-                None => sum = sum.plus(&AngleSum::new([(*atom, *n)]), 1),
+                None => sum = sum.plus(&AtomAngleSum::new([(*atom, *n)]), 1),
             }
         }
         let (cosine, sine) = graph.cos_sin(angle, 0);

@@ -5,15 +5,18 @@
 
 use std::collections::BTreeSet;
 
-use crate::expr::{AngleSum, Atom, ExprId, Graph, Rational, coordinates_of};
-use crate::loops::closure::{Closure, Leg};
-use crate::loops::solved::{Root, Solved, turn};
+use crate::expr::{Atom, AtomAngleSum, ExprId, Graph, Rational, coordinates_of};
+use crate::loops::closure::{LoopClosure, PlanarLeg};
+use crate::loops::solved::{ClosureSolution, SignedRoot, rotate_vector};
 use crate::loops::whole_root;
 
-/// The vectors that turn with one set of unknown angles, as one vector in a frame turned by `angle`.
-struct Group {
+/// The vectors that rotate with the same unknown angles, as one vector in a frame rotated by `angle`.
+struct LegGroup {
+    /// Unknown coordinates in the angle, with their integer factors.
     unknown: BTreeSet<(usize, i32)>,
-    angle: AngleSum,
+    /// The angle of the first of these vectors, with its known part.
+    angle: AtomAngleSum,
+    /// Sum of the vectors in that frame, m.
     vector: [ExprId; 2],
 }
 
@@ -22,26 +25,28 @@ struct Group {
 /// `positive` chooses the sign of the square root. Returns `None` where no closed form of this family applies.
 pub(crate) fn solve(
     graph: &mut Graph,
-    closure: &Closure,
+    closure: &LoopClosure,
     unknown: &[usize],
     positive: bool,
-) -> Option<Solved> {
+) -> Option<ClosureSolution> {
     if !closure.relations.is_empty() {
         let relations = closure.relations.clone();
-        return Some(Solved {
+        return Some(ClosureSolution {
             angles: Vec::new(),
             relations,
             values: Vec::new(),
             root: None,
         });
     }
+    // Vectors without unknown angles add up to one known vector; the others are grouped by their unknown angles.
     let legs = closure.chain.as_ref()?;
     let mut known = [Graph::ZERO; 2];
-    let mut groups: Vec<Group> = Vec::new();
+    let mut groups: Vec<LegGroup> = Vec::new();
+    // Unknown coordinates that change the length of a vector, as prismatic joints do.
     let slides: Vec<usize> = unknown
         .iter()
         .copied()
-        .filter(|c| legs.iter().any(|leg| depends(graph, &leg.vector, *c)))
+        .filter(|c| legs.iter().any(|leg| has_coordinate(graph, &leg.vector, *c)))
         .collect();
     for leg in legs {
         let inside: BTreeSet<(usize, i32)> = leg
@@ -53,29 +58,28 @@ pub(crate) fn solve(
                 _ => None,
             })
             .collect();
+        // A vector without unknown angles belongs to the known one.
         if inside.is_empty() {
-            let v = turned(graph, leg, &AngleSum::NONE);
+            let v = rotate_leg(graph, leg, &AtomAngleSum::NONE);
             known = [graph.add(known[0], v[0]), graph.add(known[1], v[1])];
             continue;
         }
+        // A vector with the unknown angles of an earlier one is written in the frame of that group.
         match groups.iter_mut().find(|g| g.unknown == inside) {
             Some(group) => {
-                let v = turned(graph, leg, &group.angle);
-                group.vector = [
-                    graph.add(group.vector[0], v[0]),
-                    graph.add(group.vector[1], v[1]),
-                ];
+                let v = rotate_leg(graph, leg, &group.angle);
+                group.vector = [graph.add(group.vector[0], v[0]), graph.add(group.vector[1], v[1])];
             }
             None => {
-                let v = turned(
+                let v = rotate_leg(
                     graph,
-                    &Leg {
-                        angle: AngleSum::NONE,
+                    &PlanarLeg {
+                        angle: AtomAngleSum::NONE,
                         ..leg.clone()
                     },
-                    &AngleSum::NONE,
+                    &AtomAngleSum::NONE,
                 );
-                groups.push(Group {
+                groups.push(LegGroup {
                     unknown: inside,
                     angle: leg.angle.clone(),
                     vector: v,
@@ -83,21 +87,23 @@ pub(crate) fn solve(
             }
         }
     }
+    // Two unknown directions, one direction and one length, or two lengths.
     match (groups.as_slice(), slides.as_slice()) {
-        ([first, second], []) => two_circles(graph, known, first, second, positive),
-        ([group], [slide]) => circle_and_line(graph, known, group, *slide, positive),
-        ([], [a, b]) => two_lines(graph, known, *a, *b),
+        ([first, second], []) => intersect_circles(graph, known, first, second, positive),
+        ([group], [slide]) => intersect_circle_and_line(graph, known, group, *slide, positive),
+        ([], [a, b]) => intersect_lines(graph, known, *a, *b),
         _ => None,
     }
-    .filter(|solved| determines(solved, unknown))
+    .filter(|solved| has_determined_unknowns(solved, unknown))
 }
 
-/// Whether the solved angles determine every unknown coordinate (their integer matrix is unimodular and triangular).
-fn determines(solved: &Solved, unknown: &[usize]) -> bool {
+/// Whether the solved angles determine every unknown coordinate, one at a time and with factors of 1 or -1.
+fn has_determined_unknowns(solved: &ClosureSolution, unknown: &[usize]) -> bool {
     let mut left: BTreeSet<usize> = unknown.iter().copied().collect();
     for (slide, _) in &solved.values {
         left.remove(slide);
     }
+    // Each sum with a single remaining unknown determines that one.
     loop {
         let found = solved.angles.iter().find_map(|(angle, _)| {
             let inside: Vec<_> = angle
@@ -117,34 +123,33 @@ fn determines(solved: &Solved, unknown: &[usize]) -> bool {
     }
 }
 
-fn depends(graph: &Graph, roots: &[ExprId], coordinate: usize) -> bool {
+/// Whether any of the expressions depends on a coordinate.
+fn has_coordinate(graph: &Graph, roots: &[ExprId], coordinate: usize) -> bool {
     graph.atoms(roots).contains(&Atom::Coordinate(coordinate))
 }
 
-/// The leg's vector in a frame turned by `reference`.
-fn turned(graph: &mut Graph, leg: &Leg, reference: &AngleSum) -> [ExprId; 2] {
+/// The leg's vector in a frame rotated by `reference`.
+fn rotate_leg(graph: &mut Graph, leg: &PlanarLeg, reference: &AtomAngleSum) -> [ExprId; 2] {
     let rest = leg.angle.plus(reference, -1);
     let (c, s) = graph.cos_sin(&rest, leg.pi12);
-    turn(graph, [c, s], leg.vector)
+    rotate_vector(graph, [c, s], leg.vector)
 }
 
+/// Scalar product of two vectors in the plane.
 fn dot(graph: &mut Graph, a: [ExprId; 2], b: [ExprId; 2]) -> ExprId {
     let (x, y) = (graph.mul(a[0], b[0]), graph.mul(a[1], b[1]));
     graph.add(x, y)
 }
 
+/// The component of the vector product along the normal of the plane.
 fn cross(graph: &mut Graph, a: [ExprId; 2], b: [ExprId; 2]) -> ExprId {
     let (x, y) = (graph.mul(a[0], b[1]), graph.mul(a[1], b[0]));
     graph.sub(x, y)
 }
 
-/// Cosine and sine of the angle that turns `arm` into `v`; both have the same length.
-fn direction(
-    graph: &mut Graph,
-    v: [ExprId; 2],
-    arm: [ExprId; 2],
-    arm_squared: ExprId,
-) -> [ExprId; 2] {
+/// Cosine and sine of the angle that rotates `arm` onto `v`; both have the same length, whose square is `arm_squared`.
+fn rotation_between(graph: &mut Graph, v: [ExprId; 2], arm: [ExprId; 2], arm_squared: ExprId) -> [ExprId; 2] {
+    // An arm along the x axis needs only its length.
     if arm[1] == Graph::ZERO {
         return v.map(|x| graph.div(x, arm[0]));
     }
@@ -153,24 +158,30 @@ fn direction(
     [graph.mul(along, inverse), graph.mul(across, inverse)]
 }
 
-fn signed(graph: &mut Graph, root: ExprId, positive: bool) -> ExprId {
+/// The root, negated unless `positive`.
+fn apply_sign(graph: &mut Graph, root: ExprId, positive: bool) -> ExprId {
     if positive { root } else { graph.neg(root) }
 }
 
-fn root_of(graph: &mut Graph, radicand: ExprId) -> ExprId {
+/// The square root as a node of the graph.
+fn square_root(graph: &mut Graph, radicand: ExprId) -> ExprId {
     graph.unary(crate::expr::Unary::Sqrt, radicand)
 }
 
-/// `known + v1 + v2 = 0`, both of known length: `v1 = alpha d + beta d'`, with `d = -known` and `d'` normal to it.
-fn two_circles(
+/// `known + v1 + v2 = 0`, where both vectors have known lengths: `v1 = alpha d + beta d'`, with `d = -known` and `d'`
+/// normal to it.
+///
+/// `None` where one of the three lengths is exactly zero.
+fn intersect_circles(
     graph: &mut Graph,
     known: [ExprId; 2],
-    first: &Group,
-    second: &Group,
+    first: &LegGroup,
+    second: &LegGroup,
     positive: bool,
-) -> Option<Solved> {
+) -> Option<ClosureSolution> {
     let d = known.map(|x| graph.neg(x));
     let [dd, aa, bb] = [d, first.vector, second.vector].map(|v| dot(graph, v, v));
+    // A vector of length zero has no direction.
     if [dd, aa, bb].contains(&Graph::ZERO) {
         return None;
     }
@@ -180,7 +191,7 @@ fn two_circles(
     let ratio = graph.mul(difference, inverse);
     let half = Rational::new(1, 2);
     let one_half = graph.rational(half.clone());
-    let alpha = graph.combine([(one_half, Rational::ONE), (ratio, half)]);
+    let alpha = graph.linear_combination([(one_half, Rational::ONE), (ratio, half)]);
     let (square, alpha_square) = (graph.mul(aa, inverse), graph.mul(alpha, alpha));
     let radicand = graph.sub(square, alpha_square);
     // 4 d^4 beta^2 = 4 a^2 d^2 - (d^2 + a^2 - b^2)^2, sixteen times the square of the triangle's area
@@ -188,63 +199,60 @@ fn two_circles(
     let (four, square_of_sum) = (graph.mul(aa, dd), graph.mul(sum, sum));
     let four = graph.scale(four, &Rational::integer(4));
     let area = graph.sub(four, square_of_sum);
+    // The root without a root sign, if the area is the square of a polynomial.
     let whole = whole_root::exact_root(graph, area).map(|root| {
         let root = graph.mul(root, inverse);
         graph.scale(root, &Rational::new(1, 2))
     });
-    let root = whole.unwrap_or_else(|| root_of(graph, radicand));
-    let beta = signed(graph, root, positive);
+    let root = whole.unwrap_or_else(|| square_root(graph, radicand));
+    let beta = apply_sign(graph, root, positive);
     let normal = [graph.neg(d[1]), d[0]];
     let v1: [ExprId; 2] = std::array::from_fn(|i| {
         let (x, y) = (graph.mul(alpha, d[i]), graph.mul(beta, normal[i]));
         graph.add(x, y)
     });
+    // The second vector closes the triangle.
     let v2: [ExprId; 2] = std::array::from_fn(|i| graph.sub(d[i], v1[i]));
+    // The same root from the coordinates themselves, which shows its sign at a pose: beta = (d x v1)/d^2.
     let (c, s) = graph.cos_sin(&first.angle, 0);
-    let actual = turn(graph, [c, s], first.vector);
+    let actual = rotate_vector(graph, [c, s], first.vector);
     let across = cross(graph, d, actual);
     let witness = graph.mul(across, inverse);
-    Some(Solved {
+    Some(ClosureSolution {
         angles: vec![
-            (first.angle.clone(), direction(graph, v1, first.vector, aa)),
-            (
-                second.angle.clone(),
-                direction(graph, v2, second.vector, bb),
-            ),
+            (first.angle.clone(), rotation_between(graph, v1, first.vector, aa)),
+            (second.angle.clone(), rotation_between(graph, v2, second.vector, bb)),
         ],
         relations: Vec::new(),
         values: Vec::new(),
-        root: Some(Root {
+        root: Some(SignedRoot {
             radicand,
             witness,
-            whole,
+            exact: whole,
         }),
     })
 }
 
-/// `known(s) + R(angle) arm(s) = 0` with one of the two independent of the sliding coordinate or both linear in it.
-fn circle_and_line(
+/// `known(s) + R(angle) arm(s) = 0`, where both vectors are at most linear in the prismatic coordinate `s`.
+fn intersect_circle_and_line(
     graph: &mut Graph,
     known: [ExprId; 2],
-    group: &Group,
+    group: &LegGroup,
     slide: usize,
     positive: bool,
-) -> Option<Solved> {
-    let (k0, k1) = linear(graph, known, slide)?;
-    let (a0, a1) = linear(graph, group.vector, slide)?;
+) -> Option<ClosureSolution> {
+    // Both vectors as constant part plus s times a factor.
+    let (k0, k1) = split_linear(graph, known, slide)?;
+    let (a0, a1) = split_linear(graph, group.vector, slide)?;
     // |k0 + s k1|^2 = |a0 + s a1|^2, that is p s^2 + 2 q s + r = 0
     let mut gap = |x: [ExprId; 2], y: [ExprId; 2], u: [ExprId; 2], v: [ExprId; 2]| {
         let (one, two) = (dot(graph, x, y), dot(graph, u, v));
         graph.sub(one, two)
     };
-    let (p, q, r) = (
-        gap(k1, k1, a1, a1),
-        gap(k0, k1, a0, a1),
-        gap(k0, k0, a0, a0),
-    );
+    let (p, q, r) = (gap(k1, k1, a1, a1), gap(k0, k1, a0, a1), gap(k0, k0, a0, a0));
     let at = graph.atom(Atom::Coordinate(slide));
     let (value, root) = if p == Graph::ZERO {
-        // Equal directions of sliding: the equation is linear.
+        // Both change with s at the same rate: the equation is linear.
         if q == Graph::ZERO {
             return None;
         }
@@ -261,20 +269,23 @@ fn circle_and_line(
         let difference = graph.sub(square, product);
         let radicand = graph.mul(difference, inverse);
         let whole = whole_root::exact_root(graph, difference).map(|root| graph.div(root, one));
-        let root = whole.unwrap_or_else(|| root_of(graph, radicand));
-        let root = signed(graph, root, positive);
+        let root = whole.unwrap_or_else(|| square_root(graph, radicand));
+        let root = apply_sign(graph, root, positive);
         let root_of_length = graph.mul(root, one);
+        // s = (root - q)/p
         let numerator = graph.sub(root_of_length, q);
+        // The same root from the coordinate itself: p s + q.
         let linear = graph.mul(p, at);
         let sum = graph.add(linear, q);
         let witness = graph.div(sum, one);
-        let root = Root {
+        let root = SignedRoot {
             radicand,
             witness,
-            whole,
+            exact: whole,
         };
         (graph.div(numerator, p), Some(root))
     };
+    // With s known, the arm and its target are known, and the angle is the one between them.
     let put = |graph: &mut Graph, v0: [ExprId; 2], v1: [ExprId; 2]| -> [ExprId; 2] {
         std::array::from_fn(|i| {
             let moved = graph.mul(value, v1[i]);
@@ -284,8 +295,8 @@ fn circle_and_line(
     let v = put(graph, k0, k1).map(|x| graph.neg(x));
     let arm = put(graph, a0, a1);
     let arm_squared = dot(graph, arm, arm);
-    let angles = vec![(group.angle.clone(), direction(graph, v, arm, arm_squared))];
-    Some(Solved {
+    let angles = vec![(group.angle.clone(), rotation_between(graph, v, arm, arm_squared))];
+    Some(ClosureSolution {
         angles,
         relations: Vec::new(),
         values: vec![(slide, value)],
@@ -293,17 +304,17 @@ fn circle_and_line(
     })
 }
 
-/// `k0 + s a + t b = 0`
-fn two_lines(graph: &mut Graph, known: [ExprId; 2], first: usize, second: usize) -> Option<Solved> {
-    let (rest, a) = linear(graph, known, first)?;
-    let (k0, b) = linear(graph, rest, second)?;
+/// `k0 + s a + t b = 0` for two prismatic coordinates `s` and `t` with directions `a` and `b`, by Cramer's rule.
+fn intersect_lines(graph: &mut Graph, known: [ExprId; 2], first: usize, second: usize) -> Option<ClosureSolution> {
+    let (rest, a) = split_linear(graph, known, first)?;
+    let (k0, b) = split_linear(graph, rest, second)?;
     let determinant = cross(graph, a, b);
-    if determinant == Graph::ZERO || depends(graph, &a, second) {
+    if determinant == Graph::ZERO || has_coordinate(graph, &a, second) {
         return None;
     }
     let (s, t) = (cross(graph, b, k0), cross(graph, k0, a));
     let (s, t) = (graph.div(s, determinant), graph.div(t, determinant));
-    Some(Solved {
+    Some(ClosureSolution {
         angles: Vec::new(),
         relations: Vec::new(),
         values: vec![(first, s), (second, t)],
@@ -311,14 +322,11 @@ fn two_lines(graph: &mut Graph, known: [ExprId; 2], first: usize, second: usize)
     })
 }
 
-/// Splits a vector into what does not depend on a coordinate and its factor; `None` if it is not linear in it.
-fn linear(
-    graph: &mut Graph,
-    v: [ExprId; 2],
-    coordinate: usize,
-) -> Option<([ExprId; 2], [ExprId; 2])> {
+/// Splits a vector into the part that does not depend on a coordinate and the factor of the coordinate; `None` if the
+/// vector is not linear in it.
+fn split_linear(graph: &mut Graph, v: [ExprId; 2], coordinate: usize) -> Option<([ExprId; 2], [ExprId; 2])> {
     let slope = graph.differentiate(&v, Atom::Coordinate(coordinate));
-    if depends(graph, &slope, coordinate) {
+    if has_coordinate(graph, &slope, coordinate) {
         return None;
     }
     let at = graph.atom(Atom::Coordinate(coordinate));

@@ -1,54 +1,58 @@
 //! Square roots that need no root sign: a polynomial in cosines, sines, lengths and constants whose square is a given
-//! one, as the yaw of a platform on three equal legs has, or the crossed one of two equal pairs of links.
+//! one. Examples are the yaw of a platform on three equal legs, and the crossed linkage of two equal pairs of links.
 //!
-//! Along a line through a point, the root of a polynomial follows from its value at that point, as a power series. So
-//! the root divided by its value at one point can be evaluated anywhere, with one and the same sign; its coefficients
-//! follow from a linear system. That the square is the radicand is shown at the end.
+//! Along a line through a point, the root of a polynomial is determined by its value at that point, as a power series.
+//! So the root divided by its value at one point can be evaluated anywhere, with one and the same sign. Its
+//! coefficients are the solution of a linear system. Finally it is tested that the square is the radicand.
 //!
 //! Decision: the polynomial is evaluated and never expanded or factored. With it, the yaw of a platform on three
 //! equal legs, crossed parallelograms and deltoids have rational closed forms.
 
 use modelmill_algebra::eliminate::null_space;
-use modelmill_algebra::field::{Element, MODULUS, Stream};
-use modelmill_algebra::lift::lift;
+use modelmill_algebra::field::{FieldElement, MODULUS, RandomStream};
+use modelmill_algebra::lift::reconstruct_rational;
 use modelmill_algebra::univariate::interpolate;
 
-use crate::expr::{Atom, ExprId, FieldPoint, Graph, Node, Rational, Tape, Unary};
+use crate::expr::{Atom, EvaluationTape, ExprId, FieldPoint, Graph, Node, Rational, Unary};
 
-/// Draws at which a radicand must be a square everywhere, or nowhere, before any work is done.
-const CHARACTERS: usize = 24;
-/// Most terms that a root may have, and the highest degree in one variable that is looked for.
+/// Number of draws at which a radicand must be a square everywhere, or nowhere, before the polynomial is computed.
+const SQUARE_TESTS: usize = 24;
+/// Largest number of terms of a root.
 const MOST_TERMS: usize = 300;
-const HIGHEST: usize = 8;
+/// Highest degree of the radicand in one variable.
+const HIGHEST_DEGREE: usize = 8;
 
 /// A quantity on which the radicand depends.
 #[derive(Clone, Copy)]
-struct Variable {
+struct RadicandVariable {
+    /// The coordinate or constant.
     atom: Atom,
-    /// Whether it stands in cosines and sines.
+    /// Whether it occurs in cosines and sines.
     is_angle: bool,
     /// Its degree in the root, in cosine and sine together for an angle.
     degree: usize,
 }
 
 /// A monomial: for every variable the exponent of its value, or of its cosine and (0 or 1) sine.
-type Powers = Vec<(usize, usize)>;
+type RadicandMonomial = Vec<(usize, usize)>;
 
-/// The polynomial whose square an expression is, with either sign; `None` if there is none, or none with short
-/// coefficients.
+/// The polynomial whose square an expression is, with either sign; `None` if there is none, or if its coefficients are
+/// no short fractions.
 pub(crate) fn exact_root(graph: &mut Graph, radicand: ExprId) -> Option<ExprId> {
-    let tape = Tape::new(graph, &[radicand]);
-    let mut variables = variables(graph, radicand)?;
-    let mut stream = Stream::new(6);
+    let tape = EvaluationTape::new(graph, &[radicand]);
+    let mut variables = radicand_variables(graph, radicand)?;
+    let mut stream = RandomStream::new(6);
     if !may_be_square(&tape, &variables, &mut stream) {
         return None;
     }
+    // The root has half the degree of the radicand.
     for k in 0..variables.len() {
-        variables[k].degree = degree(&tape, &variables, k, &mut stream)? / 2;
+        variables[k].degree = radicand_degree(&tape, &variables, k, &mut stream)? / 2;
     }
-    let monomials = monomials(&variables)?;
-    let factors = coefficients(&tape, &variables, &monomials, &mut stream)?;
-    let root = written(graph, &variables, &monomials, &factors);
+    let monomials = root_monomials(&variables)?;
+    let factors = root_coefficients(&tape, &variables, &monomials, &mut stream)?;
+    let root = polynomial_expression(graph, &variables, &monomials, &factors);
+    // The root is known up to a constant factor, whose square is the ratio to the radicand.
     let square = graph.mul(root, root);
     let ratio = constant_ratio(graph, &variables, radicand, square, &mut stream)?;
     if ratio.is_negative() || ratio.is_zero() {
@@ -59,13 +63,15 @@ pub(crate) fn exact_root(graph: &mut Graph, radicand: ExprId) -> Option<ExprId> 
     Some(graph.mul(scale, root))
 }
 
-/// What a polynomial depends on; `None` if it is none, or an atom stands both in angles and outside.
-fn variables(graph: &Graph, radicand: ExprId) -> Option<Vec<Variable>> {
-    let mut found: Vec<Variable> = Vec::new();
+/// The quantities on which a polynomial depends; `None` if the expression is no polynomial, or if an atom occurs both
+/// in angles and outside.
+fn radicand_variables(graph: &Graph, radicand: ExprId) -> Option<Vec<RadicandVariable>> {
+    let mut found: Vec<RadicandVariable> = Vec::new();
+    // Records an atom, and returns whether it may occur in this way.
     let mut note = |atom: Atom, is_angle: bool| {
         match found.iter().find(|v| v.atom == atom) {
             Some(known) => return known.is_angle == is_angle,
-            None => found.push(Variable {
+            None => found.push(RadicandVariable {
                 atom,
                 is_angle,
                 degree: 0,
@@ -73,37 +79,42 @@ fn variables(graph: &Graph, radicand: ExprId) -> Option<Vec<Variable>> {
         }
         matches!(atom, Atom::Coordinate(_) | Atom::Constant(_))
     };
+    // Roots of numbers are constants; other functions are no polynomials.
     let is_sound = graph.nodes_of(&[radicand]).all(|node| match node {
         Node::Atom(atom) => note(*atom, false),
         Node::Sin(angle) | Node::Cos(angle) => angle.atoms().all(|atom| note(atom, true)),
-        Node::Unary(function, inner) => {
-            *function == Unary::Sqrt && matches!(graph.node(*inner), Node::Rational(_))
-        }
+        Node::Unary(function, inner) => *function == Unary::Sqrt && matches!(graph.node(*inner), Node::Rational(_)),
         _ => true,
     });
     (is_sound && !found.is_empty()).then_some(found)
 }
 
-/// Where each variable goes along a line: its value, or the tangent of half its angle.
-type Line = Vec<(Element, Element)>;
+/// A line in the space of the variables, as start and slope per variable: its value, or the tangent of half its angle.
+type VariableLine = Vec<(FieldElement, FieldElement)>;
 
-fn random_line(variables: &[Variable], start: Option<&[Element]>, stream: &mut Stream) -> Line {
+/// A random line, from a given point or a random one.
+fn random_line(
+    variables: &[RadicandVariable],
+    start: Option<&[FieldElement]>,
+    stream: &mut RandomStream,
+) -> VariableLine {
     let mut draw = |k: usize| {
-        let from = start.map_or_else(|| stream.element(), |start| start[k]);
-        (from, stream.element())
+        let from = start.map_or_else(|| stream.next_element(), |start| start[k]);
+        (from, stream.next_element())
     };
     (0..variables.len()).map(&mut draw).collect()
 }
 
 /// The point at `t` of a line; `None` where an angle has no tangent.
-fn at(variables: &[Variable], line: &Line, t: Element) -> Option<FieldPoint> {
+fn point_on_line(variables: &[RadicandVariable], line: &VariableLine, t: FieldElement) -> Option<FieldPoint> {
     let mut point = FieldPoint::default();
     for (variable, (from, by)) in variables.iter().zip(line) {
         let x = *from + t * *by;
+        // Rational parametrisation of the circle by the tangent of half the angle.
         if variable.is_angle {
             let square = x * x;
-            let inverse = (Element::ONE + square).inverse()?;
-            let circle = ((Element::ONE - square) * inverse, (x + x) * inverse);
+            let inverse = (FieldElement::ONE + square).inverse()?;
+            let circle = ((FieldElement::ONE - square) * inverse, (x + x) * inverse);
             point.angles.insert(variable.atom, circle);
         } else {
             point.values.insert(variable.atom, x);
@@ -112,63 +123,73 @@ fn at(variables: &[Variable], line: &Line, t: Element) -> Option<FieldPoint> {
     Some(point)
 }
 
-fn may_be_square(tape: &Tape, variables: &[Variable], stream: &mut Stream) -> bool {
+/// Whether the radicand is a square at all drawn points, or at none: a square times a constant is either.
+fn may_be_square(tape: &EvaluationTape, variables: &[RadicandVariable], stream: &mut RandomStream) -> bool {
     let mut seen = [0, 0];
-    for _ in 0..CHARACTERS {
+    for _ in 0..SQUARE_TESTS {
         let line = random_line(variables, None, stream);
-        let value = at(variables, &line, Element::ZERO).and_then(|point| tape.evaluate(&point));
+        let value = point_on_line(variables, &line, FieldElement::ZERO).and_then(|point| tape.evaluate(&point));
         let Some(value) = value else {
             return false;
         };
-        if value[0] != Element::ZERO {
+        if value[0] != FieldElement::ZERO {
             seen[usize::from(value[0].square_root().is_some())] += 1;
         }
     }
     seen.contains(&0) && seen != [0, 0]
 }
 
-/// The degree of the radicand in one variable, if it is a polynomial of even degree in it.
-fn degree(tape: &Tape, variables: &[Variable], k: usize, stream: &mut Stream) -> Option<usize> {
+/// The degree of the radicand in one variable, if it is a polynomial of even degree in it, up to [`HIGHEST_DEGREE`].
+fn radicand_degree(
+    tape: &EvaluationTape,
+    variables: &[RadicandVariable],
+    k: usize,
+    stream: &mut RandomStream,
+) -> Option<usize> {
     let mut line = random_line(variables, None, stream);
+    // Only variable k changes along this line.
     for (other, (_, by)) in line.iter_mut().enumerate() {
         if other != k {
-            *by = Element::ZERO;
+            *by = FieldElement::ZERO;
         }
     }
     let at_most = |d: usize| if variables[k].is_angle { 2 * d } else { d };
-    let mut x: Vec<Element> = Vec::new();
-    let mut y: Vec<Element> = Vec::new();
-    while x.len() < at_most(HIGHEST) + 3 {
-        let t = stream.element();
-        y.push(tape.evaluate(&at(variables, &line, t)?)?[0]);
+    let mut x: Vec<FieldElement> = Vec::new();
+    let mut y: Vec<FieldElement> = Vec::new();
+    // A few points more than coefficients show that the degree is not higher.
+    while x.len() < at_most(HIGHEST_DEGREE) + 3 {
+        let t = stream.next_element();
+        y.push(tape.evaluate(&point_on_line(variables, &line, t)?)?[0]);
         x.push(t);
     }
-    (0..=HIGHEST).step_by(2).find(|d| {
-        let cleared: Vec<Element> = (x.iter().zip(&y))
-            .map(|(t, y)| *y * clearing(&variables[k], line[k], *t, *d))
+    (0..=HIGHEST_DEGREE).step_by(2).find(|d| {
+        let cleared: Vec<FieldElement> = (x.iter().zip(&y))
+            .map(|(t, y)| *y * clearing_factor(&variables[k], line[k], *t, *d))
             .collect();
         interpolate(&x, &cleared).len() <= at_most(*d) + 1
     })
 }
 
-/// What clears the denominator that an angle brings into a polynomial of some degree in its cosine and sine.
-fn clearing(
-    variable: &Variable,
-    (from, by): (Element, Element),
-    t: Element,
+/// The factor that removes the denominator of an angle's parametrisation from a polynomial of some degree in its cosine
+/// and sine.
+fn clearing_factor(
+    variable: &RadicandVariable,
+    (from, by): (FieldElement, FieldElement),
+    t: FieldElement,
     degree: usize,
-) -> Element {
+) -> FieldElement {
     if !variable.is_angle {
-        return Element::ONE;
+        return FieldElement::ONE;
     }
     let x = from + t * by;
-    (Element::ONE + x * x).power(degree as u64)
+    (FieldElement::ONE + x * x).power(degree as u64)
 }
 
-/// All monomials of the root; `None` if they are too many.
-fn monomials(variables: &[Variable]) -> Option<Vec<Powers>> {
-    let mut all: Vec<Powers> = vec![Vec::new()];
+/// All monomials of the root; `None` if there are more than [`MOST_TERMS`].
+fn root_monomials(variables: &[RadicandVariable]) -> Option<Vec<RadicandMonomial>> {
+    let mut all: Vec<RadicandMonomial> = vec![Vec::new()];
     for variable in variables {
+        // Powers of the variable; for an angle also powers of its cosine times its sine, because sin^2 = 1 - cos^2.
         let mut own: Vec<(usize, usize)> = (0..=variable.degree).map(|n| (n, 0)).collect();
         if variable.is_angle {
             own.extend((1..=variable.degree).map(|n| (n - 1, 1)));
@@ -190,70 +211,72 @@ fn monomials(variables: &[Variable]) -> Option<Vec<Powers>> {
     Some(all)
 }
 
-/// The coefficients of a multiple of the root whose first coefficient is one.
-fn coefficients(
-    tape: &Tape,
-    variables: &[Variable],
-    monomials: &[Powers],
-    stream: &mut Stream,
+/// The coefficients of the multiple of the root whose first coefficient that is not zero is 1.
+fn root_coefficients(
+    tape: &EvaluationTape,
+    variables: &[RadicandVariable],
+    monomials: &[RadicandMonomial],
+    stream: &mut RandomStream,
 ) -> Option<Vec<Rational>> {
-    /// Rows beyond those that settle the coefficients: a wrong one would be seen.
+    /// Number of rows in addition to the coefficients: they detect a wrong solution.
     const MORE: usize = 8;
-    let start: Vec<Element> = variables.iter().map(|_| stream.element()).collect();
-    let mut rows: Vec<Vec<Element>> = Vec::new();
+    let start: Vec<FieldElement> = variables.iter().map(|_| stream.next_element()).collect();
+    let mut rows: Vec<Vec<FieldElement>> = Vec::new();
     while rows.len() < monomials.len() + MORE {
         let line = random_line(variables, Some(&start), stream);
         rows.extend(rows_along(tape, variables, monomials, &line, stream)?);
     }
+    // Unknowns are the coefficients and the scale of the root; the solution must be unique.
     let solutions = null_space(rows, monomials.len() + 1);
     let [solution] = solutions.as_slice() else {
         return None;
     };
     let factors = &solution[..monomials.len()];
-    let first = factors.iter().find(|x| **x != Element::ZERO)?.inverse()?;
+    let first = factors.iter().find(|x| **x != FieldElement::ZERO)?.inverse()?;
     factors
         .iter()
-        .map(|x| lift(&[(MODULUS, (*x * first).representative())]))
+        .map(|x| reconstruct_rational(&[(MODULUS, (*x * first).representative())]))
         .collect()
 }
 
-/// Along a line the monomials and the root over its value at the line's start, at some places.
+/// Rows of the linear system from one line: at several places the values of the monomials, then the negative of the
+/// root divided by its value at the start of the line.
 fn rows_along(
-    tape: &Tape,
-    variables: &[Variable],
-    monomials: &[Powers],
-    line: &Line,
-    stream: &mut Stream,
-) -> Option<Vec<Vec<Element>>> {
+    tape: &EvaluationTape,
+    variables: &[RadicandVariable],
+    monomials: &[RadicandMonomial],
+    line: &VariableLine,
+    stream: &mut RandomStream,
+) -> Option<Vec<Vec<FieldElement>>> {
+    // Degree of the root along the line, after its denominators are removed.
     let half: usize = variables
         .iter()
         .map(|v| if v.is_angle { 2 * v.degree } else { v.degree })
         .sum();
-    let cleared_by = |t: Element, times: usize| {
+    let cleared_by = |t: FieldElement, times: usize| {
         variables
             .iter()
             .zip(line)
-            .map(|(v, l)| clearing(v, *l, t, times * v.degree))
-            .fold(Element::ONE, |product, x| product * x)
+            .map(|(v, l)| clearing_factor(v, *l, t, times * v.degree))
+            .fold(FieldElement::ONE, |product, x| product * x)
     };
-    let places: Vec<Element> = (0..=2 * half).map(|_| stream.element()).collect();
-    let values: Option<Vec<Element>> = places
+    // The radicand along the line as a polynomial, from enough values.
+    let places: Vec<FieldElement> = (0..=2 * half).map(|_| stream.next_element()).collect();
+    let values: Option<Vec<FieldElement>> = places
         .iter()
-        .map(|t| Some(tape.evaluate(&at(variables, line, *t)?)?[0] * cleared_by(*t, 2)))
+        .map(|t| Some(tape.evaluate(&point_on_line(variables, line, *t)?)?[0] * cleared_by(*t, 2)))
         .collect();
     let square = interpolate(&places, &values?);
     let root = series_root(&square, half + 1)?;
-    let at_start = cleared_by(Element::ZERO, 1);
+    let at_start = cleared_by(FieldElement::ZERO, 1);
     let rows = places[..=half].iter().map(|t| {
-        let point = at(variables, line, *t)?;
-        let value = root
-            .iter()
-            .rev()
-            .fold(Element::ZERO, |sum, c| sum * *t + *c);
+        let point = point_on_line(variables, line, *t)?;
+        // Horner's scheme.
+        let value = root.iter().rev().fold(FieldElement::ZERO, |sum, c| sum * *t + *c);
         let value = value * at_start * cleared_by(*t, 1).inverse()?;
-        let mut row: Vec<Element> = monomials
+        let mut row: Vec<FieldElement> = monomials
             .iter()
-            .map(|powers| monomial(variables, powers, &point))
+            .map(|powers| monomial_value(variables, powers, &point))
             .collect();
         row.push(-value);
         Some(row)
@@ -261,21 +284,23 @@ fn rows_along(
     rows.collect()
 }
 
-/// The first `n` coefficients of the root of a polynomial over its value at zero.
-fn series_root(square: &[Element], n: usize) -> Option<Vec<Element>> {
+/// The first `n` coefficients of the root of a polynomial, divided by the root's value at zero.
+fn series_root(square: &[FieldElement], n: usize) -> Option<Vec<FieldElement>> {
     let inverse = square.first()?.inverse()?;
-    let half = (Element::ONE + Element::ONE).inverse()?;
-    let mut root = vec![Element::ONE];
+    let half = (FieldElement::ONE + FieldElement::ONE).inverse()?;
+    let mut root = vec![FieldElement::ONE];
+    // Coefficient k of the square of the series has twice the new coefficient and products of known ones.
     for k in 1..n {
-        let whole = square.get(k).map_or(Element::ZERO, |c| *c * inverse);
-        let known = (1..k).fold(Element::ZERO, |sum, i| sum + root[i] * root[k - i]);
+        let whole = square.get(k).map_or(FieldElement::ZERO, |c| *c * inverse);
+        let known = (1..k).fold(FieldElement::ZERO, |sum, i| sum + root[i] * root[k - i]);
         root.push((whole - known) * half);
     }
     Some(root)
 }
 
-fn monomial(variables: &[Variable], powers: &Powers, point: &FieldPoint) -> Element {
-    let factor = |(variable, (n, m)): (&Variable, &(usize, usize))| {
+/// The value of a monomial at a point of the field.
+fn monomial_value(variables: &[RadicandVariable], powers: &RadicandMonomial, point: &FieldPoint) -> FieldElement {
+    let factor = |(variable, (n, m)): (&RadicandVariable, &(usize, usize))| {
         if variable.is_angle {
             let (c, s) = point.angles[&variable.atom];
             c.power(*n as u64) * s.power(*m as u64)
@@ -284,14 +309,14 @@ fn monomial(variables: &[Variable], powers: &Powers, point: &FieldPoint) -> Elem
         }
     };
     let all = variables.iter().zip(powers).map(factor);
-    all.fold(Element::ONE, |product, x| product * x)
+    all.fold(FieldElement::ONE, |product, x| product * x)
 }
 
-/// The polynomial as an expression.
-fn written(
+/// The polynomial as an expression of the graph.
+fn polynomial_expression(
     graph: &mut Graph,
-    variables: &[Variable],
-    monomials: &[Powers],
+    variables: &[RadicandVariable],
+    monomials: &[RadicandMonomial],
     factors: &[Rational],
 ) -> ExprId {
     let mut terms = Vec::new();
@@ -302,7 +327,7 @@ fn written(
         let mut product = Vec::new();
         for (variable, (n, m)) in variables.iter().zip(powers) {
             if variable.is_angle {
-                let angle = crate::expr::AngleSum::new([(variable.atom, 1)]);
+                let angle = crate::expr::AtomAngleSum::new([(variable.atom, 1)]);
                 let (c, s) = graph.cos_sin(&angle, 0);
                 product.extend([(c, exponent(*n)), (s, exponent(*m))]);
             } else {
@@ -315,37 +340,39 @@ fn written(
     graph.sum(&terms)
 }
 
+/// A degree as an exponent of the graph.
 fn exponent(n: usize) -> i32 {
     i32::try_from(n).expect("degrees are small")
 }
 
-/// The rational number that one expression is of another, if it is one: shown at a few points.
+/// The constant rational ratio of two expressions, if it is constant; tested at a few points.
 fn constant_ratio(
     graph: &Graph,
-    variables: &[Variable],
+    variables: &[RadicandVariable],
     of: ExprId,
     to: ExprId,
-    stream: &mut Stream,
+    stream: &mut RandomStream,
 ) -> Option<Rational> {
-    let tape = Tape::new(graph, &[of, to]);
-    let mut draw = || -> Option<Element> {
+    let tape = EvaluationTape::new(graph, &[of, to]);
+    let mut draw = || -> Option<FieldElement> {
         let line = random_line(variables, None, stream);
-        let values = tape.evaluate(&at(variables, &line, Element::ZERO)?)?;
+        let values = tape.evaluate(&point_on_line(variables, &line, FieldElement::ZERO)?)?;
         Some(values[0] * values[1].inverse()?)
     };
+    // The ratio must be the same at all points.
     let ratio = draw()?;
     for _ in 0..3 {
         if draw()? != ratio {
             return None;
         }
     }
-    lift(&[(MODULUS, ratio.representative())])
+    reconstruct_rational(&[(MODULUS, ratio.representative())])
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::expr::AngleSum;
+    use crate::expr::AtomAngleSum;
 
     /// Squares of what `make` makes of a graph are found back, with either sign.
     #[track_caller]
@@ -355,13 +382,13 @@ mod tests {
         let square = graph.mul(root, root);
         let found = exact_root(&mut graph, square).expect("a root");
         let again = graph.mul(found, found);
-        let tape = Tape::new(&graph, &[square, again]);
-        let mut stream = Stream::new(1);
+        let tape = EvaluationTape::new(&graph, &[square, again]);
+        let mut stream = RandomStream::new(1);
         for _ in 0..5 {
-            let mut point = FieldPoint::<Element>::default();
+            let mut point = FieldPoint::<FieldElement>::default();
             for atom in graph.atoms(&[square]) {
-                point.values.insert(atom, stream.element());
-                point.angles.insert(atom, stream.circle());
+                point.values.insert(atom, stream.next_element());
+                point.angles.insert(atom, stream.next_circle_point());
             }
             let values = tape.evaluate(&point).unwrap();
             assert_eq!(values[0], values[1]);
@@ -372,7 +399,7 @@ mod tests {
     }
 
     fn circle(graph: &mut Graph, i: usize) -> (ExprId, ExprId) {
-        graph.cos_sin(&AngleSum::new([(Atom::Coordinate(i), 1)]), 0)
+        graph.cos_sin(&AtomAngleSum::new([(Atom::Coordinate(i), 1)]), 0)
     }
 
     #[test]
@@ -396,7 +423,7 @@ mod tests {
             let three = graph.integer(3);
             let root = graph.unary(Unary::Sqrt, three);
             let (x, y) = (graph.mul(length, c), graph.mul(length, s));
-            let sum = graph.combine([(x, Rational::new(2, 3)), (y, Rational::integer(-5))]);
+            let sum = graph.linear_combination([(x, Rational::new(2, 3)), (y, Rational::integer(-5))]);
             let sum = graph.add(sum, length);
             graph.mul(root, sum)
         });

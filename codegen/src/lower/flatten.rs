@@ -1,66 +1,75 @@
-//! Opens nested sums and products that are used only once, so that the passes behind see them whole.
+//! Flattens nested sums and products that are used only once, so that the following passes see all their operands.
 
 use rustc_hash::FxHashMap;
 
 use super::schedule::fixed_nodes;
 use crate::expr::{ExprId, Graph, Node};
 
-/// How often each node is used by `roots` and each other.
+/// Number of uses of each node by `roots` and by nodes that these need.
 pub(crate) fn use_counts(graph: &Graph, roots: &[ExprId]) -> Vec<usize> {
+    // Roots count as uses.
     let mut uses = vec![0; graph.len()];
     for root in roots {
         uses[root.index()] += 1;
     }
     for (i, needed) in graph.reachable(roots).into_iter().enumerate() {
         if needed {
-            graph.for_each_child(
-                ExprId(u32::try_from(i).expect("graph below 4G nodes")),
-                |child| {
-                    uses[child.index()] += 1;
-                },
-            );
+            graph.for_each_child(ExprId(u32::try_from(i).expect("graph below 4G nodes")), |child| {
+                uses[child.index()] += 1;
+            });
         }
     }
     uses
 }
 
-/// Rewrites every node bottom-up.
+/// Rewrites every needed node, operands first. `rule` gets a node with rewritten operands and returns its replacement.
 pub(crate) fn rewrite(
     graph: &mut Graph,
     roots: &[ExprId],
+    rule: impl FnMut(&mut Graph, ExprId, Node) -> ExprId,
+) -> Vec<ExprId> {
+    rewrite_affected(graph, roots, |_| true, rule)
+}
+
+/// Rewrites bottom-up the nodes that are affected and those above them; all others stay as they are.
+pub(crate) fn rewrite_affected(
+    graph: &mut Graph,
+    roots: &[ExprId],
+    is_affected: impl Fn(&Node) -> bool,
     mut rule: impl FnMut(&mut Graph, ExprId, Node) -> ExprId,
 ) -> Vec<ExprId> {
     let mut new: Vec<Option<ExprId>> = vec![None; graph.len()];
-    let rewritten =
-        |new: &[Option<ExprId>], id: ExprId| new[id.index()].expect("children come first");
+    let rewritten = |new: &[Option<ExprId>], id: ExprId| new[id.index()].expect("children come first");
     for (i, needed) in graph.reachable(roots).into_iter().enumerate() {
         if !needed {
             continue;
         }
         let id = ExprId(u32::try_from(i).expect("graph below 4G nodes"));
+        let mut is_same = !is_affected(graph.node(id));
+        if is_same {
+            graph.for_each_child(id, |child| is_same &= new[child.index()] == Some(child));
+        }
+        if is_same {
+            new[i] = Some(id);
+            continue;
+        }
+        // The node with its operands replaced.
         let node = match graph.node(id).clone() {
-            Node::Sum(terms) => Node::Sum(
-                terms
-                    .into_iter()
-                    .map(|(c, k)| (rewritten(&new, c), k))
-                    .collect(),
-            ),
-            Node::Product(factors) => Node::Product(
-                factors
-                    .into_iter()
-                    .map(|(c, n)| (rewritten(&new, c), n))
-                    .collect(),
-            ),
+            Node::Sum(terms) => Node::Sum(terms.into_iter().map(|(c, k)| (rewritten(&new, c), k)).collect()),
+            Node::Product(factors) => {
+                Node::Product(factors.into_iter().map(|(c, n)| (rewritten(&new, c), n)).collect())
+            }
             Node::Unary(f, c) => Node::Unary(f, rewritten(&new, c)),
             leaf => leaf,
         };
+        // The rule may replace the node by anything of equal value.
         let value = rule(graph, id, node);
         new[i] = Some(value);
     }
     roots.iter().map(|root| rewritten(&new, *root)).collect()
 }
 
-/// Builds a node through the smart constructors.
+/// Builds a node by the constructors that simplify; `id` is the node itself if it has no operands.
 pub(crate) fn rebuild(graph: &mut Graph, id: ExprId, node: &Node) -> ExprId {
     match node {
         Node::Sum(terms) => graph.sum(terms),
@@ -70,18 +79,19 @@ pub(crate) fn rebuild(graph: &mut Graph, id: ExprId, node: &Node) -> ExprId {
     }
 }
 
-/// Opens what is used once.
+/// Merges sums into sums and products into products where the inner one is used once. Fixed nodes stay as they are.
 pub(crate) fn flatten(graph: &mut Graph, roots: &[ExprId]) -> Vec<ExprId> {
     let uses = use_counts(graph, roots);
     let fixed = fixed_nodes(graph, roots);
-    // The rule sees rewritten operands; how often they were used is known by what they came from.
+    // The rule sees rewritten operands; whether they are used once is known of the nodes that they came from.
     let mut once: FxHashMap<ExprId, bool> = FxHashMap::default();
     rewrite(graph, roots, |graph, id, node| {
-        let open = |graph: &Graph, child: ExprId| {
-            once.get(&child).copied().unwrap_or(false) && graph.node(child).is_open()
-        };
+        // Whether an operand may be merged into its user.
+        let open =
+            |graph: &Graph, child: ExprId| once.get(&child).copied().unwrap_or(false) && graph.node(child).is_open();
         let value = match &node {
             Node::Sum(terms) => {
+                // The factor of an inner sum is multiplied into its terms.
                 let mut flat = Vec::new();
                 for (child, k) in terms {
                     let (base, inner_k) = graph.split_factor(*child);
@@ -96,6 +106,7 @@ pub(crate) fn flatten(graph: &mut Graph, roots: &[ExprId]) -> Vec<ExprId> {
                 graph.sum(&flat)
             }
             Node::Product(factors) => {
+                // The exponent of an inner product is multiplied into those of its factors.
                 let mut flat = Vec::new();
                 for (child, n) in factors {
                     match graph.node(*child) {
@@ -110,10 +121,8 @@ pub(crate) fn flatten(graph: &mut Graph, roots: &[ExprId]) -> Vec<ExprId> {
             _ => rebuild(graph, id, &node),
         };
         let single = uses[id.index()] == 1 && !fixed.get(id.index()).copied().unwrap_or(false);
-        // A value that several nodes became is used more than once.
-        once.entry(value)
-            .and_modify(|o| *o = false)
-            .or_insert(single);
+        // A value that replaces several nodes is used more than once.
+        once.entry(value).and_modify(|o| *o = false).or_insert(single);
         value
     })
 }

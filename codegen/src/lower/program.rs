@@ -1,4 +1,4 @@
-//! Straight-line programs: what emission writes as Rust and the block evaluator runs.
+//! Straight-line programs: the form that emission prints and the block evaluator runs.
 
 use std::fmt;
 
@@ -7,20 +7,25 @@ use serde::Serialize;
 
 use crate::expr::{Atom, Rational, Unary};
 
-/// Index of a value: the operation that makes it.
+/// Index of a value: that of the operation that computes it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct ValueId(pub(crate) u32);
+pub struct ValueId(u32);
 
 impl ValueId {
-    /// Position of its operation in [`Program::ops`].
+    /// The value of the operation at a position.
+    pub fn from_index(index: usize) -> Self {
+        Self(u32::try_from(index).expect("programs below 4G operations"))
+    }
+
+    /// Position of its operation in [`StraightLineProgram::ops`].
     pub fn index(self) -> usize {
         self.0 as usize
     }
 }
 
-/// One operation; operands stand before it.
+/// One operation; its operands come before it in the program.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
-pub enum Op {
+pub enum ProgramOp {
     /// A number.
     Number(Rational),
     /// An input.
@@ -37,7 +42,7 @@ pub enum Op {
     Neg(ValueId),
     /// A function of one argument.
     Unary(Unary, ValueId),
-    /// Sine; its cosine usually stands beside it.
+    /// Sine; the cosine of the same angle is usually the operation before.
     Sin(ValueId),
     /// Cosine.
     Cos(ValueId),
@@ -45,9 +50,11 @@ pub enum Op {
     Atan2(ValueId, ValueId),
 }
 
-impl Op {
+impl ProgramOp {
     /// The same operation on other operands.
-    pub(crate) fn map_operands(self, new: impl Fn(ValueId) -> ValueId) -> Self {
+    #[must_use]
+    /// The same operation on the operands that `new` gives.
+    pub fn map_operands(self, new: impl Fn(ValueId) -> ValueId) -> Self {
         match self {
             Self::Number(_) | Self::Input(_) => self,
             Self::Add(a, b) => Self::Add(new(a), new(b)),
@@ -62,15 +69,11 @@ impl Op {
         }
     }
 
-    /// Calls `visit` for every operand.
+    /// Calls `visit` for every operand, in order.
     pub fn for_each_operand(&self, mut visit: impl FnMut(ValueId)) {
         match self {
             Self::Number(_) | Self::Input(_) => {}
-            Self::Add(a, b)
-            | Self::Sub(a, b)
-            | Self::Mul(a, b)
-            | Self::Div(a, b)
-            | Self::Atan2(a, b) => {
+            Self::Add(a, b) | Self::Sub(a, b) | Self::Mul(a, b) | Self::Div(a, b) | Self::Atan2(a, b) => {
                 visit(*a);
                 visit(*b);
             }
@@ -81,28 +84,29 @@ impl Op {
 
 /// When a value can be computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Stage {
+pub enum ProgramStage {
     /// Once for a geometry and a set of parameters.
     Fixed,
     /// At every state.
     State,
 }
 
-/// A determinant this much smaller than the magnitude of its terms counts as zero.
-pub(crate) const SINGULAR: f64 = 1e-9;
+/// A determinant below this part of the magnitude of its terms counts as zero.
+pub const SINGULAR: f64 = 1e-9;
 
-/// What must hold at a pose for the model to have an answer.
+/// A condition that a pose must satisfy for the model to have a solution.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Guard {
+pub enum PoseGuard {
     /// The value must not be negative: otherwise the loops cannot close.
     Reachable(ValueId),
-    /// The magnitude of the value must stay above 1e-9 of the second one, the magnitude of its terms, which is fixed: otherwise the pose is singular.
+    /// The magnitude of the value must stay above 1e-9 of the second one, the fixed magnitude of its terms: otherwise
+    /// the pose is singular.
     Regular(ValueId, ValueId),
-    /// The value must be a finite number: a term of the model may have none.
+    /// The value must be finite: otherwise a term of the model is undefined.
     Finite(ValueId),
 }
 
-impl Guard {
+impl PoseGuard {
     /// The guarded value.
     pub fn value(self) -> ValueId {
         match self {
@@ -110,21 +114,21 @@ impl Guard {
         }
     }
 
-    /// What it is held against, if that is a value of the program.
-    pub fn size(self) -> Option<ValueId> {
+    /// The value to compare with, if there is one.
+    pub fn reference_size(self) -> Option<ValueId> {
         match self {
             Self::Regular(_, size) => Some(size),
             Self::Reachable(_) | Self::Finite(_) => None,
         }
     }
 
-    /// Both, for each that there is.
+    /// The guarded value and the value to compare with, if there is one.
     pub fn values(self) -> impl Iterator<Item = ValueId> {
-        std::iter::once(self.value()).chain(self.size())
+        std::iter::once(self.value()).chain(self.reference_size())
     }
 
-    /// Whether a value passes beside its size; what is not a number never does.
-    pub fn passes(self, value: f64, size: f64) -> bool {
+    /// Whether the condition is satisfied; `size` is the value to compare with. NaN never satisfies it.
+    pub fn is_satisfied(self, value: f64, size: f64) -> bool {
         match self {
             Self::Reachable(_) => value >= 0.0,
             Self::Regular(..) => value.abs() > SINGULAR * size,
@@ -133,29 +137,31 @@ impl Guard {
     }
 }
 
-/// A straight-line program with several outputs.
+/// A program without branches and loops, with several outputs and conditions on the pose.
 #[derive(Clone, Debug, Default)]
-pub struct Program {
-    /// Operations in order.
-    pub ops: Vec<Op>,
-    /// Stage of each operation.
-    pub stages: Vec<Stage>,
-    /// Outputs.
+pub struct StraightLineProgram {
+    /// Operations; operands come first.
+    pub ops: Vec<ProgramOp>,
+    /// Stage of each operation, in the order of `ops`.
+    pub stages: Vec<ProgramStage>,
+    /// Values that are returned, in the order of the program's documentation.
     pub outputs: Vec<ValueId>,
-    /// What must hold at a pose.
-    pub guards: Vec<Guard>,
+    /// Conditions on the pose, in the order in which faults are reported.
+    pub guards: Vec<PoseGuard>,
 }
 
-impl Program {
-    /// Which operations some outputs and the guards need.
-    pub(crate) fn needed(&self, wanted: &dyn Fn(usize) -> bool) -> Vec<bool> {
+impl StraightLineProgram {
+    /// Which operations are needed by the guards and by those outputs whose index is `wanted`.
+    pub(crate) fn needed_operations(&self, wanted: &dyn Fn(usize) -> bool) -> Vec<bool> {
         let mut needed = vec![false; self.ops.len()];
+        // Outputs that are wanted, and all guards.
         let outputs = self.outputs.iter().enumerate();
         let outputs = outputs.filter(|(k, _)| wanted(*k)).map(|(_, value)| *value);
         let guards = self.guards.iter().flat_map(|guard| guard.values());
         for value in outputs.chain(guards) {
             needed[value.index()] = true;
         }
+        // Backwards, so that the users of an operation are known before it.
         for (i, op) in self.ops.iter().enumerate().rev() {
             if needed[i] {
                 op.for_each_operand(|v| needed[v.index()] = true);
@@ -165,7 +171,7 @@ impl Program {
     }
 }
 
-/// Operations per call. Negations, and what is computed once per geometry, are not counted.
+/// Operations per call. Changes of sign and precomputed values are not counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(any(test, feature = "json"), derive(Serialize))]
 pub struct OperationCount {
@@ -179,20 +185,19 @@ pub struct OperationCount {
     pub sqrt: usize,
     /// Pairs of sine and cosine of the same angle, and arc tangents.
     pub sincos: usize,
-    /// Signs, absolute values, exponentials.
+    /// Signs, absolute values, exponentials, hyperbolic tangents.
     #[cfg_attr(any(test, feature = "json"), serde(skip_serializing_if = "is_zero"))]
     pub other: usize,
 }
 
+/// Tells serde to leave out a count of zero.
 #[cfg(any(test, feature = "json"))]
-#[expect(
-    clippy::trivially_copy_pass_by_ref,
-    reason = "serde asks for a reference"
-)]
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde requires a reference")]
 fn is_zero(n: &usize) -> bool {
     *n == 0
 }
 
+/// A list such as `12 additions, 9 multiplications, 1 division`; rare operations only if there are any.
 impl fmt::Display for OperationCount {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} additions, {} multiplications", self.add, self.mul)?;
@@ -212,9 +217,11 @@ impl fmt::Display for OperationCount {
     }
 }
 
-impl Program {
+impl StraightLineProgram {
     /// The same program without the operations that no output and no guard needs.
-    pub(crate) fn without_dead_code(self) -> Self {
+    #[must_use]
+    /// The same program without operations that no output and no guard needs.
+    pub fn without_dead_code(self) -> Self {
         let mut needed = vec![false; self.ops.len()];
         for value in self
             .outputs
@@ -229,73 +236,75 @@ impl Program {
                 self.ops[i].for_each_operand(|operand| needed[operand.index()] = true);
             }
         }
+        // The order of the remaining operations does not change.
         let kept: Vec<usize> = (0..self.ops.len()).filter(|i| needed[*i]).collect();
-        self.in_order(&kept)
+        self.reorder(&kept)
     }
 
-    /// The same program with its first `n` outputs alone.
+    /// The same program with only its first `n` outputs. Conditions that other outputs are finite are removed.
     pub(crate) fn with_outputs(mut self, n: usize) -> Self {
         self.outputs.truncate(n);
         let outputs = &self.outputs;
         self.guards
-            .retain(|guard| !matches!(guard, Guard::Finite(v) if !outputs.contains(v)));
+            .retain(|guard| !matches!(guard, PoseGuard::Finite(v) if !outputs.contains(v)));
         self.without_dead_code()
     }
 
     /// The same program with the operations that `order` names, in that order; operands stand before what needs them.
-    pub(crate) fn in_order(&self, order: &[usize]) -> Self {
+    #[must_use]
+    /// The same program with the operations of `order`, in that order; operands must come before their users.
+    pub fn reorder(&self, order: &[usize]) -> Self {
+        // Position of each old value in the new program.
         let mut places: Vec<Option<ValueId>> = vec![None; self.ops.len()];
         let mut ordered = Self::default();
         for i in order {
-            let op = self.ops[*i].clone().map_operands(|operand| {
-                places[operand.index()].expect("operands stand before what needs them")
-            });
+            let op = self.ops[*i]
+                .clone()
+                .map_operands(|operand| places[operand.index()].expect("operands stand before what needs them"));
             let place = ordered.ops.len();
-            places[*i] = Some(ValueId(
-                u32::try_from(place).expect("program below 4G operations"),
-            ));
+            places[*i] = Some(ValueId::from_index(place));
             ordered.ops.push(op);
             ordered.stages.push(self.stages[*i]);
         }
-        let new = |value: &ValueId| {
-            places[value.index()].expect("outputs and guarded values are in the order")
-        };
+        // Outputs and guards refer to the new positions.
+        let new = |value: &ValueId| places[value.index()].expect("outputs and guarded values are in the order");
         ordered.outputs = self.outputs.iter().map(new).collect();
         ordered.guards = self
             .guards
             .iter()
             .map(|guard| match guard {
-                Guard::Reachable(v) => Guard::Reachable(new(v)),
-                Guard::Regular(v, size) => Guard::Regular(new(v), new(size)),
-                Guard::Finite(v) => Guard::Finite(new(v)),
+                PoseGuard::Reachable(v) => PoseGuard::Reachable(new(v)),
+                PoseGuard::Regular(v, size) => PoseGuard::Regular(new(v), new(size)),
+                PoseGuard::Finite(v) => PoseGuard::Finite(new(v)),
             })
             .collect();
         ordered
     }
 
-    /// Estimated cost per state in additions: multiplications cost the same, the slow operations more.
+    /// Estimated cost per state in additions: a multiplication costs 1, a division or root 6, any other function 20.
     pub fn weight(&self) -> usize {
-        let count = self.count(Stage::State);
+        let count = self.count_operations(ProgramStage::State);
         count.add + count.mul + 6 * (count.div + count.sqrt) + 20 * (count.sincos + count.other)
     }
 
-    /// Counts the operations of one stage.
-    pub fn count(&self, stage: Stage) -> OperationCount {
+    /// Counts the operations of one stage; sine and cosine of the same angle count as one.
+    pub fn count_operations(&self, stage: ProgramStage) -> OperationCount {
         let mut count = OperationCount::default();
+        // Angles whose sine or cosine is computed, each counted once.
         let mut angles = std::collections::BTreeSet::new();
         for (op, s) in self.ops.iter().zip(&self.stages) {
             if *s != stage {
                 continue;
             }
             match op {
-                Op::Add(..) | Op::Sub(..) => count.add += 1,
-                Op::Mul(..) => count.mul += 1,
-                Op::Div(..) => count.div += 1,
-                Op::Unary(Unary::Sqrt, _) => count.sqrt += 1,
-                Op::Sin(a) | Op::Cos(a) => _ = angles.insert(*a),
-                Op::Atan2(..) => count.sincos += 1,
-                Op::Unary(..) => count.other += 1,
-                Op::Number(_) | Op::Input(_) | Op::Neg(_) => {}
+                ProgramOp::Add(..) | ProgramOp::Sub(..) => count.add += 1,
+                ProgramOp::Mul(..) => count.mul += 1,
+                ProgramOp::Div(..) => count.div += 1,
+                ProgramOp::Unary(Unary::Sqrt, _) => count.sqrt += 1,
+                ProgramOp::Sin(a) | ProgramOp::Cos(a) => _ = angles.insert(*a),
+                ProgramOp::Atan2(..) => count.sincos += 1,
+                ProgramOp::Unary(..) => count.other += 1,
+                ProgramOp::Number(_) | ProgramOp::Input(_) | ProgramOp::Neg(_) => {}
             }
         }
         count.sincos += angles.len();

@@ -1,28 +1,34 @@
-//! Inertia of the tree as its joints feel it: composite bodies (Walker and Orin 1982).
+//! Inertia of the tree as seen from its joints: composite bodies (Walker and Orin 1982).
 //!
-//! All links below a joint, held as they stand, are one body. The wrench that accelerates it about or along that joint
-//! alone, read off at the joints above, gives a column of the mass matrix; what lies below follows by symmetry.
+//! All links below a joint, with all other joints fixed, are one body. The wrench that accelerates it about or along
+//! that joint alone, evaluated at the joints above, gives a column of the mass matrix. The rest of the matrix is
+//! determined by symmetry.
 //!
-//! Decision: the mass matrix is not found by differentiation. Composite bodies need far fewer operations than one
+//! Decision: the mass matrix is not derived by differentiation. Composite bodies need far fewer operations than one
 //! recursion per acceleration: 356 for the Panda arm, whose recursion alone takes 549.
 
 use modelmill_spec::{CoordinateIdx, FreeBody, TwistAxes};
 
-use super::{Body, Depths, Side, Spread, Style, Wrench, carry};
-use crate::expr::vector::{self, Turn, Vector};
+use super::{BodyInertia, CarryDepths, InertiaDiagonal, JointSide, RecursionStyle, SymbolicWrench, carry_wrench};
+use crate::expr::vector::{self, AxisRotation, SymbolicVector};
 use crate::expr::{ExprId, Graph, Rational};
-use crate::tree::{Link, Tree, free};
+use crate::tree::{KinematicTree, TreeLink, free};
 
 /// Mass, first moment and second moments of mass (xx, yy, zz; yz, xz, xy) about the origin of a frame.
 #[derive(Clone, Copy)]
-struct Moments {
+struct CompositeInertia {
+    /// Mass, kg.
     mass: ExprId,
-    first: Vector,
-    square: Vector,
-    mixed: Vector,
+    /// First moment, kg m.
+    first: SymbolicVector,
+    /// Second moments xx, yy and zz, kg m^2.
+    square: SymbolicVector,
+    /// Second moments yz, xz and xy, kg m^2.
+    mixed: SymbolicVector,
 }
 
-impl Moments {
+impl CompositeInertia {
+    /// No inertia.
     const NONE: Self = Self {
         mass: Graph::ZERO,
         first: vector::ZERO,
@@ -30,13 +36,16 @@ impl Moments {
         mixed: vector::ZERO,
     };
 
-    fn from_body(graph: &mut Graph, body: &Body) -> Self {
+    /// The second moments of a body, from moments of inertia where it has those.
+    fn from_body(graph: &mut Graph, body: &BodyInertia) -> Self {
         let square = match body.spread {
-            Spread::Flat([x, y]) => [x, y, Graph::ZERO],
-            Spread::Moments(moments) => std::array::from_fn(|i| {
+            InertiaDiagonal::Flat([x, y]) => [x, y, Graph::ZERO],
+            // The moment about an axis is the sum of the two other second moments, so each of those is half a
+            // combination of all.
+            InertiaDiagonal::Moments(moments) => std::array::from_fn(|i| {
                 let half = Rational::new(1, 2);
                 let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-                graph.combine([
+                graph.linear_combination([
                     (moments[j], half.clone()),
                     (moments[k], half.clone()),
                     (moments[i], -&half),
@@ -47,11 +56,12 @@ impl Moments {
             mass: body.mass,
             first: body.moment_moment,
             square,
-            // Products of inertia are second moments with the sign changed.
+            // Products of inertia are second moments with the opposite sign.
             mixed: body.products.map(|p| graph.neg(p)),
         }
     }
 
+    /// The sum of two inertias about the same origin and in the same axes.
     fn plus(&self, graph: &mut Graph, other: &Self) -> Self {
         Self {
             mass: graph.add(self.mass, other.mass),
@@ -61,8 +71,8 @@ impl Moments {
         }
     }
 
-    /// About a point from which the present one is at `arm`.
-    fn moved(&self, graph: &mut Graph, arm: &Vector) -> Self {
+    /// The inertia about another origin, from which the present origin is at `arm`, m.
+    fn shift_origin(&self, graph: &mut Graph, arm: &SymbolicVector) -> Self {
         let mut moved = *self;
         for i in 0..3 {
             let (j, k) = ((i + 1) % 3, (i + 2) % 3);
@@ -80,24 +90,26 @@ impl Moments {
         moved
     }
 
-    /// In the frame in which the present one is turned.
-    fn turned(&self, graph: &mut Graph, turn: &Turn) -> Self {
+    /// The inertia in the axes from which the present axes are rotated by `turn`.
+    fn rotate(&self, graph: &mut Graph, turn: &AxisRotation) -> Self {
+        // The other two axes, in cyclic order.
         let axis = turn.axis as usize;
         let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
         let (c, s) = graph.cos_sin(&turn.sum, turn.pi12);
         let mut turned = *self;
-        turned.first = graph.turn_out(turn, &self.first);
-        // The mixed moments with the axis turn as a vector: mixed[j] belongs to axis and i, mixed[i] to axis and j.
+        turned.first = graph.rotate_out(turn, &self.first);
+        // The mixed moments with the axis rotate as a vector: mixed[j] belongs to axis and i, mixed[i] to axis and j.
         let mut beside = vector::ZERO;
         (beside[i], beside[j]) = (self.mixed[j], self.mixed[i]);
-        let beside = graph.turn_out(turn, &beside);
+        let beside = graph.rotate_out(turn, &beside);
         (turned.mixed[j], turned.mixed[i]) = (beside[i], beside[j]);
-        // The others turn by twice the angle about their mean.
+        // The others rotate by twice the angle about their mean.
         let half = Rational::new(1, 2);
         let (x, y) = (self.square[i], self.square[j]);
-        let mean = graph.combine([(x, half.clone()), (y, half.clone())]);
-        let apart = graph.combine([(x, half.clone()), (y, -&half)]);
+        let mean = graph.linear_combination([(x, half.clone()), (y, half.clone())]);
+        let apart = graph.linear_combination([(x, half.clone()), (y, -&half)]);
         let mixed = self.mixed[axis];
+        // A constant angle has exact values for twice the angle.
         let (cosine, sine) = if turn.sum.is_empty() {
             graph.cos_sin(&turn.sum, 2 * turn.pi12)
         } else {
@@ -105,13 +117,7 @@ impl Moments {
             let (ss, sine) = (graph.mul(twice, s), graph.mul(twice, c));
             (graph.sub(Graph::ONE, ss), sine)
         };
-        let products = [
-            (cosine, apart),
-            (sine, mixed),
-            (sine, apart),
-            (cosine, mixed),
-        ]
-        .map(|(a, b)| graph.mul(a, b));
+        let products = [(cosine, apart), (sine, mixed), (sine, apart), (cosine, mixed)].map(|(a, b)| graph.mul(a, b));
         let apart = graph.sub(products[0], products[1]);
         turned.mixed[axis] = graph.add(products[2], products[3]);
         turned.square[i] = graph.add(mean, apart);
@@ -119,52 +125,51 @@ impl Moments {
         turned
     }
 
-    /// What a link carries, as its parent sees it.
-    fn to_parent(self, graph: &mut Graph, style: Style, link: &Link) -> Self {
+    /// The inertia of a link about the origin and in the axes of its parent.
+    fn to_parent(self, graph: &mut Graph, style: RecursionStyle, link: &TreeLink) -> Self {
         let (across, along) = style.split_position(link);
-        let mut moments = self.moved(graph, &[Graph::ZERO, Graph::ZERO, along]);
+        // The link's transformation backwards: offset along the joint's axis, rotations, offset before them.
+        let mut moments = self.shift_origin(graph, &[Graph::ZERO, Graph::ZERO, along]);
         for turn in link.pre.iter().chain([&link.joint]).rev() {
-            moments = moments.turned(graph, turn);
+            moments = moments.rotate(graph, turn);
         }
-        moments.moved(graph, &across)
+        moments.shift_origin(graph, &across)
     }
 
-    /// The wrench that turns the body about z with acceleration 1.
-    fn turning(&self, graph: &mut Graph) -> Wrench {
+    /// The wrench that accelerates the body about z by 1 rad/s^2, at standstill.
+    fn rotation_wrench(&self, graph: &mut Graph) -> SymbolicWrench {
+        // Force: z x first moment. Moment: the column z of the inertia matrix.
         let [x, y, _] = self.first;
         let [yz, xz, _] = self.mixed;
-        Wrench {
+        SymbolicWrench {
             force: [graph.neg(y), x, Graph::ZERO],
-            moment: [
-                graph.neg(xz),
-                graph.neg(yz),
-                graph.add(self.square[0], self.square[1]),
-            ],
+            moment: [graph.neg(xz), graph.neg(yz), graph.add(self.square[0], self.square[1])],
         }
     }
 
-    /// The wrench that slides it along z with acceleration 1.
-    fn sliding(&self, graph: &mut Graph) -> Wrench {
+    /// The wrench that accelerates the body along z by 1 m/s^2, at standstill.
+    fn translation_wrench(&self, graph: &mut Graph) -> SymbolicWrench {
         let [x, y, _] = self.first;
-        Wrench {
+        SymbolicWrench {
             force: [Graph::ZERO, Graph::ZERO, self.mass],
             moment: [y, graph.neg(x), Graph::ZERO],
         }
     }
 }
 
-/// Mass matrix of the open tree by its coordinates, by rows.
+/// Mass matrix of the open tree by its coordinates, by rows; symmetric.
 pub(crate) fn mass_matrix(
     graph: &mut Graph,
-    tree: &Tree,
-    style: Style,
+    tree: &KinematicTree,
+    style: RecursionStyle,
     n_coordinates: usize,
-    bodies: &[(usize, Body)],
+    bodies: &[(usize, BodyInertia)],
 ) -> Vec<Vec<ExprId>> {
     let n = tree.links.len();
-    let mut composite = vec![Moments::NONE; n];
+    // Inertia of every link with all links below it.
+    let mut composite = vec![CompositeInertia::NONE; n];
     for (link, body) in bodies {
-        let moments = Moments::from_body(graph, body);
+        let moments = CompositeInertia::from_body(graph, body);
         composite[*link] = composite[*link].plus(graph, &moments);
     }
     for i in (0..n).rev() {
@@ -173,8 +178,8 @@ pub(crate) fn mass_matrix(
             composite[parent] = composite[parent].plus(graph, &carried);
         }
     }
-    // Every link's turning and sliding as a coordinate of its own: turning first, then sliding; behind them the six motions
-    // of every free body.
+    // Every link's rotation and translation is a coordinate of its own: 2 i for rotation, 2 i + 1 for translation.
+    // After them come the six motions of every free body.
     let mut apart = tree.clone();
     let mut bodies_free = Vec::new();
     for (i, link) in apart.links.iter_mut().enumerate() {
@@ -192,6 +197,7 @@ pub(crate) fn mass_matrix(
             });
         }
     }
+    // The true coordinates of each of these motions, with their factors.
     let motions: Vec<Vec<(usize, Rational)>> = tree
         .links
         .iter()
@@ -201,32 +207,26 @@ pub(crate) fn mass_matrix(
             [turns.collect(), link.slides.clone()]
         })
         .collect();
-    let depths = Depths {
-        moments: 0,
-        forces: 0,
-    };
+    // Wrenches are carried from link to link down to the base.
+    let depths = CarryDepths { moments: 0, forces: 0 };
+    // Terms of every entry, added at the end.
     let mut terms = vec![vec![Vec::new(); n_coordinates]; n_coordinates];
     for (m, coordinates) in motions.iter().enumerate() {
         if coordinates.is_empty() {
             continue;
         }
+        // Motion m of link m / 2: rotation about z if m is even, translation along z if it is odd.
         let moments = composite[m / 2];
         let wrench = if m % 2 == 0 {
-            moments.turning(graph)
+            moments.rotation_wrench(graph)
         } else {
-            moments.sliding(graph)
+            moments.translation_wrench(graph)
         };
-        let wrench = [(m / 2, Side::Moving, wrench)];
-        let column = carry(
-            graph,
-            &apart,
-            style,
-            2 * n + 6 * bodies_free.len(),
-            depths,
-            wrench,
-        );
+        let wrench = [(m / 2, JointSide::Moving, wrench)];
+        let column = carry_wrench(graph, &apart, style, 2 * n + 6 * bodies_free.len(), depths, wrench);
+        // Forces on the free body at the base.
         for ((_, body), on_body) in bodies_free.iter().zip(column[2 * n..].chunks(6)) {
-            for (c, entry) in on_free_body(graph, body, on_body) {
+            for (c, entry) in free_body_forces(graph, body, on_body) {
                 for (d, g) in coordinates {
                     terms[c][*d].push((entry, g.clone()));
                     terms[*d][c].push((entry, g.clone()));
@@ -234,7 +234,7 @@ pub(crate) fn mass_matrix(
             }
         }
         for (k, entry) in column.into_iter().take(2 * n).enumerate() {
-            // A link's turning and sliding see each other from both sides; each pair counts once.
+            // Rotation and translation of one link act on each other; each pair counts once.
             if k / 2 == m / 2 && k > m {
                 continue;
             }
@@ -242,6 +242,7 @@ pub(crate) fn mass_matrix(
                 for (d, g) in coordinates {
                     let factor = f * g;
                     terms[*c][*d].push((entry, factor.clone()));
+                    // The matrix is symmetric.
                     if k != m {
                         terms[*d][*c].push((entry, factor));
                     }
@@ -249,8 +250,9 @@ pub(crate) fn mass_matrix(
             }
         }
     }
+    // Blocks of the free bodies' own motions.
     for (link, body) in &bodies_free {
-        for (c, d, entry) in own_block(graph, body, &composite[*link]) {
+        for (c, d, entry) in free_body_block(graph, body, &composite[*link]) {
             terms[c][d].push((entry, Rational::ONE));
             if c != d {
                 terms[d][c].push((entry, Rational::ONE));
@@ -263,15 +265,15 @@ pub(crate) fn mass_matrix(
         .collect()
 }
 
-/// The coordinates whose rates are a free body's twist.
-fn of_twist(body: &FreeBody) -> [usize; 6] {
+/// The coordinates whose rates are a free body's twist: three of its velocity, three of its angular velocity.
+fn twist_coordinates(body: &FreeBody) -> [usize; 6] {
     let [x, y, z] = body.position;
     let [_, qx, qy, qz] = body.quaternion;
     [x, y, z, qx, qy, qz].map(|i| i.0)
 }
 
-/// Force and moment in a free body's axes by the coordinates on which they act.
-fn on_free_body(
+/// Generalised forces of a free body from force and moment in its axes, each with the coordinate on which it acts.
+fn free_body_forces(
     graph: &mut Graph,
     body: &FreeBody,
     wrench: &[ExprId],
@@ -280,24 +282,25 @@ fn on_free_body(
     let moment = std::array::from_fn(|k| wrench[3 + k]);
     let force = free::from_body(graph, body, body.linear, &force);
     let moment = free::from_body(graph, body, body.angular, &moment);
-    of_twist(body)
-        .into_iter()
-        .zip(force.into_iter().chain(moment))
+    twist_coordinates(body).into_iter().zip(force.into_iter().chain(moment))
 }
 
-/// Entries of the mass matrix by a free body's own motion: those on and above the diagonal.
-fn own_block(graph: &mut Graph, body: &FreeBody, carried: &Moments) -> Vec<(usize, usize, ExprId)> {
-    let twist = of_twist(body);
+/// Entries of the mass matrix by a free body's own motion, on and above the diagonal: row, column and value.
+fn free_body_block(graph: &mut Graph, body: &FreeBody, carried: &CompositeInertia) -> Vec<(usize, usize, ExprId)> {
+    let twist = twist_coordinates(body);
     let mut entries = Vec::new();
     for (k, d) in twist.into_iter().enumerate() {
+        // A unit acceleration along or about one axis of the twist.
         let mut along = vector::ZERO;
         along[k % 3] = Graph::ONE;
         let axes = if k < 3 { body.linear } else { body.angular };
+        // Axes of the twist are those of the body or of the world.
         let along = free::to_body(graph, body, axes, &along);
         let (force, moment) = if k < 3 {
             let force = graph.scale_vector(carried.mass, &along);
             (force, graph.cross(&carried.first, &along))
         } else {
+            // Angular acceleration: the moment is the inertia matrix times the axis.
             let moment = std::array::from_fn(|i| {
                 let (j, l) = ((i + 1) % 3, (i + 2) % 3);
                 let about = graph.add(carried.square[j], carried.square[l]);
@@ -312,7 +315,8 @@ fn own_block(graph: &mut Graph, body: &FreeBody, carried: &Moments) -> Vec<(usiz
             (graph.cross(&along, &carried.first), moment)
         };
         let wrench = [force, moment].concat();
-        let column = on_free_body(graph, body, &wrench);
+        // Entries below the diagonal are determined by symmetry.
+        let column = free_body_forces(graph, body, &wrench);
         entries.extend(column.take(k + 1).map(|(c, entry)| (c, d, entry)));
     }
     entries

@@ -1,30 +1,33 @@
-//! Forces of all joints above a link, read off in the link's own frame: `z_i . (M + (o - c_i) x F)` with the axis of
-//! joint i and a point on it (virtual power). Axes through one point share the moment about it, and axes and points are
+//! Forces of all joints above a link, computed in the link's own frame: `z_i . (M + (o - c_i) x F)` with the axis of
+//! joint i and a point on it (virtual power). Axes through one point share the moment about it. Axes and points are
 //! shared by all wrenches that are projected in the same frame.
 
-use super::rows::{ForceRows, back_along_axis};
-use super::{Style, Wrench, turn_in_all};
-use crate::expr::vector::{self, Vector};
+use super::rows::{ForceRows, moment_before_axis_offset};
+use super::{RecursionStyle, SymbolicWrench, rotate_into_inner};
+use crate::expr::vector::{self, SymbolicVector};
 use crate::expr::{ExprId, Graph};
-use crate::tree::Tree;
+use crate::tree::KinematicTree;
 
-/// Leaves the forces of a wrench at all joints above `at`.
-pub(super) fn project(
+/// Adds the forces of a wrench on link `at` to all joints above it.
+pub(super) fn project_on_joints(
     graph: &mut Graph,
-    tree: &Tree,
-    style: Style,
+    tree: &KinematicTree,
+    style: RecursionStyle,
     at: usize,
-    wrench: &Wrench,
+    wrench: &SymbolicWrench,
     rows: &mut ForceRows,
 ) {
-    let path = tree.path(Some(at));
+    let path = tree.path_to(Some(at));
     let Some((_, above)) = path.split_last() else {
         return;
     };
-    let moment = back_along_axis(graph, style, &tree.links[at], wrench);
-    let points = points(graph, tree, &path);
+    // The moment about the point before the offset along the axis, for which axes and arms are computed.
+    let moment = moment_before_axis_offset(graph, style, &tree.links[at], wrench);
+    let points = axis_points(graph, tree, &path);
+    // From the nearest axes to the base, in groups of axes that meet in one point.
     let mut rest = above;
     while let Some(last) = rest.last() {
+        // Joints whose axes share the point of the nearest one.
         let n = rest
             .iter()
             .rev()
@@ -32,16 +35,18 @@ pub(super) fn project(
             .count();
         let (further, group) = rest.split_at(rest.len() - n);
         rest = further;
+        // A pure moment needs no point.
         let arm = if wrench.has_force() {
-            arm(graph, tree, style, *last, points[*last].along, &path)
+            lever_arm(graph, tree, style, *last, points[*last].along, &path)
         } else {
             vector::ZERO
         };
-        let axes: Vec<Vector> = group
+        // Axes in the frame of the link.
+        let axes: Vec<SymbolicVector> = group
             .iter()
-            .map(|i| direction(graph, tree, style, *i, at))
+            .map(|i| axis_direction(graph, tree, style, *i, at))
             .collect();
-        // One axis alone: the screw's two halves; several: the moment about their point.
+        // Several axes share the moment about their common point. A single axis needs only one component of it.
         let shared = (group.len() > 1).then(|| {
             let lever = graph.cross(&arm, &wrench.force);
             graph.add_vectors(&[moment, lever])
@@ -51,41 +56,44 @@ pub(super) fn project(
             let about = match shared {
                 Some(moment) => graph.dot(axis, &moment),
                 None => {
+                    // Virtual power: velocity of the point of action and angular velocity for a unit rate of the joint.
                     let speed = graph.cross(axis, &arm);
                     let turned = graph.dot(axis, &moment);
                     let moved = graph.dot(&speed, &wrench.force);
                     graph.add(turned, moved)
                 }
             };
+            // The force along the axis, for joints that translate.
             let along = if link.slides.is_empty() {
                 Graph::ZERO
             } else {
                 graph.dot(axis, &wrench.force)
             };
-            rows.leave(link, about, along);
+            rows.add_joint_force(link, about, along);
         }
     }
 }
 
-/// A point on a joint's axis.
+/// A point on a joint's axis, through which other axes may pass.
 #[derive(Clone, Copy)]
-struct Point {
+struct AxisPoint {
     /// Axes with the same number go through the same point.
     group: usize,
-    /// Where it lies on the axis, from the link's origin.
+    /// Its position along the axis, from the link's origin, m.
     along: ExprId,
 }
 
-/// A point for every joint on a path, by link; neighbouring axes that meet share one.
-fn points(graph: &mut Graph, tree: &Tree, path: &[usize]) -> Vec<Point> {
+/// A point for every joint on a path, by link. Neighbouring axes that meet share a point.
+fn axis_points(graph: &mut Graph, tree: &KinematicTree, path: &[usize]) -> Vec<AxisPoint> {
+    // Each axis begins with a point of its own, the origin of its link.
     let mut points = vec![
-        Point {
+        AxisPoint {
             group: 0,
             along: Graph::ZERO
         };
         tree.links.len()
     ];
-    // Whether the point of the group may still be moved along its only axis.
+    // Whether the point of the group may still be moved along its only axis: a second axis fixes it.
     let mut is_free = true;
     for (k, i) in path.iter().enumerate() {
         points[*i].group = k;
@@ -93,11 +101,13 @@ fn points(graph: &mut Graph, tree: &Tree, path: &[usize]) -> Vec<Point> {
         let above = k.checked_sub(1).map(|k| path[k]);
         let meets = above.and_then(|above| {
             let (axis, positive) = link.axis?;
+            // The axes meet if the position between them lies in the plane of both, and at the point of the group.
+            // The position without its component along the joint's axis.
             let mut left = link.position;
             let own = std::mem::replace(&mut left[axis], Graph::ZERO);
             let [x, y, z] = left;
             let fits = is_free || points[above].along == z;
-            // A point must stay on both axes: a slide would take it along.
+            // A point must stay on both axes, but a prismatic joint would move it.
             let slides = !link.slides.is_empty() || !tree.links[above].slides.is_empty();
             let meets = axis != 2 && x == Graph::ZERO && y == Graph::ZERO && fits && !slides;
             meets.then(|| (above, z, if positive { graph.neg(own) } else { own }))
@@ -105,7 +115,7 @@ fn points(graph: &mut Graph, tree: &Tree, path: &[usize]) -> Vec<Point> {
         match meets {
             Some((above, at, along)) => {
                 points[above].along = at;
-                points[*i] = Point {
+                points[*i] = AxisPoint {
                     group: points[above].group,
                     along,
                 };
@@ -117,55 +127,65 @@ fn points(graph: &mut Graph, tree: &Tree, path: &[usize]) -> Vec<Point> {
     points
 }
 
-/// Direction of a joint's axis in the frame of a link below it.
-fn direction(graph: &mut Graph, tree: &Tree, style: Style, joint: usize, at: usize) -> Vector {
+/// Direction of a joint's axis in the frame of a link below it, as a unit vector.
+fn axis_direction(
+    graph: &mut Graph,
+    tree: &KinematicTree,
+    style: RecursionStyle,
+    joint: usize,
+    at: usize,
+) -> SymbolicVector {
     let z = [Graph::ZERO, Graph::ZERO, Graph::ONE];
     if joint == at {
         return z;
     }
-    let first = style.first(tree, at);
+    let first = style.first_rotated_link(tree, at);
     // Parallel axes are the same in the frames of all of them.
-    if style.first(tree, joint) == first {
+    if style.first_rotated_link(tree, joint) == first {
         return z;
     }
     let Some(parent) = tree.links[first].parent else {
         return z;
     };
-    let above = direction(graph, tree, style, joint, parent);
-    let fixed = turn_in_all(graph, &tree.links[first].pre, &above);
-    graph.turn_in(style.turn(&tree.links[at]), &fixed)
+    // The direction in the parent's frame, rotated to this link.
+    let above = axis_direction(graph, tree, style, joint, parent);
+    let fixed = rotate_into_inner(graph, &tree.links[first].pre, &above);
+    graph.rotate_in(style.joint_rotation(&tree.links[at]), &fixed)
 }
 
-/// From a point on the axis of `joint`, given by its place along it, to the point of the last link of `path` that is
-/// reached before its offset along its own axis, in that link's frame.
-fn arm(
+/// Vector from a point on the axis of `joint`, given by its position along it, to the point of the last link of `path`
+/// that is reached before the offset along that link's own axis. In that link's frame, m.
+fn lever_arm(
     graph: &mut Graph,
-    tree: &Tree,
-    style: Style,
+    tree: &KinematicTree,
+    style: RecursionStyle,
     joint: usize,
     along: ExprId,
     path: &[usize],
-) -> Vector {
+) -> SymbolicVector {
     let start = path.iter().position(|i| *i == joint).unwrap_or(0);
-    // On the fixed side of the first of parallel joints; turned on only where these end.
+    // On the fixed side of the first of parallel joints; the rotation is applied only where these end.
     let mut v = [Graph::ZERO, Graph::ZERO, graph.neg(along)];
     let mut above = joint;
     for i in &path[start + 1..] {
         let link = &tree.links[*i];
         let (across, own) = style.split_position(link);
-        let turn = style.turn(&tree.links[above]).clone();
-        if style.first(tree, *i) == *i {
-            v = graph.turn_in(&turn, &v);
+        let turn = style.joint_rotation(&tree.links[above]).clone();
+        // At the end of parallel joints the vector is rotated and the position added in the parent's frame.
+        if style.first_rotated_link(tree, *i) == *i {
+            v = graph.rotate_in(&turn, &v);
             v = graph.add_vectors(&[v, across]);
-            v = turn_in_all(graph, &link.pre, &v);
+            v = rotate_into_inner(graph, &link.pre, &v);
+        // Between parallel joints only the position is rotated.
         } else {
-            let across = graph.turn_out(&turn, &across);
+            let across = graph.rotate_out(&turn, &across);
             v = graph.add_vectors(&[v, across]);
         }
+        // The offset along the last link's own axis is not included.
         if Some(i) != path.last() {
             v[2] = graph.add(v[2], own);
         }
         above = *i;
     }
-    graph.turn_in(style.turn(&tree.links[above]), &v)
+    graph.rotate_in(style.joint_rotation(&tree.links[above]), &v)
 }

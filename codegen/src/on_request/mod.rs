@@ -1,4 +1,5 @@
-//! What is derived only for those who ask: mass matrix and forward dynamics, reactions in joints, counts of operations.
+//! Programs that are derived only on request: equation of motion and forward dynamics, reactions in joints, counts of
+//! operations.
 
 pub(crate) mod dynamics;
 pub(crate) mod passes;

@@ -1,7 +1,7 @@
-//! The forms in which regressor and inverse dynamics can be written, and which of them costs least.
+//! The forms in which regressor and inverse dynamics can be written, and the search for the cheapest one.
 //!
-//! All forms of a model have the same values. What they cost says who calls: for open chains the expressions as they
-//! stand, since lowering finds little in them; for loops the finished programs.
+//! All forms of a model have the same values. The caller states the cost: for open chains that of the expressions,
+//! since lowering saves little there; for loops that of the finished programs.
 //!
 //! Decision: no form is cheapest for all mechanisms, so passes are tried in turn and one stays only where it lowers
 //! the count. All forms agree to 1e-12 on every bundled model (a test), and none subtracts nearly equal numbers
@@ -12,41 +12,43 @@ use modelmill_spec::Mechanism;
 use crate::DeriveError;
 use crate::expr::vector;
 use crate::expr::{ExprId, Graph};
-use crate::newton_euler::{self, Depths, Style};
-use crate::regressor::Equations;
-use crate::regressor::form::{ColumnForm, Frames, TotalForm};
-use crate::tree::Tree;
-use crate::tree::expressions::Monomial;
+use crate::newton_euler::{self, CarryDepths, RecursionStyle};
+use crate::regressor::UnreducedEquations;
+use crate::regressor::form::{ColumnForm, RecursionFrames, TotalForm};
+use crate::tree::KinematicTree;
+use crate::tree::expressions::ParameterMonomial;
 
-/// A change of a form.
-type Change<F> = Box<dyn Fn(F) -> F>;
-/// Families of changes.
-type Pass<F> = Vec<Vec<Change<F>>>;
+/// A change from one form to another.
+type FormChange<F> = Box<dyn Fn(F) -> F>;
+/// Families of changes that a pass tries.
+type ChangeFamilies<F> = Vec<Vec<FormChange<F>>>;
 
-/// What outputs cost.
-pub(crate) type Weigh<'a> = &'a dyn Fn(&mut Graph, &[ExprId]) -> usize;
+/// Cost of outputs, in additions.
+pub(crate) type CostFunction<'a> = &'a dyn Fn(&mut Graph, &[ExprId]) -> usize;
 
-/// Ways to write equations, one step after the other; a step that does not make them cheaper is taken back.
+/// Searches for the cheapest form, pass by pass; a change that does not lower the cost is discarded.
 ///
-/// `write` gives the outputs of a form; `steps` holds for every pass the families of changes that it tries on the
-/// best form before it; the changes of a family go one way, and once they make it worse the rest is not tried.
-fn improve<F: Copy>(
+/// `write` returns the outputs of a form. `steps` has for every pass the families of changes that it applies to the
+/// best form before it. The changes of a family go in one direction, and the rest is skipped once the cost rises.
+fn search_cheapest_form<F: Copy>(
     graph: &mut Graph,
     plain: F,
-    steps: &[Pass<F>],
-    weigh: Weigh<'_>,
+    steps: &[ChangeFamilies<F>],
+    weigh: CostFunction<'_>,
     mut write: impl FnMut(&mut Graph, F) -> Result<Vec<ExprId>, DeriveError>,
 ) -> Result<Vec<ExprId>, DeriveError> {
+    // The best form so far with its outputs and cost.
     let (mut form, mut best) = (plain, write(graph, plain)?);
     let mut least = weigh(graph, &best);
     for pass in steps {
         for family in pass {
+            // All changes of a family apply to the same form.
             let before = form;
             let mut last = usize::MAX;
             for change in family {
                 let changed = change(before);
                 let outputs = write(graph, changed)?;
-                // Much makes no difference for planar mechanisms, and weighing takes longest.
+                // Many changes have no effect on planar mechanisms, and computing the cost takes longest.
                 if outputs == best {
                     continue;
                 }
@@ -54,6 +56,7 @@ fn improve<F: Copy>(
                 if cost < least {
                     (form, best, least) = (changed, outputs, cost);
                 }
+                // The family has passed its minimum.
                 if cost > last {
                     break;
                 }
@@ -64,21 +67,23 @@ fn improve<F: Copy>(
     Ok(best)
 }
 
-/// The frames that have been written already.
+/// Frames of the recursion by style and axes, so that each is written once.
 #[derive(Default)]
-struct Written(Vec<((Style, bool), Frames)>);
+struct FrameCache(Vec<((RecursionStyle, bool), RecursionFrames)>);
 
-impl Written {
-    fn frames(
+impl FrameCache {
+    /// The frames for a style and axes; they are written at the first call.
+    fn frames_for(
         &mut self,
         graph: &mut Graph,
-        equations: &Equations,
-        gravity: &vector::Vector,
-        key: (Style, bool),
-    ) -> &Frames {
+        equations: &UnreducedEquations,
+        gravity: &vector::SymbolicVector,
+        key: (RecursionStyle, bool),
+    ) -> &RecursionFrames {
+        // Few frames are written, so a list is searched.
         let at = self.0.iter().position(|(k, _)| *k == key);
         let at = at.unwrap_or_else(|| {
-            let frames = Frames::new(graph, &equations.tree, gravity, key.0, key.1);
+            let frames = RecursionFrames::new(graph, &equations.tree, gravity, key.0, key.1);
             self.0.push((key, frames));
             self.0.len() - 1
         });
@@ -88,137 +93,146 @@ impl Written {
 
 /// The passes of the recursions, by name, in the order in which they are tried.
 pub(crate) const PASSES: [&str; 5] = [
-    "parallel axes at once, or in axes that do not turn",
+    "parallel axes combined, or in fixed axes",
     "acceleration of a joint's axis from its parent",
-    "offsets along an axis behind its joint",
+    "offsets along an axis after its joint",
     "moments about a joint's axis on its fixed side",
-    "inertia turned rather than motion, forces read off in one frame",
+    "inertia rotated instead of motion, forces computed in one frame",
 ];
 
-/// The columns of some products, each by its drives, in the form that costs least after the first `n_passes` passes.
-pub(crate) fn columns(
+/// The columns of some products, one entry per drive, in the cheapest form after the first `n_passes` passes.
+pub(crate) fn cheapest_columns(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    equations: &Equations,
-    products: &[Monomial],
+    equations: &UnreducedEquations,
+    products: &[ParameterMonomial],
     n_passes: usize,
-    weigh: Weigh<'_>,
+    weigh: CostFunction<'_>,
 ) -> Result<Vec<Vec<ExprId>>, DeriveError> {
     let tree = &equations.tree;
-    let depths = (0..tree.links.len()).map(|i| tree.path(Some(i)).len());
+    // Depth of the tree, in links.
+    let depths = (0..tree.links.len()).map(|i| tree.path_to(Some(i)).len());
     let deepest = depths.max().unwrap_or(0);
-    let styled = |change: fn(Style) -> Style| -> ColumnChange {
+    // A change of style only.
+    let styled = |change: fn(RecursionStyle) -> RecursionStyle| -> ColumnChange {
         Box::new(move |form| ColumnForm {
             style: change(form.style),
             ..form
         })
     };
+    // Fixed axes exclude the combination of parallel axes.
     let in_fixed_axes: ColumnChange = Box::new(|form| ColumnForm {
         fixed_axes: true,
-        style: Style {
+        style: RecursionStyle {
             across_parallel_axes: false,
             ..form.style
         },
         ..form
     });
-    let [across, axis_column, offset_after_turn] = styles().map(styled);
-    let mut steps: Vec<Pass<ColumnForm>> = vec![
+    let [across, axis_column, offset_after_turn] = style_changes().map(styled);
+    // One entry per pass, in the order of [`PASSES`].
+    let mut steps: Vec<ChangeFamilies<ColumnForm>> = vec![
         vec![vec![across], vec![in_fixed_axes]],
         vec![vec![axis_column]],
         vec![vec![offset_after_turn]],
     ];
-    steps.push(vec![vec![Box::new(|form| ColumnForm {
-        axial: true,
-        ..form
-    })]]);
+    steps.push(vec![vec![Box::new(|form| ColumnForm { axial: true, ..form })]]);
+    // Depths to which moments and forces are carried.
     let to = |moments, forces| -> ColumnChange {
         Box::new(move |form| ColumnForm {
-            depths: Depths { moments, forces },
+            depths: CarryDepths { moments, forces },
             ..form
         })
     };
-    // Frames near the base are cheap to reach and save little.
+    // Frames near the base are cheap to reach and save little, so the search begins halfway.
     let both = (2.max(deepest / 2)..=deepest).map(|depth| to(depth, depth));
     let moments: ColumnChange = Box::new(|form| ColumnForm {
-        depths: Depths {
+        depths: CarryDepths {
             forces: 0,
             ..form.depths
         },
         ..form
     });
     steps.push(vec![both.collect(), vec![moments]]);
+    // Without parallel axes the first pass changes nothing.
     if !has_parallel_axes(tree) {
         steps[0].clear();
     }
     steps.truncate(n_passes);
-    let mut written = Written::default();
+    let mut written = FrameCache::default();
+    // Outputs are searched as one list, and then cut into columns.
     let n_drives = mechanism.drives.len();
-    let outputs = improve(graph, ColumnForm::PLAIN, &steps, weigh, |graph, form| {
+    let outputs = search_cheapest_form(graph, ColumnForm::PLAIN, &steps, weigh, |graph, form| {
         let key = (form.style, form.fixed_axes);
-        let frames = written.frames(graph, equations, &equations.gravity, key);
+        let frames = written.frames_for(graph, equations, &equations.gravity, key);
         let columns = equations.columns_of(graph, mechanism, frames, products, form)?;
         Ok(columns.into_iter().flatten().collect())
     })?;
     Ok(outputs.chunks(n_drives.max(1)).map(<[_]>::to_vec).collect())
 }
 
-/// The inverse dynamics in the form that costs least after the first `n_passes` passes.
-pub(crate) fn total(
+/// The inverse dynamics in the cheapest form after the first `n_passes` passes.
+pub(crate) fn cheapest_total(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    equations: &Equations,
-    value: &dyn Fn(&Monomial) -> ExprId,
+    equations: &UnreducedEquations,
+    value: &dyn Fn(&ParameterMonomial) -> ExprId,
     n_passes: usize,
-    weigh: Weigh<'_>,
+    weigh: CostFunction<'_>,
 ) -> Result<Vec<ExprId>, DeriveError> {
-    let mut steps = total_steps(&equations.tree);
+    let mut steps = total_form_steps(&equations.tree);
     steps.truncate(n_passes);
-    let mut written = Written::default();
-    improve(graph, TotalForm::PLAIN, &steps, weigh, |graph, form| {
+    let mut written = FrameCache::default();
+    search_cheapest_form(graph, TotalForm::PLAIN, &steps, weigh, |graph, form| {
         let key = (form.style, form.fixed_axes);
-        let frames = written.frames(graph, equations, &equations.gravity, key);
+        let frames = written.frames_for(graph, equations, &equations.gravity, key);
         equations.inverse_dynamics(graph, mechanism, frames, value, form)
     })
 }
 
-/// The generalised forces of all links under a gravity, finished by `finish`, in the form that costs least.
+/// The generalised forces of all links under a gravity, in the cheapest form. `finish` turns them into the outputs
+/// whose cost counts.
 pub(crate) fn best_total(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    equations: &Equations,
-    gravity: vector::Vector,
-    value: &dyn Fn(&Monomial) -> ExprId,
-    weigh: Weigh<'_>,
+    equations: &UnreducedEquations,
+    gravity: vector::SymbolicVector,
+    value: &dyn Fn(&ParameterMonomial) -> ExprId,
+    weigh: CostFunction<'_>,
     mut finish: impl FnMut(&mut Graph, &[ExprId]) -> Vec<ExprId>,
 ) -> Result<Vec<ExprId>, DeriveError> {
     let n = mechanism.coordinates.len();
-    let mut written = Written::default();
-    improve(
+    let mut written = FrameCache::default();
+    search_cheapest_form(
         graph,
         TotalForm::PLAIN,
-        &total_steps(&equations.tree),
+        &total_form_steps(&equations.tree),
         weigh,
         |graph, form| {
             let key = (form.style, form.fixed_axes);
-            let frames = written.frames(graph, equations, &gravity, key);
+            let frames = written.frames_for(graph, equations, &gravity, key);
             let wrenches = form.wrenches(graph, &equations.inertia, &equations.tree, frames, value);
-            let on_tree = newton_euler::backward(graph, &frames.tree, form.style, n, wrenches);
+            let on_tree = newton_euler::backward_recursion(graph, &frames.tree, form.style, n, wrenches);
             Ok(finish(graph, &on_tree))
         },
     )
 }
 
-type ColumnChange = Change<ColumnForm>;
-type TotalChange = Change<TotalForm>;
+/// A change of a regressor column's form.
+type ColumnChange = FormChange<ColumnForm>;
+/// A change of the inverse dynamics' form.
+type TotalChange = FormChange<TotalForm>;
 
-/// Whether there is a link whose joint is parallel to its parent's.
-fn has_parallel_axes(tree: &Tree) -> bool {
+/// Whether a joint is parallel to that of its parent.
+fn has_parallel_axes(tree: &KinematicTree) -> bool {
     let mut links = tree.links.iter().enumerate();
     links.any(|(i, link)| link.first_parallel != i)
 }
 
-fn total_steps(tree: &Tree) -> Vec<Pass<TotalForm>> {
-    let styled = |change: fn(Style) -> Style| -> TotalChange {
+/// The passes for inverse dynamics, in the order of [`PASSES`].
+fn total_form_steps(tree: &KinematicTree) -> Vec<ChangeFamilies<TotalForm>> {
+    // A change of style only.
+    let styled = |change: fn(RecursionStyle) -> RecursionStyle| -> TotalChange {
         Box::new(move |form| TotalForm {
             style: change(form.style),
             ..form
@@ -226,14 +240,14 @@ fn total_steps(tree: &Tree) -> Vec<Pass<TotalForm>> {
     };
     let in_fixed_axes: TotalChange = Box::new(|form| TotalForm {
         fixed_axes: true,
-        style: Style {
+        style: RecursionStyle {
             across_parallel_axes: false,
             ..form.style
         },
         ..form
     });
-    let [across, axis_column, offset_after_turn] = styles().map(styled);
-    let mut steps: Vec<Pass<TotalForm>> = vec![
+    let [across, axis_column, offset_after_turn] = style_changes().map(styled);
+    let mut steps: Vec<ChangeFamilies<TotalForm>> = vec![
         vec![vec![across], vec![in_fixed_axes]],
         vec![vec![axis_column]],
         vec![vec![offset_after_turn]],
@@ -241,10 +255,7 @@ fn total_steps(tree: &Tree) -> Vec<Pass<TotalForm>> {
     if !has_parallel_axes(tree) {
         steps[0].clear();
     }
-    steps.push(vec![vec![Box::new(|form| TotalForm {
-        flat: true,
-        ..form
-    })]]);
+    steps.push(vec![vec![Box::new(|form| TotalForm { flat: true, ..form })]]);
     steps.push(vec![vec![Box::new(|form| TotalForm {
         turn_ends: true,
         ..form
@@ -252,18 +263,18 @@ fn total_steps(tree: &Tree) -> Vec<Pass<TotalForm>> {
     steps
 }
 
-/// The changes of style, in the order of [`PASSES`]; parallel axes are passed at once only where axes turn.
-fn styles() -> [fn(Style) -> Style; 3] {
+/// The changes of style, in the order of [`PASSES`].
+fn style_changes() -> [fn(RecursionStyle) -> RecursionStyle; 3] {
     [
-        |style| Style {
+        |style| RecursionStyle {
             across_parallel_axes: true,
             ..style
         },
-        |style| Style {
+        |style| RecursionStyle {
             axis_column: true,
             ..style
         },
-        |style| Style {
+        |style| RecursionStyle {
             offset_after_turn: true,
             ..style
         },

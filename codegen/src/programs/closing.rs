@@ -1,110 +1,120 @@
 //! Closes expressions over the active coordinates: passive positions by their closed form, passive rates and
-//! accelerations from the differentiated loops.
+//! accelerations by the differentiated closure equations.
 
 use std::collections::BTreeMap;
 
 use modelmill_spec::Mechanism;
 
 use crate::DeriveError;
-use crate::expr::{AngleSum, Atom, ExprId, Graph, Node, nominal_value};
-use crate::loops::branches::closed_form;
-use crate::loops::magnitude::{self, Size};
-use crate::loops::solve_step::Plan;
-use crate::loops::solved::{times, turn};
+use crate::expr::{Atom, AtomAngleSum, ExprId, Graph, Node, nominal_value};
+use crate::loops::branches::closed_form_plan;
+use crate::loops::magnitude::{self, LoopSize};
+use crate::loops::solve_step::LoopPlan;
+use crate::loops::solved::{multiply_angle, rotate_vector};
 use crate::lower::SINGULAR;
 use crate::lower::cost::cost;
-use crate::lower::{By, Definition, PASSES, Pass, Program, Request, lower_by};
-use crate::regressor::Equations;
+use crate::lower::{
+    AtomDefinition, AtomRule, LoweringPass, LoweringRequest, PASSES, StraightLineProgram, lower_with_passes,
+};
+use crate::regressor::UnreducedEquations;
 use crate::tree::checks;
 
-/// Puts the passive coordinates' closed form, rates and accelerations in place.
+/// Replaces passive coordinates, rates and accelerations in expressions.
 #[derive(Clone)]
-pub(crate) struct Closing {
+pub(crate) struct PassiveClosure {
     /// The order in which the loops are solved, if they have closed forms.
-    plan: Option<Plan>,
-    /// How passive angles are computed, where their values are asked for or follow others.
-    definitions: Vec<Definition>,
+    plan: Option<LoopPlan>,
+    /// Rules for passive angles whose value is read or that are coupled to others.
+    definitions: Vec<AtomDefinition>,
+    /// Radicands that must not be negative.
     reachable: Vec<ExprId>,
-    /// Nodes replaced by the position's closed form.
+    /// Replacements of passive lengths and of angles that are sums of known ones.
     position: BTreeMap<ExprId, ExprId>,
-    /// Sums of angles whose cosine and sine are known, and what every passive angle is made of.
+    /// Cosine and sine of solved sums of angles.
     solved: Vec<[ExprId; 2]>,
-    angle_of: BTreeMap<usize, AngleParts>,
-    /// Determinants, with the magnitudes of their terms.
+    /// Every passive angle as a sum of solved and known ones.
+    angle_of: BTreeMap<usize, ResolvedAngle>,
+    /// Determinants with the magnitudes of their terms.
     regular: Vec<(ExprId, ExprId)>,
-    size: Size,
+    /// Size of the loops, for these magnitudes.
+    size: LoopSize,
     /// Whether effects may have no finite value at some states.
     may_be_undefined: bool,
-    /// The passes of lowering that are used.
-    passes: &'static [Pass],
+    /// The passes of lowering to use.
+    passes: &'static [LoweringPass],
 }
 
-/// An angle as a sum of known angles, a multiple of pi/12, and solved angles by position.
+/// An angle as a sum of known angles, a multiple of pi/12, and solved sums by index.
+/// Sum of known angles.
 #[derive(Clone, Debug, Default)]
-struct AngleParts {
-    known: AngleSum,
+struct ResolvedAngle {
+    /// Multiple of pi/12.
+    known: AtomAngleSum,
+    /// Indices of solved sums with their integer factors.
     pi12: i32,
     solved: Vec<(usize, i32)>,
 }
 
-/// The whole number of quarter turns that is nearest to an angle.
+/// The nearest integer number of quarter turns of an angle in rad.
 fn quarter_turns(angle: f64) -> i32 {
     #[expect(clippy::cast_possible_truncation, reason = "bounded")]
-    let quarters = (angle / std::f64::consts::FRAC_PI_2)
-        .round()
-        .clamp(-1e8, 1e8) as i32;
+    let quarters = (angle / std::f64::consts::FRAC_PI_2).round().clamp(-1e8, 1e8) as i32;
     quarters
 }
 
-impl Closing {
+impl PassiveClosure {
+    /// Prepares the closure. Fails with `SingularNominal` if a determinant is zero at the nominal pose.
     pub(crate) fn new(
         graph: &mut Graph,
         mechanism: &Mechanism,
-        equations: &Equations,
+        equations: &UnreducedEquations,
     ) -> Result<Self, DeriveError> {
         let mut closing = Self {
-            plan: closed_form(graph, mechanism, &equations.projection.loops),
+            plan: closed_form_plan(graph, mechanism, &equations.projection.loops),
             definitions: Vec::new(),
             reachable: Vec::new(),
             position: BTreeMap::new(),
             solved: Vec::new(),
             angle_of: BTreeMap::new(),
             regular: Vec::new(),
-            size: Size::from_residual(graph, mechanism, &equations.projection.loops.residual),
+            size: LoopSize::from_residual(graph, mechanism, &equations.projection.loops.residual),
             may_be_undefined: checks::may_be_undefined(mechanism),
             passes: &PASSES,
         };
+        // A small determinant is singular only if its digits are significant.
         for id in &equations.projection.determinants {
-            let limit = SINGULAR * magnitude::at_nominal(graph, mechanism, &[*id]);
+            let limit = SINGULAR * magnitude::nominal_magnitude(graph, mechanism, &[*id]);
             let is_small = |value: f64| value.abs() <= limit;
             if nominal_value(graph, mechanism, *id).is_some_and(is_small)
-                && magnitude::digits_left(graph, mechanism, *id).is_none_or(|left| left <= SINGULAR)
+                && magnitude::significant_digits(graph, mechanism, *id).is_none_or(|left| left <= SINGULAR)
             {
                 return Err(DeriveError::SingularNominal);
             }
-            let size = closing.size.of_determinant(graph, mechanism, *id, SINGULAR);
+            let size = closing.size.determinant_magnitude(graph, mechanism, *id, SINGULAR);
             closing.regular.push((*id, size));
         }
         let Some(plan) = closing.plan.clone() else {
             return Ok(closing);
         };
+        // Steps in order: each makes its unknowns known for the following ones.
         for step in &plan.steps {
-            // Earlier steps' unknowns are known by now; their closed form goes into this step's expressions.
-            let mut roots: Vec<ExprId> =
-                step.solved.angles.iter().flat_map(|(_, cs)| *cs).collect();
+            // The closed form of earlier unknowns is put into this step's expressions.
+            let mut roots: Vec<ExprId> = step.solved.angles.iter().flat_map(|(_, cs)| *cs).collect();
             roots.extend(step.solved.values.iter().map(|(_, value)| *value));
             roots.extend(step.solved.root.iter().map(|root| root.radicand));
+            // Angles, then values, then the radicand, in this order.
             let closed = closing.close_position(graph, &roots);
             let n_angles = step.solved.angles.len();
             let first = closing.solved.len();
             closing
                 .solved
                 .extend(closed[..2 * n_angles].chunks(2).map(|cs| [cs[0], cs[1]]));
+            // Values of the step: angles become definitions, lengths replacements.
             for ((coordinate, _), value) in step.solved.values.iter().zip(&closed[2 * n_angles..]) {
                 let atom = Atom::Coordinate(*coordinate);
                 if mechanism.coordinates[*coordinate].motion.is_angle() {
-                    let by = By::Value(*value);
-                    closing.definitions.push(Definition { atom, by });
+                    let by = AtomRule::Value(*value);
+                    closing.definitions.push(AtomDefinition { atom, rule: by });
                 } else {
                     closing.position.insert(graph.atom(atom), *value);
                 }
@@ -112,18 +122,17 @@ impl Closing {
             closing
                 .reachable
                 .extend(step.solved.root.iter().map(|_| closed[closed.len() - 1]));
-            let angles: Vec<AngleSum> = step
-                .solved
-                .angles
-                .iter()
-                .map(|(angle, _)| angle.clone())
-                .collect();
-            closing.resolve(step.unknown.clone(), &angles, first);
+            // The sums of angles that the step solves for.
+            let angles: Vec<AtomAngleSum> = step.solved.angles.iter().map(|(angle, _)| angle.clone()).collect();
+            // Single angles from the solved sums of this step.
+            closing.resolve_angles(step.unknown.clone(), &angles, first);
             for relation in &step.solved.relations {
-                let parts = closing.split(&relation.sum, relation.pi12);
+                let parts = closing.resolve_sum(&relation.sum, relation.pi12);
                 closing.angle_of.insert(relation.coordinate, parts);
             }
         }
+        // Passive angles: known sums are replaced directly, others are computed from sine and cosine if their value is
+        // read.
         for p in &equations.projection.loops.passive {
             if closing.angle_of.contains_key(p) {
                 let parts = &closing.angle_of[p];
@@ -133,54 +142,53 @@ impl Closing {
                     closing.position.insert(atom, value);
                     continue;
                 }
-                // A follower has its value; its turn alone would not say how often it went round.
+                // A coupled coordinate has its value already; sine and cosine would lose whole turns.
                 let atom = Atom::Coordinate(*p);
                 if closing.definitions.iter().any(|d| d.atom == atom) {
                     continue;
                 }
-                let [cosine, sine] = closing.cos_sin(graph, &AngleSum::new([(atom, 1)]));
+                let [cosine, sine] = closing.cos_sin(graph, &AtomAngleSum::new([(atom, 1)]));
+                // The angle is computed relative to the quarter turn of the nominal pose.
                 let quarters = quarter_turns(mechanism.coordinates[*p].nominal);
-                let back = graph.cos_sin(&AngleSum::NONE, -6 * quarters);
-                let [cosine, sine] = turn(graph, [back.0, back.1], [cosine, sine]);
-                closing.definitions.push(Definition {
+                let back = graph.cos_sin(&AtomAngleSum::NONE, -6 * quarters);
+                let [cosine, sine] = rotate_vector(graph, [back.0, back.1], [cosine, sine]);
+                closing.definitions.push(AtomDefinition {
                     atom,
-                    by: By::Turn {
-                        quarters,
-                        sine,
-                        cosine,
-                    },
+                    rule: AtomRule::Turn { quarters, sine, cosine },
                 });
             }
         }
         Ok(closing)
     }
 
-    /// Guards further determinants.
-    pub(crate) fn guard(&mut self, graph: &mut Graph, mechanism: &Mechanism, more: &[ExprId]) {
+    /// Adds determinants to the guards, if they are new.
+    pub(crate) fn add_guards(&mut self, graph: &mut Graph, mechanism: &Mechanism, more: &[ExprId]) {
         for id in more {
             if self.regular.iter().all(|(known, _)| known != id) {
-                let size = self.size.of_determinant(graph, mechanism, *id, SINGULAR);
+                let size = self.size.determinant_magnitude(graph, mechanism, *id, SINGULAR);
                 self.regular.push((*id, size));
             }
         }
     }
 
-    /// Uses some passes of lowering only, to see what the others do.
-    pub(crate) fn limit_passes(&mut self, passes: &'static [Pass]) {
+    /// Uses only the given passes of lowering, to count what each of them saves.
+    pub(crate) fn limit_passes(&mut self, passes: &'static [LoweringPass]) {
         self.passes = passes;
     }
 
-    /// How every loop is solved in closed form, if all of them are.
-    pub(crate) fn plan(&self) -> Option<&Plan> {
+    /// The closed-form solution of all loops, if there is one.
+    pub(crate) fn plan(&self) -> Option<&LoopPlan> {
         self.plan.as_ref()
     }
 
-    /// Writes every unknown angle as a sum of solved angles and known coordinates.
-    fn resolve(&mut self, mut unknown: Vec<usize>, angles: &[AngleSum], first: usize) {
+    /// Writes every unknown angle as a sum of solved sums and known coordinates. `first` is the index of the first of
+    /// `angles` among the solved sums.
+    fn resolve_angles(&mut self, mut unknown: Vec<usize>, angles: &[AtomAngleSum], first: usize) {
         let mut progress = true;
         while progress {
             progress = false;
             for (k, angle) in angles.iter().enumerate() {
+                // A solved sum with a single unknown determines it.
                 let inside: Vec<_> = angle
                     .terms()
                     .iter()
@@ -190,15 +198,11 @@ impl Closing {
                     continue;
                 };
                 // q = sign * (solved - rest)
-                let rest = self.split(&angle.plus(&AngleSum::new([(*atom, *sign)]), -1), 0);
-                let mut parts = AngleParts {
-                    known: AngleSum::NONE.plus(&rest.known, -sign),
+                let rest = self.resolve_sum(&angle.plus(&AtomAngleSum::new([(*atom, *sign)]), -1), 0);
+                let mut parts = ResolvedAngle {
+                    known: AtomAngleSum::NONE.plus(&rest.known, -sign),
                     pi12: -sign * rest.pi12,
-                    solved: rest
-                        .solved
-                        .into_iter()
-                        .map(|(s, n)| (s, -n * sign))
-                        .collect(),
+                    solved: rest.solved.into_iter().map(|(s, n)| (s, -n * sign)).collect(),
                 };
                 parts.solved.push((first + k, *sign));
                 self.angle_of.insert(*i, parts);
@@ -208,9 +212,9 @@ impl Closing {
         }
     }
 
-    /// A sum of angles with its passive coordinates put by what they are made of.
-    fn split(&self, sum: &AngleSum, pi12: i32) -> AngleParts {
-        let mut known = AngleSum::NONE;
+    /// A sum of angles in which passive coordinates are replaced by their own sums.
+    fn resolve_sum(&self, sum: &AtomAngleSum, pi12: i32) -> ResolvedAngle {
+        let mut known = AtomAngleSum::NONE;
         let mut pi12 = pi12;
         let mut solved: BTreeMap<usize, i32> = BTreeMap::new();
         for (atom, n) in sum.terms() {
@@ -223,38 +227,40 @@ impl Closing {
                         *solved.entry(*piece).or_insert(0) += m * n;
                     }
                 }
-                _ => known = known.plus(&AngleSum::new([(*atom, 1)]), *n),
+                _ => known = known.plus(&AtomAngleSum::new([(*atom, 1)]), *n),
             }
         }
-        AngleParts {
+        ResolvedAngle {
             known,
             pi12,
             solved: solved.into_iter().filter(|(_, n)| *n != 0).collect(),
         }
     }
 
-    /// Cosine and sine of a sum of angles, by the addition theorem.
-    fn cos_sin(&self, graph: &mut Graph, sum: &AngleSum) -> [ExprId; 2] {
-        let parts = self.split(sum, 0);
+    /// Cosine and sine of a sum of angles, by the addition theorems.
+    fn cos_sin(&self, graph: &mut Graph, sum: &AtomAngleSum) -> [ExprId; 2] {
+        let parts = self.resolve_sum(sum, 0);
         let (c, s) = graph.cos_sin(&parts.known, parts.pi12);
         let mut total = [c, s];
+        // Solved sums are added one after the other.
         for (piece, n) in parts.solved {
-            let turned = times(graph, self.solved[piece], n.into());
-            total = turn(graph, total, turned);
+            let turned = multiply_angle(graph, self.solved[piece], n.into());
+            total = rotate_vector(graph, total, turned);
         }
         total
     }
 
-    /// Replaces passive positions by their closed form.
+    /// Replaces passive positions in expressions by their closed form.
     fn close_position(&self, graph: &mut Graph, roots: &[ExprId]) -> Vec<ExprId> {
         let mut replacements = self.position.clone();
-        let trigonometric: Vec<(Node, AngleSum)> = graph
+        // Sines and cosines that contain passive angles.
+        let trigonometric: Vec<(Node, AtomAngleSum)> = graph
             .nodes_of(roots)
             .filter_map(|node| match node {
                 Node::Sin(angle) | Node::Cos(angle)
-                    if angle.atoms().any(
-                        |a| matches!(a, Atom::Coordinate(i) if self.angle_of.contains_key(&i)),
-                    ) =>
+                    if angle
+                        .atoms()
+                        .any(|a| matches!(a, Atom::Coordinate(i) if self.angle_of.contains_key(&i))) =>
                 {
                     Some((node.clone(), angle.clone()))
                 }
@@ -272,41 +278,42 @@ impl Closing {
         graph.substitute(roots, &replacements)
     }
 
-    /// The definitions of atoms that some expressions need, directly or by way of other definitions.
-    fn definitions(&self, graph: &Graph, roots: &[ExprId]) -> Vec<Definition> {
+    /// The definitions of atoms that some expressions need, directly or through other definitions.
+    fn definitions(&self, graph: &Graph, roots: &[ExprId]) -> Vec<AtomDefinition> {
         let mut used = graph.atoms(roots);
+        // Guards may need definitions too.
         used.extend(graph.atoms(&self.reachable));
-        let (mut found, mut left): (Vec<Definition>, _) = (Vec::new(), self.definitions.clone());
+        let (mut found, mut left): (Vec<AtomDefinition>, _) = (Vec::new(), self.definitions.clone());
         loop {
-            let (next, rest): (Vec<Definition>, Vec<Definition>) =
+            let (next, rest): (Vec<AtomDefinition>, Vec<AtomDefinition>) =
                 left.into_iter().partition(|d| used.contains(&d.atom));
             if next.is_empty() {
                 return found;
             }
             for definition in &next {
-                used.extend(graph.atoms(&definition.by.operands()));
+                used.extend(graph.atoms(&definition.rule.operands()));
             }
             found.extend(next);
             left = rest;
         }
     }
 
-    /// Closes some expressions over the active coordinates and lowers them.
+    /// Closes some expressions over the active coordinates and lowers them to a program.
     pub(crate) fn program(
         &self,
         graph: &mut Graph,
-        equations: &Equations,
+        equations: &UnreducedEquations,
         outputs: &[ExprId],
-    ) -> Program {
+    ) -> StraightLineProgram {
         self.program_at(graph, equations, outputs, &BTreeMap::new())
     }
 
-    /// What a program of some expressions costs. Expressions of an open chain are counted as they stand, since closing
-    /// does nothing to them and lowering finds little; that saves nearly all of the time.
-    pub(crate) fn weight(
+    /// Cost of a program of some expressions, in additions. In an open chain the expressions themselves are counted:
+    /// closing changes nothing and lowering saves little, and that takes a small part of the time.
+    pub(crate) fn program_cost(
         &self,
         graph: &mut Graph,
-        equations: &Equations,
+        equations: &UnreducedEquations,
         outputs: &[ExprId],
         known: &BTreeMap<ExprId, ExprId>,
     ) -> usize {
@@ -317,15 +324,16 @@ impl Closing {
         }
     }
 
-    /// The same where some rates and accelerations are known, such as none at all.
+    /// The same with some rates and accelerations replaced by `known` expressions, such as zero.
     pub(crate) fn program_at(
         &self,
         graph: &mut Graph,
-        equations: &Equations,
+        equations: &UnreducedEquations,
         outputs: &[ExprId],
         known: &BTreeMap<ExprId, ExprId>,
-    ) -> Program {
+    ) -> StraightLineProgram {
         let projection = &equations.projection;
+        // Rates first, because accelerations depend on them.
         let passive_rates = graph.substitute(&projection.passive_rates, known);
         let mut rates: BTreeMap<ExprId, ExprId> = projection
             .loops
@@ -340,6 +348,7 @@ impl Closing {
         for (p, acceleration) in projection.loops.passive.iter().zip(accelerations) {
             motion.insert(graph.atom(Atom::Acceleration(*p)), acceleration);
         }
+        // Outputs and determinants are closed together, so that they share expressions.
         let mut roots = graph.substitute(outputs, &motion);
         let n = roots.len();
         roots.extend(self.regular.iter().map(|(id, _)| *id));
@@ -351,16 +360,16 @@ impl Closing {
             .copied()
             .zip(&self.regular)
             .filter_map(|(closed, (_, size))| {
-                // A number that is not zero never is, and a rational factor need not be multiplied just to be compared.
+                // A constant that is not zero needs no guard, and a rational factor is moved to the size.
                 let (base, factor) = graph.split_factor(closed);
                 let varies = base != Graph::ONE || factor.is_zero();
                 varies.then(|| (base, graph.scale(*size, &factor.abs().recip())))
             })
             .collect();
-        lower_by(
+        lower_with_passes(
             graph,
             self.passes,
-            &Request {
+            &LoweringRequest {
                 may_be_undefined: self.may_be_undefined,
                 outputs,
                 reachable: &self.reachable,

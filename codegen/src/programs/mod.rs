@@ -1,7 +1,8 @@
-//! The programs of a model: passive coordinates, regressor, inverse dynamics, Jacobian of the drives.
+//! The programs of a model: passive coordinates, regressor, inverse dynamics, Jacobian of the drives. Equations and
+//! reduction go in, straight-line programs come out.
 //!
 //! Retained columns are original columns, so the inverse dynamics with base parameters is the same recursion with
-//! p_min put in place of the retained products and zero for all others.
+//! p_min as values of the retained products and zero for all others.
 
 pub(crate) mod cheapest;
 pub(crate) mod closing;
@@ -13,76 +14,80 @@ use modelmill_spec::Mechanism;
 
 use crate::DeriveError;
 use crate::expr::{Atom, ExprId, Graph};
-use crate::loops::magnitude::Size;
-use crate::lower::{Program, Request, lower};
-use crate::programs::closing::Closing;
-use crate::reduce::{Reduction, base};
-use crate::regressor::Equations;
-use crate::tree::expressions::Monomial;
+use crate::loops::magnitude::LoopSize;
+use crate::lower::{LoweringRequest, StraightLineProgram, lower};
+use crate::programs::closing::PassiveClosure;
+use crate::reduce::{BaseReduction, base};
+use crate::regressor::UnreducedEquations;
+use crate::tree::expressions::ParameterMonomial;
 
-/// How the passive coordinates are found.
+/// How the passive coordinates are computed.
 #[derive(Clone, Debug)]
 pub enum PassivePosition {
-    /// There are none.
+    /// The model has none.
     None,
-    /// In closed form, inside the programs.
+    /// In closed form, as a part of every program.
     Closed,
-    /// By Newton's method on the loops.
+    /// By Newton's method on the closure equations.
     Newton(Box<LoopPrograms>),
 }
 
-/// What Newton's method on the loops evaluates.
+/// Programs that Newton's method evaluates.
 #[derive(Clone, Debug)]
 pub struct LoopPrograms {
-    /// Residuals, then their Jacobian by the passive coordinates row by row.
-    pub residual: Program,
-    /// What residuals, passive and active coordinates are held against, one after the other.
-    pub scales: Program,
+    /// Residuals, then their Jacobian with respect to the passive coordinates, row by row.
+    pub residual: StraightLineProgram,
+    /// Scales of residuals, passive and active coordinates, in this order.
+    pub scales: StraightLineProgram,
 }
 
-/// Straight-line programs; outputs in the order given.
+/// All straight-line programs of a model.
 #[derive(Clone, Debug)]
-pub struct Programs {
-    /// How the passive coordinates are found.
+pub struct ModelPrograms {
+    /// How the passive coordinates are computed.
     pub passive_position: PassivePosition,
-    /// Passive coordinates, their rates, their accelerations.
-    pub passive: Program,
-    /// H: rows of drives, columns of p_g, row by row.
-    pub full_regressor: Program,
-    /// H_min: rows of drives, columns of p_min, row by row.
-    pub regressor: Program,
+    /// Passive coordinates, then their rates, then their accelerations.
+    pub passive: StraightLineProgram,
+    /// H: one row per drive, one column per product of p_g, row by row.
+    pub full_regressor: StraightLineProgram,
+    /// H_min: one row per drive, one column per base parameter, row by row.
+    pub regressor: StraightLineProgram,
     /// Forces of the drives for given p_min.
-    pub inverse_dynamics: Program,
-    /// p_min of given parameters and constants; all of it is fixed.
-    pub base_parameters: Program,
-    /// Coordinates and rates of the drives, then their Jacobian by the active coordinates, row by row.
-    pub drives: Program,
-    /// How large the loops are beside those of the file's constants, if coordinates in them are lengths; fixed.
-    pub scale: Option<Program>,
+    pub inverse_dynamics: StraightLineProgram,
+    /// p_min from parameters and constants; every operation is fixed.
+    pub base_parameters: StraightLineProgram,
+    /// Coordinates and rates of the drives, then their Jacobian with respect to the active coordinates, row by row.
+    pub drives: StraightLineProgram,
+    /// Size of the loops relative to that with the file's constants, if coordinates in them are lengths; fixed.
+    pub scale: Option<StraightLineProgram>,
 }
 
-/// `passes` says how many of [`cheapest::PASSES`] look for cheaper forms.
+/// Writes all programs. The first `passes` of [`cheapest::PASSES`] search for cheaper forms.
 pub(crate) fn programs(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    equations: &Equations,
-    reduction: &Reduction,
-    closing: &Closing,
+    equations: &UnreducedEquations,
+    reduction: &BaseReduction,
+    closing: &PassiveClosure,
     passes: usize,
-) -> Result<Programs, DeriveError> {
+) -> Result<ModelPrograms, DeriveError> {
     let n_drives = mechanism.drives.len();
 
-    let base = base_atoms(graph, reduction);
-    let base_value = |m: &Monomial| base.get(m).copied().unwrap_or(Graph::ZERO);
-    let retained: Vec<Monomial> = (reduction.retained.iter())
+    // Base parameters take the place of the retained products.
+    let base = base_parameter_atoms(graph, reduction);
+    let base_value = |m: &ParameterMonomial| base.get(m).copied().unwrap_or(Graph::ZERO);
+    let retained: Vec<ParameterMonomial> = (reduction.retained.iter())
         .map(|k| reduction.products[*k].clone())
         .collect();
+    // Columns as the rows of a matrix.
     let row_by_row = |columns: &[Vec<ExprId>]| -> Vec<ExprId> {
         (0..n_drives)
             .flat_map(|d| columns.iter().map(move |column| column[d]))
             .collect()
     };
+    // Motion of loops and drives.
     let projection = &equations.projection;
+    // Columns of p_g as they were derived, before any search for cheaper forms.
     let all: Vec<Vec<ExprId>> = reduction
         .products
         .iter()
@@ -91,6 +96,7 @@ pub(crate) fn programs(
             equations.columns[position.expect("a product of p_g is a candidate")].clone()
         })
         .collect();
+    // Outputs of the passive motion, then of the drives.
     let mut passive: Vec<ExprId> = projection
         .loops
         .passive
@@ -103,6 +109,7 @@ pub(crate) fn programs(
     drives.extend(projection.drives.iter().map(|d| d.rate));
     drives.extend(projection.drive_jacobian.iter().flatten());
 
+    // Loops have a closed form, or Newton's method gets residuals, their Jacobian and scales.
     let passive_position = if projection.loops.passive.is_empty() {
         PassivePosition::None
     } else if closing.plan().is_some() {
@@ -110,26 +117,27 @@ pub(crate) fn programs(
     } else {
         let mut outputs = projection.loops.residual.clone();
         outputs.extend(projection.residual_jacobian.iter().flatten());
-        let scales = scales::scales(graph, mechanism, &projection.loops);
+        let scales = scales::residual_scales(graph, mechanism, &projection.loops);
         PassivePosition::Newton(Box::new(LoopPrograms {
-            residual: plain(graph, &outputs),
-            scales: plain(graph, &scales),
+            residual: plain_program(graph, &outputs),
+            scales: plain_program(graph, &scales),
         }))
     };
-    let base_expressions = base::expressions(graph, reduction);
-    let base_parameters = plain(graph, &base_expressions);
+    // Base parameters, and the cheapest forms of regressor and inverse dynamics.
+    let base_expressions = base::base_expressions(graph, reduction);
+    let base_parameters = plain_program(graph, &base_expressions);
     let nothing = BTreeMap::new();
-    let weigh =
-        |graph: &mut Graph, outputs: &[ExprId]| closing.weight(graph, equations, outputs, &nothing);
-    let regressor = cheapest::columns(graph, mechanism, equations, &retained, passes, &weigh)?;
+    let weigh = |graph: &mut Graph, outputs: &[ExprId]| closing.program_cost(graph, equations, outputs, &nothing);
+    let regressor = cheapest::cheapest_columns(graph, mechanism, equations, &retained, passes, &weigh)?;
     let regressor = row_by_row(&regressor);
-    let inverse_dynamics =
-        cheapest::total(graph, mechanism, equations, &base_value, passes, &weigh)?;
+    let inverse_dynamics = cheapest::cheapest_total(graph, mechanism, equations, &base_value, passes, &weigh)?;
+    // The scale is needed only if lengths are in the loops.
     let slides = mechanism.coordinates.iter().any(|c| c.motion.is_length());
     let scale = (slides && !projection.loops.residual.is_empty()).then(|| {
-        let scale = Size::from_residual(graph, mechanism, &projection.loops.residual).scale(graph);
-        plain(graph, &[scale])
+        let scale = LoopSize::from_residual(graph, mechanism, &projection.loops.residual).relative_scale(graph);
+        plain_program(graph, &[scale])
     });
+    // Expressions are closed over the active coordinates and lowered.
     let n_motion = drives.len();
     let together = [drives.as_slice(), &inverse_dynamics].concat();
     let mut program = |outputs: &[ExprId]| closing.program(graph, equations, outputs);
@@ -137,13 +145,14 @@ pub(crate) fn programs(
     let inverse_dynamics = program(&inverse_dynamics);
     let mut drives = program(&drives);
     if matches!(passive_position, PassivePosition::Closed) {
-        // Loops are closed by the same operations as elsewhere, so that code has them once, unless that costs too much.
+        // Loops are closed by the same operations as in the inverse dynamics, so that the code has them once, unless
+        // that costs more than a tenth.
         let same = program(&together).with_outputs(n_motion);
         if 10 * same.weight() <= 11 * drives.weight() {
             drives = same;
         }
     }
-    Ok(Programs {
+    Ok(ModelPrograms {
         passive_position,
         passive: program(&passive),
         full_regressor: program(&row_by_row(&all)),
@@ -155,8 +164,11 @@ pub(crate) fn programs(
     })
 }
 
-/// The base parameters by the products that they stand for; all other products are zero.
-pub(crate) fn base_atoms(graph: &mut Graph, reduction: &Reduction) -> BTreeMap<Monomial, ExprId> {
+/// Base parameters by their retained product; all other products are zero.
+pub(crate) fn base_parameter_atoms(
+    graph: &mut Graph,
+    reduction: &BaseReduction,
+) -> BTreeMap<ParameterMonomial, ExprId> {
     let retained = reduction.retained.iter().enumerate();
     retained
         .map(|(k, product)| {
@@ -166,9 +178,9 @@ pub(crate) fn base_atoms(graph: &mut Graph, reduction: &Reduction) -> BTreeMap<M
         .collect()
 }
 
-/// A program of expressions as they stand, without guards.
-fn plain(graph: &mut Graph, outputs: &[ExprId]) -> Program {
-    let request = Request {
+/// A program of expressions without guards and without passive coordinates to close.
+fn plain_program(graph: &mut Graph, outputs: &[ExprId]) -> StraightLineProgram {
+    let request = LoweringRequest {
         may_be_undefined: false,
         outputs,
         reachable: &[],

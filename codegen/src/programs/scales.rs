@@ -1,29 +1,27 @@
-//! What Newton's method on the loops holds residuals and steps against.
+//! Scales with which Newton's method on the loops compares residuals and steps.
 
 use std::collections::HashMap;
 
 use modelmill_spec::Mechanism;
 
 use crate::expr::{ExprId, Graph, coordinates_of};
-use crate::loops::Loops;
-use crate::loops::magnitude::magnitude;
+use crate::loops::KinematicLoops;
+use crate::loops::magnitude::expression_magnitude;
 
-/// Scales of the residuals, of the passive coordinates and of the active ones, one after the other.
+/// Scales of the residuals, of the passive coordinates and of the active ones, in this order.
 ///
-/// A residual's scale is the sum of the magnitudes of its terms, a sine counting as 1. A coordinate's is 1 for an angle,
-/// the sum of its residuals' scales for a length, and 0 if no loop depends on it.
-pub(crate) fn scales(graph: &mut Graph, mechanism: &Mechanism, loops: &Loops) -> Vec<ExprId> {
+/// The scale of a residual is the sum of the magnitudes of its terms, with a sine counted as 1. The scale of a
+/// coordinate is 1 for an angle, the sum of its residuals' scales for a length, and 0 if no loop depends on it.
+pub(crate) fn residual_scales(graph: &mut Graph, mechanism: &Mechanism, loops: &KinematicLoops) -> Vec<ExprId> {
     let mut known = HashMap::new();
     let residuals: Vec<ExprId> = loops
         .residual
         .iter()
-        .map(|r| magnitude(graph, mechanism, &mut known, *r))
+        .map(|r| expression_magnitude(graph, mechanism, &mut known, *r))
         .collect();
-    let of: Vec<Vec<usize>> = loops
-        .residual
-        .iter()
-        .map(|r| coordinates_of(graph, &[*r]))
-        .collect();
+    // Coordinates on which each residual depends.
+    let of: Vec<Vec<usize>> = loops.residual.iter().map(|r| coordinates_of(graph, &[*r])).collect();
+    // Residuals first, then coordinates.
     let mut scales = residuals.clone();
     for i in loops.passive.iter().chain(&loops.active) {
         let rows = residuals.iter().zip(&of).filter(|(_, of)| of.contains(i));

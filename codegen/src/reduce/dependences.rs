@@ -1,20 +1,21 @@
-//! Which columns depend on which, and the proof that the dependences hold.
+//! Dependences between columns at random points of the field, and the confirmation of a reduction at fresh points.
 
-use modelmill_algebra::field::{Element, MODULUS, PRIMES, Stream};
+use modelmill_algebra::field::{FieldElement, MODULUS, PRIMES, RandomStream};
 use modelmill_spec::Mechanism;
 
-use super::reduction::{Dependency, Method, Reduction};
-use super::relations::{self, ColumnRelation, Written};
+use super::reduction::{BaseReduction, ColumnDependency, ReductionMethod};
+use super::relations::{self, ColumnRelation, DependentColumn};
 use super::sample::SampledRegressor;
 use crate::DeriveError;
-use crate::tree::expressions::Monomial;
+use crate::tree::expressions::ParameterMonomial;
 
-/// With how many sets of constants the result is shown, and at how many points of motion for each.
+/// Number of sets of constants with which a result is confirmed.
 const CONFIRMED_WITH: usize = 4;
+/// Number of points of motion for each of them.
 const CONFIRMED_AT: usize = 2;
 
-/// Which columns depend on which, as seen for one random set of constants; columns by position among the effective ones.
-pub(super) struct Dependences {
+/// Which columns depend on which, for one random set of constants. Columns are numbered among those with an effect.
+pub(super) struct DependenceStructure {
     /// Columns that are not identically zero.
     pub(super) shown: Vec<usize>,
     /// Retained columns, sorted.
@@ -23,38 +24,35 @@ pub(super) struct Dependences {
     pub(super) dependent: Vec<usize>,
     /// Pairs of a dependent and a retained column with a factor that does not vanish.
     pub(super) wanted: Vec<(usize, usize)>,
-    /// The same dependences, also between columns that are closer together.
+    /// The same dependences, also between columns that depend on each other more directly.
     pub(super) relations: Vec<ColumnRelation>,
-    /// At how many points of motion everything was seen.
+    /// Number of points of motion that were sampled.
     pub(super) n_points: usize,
 }
 
-impl Dependences {
-    pub(super) fn find(
+impl DependenceStructure {
+    /// Samples the regressor and eliminates; columns that come first in `order` are retained first.
+    pub(super) fn find_dependences(
         regressor: &SampledRegressor,
         order: &[usize],
-        stream: &mut Stream,
+        stream: &mut RandomStream,
     ) -> Result<Self, DeriveError> {
         let n = regressor.n_columns;
         let constants = regressor.sampler.constants::<MODULUS>(stream)?;
-        let (echelon, n_points) = regressor.echelon(&constants, order, None, stream)?;
-        let shown: Vec<usize> = (0..n).filter(|k| echelon.is_seen(*k)).collect();
+        let (echelon, n_points) = regressor.reduced_rows(&constants, order, None, stream)?;
+        let shown: Vec<usize> = (0..n).filter(|k| echelon.has_nonzero_value(*k)).collect();
         let mut pivots = echelon.pivots.clone();
         pivots.sort_unstable();
-        let dependent: Vec<usize> = shown
-            .iter()
-            .copied()
-            .filter(|k| !pivots.contains(k))
-            .collect();
+        // Columns without a pivot depend on the retained ones.
+        let dependent: Vec<usize> = shown.iter().copied().filter(|k| !pivots.contains(k)).collect();
         let wanted = dependent
             .iter()
             .flat_map(|j| pivots.iter().map(move |p| (*j, *p)))
-            .filter(|(j, p)| echelon.entry(*p, *j).is_some_and(|x| x != Element::ZERO))
+            // Factors that vanish at random constants vanish always.
+            .filter(|(j, p)| echelon.entry(*p, *j).is_some_and(|x| x != FieldElement::ZERO))
             .collect();
-        let order: Vec<usize> = (order.iter().copied())
-            .filter(|k| shown.contains(k))
-            .collect();
-        let relations = relations::find(&echelon, &order, &dependent);
+        let order: Vec<usize> = (order.iter().copied()).filter(|k| shown.contains(k)).collect();
+        let relations = relations::find_relations(&echelon, &order, &dependent);
         Ok(Self {
             shown,
             pivots,
@@ -65,23 +63,28 @@ impl Dependences {
         })
     }
 
+    /// The reduction from the factors of all dependent columns; `name` returns the product of a column.
+    ///
+    /// # Errors
+    /// [`DeriveError::FactorNotRecovered`] if a factor is `None`.
     pub(super) fn reduction(
         &self,
         mechanism: &Mechanism,
-        candidates: &[Monomial],
-        name: &dyn Fn(usize) -> Monomial,
-        lines: Vec<Written>,
-    ) -> Result<Reduction, DeriveError> {
+        candidates: &[ParameterMonomial],
+        name: &dyn Fn(usize) -> ParameterMonomial,
+        lines: Vec<DependentColumn>,
+    ) -> Result<BaseReduction, DeriveError> {
         let position = |k: usize| {
             self.shown
                 .iter()
                 .position(|x| *x == k)
                 .expect("a column with an effect is shown")
         };
-        let mut dependencies: Vec<Dependency> = self
+        // One line per dependent column, filled below.
+        let mut dependencies: Vec<ColumnDependency> = self
             .dependent
             .iter()
-            .map(|j| Dependency {
+            .map(|j| ColumnDependency {
                 product: position(*j),
                 equals: Vec::new(),
                 via: Vec::new(),
@@ -89,30 +92,26 @@ impl Dependences {
             .collect();
         for written in lines {
             let j = written.column;
-            let line = (self.dependent.iter().position(|x| *x == j))
-                .expect("a written column is dependent");
-            for (p, factor) in written.by {
+            let line = (self.dependent.iter().position(|x| *x == j)).expect("a written column is dependent");
+            for (p, factor) in written.factors {
                 let factor = factor.ok_or_else(|| DeriveError::FactorNotRecovered {
                     product: name(j).text(mechanism),
                     retained: name(p).text(mechanism),
                 })?;
+                // A factor belongs to a retained column, or to another dependent one.
                 match self.pivots.iter().position(|x| *x == p) {
                     Some(retained) => dependencies[line].equals.push((retained, factor)),
                     None => dependencies[line].via.push((position(p), factor)),
                 }
             }
         }
-        let products: Vec<Monomial> = self.shown.iter().map(|k| name(*k)).collect();
-        Ok(Reduction {
-            without_effect: candidates
-                .iter()
-                .filter(|c| !products.contains(c))
-                .cloned()
-                .collect(),
+        let products: Vec<ParameterMonomial> = self.shown.iter().map(|k| name(*k)).collect();
+        Ok(BaseReduction {
+            without_effect: candidates.iter().filter(|c| !products.contains(c)).cloned().collect(),
             retained: self.pivots.iter().map(|p| position(*p)).collect(),
             products,
             dependencies,
-            method: Method::Exact {
+            method: ReductionMethod::Exact {
                 confirmed_at: CONFIRMED_WITH * CONFIRMED_AT,
                 at_values: mechanism.is_at_values,
             },
@@ -120,22 +119,24 @@ impl Dependences {
     }
 }
 
-impl Reduction {
-    /// Shows `H p_g = H_min p_min` for random parameters at fresh points of motion with fresh constants.
-    pub(super) fn confirm(
+impl BaseReduction {
+    /// Confirms `H p_g = H_min p_min` for random parameters at fresh points of motion with fresh constants.
+    ///
+    /// # Errors
+    /// [`DeriveError::NotConfirmed`] if it is not true, [`DeriveError::RankChanged`] if a factor has no value there.
+    pub(super) fn confirm_reduction(
         &self,
         regressor: &SampledRegressor,
         shown: &[usize],
-        stream: &mut Stream,
+        stream: &mut RandomStream,
     ) -> Result<(), DeriveError> {
-        /// A field that had no part in finding it.
+        /// A field that was not used to find the reduction.
         const FRESH: u64 = PRIMES[PRIMES.len() - 1];
         for _ in 0..CONFIRMED_WITH {
             let constants = regressor.sampler.constants::<FRESH>(stream)?;
-            let parameters: Vec<Element<FRESH>> =
-                self.products.iter().map(|_| stream.element()).collect();
-            let mut base: Vec<Element<FRESH>> =
-                self.retained.iter().map(|k| parameters[*k]).collect();
+            // Random parameters, and the base parameters that eq. (7) gives for them.
+            let parameters: Vec<FieldElement<FRESH>> = self.products.iter().map(|_| stream.next_element()).collect();
+            let mut base: Vec<FieldElement<FRESH>> = self.retained.iter().map(|k| parameters[*k]).collect();
             let factors = self
                 .factors_by(&|factor| factor.value(&constants))
                 .ok_or(DeriveError::RankChanged)?;
@@ -144,17 +145,14 @@ impl Reduction {
                     base[k] = base[k] + factor * parameters[line.product];
                 }
             }
+            // Both sides at fresh points of motion.
             for _ in 0..CONFIRMED_AT {
-                for row in regressor.point(&constants, stream)? {
-                    let sum = |terms: &mut dyn Iterator<Item = (usize, Element<FRESH>)>| {
-                        terms.fold(Element::ZERO, |s, (k, p)| s + row[k] * p)
+                for row in regressor.draw_rows(&constants, stream)? {
+                    let sum = |terms: &mut dyn Iterator<Item = (usize, FieldElement<FRESH>)>| {
+                        terms.fold(FieldElement::ZERO, |s, (k, p)| s + row[k] * p)
                     };
                     let full = sum(&mut shown.iter().copied().zip(parameters.iter().copied()));
-                    let reduced = sum(&mut self
-                        .retained
-                        .iter()
-                        .map(|k| shown[*k])
-                        .zip(base.iter().copied()));
+                    let reduced = sum(&mut self.retained.iter().map(|k| shown[*k]).zip(base.iter().copied()));
                     if full != reduced {
                         return Err(DeriveError::NotConfirmed);
                     }

@@ -1,129 +1,125 @@
-//! The factors of eq. (6) as rational functions of the constants: reconstructed from points of motion for relations that
-//! are as simple as can be found, put together from there.
+//! The factors of eq. (6) as rational functions of the constants. Simple relations between columns are reconstructed
+//! from points of motion, and the factors are combined from these.
 
-use modelmill_algebra::field::{Element, Stream};
+use modelmill_algebra::field::{FieldElement, RandomStream};
 
-use super::dependences::Dependences;
-use super::oracle::{Budget, Occurrence, Oracle};
-use super::reconstruct::{self, Survey};
-use super::relations::{self, ColumnRelation, Related, Written};
+use super::dependences::DependenceStructure;
+use super::oracle::{ConstantOccurrence, OperationBudget, PrimeFieldOracle};
+use super::reconstruct::{self, DependenceSurvey};
+use super::relations::{self, ColumnRelation, DependentColumn, RelationRows, SolvedRelations};
 use super::sample::SampledRegressor;
 use crate::DeriveError;
 use crate::expr::FieldPoint;
 
-/// Operations of the field that factors may take: a minute or so.
+/// Largest number of field operations for the factors, which takes about a minute.
 pub(super) const MOST_OPERATIONS: u64 = 20_000_000_000;
 
-/// Relations to retained columns that are not longer than this are as good as near ones.
+/// Relations to retained columns that are not longer than this are used directly.
 const FEW: usize = 12;
 
-/// Terms of all factors on retained columns beyond which nobody reads them: then columns are written by near ones.
+/// Above this number of terms in all factors on retained columns, columns are written by neighbouring columns.
 const MOST_TERMS: usize = 5_000;
 
-/// The dependent columns by others; factors that resist are `None`.
-pub(super) fn find(
-    dependences: &Dependences,
+/// The dependent columns as combinations of others. Factors that cannot be reconstructed are `None`.
+pub(super) fn find_factors(
+    dependences: &DependenceStructure,
     regressor: &SampledRegressor,
-    variables: &[Occurrence],
+    variables: &[ConstantOccurrence],
     roots: &[i64],
     operations: u64,
-    stream: &mut Stream,
-) -> Result<Vec<Written>, DeriveError> {
+    stream: &mut RandomStream,
+) -> Result<Vec<DependentColumn>, DeriveError> {
     if dependences.wanted.is_empty() {
         return Ok(Vec::new());
     }
+    // Relations to retained columns only.
     let direct: Vec<ColumnRelation> = (dependences.relations.iter())
-        .filter(|relation| relation.is_direct())
+        .filter(|relation| relation.has_retained_only())
         .cloned()
         .collect();
-    let mut budget = Budget::new(operations);
+    let mut budget = OperationBudget::new(operations);
     let mut by = |relations: &[ColumnRelation]| {
-        by_relations(
-            relations,
-            dependences,
-            regressor,
-            variables,
-            roots,
-            &mut budget,
-            stream,
-        )
+        factors_by_relations(relations, dependences, regressor, variables, roots, &mut budget, stream)
     };
     match by(&dependences.relations) {
-        // Which columns are near may depend on the constants, as with roots that take either sign.
+        // Which columns are near may depend on the constants, for example with roots of either sign.
         Err(DeriveError::RankChanged) if direct.len() < dependences.relations.len() => by(&direct),
         found => found,
     }
 }
 
-/// How many factors on retained columns have a sum in a denominator.
+/// Number of factors on retained columns with a sum in a denominator.
 pub(super) fn n_quotients(
-    dependences: &Dependences,
+    dependences: &DependenceStructure,
     regressor: &SampledRegressor,
-    variables: &[Occurrence],
-    stream: &mut Stream,
+    variables: &[ConstantOccurrence],
+    stream: &mut RandomStream,
 ) -> Result<usize, DeriveError> {
-    let direct = dependences.relations.iter().filter(|r| r.is_direct());
+    let direct = dependences.relations.iter().filter(|r| r.has_retained_only());
     let direct: Vec<ColumnRelation> = direct.cloned().collect();
-    let mut oracle = FromMotion {
+    // Only relations to retained columns have factors on retained columns.
+    let mut oracle = MotionFactorOracle {
         regressor,
         dependences,
         relations: &direct,
         sampling: stream.clone(),
-        budget: &mut Budget::new(MOST_OPERATIONS),
+        budget: &mut OperationBudget::new(MOST_OPERATIONS),
     };
     reconstruct::n_quotients(&mut oracle, variables, stream)
 }
 
-/// The dependent columns by some relations, those to retained columns among them.
-fn by_relations(
+/// The dependent columns from given relations, which include those to retained columns.
+fn factors_by_relations(
     all: &[ColumnRelation],
-    dependences: &Dependences,
+    dependences: &DependenceStructure,
     regressor: &SampledRegressor,
-    variables: &[Occurrence],
+    variables: &[ConstantOccurrence],
     roots: &[i64],
-    budget: &mut Budget,
-    stream: &mut Stream,
-) -> Result<Vec<Written>, DeriveError> {
-    let mut found = |chosen: Vec<ColumnRelation>, stream: &mut Stream| {
-        let mut oracle = FromMotion {
+    budget: &mut OperationBudget,
+    stream: &mut RandomStream,
+) -> Result<Vec<DependentColumn>, DeriveError> {
+    // Reconstructs the factors of some relations; those to retained columns are needed for all others.
+    let mut found = |chosen: Vec<ColumnRelation>, stream: &mut RandomStream| {
+        let mut oracle = MotionFactorOracle {
             regressor,
             dependences,
             relations: &chosen,
             sampling: stream.clone(),
             budget: &mut *budget,
         };
-        let mut survey = Survey::new(&mut oracle, variables, roots, stream)?;
+        let mut survey = DependenceSurvey::new(&mut oracle, variables, roots, stream)?;
+        // A relation to retained columns is needed by all that use its column.
         let wanted: Vec<(usize, bool)> = (chosen.iter())
-            .flat_map(|r| std::iter::repeat_n(r.is_direct(), r.len()))
+            .flat_map(|r| std::iter::repeat_n(r.has_retained_only(), r.len()))
             .enumerate()
             .collect();
-        let factors = survey.functions(&mut oracle, &wanted, stream)?;
-        Ok::<_, DeriveError>(Related::new(chosen.iter(), factors))
+        let factors = survey.reconstruct_functions(&mut oracle, &wanted, stream)?;
+        Ok::<_, DeriveError>(SolvedRelations::new(chosen.iter(), factors))
     };
-    // Near relations come right behind those to retained columns.
-    let nearest = (0..all.len()).filter(|i| all.get(i + 1).is_none_or(ColumnRelation::is_direct));
+    // The relation to near columns comes directly after the one to retained columns.
+    let nearest = (0..all.len()).filter(|i| all.get(i + 1).is_none_or(ColumnRelation::has_retained_only));
     let mut related = found(nearest.map(|i| all[i].clone()).collect(), stream)?;
-    // What is near need not be simple: where the first joints of an arm do not feel all of a link, relations between links
-    // divide by sines of twists, and those to retained columns do not.
+    // A near relation may be complicated: if the first joints of an arm have no effect on all of a link, relations
+    // between links divide by sines of twists, and relations to retained columns do not.
     let is_long = related.is_complete() && related.n_terms() > MOST_TERMS;
-    let unwieldy = related.unwieldy();
+    let unwieldy = related.unwieldy_columns();
     let direct: Vec<ColumnRelation> = (all.iter())
-        .filter(|r| r.is_direct() && unwieldy.contains(&r.column))
+        .filter(|r| r.has_retained_only() && unwieldy.contains(&r.column))
         .filter(|r| !is_long || r.len() <= FEW)
         .cloned()
         .collect();
-    if !direct.is_empty() && !related.is_lost() {
+    if !direct.is_empty() && !related.has_unknown_factor() {
         related.replace(found(direct, stream)?);
     }
+    // Too many terms: columns are written by near columns.
     if is_long {
-        return Ok(related.written());
+        return Ok(related.into_dependent_columns());
     }
-    let mut written = related.written_out(&dependences.wanted, roots);
-    let missing: Vec<usize> = (0..written.len())
-        .filter(|k| written[*k].is_none())
-        .collect();
+    let mut written = related.expanded_factors(&dependences.wanted, roots);
+    // Factors that cannot be multiplied out are reconstructed from the combined relations.
+    let missing: Vec<usize> = (0..written.len()).filter(|k| written[*k].is_none()).collect();
     if !missing.is_empty() && related.is_complete() {
-        let mut rest = FromRelations {
+        let mut rest = RelationFactorOracle {
             related: &related,
             regressor,
             wanted: missing.iter().map(|k| dependences.wanted[*k]).collect(),
@@ -134,87 +130,98 @@ fn by_relations(
             written[k] = function;
         }
     }
+    // Every factor on a retained column becomes a line of its own.
     let pairs = dependences.wanted.iter().zip(written);
-    let line = |((column, p), factor): (&(usize, usize), _)| Written {
+    let line = |((column, p), factor): (&(usize, usize), _)| DependentColumn {
         column: *column,
-        by: vec![(*p, factor)],
+        factors: vec![(*p, factor)],
     };
     Ok(pairs.map(line).collect())
 }
 
-/// The factors of relations, from points of motion.
-struct FromMotion<'a> {
+/// Evaluates the factors of relations from points of motion.
+struct MotionFactorOracle<'a> {
+    /// The regressor's columns at random points.
     regressor: &'a SampledRegressor,
-    dependences: &'a Dependences,
+    /// Dependences that the columns must show again.
+    dependences: &'a DependenceStructure,
+    /// Relations whose factors are evaluated.
     relations: &'a [ColumnRelation],
-    sampling: Stream,
-    budget: &'a mut Budget,
+    /// Random numbers for the points.
+    sampling: RandomStream,
+    /// Remaining field operations.
+    budget: &'a mut OperationBudget,
 }
 
-impl Oracle for FromMotion<'_> {
-    fn constants<const P: u64>(
-        &self,
-        stream: &mut Stream,
-    ) -> Result<FieldPoint<Element<P>>, DeriveError> {
+impl PrimeFieldOracle for MotionFactorOracle<'_> {
+    fn constants<const P: u64>(&self, stream: &mut RandomStream) -> Result<FieldPoint<FieldElement<P>>, DeriveError> {
         self.regressor.sampler.constants(stream)
     }
 
     fn values<const P: u64>(
         &mut self,
-        constants: &FieldPoint<Element<P>>,
-    ) -> Result<Vec<Element<P>>, DeriveError> {
+        constants: &FieldPoint<FieldElement<P>>,
+    ) -> Result<Vec<FieldElement<P>>, DeriveError> {
+        // Two ways: eliminate all columns at once, or each relation from its own columns. The cheaper one is used.
         let rank = self.dependences.pivots.len();
         let at_once = rank * rank * self.regressor.n_columns;
         let one_by_one: usize = self.relations.iter().map(|r| (r.len() + 1).pow(3)).sum();
-        self.spend(at_once.min(one_by_one))?;
+        self.charge(at_once.min(one_by_one))?;
+        // One relation at a time: its columns at as many points as the survey of dependences used.
         if one_by_one < at_once {
-            let mut rows = Vec::new();
+            // Few points are enough for relations between few columns.
+            let mut open: Vec<RelationRows<P>> = self.relations.iter().map(RelationRows::new).collect();
             for _ in 0..self.dependences.n_points {
-                rows.extend(self.regressor.point(constants, &mut self.sampling)?);
+                if open.iter().all(RelationRows::is_confirmed) {
+                    break;
+                }
+                let rows = self.regressor.draw_rows(constants, &mut self.sampling)?;
+                for relation in &mut open {
+                    relation.take(&rows);
+                }
             }
-            return relations::values_from_rows(self.relations, &rows);
+            let values = open.iter().map(RelationRows::values);
+            return Ok(values.collect::<Result<Vec<_>, _>>()?.concat());
         }
-        let (echelon, _) = self.regressor.echelon(
-            constants,
-            &self.dependences.pivots,
-            Some(rank),
-            &mut self.sampling,
-        )?;
+        let (echelon, _) =
+            self.regressor
+                .reduced_rows(constants, &self.dependences.pivots, Some(rank), &mut self.sampling)?;
         relations::values(self.relations, &echelon)
     }
 
-    fn spend(&mut self, operations: usize) -> Result<(), DeriveError> {
+    fn charge(&mut self, operations: usize) -> Result<(), DeriveError> {
         self.budget.spend(operations)
     }
 }
 
-/// Wanted factors from relations, all of which must be known: much cheaper than from points of motion.
-struct FromRelations<'a> {
-    related: &'a Related,
+/// Evaluates wanted factors from relations whose factors are all known; much cheaper than from points of motion.
+struct RelationFactorOracle<'a> {
+    /// The relations.
+    related: &'a SolvedRelations,
+    /// Source of constants at which all functions exist.
     regressor: &'a SampledRegressor,
-    /// Which ones.
+    /// Pairs of a dependent and a retained column.
     wanted: Vec<(usize, usize)>,
-    budget: &'a mut Budget,
+    /// Remaining field operations.
+    budget: &'a mut OperationBudget,
 }
 
-impl Oracle for FromRelations<'_> {
-    fn constants<const P: u64>(
-        &self,
-        stream: &mut Stream,
-    ) -> Result<FieldPoint<Element<P>>, DeriveError> {
+impl PrimeFieldOracle for RelationFactorOracle<'_> {
+    fn constants<const P: u64>(&self, stream: &mut RandomStream) -> Result<FieldPoint<FieldElement<P>>, DeriveError> {
         self.regressor.sampler.constants(stream)
     }
 
     fn values<const P: u64>(
         &mut self,
-        constants: &FieldPoint<Element<P>>,
-    ) -> Result<Vec<Element<P>>, DeriveError> {
-        self.spend(1000 * self.wanted.len())?;
+        constants: &FieldPoint<FieldElement<P>>,
+    ) -> Result<Vec<FieldElement<P>>, DeriveError> {
+        // An estimate: a thousand operations per factor.
+        self.charge(1000 * self.wanted.len())?;
         let values = self.related.values(&self.wanted, constants);
         values.ok_or(DeriveError::RankChanged)
     }
 
-    fn spend(&mut self, operations: usize) -> Result<(), DeriveError> {
+    fn charge(&mut self, operations: usize) -> Result<(), DeriveError> {
         self.budget.spend(operations)
     }
 }
@@ -228,14 +235,12 @@ mod tests {
     use super::*;
     use crate::expr::independent::SEED;
     use crate::expr::{ExprId, Graph};
-    use crate::reduce::constants::{occurrences, root_radicands};
-    use crate::reduce::sample::sampled;
+    use crate::reduce::constants::{constant_occurrences, root_radicands};
+    use crate::reduce::sample::sample_regressor;
 
     /// An arm of revolute joints, each with a length, a twist and an offset of its own.
     fn twisted(n: usize) -> Mechanism {
-        let mut text = String::from(
-            "schema = 1\nname = \"twisted\"\ngravity = [0, 0, \"-9.81\"]\n[constants]\n",
-        );
+        let mut text = String::from("schema = 1\nname = \"twisted\"\ngravity = [0, 0, \"-9.81\"]\n[constants]\n");
         for i in 1..n {
             writeln!(text, "a{i} = {{ value = 0.1, unit = \"m\" }}\nb{i} = {{ value = 0.{i}, unit = \"rad\" }}\nd{i} = {{ value = 0.2, unit = \"m\" }}").unwrap();
         }
@@ -255,16 +260,16 @@ mod tests {
         modelmill_spec::load(
             "twisted.toml",
             &text,
-            &modelmill_boundary::files::Memory::default(),
+            &modelmill_boundary::files::MemoryFiles::default(),
         )
         .unwrap_or_else(|failure| panic!("{failure}"))
         .mechanism
     }
 
     /// Factors by near relations where they pay, and by relations to retained columns alone.
-    fn both(mechanism: &Mechanism, operations: u64) -> Result<[Vec<Written>; 2], DeriveError> {
+    fn both(mechanism: &Mechanism, operations: u64) -> Result<[Vec<DependentColumn>; 2], DeriveError> {
         let mut graph = Graph::new();
-        let equations = crate::regressor::equations(&mut graph, mechanism)?;
+        let equations = crate::regressor::unreduced_equations(&mut graph, mechanism)?;
         let columns: Vec<&Vec<ExprId>> = (equations.columns.iter())
             .filter(|column| column.iter().any(|x| *x != Graph::ZERO))
             .collect();
@@ -272,35 +277,28 @@ mod tests {
         let outputs: Vec<ExprId> = (0..projection.drives.len())
             .flat_map(|d| columns.iter().map(move |column| column[d]))
             .collect();
-        let regressor = sampled(&mut graph, mechanism, projection, &outputs, columns.len())?;
-        let mut stream = Stream::new(SEED);
+        let regressor = sample_regressor(&mut graph, mechanism, projection, &outputs, columns.len())?;
+        let mut stream = RandomStream::new(SEED);
         let order: Vec<usize> = (0..columns.len()).collect();
-        let mut dependences = Dependences::find(&regressor, &order, &mut stream)?;
-        let variables = occurrences(&graph, &outputs, &projection.loops.residual);
+        let mut dependences = DependenceStructure::find_dependences(&regressor, &order, &mut stream)?;
+        let variables = constant_occurrences(&graph, &outputs, &projection.loops.residual);
         let roots = root_radicands(&graph, &outputs, &projection.loops.residual);
-        let mut factors = |dependences: &Dependences| {
-            find(
-                dependences,
-                &regressor,
-                &variables,
-                &roots,
-                operations,
-                &mut stream,
-            )
+        let mut factors = |dependences: &DependenceStructure| {
+            find_factors(dependences, &regressor, &variables, &roots, operations, &mut stream)
         };
         let near = factors(&dependences)?;
         assert!(
-            dependences.relations.iter().any(|r| !r.is_direct()),
+            dependences.relations.iter().any(|r| !r.has_retained_only()),
             "nothing is near"
         );
-        dependences.relations.retain(ColumnRelation::is_direct);
+        dependences.relations.retain(ColumnRelation::has_retained_only);
         Ok([near, factors(&dependences)?])
     }
 
     #[test]
     fn factors_put_together_from_near_ones_are_those_that_are_found_at_once() {
         let [near, direct] = both(&twisted(4), MOST_OPERATIONS).unwrap();
-        let all = direct.iter().flat_map(|line| &line.by);
+        let all = direct.iter().flat_map(|line| &line.factors);
         assert!(all.clone().count() > 50 && all.clone().all(|(_, factor)| factor.is_some()));
         assert_eq!(near, direct);
     }
@@ -308,11 +306,6 @@ mod tests {
     #[test]
     fn what_takes_too_long_is_given_up() {
         let found = both(&twisted(4), 100_000).unwrap_err();
-        assert_eq!(
-            found,
-            DeriveError::FactorsTooLong {
-                operations: 100_000
-            }
-        );
+        assert_eq!(found, DeriveError::FactorsTooLong { operations: 100_000 });
     }
 }

@@ -1,14 +1,15 @@
-//! Exact reduction to base parameters without expanding anything.
+//! Exact reduction of the regressor to base parameters, without expanding any expression.
 //!
-//! The columns of H are functions on the loops' variety. They are evaluated at random points of a prime field, their
-//! linear dependences found by elimination there, and the constant factors of eq. (6) reconstructed as rational functions
-//! of the model's constants. A wrong answer has a probability below 1e-15 (Schwartz 1980, Zippel 1979).
+//! The columns of H are functions on the variety of the loops. They are evaluated at random points of a prime field,
+//! and their linear dependences are found there by elimination. The constant factors of eq. (6) are then reconstructed
+//! as rational functions of the model's constants. A wrong result has a probability below 1e-15 (Schwartz 1980, Zippel
+//! 1979).
 //!
-//! Where exactness ends: sine, cosine and square roots are algebraic in the field. Signs, absolute values, `tanh`
-//! and `exp` are opaque: equal arguments get equal random values, odd functions stay odd, a sign squares to one. So
-//! the base is minimal for functions that the field knows. It may be too large by what only opaque functions or
-//! numbers share (`sin(q/2)*cos(q/2)` and `sin(q)`, springs on two passive angles that are always equal, constants
-//! that are equal in this file only). The numeric rank is printed too, and a difference is reported.
+//! Limits of exactness: sine, cosine and square roots are algebraic in the field. Signs, absolute values, `tanh` and
+//! `exp` are opaque: equal arguments get equal random values, odd functions stay odd, and a sign has square one. So the
+//! base is minimal with respect to functions that the field knows. It may be too large by relations that only opaque
+//! functions or numbers have (`sin(q/2)*cos(q/2)` and `sin(q)`, springs on two passive angles that are always equal,
+//! constants that are equal in this file only). The numeric rank is printed as well, and a difference is reported.
 
 pub(crate) mod base;
 mod conditioned;
@@ -29,62 +30,61 @@ mod sample;
 mod states;
 mod support;
 
-use modelmill_algebra::field::Stream;
+use modelmill_algebra::field::RandomStream;
 use modelmill_spec::Mechanism;
 
-pub use rational_function::{Polynomial, Powers, RationalFunction, Variable};
-pub use reduction::{Dependency, Method, Reduction};
+pub use rational_function::{FactorVariable, PowerProduct, RationalFunction, TrigonometricPolynomial};
+pub use reduction::{BaseReduction, ColumnDependency, ReductionMethod};
 
 use crate::DeriveError;
 use crate::expr::independent::SEED;
 use crate::expr::{ExprId, Graph};
-use crate::regressor::Equations;
-use crate::tree::expressions::Monomial;
-use constants::{occurrences, root_radicands};
-use dependences::Dependences;
-use preference::{Preference, preference};
-use sample::sampled;
+use crate::regressor::UnreducedEquations;
+use crate::tree::expressions::ParameterMonomial;
+use constants::{constant_occurrences, root_radicands};
+use dependences::DependenceStructure;
+use preference::{RetentionPreference, retention_preference};
+use sample::sample_regressor;
 
-/// Reduces the columns `columns[k][d]` (product by drive) to a base.
+/// Reduces the columns `columns[k][d]` (product by drive) to a base: exactly if possible, else numerically.
 ///
-/// Products that the model file wants to retain are tried first, then the others as [`preference`] orders them; those at
-/// which factors explode with the file's values are exchanged ([`conditioned`]).
+/// Products that the model file requests to retain are tried first, then the others in the order of [`preference`].
+/// Retained products with very large factors at the file's values are exchanged ([`conditioned`]).
+///
+/// # Errors
+/// A [`DeriveError`] if neither the exact nor the numeric reduction succeeds.
 pub(crate) fn reduce(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    equations: &Equations,
-) -> Result<Reduction, DeriveError> {
-    let Equations {
+    equations: &UnreducedEquations,
+) -> Result<BaseReduction, DeriveError> {
+    let UnreducedEquations {
         projection,
         products: candidates,
         columns,
         ..
     } = equations;
+    // Products with an effect on at least one drive.
     let effective: Vec<usize> = (0..columns.len())
         .filter(|k| columns[*k].iter().any(|x| *x != Graph::ZERO))
         .collect();
-    let preference = preference(graph, mechanism, equations, &effective);
+    let preference = retention_preference(graph, mechanism, equations, &effective);
+    // Columns drive by drive, as rows of the regressor have them.
     let outputs: Vec<ExprId> = (0..projection.drives.len())
         .flat_map(|d| effective.iter().map(move |k| columns[*k][d]))
         .collect();
-    let exact = reduce_exactly(
-        graph,
-        mechanism,
-        equations,
-        &effective,
-        &preference,
-        &outputs,
-    );
+    let exact = reduce_exactly(graph, mechanism, equations, &effective, &preference, &outputs);
     let exact = exact.and_then(|found| {
-        // Loops are sampled on their algebraic variety; machines live on the branch of the nominal pose.
+        // Loops are sampled on their complete algebraic variety, but machines live on the branch of the nominal pose.
         let is_contradicted = !projection.loops.closures.is_empty()
-            && numeric::contradicts(graph, mechanism, projection, candidates, columns, &found);
+            && numeric::is_contradicted(graph, mechanism, projection, candidates, columns, &found);
         if is_contradicted {
             Err(DeriveError::NotConfirmed)
         } else {
             Ok(found)
         }
     });
+    // Errors that only the exact method has lead to the numeric one; all others are returned.
     match exact {
         Err(
             because @ (DeriveError::LoopsNotSampled { .. }
@@ -97,51 +97,52 @@ pub(crate) fn reduce(
         ) => {
             let order = preference.own_first.iter();
             let order: Vec<usize> = order.map(|k| effective[*k]).collect();
-            numeric::reduce(
-                graph, mechanism, projection, candidates, columns, &order, because,
-            )
+            numeric::reduce(graph, mechanism, projection, candidates, columns, &order, because)
         }
         exact => exact,
     }
 }
 
+/// Finds the dependences at random points of the field, and their factors as functions of the constants.
 fn reduce_exactly(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    equations: &Equations,
+    equations: &UnreducedEquations,
     effective: &[usize],
-    preference: &Preference,
+    preference: &RetentionPreference,
     outputs: &[ExprId],
-) -> Result<Reduction, DeriveError> {
+) -> Result<BaseReduction, DeriveError> {
     let (projection, candidates) = (&equations.projection, &equations.products);
-    let regressor = sampled(graph, mechanism, projection, outputs, effective.len())?;
-    let mut stream = Stream::new(SEED);
+    let regressor = sample_regressor(graph, mechanism, projection, outputs, effective.len())?;
+    // Numbers and constants that factors may contain.
+    let mut stream = RandomStream::new(SEED);
     let roots = root_radicands(graph, outputs, &projection.loops.residual);
-    let variables = occurrences(graph, outputs, &projection.loops.residual);
+    let variables = constant_occurrences(graph, outputs, &projection.loops.residual);
+    // Dependences with the columns in the order of declaration, and with each link's own columns first.
     let mut order = &preference.declared;
-    let mut dependences = Dependences::find(&regressor, order, &mut stream)?;
+    let mut dependences = DependenceStructure::find_dependences(&regressor, order, &mut stream)?;
     if preference.own_first != preference.declared {
-        let other = Dependences::find(&regressor, &preference.own_first, &mut stream)?;
-        let mut n_quotients = |dependences: &Dependences| {
-            factors::n_quotients(dependences, &regressor, &variables, &mut stream)
-        };
+        let other = DependenceStructure::find_dependences(&regressor, &preference.own_first, &mut stream)?;
+        let mut n_quotients =
+            |dependences: &DependenceStructure| factors::n_quotients(dependences, &regressor, &variables, &mut stream);
+        // The second order is used if its factors have fewer sums in denominators.
         if other.pivots != dependences.pivots && n_quotients(&other)? < n_quotients(&dependences)? {
             (order, dependences) = (&preference.own_first, other);
         }
     }
-    let columns: Vec<Vec<ExprId>> = (effective.iter())
-        .map(|k| equations.columns[*k].clone())
-        .collect();
+    // The same columns in double precision decide whether factors are moderate at the file's values.
+    let columns: Vec<Vec<ExprId>> = (effective.iter()).map(|k| equations.columns[*k].clone()).collect();
     let units: Vec<String> = (effective.iter())
-        .map(|k| base::unit(mechanism, &candidates[*k]))
+        .map(|k| base::product_unit(mechanism, &candidates[*k]))
         .collect();
-    let written = conditioned::Columns {
+    let written = conditioned::RegressorColumns {
         values: &columns,
         units: &units,
     };
     let names = |k: usize| candidates[effective[k]].clone();
-    let reduced = |dependences: &Dependences, stream: &mut Stream| {
-        let factors = factors::find(
+    // Factors of a set of dependences, confirmed with fresh constants.
+    let reduced = |dependences: &DependenceStructure, stream: &mut RandomStream| {
+        let factors = factors::find_factors(
             dependences,
             &regressor,
             &variables,
@@ -150,10 +151,11 @@ fn reduce_exactly(
             stream,
         )?;
         let reduction = dependences.reduction(mechanism, candidates, &names, factors)?;
-        reduction.confirm(&regressor, &dependences.shown, stream)?;
+        reduction.confirm_reduction(&regressor, &dependences.shown, stream)?;
         Ok(reduction)
     };
-    let better = conditioned::exchanged(
+    // Columns that nearly coincide at the file's values may be retained in place of others.
+    let better = conditioned::exchange_columns(
         graph,
         mechanism,
         projection,
@@ -163,6 +165,7 @@ fn reduce_exactly(
         &order[..preference.n_named],
     );
     if let Some(exchange) = better {
+        // An uncertain exchange is made only if the exact factors are large as well.
         if !exchange.is_certain
             && let Ok(found) = reduced(&dependences, &mut stream)
         {
@@ -171,27 +174,31 @@ fn reduce_exactly(
                 return Ok(found);
             }
         }
-        let (first, rest): (Vec<usize>, Vec<usize>) =
-            order.iter().partition(|k| exchange.retained.contains(k));
-        dependences = Dependences::find(&regressor, &[first, rest].concat(), &mut stream)?;
+        // The new choice becomes the order in which columns are tried.
+        let (first, rest): (Vec<usize>, Vec<usize>) = order.iter().partition(|k| exchange.retained.contains(k));
+        dependences = DependenceStructure::find_dependences(&regressor, &[first, rest].concat(), &mut stream)?;
     }
     reduced(&dependences, &mut stream)
 }
 
-/// The products that are wanted and have an effect, all retained.
-pub(crate) fn unreduced(equations: &Equations, wanted: &dyn Fn(&Monomial) -> bool) -> Reduction {
+/// A reduction that retains every wanted product with an effect; for uses that need no base.
+pub(crate) fn without_reduction(
+    equations: &UnreducedEquations,
+    wanted: &dyn Fn(&ParameterMonomial) -> bool,
+) -> BaseReduction {
     let is_zero = |column: &Vec<ExprId>| column.iter().all(|x| *x == Graph::ZERO);
-    let pick = |zero: bool| -> Vec<Monomial> {
+    // Wanted products with or without an effect.
+    let pick = |zero: bool| -> Vec<ParameterMonomial> {
         let pairs = equations.products.iter().zip(&equations.columns);
         let found = pairs.filter(|(product, column)| wanted(product) && is_zero(column) == zero);
         found.map(|(product, _)| product.clone()).collect()
     };
     let products = pick(false);
-    Reduction {
+    BaseReduction {
         retained: (0..products.len()).collect(),
         without_effect: pick(true),
         products,
         dependencies: Vec::new(),
-        method: Method::Unreduced,
+        method: ReductionMethod::Unreduced,
     }
 }

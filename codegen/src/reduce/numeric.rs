@@ -1,9 +1,10 @@
-//! The numeric reduction, for loops that cannot be sampled exactly: the rank test of eq. (9) on the model file's values, with
-//! so many digits that what is dependent shows beside what is only small.
+//! The numeric reduction, for loops that cannot be sampled exactly: the rank test of eq. (9) on the model file's
+//! values, with so many digits that dependent columns can be distinguished from small ones.
 //!
-//! Columns of a mechanism with one freedom are functions of one coordinate, and smooth: on a short path they differ by less than
-//! machine numbers resolve. So states come from a walk along the whole motion, have some 130 digits, and are on all loops.
-//! The factors hold for the file's values alone; results say so, with what they leave at further states.
+//! Columns of a mechanism with one degree of freedom are smooth functions of one coordinate. On a short path they
+//! differ by less than double precision resolves. So states come from a walk along the complete motion, have some 130
+//! digits, and close all loops. The factors are valid for the file's values alone; results state this, with the
+//! residual at further states.
 //!
 //! Decision: with machine numbers the singular values of such columns fade into rounding without a gap; a Bricard
 //! linkage had 18, 22 or 26 base parameters, depending on the path. With 130 digits a dependent column leaves
@@ -12,75 +13,82 @@
 //! file are rounded, that rounding sets the limit, and a factor is at most one constant times a number. The factors
 //! as written are checked at further states; if that fails there is no base.
 
-use modelmill_algebra::digits::Digits;
-use modelmill_algebra::field::Stream;
+use modelmill_algebra::digits::BigFloat;
+use modelmill_algebra::field::RandomStream;
 use modelmill_spec::Mechanism;
 use nalgebra::DMatrix;
 
 use super::base;
-use super::recognise::{Constants, metres};
-use super::reduction::{Dependency, Method, Reduction};
-use super::states::States;
+use super::recognise::{FileConstants, length_exponent};
+use super::reduction::{BaseReduction, ColumnDependency, ReductionMethod};
+use super::states::WalkSampler;
 use crate::DeriveError;
 use crate::expr::independent::SEED;
-use crate::expr::{Atom, ExprId, F64, Graph, Tape};
-use crate::loops::numeric_poses::{NumericLoops, symmetric};
-use crate::regressor::projection::Projection;
-use crate::tree::expressions::Monomial;
+use crate::expr::{Atom, EvaluationTape, ExprId, FloatDomain, Graph};
+use crate::loops::numeric_poses::{NumericLoops, uniform_symmetric};
+use crate::regressor::projection::LoopProjection;
+use crate::tree::expressions::ParameterMonomial;
 
-/// A column counts as dependent where others leave less than this of it, relative to its size; and as none where it is smaller
-/// than this, relative to the largest. So does a column at a pose in machine numbers.
+/// A column counts as dependent if its residual is below this share of its size, and as zero if it is below this share
+/// of the largest column. The second limit is also used for columns in double precision.
 const DEPENDENT: f64 = 1e-13;
-/// The same where the digits of the file leave loops open: as a multiple of what they leave, relative to the size of a loop.
+/// The same for loops with rounded lengths: as a multiple of their closure error, relative to the size of a loop.
 const PER_OFF: f64 = 100.0;
-/// What written factors may leave of a column at further states, relative to its terms.
+/// Largest residual of a column at further states with the factors as written, relative to its terms.
 const SHOWN: f64 = 1e-10;
-/// The same where loops are left open, as a multiple of that.
+/// The same for loops with rounded lengths, as a multiple of their closure error.
 const SHOWN_PER_OFF: f64 = 1000.0;
-/// How far poses lie from the nominal one, in rad or relative to the size of the loops, and how often that is halved
-/// where most of such poses cannot be reached.
+/// Distance of poses from the nominal one, in rad or relative to the size of the loops.
 pub(super) const REACH: f64 = 0.4;
+/// How often the distance is halved if most of such poses cannot be reached.
 const HALVINGS: u32 = 7;
 
-/// How often states are added where dependences do not hold further along the motion.
+/// How often states are added if dependences are not valid further along the motion.
 const ROUNDS: usize = 4;
 
-/// Reduces `columns[k][d]`, trying them in the given order.
+/// the exact reduction failed.
+/// Reduces `columns[k][d]` (product by drive), trying them as retained ones in the given order. `because` is the reason
+/// why
+///
+/// # Errors
+/// [`DeriveError::NotConfirmed`] if the factors are not valid at further states, or the errors of [`WalkSampler`].
 pub(super) fn reduce(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    projection: &Projection,
-    candidates: &[Monomial],
+    projection: &LoopProjection,
+    candidates: &[ParameterMonomial],
     columns: &[Vec<ExprId>],
     order: &[usize],
     because: DeriveError,
-) -> Result<Reduction, DeriveError> {
-    let mut states = States::new(graph, mechanism, projection, columns)?;
+) -> Result<BaseReduction, DeriveError> {
+    let mut states = WalkSampler::new(graph, mechanism, projection, columns)?;
+    // More rows than columns, so that dependences cannot appear by chance.
     let n_rows = columns.len() + columns.len() / 4 + 20;
     let values: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
-    let mut rows = states.rows(n_rows)?;
+    let mut rows = states.next_rows(n_rows)?;
     for _ in 0..ROUNDS {
-        let w = Columns::new(&rows, columns.len());
-        let limit = DEPENDENT.max(PER_OFF * states.off());
-        // Masses and their moments are compared at the length of the largest loop.
+        let w = ObservationColumns::new(&rows, columns.len());
+        let limit = DEPENDENT.max(PER_OFF * states.closure_error());
+        // Masses and their moments are compared at the size of the largest loop as the length.
         let sized = |k: usize| {
-            let metres = metres(&base::unit(mechanism, &candidates[k])).unwrap_or(2);
-            w.norms[k] / states.length().powi(2 - metres)
+            let metres = length_exponent(&base::product_unit(mechanism, &candidates[k])).unwrap_or(2);
+            w.norms[k] / states.loop_size().powi(2 - metres)
         };
         let sizes: Vec<f64> = (0..columns.len()).map(sized).collect();
         let largest = sizes.iter().fold(0.0, |a: f64, b| a.max(*b));
         let is_effective = |k: &usize| sizes[*k] > limit * largest;
         let tried: Vec<usize> = order.iter().copied().filter(is_effective).collect();
-        let base = Base::new(&w, &tried, limit);
-        // What contributes less than is dropped is rounding.
+        let base = NumericBase::new(&w, &tried, limit);
+        // Contributions below the residual of dropped columns are rounding errors.
         let rounding = (1e3 * base.most_dropped).clamp(1e-60, 1e-9);
-        let (mut found, effective) = written(mechanism, candidates, &w, &tried, &base, rounding);
-        let further = states.rows(n_rows)?;
-        let residual = Columns::new(&further, columns.len()).left(&found, &effective, &values);
-        // Terms that count as rounding are left out, each by itself.
+        let (mut found, effective) = numeric_reduction(mechanism, candidates, &w, &tried, &base, rounding);
+        // The factors as written are checked at states that were not used.
+        let further = states.next_rows(n_rows)?;
+        let residual = ObservationColumns::new(&further, columns.len()).largest_residual(&found, &effective, &values);
+        // Terms below the rounding error are dropped, each by itself.
         let left_out = rounding * base.kept.len() as f64;
-        if residual <= SHOWN.max(SHOWN_PER_OFF * states.off()).max(left_out) {
-            found.method = Method::Numeric {
+        if residual <= SHOWN.max(SHOWN_PER_OFF * states.closure_error()).max(left_out) {
+            found.method = ReductionMethod::Numeric {
                 least_kept: base.least_kept,
                 most_dropped: base.most_dropped,
                 residual,
@@ -88,22 +96,22 @@ pub(super) fn reduce(
             };
             return Ok(found);
         }
-        // The path was too short for what is so small on it.
+        // The path was too short to distinguish small columns, so it is extended.
         rows.extend(further);
     }
     Err(DeriveError::NotConfirmed)
 }
 
-/// What was found as dependences of columns that have an effect, with the positions of these; factors as a person would write
-/// them.
-fn written(
+/// The reduction by the numeric dependences, and the positions of the columns with an effect. Factors are written in
+/// the form that a person would choose.
+fn numeric_reduction(
     mechanism: &Mechanism,
-    candidates: &[Monomial],
-    w: &Columns,
+    candidates: &[ParameterMonomial],
+    w: &ObservationColumns,
     tried: &[usize],
-    base: &Base,
+    base: &NumericBase,
     rounding: f64,
-) -> (Reduction, Vec<usize>) {
+) -> (BaseReduction, Vec<usize>) {
     let mut effective = tried.to_vec();
     effective.sort_unstable();
     let at = |k: usize| {
@@ -112,59 +120,55 @@ fn written(
             .position(|x| *x == k)
             .expect("an effective column has a position")
     };
+    // Retained columns in the order of the products.
     let mut sorted = base.kept.clone();
     sorted.sort_unstable();
-    let retained_at = |k: usize| {
-        sorted
-            .iter()
-            .position(|x| *x == k)
-            .expect("a kept column is kept")
-    };
-    let constants = Constants::new(mechanism, rounding.min(1e-10));
-    let mut dependencies: Vec<Dependency> = Vec::new();
+    let retained_at = |k: usize| sorted.iter().position(|x| *x == k).expect("a kept column is kept");
+    let constants = FileConstants::new(mechanism, rounding.min(1e-10));
+    let mut dependencies: Vec<ColumnDependency> = Vec::new();
     for j in tried.iter().copied().filter(|j| !base.kept.contains(j)) {
-        let factors = base.kept.iter().zip(base.factors(j));
+        let factors = base.kept.iter().zip(base.column_factors(j));
+        // Factors whose contribution is below the rounding error are dropped.
         let mut equals: Vec<_> = factors
             .filter(|(k, f)| f.abs().to_f64() * w.norms[**k] > rounding * w.norms[j])
             .map(|(k, f)| {
                 (
                     retained_at(*k),
-                    constants.factor(&f, &candidates[j], &candidates[*k]),
+                    constants.recognise_factor(&f, &candidates[j], &candidates[*k]),
                 )
             })
             .collect();
         equals.sort_by_key(|(k, _)| *k);
-        dependencies.push(Dependency {
+        dependencies.push(ColumnDependency {
             product: at(j),
             equals,
             via: Vec::new(),
         });
     }
     dependencies.sort_by_key(|line| line.product);
-    let products: Vec<Monomial> = effective.iter().map(|k| candidates[*k].clone()).collect();
-    let found = Reduction {
-        without_effect: candidates
-            .iter()
-            .filter(|c| !products.contains(c))
-            .cloned()
-            .collect(),
+    let products: Vec<ParameterMonomial> = effective.iter().map(|k| candidates[*k].clone()).collect();
+    let found = BaseReduction {
+        without_effect: candidates.iter().filter(|c| !products.contains(c)).cloned().collect(),
         retained: sorted.iter().map(|k| at(*k)).collect(),
         products,
         dependencies,
-        method: Method::Unreduced,
+        method: ReductionMethod::Unreduced,
     };
     (found, effective)
 }
 
-/// Columns of W.
-struct Columns {
-    values: Vec<Vec<Digits>>,
+/// Columns of the observation matrix W of eq. (9).
+struct ObservationColumns {
+    /// One vector per column.
+    values: Vec<Vec<BigFloat>>,
+    /// Euclidean norm of every column.
     norms: Vec<f64>,
 }
 
-impl Columns {
-    fn new(rows: &[Vec<Digits>], n: usize) -> Self {
-        let values: Vec<Vec<Digits>> = (0..n)
+impl ObservationColumns {
+    /// Collects the columns of some rows.
+    fn new(rows: &[Vec<BigFloat>], n: usize) -> Self {
+        let values: Vec<Vec<BigFloat>> = (0..n)
             .map(|k| rows.iter().map(|row| row[k].clone()).collect())
             .collect();
         Self {
@@ -173,8 +177,8 @@ impl Columns {
         }
     }
 
-    /// The most that dependences leave of a column, relative to their terms.
-    fn left(&self, found: &Reduction, effective: &[usize], constants: &[f64]) -> f64 {
+    /// The largest residual of a dependent column with given factors, relative to the sum of the norms of its terms.
+    fn largest_residual(&self, found: &BaseReduction, effective: &[usize], constants: &[f64]) -> f64 {
         let lines = found.dependencies.iter().zip(found.factors(constants));
         let shares = lines.map(|(line, factors)| {
             let product = effective[line.product];
@@ -183,8 +187,8 @@ impl Columns {
             for (k, factor) in factors {
                 let kept = effective[found.retained[k]];
                 size += factor.abs() * self.norms[kept];
-                let factor = Digits::from_f64(-factor).expect("a factor is a number");
-                add(&mut left, &factor, &self.values[kept]);
+                let factor = BigFloat::from_f64(-factor).expect("a factor is a number");
+                add_multiple(&mut left, &factor, &self.values[kept]);
             }
             norm(&left) / size
         });
@@ -192,40 +196,41 @@ impl Columns {
     }
 }
 
-fn norm(column: &[Digits]) -> f64 {
-    column
-        .iter()
-        .map(|x| x.to_f64().powi(2))
-        .sum::<f64>()
-        .sqrt()
+/// Euclidean norm, in double precision.
+fn norm(column: &[BigFloat]) -> f64 {
+    column.iter().map(|x| x.to_f64().powi(2)).sum::<f64>().sqrt()
 }
 
-fn dot(a: &[Digits], b: &[Digits]) -> Digits {
+/// Scalar product with all digits.
+fn dot(a: &[BigFloat], b: &[BigFloat]) -> BigFloat {
     let products = a.iter().zip(b).map(|(a, b)| a * b);
-    products.fold(Digits::zero(), |sum, term| &sum + &term)
+    products.fold(BigFloat::zero(), |sum, term| &sum + &term)
 }
 
 /// `column + factor * other`
-fn add(column: &mut [Digits], factor: &Digits, other: &[Digits]) {
+fn add_multiple(column: &mut [BigFloat], factor: &BigFloat, other: &[BigFloat]) {
     for (x, y) in column.iter_mut().zip(other) {
         *x = &*x + &(factor * y);
     }
 }
 
-/// Columns that are kept, and what all others are beside them.
-struct Base {
-    /// In the order in which they were taken.
+/// Retained columns, and all other columns as combinations of them.
+struct NumericBase {
+    /// Retained columns, in the order in which they were selected.
     kept: Vec<usize>,
-    /// What the others leave of the kept column that is nearest to being dependent, and of the dropped one that is furthest.
+    /// Least relative residual of a retained column when it was selected.
     least_kept: f64,
+    /// Largest relative residual of a column that was not selected.
     most_dropped: f64,
-    /// Of each column the shares along what was left of each kept one when that was taken.
-    shares: Vec<Vec<Digits>>,
+    /// For each column its components along the residuals of the retained columns, in the order of their selection.
+    shares: Vec<Vec<BigFloat>>,
 }
 
-impl Base {
-    /// The first columns of which much is left beside those before, then those of which most is left, down to `limit`.
-    fn new(w: &Columns, tried: &[usize], limit: f64) -> Self {
+impl NumericBase {
+    /// Selects columns by Gram-Schmidt: first the earliest columns with a large residual, then always the one with the
+    /// largest residual, down to `limit`.
+    fn new(w: &ObservationColumns, tried: &[usize], limit: f64) -> Self {
+        // Relative residual above which the order decides, and not the size.
         const MUCH: f64 = 1e-3;
         let mut left = w.values.clone();
         let mut base = Self {
@@ -235,6 +240,7 @@ impl Base {
             shares: vec![Vec::new(); w.values.len()],
         };
         loop {
+            // Relative residuals of all columns that are not selected.
             let open: Vec<(usize, f64)> = (tried.iter().copied())
                 .filter(|j| !base.kept.contains(j))
                 .map(|j| (j, norm(&left[j]) / w.norms[j]))
@@ -247,18 +253,19 @@ impl Base {
             };
             base.least_kept = base.least_kept.min(size);
             base.kept.push(pivot);
+            // The selected residual is removed from all other columns.
             let direction = left[pivot].clone();
             let square = dot(&direction, &direction);
             for (j, _) in open.into_iter().filter(|(j, _)| *j != pivot) {
                 let share = dot(&direction, &left[j]) / square.clone();
-                add(&mut left[j], &-&share, &direction);
+                add_multiple(&mut left[j], &-&share, &direction);
                 base.shares[j].push(share);
             }
         }
     }
 
-    /// A dropped column by the kept ones.
-    fn factors(&self, j: usize) -> Vec<Digits> {
+    /// The factors of the retained columns in a dependent column, by back substitution.
+    fn column_factors(&self, j: usize) -> Vec<BigFloat> {
         let mut factors = self.shares[j].clone();
         for m in (0..factors.len()).rev() {
             for i in 0..m {
@@ -270,19 +277,19 @@ impl Base {
     }
 }
 
-/// Whether dependences that were found elsewhere fail on the model file's values around the nominal pose. Where no pose
-/// is found they do not.
-pub(super) fn contradicts(
+/// Whether dependences that were found exactly are not valid at the model file's values around the nominal pose. False
+/// if no pose is found.
+pub(super) fn is_contradicted(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    projection: &Projection,
-    candidates: &[Monomial],
+    projection: &LoopProjection,
+    candidates: &[ParameterMonomial],
     columns: &[Vec<ExprId>],
-    found: &Reduction,
+    found: &BaseReduction,
 ) -> bool {
-    /// Far above rounding in poses that are followed, far below what a wrong dependence makes.
+    /// Far above rounding errors at followed poses, and far below the residual of a wrong dependence.
     const WRONG: f64 = 1e-6;
-    let Ok(w) = sample(graph, mechanism, projection, columns, 0, REACH) else {
+    let Ok(w) = sample_observations(graph, mechanism, projection, columns, 0, REACH) else {
         return false;
     };
     let constants: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
@@ -295,67 +302,60 @@ pub(super) fn contradicts(
     };
     let largest = w.column_iter().map(|c| c.norm()).fold(0.0, f64::max);
     let factors = found.factors(&constants);
-    found
-        .dependencies
-        .iter()
-        .zip(&factors)
-        .any(|(line, factors)| {
-            let mut left = column(line.product).into_owned();
-            let mut size = left.norm();
-            for (k, factor) in factors {
-                let term = column(found.retained[*k]) * *factor;
-                size += term.norm();
-                left -= term;
-            }
-            left.norm() > WRONG * size && left.norm() > DEPENDENT * largest
-        })
+    found.dependencies.iter().zip(&factors).any(|(line, factors)| {
+        let mut left = column(line.product).into_owned();
+        let mut size = left.norm();
+        for (k, factor) in factors {
+            let term = column(found.retained[*k]) * *factor;
+            size += term.norm();
+            left -= term;
+        }
+        left.norm() > WRONG * size && left.norm() > DEPENDENT * largest
+    })
 }
 
-/// W of eq. (9) at random states around the nominal pose, with some more rows than are wanted.
-pub(super) fn sample(
+/// The observation matrix W of eq. (9) at random states around the nominal pose, with a few more rows than `wanted`.
+///
+/// # Errors
+/// [`DeriveError::NoPointFound`] if too few poses can be reached.
+pub(super) fn sample_observations(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    projection: &Projection,
+    projection: &LoopProjection,
     columns: &[Vec<ExprId>],
     wanted: usize,
     farthest: f64,
 ) -> Result<DMatrix<f64>, DeriveError> {
     let n_drives = projection.drives.len();
-    let outputs: Vec<ExprId> = (0..n_drives)
-        .flat_map(|d| columns.iter().map(move |c| c[d]))
-        .collect();
+    let outputs: Vec<ExprId> = (0..n_drives).flat_map(|d| columns.iter().map(move |c| c[d])).collect();
     let loops = NumericLoops::new(graph, mechanism, &projection.loops.residual);
-    let [rates, accelerations, outputs] = [
-        &projection.passive_rates,
-        &projection.passive_accelerations,
-        &outputs,
-    ]
-    .map(|roots| Tape::new(graph, roots));
-    let mut stream = Stream::new(SEED);
+    let [rates, accelerations, outputs] = [&projection.passive_rates, &projection.passive_accelerations, &outputs]
+        .map(|roots| EvaluationTape::new(graph, roots));
+    let mut stream = RandomStream::new(SEED);
     let n_coordinates = mechanism.coordinates.len();
     let mut rows: Vec<f64> = Vec::new();
     let wanted = wanted.div_ceil(n_drives.max(1)) + 10;
     let (mut n_points, mut tries) = (0, 0);
     let mut reach = farthest;
     while n_points < wanted && tries < (HALVINGS as usize + 20) * wanted {
+        // Poses are drawn nearer to the nominal one while fewer than a quarter of them can be reached.
         if tries % wanted == 0 && n_points < tries / 4 {
             reach = (reach / 2.0).max(farthest / f64::from(1_u32 << HALVINGS));
         }
         tries += 1;
-        let Some(q) = loops.random(reach, &mut stream) else {
+        let Some(q) = loops.random_pose(reach, &mut stream) else {
             continue;
         };
+        // Random rates and accelerations, scaled by the units of the coordinates.
         let mut moving = |most: f64| -> Vec<f64> {
             (0..n_coordinates)
-                .map(|i| most * loops.unit(i) * symmetric(&mut stream))
+                .map(|i| most * loops.coordinate_unit(i) * uniform_symmetric(&mut stream))
                 .collect()
         };
         let (mut qd, mut qdd) = (moving(2.0), moving(5.0));
-        let load: Vec<f64> = (0..n_drives)
-            .map(|_| 100.0 * symmetric(&mut stream))
-            .collect();
-        let evaluate = |tape: &Tape, qd: &[f64], qdd: &[f64]| {
-            tape.evaluate(&F64(|atom: Atom| match atom {
+        let load: Vec<f64> = (0..n_drives).map(|_| 100.0 * uniform_symmetric(&mut stream)).collect();
+        let evaluate = |tape: &EvaluationTape, qd: &[f64], qdd: &[f64]| {
+            tape.evaluate(&FloatDomain(|atom: Atom| match atom {
                 Atom::Constant(i) => mechanism.constants[i].value,
                 Atom::Parameter(i) => mechanism.parameters[i].nominal,
                 Atom::Coordinate(i) => q[i],
@@ -366,6 +366,7 @@ pub(super) fn sample(
                 Atom::Base(_) | Atom::Shared(_) => 0.0,
             }))
         };
+        // The loops determine the passive rates, then the passive accelerations.
         let Some(found) = evaluate(&rates, &qd, &qdd) else {
             continue;
         };
@@ -389,17 +390,13 @@ pub(super) fn sample(
     if n_points < wanted {
         return Err(DeriveError::NoPointFound { draws: tries });
     }
-    Ok(DMatrix::from_row_slice(
-        n_points * n_drives,
-        columns.len(),
-        &rows,
-    ))
+    Ok(DMatrix::from_row_slice(n_points * n_drives, columns.len(), &rows))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::regressor::equations;
+    use crate::regressor::unreduced_equations;
     use crate::review::tests::model;
 
     /// Where an exact base is known the numeric one has as many columns, with factors that are constants of the file.
@@ -418,9 +415,9 @@ mod tests {
         ] {
             let mechanism = model(name);
             let mut graph = Graph::new();
-            let found = equations(&mut graph, &mechanism).expect("equations");
+            let found = unreduced_equations(&mut graph, &mechanism).expect("equations");
             let exact = crate::reduce::reduce(&mut graph, &mechanism, &found).expect("a base");
-            assert!(matches!(exact.method, Method::Exact { .. }), "{name}");
+            assert!(matches!(exact.method, ReductionMethod::Exact { .. }), "{name}");
             let order: Vec<usize> = (0..found.columns.len())
                 .filter(|k| found.columns[*k].iter().any(|x| *x != Graph::ZERO))
                 .collect();
@@ -435,7 +432,7 @@ mod tests {
             )
             .expect("a base");
             assert_eq!(numeric.retained.len(), exact.retained.len(), "{name}");
-            let Method::Numeric {
+            let ReductionMethod::Numeric {
                 least_kept,
                 most_dropped,
                 residual,
@@ -457,25 +454,21 @@ mod tests {
             assert!(text.contains(old), "{name} has no {old}");
             text = text.replace(old, new);
         }
-        let memory = modelmill_boundary::files::Memory::default();
+        let memory = modelmill_boundary::files::MemoryFiles::default();
         match modelmill_spec::load(name, &text, &memory) {
             Ok(loaded) => loaded.mechanism,
             Err(failure) => panic!("{}", failure.render(false)),
         }
     }
 
-    /// Loops that move against the count of their freedoms, and loops that fold: the number is beyond doubt, and factors are
-    /// constants of the file, without a decimal point.
+    /// Loops that move against the count of their freedoms, and loops that fold: the number is beyond doubt, and
+    /// factors are constants of the file, without a decimal point.
     #[test]
     fn overconstrained_and_symmetric_loops() {
-        for (name, rank) in [
-            ("bricard_trihedral", 22),
-            ("bricard_regular", 19),
-            ("sarrus", 5),
-        ] {
+        for (name, rank) in [("bricard_trihedral", 22), ("bricard_regular", 19), ("sarrus", 5)] {
             let found = crate::derive(&judged(name, &[])).expect("a derivation");
             assert_eq!(found.reduction.retained.len(), rank, "{name}");
-            let Method::Numeric {
+            let ReductionMethod::Numeric {
                 least_kept,
                 most_dropped,
                 residual,
@@ -490,26 +483,19 @@ mod tests {
                 continue;
             }
             for base in found.base_parameters() {
-                assert!(
-                    !base.expression.contains('.'),
-                    "{name}: {}",
-                    base.expression
-                );
+                assert!(!base.expression.contains('.'), "{name}: {}", base.expression);
             }
         }
     }
 
-    /// Lengths that a person has rounded close a loop with more equations than it needs only nearly: the base is that of the
-    /// loop that was meant, and what is left says how nearly.
+    /// With rounded lengths, a loop with more equations than needed closes only approximately. The base is that of the
+    /// exact loop, and the residual shows the rounding.
     #[test]
     fn rounded_lengths_keep_the_base() {
-        let rounded = [(
-            r#"xyz = ["-(a)", 0, 0]"#,
-            r#"xyz = ["-0.4000000003", 0, 0]"#,
-        )];
+        let rounded = [(r#"xyz = ["-(a)", 0, 0]"#, r#"xyz = ["-0.4000000003", 0, 0]"#)];
         let found = crate::derive(&judged("bricard_regular", &rounded)).expect("a derivation");
         assert_eq!(found.reduction.retained.len(), 19);
-        let Method::Numeric { residual, .. } = found.reduction.method else {
+        let ReductionMethod::Numeric { residual, .. } = found.reduction.method else {
             panic!("{:?}", found.reduction.method);
         };
         assert!(residual > 1e-12 && residual < 1e-6, "{residual:.1e}");

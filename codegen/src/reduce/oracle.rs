@@ -1,34 +1,44 @@
-//! Functions of the constants as a black box, and how much work may go into asking it.
+//! Functions of the constants as a black box, and a limit of the work that their evaluation may take.
 
-use modelmill_algebra::field::{Element, Stream};
+use modelmill_algebra::field::{FieldElement, RandomStream};
 
 use crate::DeriveError;
 use crate::expr::FieldPoint;
 
-/// A black box in every prime field.
-pub(crate) trait Oracle {
-    /// Random constants.
-    fn constants<const P: u64>(
-        &self,
-        stream: &mut Stream,
-    ) -> Result<FieldPoint<Element<P>>, DeriveError>;
-    /// Values of all functions at given constants.
+/// Functions that can be evaluated in every prime field, but not inspected.
+pub(crate) trait PrimeFieldOracle {
+    /// Random constants at which the functions exist.
+    ///
+    /// # Errors
+    /// [`DeriveError::NoPointFound`] if there are no such constants.
+    fn constants<const P: u64>(&self, stream: &mut RandomStream) -> Result<FieldPoint<FieldElement<P>>, DeriveError>;
+    /// Values of all functions for given constants.
+    ///
+    /// # Errors
+    /// A [`DeriveError`] if a value does not exist, or if the operations are used up.
     fn values<const P: u64>(
         &mut self,
-        constants: &FieldPoint<Element<P>>,
-    ) -> Result<Vec<Element<P>>, DeriveError>;
-    /// Says that so many operations will be done beside evaluation; an error where they are too many.
-    fn spend(&mut self, operations: usize) -> Result<(), DeriveError>;
+        constants: &FieldPoint<FieldElement<P>>,
+    ) -> Result<Vec<FieldElement<P>>, DeriveError>;
+    /// Announces operations in addition to the evaluation.
+    ///
+    /// # Errors
+    /// [`DeriveError::FactorsTooLong`] if the limit is exceeded.
+    fn charge(&mut self, operations: usize) -> Result<(), DeriveError>;
 }
 
-/// How many operations of the field may still be done. Time would differ from machine to machine, and with it the result.
+/// Number of field operations that may still be done. A limit in seconds would give different results on different
+/// machines.
 #[derive(Clone, Debug)]
-pub(super) struct Budget {
+pub(super) struct OperationBudget {
+    /// The limit.
     all: u64,
+    /// Remaining operations.
     left: u64,
 }
 
-impl Budget {
+impl OperationBudget {
+    /// A budget of some operations, none of them used.
     pub(super) fn new(operations: u64) -> Self {
         Self {
             all: operations,
@@ -36,16 +46,15 @@ impl Budget {
         }
     }
 
+    /// Uses some operations; an error if fewer remain.
     pub(super) fn spend(&mut self, operations: usize) -> Result<(), DeriveError> {
         let operations = u64::try_from(operations).unwrap_or(u64::MAX);
         let left = self.left.checked_sub(operations);
-        self.left = left.ok_or(DeriveError::FactorsTooLong {
-            operations: self.all,
-        })?;
+        self.left = left.ok_or(DeriveError::FactorsTooLong { operations: self.all })?;
         Ok(())
     }
 }
 
-/// A way in which a constant occurs, by index and whether inside sines and cosines. A constant that occurs in both ways
-/// counts as two: no rational function ties a number to its sine.
-pub(crate) type Occurrence = (usize, bool);
+/// A way in which a constant occurs: its index, and whether it is in sines and cosines. A constant that occurs in both
+/// ways counts as two, because no rational function relates a number to its sine.
+pub(crate) type ConstantOccurrence = (usize, bool);

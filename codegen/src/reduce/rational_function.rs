@@ -1,20 +1,20 @@
-//! Rational functions of the model's constants: the factors a_k of eq. (6).
+//! Rational functions of the model's constants: the factors a_k of eq. (6), with their values and normal form.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use modelmill_algebra::field::Element;
+use modelmill_algebra::field::FieldElement;
 
 use num_rational::BigRational;
 use num_traits::{ToPrimitive, Zero};
 
-use crate::expr::{AngleSum, Atom, ExprId, FieldPoint, Graph, Rational};
+use crate::expr::{Atom, AtomAngleSum, ExprId, FieldPoint, Graph, Rational};
 
-/// What is left of a sum's terms, relative to their sizes, below which it is added up exactly.
+/// A sum below this share of its terms' magnitudes is added up exactly, because rounding would dominate it.
 const CANCELLED: f64 = 1e-3;
 
 /// What a factor may depend on: a constant, or the cosine or sine of a constant angle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Variable {
+pub enum FactorVariable {
     /// A constant of the model file.
     Constant(usize),
     /// Cosine of a constant angle.
@@ -25,20 +25,22 @@ pub enum Variable {
     Root(i64),
 }
 
-impl Variable {
+impl FactorVariable {
     /// Its value at a point of the field.
-    pub(crate) fn value<const P: u64>(self, point: &FieldPoint<Element<P>>) -> Option<Element<P>> {
+    pub(crate) fn value<const P: u64>(self, point: &FieldPoint<FieldElement<P>>) -> Option<FieldElement<P>> {
+        // Sine and cosine of a constant are drawn independently of its value.
         match self {
             Self::Constant(i) => point.values.get(&Atom::Constant(i)).copied(),
             Self::Cos(i) => point.angles.get(&Atom::Constant(i)).map(|cs| cs.0),
             Self::Sin(i) => point.angles.get(&Atom::Constant(i)).map(|cs| cs.1),
+            // Both signs of the root are possible; the point has chosen one.
             Self::Root(n) => {
-                crate::expr::Domain::unary(point, crate::expr::Unary::Sqrt, &Element::from_i64(n))
+                crate::expr::EvaluationDomain::unary(point, crate::expr::Unary::Sqrt, &FieldElement::from_i64(n))
             }
         }
     }
 
-    /// Its value for constants in floating point, by index.
+    /// Its value in double precision, for constants by index.
     fn value_f64(self, constants: &[f64]) -> f64 {
         match self {
             Self::Constant(i) => constants[i],
@@ -52,8 +54,8 @@ impl Variable {
     pub fn expression(self, graph: &mut Graph) -> ExprId {
         match self {
             Self::Constant(i) => graph.atom(Atom::Constant(i)),
-            Self::Cos(i) => graph.cos_sin(&AngleSum::new([(Atom::Constant(i), 1)]), 0).0,
-            Self::Sin(i) => graph.cos_sin(&AngleSum::new([(Atom::Constant(i), 1)]), 0).1,
+            Self::Cos(i) => graph.cos_sin(&AtomAngleSum::new([(Atom::Constant(i), 1)]), 0).0,
+            Self::Sin(i) => graph.cos_sin(&AtomAngleSum::new([(Atom::Constant(i), 1)]), 0).1,
             Self::Root(n) => {
                 let radicand = graph.integer(n);
                 graph.unary(crate::expr::Unary::Sqrt, radicand)
@@ -63,28 +65,29 @@ impl Variable {
 }
 
 /// A product of powers of variables, sorted, without zero exponents.
-pub type Powers = Vec<(Variable, u32)>;
+pub type PowerProduct = Vec<(FactorVariable, u32)>;
 
 /// A polynomial with rational coefficients, none of them zero.
-pub type Polynomial = BTreeMap<Powers, Rational>;
+pub type TrigonometricPolynomial = BTreeMap<PowerProduct, Rational>;
 
 /// A quotient of two polynomials in the constants, in lowest terms up to common factors of several terms.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RationalFunction {
     /// Numerator; empty for 0.
-    pub numerator: Polynomial,
+    pub numerator: TrigonometricPolynomial,
     /// Denominator with coprime integer coefficients, the first of them positive.
-    pub denominator: Polynomial,
+    pub denominator: TrigonometricPolynomial,
 }
 
 impl RationalFunction {
     /// A number.
     pub fn constant(value: Rational) -> Self {
-        let one = BTreeMap::from([(Powers::new(), Rational::ONE)]);
+        // Zero is the polynomial without terms.
+        let one = BTreeMap::from([(PowerProduct::new(), Rational::ONE)]);
         let numerator = if value.is_zero() {
             BTreeMap::new()
         } else {
-            BTreeMap::from([(Powers::new(), value)])
+            BTreeMap::from([(PowerProduct::new(), value)])
         };
         Self {
             numerator,
@@ -93,23 +96,27 @@ impl RationalFunction {
     }
 
     /// Normalises a quotient; the denominator must not be zero.
-    pub(crate) fn new(mut numerator: Polynomial, mut denominator: Polynomial) -> Self {
+    pub(crate) fn new(mut numerator: TrigonometricPolynomial, mut denominator: TrigonometricPolynomial) -> Self {
         assert!(!denominator.is_empty(), "a denominator is not zero");
         if numerator.is_empty() {
+            // A numerator without terms is zero.
             return Self::constant(Rational::ZERO);
         }
         (numerator, denominator) = (with_fewest_terms(numerator), with_fewest_terms(denominator));
+        // Powers of variables that all terms have are removed from both polynomials.
         let common = denominator
             .keys()
             .chain(numerator.keys())
             .map(|powers| powers.iter().copied().collect::<BTreeMap<_, _>>())
+            // The smallest exponent of every variable.
             .reduce(|a, b| {
                 a.into_iter()
                     .filter_map(|(v, n)| b.get(&v).map(|m| (v, n.min(*m))))
                     .collect()
             })
             .unwrap_or_default();
-        let strip = |p: Polynomial| -> Polynomial {
+        // Divides every term by the common powers.
+        let strip = |p: TrigonometricPolynomial| -> TrigonometricPolynomial {
             p.into_iter()
                 .map(|(powers, k)| {
                     let rest = powers
@@ -122,24 +129,16 @@ impl RationalFunction {
                 .collect()
         };
         (numerator, denominator) = (strip(numerator), strip(denominator));
-        let mut content = denominator
-            .values()
-            .fold(Rational::ZERO, |c, k| c.content_with(k));
-        if denominator
-            .values()
-            .next_back()
-            .is_some_and(Rational::is_negative)
-        {
+        // The denominator gets coprime integer coefficients, the first of them positive.
+        let mut content = denominator.values().fold(Rational::ZERO, |c, k| c.content_with(k));
+        if denominator.values().next_back().is_some_and(Rational::is_negative) {
             content = -&content;
         }
         let inverse = content.recip();
         for k in numerator.values_mut().chain(denominator.values_mut()) {
             *k = &*k * &inverse;
         }
-        Self {
-            numerator,
-            denominator,
-        }
+        Self { numerator, denominator }
     }
 
     /// Whether it is 0.
@@ -147,15 +146,16 @@ impl RationalFunction {
         self.numerator.is_empty()
     }
 
-    /// The number, if it is one.
+    /// The number that it equals; `None` if it depends on constants.
     pub fn as_constant(&self) -> Option<Rational> {
         if self.is_zero() {
             return Some(Rational::ZERO);
         }
+        // Both polynomials are numbers.
         match (
             self.numerator.len(),
-            self.numerator.get(&Powers::new()),
-            self.denominator.get(&Powers::new()),
+            self.numerator.get(&PowerProduct::new()),
+            self.denominator.get(&PowerProduct::new()),
         ) {
             (1, Some(n), Some(d)) if self.denominator.len() == 1 => Some(n * &d.recip()),
             _ => None,
@@ -163,25 +163,25 @@ impl RationalFunction {
     }
 
     /// Its value at a point of the field; `None` where the denominator vanishes.
-    pub(crate) fn value<const P: u64>(&self, point: &FieldPoint<Element<P>>) -> Option<Element<P>> {
+    pub(crate) fn value<const P: u64>(&self, point: &FieldPoint<FieldElement<P>>) -> Option<FieldElement<P>> {
         let denominator = polynomial_value(&self.denominator, point)?.inverse()?;
         Some(polynomial_value(&self.numerator, point)? * denominator)
     }
 
-    /// Its value for constants in floating point, by index. Sums whose terms all but cancel are added up exactly: quotients
-    /// of them are large, and would have lost their digits twice over.
+    /// Its value in double precision, for constants by index. Sums whose terms nearly cancel are added up exactly,
+    /// because quotients with them are large and would lose digits in both parts.
     pub fn value_f64(&self, constants: &[f64]) -> f64 {
-        let evaluate = |p: &Polynomial| -> f64 {
+        let evaluate = |p: &TrigonometricPolynomial| -> f64 {
+            // The sum and the sum of the magnitudes of its terms.
             let (mut sum, mut size) = (0.0, 0.0);
             for (powers, k) in p {
                 let term = powers.iter().fold(k.to_f64(), |product, (v, n)| {
-                    product
-                        * v.value_f64(constants)
-                            .powi(i32::try_from(*n).unwrap_or(i32::MAX))
+                    product * v.value_f64(constants).powi(i32::try_from(*n).unwrap_or(i32::MAX))
                 });
                 sum += term;
                 size += term.abs();
             }
+            // Most digits have cancelled, so the terms are added as fractions.
             if sum.abs() < CANCELLED * size && size.is_finite() {
                 let exact: Vec<BigRational> = constants.iter().map(|c| from_f64(*c)).collect();
                 return polynomial_exact(p, &exact).to_f64().unwrap_or(f64::NAN);
@@ -191,26 +191,21 @@ impl RationalFunction {
         evaluate(&self.numerator) / evaluate(&self.denominator)
     }
 
-    /// Its exact value for exact constants, by index; sines, cosines and roots are those of floating point.
+    /// Its exact value for exact constants, by index; sines, cosines and roots are those of double precision.
     pub fn value_exact(&self, constants: &[BigRational]) -> BigRational {
-        polynomial_exact(&self.numerator, constants)
-            / polynomial_exact(&self.denominator, constants)
+        polynomial_exact(&self.numerator, constants) / polynomial_exact(&self.denominator, constants)
     }
 
     /// As an expression of the graph.
     pub fn expression(&self, graph: &mut Graph) -> ExprId {
-        let mut build = |p: &Polynomial| {
+        // Each polynomial as a sum of products of powers.
+        let mut build = |p: &TrigonometricPolynomial| {
             let terms: Vec<_> = p
                 .iter()
                 .map(|(powers, k)| {
                     let factors: Vec<_> = powers
                         .iter()
-                        .map(|(v, n)| {
-                            (
-                                v.expression(graph),
-                                i32::try_from(*n).expect("a small exponent"),
-                            )
-                        })
+                        .map(|(v, n)| (v.expression(graph), i32::try_from(*n).expect("a small exponent")))
                         .collect();
                     (graph.product(&factors), k.clone())
                 })
@@ -222,23 +217,24 @@ impl RationalFunction {
     }
 }
 
-/// The number that a float is; zero for what is none.
+/// The exact value of a double; zero if it is not finite.
 fn from_f64(value: f64) -> BigRational {
     BigRational::from_float(value).unwrap_or_else(BigRational::zero)
 }
 
-/// The exact value of a polynomial for exact constants; sines, cosines and roots are those of floating point.
-fn polynomial_exact(p: &Polynomial, constants: &[BigRational]) -> BigRational {
+/// The exact value of a polynomial for exact constants; sines, cosines and roots are those of double precision.
+fn polynomial_exact(p: &TrigonometricPolynomial, constants: &[BigRational]) -> BigRational {
     let mut sum = BigRational::zero();
     for (powers, k) in p {
         let mut product = k.to_big();
         for (v, n) in powers {
+            // Angles are rounded to double precision before their sine or cosine is computed.
             let angle = |i: &usize| constants[*i].to_f64().unwrap_or(f64::NAN);
             let value = match v {
-                Variable::Constant(i) => constants[*i].clone(),
-                Variable::Cos(i) => from_f64(angle(i).cos()),
-                Variable::Sin(i) => from_f64(angle(i).sin()),
-                Variable::Root(r) => from_f64((*r as f64).sqrt()),
+                FactorVariable::Constant(i) => constants[*i].clone(),
+                FactorVariable::Cos(i) => from_f64(angle(i).cos()),
+                FactorVariable::Sin(i) => from_f64(angle(i).sin()),
+                FactorVariable::Root(r) => from_f64((*r as f64).sqrt()),
             };
             product *= num_traits::pow(value, *n as usize);
         }
@@ -247,38 +243,41 @@ fn polynomial_exact(p: &Polynomial, constants: &[BigRational]) -> BigRational {
     sum
 }
 
-/// The same polynomial with even powers of a cosine as powers of the sine where that has fewer terms:
+/// The same polynomial with even powers of a cosine written as powers of the sine if that has fewer terms:
 /// `L^2 - L^2*cos(beta)^2` is `L^2*sin(beta)^2`.
-fn with_fewest_terms(mut p: Polynomial) -> Polynomial {
+fn with_fewest_terms(mut p: TrigonometricPolynomial) -> TrigonometricPolynomial {
+    // Angles whose cosines occur.
     let angles: BTreeSet<usize> = p
         .keys()
         .flatten()
         .filter_map(|(v, _)| match v {
-            Variable::Cos(i) => Some(*i),
+            FactorVariable::Cos(i) => Some(*i),
             _ => None,
         })
         .collect();
     for i in angles {
-        let mut in_sines = Polynomial::new();
+        let mut in_sines = TrigonometricPolynomial::new();
         for (powers, k) in &p {
-            let power_of = |v: Variable| {
+            // Exponent of a variable in this term.
+            let power_of = |v: FactorVariable| {
                 let found = powers.iter().find(|(w, _)| *w == v);
                 found.map_or(0, |(_, n)| *n)
             };
-            let (cosines, sines) = (power_of(Variable::Cos(i)), power_of(Variable::Sin(i)));
+            let (cosines, sines) = (power_of(FactorVariable::Cos(i)), power_of(FactorVariable::Sin(i)));
             // cos^2n = (1 - sin^2)^n, term by term with alternating binomial coefficients.
             let n = cosines / 2;
             let mut coefficient = k.clone();
             for j in 0..=n {
-                let mut term: BTreeMap<Variable, u32> = powers.iter().copied().collect();
-                term.insert(Variable::Cos(i), cosines % 2);
-                term.insert(Variable::Sin(i), sines + 2 * j);
-                let term: Powers = term.into_iter().filter(|(_, n)| *n > 0).collect();
+                let mut term: BTreeMap<FactorVariable, u32> = powers.iter().copied().collect();
+                term.insert(FactorVariable::Cos(i), cosines % 2);
+                term.insert(FactorVariable::Sin(i), sines + 2 * j);
+                let term: PowerProduct = term.into_iter().filter(|(_, n)| *n > 0).collect();
                 let sum = in_sines.entry(term).or_insert(Rational::ZERO);
                 *sum = &*sum + &coefficient;
                 coefficient = &coefficient * &Rational::new(-i64::from(n - j), i64::from(j) + 1);
             }
         }
+        // Terms may have cancelled.
         in_sines.retain(|_, k| !k.is_zero());
         if in_sines.len() < p.len() {
             p = in_sines;
@@ -287,20 +286,22 @@ fn with_fewest_terms(mut p: Polynomial) -> Polynomial {
     p
 }
 
+/// The value of a product of powers at a point of the field; `None` if a root does not exist there.
 pub(crate) fn monomial_value<const P: u64>(
-    powers: &Powers,
-    point: &FieldPoint<Element<P>>,
-) -> Option<Element<P>> {
-    powers.iter().try_fold(Element::ONE, |product, (v, n)| {
+    powers: &PowerProduct,
+    point: &FieldPoint<FieldElement<P>>,
+) -> Option<FieldElement<P>> {
+    powers.iter().try_fold(FieldElement::ONE, |product, (v, n)| {
         Some(product * v.value(point)?.power(u64::from(*n)))
     })
 }
 
+/// The value of a polynomial at a point of the field; `None` if a root does not exist there.
 fn polynomial_value<const P: u64>(
-    p: &Polynomial,
-    point: &FieldPoint<Element<P>>,
-) -> Option<Element<P>> {
-    p.iter().try_fold(Element::ZERO, |sum, (powers, k)| {
-        Some(sum + Element::from_rational(k)? * monomial_value(powers, point)?)
+    p: &TrigonometricPolynomial,
+    point: &FieldPoint<FieldElement<P>>,
+) -> Option<FieldElement<P>> {
+    p.iter().try_fold(FieldElement::ZERO, |sum, (powers, k)| {
+        Some(sum + FieldElement::from_rational(k)? * monomial_value(powers, point)?)
     })
 }

@@ -1,61 +1,73 @@
-//! Numbers as what a person would write: a small rational, or one times constants of the model file.
+//! Numbers written in a form that a person would choose: a small rational, or one times constants of the model file.
 //!
-//! Of all that equal a number in all its digits and have its unit the shortest is taken; what has none is rounded.
+//! Among all forms that equal a number in all its digits and have its unit, the shortest is used. A number without such
+//! a form is rounded.
 
-use modelmill_algebra::digits::Digits;
+use modelmill_algebra::digits::BigFloat;
 use modelmill_spec::Mechanism;
 use num_traits::ToPrimitive;
 
 use super::base;
-use super::rational_function::{Polynomial, Powers, RationalFunction, Variable};
+use super::rational_function::{FactorVariable, PowerProduct, RationalFunction, TrigonometricPolynomial};
 use crate::expr::Rational;
-use crate::tree::expressions::Monomial;
+use crate::tree::expressions::ParameterMonomial;
 
+/// Largest denominator of a rational that is recognised.
 const LARGEST_DENOMINATOR: i64 = 24;
+/// Largest numerator of a rational that is recognised.
 const LARGEST_NUMERATOR: f64 = 1000.0;
 
-/// Constants are put together only where so many digits are known.
+/// Products of several constants are tried only if numbers are known to this relative accuracy.
 const TOGETHER: f64 = 1e-20;
-/// Three constants are put together only where no more than this many stand in a file.
+/// Products of three constants are tried only in files with at most this many constants.
 const MOST_IN_THREES: usize = 12;
-/// The same for two.
+/// The same for products of two constants.
 const MOST_IN_PAIRS: usize = 60;
 
-/// Constants of a model file, alone and a few together.
-pub(super) struct Constants<'a> {
+/// Constants of a model file, and products of powers of a few of them.
+pub(super) struct FileConstants<'a> {
+    /// The mechanism whose constants these are.
     mechanism: &'a Mechanism,
-    powers: Vec<Power>,
-    /// How far a number may be from what it is taken for, relative to it.
+    /// All products that are tried; the first one is 1.
+    powers: Vec<ConstantPower>,
+    /// Largest relative difference between a number and a form that it is recognised as.
     rounding: f64,
 }
 
-/// A product of powers of constants.
-struct Power {
-    above: Vec<Variable>,
-    below: Vec<Variable>,
-    value: Digits,
+/// A product of powers of constants with its value.
+struct ConstantPower {
+    /// Constants in the numerator; a constant may occur twice.
+    above: Vec<FactorVariable>,
+    /// Constants in the denominator.
+    below: Vec<FactorVariable>,
+    /// Exact value for the decimals of the file.
+    value: BigFloat,
+    /// The same in double precision.
     rough: f64,
-    /// Its unit as a power of metres.
+    /// Exponent of the metre in its unit.
     metres: i32,
 }
 
-impl Power {
+impl ConstantPower {
+    /// Whether it is the product without factors.
     fn is_one(&self) -> bool {
         self.above.is_empty() && self.below.is_empty()
     }
 }
 
-impl<'a> Constants<'a> {
+impl<'a> FileConstants<'a> {
+    /// Collects the products that may occur for numbers with a relative error of `rounding`.
     pub(super) fn new(mechanism: &'a Mechanism, rounding: f64) -> Self {
-        let one = Power {
+        let one = ConstantPower {
             above: Vec::new(),
             below: Vec::new(),
-            value: Digits::integer(1),
+            value: BigFloat::integer(1),
             rough: 1.0,
             metres: 0,
         };
         let mut powers = vec![one];
-        let lengths: Vec<(Variable, Digits, i32)> = (mechanism.constants.iter().enumerate())
+        // Only lengths and pure numbers are used; angles occur in factors only through sines and cosines.
+        let lengths: Vec<(FactorVariable, BigFloat, i32)> = (mechanism.constants.iter().enumerate())
             .filter(|(_, c)| !c.is_angle && c.value != 0.0)
             .filter_map(|(i, c)| {
                 let metres = match c.unit.as_str() {
@@ -63,21 +75,23 @@ impl<'a> Constants<'a> {
                     "1" => 0,
                     _ => return None,
                 };
-                Some((Variable::Constant(i), Digits::as_written(c.value)?, metres))
+                Some((
+                    FactorVariable::Constant(i),
+                    BigFloat::from_shortest_decimal(c.value)?,
+                    metres,
+                ))
             })
             .collect();
         let mut push = |above: &[usize], below: &[usize]| {
-            let of = |chosen: &[usize]| -> Vec<Variable> {
-                chosen.iter().map(|i| lengths[*i].0).collect()
-            };
+            let of = |chosen: &[usize]| -> Vec<FactorVariable> { chosen.iter().map(|i| lengths[*i].0).collect() };
             let product = |chosen: &[usize]| {
                 chosen
                     .iter()
-                    .fold(Digits::integer(1), |product, i| &product * &lengths[*i].1)
+                    .fold(BigFloat::integer(1), |product, i| &product * &lengths[*i].1)
             };
             let metres = |chosen: &[usize]| chosen.iter().map(|i| lengths[*i].2).sum::<i32>();
             let value = product(above) / product(below);
-            powers.push(Power {
+            powers.push(ConstantPower {
                 above: of(above),
                 below: of(below),
                 rough: value.to_f64(),
@@ -89,12 +103,8 @@ impl<'a> Constants<'a> {
             push(&[i], &[]);
             push(&[], &[i]);
         }
-        // Of so many products some equal any number to a few digits.
-        let together = if rounding <= TOGETHER {
-            lengths.len()
-        } else {
-            0
-        };
+        // There are so many products that with few digits some would equal any number by chance.
+        let together = if rounding <= TOGETHER { lengths.len() } else { 0 };
         for i in 0..together {
             for j in (0..lengths.len()).filter(|_| lengths.len() <= MOST_IN_PAIRS) {
                 if i <= j {
@@ -118,26 +128,27 @@ impl<'a> Constants<'a> {
         }
     }
 
-    /// The factor of the column of `kept` in that of `product`.
-    pub(super) fn factor(
+    /// The factor of the retained column `kept` in the column of `product`, with the value `value`.
+    pub(super) fn recognise_factor(
         &self,
-        value: &Digits,
-        product: &Monomial,
-        kept: &Monomial,
+        value: &BigFloat,
+        product: &ParameterMonomial,
+        kept: &ParameterMonomial,
     ) -> RationalFunction {
-        let [of_product, of_kept] = [product, kept].map(|of| base::unit(self.mechanism, of));
+        let [of_product, of_kept] = [product, kept].map(|of| base::product_unit(self.mechanism, of));
         // The column of a product has its inverse unit.
         let wanted = if of_product == of_kept {
             Some(0)
         } else {
-            metres(&of_product)
-                .zip(metres(&of_kept))
+            length_exponent(&of_product)
+                .zip(length_exponent(&of_kept))
                 .map(|(a, b)| b - a)
         };
         let fitting = self.powers.iter().filter(|p| match wanted {
             Some(n) => p.metres == n,
             None => p.is_one(),
         });
+        // A short form has small numbers and few constants.
         let found = fitting.filter_map(|power| {
             let number = self.small_rational(value, power)?;
             let (n, d) = number.as_small()?;
@@ -145,34 +156,34 @@ impl<'a> Constants<'a> {
             Some((length, number, power))
         });
         match found.min_by_key(|(length, _, _)| *length) {
-            Some((_, number, power)) => written(number, power),
-            None => decimal(value.to_f64()),
+            Some((_, number, power)) => to_rational_function(number, power),
+            None => decimal_function(value.to_f64()),
         }
     }
 
-    /// `value` over `power`, if that is a small rational.
-    fn small_rational(&self, value: &Digits, power: &Power) -> Option<Rational> {
+    /// `value` divided by `power`, if that is a small rational number.
+    fn small_rational(&self, value: &BigFloat, power: &ConstantPower) -> Option<Rational> {
+        // Relative difference up to which the exact comparison is made.
         const ROUGH: f64 = 1e-9;
         let ratio = value.to_f64() / power.rough;
+        // Denominators in increasing order; double precision rules out most of them before the exact comparison.
         (1..=LARGEST_DENOMINATOR).find_map(|below| {
             let wanted = ratio * below as f64;
             let above = wanted.round();
-            if above == 0.0
-                || above.abs() > LARGEST_NUMERATOR
-                || (above - wanted).abs() > ROUGH * wanted.abs()
-            {
+            if above == 0.0 || above.abs() > LARGEST_NUMERATOR || (above - wanted).abs() > ROUGH * wanted.abs() {
                 return None;
             }
             let number = Rational::new(above.to_i64()?, below);
-            let off = &(&Digits::from_rational(&number) * &power.value) - value;
+            let off = &(&BigFloat::from_rational(&number) * &power.value) - value;
             (off.to_f64().abs() <= self.rounding * value.to_f64().abs()).then_some(number)
         })
     }
 }
 
-fn written(number: Rational, power: &Power) -> RationalFunction {
-    let powers = |of: &[Variable]| {
-        let mut powers = Powers::new();
+/// A number times a product of powers as a rational function.
+fn to_rational_function(number: Rational, power: &ConstantPower) -> RationalFunction {
+    let powers = |of: &[FactorVariable]| {
+        let mut powers = PowerProduct::new();
         for variable in of {
             match powers.iter_mut().find(|(v, _)| v == variable) {
                 Some((_, n)) => *n += 1,
@@ -183,13 +194,13 @@ fn written(number: Rational, power: &Power) -> RationalFunction {
         powers
     };
     RationalFunction::new(
-        Polynomial::from([(powers(&power.above), number)]),
-        Polynomial::from([(powers(&power.below), Rational::ONE)]),
+        TrigonometricPolynomial::from([(powers(&power.above), number)]),
+        TrigonometricPolynomial::from([(powers(&power.below), Rational::ONE)]),
     )
 }
 
-/// The power of metres in the unit of a mass or one of its moments.
-pub(super) fn metres(unit: &str) -> Option<i32> {
+/// The exponent of the metre in the unit of a mass or one of its moments; `None` for other units.
+pub(super) fn length_exponent(unit: &str) -> Option<i32> {
     match unit {
         "kg" => Some(0),
         "kg m" => Some(1),
@@ -198,9 +209,10 @@ pub(super) fn metres(unit: &str) -> Option<i32> {
     }
 }
 
-/// A number with thirteen significant digits, as an exact rational, so that everything behind treats it like any other
+/// A number rounded to thirteen significant digits, as an exact rational, so that later steps treat it like any other
 /// factor.
-fn decimal(value: f64) -> RationalFunction {
+fn decimal_function(value: f64) -> RationalFunction {
+    // Digits after the decimal point of the mantissa.
     const DIGITS: i32 = 12;
     let written = format!("{value:.12e}");
     let rational = written.split_once('e').and_then(|(mantissa, exponent)| {

@@ -1,67 +1,66 @@
-//! What a reduction says: which products are retained, and how all others follow.
+//! The result of a reduction: the retained products, and every other product's column as a combination of theirs.
 
 use std::collections::BTreeMap;
 use std::ops::{Add, Mul};
 
 use super::rational_function::RationalFunction;
 use crate::DeriveError;
-use crate::tree::expressions::Monomial;
+use crate::tree::expressions::ParameterMonomial;
 
-/// The result: which columns are kept and how the others follow from them.
+/// The result: which columns are retained, and how the others are combined from them.
 #[derive(Clone, Debug)]
-pub struct Reduction {
+pub struct BaseReduction {
     /// Products of parameters whose column is not zero, in the order of eq. (5): p_g.
-    pub products: Vec<Monomial>,
+    pub products: Vec<ParameterMonomial>,
     /// Products whose column is identically zero.
-    pub without_effect: Vec<Monomial>,
+    pub without_effect: Vec<ParameterMonomial>,
     /// Positions in `products` of the retained columns, in the order of p_min.
     pub retained: Vec<usize>,
     /// Eq. (6): for every other product, by position, the retained ones (by position in `retained`) with their factors.
-    pub dependencies: Vec<Dependency>,
-    /// How it was found.
-    pub method: Method,
+    pub dependencies: Vec<ColumnDependency>,
+    /// The method that found it.
+    pub method: ReductionMethod,
 }
 
-/// How a reduction was found.
+/// The method by which a reduction was found.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Method {
-    /// In the prime field: it holds for all values of the constants but special ones, and for the file's own where these
-    /// were put in their place.
+pub enum ReductionMethod {
+    /// In the prime field: it is valid for all values of the constants except special ones. With `at_values` it is
+    /// valid for the values of the file only.
     Exact {
-        /// At how many points of motion `H p_g = H_min p_min` was shown, with fresh constants.
+        /// Number of points of motion, with fresh constants, at which `H p_g = H_min p_min` was confirmed.
         confirmed_at: usize,
-        /// Whether the constants stand as numbers, so that it holds for the file's values alone.
+        /// Whether the constants were replaced by numbers, so that the result is valid for the file's values alone.
         at_values: bool,
     },
-    /// Not at all: every product that was asked for is retained.
+    /// No reduction: every requested product is retained.
     Unreduced,
-    /// On the model file's values, with many digits: factors that are recognised are written so, others are rounded numbers.
+    /// From the values of the model file, with many digits. Recognised factors are exact, others are rounded numbers.
     Numeric {
-        /// What the others leave of the retained column that is nearest to being dependent, relative to its size.
+        /// Residual of the retained column that is nearest to being dependent on the others, relative to its size.
         least_kept: f64,
-        /// The same for the dependent column that is furthest from it.
+        /// The same for the dependent column with the largest residual.
         most_dropped: f64,
-        /// What the factors leave of a dependent column at further states, relative to its terms: the most of all.
+        /// Largest residual of a dependent column at further states, relative to its terms.
         residual: f64,
         /// Why there is no exact reduction.
         because: Box<DeriveError>,
     },
 }
 
-impl Method {
-    /// What a reader of a numeric reduction must know, in words; `None` where the reduction holds for general values.
+impl ReductionMethod {
+    /// The limitation of the reduction as a sentence for the reader; `None` if it is valid for general values.
     pub fn caution(&self) -> Option<String> {
         match self {
-            Self::Exact {
-                at_values: false, ..
-            }
-            | Self::Unreduced => None,
+            Self::Exact { at_values: false, .. } | Self::Unreduced => None,
             Self::Exact { .. } => Some(
-                "the constants stand as the numbers of this file: base and equations hold for these values alone".to_owned(),
+                "the constants are replaced by the values of this file: base and equations are valid for these values \
+                 only"
+                    .to_owned(),
             ),
             Self::Numeric { because, residual, .. } => Some(format!(
-                "the base parameters were found numerically, on the values of this file: {because}; factors are rounded (they \
-                 leave {residual:.1e} of a column), and base and factors hold for these values alone"
+                "the base parameters were computed numerically from the values of this file: {because}; factors are \
+                 rounded (residual {residual:.1e} of a column), and base and factors are valid for these values only"
             )),
         }
     }
@@ -69,30 +68,29 @@ impl Method {
 
 /// One line of eq. (6): `h_j = sum of a_k h_k`.
 #[derive(Clone, Debug)]
-pub struct Dependency {
-    /// Position of the eliminated product in [`Reduction::products`].
+pub struct ColumnDependency {
+    /// Position of the eliminated product in [`BaseReduction::products`].
     pub product: usize,
-    /// Positions in [`Reduction::retained`] with the factors.
+    /// Positions in [`BaseReduction::retained`] with the factors.
     pub equals: Vec<(usize, RationalFunction)>,
-    /// Positions in [`Reduction::products`] of other dependent products with the factors: their columns stand for what they
-    /// equal in turn. None where it is no longer to write that out.
+    /// Positions in [`BaseReduction::products`] of other dependent products with the factors: these columns are
+    /// combinations themselves. Empty if the factors on retained columns are not longer.
     pub via: Vec<(usize, RationalFunction)>,
 }
 
-impl Reduction {
-    /// The factors of every dependent product on retained ones alone, by position in [`Reduction::retained`]; `None` where
-    /// `value` has none for a factor.
-    pub fn factors_by<T>(
-        &self,
-        value: &dyn Fn(&RationalFunction) -> Option<T>,
-    ) -> Option<Vec<BTreeMap<usize, T>>>
+impl BaseReduction {
+    /// The factors of every dependent product on retained ones alone, by position in [`BaseReduction::retained`];
+    /// `None` if `value` returns `None` for a factor.
+    pub fn factors_by<T>(&self, value: &dyn Fn(&RationalFunction) -> Option<T>) -> Option<Vec<BTreeMap<usize, T>>>
     where
         T: Clone + Add<Output = T> + Mul<Output = T>,
     {
         let mut all: Vec<BTreeMap<usize, T>> = vec![BTreeMap::new(); self.dependencies.len()];
-        for i in self.inner_first() {
+        // Lines that others refer to come first, so their factors are complete when they are needed.
+        for i in self.lines_in_dependency_order() {
             let line = &self.dependencies[i];
             let mut found: BTreeMap<usize, T> = BTreeMap::new();
+            // Adds to the factor on retained column k.
             let mut add = |k: usize, term: T| {
                 let sum = match found.remove(&k) {
                     Some(before) => before + term,
@@ -114,32 +112,28 @@ impl Reduction {
         Some(all)
     }
 
-    /// The same in floating point, for constants in the order of the model file.
+    /// The same in double precision, for constants in the order of the model file.
     pub fn factors(&self, constants: &[f64]) -> Vec<BTreeMap<usize, f64>> {
         let found = self.factors_by(&|factor| Some(factor.value_f64(constants)));
         found.expect("floating point has a value for everything")
     }
 
-    /// The line of a dependent product.
+    /// Index in `dependencies` of a dependent product.
     pub(crate) fn line_of(&self, product: usize) -> usize {
-        let line = self
-            .dependencies
-            .iter()
-            .position(|line| line.product == product);
+        let line = self.dependencies.iter().position(|line| line.product == product);
         line.expect("what a product goes by is dependent")
     }
 
-    /// All lines, each after those that it goes by.
-    pub(crate) fn inner_first(&self) -> Vec<usize> {
+    /// Indices of all lines, each after the lines that it refers to.
+    pub(crate) fn lines_in_dependency_order(&self) -> Vec<usize> {
         let mut order = Vec::with_capacity(self.dependencies.len());
         let mut is_done = vec![false; self.dependencies.len()];
         for start in 0..self.dependencies.len() {
+            // Depth-first search: a line is complete after all lines that it refers to.
             let mut open = vec![start];
             while let Some(i) = open.last().copied() {
                 let via = self.dependencies[i].via.iter();
-                let next = via
-                    .map(|(product, _)| self.line_of(*product))
-                    .find(|l| !is_done[*l]);
+                let next = via.map(|(product, _)| self.line_of(*product)).find(|l| !is_done[*l]);
                 match next {
                     Some(next) => open.push(next),
                     None => {

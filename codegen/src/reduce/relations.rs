@@ -1,9 +1,10 @@
-//! Dependences of columns as they are closest together, and the factors of eq. (6) put together from them.
+//! Relations between columns that depend on each other as directly as possible, and the factors of eq. (6) combined
+//! from them.
 //!
-//! A column that depends on others can often be written with a few near ones, which may depend on others in turn: the
-//! columns of a link of an arm need those of the link before it and the constants of the one joint between them (Gautier
-//! and Khalil 1990), while its factors on the retained columns run through all joints down to the base. So relations
-//! between neighbours are reconstructed, and factors are their sums of products.
+//! A dependent column can often be written with a few near columns, which may depend on others in turn. The columns of
+//! a link of an arm need only those of the link before it and the constants of the one joint between them (Gautier and
+//! Khalil 1990). Its factors on the retained columns depend on all joints down to the base. So relations between
+//! neighbours are reconstructed, and the factors are sums of their products.
 //!
 //! Decision: products of relations are multiplied out up to 5000 terms; beyond that, base parameters are given by
 //! named sums, link by link. Polynomials over powers of lengths have one normal form, so this gives the same result
@@ -12,79 +13,49 @@
 
 use std::collections::BTreeMap;
 
-use modelmill_algebra::eliminate::{self, Echelon};
-use modelmill_algebra::field::Element;
+use modelmill_algebra::eliminate::{self, RowEchelonForm};
+use modelmill_algebra::field::FieldElement;
 
-use super::rational_function::{Polynomial, Powers, RationalFunction, Variable};
+use super::rational_function::{FactorVariable, PowerProduct, RationalFunction, TrigonometricPolynomial};
 use crate::DeriveError;
 use crate::expr::{FieldPoint, Rational};
 
-/// One column in terms of others, all by position among the effective ones.
+/// One column as a combination of others, all numbered among the columns with an effect.
 #[derive(Clone, Debug)]
 pub(super) struct ColumnRelation {
-    /// The column.
+    /// The column that the relation expresses.
     pub(super) column: usize,
-    /// Retained columns that it needs.
+    /// Retained columns in the combination.
     retained: Vec<usize>,
-    /// Columns that it needs and that have relations of their own, before this one.
+    /// Dependent columns in the combination, which have relations before this one.
     pub(super) dependent: Vec<usize>,
 }
 
 impl ColumnRelation {
-    /// How many factors it has.
+    /// Number of its factors.
     pub(super) fn len(&self) -> usize {
         self.retained.len() + self.dependent.len()
     }
 
-    /// Its factors from rows of values of all columns, of which there must be enough to determine them.
-    fn values_from_rows<const P: u64>(
-        &self,
-        rows: &[Vec<Element<P>>],
-    ) -> Result<Vec<Element<P>>, DeriveError> {
-        /// Rows beyond those that determine the factors: they show that the relation holds.
-        const MORE: usize = 2;
-        let n = self.len();
-        let order: Vec<usize> = (0..=n).collect();
-        let mut echelon = Echelon::new(&order);
-        let mut more = 0;
-        for row in rows {
-            let columns = self.columns().chain([self.column]);
-            let row: Vec<Element<P>> = columns.map(|k| row[k]).collect();
-            if row.iter().all(|x| *x == Element::ZERO) {
-                continue;
-            }
-            if echelon.pivots.len() == n {
-                more += 1;
-            }
-            echelon.insert(row);
-            if more == MORE {
-                break;
-            }
-        }
-        // A pivot in the last column is a row that the others contradict.
-        if echelon.pivots.len() != n || echelon.pivots.contains(&n) {
-            return Err(DeriveError::RankChanged);
-        }
-        let factors = (0..n).map(|k| echelon.entry(k, n).ok_or(DeriveError::RankChanged));
-        factors.collect()
-    }
-
-    /// Whether it needs retained columns alone.
-    pub(super) fn is_direct(&self) -> bool {
+    /// Whether it contains retained columns only.
+    pub(super) fn has_retained_only(&self) -> bool {
         self.dependent.is_empty()
     }
 
-    /// Columns with a factor, in the order of [`Self::values`].
+    /// The columns of its factors, in the order of [`Self::values`].
     fn columns(&self) -> impl Iterator<Item = usize> + '_ {
         self.retained.iter().chain(&self.dependent).copied()
     }
 
     /// Its factors for the constants at which columns were reduced to `echelon`.
-    fn values<const P: u64>(&self, echelon: &Echelon<P>) -> Result<Vec<Element<P>>, DeriveError> {
+    ///
+    /// # Errors
+    /// [`DeriveError::RankChanged`] if the columns have other dependences at these constants.
+    fn values<const P: u64>(&self, echelon: &RowEchelonForm<P>) -> Result<Vec<FieldElement<P>>, DeriveError> {
         let entry = |p: usize, k: usize| echelon.entry(p, k).ok_or(DeriveError::RankChanged);
         let mut of_dependent = Vec::new();
         if !self.dependent.is_empty() {
-            // Factors of the dependent columns from the rows of all retained ones that have no factor here.
+            // The factors of dependent columns must cancel all retained columns that are not in the relation.
             let mut rows = Vec::new();
             for p in &echelon.pivots {
                 if self.retained.contains(p) {
@@ -95,10 +66,11 @@ impl ColumnRelation {
                     row.push(entry(*p, *k)?);
                 }
                 row.push(-entry(*p, self.column)?);
-                if row.iter().any(|x| *x != Element::ZERO) {
+                if row.iter().any(|x| *x != FieldElement::ZERO) {
                     rows.push(row);
                 }
             }
+            // The solution must be unique up to a scale, which is set by the column itself.
             let solutions = eliminate::null_space(rows, self.dependent.len() + 1);
             let [solution] = solutions.as_slice() else {
                 return Err(DeriveError::RankChanged);
@@ -107,6 +79,7 @@ impl ColumnRelation {
             let scale = last.inverse().ok_or(DeriveError::RankChanged)?;
             of_dependent.extend(rest.iter().map(|x| *x * scale));
         }
+        // The factors of retained columns are the remainder.
         let mut values = Vec::with_capacity(self.len());
         for p in &self.retained {
             let mut value = entry(*p, self.column)?;
@@ -120,12 +93,12 @@ impl ColumnRelation {
     }
 }
 
-/// Relations for every dependent column, in an order in which each needs earlier columns only: to retained
-/// columns, then, if they are fewer, to the columns before it that come last.
+/// Relations for every dependent column, in an order in which each needs only earlier columns. The relation to retained
+/// columns comes first. If fewer columns are sufficient, a relation to the last columns before this one follows.
 ///
-/// `order` is that in which columns are retained.
-pub(super) fn find<const P: u64>(
-    echelon: &Echelon<P>,
+/// `order` is the order in which columns are retained.
+pub(super) fn find_relations<const P: u64>(
+    echelon: &RowEchelonForm<P>,
     order: &[usize],
     dependent: &[usize],
 ) -> Vec<ColumnRelation> {
@@ -134,16 +107,14 @@ pub(super) fn find<const P: u64>(
         if !dependent.contains(column) {
             continue;
         }
+        // Retained columns with a factor that is not zero.
         let mut direct: Vec<usize> = (echelon.pivots.iter().copied())
-            .filter(|p| echelon.entry(*p, *column) != Some(Element::ZERO))
+            .filter(|p| echelon.entry(*p, *column) != Some(FieldElement::ZERO))
             .collect();
         direct.sort_unstable();
-        let near = near(echelon, &order[..at], *column);
+        let near = needed_columns(echelon, &order[..at], *column);
         let is_shorter = near.len() < direct.len();
-        for columns in [Some(direct), is_shorter.then_some(near)]
-            .into_iter()
-            .flatten()
-        {
+        for columns in [Some(direct), is_shorter.then_some(near)].into_iter().flatten() {
             let (dependent, retained) = columns.into_iter().partition(|k| dependent.contains(k));
             found.push(ColumnRelation {
                 column: *column,
@@ -155,39 +126,45 @@ pub(super) fn find<const P: u64>(
     found
 }
 
-/// The columns among those before `column` that it needs if the last ones are preferred.
-fn near<const P: u64>(echelon: &Echelon<P>, before: &[usize], column: usize) -> Vec<usize> {
-    /// Columns as vectors over the retained ones, each with what it is made of.
-    struct Made<const P: u64> {
+/// The columns among those before `column` that express it if the last ones are preferred.
+fn needed_columns<const P: u64>(echelon: &RowEchelonForm<P>, before: &[usize], column: usize) -> Vec<usize> {
+    /// A column as a vector over the retained ones, with the combination of columns that it equals.
+    struct ColumnCombination<const P: u64> {
+        /// Position of its first entry that is not zero, which is 1.
         pivot: usize,
-        vector: Vec<Element<P>>,
-        of: BTreeMap<usize, Element<P>>,
+        /// Entries by retained column.
+        vector: Vec<FieldElement<P>>,
+        /// Columns with their factors.
+        combination: BTreeMap<usize, FieldElement<P>>,
     }
-    let mut known: Vec<Made<P>> = Vec::new();
-    let vector_of = |k: usize| -> Vec<Element<P>> {
+    let mut known: Vec<ColumnCombination<P>> = Vec::new();
+    // A column as a vector over the retained ones.
+    let vector_of = |k: usize| -> Vec<FieldElement<P>> {
         let entries = echelon.pivots.iter().map(|p| echelon.entry(*p, k));
         entries.map(Option::unwrap_or_default).collect()
     };
-    let reduced = |known: &[Made<P>], target: &mut Vec<Element<P>>, of: &mut BTreeMap<_, _>| {
+    // Eliminates the known pivots from a vector, and applies the same steps to its combination.
+    let reduced = |known: &[ColumnCombination<P>], target: &mut Vec<FieldElement<P>>, of: &mut BTreeMap<_, _>| {
         for one in known {
             let factor = -target[one.pivot];
-            if factor == Element::ZERO {
+            if factor == FieldElement::ZERO {
                 continue;
             }
             for (x, y) in target.iter_mut().zip(&one.vector) {
                 *x = *x + factor * *y;
             }
-            for (k, y) in &one.of {
-                let x: &mut Element<P> = of.entry(*k).or_default();
+            for (k, y) in &one.combination {
+                let x: &mut FieldElement<P> = of.entry(*k).or_default();
                 *x = *x + factor * *y;
             }
         }
     };
+    // The target is reduced by columns from the last one backwards, until nothing of it remains.
     let (mut target, mut made) = (vector_of(column), BTreeMap::new());
     for &k in before.iter().rev() {
-        let (mut vector, mut of) = (vector_of(k), BTreeMap::from([(k, Element::ONE)]));
+        let (mut vector, mut of) = (vector_of(k), BTreeMap::from([(k, FieldElement::ONE)]));
         reduced(&known, &mut vector, &mut of);
-        let Some(pivot) = vector.iter().position(|x| *x != Element::ZERO) else {
+        let Some(pivot) = vector.iter().position(|x| *x != FieldElement::ZERO) else {
             continue;
         };
         let Some(scale) = vector[pivot].inverse() else {
@@ -196,22 +173,29 @@ fn near<const P: u64>(echelon: &Echelon<P>, before: &[usize], column: usize) -> 
         for x in vector.iter_mut().chain(of.values_mut()) {
             *x = *x * scale;
         }
-        known.push(Made { pivot, vector, of });
+        known.push(ColumnCombination {
+            pivot,
+            vector,
+            combination: of,
+        });
         let last = known.len() - 1;
         reduced(&known[last..], &mut target, &mut made);
-        if target.iter().all(|x| *x == Element::ZERO) {
+        if target.iter().all(|x| *x == FieldElement::ZERO) {
             break;
         }
     }
-    made.retain(|_, x| *x != Element::ZERO);
+    made.retain(|_, x| *x != FieldElement::ZERO);
     made.into_keys().collect()
 }
 
-/// Values of the factors of all relations, one after the other, from columns that were reduced to `echelon`.
+/// Values of the factors of all relations in order, from columns that were reduced to `echelon`.
+///
+/// # Errors
+/// As [`ColumnRelation::values`].
 pub(super) fn values<const P: u64>(
     relations: &[ColumnRelation],
-    echelon: &Echelon<P>,
-) -> Result<Vec<Element<P>>, DeriveError> {
+    echelon: &RowEchelonForm<P>,
+) -> Result<Vec<FieldElement<P>>, DeriveError> {
     let mut values = Vec::new();
     for relation in relations {
         values.extend(relation.values(echelon)?);
@@ -219,38 +203,78 @@ pub(super) fn values<const P: u64>(
     Ok(values)
 }
 
-/// The same from rows of values of all columns.
-pub(super) fn values_from_rows<const P: u64>(
-    relations: &[ColumnRelation],
-    rows: &[Vec<Element<P>>],
-) -> Result<Vec<Element<P>>, DeriveError> {
-    let mut values = Vec::new();
-    for relation in relations {
-        values.extend(relation.values_from_rows(rows)?);
+/// The factors of a relation, from rows of values of all columns as they come.
+pub(super) struct RelationRows<'a, const P: u64> {
+    relation: &'a ColumnRelation,
+    echelon: RowEchelonForm<P>,
+    /// How many rows came when the factors were determined.
+    n_more: usize,
+}
+
+impl<'a, const P: u64> RelationRows<'a, P> {
+    pub(super) fn new(relation: &'a ColumnRelation) -> Self {
+        let order: Vec<usize> = (0..=relation.len()).collect();
+        Self {
+            relation,
+            echelon: RowEchelonForm::new(&order),
+            n_more: 0,
+        }
     }
-    Ok(values)
+
+    /// Takes further rows, as far as it needs them.
+    pub(super) fn take(&mut self, rows: &[Vec<FieldElement<P>>]) {
+        for row in rows {
+            if self.is_confirmed() {
+                break;
+            }
+            let columns = self.relation.columns().chain([self.relation.column]);
+            let row: Vec<FieldElement<P>> = columns.map(|k| row[k]).collect();
+            if row.iter().all(|x| *x == FieldElement::ZERO) {
+                continue;
+            }
+            if self.echelon.pivots.len() == self.relation.len() {
+                self.n_more += 1;
+            }
+            self.echelon.insert(row);
+        }
+    }
+
+    /// Whether rows beyond those that determine the factors have shown that the relation holds.
+    pub(super) fn is_confirmed(&self) -> bool {
+        const MORE: usize = 2;
+        self.n_more == MORE
+    }
+
+    /// The factors; an error if they are not determined, or rows contradict each other.
+    pub(super) fn values(&self) -> Result<Vec<FieldElement<P>>, DeriveError> {
+        let n = self.relation.len();
+        // A pivot in the last column is a row that the others contradict.
+        if self.echelon.pivots.len() != n || self.echelon.pivots.contains(&n) {
+            return Err(DeriveError::RankChanged);
+        }
+        let entry = |k| self.echelon.entry(k, n).ok_or(DeriveError::RankChanged);
+        (0..n).map(entry).collect()
+    }
 }
 
-/// A dependent column by others, with factors; `None` for those that resist.
+/// A dependent column as a combination of others; factors that could not be reconstructed are `None`.
 #[derive(Debug, PartialEq)]
-pub(super) struct Written {
+pub(super) struct DependentColumn {
+    /// The column.
     pub(super) column: usize,
-    /// Retained columns, and dependent ones that stand for what they equal.
-    pub(super) by: Vec<(usize, Option<RationalFunction>)>,
+    /// Factors of retained columns, and of dependent ones that are combinations themselves.
+    pub(super) factors: Vec<(usize, Option<RationalFunction>)>,
 }
 
-/// Relations with their factors as functions of the constants.
-pub(super) struct Related(Vec<(ColumnRelation, Factors)>);
+/// Relations with their factors as functions of the constants, in an order in which each needs only earlier columns.
+pub(super) struct SolvedRelations(Vec<(ColumnRelation, RelationFactors)>);
 
-/// The factor of each column of a relation; `None` for those that resist.
-type Factors = Vec<Option<RationalFunction>>;
+/// The factor of each column of a relation; `None` if it could not be reconstructed.
+type RelationFactors = Vec<Option<RationalFunction>>;
 
-impl Related {
-    /// Takes the factors as [`values`] orders them.
-    pub(super) fn new<'a>(
-        relations: impl Iterator<Item = &'a ColumnRelation>,
-        factors: Factors,
-    ) -> Self {
+impl SolvedRelations {
+    /// Assigns factors, in the order of [`values`], to the relations.
+    pub(super) fn new<'a>(relations: impl Iterator<Item = &'a ColumnRelation>, factors: RelationFactors) -> Self {
         let mut rest = factors.into_iter();
         let own = |relation: &ColumnRelation| {
             let factors = relation.columns().map(|_| rest.next().flatten());
@@ -259,25 +283,24 @@ impl Related {
         Self(relations.map(own).collect())
     }
 
-    /// Dependent columns whose relations to others that depend are not known, or hold quotients other than by lengths.
-    pub(super) fn unwieldy(&self) -> Vec<usize> {
-        let is_simple =
-            |f: &Option<RationalFunction>| f.as_ref().and_then(Quotient::from_function).is_some();
+    /// Dependent columns whose relations to other dependent columns are unknown, or have denominators other than
+    /// lengths.
+    pub(super) fn unwieldy_columns(&self) -> Vec<usize> {
+        let is_simple = |f: &Option<RationalFunction>| f.as_ref().and_then(MonomialQuotient::from_function).is_some();
         let lines = self.0.iter();
-        let unwieldy =
-            lines.filter(|(r, factors)| !r.is_direct() && !factors.iter().all(is_simple));
+        let unwieldy = lines.filter(|(r, factors)| !r.has_retained_only() && !factors.iter().all(is_simple));
         unwieldy.map(|(relation, _)| relation.column).collect()
     }
 
-    /// Whether a factor on retained columns resists, so that no others need be looked for.
-    pub(super) fn is_lost(&self) -> bool {
-        let mut direct = self.0.iter().filter(|(relation, _)| relation.is_direct());
+    /// Whether a factor on retained columns could not be reconstructed, so that the others are of no use.
+    pub(super) fn has_unknown_factor(&self) -> bool {
+        let mut direct = self.0.iter().filter(|(relation, _)| relation.has_retained_only());
         direct.any(|(_, factors)| factors.iter().any(Option::is_none))
     }
 
-    /// Puts others in the place of relations of the same columns, if they are known.
+    /// Replaces relations by others of the same columns, as far as these are completely known.
     pub(super) fn replace(&mut self, others: Self) {
-        let known = |(_, factors): &(ColumnRelation, Factors)| factors.iter().all(Option::is_some);
+        let known = |(_, factors): &(ColumnRelation, RelationFactors)| factors.iter().all(Option::is_some);
         for other in others.0.into_iter().filter(known) {
             if let Some(line) = self.0.iter_mut().find(|(r, _)| r.column == other.0.column) {
                 *line = other;
@@ -285,21 +308,18 @@ impl Related {
         }
     }
 
-    /// The wanted factors, each written out if that takes no quotients but by lengths (the lowest terms of others are not
-    /// seen from their parts) and no roots that are not independent.
-    pub(super) fn written_out(
-        &self,
-        wanted: &[(usize, usize)],
-        roots: &[i64],
-    ) -> Vec<Option<RationalFunction>> {
-        let mut expanded: BTreeMap<usize, Line> = BTreeMap::new();
+    /// The wanted factors, each multiplied out if all denominators are products of lengths and all roots are
+    /// independent. Other factors are `None`, because their lowest terms cannot be determined from their parts.
+    pub(super) fn expanded_factors(&self, wanted: &[(usize, usize)], roots: &[i64]) -> Vec<Option<RationalFunction>> {
+        // Columns in order, so that the factors of dependent columns in a relation are already expanded.
+        let mut expanded: BTreeMap<usize, RetainedFactors> = BTreeMap::new();
         for (relation, factors) in &self.0 {
-            let line = if relation.is_direct() {
-                Line::from_relation(relation, factors)
+            let line = if relation.has_retained_only() {
+                RetainedFactors::from_relation(relation, factors)
             } else if are_independent(roots) {
-                Line::sum(relation, factors, &expanded)
+                RetainedFactors::from_lines(relation, factors, &expanded)
             } else {
-                Line::default()
+                RetainedFactors::default()
             };
             expanded.insert(relation.column, line);
         }
@@ -307,12 +327,13 @@ impl Related {
         wanted.iter().map(|(j, p)| function(j, p)).collect()
     }
 
-    /// How many terms the factors on retained columns have together when they are written out, at most.
+    /// Upper limit of the number of terms that all factors on retained columns have together after multiplication.
     pub(super) fn n_terms(&self) -> usize {
         let mut counts: BTreeMap<usize, BTreeMap<usize, usize>> = BTreeMap::new();
         for (relation, factors) in &self.0 {
             let mut line: BTreeMap<usize, usize> = BTreeMap::new();
             for (k, factor) in relation.columns().zip(factors) {
+                // Terms of a product of polynomials multiply, terms of sums add up.
                 let n = factor.as_ref().map_or(1, |f| f.numerator.len());
                 match counts.get(&k) {
                     None => *line.entry(k).or_default() += n,
@@ -330,12 +351,12 @@ impl Related {
         all.fold(0_usize, |sum, n| sum.saturating_add(*n))
     }
 
-    /// The relations as they are.
-    pub(super) fn written(self) -> Vec<Written> {
+    /// The relations without expansion.
+    pub(super) fn into_dependent_columns(self) -> Vec<DependentColumn> {
         let lines = self.0.into_iter();
-        let written = |(relation, factors): (ColumnRelation, Factors)| Written {
+        let written = |(relation, factors): (ColumnRelation, RelationFactors)| DependentColumn {
             column: relation.column,
-            by: relation.columns().zip(factors).collect(),
+            factors: relation.columns().zip(factors).collect(),
         };
         lines.map(written).collect()
     }
@@ -346,16 +367,16 @@ impl Related {
         all.all(Option::is_some)
     }
 
-    /// Values of some wanted factors; `None` where a denominator vanishes.
+    /// Values of wanted factors for given constants; `None` where a denominator vanishes.
     pub(super) fn values<const P: u64>(
         &self,
         wanted: &[(usize, usize)],
-        constants: &FieldPoint<Element<P>>,
-    ) -> Option<Vec<Element<P>>> {
-        let mut expanded: BTreeMap<usize, BTreeMap<usize, Element<P>>> = BTreeMap::new();
+        constants: &FieldPoint<FieldElement<P>>,
+    ) -> Option<Vec<FieldElement<P>>> {
+        let mut expanded: BTreeMap<usize, BTreeMap<usize, FieldElement<P>>> = BTreeMap::new();
         for (relation, factors) in &self.0 {
-            let mut line: BTreeMap<usize, Element<P>> = BTreeMap::new();
-            let mut add = |p: usize, value: Element<P>| {
+            let mut line: BTreeMap<usize, FieldElement<P>> = BTreeMap::new();
+            let mut add = |p: usize, value: FieldElement<P>| {
                 let sum = line.entry(p).or_default();
                 *sum = *sum + value;
             };
@@ -373,39 +394,43 @@ impl Related {
     }
 }
 
-/// Whether all are prime, so that no product of different ones is a square: those that occur are small.
+/// Whether all radicands are prime, so that no product of different roots is rational. A short search is sufficient,
+/// because the radicands that occur are small.
 fn are_independent(roots: &[i64]) -> bool {
     let is_prime = |n: i64| n > 1 && (2..n).take_while(|d| d * d <= n).all(|d| n % d != 0);
     roots.iter().all(|n| is_prime(*n))
 }
 
-/// A column's factors on retained ones.
+/// The factors of a column on retained columns.
 #[derive(Default)]
-struct Line {
+struct RetainedFactors {
+    /// Factors that are known, by retained column.
     functions: BTreeMap<usize, RationalFunction>,
-    /// The same as quotients; `None` if one of them is more than that.
-    quotients: Option<BTreeMap<usize, Quotient>>,
+    /// The same as polynomials over products of lengths; `None` if one of them has another form.
+    quotients: Option<BTreeMap<usize, MonomialQuotient>>,
 }
 
-impl Line {
+impl RetainedFactors {
+    /// The factors of a relation that contains retained columns only.
     fn from_relation(relation: &ColumnRelation, factors: &[Option<RationalFunction>]) -> Self {
         let pairs = relation.retained.iter().zip(factors);
-        let quotients =
-            (pairs.clone()).map(|(p, f)| Some((*p, Quotient::from_function(f.as_ref()?)?)));
+        let quotients = (pairs.clone()).map(|(p, f)| Some((*p, MonomialQuotient::from_function(f.as_ref()?)?)));
         Self {
             quotients: quotients.collect(),
             functions: pairs.filter_map(|(p, f)| Some((*p, f.clone()?))).collect(),
         }
     }
 
-    fn sum(
+    /// The factors of a relation whose dependent columns are expanded already; without factors if any form is
+    /// unsuitable.
+    fn from_lines(
         relation: &ColumnRelation,
         factors: &[Option<RationalFunction>],
         expanded: &BTreeMap<usize, Self>,
     ) -> Self {
-        let mut line: BTreeMap<usize, Quotient> = BTreeMap::new();
+        let mut line: BTreeMap<usize, MonomialQuotient> = BTreeMap::new();
         for (k, factor) in relation.columns().zip(factors) {
-            let Some(factor) = factor.as_ref().and_then(Quotient::from_function) else {
+            let Some(factor) = factor.as_ref().and_then(MonomialQuotient::from_function) else {
                 return Self::default();
             };
             let Some(known) = expanded.get(&k) else {
@@ -420,33 +445,35 @@ impl Line {
             }
         }
         Self {
-            functions: line.iter().map(|(p, q)| (*p, q.function())).collect(),
+            functions: line.iter().map(|(p, q)| (*p, q.to_function())).collect(),
             quotients: Some(line),
         }
     }
 }
 
-/// A polynomial over a product of powers of lengths, in lowest terms but for common powers of lengths. No square of a
-/// sine or root occurs, so that there is one way to write it.
+/// A polynomial divided by a product of powers of lengths, in lowest terms except for common powers of lengths. It
+/// contains no square of a sine or root, so its form is unique.
 #[derive(Clone, Debug, Default)]
-struct Quotient {
-    numerator: Polynomial,
-    denominator: Powers,
+struct MonomialQuotient {
+    /// The polynomial.
+    numerator: TrigonometricPolynomial,
+    /// Powers of lengths.
+    denominator: PowerProduct,
 }
 
-impl Quotient {
-    /// `None` if the denominator is something else.
+impl MonomialQuotient {
+    /// Converts a function; `None` if its denominator is no product of lengths.
     fn from_function(function: &RationalFunction) -> Option<Self> {
         let mut terms = function.denominator.iter();
         let (Some((powers, scale)), None) = (terms.next(), terms.next()) else {
             return None;
         };
-        let is_length = |(v, _): &(Variable, u32)| matches!(v, Variable::Constant(_));
+        let is_length = |(v, _): &(FactorVariable, u32)| matches!(v, FactorVariable::Constant(_));
         if !powers.iter().all(is_length) {
             return None;
         }
         let scale = scale.recip();
-        let mut numerator = Polynomial::new();
+        let mut numerator = TrigonometricPolynomial::new();
         for (powers, k) in &function.numerator {
             add_term(&mut numerator, powers.clone(), &(k * &scale));
         }
@@ -456,8 +483,9 @@ impl Quotient {
         })
     }
 
+    /// The product.
     fn times(&self, other: &Self) -> Self {
-        let mut numerator = Polynomial::new();
+        let mut numerator = TrigonometricPolynomial::new();
         for (a, x) in &self.numerator {
             for (b, y) in &other.numerator {
                 add_term(&mut numerator, product(a, b), &(x * y));
@@ -469,8 +497,9 @@ impl Quotient {
         }
     }
 
+    /// Adds another quotient, over the common denominator.
     fn add(&mut self, other: &Self) {
-        let common = lowest_multiple(&self.denominator, &other.denominator);
+        let common = least_common_multiple(&self.denominator, &other.denominator);
         if common != self.denominator {
             let missing = quotient(&common, &self.denominator);
             let numerator = std::mem::take(&mut self.numerator);
@@ -484,28 +513,31 @@ impl Quotient {
         }
     }
 
-    fn function(&self) -> RationalFunction {
-        let denominator = Polynomial::from([(self.denominator.clone(), Rational::ONE)]);
+    /// Converts to a general rational function in lowest terms.
+    fn to_function(&self) -> RationalFunction {
+        let denominator = TrigonometricPolynomial::from([(self.denominator.clone(), Rational::ONE)]);
         RationalFunction::new(self.numerator.clone(), denominator)
     }
 }
 
 /// The product of two products of powers, both sorted.
-fn product(a: &Powers, b: &Powers) -> Powers {
-    merged(a, b, |n, m| n + m)
+fn product(a: &PowerProduct, b: &PowerProduct) -> PowerProduct {
+    merge_powers(a, b, |n, m| n + m)
 }
 
-fn lowest_multiple(a: &Powers, b: &Powers) -> Powers {
-    merged(a, b, u32::max)
+/// The product with the larger exponent of every variable.
+fn least_common_multiple(a: &PowerProduct, b: &PowerProduct) -> PowerProduct {
+    merge_powers(a, b, u32::max)
 }
 
 /// `a / b`, which must be a product of powers.
-fn quotient(a: &Powers, b: &Powers) -> Powers {
-    merged(a, b, |n, m| n - m)
+fn quotient(a: &PowerProduct, b: &PowerProduct) -> PowerProduct {
+    merge_powers(a, b, |n, m| n - m)
 }
 
-fn merged(a: &Powers, b: &Powers, exponent: impl Fn(u32, u32) -> u32) -> Powers {
-    let mut found = Powers::with_capacity(a.len() + b.len());
+/// Combines the exponents of two sorted products of powers, variable by variable; zero exponents are dropped.
+fn merge_powers(a: &PowerProduct, b: &PowerProduct, exponent: impl Fn(u32, u32) -> u32) -> PowerProduct {
+    let mut found = PowerProduct::with_capacity(a.len() + b.len());
     let (mut a, mut b) = (a.iter().peekable(), b.iter().peekable());
     loop {
         let next = match (a.peek(), b.peek()) {
@@ -523,14 +555,15 @@ fn merged(a: &Powers, b: &Powers, exponent: impl Fn(u32, u32) -> u32) -> Powers 
     }
 }
 
-/// Adds a term with squares of sines and roots written otherwise.
-fn add_term(to: &mut Polynomial, powers: Powers, k: &Rational) {
+/// Adds a term, after squares of sines and roots have been replaced: `sin^2 = 1 - cos^2`, and `root^2` is a number.
+fn add_term(to: &mut TrigonometricPolynomial, powers: PowerProduct, k: &Rational) {
     if k.is_zero() {
         return;
     }
+    // The first variable whose square must be replaced.
     let squared = powers
         .iter()
-        .position(|(v, n)| *n > 1 && matches!(v, Variable::Sin(_) | Variable::Root(_)));
+        .position(|(v, n)| *n > 1 && matches!(v, FactorVariable::Sin(_) | FactorVariable::Root(_)));
     let Some(at) = squared else {
         let sum = to.entry(powers);
         match sum {
@@ -546,6 +579,7 @@ fn add_term(to: &mut Polynomial, powers: Powers, k: &Rational) {
         }
         return;
     };
+    // One square is taken out; the remaining term is added recursively.
     let (variable, n) = powers[at];
     let mut rest = powers;
     if n == 2 {
@@ -554,12 +588,12 @@ fn add_term(to: &mut Polynomial, powers: Powers, k: &Rational) {
         rest[at].1 = n - 2;
     }
     match variable {
-        Variable::Root(root) => add_term(to, rest, &(k * &Rational::integer(root))),
-        Variable::Sin(i) => {
-            let with = product(&rest, &vec![(Variable::Cos(i), 2)]);
+        FactorVariable::Root(root) => add_term(to, rest, &(k * &Rational::integer(root))),
+        FactorVariable::Sin(i) => {
+            let with = product(&rest, &vec![(FactorVariable::Cos(i), 2)]);
             add_term(to, rest, k);
             add_term(to, with, &-k);
         }
-        Variable::Constant(_) | Variable::Cos(_) => add_term(to, rest, k),
+        FactorVariable::Constant(_) | FactorVariable::Cos(_) => add_term(to, rest, k),
     }
 }

@@ -1,68 +1,74 @@
-//! Random points of a mechanism's motion in the prime field: poses, drawn again until all their square roots exist, with
-//! rates and accelerations from the differentiated loops.
+//! Random points of a mechanism's motion in the prime field. Poses are drawn until all their square roots exist. Rates
+//! and accelerations are those of the differentiated loops.
 //!
-//! Which coordinates are drawn freely does not matter for linear dependence, so those are drawn that make every loop
-//! a dyad. It matters that the poses make up one irreducible variety, the one that the nominal pose lies on; see
-//! [`crate::loops::branches`].
+//! For linear dependence it does not matter which coordinates are drawn and which are solved for. So coordinates are
+//! chosen such that every loop is a dyad. The poses must make up one irreducible variety, the one that contains the
+//! nominal pose; see [`crate::loops::branches`].
 //!
-//! Decision: rows are drawn until two points in a row add nothing, and not in a fixed number. On one irreducible
-//! variety a random point either adds a new equation or there is none left, with an error probability of 2^-55.
+//! Decision: rows are drawn until two points in a row add nothing, instead of in a fixed number. On one irreducible
+//! variety a random point either adds a new equation or there is none, with an error probability of 2^-55.
 
-use modelmill_algebra::eliminate::Echelon;
-use modelmill_algebra::field::{Element, Extended, Number, Stream};
+use modelmill_algebra::eliminate::RowEchelonForm;
+use modelmill_algebra::field::{ExtensionElement, FieldElement, FieldNumber, RandomStream};
 use modelmill_spec::Mechanism;
 
 use crate::DeriveError;
 use crate::expr::independent::IDLE;
-use crate::expr::{Atom, ExprId, FieldPoint, Graph, Node, Tape, Unary};
-use crate::loops::branches::{self, Branch};
-use crate::loops::field_poses::{FieldPoses, MOST_DRAWS};
-use crate::loops::plan::{Unknowns, plan};
-use crate::regressor::projection::Projection;
+use crate::expr::{Atom, EvaluationTape, ExprId, FieldPoint, Graph, Node, Unary};
+use crate::loops::branches::{self, RootBranch};
+use crate::loops::field_poses::{FieldPoseSampler, MOST_DRAWS};
+use crate::loops::plan::{SolvableCoordinates, plan};
+use crate::regressor::projection::LoopProjection;
 
-/// The same where signs occur, which take only two values: that two of them agree by chance at all points must be out of
-/// the question.
+/// The same as [`IDLE`] where signs occur. A sign has only two values, so two of them agree by chance at single points,
+/// but not at all of these.
 const IDLE_WITH_SIGNS: usize = 80;
 
-/// Draws points.
-pub(super) struct Sampler {
-    poses: FieldPoses,
+/// Evaluates outputs at random points of the motion.
+pub(super) struct MotionSampler {
+    /// Poses with closed loops.
+    poses: FieldPoseSampler,
+    /// Number of drives, whose loads are drawn as well.
     n_drives: usize,
-    /// Whether poses or outputs take roots of what moves.
+    /// Whether poses or outputs contain square roots of coordinates.
     has_roots: bool,
+    /// Indices of the active coordinates, whose rates and accelerations are drawn.
     active: Vec<usize>,
+    /// Indices of the passive coordinates.
     passive: Vec<usize>,
-    rates: Tape,
-    accelerations: Tape,
-    outputs: Tape,
+    /// Rates of the passive coordinates.
+    rates: EvaluationTape,
+    /// Accelerations of the passive coordinates.
+    accelerations: EvaluationTape,
+    /// The expressions that are evaluated.
+    outputs: EvaluationTape,
 }
 
-impl Sampler {
+impl MotionSampler {
     /// Prepares the evaluation of `outputs` at random points of the mechanism's motion.
+    ///
+    /// # Errors
+    /// [`DeriveError::LoopsNotSampled`] if there is no plan for the loops, [`DeriveError::BranchesNotSeparated`] if a
+    /// root's sign is determined by the motion.
     pub(super) fn new(
         graph: &mut Graph,
         mechanism: &Mechanism,
-        projection: &Projection,
+        projection: &LoopProjection,
         outputs: &[ExprId],
     ) -> Result<Self, DeriveError> {
-        let loops = || {
-            projection
-                .loops
-                .closures
-                .iter()
-                .map(|c| c.name.clone())
-                .collect()
-        };
-        let plan = plan(graph, mechanism, &projection.loops, Unknowns::Any)
+        let loops = || projection.loops.closures.iter().map(|c| c.name.clone()).collect();
+        let plan = plan(graph, mechanism, &projection.loops, SolvableCoordinates::Any)
             .ok_or_else(|| DeriveError::LoopsNotSampled { loops: loops() })?;
+        // Passive rates and accelerations are needed at every point, so their roots must exist too.
         let mut all = outputs.to_vec();
         all.extend(&projection.passive_rates);
         all.extend(&projection.passive_accelerations);
-        let poses = FieldPoses::new(graph, mechanism, plan, &all);
-        let branches = branches::branches(graph, &poses, &all)?;
+        let poses = FieldPoseSampler::new(graph, mechanism, plan, &all);
+        // Every root must have a free sign, or equal an earlier root.
+        let branches = branches::root_branches(graph, &poses, &all)?;
         if branches
             .iter()
-            .any(|branch| matches!(branch, Branch::Multiple | Branch::Bound))
+            .any(|branch| matches!(branch, RootBranch::Multiple | RootBranch::Bound))
         {
             return Err(DeriveError::BranchesNotSeparated { loops: loops() });
         }
@@ -72,52 +78,53 @@ impl Sampler {
             n_drives: mechanism.drives.len(),
             active: projection.loops.active.clone(),
             passive: projection.loops.passive.clone(),
-            rates: Tape::new(graph, &projection.passive_rates),
-            accelerations: Tape::new(graph, &projection.passive_accelerations),
-            outputs: Tape::new(graph, outputs),
+            rates: EvaluationTape::new(graph, &projection.passive_rates),
+            accelerations: EvaluationTape::new(graph, &projection.passive_accelerations),
+            outputs: EvaluationTape::new(graph, outputs),
         })
     }
 
-    /// Random constants whose functions that do not depend on the motion all exist.
+    /// Random constants at which all functions of constants exist.
     pub(super) fn constants<const P: u64>(
         &self,
-        stream: &mut Stream,
-    ) -> Result<FieldPoint<Element<P>>, DeriveError> {
-        self.poses.constants(stream)
+        stream: &mut RandomStream,
+    ) -> Result<FieldPoint<FieldElement<P>>, DeriveError> {
+        self.poses.draw_constants(stream)
     }
 
-    /// Values of the outputs at a random point of motion, for the given constants: once, or once for each of the two
-    /// parts of numbers of the quadratic extension. Factors that do not depend on the motion lie in the prime field, so
-    /// that each part keeps to the same linear relations.
+    /// Values of the outputs at a random point of motion, for the given constants. If they lie in the quadratic
+    /// extension, both parts of the numbers are returned, one after the other. Factors that do not depend on the motion
+    /// lie in the prime field, so each part satisfies the same linear relations.
     pub(super) fn draw<const P: u64>(
         &self,
-        constants: &FieldPoint<Element<P>>,
-        stream: &mut Stream,
-    ) -> Result<Vec<Element<P>>, DeriveError> {
+        constants: &FieldPoint<FieldElement<P>>,
+        stream: &mut RandomStream,
+    ) -> Result<Vec<FieldElement<P>>, DeriveError> {
         let none = || DeriveError::NoPointFound { draws: MOST_DRAWS };
+        // Without roots all values lie in the prime field.
         if !self.has_roots {
             return (0..MOST_DRAWS)
-                .find_map(|_| self.try_draw::<P, Element<P>>(constants, stream))
+                .find_map(|_| self.try_draw::<P, FieldElement<P>>(constants, stream))
                 .ok_or_else(none);
         }
         let values = (0..MOST_DRAWS)
-            .find_map(|_| self.try_draw::<P, Extended<P>>(constants, stream))
+            .find_map(|_| self.try_draw::<P, ExtensionElement<P>>(constants, stream))
             .ok_or_else(none)?;
-        let parts: [fn(&Extended<P>) -> Element<P>; 2] = [|x| x.re, |x| x.im];
-        let is_split = values.iter().any(|x| x.im != Element::ZERO);
+        // The imaginary parts are returned only if one of them is not zero.
+        let parts: [fn(&ExtensionElement<P>) -> FieldElement<P>; 2] = [|x| x.re, |x| x.im];
+        let is_split = values.iter().any(|x| x.im != FieldElement::ZERO);
         let shown = &parts[..=usize::from(is_split)];
-        Ok(shown
-            .iter()
-            .flat_map(|part| values.iter().map(part))
-            .collect())
+        Ok(shown.iter().flat_map(|part| values.iter().map(part)).collect())
     }
 
-    fn try_draw<const P: u64, N: Number + From<Element<P>>>(
+    /// Values of the outputs at one draw; `None` if a root or a quotient does not exist there.
+    fn try_draw<const P: u64, N: FieldNumber + From<FieldElement<P>>>(
         &self,
-        constants: &FieldPoint<Element<P>>,
-        stream: &mut Stream,
+        constants: &FieldPoint<FieldElement<P>>,
+        stream: &mut RandomStream,
     ) -> Option<Vec<N>> {
-        let mut point: FieldPoint<N> = self.poses.open(constants, stream);
+        let mut point: FieldPoint<N> = self.poses.draw_open_point(constants, stream);
+        // Rates, accelerations and loads are independent of each other.
         let mut draw = |atom: Atom| point.values.insert(atom, N::draw(stream));
         for a in &self.active {
             draw(Atom::Rate(*a));
@@ -126,15 +133,12 @@ impl Sampler {
         for d in 0..self.n_drives {
             draw(Atom::Load(d));
         }
-        let mut point = self.poses.close(point)?;
+        // The loops determine the passive coordinates, then their rates, then their accelerations.
+        let mut point = self.poses.close_loops(point)?;
         for (p, value) in self.passive.iter().zip(self.rates.evaluate(&point)?) {
             point.values.insert(Atom::Rate(*p), value);
         }
-        for (p, value) in self
-            .passive
-            .iter()
-            .zip(self.accelerations.evaluate(&point)?)
-        {
+        for (p, value) in self.passive.iter().zip(self.accelerations.evaluate(&point)?) {
             point.values.insert(Atom::Acceleration(*p), value);
         }
         self.outputs.evaluate(&point)
@@ -143,41 +147,43 @@ impl Sampler {
 
 /// The regressor's effective columns at random points of motion.
 pub(super) struct SampledRegressor {
-    pub(super) sampler: Sampler,
+    /// Evaluates the columns, drive by drive.
+    pub(super) sampler: MotionSampler,
+    /// Number of columns.
     pub(super) n_columns: usize,
-    /// How many points in a row must show nothing new.
+    /// Number of points in a row that must add no new row before sampling ends.
     idle: usize,
 }
 
 impl SampledRegressor {
-    /// The rows of H at one random point.
-    pub(super) fn point<const P: u64>(
+    /// The rows of H at one random point, one per drive and part of the numbers.
+    pub(super) fn draw_rows<const P: u64>(
         &self,
-        constants: &FieldPoint<Element<P>>,
-        stream: &mut Stream,
-    ) -> Result<Vec<Vec<Element<P>>>, DeriveError> {
+        constants: &FieldPoint<FieldElement<P>>,
+        stream: &mut RandomStream,
+    ) -> Result<Vec<Vec<FieldElement<P>>>, DeriveError> {
         let values = self.sampler.draw(constants, stream)?;
         Ok(values
             .chunks(self.n_columns.max(1))
-            .map(<[Element<P>]>::to_vec)
+            .map(<[FieldElement<P>]>::to_vec)
             .collect())
     }
 
-    /// Rows of W for one set of constants, reduced, until they show nothing new or `rank` is reached; and from how many
-    /// points they came.
-    pub(super) fn echelon<const P: u64>(
+    /// Rows of W for one set of constants in echelon form, until points add nothing new or `rank` is reached, and the
+    /// number of points that they come from. Columns are tried as pivots in `order`.
+    pub(super) fn reduced_rows<const P: u64>(
         &self,
-        constants: &FieldPoint<Element<P>>,
+        constants: &FieldPoint<FieldElement<P>>,
         order: &[usize],
         rank: Option<usize>,
-        stream: &mut Stream,
-    ) -> Result<(Echelon<P>, usize), DeriveError> {
-        let mut echelon = Echelon::new(order);
+        stream: &mut RandomStream,
+    ) -> Result<(RowEchelonForm<P>, usize), DeriveError> {
+        let mut echelon = RowEchelonForm::new(order);
         let (mut idle, mut n_points) = (0, 0);
         while self.n_columns > 0 && idle < self.idle && Some(echelon.pivots.len()) != rank {
             idle += 1;
             n_points += 1;
-            for row in self.point(constants, stream)? {
+            for row in self.draw_rows(constants, stream)? {
                 if echelon.insert(row) {
                     idle = 0;
                 }
@@ -187,16 +193,16 @@ impl SampledRegressor {
     }
 }
 
-/// Prepares the evaluation of so many columns, drive by drive.
-pub(super) fn sampled(
+/// Prepares the evaluation of `n_columns` columns, given drive by drive.
+pub(super) fn sample_regressor(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    projection: &Projection,
+    projection: &LoopProjection,
     outputs: &[ExprId],
     n_columns: usize,
 ) -> Result<SampledRegressor, DeriveError> {
     Ok(SampledRegressor {
-        sampler: Sampler::new(graph, mechanism, projection, outputs)?,
+        sampler: MotionSampler::new(graph, mechanism, projection, outputs)?,
         n_columns,
         idle: if has_sign(graph, outputs) {
             IDLE_WITH_SIGNS
@@ -206,6 +212,7 @@ pub(super) fn sampled(
     })
 }
 
+/// Whether outputs contain signs or absolute values.
 fn has_sign(graph: &Graph, outputs: &[ExprId]) -> bool {
     graph
         .nodes_of(outputs)

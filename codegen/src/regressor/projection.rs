@@ -1,68 +1,72 @@
-//! From the tree back to the mechanism: reactions of the loops leave by virtual power, and the drives take over.
+//! The projection from the open tree to the mechanism: constraint forces are eliminated by virtual power, and forces of
+//! the drives are solved for.
 //!
-//! With `y` the rates in which the loops are simplest (a passive joint's absolute turning rate where axes are
-//! parallel), the differentiated loops read `J_p y_p + J_a y_a = 0`; then `tau_z = tau_a + G' tau_p` with
-//! `G = -J_p^-1 J_a`, and the drives' forces follow from `(d l / d z)' f = tau_z`.
+//! Let `y` be the rates in which the loops are simplest (for a passive joint the absolute angular rate where axes are
+//! parallel). The differentiated loops are `J_p y_p + J_a y_a = 0`. Then `tau_z = tau_a + G' tau_p` with `G = -J_p^-1
+//! J_a`, and the forces f of the drives follow from `(d l / d z)' f = tau_z`.
 //!
-//! Decision: virtual power is written as generalised forces of the open tree, projected with the passive rates, and
+//! Decision: virtual power is written with generalised forces of the open tree, projected with the passive rates, and
 //! not body by body. The recursion of an open chain is the cheapest one, and the same rows serve every projection.
-//! Terms that would cancel are never built, because the absolute turning rate is the unknown of a passive joint
-//! whose axis is parallel to its parent's.
+//! Terms that would cancel are never built, because the unknown of a passive joint whose axis is parallel to its
+//! parent's is the absolute angular rate.
 
 use modelmill_spec::{DriveKind, Mechanism};
 
 use crate::DeriveError;
-use crate::expr::linear::{self, Solution};
+use crate::expr::linear::{self, LinearSolution};
 use crate::expr::{Atom, ExprId, Graph, Node, Rational, Unary, nominal_value};
-use crate::loops::Loops;
-use crate::loops::stretch::distance_squared;
-use crate::tree::Tree;
+use crate::loops::KinematicLoops;
+use crate::loops::segment::distance_squared;
+use crate::tree::KinematicTree;
 
-/// Kinematics of a drive.
+/// Kinematics of one drive.
 #[derive(Clone, Debug)]
 pub(crate) struct DriveMotion {
-    /// Its length or angle, and the first and second time derivative.
+    /// Its length (m) or angle (rad).
     pub(crate) coordinate: ExprId,
+    /// First time derivative.
     pub(crate) rate: ExprId,
+    /// Second time derivative.
     pub(crate) acceleration: ExprId,
 }
 
-/// Everything that loops and drives contribute.
+/// Kinematics of loops and drives, and the projection on the independent coordinates.
 #[derive(Clone, Debug)]
-pub(crate) struct Projection {
-    pub(crate) loops: Loops,
-    /// Positions, among the independent coordinates, of those that have a rate.
+pub(crate) struct LoopProjection {
+    /// The closed loops.
+    pub(crate) loops: KinematicLoops,
+    /// Positions among the independent coordinates of those that have a rate.
     pub(crate) freedoms: Vec<usize>,
-    /// Rate and acceleration of each passive coordinate, in the order of `passive`.
+    /// Rate of each passive coordinate, in the order of `loops.passive`.
     pub(crate) passive_rates: Vec<ExprId>,
+    /// Acceleration of each passive coordinate, in the same order.
     pub(crate) passive_accelerations: Vec<ExprId>,
-    /// Derivatives of the loops' residuals by the passive coordinates.
+    /// Derivatives of the residuals by the passive coordinates, `[residual][passive]`.
     pub(crate) residual_jacobian: Vec<Vec<ExprId>>,
-    /// Per drive.
+    /// Kinematics of each drive.
     pub(crate) drives: Vec<DriveMotion>,
-    /// `drive_jacobian[d][a]`: derivative of the drive's length by the active coordinate.
+    /// `drive_jacobian[d][a]`: derivative of the length of drive `d` by active coordinate `a`.
     pub(crate) drive_jacobian: Vec<Vec<ExprId>>,
-    /// What must not vanish.
+    /// Determinants that must not be zero.
     pub(crate) determinants: Vec<ExprId>,
-    /// `rates_of[i]`: rate of coordinate `i` as an integer combination of the `y`.
+    /// `rates_of[i]`: rate of coordinate `i` as an integer combination of the rates `y`.
     rates_of: Vec<Vec<i64>>,
-    /// `d y_p / d z_a`
+    /// `transmission[p][a]`: derivative `d y_p / d z_a`.
     transmission: Vec<Vec<ExprId>>,
 }
 
-impl Projection {
-    pub(crate) fn new(
-        graph: &mut Graph,
-        mechanism: &Mechanism,
-        tree: &Tree,
-    ) -> Result<Self, DeriveError> {
+impl LoopProjection {
+    /// Solves the differentiated loops for the passive motion and adds the drives.
+    pub(crate) fn new(graph: &mut Graph, mechanism: &Mechanism, tree: &KinematicTree) -> Result<Self, DeriveError> {
         let n = mechanism.coordinates.len();
-        let loops = Loops::new(graph, mechanism, tree)?;
+        // Derivatives of the residuals by all coordinates.
+        let loops = KinematicLoops::new(graph, mechanism, tree)?;
         let (active, passive, residual) = (&loops.active, &loops.passive, &loops.residual);
-        let rates_of = rate_map(tree, passive, n);
+        let rates_of = passive_rate_map(tree, passive, n);
         let by_coordinate: Vec<Vec<ExprId>> = (0..n)
             .map(|i| graph.differentiate(residual, Atom::Coordinate(i)))
             .collect();
+        // Derivative of a residual by the rate `y_j`.
         let in_y = |graph: &mut Graph, by_coordinate: &[Vec<ExprId>], row: usize, j: usize| {
             let terms: Vec<_> = (0..n)
                 .filter(|i| rates_of[*i][j] != 0)
@@ -70,19 +74,15 @@ impl Projection {
                 .collect();
             graph.sum(&terms)
         };
+        // Columns of the Jacobian in the rates `y`.
         let pick = |graph: &mut Graph, columns: &[usize]| -> Vec<Vec<ExprId>> {
             (0..residual.len())
-                .map(|r| {
-                    columns
-                        .iter()
-                        .map(|j| in_y(graph, &by_coordinate, r, *j))
-                        .collect()
-                })
+                .map(|r| columns.iter().map(|j| in_y(graph, &by_coordinate, r, *j)).collect())
                 .collect()
         };
         let (loop_p, loop_a) = (pick(graph, passive), pick(graph, active));
-        // Right-hand sides: the active columns, then what the accelerations see besides.
-        let drift = Self::drift(graph, residual);
+        // Right-hand sides: the columns of the active rates, then the drift, which only accelerations have.
+        let drift = Self::residual_drift(graph, residual);
         let rhs: Vec<Vec<ExprId>> = loop_a
             .iter()
             .zip(&drift)
@@ -92,19 +92,17 @@ impl Projection {
                 row
             })
             .collect();
-        let solution = linear::solve(graph, &loop_p, &rhs, "the loops for the passive rates")?;
-        let transmission: Vec<Vec<ExprId>> = solution
-            .values
-            .iter()
-            .map(|row| row[..active.len()].to_vec())
-            .collect();
+        let solution = linear::solve(graph, &loop_p, &rhs, "the passive rates")?;
+        // The solution: passive rates per active rate, and the drift of the accelerations.
+        let transmission: Vec<Vec<ExprId>> = solution.values.iter().map(|row| row[..active.len()].to_vec()).collect();
         let residual_jacobian = (0..residual.len())
             .map(|r| passive.iter().map(|p| by_coordinate[*p][r]).collect())
             .collect();
         let has_rate = |a: &usize| mechanism.coordinates[loops.active[*a]].motion.has_rate();
         let freedoms = (0..loops.active.len()).filter(has_rate).collect();
+        // Quaternions must not be zero either.
         let mut determinants = solution.determinants.clone();
-        determinants.extend(tree.squares(graph));
+        determinants.extend(tree.quaternion_squares(graph));
         let mut projection = Self {
             loops,
             freedoms,
@@ -117,20 +115,21 @@ impl Projection {
             rates_of,
             transmission,
         };
+        // Rates have no drift.
         projection.passive_rates = projection.passive_motion(graph, Atom::Rate, None);
         let drift: Vec<ExprId> = solution
             .values
             .iter()
             .map(|row| row.last().copied().unwrap_or(Graph::ZERO))
             .collect();
-        projection.passive_accelerations =
-            projection.passive_motion(graph, Atom::Acceleration, Some(&drift));
+        projection.passive_accelerations = projection.passive_motion(graph, Atom::Acceleration, Some(&drift));
         projection.add_drives(graph, mechanism, tree)?;
         Ok(projection)
     }
 
-    /// Second time derivative of the residuals without the accelerations.
-    fn drift(graph: &mut Graph, residual: &[ExprId]) -> Vec<ExprId> {
+    /// Second time derivative of the residuals at zero acceleration.
+    fn residual_drift(graph: &mut Graph, residual: &[ExprId]) -> Vec<ExprId> {
+        // The derivative of the velocities along the rates only.
         let velocity = graph.time_derivative(residual);
         let only_rates = |graph: &mut Graph, atom: Atom| match atom {
             Atom::Coordinate(i) => graph.atom(Atom::Rate(i)),
@@ -139,14 +138,11 @@ impl Projection {
         graph.directional(&velocity, only_rates)
     }
 
-    /// Rates or accelerations of the passive coordinates from the active ones.
-    fn passive_motion(
-        &self,
-        graph: &mut Graph,
-        order: fn(usize) -> Atom,
-        drift: Option<&[ExprId]>,
-    ) -> Vec<ExprId> {
+    /// Rates or accelerations of the passive coordinates from those of the active ones; `drift` is added to
+    /// accelerations.
+    fn passive_motion(&self, graph: &mut Graph, order: fn(usize) -> Atom, drift: Option<&[ExprId]>) -> Vec<ExprId> {
         let n = self.rates_of.len();
+        // Active rates are inputs, passive ones follow by the transmission.
         let mut y = vec![Graph::ZERO; n];
         for a in &self.loops.active {
             y[*a] = graph.atom(order(*a));
@@ -162,6 +158,7 @@ impl Projection {
             terms.extend(drift.map(|d| d[k]));
             y[*p] = graph.add_all(&terms);
         }
+        // From the rates `y` back to the coordinates.
         self.loops
             .passive
             .iter()
@@ -174,9 +171,10 @@ impl Projection {
             .collect()
     }
 
-    /// Generalised forces of all coordinates, turned into those of the `y` and projected on the active ones.
+    /// Generalised forces of all coordinates of the open tree, projected on the active ones.
     pub(crate) fn project(&self, graph: &mut Graph, forces: &[ExprId]) -> Vec<ExprId> {
         let n = self.rates_of.len();
+        // Forces on the rates `y`.
         let in_y: Vec<ExprId> = (0..n)
             .map(|j| {
                 let terms: Vec<_> = (0..n)
@@ -200,12 +198,9 @@ impl Projection {
             .collect()
     }
 
-    /// Forces of the drives that balance generalised forces of all coordinates (open tree).
-    pub(crate) fn drive_forces(
-        &self,
-        graph: &mut Graph,
-        forces: &[ExprId],
-    ) -> Result<Vec<ExprId>, DeriveError> {
+    /// Forces of the drives that balance generalised forces of all coordinates of the open tree.
+    pub(crate) fn drive_forces(&self, graph: &mut Graph, forces: &[ExprId]) -> Result<Vec<ExprId>, DeriveError> {
+        // Generalised forces on the active coordinates, which the drives have to balance.
         let projected = self.project(graph, forces);
         let n_drives = self.drive_jacobian.len();
         let transposed: Vec<Vec<ExprId>> = self
@@ -214,23 +209,18 @@ impl Projection {
             .map(|a| (0..n_drives).map(|d| self.drive_jacobian[d][*a]).collect())
             .collect();
         let rhs: Vec<Vec<ExprId>> = self.freedoms.iter().map(|a| vec![projected[*a]]).collect();
-        let solution = linear::solve(
-            graph,
-            &transposed,
-            &rhs,
-            "the drives' Jacobian for the drives' forces",
-        )?;
+        let solution = linear::solve(graph, &transposed, &rhs, "the drives' forces")?;
         Ok(solution.values.into_iter().map(|row| row[0]).collect())
     }
 
-    /// Multipliers of some closing equations, as many as there are passive coordinates: how strongly each pushes, where
-    /// the open tree needs the given generalised forces, drives taken off. They push where their gap grows.
+    /// Multipliers of some closure equations, as many as there are passive coordinates: the force of each gap, for
+    /// given generalised forces of the open tree minus those of the drives. A positive force widens its gap.
     pub(crate) fn multipliers(
         &self,
         graph: &mut Graph,
         gaps: &[ExprId],
         forces: &[ExprId],
-    ) -> Result<Solution, DeriveError> {
+    ) -> Result<LinearSolution, DeriveError> {
         let n = self.loops.passive.len();
         let by_passive: Vec<Vec<ExprId>> = self
             .loops
@@ -238,7 +228,7 @@ impl Projection {
             .iter()
             .map(|p| graph.differentiate(gaps, Atom::Coordinate(*p)))
             .collect();
-        // Derivatives by the passive y; these move no coordinates but passive ones.
+        // Derivatives by the passive rates `y`, which move only passive coordinates.
         let jacobian: Vec<Vec<ExprId>> = (0..gaps.len())
             .map(|row| {
                 let by = |j: &usize| {
@@ -264,13 +254,13 @@ impl Projection {
                 graph.sum(&terms)
             })
             .collect();
-        let what = "the loops for their forces";
-        let transposed: Vec<Vec<ExprId>> = (0..n)
-            .map(|p| jacobian.iter().map(|row| row[p]).collect())
-            .collect();
+        let what = "the forces of the loops";
+        let transposed: Vec<Vec<ExprId>> = (0..n).map(|p| jacobian.iter().map(|row| row[p]).collect()).collect();
+        // The transposed system is solved directly if it is small enough.
         let rhs: Vec<Vec<ExprId>> = in_y.iter().map(|x| vec![*x]).collect();
         match linear::solve(graph, &transposed, &rhs, what) {
-            // Systems of legs can be torn apart by columns only: the inverse of the untransposed one serves as well.
+            // Systems of independent legs can be split by columns only, so the inverse of the untransposed matrix is
+            // used instead.
             Err(DeriveError::TooLarge { .. }) => {}
             found => return found,
         }
@@ -280,6 +270,7 @@ impl Projection {
                 (0..n).map(one).collect()
             })
             .collect();
+        // The inverse, multiplied by the forces.
         let mut solution = linear::solve(graph, &jacobian, &identity, what)?;
         let inverse = std::mem::take(&mut solution.values);
         solution.values = (0..n)
@@ -295,22 +286,25 @@ impl Projection {
         Ok(solution)
     }
 
+    /// Adds kinematics and Jacobian of all drives, and the determinant of the Jacobian.
     fn add_drives(
         &mut self,
         graph: &mut Graph,
         mechanism: &Mechanism,
-        tree: &Tree,
+        tree: &KinematicTree,
     ) -> Result<(), DeriveError> {
         let n = mechanism.coordinates.len();
         for drive in &mechanism.drives {
             let coordinate = match drive.kind {
                 DriveKind::Joint(i) => graph.atom(Atom::Coordinate(i.0)),
                 DriveKind::Linear { from, to } => {
+                    // The length of a linear drive.
                     let square = distance_squared(graph, mechanism, tree, [to.0, from.0])?;
                     let length = graph.unary(Unary::Sqrt, square);
                     signed_length(graph, mechanism, length)
                 }
             };
+            // The row of the Jacobian by virtual power.
             let by_coordinate: Vec<ExprId> = (0..n)
                 .map(|i| graph.differentiate(&[coordinate], Atom::Coordinate(i))[0])
                 .collect();
@@ -321,8 +315,10 @@ impl Projection {
                 rate_terms.push(graph.mul(*slope, rate));
             }
             let rate = graph.add_all(&rate_terms);
+            // The acceleration is written with the rates of the tree, which are closed later.
             let tree_rate = graph.time_derivative(&[coordinate]);
             let acceleration = graph.time_derivative(&tree_rate)[0];
+            // Kinematics and row of the Jacobian.
             self.drives.push(DriveMotion {
                 coordinate,
                 rate,
@@ -330,6 +326,7 @@ impl Projection {
             });
             self.drive_jacobian.push(row);
         }
+        // The Jacobian must be square.
         let n = self.freedoms.len();
         if self.drives.len() != n {
             return Err(DeriveError::DriveCount {
@@ -337,41 +334,38 @@ impl Projection {
                 freedoms: n,
             });
         }
+        // The system is solved only for its determinants, which must not be zero.
         let identity: Vec<Vec<ExprId>> = (0..n)
-            .map(|i| {
-                (0..n)
-                    .map(|j| if i == j { Graph::ONE } else { Graph::ZERO })
-                    .collect()
-            })
+            .map(|i| (0..n).map(|j| if i == j { Graph::ONE } else { Graph::ZERO }).collect())
             .collect();
         let square: Vec<Vec<ExprId>> = self
             .drive_jacobian
             .iter()
             .map(|row| self.freedoms.iter().map(|a| row[*a]).collect())
             .collect();
-        let solution = linear::solve(graph, &square, &identity, "the drives' Jacobian")?;
+        let solution = linear::solve(graph, &square, &identity, "the inverse of the drives' Jacobian")?;
         self.determinants.extend(solution.determinants);
         Ok(())
     }
 }
 
-/// A drive's length without the magnitude's bars that it has along a slide: a drive does not reach through its own point,
-/// so that the sign is that of the nominal pose.
+/// The length of a drive without the absolute value that it has along a prismatic joint. A drive does not pass through
+/// its own point, so the sign is that of the nominal pose.
 fn signed_length(graph: &mut Graph, mechanism: &Mechanism, length: ExprId) -> ExprId {
     let (base, factor) = graph.split_factor(length);
     let Node::Unary(Unary::Abs, inner) = *graph.node(base) else {
         return length;
     };
+    // The sign at the nominal pose.
     let positive = nominal_value(graph, mechanism, inner).is_none_or(|x| x >= 0.0);
     graph.scale(inner, &if positive { factor } else { -&factor })
 }
 
-/// How every coordinate's rate follows from the rates `y`: for a passive revolute joint `y` is the absolute rate of its
-/// link about the axes that are parallel to its own.
-fn rate_map(tree: &Tree, passive: &[usize], n: usize) -> Vec<Vec<i64>> {
-    let mut rates_of: Vec<Vec<i64>> = (0..n)
-        .map(|i| (0..n).map(|j| i64::from(i == j)).collect())
-        .collect();
+/// Rates of all coordinates as integer combinations of the rates `y`. For a passive revolute joint `y` is the absolute
+/// rate of its link about the axes that are parallel to its own.
+fn passive_rate_map(tree: &KinematicTree, passive: &[usize], n: usize) -> Vec<Vec<i64>> {
+    let mut rates_of: Vec<Vec<i64>> = (0..n).map(|i| (0..n).map(|j| i64::from(i == j)).collect()).collect();
+    // Passive coordinates that have been treated; a coordinate may move several links.
     let mut done = Vec::new();
     for link in &tree.links {
         let sum = &link.absolute.sum;
@@ -381,7 +375,7 @@ fn rate_map(tree: &Tree, passive: &[usize], n: usize) -> Vec<Vec<i64>> {
         if !passive.contains(&p) || done.contains(&p) {
             continue;
         }
-        // q_p = sign (y_p - rest), where the rest consists of coordinates further up.
+        // q_p = sign (y_p - rest), where the rest consists of coordinates closer to the base.
         let mut row = vec![0; n];
         row[p] = i64::from(sign);
         for (atom, factor) in sum.terms() {

@@ -1,40 +1,41 @@
 //! From p_g to p_min: products, dependencies and base parameters, eq. (5), (6) and (16).
+//! A derivation goes in; the page gets the tables and equations of its last three sections.
 
 use modelmill_spec::Mechanism;
 
 use super::document::{
-    self, Document, Equation, Inline, Line, Table, cell, linear_model, name, number, text,
+    self, InlineSpan, PageDocument, PageEquation, PageTable, TextLine, cell, linear_model, name, number, text,
 };
 use super::rank::NumericRank;
 use crate::Derivation;
 use crate::expr::Rational;
-use crate::expr::print::{Formula, Symbol};
+use crate::expr::print::{FormulaSymbol, PrintedFormula};
 use crate::reduce::base::{
-    lumped, name as base_name, product_formula as product, sums, unit, written_out,
+    base_parameter_name as base_name, dependent_sums, expanded_formula, lumped_formulas, product_formula as product,
+    product_unit,
 };
-use crate::reduce::{Method, RationalFunction};
-use crate::tree::expressions::Monomial;
+use crate::reduce::{RationalFunction, ReductionMethod};
+use crate::tree::expressions::ParameterMonomial;
 
-/// Base parameter `k` written out term by term: what a script reads.
-pub fn base_expression(derivation: &Derivation, k: usize) -> Formula {
-    written_out(&derivation.mechanism, &derivation.reduction, k)
+/// Base parameter `k` expanded term by term, without parentheses: the form that a script reads.
+pub fn base_expression(derivation: &Derivation, k: usize) -> PrintedFormula {
+    expanded_formula(&derivation.mechanism, &derivation.reduction, k)
 }
 
 /// Base parameter `k` with common factors collected: `m1*dc1 + d1*(m2 + m3)`.
-pub fn base_grouped(derivation: &Derivation, k: usize) -> Formula {
+pub fn factored_base_expression(derivation: &Derivation, k: usize) -> PrintedFormula {
     let Derivation {
-        mechanism,
-        reduction,
-        ..
+        mechanism, reduction, ..
     } = derivation;
-    let mut terms = vec![product(
-        mechanism,
-        &reduction.products[reduction.retained[k]],
-    )];
-    let mut groups: Vec<(RationalFunction, Vec<(Rational, Formula)>)> = Vec::new();
+    // The retained product has the factor 1 and comes first.
+    let mut terms = vec![product(mechanism, &reduction.products[reduction.retained[k]])];
+    // Lumped products grouped by their common function of the constants: per function pairs of a number and a product.
+    let mut groups: Vec<(RationalFunction, Vec<(Rational, PrintedFormula)>)> = Vec::new();
     for (at, line) in reduction.dependencies.iter().enumerate() {
-        let what = Formula::product(Rational::ONE, lumped(mechanism, reduction, at));
+        let what = PrintedFormula::product(Rational::ONE, lumped_formulas(mechanism, reduction, at));
+        // The numeric content of a factor is split off, so that factors that differ by a number only share a group.
         for (_, factor) in line.equals.iter().filter(|(at, _)| *at == k) {
+            // Equal functions are found by comparison, since there are few.
             let (number, function) = factor.split_number();
             let member = (number, what.clone());
             match groups.iter_mut().find(|(f, _)| *f == function) {
@@ -43,11 +44,11 @@ pub fn base_grouped(derivation: &Derivation, k: usize) -> Formula {
             }
         }
     }
+    // One term per group: number * function * (sum of products).
     for (function, mut members) in groups {
         let factor = function.formula(mechanism);
-        let mut number = members
-            .iter()
-            .fold(Rational::ZERO, |c, (k, _)| c.content_with(k));
+        // The greatest common content of the numbers stands in front; the first term in parentheses is positive.
+        let mut number = members.iter().fold(Rational::ZERO, |c, (k, _)| c.content_with(k));
         if members[0].0.is_negative() {
             number = -&number;
         }
@@ -55,50 +56,49 @@ pub fn base_grouped(derivation: &Derivation, k: usize) -> Formula {
         for (k, _) in &mut members {
             *k = &*k * &inverse;
         }
-        let sum = members
-            .into_iter()
-            .map(|(k, what)| Formula::product(k, [what]));
-        let term = Formula::product(number, [factor, Formula::sum(sum)]);
+        let sum = members.into_iter().map(|(k, what)| PrintedFormula::product(k, [what]));
+        // number * function * sum
+        let term = PrintedFormula::product(number, [factor, PrintedFormula::sum(sum)]);
         terms.push(term);
     }
-    Formula::sum(terms)
+    PrintedFormula::sum(terms)
 }
 
-/// What a product of p_g, by its position, brings into base parameter `k`: `d1*m2`, with its factor of eq. (6). A product that
-/// goes by others, as in long chains, stands alone, since its factor is longer than what it would tell; so does the retained one.
-pub fn base_summand(derivation: &Derivation, k: usize, product_idx: usize) -> Formula {
+/// The summand of base parameter `k` that belongs to the product of p_g at `product_idx`: `d1*m2`, with its factor of
+/// eq. (6).
+/// Without factor are the retained product and, in long chains, products that depend on other dependent ones,
+/// whose factors are too long to read.
+pub fn base_summand(derivation: &Derivation, k: usize, product_idx: usize) -> PrintedFormula {
     let Derivation {
-        mechanism,
-        reduction,
-        ..
+        mechanism, reduction, ..
     } = derivation;
     let what = product(mechanism, &reduction.products[product_idx]);
     let mut lines = reduction.dependencies.iter();
+    // A line without `via` gives the factor directly.
     let line = lines.find(|line| line.product == product_idx && line.via.is_empty());
     let factor = line.and_then(|line| line.equals.iter().find(|(at, _)| *at == k));
     match factor {
-        Some((_, factor)) => Formula::product(Rational::ONE, [factor.formula(mechanism), what]),
+        Some((_, factor)) => PrintedFormula::product(Rational::ONE, [factor.formula(mechanism), what]),
         None => what,
     }
 }
 
-/// A factor of eq. (6) as expanded text.
+/// A factor of eq. (6) as expanded infix text.
 pub(super) fn factor_text(mechanism: &Mechanism, factor: &RationalFunction) -> String {
-    factor.expanded(mechanism).text()
+    factor.expanded_formula(mechanism).text()
 }
 
 /// The column of a product: `h` with the product as its index.
-fn column(mechanism: &Mechanism, of: &Monomial) -> Formula {
-    Formula::Indexed(Symbol::new("h"), Box::new(product(mechanism, of)))
+fn column_symbol(mechanism: &Mechanism, of: &ParameterMonomial) -> PrintedFormula {
+    PrintedFormula::Indexed(FormulaSymbol::new("h"), Box::new(product(mechanism, of)))
 }
 
-/// p_g with units, and what has no effect.
-pub(super) fn products(page: &mut Document, derivation: &Derivation) {
+/// The section of p_g: a table of the products with unit and nominal value, and a list of products without effect.
+pub(super) fn products(page: &mut PageDocument, derivation: &Derivation) {
     let Derivation {
-        mechanism,
-        reduction,
-        ..
+        mechanism, reduction, ..
     } = derivation;
+    // The model that the table belongs to comes first.
     page.heading("Products of dynamic parameters");
     let mut line = vec![text(
         "The forces of the drives are linear in products of dynamic parameters, eq. (5): ",
@@ -110,91 +110,99 @@ pub(super) fn products(page: &mut Document, derivation: &Derivation) {
     line.push(name("H"));
     line.push(text(" belongs to one product."));
     page.paragraph(line);
+    // Nominal values of single parameters; the value of a product follows from them.
     let parameters: Vec<f64> = mechanism.parameters.iter().map(|p| p.nominal).collect();
+    // One row per product of p_g.
     let rows = reduction
         .products
         .iter()
         .enumerate()
+        // The last cell names the base parameter of a retained product.
         .map(|(k, m)| {
             let fate = match reduction.retained.iter().position(|r| *r == k) {
                 Some(at) => vec![
                     text("retained, "),
-                    Inline::Math(Formula::name(base_name(at))),
+                    InlineSpan::Math(PrintedFormula::name(base_name(at))),
                 ],
-                None => cell(text("follows from retained columns")),
+                None => cell(text("depends on retained columns")),
             };
             vec![
                 cell(text((k + 1).to_string())),
-                cell(Inline::Math(product(mechanism, m))),
-                cell(document::unit(unit(mechanism, m))),
-                cell(text(Shown(m.value(&parameters)).to_string())),
+                cell(InlineSpan::Math(product(mechanism, m))),
+                cell(document::unit(product_unit(mechanism, m))),
+                cell(text(RoundedNumber(m.value(&parameters)).to_string())),
                 fate,
             ]
         })
         .collect();
     page.table(
         "products",
-        Table {
+        PageTable {
             head: vec!["", "product", "unit", "nominal", "column"],
             rows,
         },
     );
+    // Products without effect are listed, so that a reader does not look for them in the table.
     if !reduction.without_effect.is_empty() {
-        let mut line: Line = vec![text("Without any effect on the drives, and so left out: ")];
+        let mut line: TextLine = vec![text("These products do not affect the drives and are left out: ")];
         for (i, m) in reduction.without_effect.iter().enumerate() {
             if i > 0 {
                 line.push(text(", "));
             }
-            line.push(Inline::Math(product(mechanism, m)));
+            line.push(InlineSpan::Math(product(mechanism, m)));
         }
         line.push(text("."));
         page.paragraph(line);
     }
 }
 
-/// Eq. (6).
-pub(super) fn dependencies(page: &mut Document, derivation: &Derivation) {
+/// The section of eq. (6): the columns that are combinations of retained ones, and how they were found.
+pub(super) fn dependencies(page: &mut PageDocument, derivation: &Derivation) {
     let Derivation {
-        mechanism,
-        reduction,
-        ..
+        mechanism, reduction, ..
     } = derivation;
+    // Without dependencies one sentence is enough.
     page.heading("Dependent columns");
     if reduction.dependencies.is_empty() {
-        let mut says =
-            "All columns are linearly independent; nothing needs to be regrouped.".to_owned();
+        let mut says = "All columns are linearly independent; nothing needs to be regrouped.".to_owned();
         if let Some(caution) = reduction.method.caution() {
-            says = format!("{says} Beware: {caution}.");
+            says = format!("{says} Caution: {caution}.");
         }
         page.paragraph([text(says)]);
         return;
     }
+    // How the dependencies were found decides for which values of the constants they are valid.
     page.paragraph([text(match &reduction.method {
-        Method::Exact { confirmed_at, .. } => format!(
-            "Columns that are constant combinations of retained ones at every state, eq. (6). \
+        ReductionMethod::Exact { confirmed_at, .. } => format!(
+            "The following columns are constant combinations of retained columns at every state, eq. (6). \
              They were found in exact arithmetic and confirmed at {confirmed_at} further states with other values of the constants."
         ),
-        Method::Unreduced => "Columns are not reduced.".to_owned(),
-        Method::Numeric { least_kept, most_dropped, residual, because } => format!(
-            "Columns that are constant combinations of retained ones, eq. (6), found numerically on the values of this file: \
-             {because}. The factors are rounded, and base and factors hold for these values alone. \
-             Of every retained column the others leave at least {least_kept:.1e}, of every dependent one at most {most_dropped:.1e}; \
-             at further states the factors leave at most {residual:.1e} of a column."
+        ReductionMethod::Unreduced => "Columns are not reduced.".to_owned(),
+        ReductionMethod::Numeric { least_kept, most_dropped, residual, because } => format!(
+            "The following columns are constant combinations of retained columns, eq. (6). \
+             They were found numerically with the values of this file: {because}. \
+             The factors are rounded; base and factors are valid for these values only. \
+             In the span of the other columns, every retained column has a residual of at least {least_kept:.1e} of its size, \
+             every dependent one of at most {most_dropped:.1e}. \
+             At further states the residual of eq. (6) is at most {residual:.1e} of a column."
         ),
     })]);
+    // One equation per dependent column: factors times retained columns, or times dependent ones with lines of their
+    // own.
     let lines = reduction
         .dependencies
         .iter()
         .enumerate()
-        .map(|(i, line)| Equation {
-            left: column(mechanism, &reduction.products[line.product]),
+        .map(|(i, line)| PageEquation {
+            // The dependent column.
+            left: column_symbol(mechanism, &reduction.products[line.product]),
             right: {
                 let retained = line.equals.iter();
                 let retained = retained.map(|(k, factor)| (reduction.retained[*k], factor));
                 let via = line.via.iter().map(|(product, factor)| (*product, factor));
-                Formula::sum(retained.chain(via).map(|(product, factor)| {
-                    let column = column(mechanism, &reduction.products[product]);
-                    Formula::product(Rational::ONE, [factor.formula(mechanism), column])
+                PrintedFormula::sum(retained.chain(via).map(|(product, factor)| {
+                    let column = column_symbol(mechanism, &reduction.products[product]);
+                    PrintedFormula::product(Rational::ONE, [factor.formula(mechanism), column])
                 }))
             },
             tag: format!("6.{}", i + 1),
@@ -204,17 +212,13 @@ pub(super) fn dependencies(page: &mut Document, derivation: &Derivation) {
     page.equations("dependent columns", lines);
 }
 
-/// Eq. (16).
-pub(super) fn base_parameters(
-    page: &mut Document,
-    derivation: &Derivation,
-    numeric: Option<&NumericRank>,
-) {
+/// The section of eq. (16): the base parameters as formulas and their nominal values.
+/// `numeric` is the rank on the file's values, which is compared with the exact one.
+pub(super) fn base_parameters(page: &mut PageDocument, derivation: &Derivation, numeric: Option<&NumericRank>) {
     let Derivation {
-        mechanism,
-        reduction,
-        ..
+        mechanism, reduction, ..
     } = derivation;
+    // A sentence with the rank, then the equations, then the values.
     page.heading("Base parameters");
     let rank = reduction.retained.len();
     let mut line = vec![text(format!(
@@ -223,14 +227,16 @@ pub(super) fn base_parameters(
     ))];
     line.extend(linear_model("H_min", "p_min"));
     line.push(text("."));
+    // The numeric check, if the caller has made it.
     if let Some(n) = numeric {
+        // A smaller numeric rank means a special geometry.
         let verdict = if n.rank == rank {
-            ", the same"
+            ", as derived"
         } else {
-            ": this geometry is special, and some base parameters cannot be told apart"
+            "; this geometry is special, and some base parameters are indistinguishable"
         };
         line.push(text(format!(
-            " On the file's values the numeric rank of eq. (9) over {} states is {}{verdict}.",
+            " Numeric check of eq. (9) with the file's values at {} random states: rank {}{verdict}.",
             n.samples, n.rank
         )));
         if let Some(condition) = n.condition {
@@ -238,62 +244,59 @@ pub(super) fn base_parameters(
         }
     }
     page.paragraph(line);
-    let equation = |k: usize, right: Formula| Equation {
-        left: Formula::name(base_name(k)),
+    // The unit of a base parameter is that of its retained product.
+    let equation = |k: usize, right: PrintedFormula| PageEquation {
+        left: PrintedFormula::name(base_name(k)),
         right,
         tag: format!("16.{}", k + 1),
-        unit: Some(unit(mechanism, &reduction.products[reduction.retained[k]])),
+        unit: Some(product_unit(mechanism, &reduction.products[reduction.retained[k]])),
     };
-    let sums = sums(mechanism, reduction);
+    // Long chains have named sums, because base parameters without them would be too long to read.
+    let sums = dependent_sums(mechanism, reduction);
     if !sums.is_empty() {
         page.paragraph([text(
-            "Products that others go by stand with these, link by link (Gautier and Khalil 1990):",
+            "Named sums: a dependent product together with the products that are expressed by it, link by link (Gautier and Khalil 1990):",
         )]);
-        let sums = sums
-            .into_iter()
-            .enumerate()
-            .map(|(i, (name, right))| Equation {
-                left: Formula::name(name),
-                right,
-                tag: format!("7.{}", i + 1),
-                unit: None,
-            });
+        let sums = sums.into_iter().enumerate().map(|(i, (name, right))| PageEquation {
+            left: PrintedFormula::name(name),
+            right,
+            tag: format!("7.{}", i + 1),
+            unit: None,
+        });
         page.equations("sums", sums.collect());
     }
+    // Factored forms, which are shorter than the expanded ones that scripts read.
     let grouped = (0..rank)
-        .map(|k| equation(k, base_grouped(derivation, k)))
+        .map(|k| equation(k, factored_base_expression(derivation, k)))
         .collect();
     page.equations("base parameters", grouped);
+    // Identified values where the file has them, nominal ones otherwise.
     let values = derivation.nominal_base_values();
     let rows = (0..rank)
         .map(|k| {
             let retained = &reduction.products[reduction.retained[k]];
             vec![
-                cell(Inline::Math(Formula::name(base_name(k)))),
-                cell(Inline::Math(product(mechanism, retained))),
-                cell(text(Shown(values[k]).to_string())),
-                cell(document::unit(unit(mechanism, retained))),
+                cell(InlineSpan::Math(PrintedFormula::name(base_name(k)))),
+                cell(InlineSpan::Math(product(mechanism, retained))),
+                cell(text(RoundedNumber(values[k]).to_string())),
+                cell(document::unit(product_unit(mechanism, retained))),
             ]
         })
         .collect();
     page.table(
         "values",
-        Table {
-            head: vec![
-                "base parameter",
-                "retained product",
-                "nominal value",
-                "unit",
-            ],
+        PageTable {
+            head: vec!["base parameter", "retained product", "nominal value", "unit"],
             rows,
         },
     );
 }
 
 /// A number with six significant digits.
-struct Shown(f64);
+/// Printed with at most six digits; rounding is done in decimal, so that the text has no trailing digits.
+struct RoundedNumber(f64);
 
-impl std::fmt::Display for Shown {
+impl std::fmt::Display for RoundedNumber {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let rounded: f64 = format!("{:.5e}", self.0).parse().unwrap_or(self.0);
         f.write_str(&number(rounded))

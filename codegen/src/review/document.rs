@@ -1,113 +1,134 @@
 //! A page before it takes a notation: headings, paragraphs, tables and equations, in order.
 
-use crate::expr::print::{Formula, Symbol};
+use crate::expr::print::{FormulaSymbol, PrintedFormula};
 
-/// A stretch of a line.
+/// A part of a line in one notation.
 #[derive(Clone, Debug)]
-pub(super) enum Inline {
+pub(super) enum InlineSpan {
+    /// Prose, escaped by the printers.
     Text(String),
+    /// A name from the model file, in a fixed-width font.
     Code(String),
-    Math(Formula),
+    /// A formula, printed in the notation of the format.
+    Math(PrintedFormula),
     /// A unit such as `kg m^2`.
     Unit(String),
 }
 
-/// A line of text.
-pub(super) type Line = Vec<Inline>;
+/// A line of text, as spans in order.
+pub(super) type TextLine = Vec<InlineSpan>;
 
 /// `left = right`, with a tag in parentheses and perhaps a unit.
 #[derive(Clone, Debug)]
-pub(super) struct Equation {
-    pub(super) left: Formula,
-    pub(super) right: Formula,
+pub(super) struct PageEquation {
+    /// The formula left of the equals sign: a symbol or 0.
+    pub(super) left: PrintedFormula,
+    /// The formula right of the equals sign.
+    pub(super) right: PrintedFormula,
+    /// Tag without parentheses, such as `16.3`; unique on the page.
     pub(super) tag: String,
+    /// Unit of both sides, where one is shown.
     pub(super) unit: Option<String>,
 }
 
 /// A table; every row has as many cells as the head.
 #[derive(Clone, Debug)]
-pub(super) struct Table {
+pub(super) struct PageTable {
+    /// Headings of the columns; an empty text is a column without heading.
     pub(super) head: Vec<&'static str>,
-    pub(super) rows: Vec<Vec<Line>>,
+    /// Cells by row and column.
+    pub(super) rows: Vec<Vec<TextLine>>,
 }
 
-/// A part of a page.
+/// A block of a page: the printers handle one kind after the other.
 #[derive(Clone, Debug)]
-pub(super) enum Block {
+pub(super) enum PageBlock {
+    /// Title of a section; its text also makes the anchor in HTML.
     Heading(String),
-    Paragraph(Line),
-    Table(Table),
-    Equations(Vec<Equation>),
-    /// Long matter that a reader may skip.
-    Folded(String, Vec<Block>),
+    /// Prose.
+    Paragraph(TextLine),
+    /// A table, shown in full.
+    Table(PageTable),
+    /// Equations, one below the other.
+    Equations(Vec<PageEquation>),
+    /// A summary line and blocks that open on demand, for long tables and listings.
+    Folded(String, Vec<PageBlock>),
 }
 
-/// A page.
+/// A page, independent of its notation.
 #[derive(Clone, Debug)]
-pub(super) struct Document {
+pub(super) struct PageDocument {
+    /// Title of the model, or its name if it has none.
     pub(super) title: String,
-    pub(super) blocks: Vec<Block>,
+    /// Sections in order, each opened by a heading.
+    pub(super) blocks: Vec<PageBlock>,
 }
 
-/// Tables and lists of equations that are longer are folded away.
+/// More rows or equations than this are folded.
 const LONG: usize = 24;
 
-impl Document {
+impl PageDocument {
+    /// Opens a section.
     pub(super) fn heading(&mut self, text: &str) {
-        self.blocks.push(Block::Heading(text.to_owned()));
+        self.blocks.push(PageBlock::Heading(text.to_owned()));
     }
 
-    pub(super) fn paragraph(&mut self, line: impl IntoIterator<Item = Inline>) {
-        self.blocks
-            .push(Block::Paragraph(line.into_iter().collect()));
+    /// Adds a paragraph of spans.
+    pub(super) fn paragraph(&mut self, line: impl IntoIterator<Item = InlineSpan>) {
+        self.blocks.push(PageBlock::Paragraph(line.into_iter().collect()));
     }
 
-    /// A table, folded if it is long; nothing if it has no rows.
-    pub(super) fn table(&mut self, what: &str, table: Table) {
+    /// Adds a table. A long one is folded under its count and the noun `what`; one without rows is left out.
+    pub(super) fn table(&mut self, what: &str, table: PageTable) {
         match table.rows.len() {
             0 => {}
             n if n > LONG => {
                 let summary = format!("{n} {what}");
                 self.blocks
-                    .push(Block::Folded(summary, vec![Block::Table(table)]));
+                    .push(PageBlock::Folded(summary, vec![PageBlock::Table(table)]));
             }
-            _ => self.blocks.push(Block::Table(table)),
+            _ => self.blocks.push(PageBlock::Table(table)),
         }
     }
 
-    /// Equations, folded if they are many.
-    pub(super) fn equations(&mut self, what: &str, equations: Vec<Equation>) {
+    /// Adds equations. Many are folded under their count and the noun `what`; an empty list is left out.
+    pub(super) fn equations(&mut self, what: &str, equations: Vec<PageEquation>) {
         match equations.len() {
             0 => {}
             n if n > LONG => {
                 let summary = format!("{n} {what}");
                 self.blocks
-                    .push(Block::Folded(summary, vec![Block::Equations(equations)]));
+                    .push(PageBlock::Folded(summary, vec![PageBlock::Equations(equations)]));
             }
-            _ => self.blocks.push(Block::Equations(equations)),
+            _ => self.blocks.push(PageBlock::Equations(equations)),
         }
     }
 }
 
-pub(super) fn text(text: impl Into<String>) -> Inline {
-    Inline::Text(text.into())
+/// A span of prose.
+pub(super) fn text(text: impl Into<String>) -> InlineSpan {
+    InlineSpan::Text(text.into())
 }
 
-pub(super) fn code(text: impl Into<String>) -> Inline {
-    Inline::Code(text.into())
+/// A span for a name from the model file.
+pub(super) fn code(text: impl Into<String>) -> InlineSpan {
+    InlineSpan::Code(text.into())
 }
 
-pub(super) fn name(name: &str) -> Inline {
-    Inline::Math(Formula::Symbol(Symbol::new(name)))
+/// A symbol by its name; an underscore begins an index.
+pub(super) fn name(name: &str) -> InlineSpan {
+    InlineSpan::Math(PrintedFormula::Symbol(FormulaSymbol::new(name)))
 }
 
-pub(super) fn unit(unit: impl Into<String>) -> Inline {
-    Inline::Unit(unit.into())
+/// A unit in the notation of the model file, such as `kg m^2`.
+pub(super) fn unit(unit: impl Into<String>) -> InlineSpan {
+    InlineSpan::Unit(unit.into())
 }
 
-/// `tau = H(q, q', q'') p`
-pub(super) fn linear_model(matrix: &str, parameters: &str) -> Vec<Inline> {
-    let motion = |order| Inline::Math(Formula::Symbol(Symbol::derived("q", order)));
+/// The spans of `tau = H(q, q', q'') p` with the given names of matrix and parameters.
+pub(super) fn linear_model(matrix: &str, parameters: &str) -> Vec<InlineSpan> {
+    // q and its derivatives.
+    let motion = |order| InlineSpan::Math(PrintedFormula::Symbol(FormulaSymbol::time_derivative("q", order)));
     vec![
         name("tau"),
         text(" = "),
@@ -123,13 +144,14 @@ pub(super) fn linear_model(matrix: &str, parameters: &str) -> Vec<Inline> {
     ]
 }
 
-/// A cell of one stretch.
-pub(super) fn cell(inline: Inline) -> Line {
+/// A cell of one span.
+pub(super) fn cell(inline: InlineSpan) -> TextLine {
     vec![inline]
 }
 
-/// A number as Rust prints it, the shortest text that reads back as the same number.
+/// A number in the shortest text that reads back as the same number, with an exponent outside 1e-4 to 1e7.
 pub(super) fn number(value: f64) -> String {
+    // Very small and very large numbers have an exponent.
     let magnitude = value.abs();
     if value != 0.0 && !(1e-4..1e7).contains(&magnitude) {
         format!("{value:e}")
@@ -138,10 +160,10 @@ pub(super) fn number(value: f64) -> String {
     }
 }
 
-/// The stretches of an equation's right side that may stand on lines of their own: sign and magnitude of each term.
-pub(super) fn terms(formula: &Formula) -> Vec<Formula> {
+/// The parts of an equation's right side between which a line may be broken: the terms of a sum.
+pub(super) fn line_terms(formula: &PrintedFormula) -> Vec<PrintedFormula> {
     match formula {
-        Formula::Sum(terms) => terms.clone(),
+        PrintedFormula::Sum(terms) => terms.clone(),
         other => vec![other.clone()],
     }
 }

@@ -1,64 +1,69 @@
-//! Effects with what they add.
+//! The section of effects: a table of their places and of the force that each adds.
 
-use modelmill_spec::{DriveKind, Effect, Mechanism, Place};
+use modelmill_spec::{DriveKind, EffectPlace, Mechanism, ModelEffect};
 
-use super::document::{Document, Inline, Line, Table, cell, code, text};
+use super::document::{InlineSpan, PageDocument, PageTable, TextLine, cell, code, text};
 use crate::expr::Rational;
-use crate::expr::print::{Formula, exact_at};
+use crate::expr::print::{PrintedFormula, exact_formula_at};
 
-/// Stands for the coordinate of each of several places.
+/// Symbols for the coordinate of an effect with several places; the first that the model does not use is taken.
 const EACH: [&str; 4] = ["x", "xi", "chi", "place"];
-/// Stands for the coordinate of the other of two places.
+/// Symbols for the coordinate of the other place of an effect that couples two.
 const OTHER: [&str; 4] = ["y", "eta", "psi", "other"];
 
-/// Effects with their expressions.
-pub(super) fn effects(page: &mut Document, mechanism: &Mechanism) {
+/// Adds the section, if the model has effects.
+pub(super) fn effects(page: &mut PageDocument, mechanism: &Mechanism) {
     if mechanism.effects.is_empty() {
         return;
     }
     // A coordinate or constant of the model may have that name.
-    let taken = crate::emit::tree::names::reserved(mechanism);
+    let taken = crate::names::reserved_names(mechanism);
     let free = |names: [&str; 4], last: &str| {
         let found = names.into_iter().find(|name| !taken.contains(*name));
         found.unwrap_or(last).to_owned()
     };
+    // Fallbacks are long, so that no model uses them by chance.
     let each = free(EACH, "x_of_the_place");
     let other = free(OTHER, "x_of_the_other_place");
+    // How the table is read.
     page.heading("Effects");
     page.paragraph([
-        text("Each adds to the force of its place; a linear drive's name stands for its length, "),
+        text("Each effect adds a force at its place. The name of a linear drive stands for its length, "),
         code("load"),
-        text(" for the force that the place carries. Where an effect acts at several places, "),
-        Inline::Math(Formula::name(&*each)),
+        text(" for the force that the place transmits. If an effect acts at several places, "),
+        InlineSpan::Math(PrintedFormula::name(&*each)),
         text(" stands for the coordinate of each of them. At a point the parameter is a mass."),
     ]);
-    let is_coupled = |effect: &Effect| {
+    // An effect with a fixed `other` names that place in its row; only the others need a symbol for it.
+    let is_coupled = |effect: &ModelEffect| {
         let mut terms = effect.terms.iter();
         effect.other.is_none()
             && terms.any(|term| {
-                term.expression.mentions(
-                    &|symbol| matches!(symbol, modelmill_spec::Symbol::Place(q) if q.is_other()),
-                )
+                term.expression
+                    .mentions(&|symbol| matches!(symbol, modelmill_spec::ModelSymbol::Place(q) if q.is_other()))
             })
     };
     if mechanism.effects.iter().any(is_coupled) {
         page.paragraph([
-            text("Where an effect couples two places, "),
-            Inline::Math(Formula::name(&*other)),
+            text("If an effect couples two places, "),
+            InlineSpan::Math(PrintedFormula::name(&*other)),
             text(" stands for the coordinate of the other one."),
         ]);
     }
+    // One row per effect: kind, places, contribution.
     let rows = mechanism
         .effects
         .iter()
         .map(|effect| {
-            let mut places = Line::new();
+            // Places by their names in the model file.
+            let mut places = TextLine::new();
             for (i, place) in effect.places.iter().enumerate() {
                 if i > 0 {
                     places.push(text(", "));
                 }
                 places.push(code(mechanism.place_name(*place)));
             }
+            // The second place of a coupling.
             if let Some(other) = effect.other {
                 places.push(text(", by "));
                 places.push(code(mechanism.place_name(other)));
@@ -66,56 +71,66 @@ pub(super) fn effects(page: &mut Document, mechanism: &Mechanism) {
             vec![
                 cell(text(effect.kind.replace('_', " "))),
                 places,
-                adds(mechanism, effect, &each, &other),
+                effect_contribution(mechanism, effect, &each, &other),
             ]
         })
         .collect();
     let head = vec!["effect", "at", "adds"];
-    page.table("effects", Table { head, rows });
+    page.table("effects", PageTable { head, rows });
 }
 
-/// What an effect adds, as a formula where it is one, else in words.
-fn adds(mechanism: &Mechanism, effect: &Effect, each: &str, other: &str) -> Line {
-    let names: Vec<Formula> = (effect.terms.iter())
-        .map(|term| Formula::name(&*mechanism.parameters[term.parameter.0].name))
+/// The contribution of an effect to the force: a sum of parameter times expression, or a text if it is a piece of
+/// mechanics.
+fn effect_contribution(mechanism: &Mechanism, effect: &ModelEffect, each: &str, other: &str) -> TextLine {
+    // The parameters of the effect, one per term.
+    let names: Vec<PrintedFormula> = (effect.terms.iter())
+        .map(|term| PrintedFormula::name(&*mechanism.parameters[term.parameter.0].name))
         .collect();
+    // Effects without mechanics are expressions of the motion at their place.
     let Some(mechanics) = effect.mechanics else {
-        let name = |place: &Place| match place {
-            Place::Drive(d) => match mechanism.drives[d.0].kind {
+        // A joint is named by its coordinate, a linear drive by its length.
+        let name = |place: &EffectPlace| match place {
+            EffectPlace::Drive(d) => match mechanism.drives[d.0].kind {
                 DriveKind::Joint(c) => Some(&*mechanism.coordinates[c.0].name),
                 DriveKind::Linear { .. } => Some(&*mechanism.drives[d.0].name),
             },
-            Place::Coordinate(c) => Some(&*mechanism.coordinates[c.0].name),
+            EffectPlace::Coordinate(c) => Some(&*mechanism.coordinates[c.0].name),
             _ => None,
         };
+        // A single place is named by its own coordinate or length.
         let x = match effect.places.as_slice() {
             [place] => name(place).unwrap_or(each),
             _ => each,
         };
+        // The other place by its own name, if it has one.
         let other = effect.other.as_ref().and_then(name).unwrap_or(other);
+        // The sum of parameter times expression.
         let terms = effect.terms.iter().zip(&names);
-        let sum = Formula::sum(terms.map(|(term, parameter)| {
-            let factor = exact_at(mechanism, &term.expression, [x, other]);
-            Formula::product(Rational::ONE, [parameter.clone(), factor])
+        let sum = PrintedFormula::sum(terms.map(|(term, parameter)| {
+            let factor = exact_formula_at(mechanism, &term.expression, [x, other]);
+            PrintedFormula::product(Rational::ONE, [parameter.clone(), factor])
         }));
-        return cell(Inline::Math(sum));
+        return cell(InlineSpan::Math(sum));
     };
-    let listed: Vec<(&str, Formula)> = if names.is_empty() {
+    // Mechanics is described by its parameters, or by its constants if it has no parameters.
+    let listed: Vec<(&str, PrintedFormula)> = if names.is_empty() {
         let constants = effect.constants.iter().map(|(symbol, value)| {
-            let value = exact_at(mechanism, value, [each, other]);
+            let value = exact_formula_at(mechanism, value, [each, other]);
             (mechanics.constant_label(symbol), value)
         });
         constants.collect()
     } else {
         names.into_iter().map(|name| ("", name)).collect()
     };
-    let mut line = vec![text(mechanics.lead())];
+    // The introduction of the mechanics, followed by the list.
+    let mut line = vec![text(mechanics.introduction())];
     for (i, (label, formula)) in listed.into_iter().enumerate() {
+        // The list is separated by commas.
         let comma = if i == 0 { "" } else { ", " };
         if i > 0 || !label.is_empty() {
             line.push(text(format!("{comma}{label}")));
         }
-        line.push(Inline::Math(formula));
+        line.push(InlineSpan::Math(formula));
     }
     line
 }

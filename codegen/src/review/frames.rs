@@ -1,17 +1,21 @@
+//! A `Mechanism` goes in; the page gets the sections that describe geometry and masses as the model file states them.
 //! Tables of frames, points, bodies and lumped masses.
 
 use modelmill_spec::{
-    Axis, Convention, CoordinateIdx, Exact, Frame, FreeBody, Inertial, Mechanism, Step, TwistAxes,
+    CoordinateIdx, ExactExpression, FrameAxis, FrameConvention, FrameStep, FreeBody, Mechanism, ModelFrame,
+    PartInertia, TwistAxes,
 };
 
-use super::document::{Block, Document, Inline, Line, Table, cell, code, text};
+use super::document::{InlineSpan, PageBlock, PageDocument, PageTable, TextLine, cell, code, text};
 use crate::expr::Rational;
-use crate::expr::print::{Formula, angle, exact, length};
+use crate::expr::print::{PrintedFormula, angle_formula, exact_formula, length_formula};
 
-/// Frames and points.
-pub(super) fn frames(page: &mut Document, mechanism: &Mechanism) {
+/// The section of frames: Denavit-Hartenberg tables, one per convention, then transforms, then points.
+pub(super) fn frames(page: &mut PageDocument, mechanism: &Mechanism) {
     page.heading("Frames");
-    let on = |frame: &Frame| code(&*mechanism.frames[frame.parent.0].name);
+    // The frame on which another one is mounted.
+    let on = |frame: &ModelFrame| code(&*mechanism.frames[frame.parent.0].name);
+    // The base frame at index 0 has no row.
     for (title, standard) in [
         (
             "Modified Denavit-Hartenberg parameters: Rx(alpha) Tx(a) Rz(theta) Tz(d) leads from a frame to the next.",
@@ -22,64 +26,74 @@ pub(super) fn frames(page: &mut Document, mechanism: &Mechanism) {
             true,
         ),
     ] {
-        let rows: Vec<Vec<Line>> = mechanism.frames[1..]
+        // One table per convention, with the frames that use it.
+        let rows: Vec<Vec<TextLine>> = mechanism.frames[1..]
             .iter()
             .filter(|frame| match frame.convention {
-                Convention::ModifiedDh(_) => !standard,
-                Convention::StandardDh(_) => standard,
-                Convention::Base | Convention::Transform(_) => false,
+                FrameConvention::ModifiedDh(_) => !standard,
+                FrameConvention::StandardDh(_) => standard,
+                FrameConvention::Base | FrameConvention::Transform(_) => false,
             })
             .map(|frame| {
                 let mut row = vec![cell(code(&*frame.name)), cell(on(frame))];
-                row.extend(dh(mechanism, frame).map(|x| cell(Inline::Math(x))));
+                row.extend(dh_parameters(mechanism, frame).map(|x| cell(InlineSpan::Math(x))));
                 row
             })
             .collect();
+        // A convention that no frame uses has no table.
         if rows.is_empty() {
             continue;
         }
         page.paragraph([text(title)]);
         let head = vec!["frame", "on", "a", "alpha", "d", "theta"];
-        page.blocks.push(Block::Table(Table { head, rows }));
+        page.blocks.push(PageBlock::Table(PageTable { head, rows }));
     }
-    let rows: Vec<Vec<Line>> = mechanism.frames[1..]
+    // Frames that are given by single rotations and translations.
+    let rows: Vec<Vec<TextLine>> = mechanism.frames[1..]
         .iter()
-        .filter(|frame| matches!(frame.convention, Convention::Transform(_)))
+        .filter(|frame| matches!(frame.convention, FrameConvention::Transform(_)))
+        // Each step is written as `Rx(...)`, `Tz(...)`, in the order in which the file has them.
         .map(|frame| {
-            let mut steps: Line = Vec::new();
+            let mut steps: TextLine = Vec::new();
             for step in &frame.steps {
+                // Kind, axis and amount of one step.
                 let (letter, axis, by) = match step {
-                    Step::Free(body) => {
-                        steps.extend(free_body(mechanism, body));
+                    // A floating body is described in words.
+                    FrameStep::Free(body) => {
+                        steps.extend(free_body_motion(mechanism, body));
                         continue;
                     }
-                    Step::Rotate(axis, by) => ("R", axis, angle(mechanism, by)),
-                    Step::Translate(axis, by) => ("T", axis, length(mechanism, by)),
+                    FrameStep::Rotate(axis, by) => ("R", axis, angle_formula(mechanism, by)),
+                    FrameStep::Translate(axis, by) => ("T", axis, length_formula(mechanism, by)),
                 };
+                // The letter of the axis becomes part of the name: `Rx`, `Tz`.
                 let axis = match axis {
-                    Axis::X => "x",
-                    Axis::Y => "y",
-                    Axis::Z => "z",
+                    FrameAxis::X => "x",
+                    FrameAxis::Y => "y",
+                    FrameAxis::Z => "z",
                 };
+                // Steps are separated by blanks.
                 let space = if steps.is_empty() { "" } else { " " };
                 steps.push(text(format!("{space}{letter}{axis}(")));
-                steps.push(Inline::Math(by));
+                steps.push(InlineSpan::Math(by));
                 steps.push(text(")"));
             }
+            // A frame without steps coincides with its parent.
             if steps.is_empty() {
-                steps.push(text("the same place"));
+                steps.push(text("identity"));
             }
             vec![cell(code(&*frame.name)), cell(on(frame)), steps]
         })
         .collect();
     if !rows.is_empty() {
         page.paragraph([text(
-            "Transforms, each rotation and translation about and along the axes reached so far.",
+            "Transforms: each rotation is about, and each translation along, the axes of the frame reached so far.",
         )]);
         let head = vec!["frame", "on", "transform"];
-        page.blocks.push(Block::Table(Table { head, rows }));
+        page.blocks.push(PageBlock::Table(PageTable { head, rows }));
     }
-    let rows: Vec<Vec<Line>> = mechanism
+    // Points with their frames and positions.
+    let rows: Vec<Vec<TextLine>> = mechanism
         .points
         .iter()
         .map(|point| {
@@ -93,18 +107,21 @@ pub(super) fn frames(page: &mut Document, mechanism: &Mechanism) {
     if !rows.is_empty() {
         page.paragraph([text("Points, fixed to their frames.")]);
         let head = vec!["point", "on", "position in the frame, m"];
-        page.table("points", Table { head, rows });
+        page.table("points", PageTable { head, rows });
     }
 }
 
-/// What a body that hangs on nothing moves by.
-fn free_body(mechanism: &Mechanism, body: &FreeBody) -> Line {
+/// The coordinates of a floating body and the axes in which its velocities and forces are given.
+fn free_body_motion(mechanism: &Mechanism, body: &FreeBody) -> TextLine {
+    // Names of the coordinates as a list.
     let names = |all: &[CoordinateIdx]| {
         let names = all.iter().map(|i| mechanism.coordinates[i.0].name.as_str());
         names.collect::<Vec<_>>().join(", ")
     };
+    // The axes in words.
     let axes = |axes| match axes {
         TwistAxes::Body => "the body's axes",
+        // Linear and angular quantities may use different axes.
         TwistAxes::World => "the base's axes",
     };
     vec![
@@ -120,44 +137,50 @@ fn free_body(mechanism: &Mechanism, body: &FreeBody) -> Line {
     ]
 }
 
-/// a, alpha, d, theta of a frame in a Denavit-Hartenberg convention.
-fn dh(mechanism: &Mechanism, frame: &Frame) -> [Formula; 4] {
-    let rotation = |wanted: Axis| {
-        Formula::sum(frame.steps.iter().filter_map(|step| match step {
-            Step::Rotate(axis, by) if *axis == wanted => Some(angle(mechanism, by)),
+/// Lengths a and d (m), angles alpha and theta (rad), in the order a, alpha, d, theta.
+/// Steps about or along the same axis are summed.
+fn dh_parameters(mechanism: &Mechanism, frame: &ModelFrame) -> [PrintedFormula; 4] {
+    // The angle about an axis.
+    let rotation = |wanted: FrameAxis| {
+        PrintedFormula::sum(frame.steps.iter().filter_map(|step| match step {
+            FrameStep::Rotate(axis, by) if *axis == wanted => Some(angle_formula(mechanism, by)),
             _ => None,
         }))
     };
-    let translation = |wanted: Axis| {
-        Formula::sum(frame.steps.iter().filter_map(|step| match step {
-            Step::Translate(axis, by) if *axis == wanted => Some(length(mechanism, by)),
+    // The length along an axis.
+    let translation = |wanted: FrameAxis| {
+        PrintedFormula::sum(frame.steps.iter().filter_map(|step| match step {
+            FrameStep::Translate(axis, by) if *axis == wanted => Some(length_formula(mechanism, by)),
             _ => None,
         }))
     };
     [
-        translation(Axis::X),
-        rotation(Axis::X),
-        translation(Axis::Z),
-        rotation(Axis::Z),
+        // The convention has a along x, alpha about x, d along z and theta about z.
+        translation(FrameAxis::X),
+        rotation(FrameAxis::X),
+        translation(FrameAxis::Z),
+        rotation(FrameAxis::Z),
     ]
 }
 
-fn vector(mechanism: &Mechanism, at: &[Exact; 3]) -> Line {
+/// A vector with three components, in parentheses.
+fn vector(mechanism: &Mechanism, at: &[ExactExpression; 3]) -> TextLine {
     let mut line = vec![text("(")];
     for (i, x) in at.iter().enumerate() {
         if i > 0 {
             line.push(text(", "));
         }
-        line.push(Inline::Math(exact(mechanism, x)));
+        line.push(InlineSpan::Math(exact_formula(mechanism, x)));
     }
     line.push(text(")"));
     line
 }
 
-/// The entries of an inertia that are not zero, with their places.
-fn entries(mechanism: &Mechanism, names: [&str; 6], values: &[Exact; 6]) -> Line {
+/// The entries of an inertia that are not zero, each after its name, or `0`.
+fn inertia_entries(mechanism: &Mechanism, names: [&str; 6], values: &[ExactExpression; 6]) -> TextLine {
     let mut line = Vec::new();
     for (name, value) in names.iter().zip(values) {
+        // Most inertias have few entries.
         if value.is_zero() {
             continue;
         }
@@ -165,7 +188,7 @@ fn entries(mechanism: &Mechanism, names: [&str; 6], values: &[Exact; 6]) -> Line
             line.push(text(", "));
         }
         line.push(text(format!("{name} ")));
-        line.push(Inline::Math(exact(mechanism, value)));
+        line.push(InlineSpan::Math(exact_formula(mechanism, value)));
     }
     if line.is_empty() {
         line.push(text("0"));
@@ -173,43 +196,44 @@ fn entries(mechanism: &Mechanism, names: [&str; 6], values: &[Exact; 6]) -> Line
     line
 }
 
+/// Entries of a symmetric matrix in the order of the model file.
 const PLACES: [&str; 6] = ["xx", "xy", "xz", "yy", "yz", "zz"];
 
-/// Parts and lumped masses.
-pub(super) fn bodies(page: &mut Document, mechanism: &Mechanism) {
+/// The section of bodies: parts given about their centre of mass, parts given linearly, lumped masses.
+pub(super) fn bodies(page: &mut PageDocument, mechanism: &Mechanism) {
     page.heading("Bodies");
     let (mut about_centre, mut linear) = (Vec::new(), Vec::new());
     for part in &mechanism.parts {
+        // Name and frame of a part.
         let start = vec![
             cell(text(&*part.name)),
             cell(code(&*mechanism.frames[part.frame.0].name)),
         ];
+        // Both forms have the same three columns, but the meaning of the last two differs, so each has a table.
         let (rows, mass, place, inertia) = match &part.inertial {
-            Inertial::AboutCentre {
-                mass,
-                centre,
-                inertia,
-            } => (&mut about_centre, mass, centre, inertia),
-            Inertial::Linear {
+            PartInertia::AboutCentre { mass, centre, inertia } => (&mut about_centre, mass, centre, inertia),
+            PartInertia::Linear {
                 mass,
                 first_moment,
                 inertia,
             } => (&mut linear, mass, first_moment, inertia),
         };
+        // Mass, centre or first moment, and inertia.
         let mut row = start;
-        row.push(cell(Inline::Math(exact(mechanism, mass))));
+        row.push(cell(InlineSpan::Math(exact_formula(mechanism, mass))));
         row.push(vector(mechanism, place));
-        row.push(entries(mechanism, PLACES, inertia));
+        row.push(inertia_entries(mechanism, PLACES, inertia));
         rows.push(row);
     }
+    // Each form has its own table, because the third and fourth columns differ.
     if !about_centre.is_empty() {
         page.paragraph([text(
-            "Parts by mass, centre of mass, and inertia about the centre along the frame's axes; what is not listed is zero.",
+            "Parts by mass, centre of mass, and inertia about the centre of mass in the frame's axes. Entries not listed are zero.",
         )]);
         let head = vec!["part", "frame", "mass, kg", "centre, m", "inertia, kg m²"];
         page.table(
             "parts",
-            Table {
+            PageTable {
                 head,
                 rows: about_centre,
             },
@@ -217,41 +241,39 @@ pub(super) fn bodies(page: &mut Document, mechanism: &Mechanism) {
     }
     if !linear.is_empty() {
         page.paragraph([text(
-            "Parts by mass, first moment, and inertia about the frame's origin; what is not listed is zero.",
+            "Parts by mass, first moment, and inertia about the frame's origin. Entries not listed are zero.",
         )]);
-        let head = vec![
-            "part",
-            "frame",
-            "mass, kg",
-            "first moment, kg m",
-            "inertia, kg m²",
-        ];
-        page.table("parts", Table { head, rows: linear });
+        let head = vec!["part", "frame", "mass, kg", "first moment, kg m", "inertia, kg m²"];
+        page.table("parts", PageTable { head, rows: linear });
     }
     lumped_masses(page, mechanism);
 }
 
-fn lumped_masses(page: &mut Document, mechanism: &Mechanism) {
+/// The table of lumped masses: a share of a mass at a point for forces and at a point for moments.
+fn lumped_masses(page: &mut PageDocument, mechanism: &Mechanism) {
     if mechanism.lumped_masses.is_empty() {
         return;
     }
     page.paragraph([text("Lumped masses.")]);
+    // Number of masses that act at two different points.
     let mut apart = 0;
     let rows = mechanism
         .lumped_masses
         .iter()
         .map(|lump| {
+            // The share is exact, such as 1/2 of a rod's mass.
             let share = Rational::from(lump.share.clone());
-            let mass = Formula::product(share, [exact(mechanism, &lump.mass)]);
+            let mass = PrintedFormula::product(share, [exact_formula(mechanism, &lump.mass)]);
+            // Usually both balances use the same point.
             let same = lump.force_at == lump.moment_at;
             apart += usize::from(!same);
             let moment = if same {
-                cell(text("the same place"))
+                cell(text("the same point"))
             } else {
                 vector(mechanism, &lump.moment_at)
             };
             vec![
-                cell(Inline::Math(mass)),
+                cell(InlineSpan::Math(mass)),
                 cell(code(&*mechanism.frames[lump.frame.0].name)),
                 vector(mechanism, &lump.force_at),
                 moment,
@@ -261,19 +283,21 @@ fn lumped_masses(page: &mut Document, mechanism: &Mechanism) {
     let head = vec![
         "mass, kg",
         "frame",
-        "the balance of forces sees it at, m",
-        "the balance of moments sees it at, m",
+        "point in the balance of forces, m",
+        "point in the balance of moments, m",
     ];
-    page.table("lumped masses", Table { head, rows });
+    page.table("lumped masses", PageTable { head, rows });
+    // Such a mass belongs to a simplified model and not to a rigid body, which a reader has to know.
     if apart > 0 {
+        // The noun in singular or plural.
         let n = if apart == 1 {
             "one mass".to_owned()
         } else {
             format!("{apart} masses")
         };
         page.paragraph([text(format!(
-            "Note: the balance of forces and the balance of moments see {n} at different places. \
-             This is no rigid body; the file asks for it."
+            "Note: the balance of forces and the balance of moments use different points for {n}. \
+             This is not a rigid body; the model file states it so."
         ))]);
     }
 }

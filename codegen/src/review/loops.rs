@@ -1,38 +1,35 @@
-//! Loops and drives: closure equations, how they are solved, and what the drives see.
+//! The sections of loops and drives: closure equations, how they are solved, drive lengths and the Jacobian of the
+//! drives.
 
-use modelmill_spec::{Carries, DriveKind, Mechanism};
+use modelmill_spec::{DriveKind, Mechanism, PlaceLoad};
 
-use super::document::{Block, Document, Equation, Inline, Line, Table, cell, code, text};
-use crate::expr::print::{Formula, angle_sum, formula, tree_size};
+use super::document::{InlineSpan, PageBlock, PageDocument, PageEquation, PageTable, TextLine, cell, code, text};
+use crate::expr::print::{PrintedFormula, angle_sum_formula, formula, tree_size};
 use crate::expr::{ExprId, Graph, Rational, nominal_value};
 use crate::{Derivation, PassivePosition};
 
 /// Expressions with more nodes than this are shown in a program rather than in one line.
 const LONGEST: usize = 70;
 
-fn names(mechanism: &Mechanism, coordinates: &[usize]) -> Line {
-    let mut line = Line::new();
+/// Names of coordinates as a list: `a, b and c`.
+fn coordinate_names(mechanism: &Mechanism, coordinates: &[usize]) -> TextLine {
+    let mut line = TextLine::new();
     for (i, c) in coordinates.iter().enumerate() {
         if i > 0 {
-            line.push(text(if i + 1 == coordinates.len() {
-                " and "
-            } else {
-                ", "
-            }));
+            line.push(text(if i + 1 == coordinates.len() { " and " } else { ", " }));
         }
-        line.push(Inline::Math(Formula::name(
-            &*mechanism.coordinates[*c].name,
-        )));
+        line.push(InlineSpan::Math(PrintedFormula::name(&*mechanism.coordinates[*c].name)));
     }
     line
 }
 
-fn shown(graph: &Graph, mechanism: &Mechanism, id: ExprId) -> Option<Formula> {
+/// The formula of an expression, or `None` if it is too long for a line.
+fn short_formula(graph: &Graph, mechanism: &Mechanism, id: ExprId) -> Option<PrintedFormula> {
     (tree_size(graph, id, LONGEST) < LONGEST).then(|| formula(graph, mechanism, id))
 }
 
-/// Closure equations and the way from the active to the passive coordinates.
-pub(super) fn loops(page: &mut Document, derivation: &Derivation) {
+/// Adds couplings, closure equations, and the solution for the passive coordinates.
+pub(super) fn loops(page: &mut PageDocument, derivation: &Derivation) {
     let Derivation {
         mechanism,
         graph,
@@ -40,15 +37,19 @@ pub(super) fn loops(page: &mut Document, derivation: &Derivation) {
         equations,
         ..
     } = derivation;
+    // Couplings have a section of their own, which a mechanism without loops has as well.
     let projection = &equations.projection;
-    couplings(page, derivation);
+    list_couplings(page, derivation);
     if mechanism.loops.is_empty() {
         return;
     }
     page.heading("Loops");
+    // The tag counts all closure equations, so that a missing number shows that a long one was left out.
     let mut tag = 0;
     for (l, closure) in mechanism.loops.iter().zip(&projection.loops.closures) {
+        // The two points that coincide.
         let [a, b] = l.joins.map(|p| code(&*mechanism.points[p.0].name));
+        // A chain of links exists for planar loops only.
         let plane = if closure.chain.is_some() {
             "; the loop is planar"
         } else {
@@ -63,14 +64,15 @@ pub(super) fn loops(page: &mut Document, derivation: &Derivation) {
             b,
             text(format!(" coincide{plane}.")),
         ]);
+        // Equations that fit into a line.
         let lines = closure
             .residual
             .iter()
             .filter_map(|id| {
                 tag += 1;
-                Some(Equation {
-                    left: Formula::integer(0),
-                    right: shown(graph, mechanism, *id)?,
+                Some(PageEquation {
+                    left: PrintedFormula::integer(0),
+                    right: short_formula(graph, mechanism, *id)?,
                     tag: format!("L{tag}"),
                     unit: None,
                 })
@@ -78,59 +80,67 @@ pub(super) fn loops(page: &mut Document, derivation: &Derivation) {
             .collect();
         page.equations("closure equations", lines);
     }
+    // How the passive coordinates are computed: not at all, in closed form, or iteratively.
     match &programs.passive_position {
         PassivePosition::None => {}
-        PassivePosition::Closed => solved_in_closed_form(page, derivation),
+        // Closed form: the steps of the solution.
+        PassivePosition::Closed => list_closed_form(page, derivation),
+        // Iterative: the list of the coordinates is enough.
         PassivePosition::Newton { .. } => {
             let mut line = vec![text("The passive coordinates ")];
-            line.extend(names(mechanism, &projection.loops.passive));
+            line.extend(coordinate_names(mechanism, &projection.loops.passive));
             line.push(text(
-                " follow by Newton's method on the closure equations, started from the nominal pose or the pose before, \
-                 which keeps to the assembly mode of the model file.",
+                " are computed by Newton's method on the closure equations, started from the nominal pose or the previous pose. \
+                 This keeps the assembly mode of the model file.",
             ));
             page.paragraph(line);
         }
     }
-    let determinants: Vec<Equation> = projection
+    // Determinants of the linear equations of the rates and of the drives' Jacobian.
+    let determinants: Vec<PageEquation> = projection
         .determinants
         .iter()
         .enumerate()
         .filter_map(|(k, id)| {
-            Some(Equation {
-                left: Formula::name(format!("Delta_{}", k + 1)),
-                right: shown(graph, mechanism, *id)?,
+            Some(PageEquation {
+                left: PrintedFormula::name(format!("Delta_{}", k + 1)),
+                right: short_formula(graph, mechanism, *id)?,
                 tag: format!("L{}", tag + k + 1),
                 unit: None,
             })
         })
         .collect();
-    let mut says = "Their rates and accelerations follow from the differentiated closure equations, which are linear in them."
-        .to_owned();
+    let mut says =
+        "Their rates and accelerations follow from the differentiated closure equations, which are linear in them."
+            .to_owned();
+    // Determinants that are too long are not listed.
     if determinants.is_empty() {
-        says.push_str(" A pose where their matrix is singular is reported as such.");
+        says.push_str(" A pose where their matrix is singular is reported.");
     } else {
-        says.push_str(" The mechanism is singular, and the model says so, where a determinant of theirs or of the drives' Jacobian vanishes:");
+        says.push_str(" The pose is singular, and is reported, where a determinant of these equations or of the drives' Jacobian is zero:");
     }
     page.paragraph([text(says)]);
     page.equations("determinants", determinants);
 }
 
-/// What follows other coordinates.
-fn couplings(page: &mut Document, derivation: &Derivation) {
+/// The section of couplings: coordinates that are given functions of others.
+fn list_couplings(page: &mut PageDocument, derivation: &Derivation) {
     let Derivation {
         mechanism,
         graph,
         equations,
         ..
     } = derivation;
+    // Couplings are closures with a coordinate that others determine.
     let closures = equations.projection.loops.closures.iter();
     let mut lines = Vec::new();
     for follower in closures.filter_map(|closure| closure.follower.as_ref()) {
-        let Some(right) = shown(graph, mechanism, follower.value) else {
+        // A long coupling is left out.
+        let Some(right) = short_formula(graph, mechanism, follower.value) else {
             continue;
         };
-        lines.push(Equation {
-            left: Formula::name(&*mechanism.coordinates[follower.coordinate].name),
+        lines.push(PageEquation {
+            left: PrintedFormula::name(&*mechanism.coordinates[follower.coordinate].name),
             right,
             tag: format!("C{}", lines.len() + 1),
             unit: None,
@@ -139,15 +149,17 @@ fn couplings(page: &mut Document, derivation: &Derivation) {
     if lines.is_empty() {
         return;
     }
+    // Equations of all couplings together.
     page.heading("Couplings");
     page.paragraph([text(
-        "These coordinates follow others, and their rates and accelerations do alike. Forces on them act on what they \
-         follow, times the factor.",
+        "These coordinates are determined by others, and so are their rates and accelerations. A force on one of them acts \
+         on the coordinates that determine it, times the factor.",
     )]);
     page.equations("couplings", lines);
 }
 
-fn solved_in_closed_form(page: &mut Document, derivation: &Derivation) {
+/// The solution in closed form, step by step; a step solves for one or two passive coordinates.
+fn list_closed_form(page: &mut PageDocument, derivation: &Derivation) {
     let Derivation {
         mechanism,
         graph,
@@ -157,22 +169,26 @@ fn solved_in_closed_form(page: &mut Document, derivation: &Derivation) {
     let Some(plan) = closing.plan() else {
         return;
     };
+    // Relations between angles of parallelograms and the like are gathered and shown at the end.
     let mut related = Vec::new();
+    // Whether a coordinate is determined by a coupling.
     let is_follower = |i: &usize| {
         let mut couplings = mechanism.couplings.iter();
         couplings.any(|coupling| coupling.coordinate.0 == *i)
     };
+    // Steps of couplings only are shown in their own section.
     for step in &plan.steps {
         if step.unknown.iter().all(is_follower) {
             continue;
         }
         for relation in &step.solved.relations {
+            // Offsets are multiples of pi/12.
             let offset = Rational::new(i64::from(relation.pi12), 12);
-            related.push(Equation {
-                left: Formula::name(&*mechanism.coordinates[relation.coordinate].name),
-                right: Formula::sum([
-                    angle_sum(mechanism, &relation.sum),
-                    Formula::product(offset, [Formula::name("pi")]),
+            related.push(PageEquation {
+                left: PrintedFormula::name(&*mechanism.coordinates[relation.coordinate].name),
+                right: PrintedFormula::sum([
+                    angle_sum_formula(mechanism, &relation.sum),
+                    PrintedFormula::product(offset, [PrintedFormula::name("pi")]),
                 ]),
                 tag: format!("P{}", related.len() + 1),
                 unit: None,
@@ -181,12 +197,15 @@ fn solved_in_closed_form(page: &mut Document, derivation: &Derivation) {
         if !step.solved.relations.is_empty() {
             continue;
         }
-        let mut line = names(mechanism, &step.unknown);
+        // The unknowns of the step, and how they are solved for.
+        let mut line = coordinate_names(mechanism, &step.unknown);
+        // How many unknowns of the step are values and not angles states its kind.
         line.push(text(match step.solved.values.len() {
-            0 => " follow in closed form as the intersection of two circles",
-            1 => " follow in closed form as the intersection of a circle and a line",
-            _ => " follow from two linear equations",
+            0 => " are determined in closed form as the intersection of two circles",
+            1 => " are determined in closed form as the intersection of a circle and a line",
+            _ => " are determined by two linear equations",
         }));
+        // The sign of a square root chooses the assembly mode; it is that of the nominal pose.
         if let Some(root) = step.solved.root {
             let sign = if nominal_value(graph, mechanism, root.witness).is_none_or(|x| x >= 0.0) {
                 "positive"
@@ -194,7 +213,7 @@ fn solved_in_closed_form(page: &mut Document, derivation: &Derivation) {
                 "negative"
             };
             line.push(text(format!(
-                "; the nominal pose chooses the {sign} root. Where the radicand is negative the pose is out of reach"
+                "; the nominal pose selects the {sign} root. Where the radicand is negative, the pose cannot be reached"
             )));
         }
         line.push(text("."));
@@ -202,14 +221,15 @@ fn solved_in_closed_form(page: &mut Document, derivation: &Derivation) {
     }
     if !related.is_empty() {
         page.paragraph([text(
-            "Around the nominal pose these passive angles are tied to others outright, which closes their loops identically:",
+            "Around the nominal pose these relations between angles close their loops identically:",
         )]);
         page.equations("relations", related);
     }
 }
 
-/// Drives with their coordinates and Jacobian.
-pub(super) fn drives(page: &mut Document, derivation: &Derivation) {
+/// The section of drives: where each acts; for linear drives also length and derivatives by the independent
+/// coordinates.
+pub(super) fn drives(page: &mut PageDocument, derivation: &Derivation) {
     let Derivation {
         mechanism,
         graph,
@@ -218,19 +238,24 @@ pub(super) fn drives(page: &mut Document, derivation: &Derivation) {
     } = derivation;
     let projection = &equations.projection;
     page.heading("Drives");
+    // Whether the paragraph on lengths is needed.
     let mut any_linear = false;
     let rows = mechanism
         .drives
         .iter()
+        // A joint drive acts on a coordinate, a linear drive between two points.
         .map(|drive| {
+            // What the force acts on, and its sign.
             let acts = match drive.kind {
                 DriveKind::Joint(i) => {
+                    // A joint drive acts on its coordinate.
                     let coordinate = &mechanism.coordinates[i.0];
-                    let kind = match coordinate.motion.carries() {
-                        Carries::Torque => "torque on ",
+                    // Torque or force, by the motion of the coordinate.
+                    let kind = match coordinate.motion.place_load() {
+                        PlaceLoad::Torque => "torque on ",
                         _ => "force on ",
                     };
-                    vec![text(kind), Inline::Math(Formula::name(&*coordinate.name))]
+                    vec![text(kind), InlineSpan::Math(PrintedFormula::name(&*coordinate.name))]
                 }
                 DriveKind::Linear { from, to } => {
                     any_linear = true;
@@ -246,48 +271,49 @@ pub(super) fn drives(page: &mut Document, derivation: &Derivation) {
             vec![cell(code(&*drive.name)), acts]
         })
         .collect();
+    // All drives, joint drives as well.
     page.table(
         "drives",
-        Table {
+        PageTable {
             head: vec!["drive", "acts as"],
             rows,
         },
     );
+    // Only linear drives are listed: their lengths are new quantities.
     let mut lines = Vec::new();
     for (d, drive) in mechanism.drives.iter().enumerate() {
         if matches!(drive.kind, DriveKind::Joint(_)) {
             continue;
         }
+        // Entries that are zero or too long for a line are left out.
         let mut line = |left: String, id: ExprId| {
             if id == Graph::ZERO {
                 return None;
             }
-            let right = shown(graph, mechanism, id)?;
+            let right = short_formula(graph, mechanism, id)?;
             let tag = format!("D{}", lines.len() + 1);
-            lines.push(Equation {
-                left: Formula::name(left),
+            lines.push(PageEquation {
+                left: PrintedFormula::name(left),
                 right,
                 tag,
                 unit: None,
             });
             Some(())
         };
+        // The length.
         line(format!("l_{}", drive.name), projection.drives[d].coordinate);
-        for (a, slope) in projection
-            .loops
-            .active
-            .iter()
-            .zip(&projection.drive_jacobian[d])
-        {
+        // The row of the Jacobian.
+        for (a, slope) in projection.loops.active.iter().zip(&projection.drive_jacobian[d]) {
             let coordinate = &mechanism.coordinates[*a].name;
             line(format!("J_{}_{coordinate}", drive.name), *slope);
         }
     }
     if any_linear {
         page.paragraph([text(
-            "Lengths of the linear drives, and their derivatives by the independent coordinates, the Jacobian J; what is not listed is zero. \
-             By virtual power J' f equals the generalised forces of the independent coordinates.",
+            "Lengths of the linear drives and their derivatives with respect to the independent coordinates, the Jacobian J. \
+             Entries not listed are zero, or too long for this list; the programs below show those. \
+             By the principle of virtual power, J' f is the generalised force of the independent coordinates.",
         )]);
-        page.blocks.push(Block::Equations(lines));
+        page.blocks.push(PageBlock::Equations(lines));
     }
 }

@@ -21,19 +21,21 @@ mod render_text;
 #[cfg(test)]
 pub(crate) mod tests;
 
-pub use base_parameters::{base_expression, base_grouped, base_summand};
-pub use equations::{BaseLine, DependencyLine, Equations, NumericMethod, Operations, Rank};
+pub use base_parameters::{base_expression, base_summand, factored_base_expression};
+pub use equations::{
+    BaseParameterLine, DependencyLine, NumericMethod, ProgramOperations, RankSummary, ReducedEquations,
+};
 pub use rank::NumericRank;
 
-use modelmill_draw::{Scene, Style, inline_svg};
+use modelmill_draw::{DrawingStyle, MechanismScene, inline_svg};
 use modelmill_spec::Mechanism;
 
 use crate::Derivation;
-use document::Document;
+use document::PageDocument;
 
 /// How a page is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
+pub enum PageFormat {
     /// Plain text for a terminal.
     Text,
     /// Markdown with LaTeX formulas.
@@ -42,41 +44,46 @@ pub enum Format {
     Latex,
     /// One self-contained HTML file with MathML.
     Html,
-    /// [`Equations`] as JSON; needs the feature `json`.
+    /// [`ReducedEquations`] as JSON; needs the feature `json`.
     #[cfg(any(test, feature = "json"))]
     Json,
 }
 
-/// The page of a model.
+/// The page of a model in one notation.
 ///
-/// `numeric` is the rank of eq. (9) on the file's values, if the caller has found it.
-pub fn page(derivation: &Derivation, format: Format, numeric: Option<&NumericRank>) -> String {
-    let document = || write(derivation, numeric);
+/// `numeric` is the rank of eq. (9) on the file's values, if the caller has computed it.
+pub fn page(derivation: &Derivation, format: PageFormat, numeric: Option<&NumericRank>) -> String {
+    // JSON needs no page, so it is composed on demand.
+    let document = || compose_page(derivation, numeric);
     match format {
-        Format::Text => render_text::render(&document()),
-        Format::Markdown => render_markdown::render(&document()),
-        Format::Latex => render_latex::render(&document()),
-        Format::Html => render_html::render(&document(), &picture(&derivation.mechanism)),
+        PageFormat::Text => render_text::render(&document()),
+        PageFormat::Markdown => render_markdown::render(&document()),
+        PageFormat::Latex => render_latex::render(&document()),
+        // The picture is part of the HTML page only.
+        PageFormat::Html => render_html::render(&document(), &mechanism_picture(&derivation.mechanism)),
         #[cfg(any(test, feature = "json"))]
-        Format::Json => Equations::new(derivation, numeric).json(),
+        PageFormat::Json => ReducedEquations::new(derivation, numeric).json(),
     }
 }
 
-/// The mechanism at its nominal pose.
-fn picture(mechanism: &Mechanism) -> String {
+/// The mechanism at its nominal pose, as an inline SVG.
+fn mechanism_picture(mechanism: &Mechanism) -> String {
+    // Nominal pose, from the direction in which the mechanism is seen best.
     let nominal: Vec<f64> = mechanism.coordinates.iter().map(|c| c.nominal).collect();
-    let scene = Scene::new(mechanism, &nominal);
-    inline_svg(&[&scene], &scene.view(), &Style::default())
+    let scene = MechanismScene::new(mechanism, &nominal);
+    inline_svg(&[&scene], &scene.best_view(), &DrawingStyle::default())
 }
 
-/// The derivation, step by step.
-fn write(derivation: &Derivation, numeric: Option<&NumericRank>) -> Document {
+/// The page in the order of the derivation: given quantities, kinematics, effects, base parameters, programs.
+fn compose_page(derivation: &Derivation, numeric: Option<&NumericRank>) -> PageDocument {
     let mechanism = &derivation.mechanism;
+    // The title of the model file, or the name of the model.
     let title = mechanism.title.clone();
-    let mut page = Document {
+    let mut page = PageDocument {
         title: title.unwrap_or_else(|| mechanism.name.clone()),
         blocks: Vec::new(),
     };
+    // Sections in the order in which one follows from the others.
     parameters::summary(&mut page, derivation);
     parameters::quantities(&mut page, mechanism);
     frames::frames(&mut page, mechanism);

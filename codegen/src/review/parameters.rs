@@ -1,20 +1,22 @@
-//! What the model is, and the tables of its constants, parameters and coordinates.
+//! The first sections of the page: a summary, and the tables of constants, parameters and coordinates.
 
 use modelmill_spec::Mechanism;
 
-use super::document::{Document, Inline, Table, cell, code, name, number, text, unit};
+use super::document::{InlineSpan, PageDocument, PageTable, cell, code, name, number, text, unit};
 use crate::Derivation;
-use crate::expr::print::{Formula, exact};
+use crate::expr::print::{PrintedFormula, exact_formula};
 
-/// The first paragraph.
-pub(super) fn summary(page: &mut Document, derivation: &Derivation) {
+/// The first paragraph: counts of bodies, coordinates, loops, drives, effects, products and base parameters.
+pub(super) fn summary(page: &mut PageDocument, derivation: &Derivation) {
     let mechanism = &derivation.mechanism;
     let reduction = &derivation.reduction;
+    // Counts with their noun in singular or plural.
     let count = |n: usize, one: &str, many: &str| match n {
         0 => format!("no {many}"),
         1 => format!("1 {one}"),
         n => format!("{n} {many}"),
     };
+    // The number of passive coordinates is shown in parentheses.
     let passive = mechanism.coordinates.iter().filter(|c| c.passive).count();
     page.paragraph([
         text("Model "),
@@ -37,11 +39,12 @@ pub(super) fn summary(page: &mut Document, derivation: &Derivation) {
     ]);
 }
 
-/// Constants, gravity, parameters, coordinates.
-pub(super) fn quantities(page: &mut Document, mechanism: &Mechanism) {
+/// The sections of constants with gravity, dynamic parameters and coordinates.
+pub(super) fn quantities(page: &mut PageDocument, mechanism: &Mechanism) {
     if !mechanism.constants.is_empty() {
         page.heading("Constants");
     }
+    // Notes of the model file explain the symbols.
     let remark = |note: &Option<String>| cell(text(note.clone().unwrap_or_default()));
     let rows = mechanism
         .constants
@@ -55,13 +58,17 @@ pub(super) fn quantities(page: &mut Document, mechanism: &Mechanism) {
             ]
         })
         .collect();
+    // A model without constants has no table.
     let head = vec!["symbol", "value", "unit", "meaning"];
-    page.table("constants", Table { head, rows });
-    let gravity = mechanism.gravity.each_ref().map(|g| exact(mechanism, g));
-    if gravity.iter().all(Formula::is_zero) {
+    page.table("constants", PageTable { head, rows });
+    // Gravity is a vector of expressions in the model's constants.
+    let gravity = mechanism.gravity.each_ref().map(|g| exact_formula(mechanism, g));
+    // A model without gravity states so.
+    if gravity.iter().all(PrintedFormula::is_zero) {
         page.paragraph([text("Gravity does not act.")]);
     } else {
-        let [x, y, z] = gravity.map(Inline::Math);
+        // The vector in the axes of the base.
+        let [x, y, z] = gravity.map(InlineSpan::Math);
         page.paragraph([
             text("Gravity in the base frame: ("),
             x,
@@ -74,6 +81,7 @@ pub(super) fn quantities(page: &mut Document, mechanism: &Mechanism) {
             text("."),
         ]);
     }
+    // Nominal values as in the model file.
     page.heading("Dynamic parameters");
     let rows = mechanism
         .parameters
@@ -88,8 +96,10 @@ pub(super) fn quantities(page: &mut Document, mechanism: &Mechanism) {
         })
         .collect();
     let head = vec!["symbol", "nominal", "unit", "meaning"];
-    page.table("parameters", Table { head, rows });
+    page.table("parameters", PageTable { head, rows });
+    // The role states which coordinates are inputs of the programs.
     page.heading("Coordinates");
+    // A coordinate with a coupling is a given function of others.
     let follows = |i: usize| {
         let mut couplings = mechanism.couplings.iter();
         couplings.any(|coupling| coupling.coordinate.0 == i)
@@ -100,25 +110,22 @@ pub(super) fn quantities(page: &mut Document, mechanism: &Mechanism) {
         .enumerate()
         .map(|(i, c)| {
             let in_unit = c.motion.unit();
-            let kind = if c.motion.is_angle() {
-                "angle"
-            } else {
-                "length"
-            };
+            // Angles are in rad, lengths in m.
+            let kind = if c.motion.is_angle() { "angle" } else { "length" };
+            // Coupled and passive coordinates are computed; all others are inputs.
             let role = if follows(i) {
-                "passive, follows others"
+                "passive, coupled to others"
             } else if c.passive {
-                "passive, follows from the loops"
+                "passive, determined by loop closure"
             } else {
                 "independent"
             };
             vec![
                 cell(name(&c.name)),
                 cell(text(kind)),
+                // Six decimals without trailing zeros.
                 cell(text(
-                    format!("{:.6}", c.nominal)
-                        .trim_end_matches('0')
-                        .trim_end_matches('.'),
+                    format!("{:.6}", c.nominal).trim_end_matches('0').trim_end_matches('.'),
                 )),
                 cell(unit(in_unit)),
                 cell(text(role)),
@@ -126,5 +133,5 @@ pub(super) fn quantities(page: &mut Document, mechanism: &Mechanism) {
         })
         .collect();
     let head = vec!["symbol", "kind", "nominal", "unit", "role"];
-    page.table("coordinates", Table { head, rows });
+    page.table("coordinates", PageTable { head, rows });
 }

@@ -1,25 +1,26 @@
-//! The programs as equations with named intermediate values, and what they cost.
+//! The sections of operation counts and of the programs as equations with named intermediate values.
 
 use std::collections::BTreeSet;
 
-use modelmill_spec::{Drive, DriveKind};
+use modelmill_spec::{DriveKind, ModelDrive};
 
-use super::document::{Block, Document, Equation, Line, Table, cell, name, text};
-use super::listing::{self, Listing};
-use crate::emit::tree::names::{Meaning, Meanings, reserved};
-use crate::expr::print::{Formula, Symbol};
-use crate::lower::{OperationCount, Program, Stage};
-use crate::reduce::base::name as base_name;
+use super::document::{PageBlock, PageDocument, PageEquation, PageTable, TextLine, cell, name, text};
+use super::listing::{self, ProgramListing};
+use crate::expr::print::{FormulaSymbol, PrintedFormula};
+use crate::lower::{OperationCount, ProgramStage, StraightLineProgram};
+use crate::names::{NamedQuantities, QuantityName, reserved_names};
+use crate::reduce::base::base_parameter_name as base_name;
 use crate::{Derivation, PassivePosition};
 
-/// Operation counts, then the programs.
-pub(super) fn programs(page: &mut Document, derivation: &Derivation) {
+/// Adds the table of operation counts, then a folded listing per program.
+pub(super) fn programs(page: &mut PageDocument, derivation: &Derivation) {
     let programs = &derivation.programs;
     page.heading("Operations");
     page.paragraph([text(
-        "Operations of the programs per state, and those that are done once for a geometry and its parameters. \
-         Changes of sign are free.",
+        "Operations of the programs per state, and operations done once per geometry and set of parameters. \
+         Sign changes are not counted.",
     )]);
+    // Two rows per program: per state, and once per geometry.
     let mut rows = Vec::new();
     for (what, program) in [
         ("passive coordinates", &programs.passive),
@@ -29,84 +30,85 @@ pub(super) fn programs(page: &mut Document, derivation: &Derivation) {
         ("H, all products", &programs.full_regressor),
         ("p_min from parameters", &programs.base_parameters),
     ] {
+        // A model without loops has no program for passive coordinates.
         if program.outputs.is_empty() {
             continue;
         }
-        for (stage, when) in [(Stage::State, "state"), (Stage::Fixed, "geometry")] {
-            let count = program.count(stage);
+        for (stage, when) in [(ProgramStage::State, "state"), (ProgramStage::Fixed, "geometry")] {
+            // Operations by kind.
+            let count = program.count_operations(stage);
             // A program that does nothing at a state, or nothing beforehand, needs no line for it.
             if count == OperationCount::default()
-                && (stage == Stage::Fixed || program.count(Stage::Fixed) != count)
+                && (stage == ProgramStage::Fixed || program.count_operations(ProgramStage::Fixed) != count)
             {
                 continue;
             }
             let mut row = vec![cell(text(what)), cell(text(when))];
+            // One column per kind of operation.
             row.extend(
-                [
-                    count.add,
-                    count.mul,
-                    count.div,
-                    count.sqrt,
-                    count.sincos,
-                    count.other,
-                ]
-                .map(|n| cell(text(n.to_string()))),
+                [count.add, count.mul, count.div, count.sqrt, count.sincos, count.other]
+                    .map(|n| cell(text(n.to_string()))),
             );
             rows.push(row);
         }
     }
-    let head = vec![
-        "program", "per", "+ -", "*", "/", "sqrt", "sin cos", "other",
-    ];
-    page.blocks.push(Block::Table(Table { head, rows }));
+    let head = vec!["program", "per", "+ -", "*", "/", "sqrt", "sin cos", "other"];
+    page.blocks.push(PageBlock::Table(PageTable { head, rows }));
 
+    // The legend comes first, then one folded listing per program.
     page.heading("Programs");
     let listings = listings(derivation);
     page.paragraph([text(
-        "The programs step by step. What is used once is put in place; what is shared has a name.",
+        "The programs step by step. Intermediate results used more than once have names; the others are written inline.",
     )]);
-    legend(page, &listings);
+    add_legend(page, &listings);
     for (title, _, _, listing) in listings {
-        fold(page, &title, listing);
+        add_folded_listing(page, &title, listing);
     }
 }
 
-/// A title, the names of the outputs, the program, and its equations.
-pub(super) type Listed<'a> = (String, Vec<Symbol>, &'a Program, Listing);
+/// A listing with its title, the symbols of the outputs and the program that it shows.
+pub(super) type ListedProgram<'a> = (String, Vec<FormulaSymbol>, &'a StraightLineProgram, ProgramListing);
 
-/// The programs that are shown.
-pub(super) fn listings(derivation: &Derivation) -> Vec<Listed<'_>> {
+/// The programs that the page lists: passive coordinates, drives, regressor. Those that the model does not need are
+/// left out.
+pub(super) fn listings(derivation: &Derivation) -> Vec<ListedProgram<'_>> {
     let Derivation {
         mechanism,
         programs,
         reduction,
         ..
     } = derivation;
-    let meanings = Meanings::new(derivation);
-    let taken = reserved(mechanism);
-    let list = |program: &Program, outputs: &[Symbol], prefix: &str| {
-        let mut names = meanings.of(program);
+    // Known quantities are recognised by their values at a random state.
+    let meanings = NamedQuantities::new(derivation);
+    let taken = reserved_names(mechanism);
+    // Names of quantities apply within a program; symbols of outputs take precedence.
+    let list = |program: &StraightLineProgram, outputs: &[FormulaSymbol], prefix: &str| {
+        let mut names = meanings.name_values(program);
+        // An output keeps its own symbol.
         names.retain(|_, meaning| !outputs.contains(&meaning.symbol));
+        // Outputs that are motions of coordinates or drives get their symbol where they are computed.
         for (value, symbol) in program.outputs.iter().zip(outputs) {
-            // An output with a meaning is called by it from the start.
+            // Later equations of the program then refer to the output by its symbol.
             if is_motion(derivation, symbol) && !is_trivial(program, value.index()) {
-                let meaning = Meaning {
+                let meaning = QuantityName {
                     symbol: symbol.clone(),
                     negative: false,
                 };
                 names.insert(value.index(), meaning);
             }
         }
-        listing::list(program, mechanism, &names, &taken, outputs, prefix)
+        listing::list_program(program, mechanism, &names, &taken, outputs, prefix)
     };
     let mut listings = Vec::new();
+    // Passive coordinates with rates and accelerations exist as a program only if loops close in closed form.
     let (active, passive) = derivation.coordinates();
     if !passive.is_empty() && matches!(programs.passive_position, PassivePosition::Closed) {
-        let outputs: Vec<Symbol> = (0..3)
+        let outputs: Vec<FormulaSymbol> = (0..3)
             .flat_map(|order| {
                 passive
                     .iter()
-                    .map(move |p| Symbol::derived(&*mechanism.coordinates[*p].name, order))
+                    .map(move |p| FormulaSymbol::time_derivative(&*mechanism.coordinates[*p].name, order))
             })
             .collect();
         listings.push((
@@ -116,29 +118,35 @@ pub(super) fn listings(derivation: &Derivation) -> Vec<Listed<'_>> {
             "P",
         ));
     }
-    let is_linear = |d: &Drive| matches!(d.kind, DriveKind::Linear { .. });
+    // Lengths and their rates, then the Jacobian row by row.
+    let is_linear = |d: &ModelDrive| matches!(d.kind, DriveKind::Linear { .. });
     if mechanism.drives.iter().any(is_linear) {
-        let mut outputs: Vec<Symbol> = Vec::new();
+        // Outputs in the order of the program.
+        let mut outputs: Vec<FormulaSymbol> = Vec::new();
+        // Lengths, then their rates.
         for order in 0..2 {
             let lengths = mechanism
                 .drives
                 .iter()
-                .map(|d| Symbol::derived(format!("l_{}", d.name), order));
+                .map(|d| FormulaSymbol::time_derivative(format!("l_{}", d.name), order));
             outputs.extend(lengths);
         }
         for d in &mechanism.drives {
+            // One entry of the Jacobian per active coordinate.
             let row = active
                 .iter()
-                .map(|a| Symbol::new(format!("J_{}_{}", d.name, mechanism.coordinates[*a].name)));
+                .map(|a| FormulaSymbol::new(format!("J_{}_{}", d.name, mechanism.coordinates[*a].name)));
             outputs.extend(row);
         }
         listings.push(("Drives and their Jacobian", outputs, &programs.drives, "D"));
     }
+    // The regressor, row by row.
     let rank = reduction.retained.len();
-    let outputs: Vec<Symbol> = (0..mechanism.drives.len())
-        .flat_map(|d| (0..rank).map(move |k| Symbol::new(format!("H_{}_{}", d + 1, k + 1))))
+    let outputs: Vec<FormulaSymbol> = (0..mechanism.drives.len())
+        .flat_map(|d| (0..rank).map(move |k| FormulaSymbol::new(format!("H_{}_{}", d + 1, k + 1))))
         .collect();
     let rows: Vec<&str> = mechanism.drives.iter().map(|d| &*d.name).collect();
+    // The title names the first and the last column.
     let columns = match rank {
         0 => "none".to_owned(),
         1 => base_name(0),
@@ -158,41 +166,41 @@ pub(super) fn listings(derivation: &Derivation) -> Vec<Listed<'_>> {
         .collect()
 }
 
-/// What the letters stand for; the first column is how their names begin.
+/// Legend of symbols; the first field lists the beginnings of names that a text explains.
 const LETTERS: [(&[&str], &str); 10] = [
     (&["c", "s"], "cosine and sine of the angle in the index"),
     (
         &["omega"],
-        "angular velocity of a frame along its own axes, and with a dot its angular acceleration",
+        "angular velocity of a frame in its own axes; with a dot, its angular acceleration",
     ),
     (
         &["a"],
-        "acceleration of the origin of a frame, gravity taken off, along its own axes or those of the frame named second",
+        "acceleration of the frame's origin minus gravity, in its own axes (or, with two indices, in the axes of the second frame)",
     ),
     (
         &["U"],
-        "matrix that takes a place in a frame to its acceleration relative to the origin",
+        "matrix that maps a point of a frame to its acceleration relative to the frame's origin",
     ),
     (
         &["r"],
-        "place of a point or a frame's origin; with two names, the way from the first to the second; along the base frame's axes",
+        "position of a point or a frame's origin, in the base frame's axes; with two names, the vector from the first to the second",
     ),
     (&["e", "l"], "vector along a linear drive, and its length"),
-    (&["J"], "derivative of a drive's length by a coordinate"),
-    (
-        &["Delta"],
-        "determinant of a small linear system, and its inverse",
-    ),
-    (&["k"], "computed once for a geometry"),
+    (&["J"], "derivative of a drive's length with respect to a coordinate"),
+    (&["Delta"], "determinant of a small linear system, and its inverse"),
+    (&["k"], "value computed once per geometry"),
     (&["x"], "any other intermediate value"),
 ];
 
-/// Explains the letters that the listings use.
-fn legend(page: &mut Document, listings: &[Listed<'_>]) {
+/// Adds a legend of the symbols that the listings use.
+fn add_legend(page: &mut PageDocument, listings: &[ListedProgram<'_>]) {
+    // The beginning of a name: the part before the first underscore, without digits.
     let mut used = BTreeSet::new();
+    // Symbols on the left of all equations.
     for (_, _, _, listing) in listings {
         for equation in listing.fixed.iter().chain(&listing.state) {
-            if let Formula::Symbol(symbol) = &equation.left {
+            if let PrintedFormula::Symbol(symbol) = &equation.left {
+                // Names such as `omega_S3_z` begin with the letter.
                 let head = symbol.name.split('_').next().unwrap_or_default();
                 used.insert(head.trim_end_matches(|c: char| c.is_ascii_digit()));
             }
@@ -201,7 +209,8 @@ fn legend(page: &mut Document, listings: &[Listed<'_>]) {
     let rows = LETTERS
         .iter()
         .filter_map(|(letters, says)| {
-            let mut line = Line::new();
+            // Symbols that share a meaning are listed together.
+            let mut line = TextLine::new();
             for letter in letters.iter().filter(|l| used.contains(**l)) {
                 if !line.is_empty() {
                     line.push(text(", "));
@@ -212,35 +221,38 @@ fn legend(page: &mut Document, listings: &[Listed<'_>]) {
         })
         .collect();
     let head = vec!["letter", "meaning"];
-    page.table("letters", Table { head, rows });
+    page.table("letters", PageTable { head, rows });
 }
 
-/// Whether a name is that of a coordinate's or drive's motion rather than of an entry of H_min.
-fn is_motion(derivation: &Derivation, symbol: &Symbol) -> bool {
-    derivation
-        .mechanism
-        .coordinates
-        .iter()
-        .any(|c| c.name == symbol.name)
+/// Whether a symbol is a coordinate, drive length or Jacobian entry, and not an entry of H_min.
+fn is_motion(derivation: &Derivation, symbol: &FormulaSymbol) -> bool {
+    derivation.mechanism.coordinates.iter().any(|c| c.name == symbol.name)
         || symbol.name.starts_with("l_")
         || symbol.name.starts_with("J_")
 }
 
-fn is_trivial(program: &Program, i: usize) -> bool {
-    use crate::lower::Op;
-    matches!(program.ops[i], Op::Number(_) | Op::Input(_) | Op::Neg(_))
+/// Whether a value is a number, an input or a change of sign, which needs no equation.
+fn is_trivial(program: &StraightLineProgram, i: usize) -> bool {
+    use crate::lower::ProgramOp;
+    matches!(
+        program.ops[i],
+        ProgramOp::Number(_) | ProgramOp::Input(_) | ProgramOp::Neg(_)
+    )
 }
 
-fn fold(page: &mut Document, title: &str, listing: Listing) {
-    let Listing { fixed, state } = listing;
-    let mut blocks: Vec<Block> = Vec::new();
-    let mut part = |says: &str, equations: Vec<Equation>| {
+/// Adds a folded block with the equations of both stages.
+fn add_folded_listing(page: &mut PageDocument, title: &str, listing: ProgramListing) {
+    // Fixed equations first, because those of a state refer to them.
+    let ProgramListing { fixed, state } = listing;
+    let mut blocks: Vec<PageBlock> = Vec::new();
+    // A stage without equations has no heading.
+    let mut part = |says: &str, equations: Vec<PageEquation>| {
         if !equations.is_empty() {
-            blocks.push(Block::Paragraph(vec![text(says)]));
-            blocks.push(Block::Equations(equations));
+            blocks.push(PageBlock::Paragraph(vec![text(says)]));
+            blocks.push(PageBlock::Equations(equations));
         }
     };
     part("Once per geometry:", fixed);
     part("At every state:", state);
-    page.blocks.push(Block::Folded(title.to_owned(), blocks));
+    page.blocks.push(PageBlock::Folded(title.to_owned(), blocks));
 }

@@ -1,12 +1,12 @@
-//! The rank on the file's values, beside the exact one.
+//! The numeric rank of the regressor on the file's values, which the page compares with the exact one.
 
-/// Rank of the regressor on the file's values, found numerically.
+/// Rank of the regressors stacked over random states, eq. (9), on the file's values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NumericRank {
-    /// The rank.
+    /// Number of linearly independent columns.
     pub rank: usize,
-    /// At how many random states the regressor was stacked.
+    /// Number of random states.
     pub samples: usize,
-    /// Condition number of the columns that are retained, if known.
+    /// Condition number of the retained columns, if known.
     pub condition: Option<f64>,
 }

@@ -1,4 +1,5 @@
-//! A page as one self-contained HTML file in the style of all pages: MathML for the formulas, parted so that lines can end.
+//! A page as one self-contained HTML file in the style of all pages: MathML for the formulas, in segments so that lines
+//! can break.
 //!
 //! Decision: a browser breaks no line inside a formula. So each segment up to the next sign of a sum is a formula
 //! of its own, also inside parentheses, and fractions and roots that are too wide are written on the line. No math
@@ -9,17 +10,19 @@ use std::fmt::Write;
 use modelmill_boundary::text::html as escape;
 use modelmill_draw::page;
 
-use super::document::{Block, Document, Equation, Inline, Line};
-use crate::expr::print::Formula;
+use super::document::{InlineSpan, PageBlock, PageDocument, PageEquation, TextLine};
+use crate::expr::print::PrintedFormula;
 
-/// `picture` is an SVG of the mechanism.
-pub(super) fn render(document: &Document, picture: &str) -> String {
+/// The page as HTML. `picture` is an SVG of the mechanism.
+pub(super) fn render(document: &PageDocument, picture: &str) -> String {
+    // The frame of the page is the same for all pages.
     let mut out = page::begin(&document.title);
+    // Links to all sections come first.
     let headings: Vec<&String> = document
         .blocks
         .iter()
         .filter_map(|block| match block {
-            Block::Heading(text) => Some(text),
+            PageBlock::Heading(text) => Some(text),
             _ => None,
         })
         .collect();
@@ -33,6 +36,7 @@ pub(super) fn render(document: &Document, picture: &str) -> String {
     out
 }
 
+/// The anchor of a heading: letters and digits in lower case, `-` for all others.
 fn anchor(text: &str) -> String {
     text.chars()
         .map(|c| {
@@ -45,15 +49,18 @@ fn anchor(text: &str) -> String {
         .collect()
 }
 
-fn blocks(out: &mut String, blocks: &[Block]) {
+/// Blocks in order; folded ones recursively.
+fn blocks(out: &mut String, blocks: &[PageBlock]) {
     for block in blocks {
         match block {
-            Block::Heading(text) => {
+            PageBlock::Heading(text) => {
                 _ = writeln!(out, "<h2 id=\"{}\">{}</h2>", anchor(text), escape(text));
             }
-            Block::Paragraph(line) => _ = writeln!(out, "<p>{}</p>", inlines(line)),
-            Block::Table(table) => {
+            PageBlock::Paragraph(line) => _ = writeln!(out, "<p>{}</p>", inlines(line)),
+            PageBlock::Table(table) => {
+                // The wrapper scrolls if the table is wider than the page.
                 out.push_str("<div class=\"wide\"><table>\n<thead><tr>");
+                // Headings of the columns.
                 for head in &table.head {
                     _ = write!(out, "<th scope=\"col\">{}</th>", escape(head));
                 }
@@ -67,14 +74,15 @@ fn blocks(out: &mut String, blocks: &[Block]) {
                 }
                 out.push_str("</tbody>\n</table></div>\n");
             }
-            Block::Equations(equations) => {
+            // Equations are a grid: left side, right side, tag.
+            PageBlock::Equations(equations) => {
                 out.push_str("<div class=\"equations\">\n");
                 for equation in equations {
                     write_equation(out, equation);
                 }
                 out.push_str("</div>\n");
             }
-            Block::Folded(summary, inner) => {
+            PageBlock::Folded(summary, inner) => {
                 _ = writeln!(out, "<details>\n<summary>{}</summary>", escape(summary));
                 self::blocks(out, inner);
                 out.push_str("</details>\n");
@@ -83,13 +91,15 @@ fn blocks(out: &mut String, blocks: &[Block]) {
     }
 }
 
-fn write_equation(out: &mut String, equation: &Equation) {
+/// One equation: left side, right side in segments, unit and tag.
+fn write_equation(out: &mut String, equation: &PageEquation) {
     _ = write!(
         out,
         "<div class=\"equation\"><span class=\"left\">{}</span> <span class=\"right\">{}",
         math(&format!("{}<mo>=</mo>", equation.left.mathml())),
-        parted(&equation.right)
+        mathml_segments(&equation.right)
     );
+    // The unit stands in a span of its own.
     if let Some(text) = &equation.unit {
         _ = write!(out, " <span class=\"unit\">{}</span>", unit(text));
     }
@@ -100,11 +110,13 @@ fn write_equation(out: &mut String, equation: &Equation) {
     );
 }
 
-/// A unit with its exponents raised.
+/// A unit with raised exponents; `^` ends at the first character that is no digit or minus.
 fn unit(text: &str) -> String {
     let mut out = String::new();
+    // Whether an exponent is open.
     let mut raised = false;
     for c in text.chars() {
+        // The exponent begins after the caret.
         if c == '^' {
             out.push_str("<sup>");
             raised = true;
@@ -115,6 +127,7 @@ fn unit(text: &str) -> String {
             raised = false;
         }
         match c {
+            // A narrow blank that does not break.
             ' ' => out.push_str("&#x202F;"),
             c => out.push_str(&escape(c.encode_utf8(&mut [0; 4]))),
         }
@@ -125,25 +138,28 @@ fn unit(text: &str) -> String {
     out
 }
 
+/// Content as a formula of its own.
 fn math(content: &str) -> String {
     format!("<math>{content}</math>")
 }
 
-/// Stretches of a formula are formulas of their own, so that the browser can break a long sum between them.
-fn parted(formula: &Formula) -> String {
-    let stretches = formula.mathml_stretches();
-    let stretches: Vec<String> = stretches.iter().map(|one| math(one)).collect();
-    stretches.join(" ")
+/// Each segment of a formula is a formula of its own, so that the browser can break a long sum between them.
+fn mathml_segments(formula: &PrintedFormula) -> String {
+    let segments = formula.mathml_segments();
+    let segments: Vec<String> = segments.iter().map(|one| math(one)).collect();
+    segments.join(" ")
 }
 
-fn inlines(line: &Line) -> String {
+/// Spans of a line; plain numbers are prose with a minus sign, not formulas.
+fn inlines(line: &TextLine) -> String {
     line.iter()
         .map(|inline| match inline {
-            Inline::Text(text) => escape(text).into_owned(),
-            Inline::Unit(text) => unit(text),
-            Inline::Code(text) => format!("<code>{}</code>", escape(text)),
-            Inline::Math(Formula::Number(n)) => n.to_string().replace('-', "\u{2212}"),
-            Inline::Math(formula) => parted(formula),
+            InlineSpan::Text(text) => escape(text).into_owned(),
+            InlineSpan::Unit(text) => unit(text),
+            InlineSpan::Code(text) => format!("<code>{}</code>", escape(text)),
+            // U+2212 is the minus sign.
+            InlineSpan::Math(PrintedFormula::Number(n)) => n.to_string().replace('-', "\u{2212}"),
+            InlineSpan::Math(formula) => mathml_segments(formula),
         })
         .collect()
 }

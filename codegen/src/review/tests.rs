@@ -1,17 +1,17 @@
-//! The page and the JSON say what the derivation found: their text read again has the values of the reduction and of
-//! the programs.
+//! Page and JSON agree with the derivation: their text, parsed again, has the values of the reduction and of the
+//! programs.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use modelmill_spec::Mechanism;
 
-use super::{Equations, Format, NumericRank, base_expression, base_grouped, page, programs};
-use crate::emit::tree::names::{Meanings, run};
+use super::{NumericRank, PageFormat, ReducedEquations, base_expression, factored_base_expression, page, programs};
 use crate::expr::Atom;
 use crate::expr::print::parse::parse;
 use crate::expr::print::tests::{latex_is_balanced, markup_is_balanced};
-use crate::expr::print::{Formula, atom};
+use crate::expr::print::{PrintedFormula, atom};
+use crate::names::NamedQuantities;
 use crate::{Derivation, derive};
 
 const MODELS: [&str; 8] = [
@@ -42,14 +42,12 @@ fn derivation(name: &str) -> Derivation {
     derive(&model(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
 }
 
-/// Values of constants and parameters that are nobody's in particular.
+/// Arbitrary values of constants and parameters.
 fn values(derivation: &Derivation) -> (Vec<f64>, Vec<f64>, BTreeMap<String, f64>) {
     let odd = |i: usize| 0.7 + ((i * 37 + 11) % 29) as f64 / 17.0;
     let mechanism = &derivation.mechanism;
     let constants: Vec<f64> = (0..mechanism.constants.len()).map(odd).collect();
-    let parameters: Vec<f64> = (0..mechanism.parameters.len())
-        .map(|i| odd(i + 5))
-        .collect();
+    let parameters: Vec<f64> = (0..mechanism.parameters.len()).map(|i| odd(i + 5)).collect();
     let mut names = BTreeMap::new();
     for (c, v) in mechanism.constants.iter().zip(&constants) {
         names.insert(c.name.clone(), *v);
@@ -70,12 +68,12 @@ fn base_parameters_read_again_have_the_values_of_the_reduction() {
         let derivation = derivation(name);
         let (constants, parameters, names) = values(&derivation);
         let expected = derivation.base_values(&parameters, &constants);
-        let equations = Equations::new(&derivation, None);
+        let equations = ReducedEquations::new(&derivation, None);
         for (k, expected) in expected.iter().enumerate() {
             let expanded = &equations.base[k].expression;
             assert_close(parse(expanded).value_f64(&names), *expected, expanded);
             assert_eq!(*expanded, base_expression(&derivation, k).text());
-            let grouped = base_grouped(&derivation, k).text();
+            let grouped = factored_base_expression(&derivation, k).text();
             assert_close(parse(&grouped).value_f64(&names), *expected, &grouped);
         }
     }
@@ -86,7 +84,7 @@ fn factors_read_again_have_the_values_of_the_reduction() {
     for name in MODELS {
         let derivation = derivation(name);
         let (constants, _, names) = values(&derivation);
-        let equations = Equations::new(&derivation, None);
+        let equations = ReducedEquations::new(&derivation, None);
         let lines = &derivation.reduction.dependencies;
         assert_eq!(
             equations.dependencies.len(),
@@ -107,13 +105,9 @@ fn factors_read_again_have_the_values_of_the_reduction() {
 #[test]
 fn every_product_is_retained_or_depends_on_retained_ones() {
     for name in MODELS {
-        let equations = Equations::new(&derivation(name), None);
+        let equations = ReducedEquations::new(&derivation(name), None);
         let retained: BTreeSet<&String> = equations.base.iter().map(|b| &b.retained).collect();
-        let dependent: BTreeSet<&String> = equations
-            .dependencies
-            .iter()
-            .map(|d| &d.parameter)
-            .collect();
+        let dependent: BTreeSet<&String> = equations.dependencies.iter().map(|d| &d.parameter).collect();
         for product in &equations.parameters {
             assert!(retained.contains(product) != dependent.contains(product));
         }
@@ -126,31 +120,31 @@ fn every_product_is_retained_or_depends_on_retained_ones() {
     }
 }
 
-/// The listings, read again and carried out line by line, give what the programs give.
+/// The equations of the listings, evaluated line by line, have the values of the programs.
 #[test]
 fn listed_programs_compute_what_the_programs_compute() {
     for name in MODELS {
         let derivation = derivation(name);
         let mechanism = &derivation.mechanism;
-        let meanings = Meanings::new(&derivation);
+        let meanings = NamedQuantities::new(&derivation);
         assert!(!meanings.atoms.is_empty(), "{name}: no state was found");
         for (title, outputs, program, listing) in programs::listings(&derivation) {
             let mut known: BTreeMap<String, f64> = meanings
                 .atoms
                 .iter()
                 // Passive motion is computed; where it is not, it is an input.
-                .filter(|(a, _)| program.ops.contains(&crate::Op::Input(**a)))
+                .filter(|(a, _)| program.ops.contains(&crate::ProgramOp::Input(**a)))
                 .map(|(a, v)| (atom(mechanism, *a).text(), *v))
                 .collect();
             for line in listing.fixed.iter().chain(&listing.state) {
-                let Formula::Symbol(left) = &line.left else {
+                let PrintedFormula::Symbol(left) = &line.left else {
                     panic!("{}", line.left)
                 };
                 let value = parse(&line.right.text()).value_f64(&known);
                 let before = known.insert(left.text(), value);
                 assert_eq!(before, None, "{name}, {title}: {} twice", left.text());
             }
-            let expected = run(program, &meanings.atoms);
+            let expected = meanings.values(program);
             for (symbol, value) in outputs.iter().zip(&program.outputs) {
                 let found = known[&symbol.text()];
                 assert_close(found, expected[value.index()], &symbol.text());
@@ -159,38 +153,26 @@ fn listed_programs_compute_what_the_programs_compute() {
     }
 }
 
-/// A value that has a meaning carries the value of its meaning.
+/// A named value equals the quantity of its name.
 #[test]
 fn named_values_are_what_they_are_called() {
     let derivation = derivation("spidermill");
-    let meanings = Meanings::new(&derivation);
-    let (_, _, program, listing) = programs::listings(&derivation)
-        .pop()
-        .expect("the regressor is last");
+    let meanings = NamedQuantities::new(&derivation);
+    let (_, _, program, listing) = programs::listings(&derivation).pop().expect("the regressor is last");
     let lines: BTreeSet<String> = listing.state.iter().map(|e| e.left.text()).collect();
-    for wanted in [
-        "c_theta1",
-        "omega_S3_z",
-        "omega_S3_z_d",
-        "c_gamma1",
-        "l_spindle_left",
-    ] {
+    for wanted in ["c_theta1", "omega_S3_z", "omega_S3_z_d", "c_gamma1", "l_spindle_left"] {
         assert!(lines.contains(wanted), "{wanted} in {lines:?}");
     }
-    let values = run(program, &meanings.atoms);
+    let values = meanings.values(program);
     let rate = |i: usize| meanings.atoms[&Atom::Rate(i)];
-    let names = meanings.of(program);
+    let names = meanings.name_values(program);
     let (at, meaning) = names
         .iter()
         .find(|(_, m)| m.symbol.text() == "omega_S3_z")
         .expect("a name in the listing");
     let sign = if meaning.negative { -1.0 } else { 1.0 };
     let (theta1, gamma1) = (0, 2);
-    assert_close(
-        sign * values[*at],
-        rate(theta1) + rate(gamma1),
-        "omega_S3_z",
-    );
+    assert_close(sign * values[*at], rate(theta1) + rate(gamma1), "omega_S3_z");
 }
 
 #[test]
@@ -203,36 +185,26 @@ fn pages_are_whole_and_the_same_every_time() {
     for name in ["spidermill-paper", "two_link", "three_rrr"] {
         let (one, two) = (derivation(name), derivation(name));
         for format in [
-            Format::Text,
-            Format::Markdown,
-            Format::Latex,
-            Format::Html,
-            Format::Json,
+            PageFormat::Text,
+            PageFormat::Markdown,
+            PageFormat::Latex,
+            PageFormat::Html,
+            PageFormat::Json,
         ] {
             let text = page(&one, format, Some(&numeric));
-            assert_eq!(
-                text,
-                page(&two, format, Some(&numeric)),
-                "{name} {format:?}"
-            );
+            assert_eq!(text, page(&two, format, Some(&numeric)), "{name} {format:?}");
             assert!(text.ends_with('\n'));
         }
-        let html = page(&one, Format::Html, None);
+        let html = page(&one, PageFormat::Html, None);
         let without_scripts: String = html
             .split("<script>")
-            .map(|piece| {
-                piece
-                    .split_once("</script>")
-                    .map_or(piece, |(_, rest)| rest)
-            })
+            .map(|piece| piece.split_once("</script>").map_or(piece, |(_, rest)| rest))
             .collect();
         assert!(markup_is_balanced(&without_scripts), "{name}");
-        // Nothing is fetched.
+        // The page loads no other file.
         assert!(!html.contains("src=") && !html.contains("http") && !html.contains("url("));
-        let latex = page(&one, Format::Latex, None);
-        assert!(latex_is_balanced(
-            &latex.replace("\\{", "").replace("\\}", "")
-        ));
+        let latex = page(&one, PageFormat::Latex, None);
+        assert!(latex_is_balanced(&latex.replace("\\{", "").replace("\\}", "")));
         let count = |what: &str| latex.matches(what).count();
         assert_eq!(count("\\begin{"), count("\\end{"));
     }
@@ -245,7 +217,7 @@ fn json_has_the_fields_of_the_contract() {
         samples: 40,
         condition: None,
     };
-    let text = Equations::new(&derivation("spidermill-paper"), Some(&numeric)).json();
+    let text = ReducedEquations::new(&derivation("spidermill-paper"), Some(&numeric)).json();
     let json: serde_json::Value = serde_json::from_str(&text).expect("valid JSON");
     let keys: Vec<&String> = json.as_object().expect("an object").keys().collect();
     assert_eq!(
@@ -270,35 +242,24 @@ fn json_has_the_fields_of_the_contract() {
         }
     }
     let last = json["dependencies"].as_array().and_then(|d| d.last());
-    assert_eq!(
-        last,
-        Some(&serde_json::json!({"parameter": "m1", "equals": {}}))
-    );
+    assert_eq!(last, Some(&serde_json::json!({"parameter": "m1", "equals": {}})));
 }
 
 /// Eq. (5), (6) and (16) in a few lines.
 fn summary(name: &str) -> String {
     let derivation = derivation(name);
-    let equations = Equations::new(&derivation, None);
+    let equations = ReducedEquations::new(&derivation, None);
     let mut lines = vec![
         format!("p_g: {}", equations.parameters.join(", ")),
         format!("without effect: {}", equations.without_effect.join(", ")),
     ];
-    for line in equations
-        .dependencies
-        .iter()
-        .filter(|d| !d.equals.is_empty())
-    {
-        let right: Vec<String> = line
-            .equals
-            .iter()
-            .map(|(r, k)| format!("({k}) h[{r}]"))
-            .collect();
+    for line in equations.dependencies.iter().filter(|d| !d.equals.is_empty()) {
+        let right: Vec<String> = line.equals.iter().map(|(r, k)| format!("({k}) h[{r}]")).collect();
         lines.push(format!("h[{}] = {}", line.parameter, right.join(" + ")));
     }
     for (k, base) in equations.base.iter().enumerate() {
         lines.push(format!("{} = {}", base.name, base.expression));
-        let grouped = base_grouped(&derivation, k).text();
+        let grouped = factored_base_expression(&derivation, k).text();
         if grouped != base.expression {
             lines.push(format!("       = {grouped}"));
         }

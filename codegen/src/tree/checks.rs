@@ -1,10 +1,13 @@
-//! What values and expressions of a model file may be.
+//! Checks of the values and expressions of a model file.
 
-use modelmill_spec::{Exact, Function, Mechanism, Symbol};
+use modelmill_spec::{ExactExpression, ExactFunction, Mechanism, ModelSymbol};
 
 use crate::DeriveError;
 
-/// That every value of a mechanism is a finite number.
+/// Checks that every value of a mechanism is a finite number.
+///
+/// # Errors
+/// [`DeriveError::NotFinite`] for the first value that is not.
 pub(crate) fn check_values(mechanism: &Mechanism) -> Result<(), DeriveError> {
     let constants = mechanism.constants.iter().map(|c| (&c.name, c.value));
     let parameters = mechanism.parameters.iter().map(|p| (&p.name, p.nominal));
@@ -15,37 +18,41 @@ pub(crate) fn check_values(mechanism: &Mechanism) -> Result<(), DeriveError> {
         .map_or(Ok(()), |(name, value)| {
             Err(DeriveError::NotFinite {
                 what: format!("the value of `{name}`, {value},"),
-                todo: "give it another one",
+                todo: "set it to a finite number",
             })
         })
 }
 
 /// Whether effects have terms that are not defined, or not finite, at every finite state: quotients, roots and
-/// exponentials of what moves.
+/// exponentials of quantities that move.
 pub(crate) fn may_be_undefined(mechanism: &Mechanism) -> bool {
     let mut terms = mechanism.effects.iter().flat_map(|effect| &effect.terms);
     terms.any(|term| is_partial(&term.expression))
 }
 
-fn is_partial(expression: &Exact) -> bool {
+/// Whether an expression may have no finite value at some state.
+fn is_partial(expression: &ExactExpression) -> bool {
     match expression {
-        Exact::Rational(_) | Exact::Pi | Exact::Symbol(_) => false,
-        Exact::Sum(operands) | Exact::Product(operands) => operands.iter().any(is_partial),
-        Exact::Quotient(a, b) => is_partial(a) || is_partial(b) || moves(b),
-        Exact::Negative(a) => is_partial(a),
-        Exact::Power(a, n) => is_partial(a) || (*n < 0 && moves(a)),
-        Exact::Apply(function, a) => {
-            is_partial(a) || (matches!(function, Function::Sqrt | Function::Exp) && moves(a))
+        ExactExpression::Rational(_) | ExactExpression::Pi | ExactExpression::Symbol(_) => false,
+        ExactExpression::Sum(operands) | ExactExpression::Product(operands) => operands.iter().any(is_partial),
+        ExactExpression::Quotient(a, b) => is_partial(a) || is_partial(b) || has_motion(b),
+        ExactExpression::Negative(a) => is_partial(a),
+        ExactExpression::Power(a, n) => is_partial(a) || (*n < 0 && has_motion(a)),
+        ExactExpression::Apply(function, a) => {
+            is_partial(a) || (matches!(function, ExactFunction::Sqrt | ExactFunction::Exp) && has_motion(a))
         }
     }
 }
 
-fn moves(expression: &Exact) -> bool {
+/// Whether an expression depends on a coordinate or on a quantity of a place.
+fn has_motion(expression: &ExactExpression) -> bool {
     match expression {
-        Exact::Rational(_) | Exact::Pi => false,
-        Exact::Symbol(symbol) => matches!(symbol, Symbol::Place(_) | Symbol::Coordinate(_)),
-        Exact::Sum(operands) | Exact::Product(operands) => operands.iter().any(moves),
-        Exact::Quotient(a, b) => moves(a) || moves(b),
-        Exact::Negative(a) | Exact::Power(a, _) | Exact::Apply(_, a) => moves(a),
+        ExactExpression::Rational(_) | ExactExpression::Pi => false,
+        ExactExpression::Symbol(symbol) => {
+            matches!(symbol, ModelSymbol::Place(_) | ModelSymbol::Coordinate(_))
+        }
+        ExactExpression::Sum(operands) | ExactExpression::Product(operands) => operands.iter().any(has_motion),
+        ExactExpression::Quotient(a, b) => has_motion(a) || has_motion(b),
+        ExactExpression::Negative(a) | ExactExpression::Power(a, _) | ExactExpression::Apply(_, a) => has_motion(a),
     }
 }

@@ -1,11 +1,12 @@
-//! The pose and twist of a body that hangs on nothing, as expressions.
+//! The pose and twist of a free body, which no joint connects to anything, as expressions.
 //!
-//! A rotation by a quaternion (w, v) of any length is `1 + 2 (w [v]x + [v]x [v]x) / (w^2 + v'v)`; so it stays one in a prime
-//! field, where no unit quaternions are drawn, and rounding of a recorded one does no harm.
+//! A rotation by a quaternion (w, v) of any length is `1 + 2 (w [v]x + [v]x [v]x) / (w^2 + v'v)`. So it is a rotation
+//! in a prime field as well, where quaternions are drawn without unit length, and for recorded quaternions with
+//! rounding errors.
 //!
 //! Decision: a free body is a link without a joint. Its pose has seven coordinates and its motion six rates; only
 //! the first link of a tree can be free. The forward recursion starts there with the given angular velocity,
-//! angular acceleration and acceleration of the origin, and the backward recursion leaves all six components of the
+//! angular acceleration and acceleration of the origin, and the backward recursion returns all six components of the
 //! wrench. The rate of the quaternion's scalar part never occurs. Its place among the rates and in the mass matrix
 //! stays (a row with a one), so that every coordinate has one index. The squared length of the quaternion joins the
 //! determinants that must not vanish. Loops and drives that reach across a free body would need derivatives of
@@ -15,12 +16,12 @@
 
 use modelmill_spec::{CoordinateIdx, FreeBody, TwistAxes};
 
-use crate::expr::vector::Vector;
+use crate::expr::vector::SymbolicVector;
 use crate::expr::{Atom, ExprId, Graph, Rational};
-use crate::tree::Tree;
+use crate::tree::KinematicTree;
 
-/// Atoms of coordinates, of their rates or of their accelerations.
-fn atoms<const N: usize>(
+/// Atoms of some coordinates, of their rates or of their accelerations; `of` chooses which.
+fn coordinate_atoms<const N: usize>(
     graph: &mut Graph,
     of: fn(usize) -> Atom,
     coordinates: [CoordinateIdx; N],
@@ -29,16 +30,17 @@ fn atoms<const N: usize>(
 }
 
 /// The square of the length of a body's quaternion.
-pub(crate) fn square(graph: &mut Graph, body: &FreeBody) -> ExprId {
-    let squares = atoms(graph, Atom::Coordinate, body.quaternion).map(|x| graph.mul(x, x));
+pub(crate) fn quaternion_square(graph: &mut Graph, body: &FreeBody) -> ExprId {
+    let squares = coordinate_atoms(graph, Atom::Coordinate, body.quaternion).map(|x| graph.mul(x, x));
     graph.add_all(&squares)
 }
 
-/// The rotation from a body's axes to the base's, by rows.
-fn rotation(graph: &mut Graph, body: &FreeBody) -> [Vector; 3] {
-    let [w, x, y, z] = atoms(graph, Atom::Coordinate, body.quaternion);
+/// The rotation matrix from a body's axes to those of the base, by rows.
+fn rotation_matrix(graph: &mut Graph, body: &FreeBody) -> [SymbolicVector; 3] {
+    let [w, x, y, z] = coordinate_atoms(graph, Atom::Coordinate, body.quaternion);
     let v = [x, y, z];
-    let square = square(graph, body);
+    let square = quaternion_square(graph, body);
+    // 2/(w^2 + v'v)
     let inverse = graph.product(&[(square, -1)]);
     let twice = graph.scale(inverse, &Rational::integer(2));
     let scaled = v.map(|x| graph.mul(twice, x));
@@ -63,12 +65,12 @@ fn rotation(graph: &mut Graph, body: &FreeBody) -> [Vector; 3] {
     })
 }
 
-/// Components in a body's axes of a vector that a twist gives in `axes`.
-pub(crate) fn to_body(graph: &mut Graph, body: &FreeBody, axes: TwistAxes, v: &Vector) -> Vector {
+/// Components in a body's axes of a vector that is given in the `axes` of a twist.
+pub(crate) fn to_body(graph: &mut Graph, body: &FreeBody, axes: TwistAxes, v: &SymbolicVector) -> SymbolicVector {
     match axes {
         TwistAxes::Body => *v,
         TwistAxes::World => {
-            let rows = rotation(graph, body);
+            let rows = rotation_matrix(graph, body);
             std::array::from_fn(|j| {
                 let column = rows.map(|row| row[j]);
                 graph.dot(&column, v)
@@ -77,36 +79,41 @@ pub(crate) fn to_body(graph: &mut Graph, body: &FreeBody, axes: TwistAxes, v: &V
     }
 }
 
-/// Components in the axes of a twist of a vector given in a body's.
-pub(crate) fn from_body(graph: &mut Graph, body: &FreeBody, axes: TwistAxes, v: &Vector) -> Vector {
+/// Components in the `axes` of a twist of a vector that is given in a body's axes.
+pub(crate) fn from_body(graph: &mut Graph, body: &FreeBody, axes: TwistAxes, v: &SymbolicVector) -> SymbolicVector {
     match axes {
         TwistAxes::Body => *v,
-        TwistAxes::World => rotation(graph, body).map(|row| graph.dot(&row, v)),
+        TwistAxes::World => rotation_matrix(graph, body).map(|row| graph.dot(&row, v)),
     }
 }
 
-/// Angular velocity, angular acceleration and acceleration of the origin less that of free fall, all in the body's axes.
+/// Motion of a free body, all in its own axes.
 pub(crate) struct FreeMotion {
-    pub(crate) omega: Vector,
-    pub(crate) alpha: Vector,
-    pub(crate) acceleration: Vector,
+    /// Angular velocity, rad/s.
+    pub(crate) omega: SymbolicVector,
+    /// Angular acceleration, rad/s^2.
+    pub(crate) alpha: SymbolicVector,
+    /// Acceleration of the origin minus that of gravity, m/s^2.
+    pub(crate) acceleration: SymbolicVector,
 }
 
 impl FreeMotion {
-    pub(crate) fn new(graph: &mut Graph, body: &FreeBody, gravity: &Vector) -> Self {
+    /// The motion from the body's rates and accelerations; `gravity` is in the base frame, m/s^2.
+    pub(crate) fn new(graph: &mut Graph, body: &FreeBody, gravity: &SymbolicVector) -> Self {
         let [_, qx, qy, qz] = body.quaternion;
         let angular = [qx, qy, qz];
         let [omega, alpha] = [Atom::Rate as fn(usize) -> Atom, Atom::Acceleration].map(|of| {
-            let given = atoms(graph, of, angular);
-            // The angular velocity does not change in its own axes, so both sides see the same derivative.
+            let given = coordinate_atoms(graph, of, angular);
+            // The derivative of the angular velocity is the same in body axes and in base axes.
             to_body(graph, body, body.angular, &given)
         });
-        let given = atoms(graph, Atom::Acceleration, body.position);
+        let given = coordinate_atoms(graph, Atom::Acceleration, body.position);
         let fall = to_body(graph, body, TwistAxes::World, gravity);
+        // The derivative of a velocity in body axes lacks the rotation of these axes.
         let acceleration = match body.linear {
             TwistAxes::World => to_body(graph, body, body.linear, &given),
             TwistAxes::Body => {
-                let velocity = atoms(graph, Atom::Rate, body.position);
+                let velocity = coordinate_atoms(graph, Atom::Rate, body.position);
                 let carried = graph.cross(&omega, &velocity);
                 graph.add_vectors(&[given, carried])
             }
@@ -119,10 +126,10 @@ impl FreeMotion {
     }
 }
 
-impl Tree {
-    /// What must not vanish so that the orientations of all free bodies exist.
-    pub(crate) fn squares(&self, graph: &mut Graph) -> Vec<ExprId> {
+impl KinematicTree {
+    /// Squared lengths of the quaternions of all free bodies, which must not vanish.
+    pub(crate) fn quaternion_squares(&self, graph: &mut Graph) -> Vec<ExprId> {
         let bodies = self.links.iter().filter_map(|link| link.free);
-        bodies.map(|body| square(graph, &body)).collect()
+        bodies.map(|body| quaternion_square(graph, &body)).collect()
     }
 }

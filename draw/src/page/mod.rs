@@ -1,5 +1,5 @@
-//! What all pages of HTML share: their head, their one style, and their one way of zooming pictures, copying numbers and printing
-//! what is folded. A page stands without its scripts too.
+//! Common parts of all HTML pages: their head, their style, and scripts that zoom pictures, copy numbers and print
+//! folded parts. A page can be read without its scripts.
 //!
 //! Decision: style and scripts of all pages lie here, because equations, reports and the workbench all depend on
 //! this crate. A test opens every kind of page in a browser and measures it: nothing is wider than a phone, cut,
@@ -12,7 +12,7 @@ use modelmill_boundary::text::html as escape;
 /// The style of all pages, light and dark, for wide and narrow screens and for paper.
 pub const STYLE: &str = include_str!("page.css");
 
-/// Scripts of all pages, to run once a page stands. Whoever puts parts of a page into another one later calls
+/// Scripts of all pages, to run after a page is complete. If parts of a page are inserted into another one later, call
 /// `enlivenPictures(element)` and `enlivenTables(element)` on them.
 pub const SCRIPTS: [&str; 3] = [
     include_str!("zoom.js"),
@@ -20,7 +20,7 @@ pub const SCRIPTS: [&str; 3] = [
     include_str!("paper.js"),
 ];
 
-/// A page up to its heading.
+/// The beginning of a page, including its heading.
 pub fn begin(title: &str) -> String {
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
@@ -32,7 +32,7 @@ pub fn begin(title: &str) -> String {
     )
 }
 
-/// The end of a page, with the scripts of all pages and `more` of its own.
+/// The end of a page, with the scripts of all pages and additional ones in `more`.
 pub fn end(more: &[&str]) -> String {
     let mut text = String::from("</main>\n");
     for script in SCRIPTS.iter().chain(more) {

@@ -1,4 +1,4 @@
-// Paper shows everything that is folded; browsers that cannot be told so by style are told here.
+// Unfolds all folded parts for printing, for browsers in which the style sheet cannot do it.
 (() => {
   'use strict';
   const unfold = () => {

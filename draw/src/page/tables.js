@@ -1,5 +1,5 @@
-// Tables: their cells know what their column is called, for screens that show each row as a card, and a click on a number copies
-// all of its digits.
+// Tables: each cell gets the name of its column, for narrow screens that show rows as cards. A click on a number copies all of
+// its digits.
 (() => {
   'use strict';
   const told = document.createElement('p');
@@ -13,7 +13,7 @@
     fading = setTimeout(() => { told.textContent = ''; }, 2500);
   };
 
-  // Puts a text on the clipboard, by an old way where pages have no other.
+  // Copies a text to the clipboard. Browsers without the clipboard interface use a selection instead.
   window.copied = async (text, what) => {
     try {
       await navigator.clipboard.writeText(text);
@@ -26,7 +26,7 @@
       const isDone = document.execCommand('copy');
       area.remove();
       if (held) held.focus({ preventScroll: true });
-      if (!isDone) { say('The browser does not let this page copy; select the text instead.'); return; }
+      if (!isDone) { say('The browser does not allow this page to copy. Select the text and copy it by hand.'); return; }
     }
     say(`${what || text} is copied`);
   };
@@ -39,7 +39,7 @@
     const cell = event.target.closest && event.target.closest('td');
     if (cell && isNumber(cell) && String(getSelection()) === '') copy(cell);
   });
-  // One number of a table is reached by Tab, the others by arrows.
+  // Tab reaches one number of a table; arrows reach the others.
   document.addEventListener('keydown', (event) => {
     const cell = event.target;
     if (!isNumber(cell)) return;
@@ -66,7 +66,7 @@
     }
   });
 
-  // Narrow tables stay what they are.
+  // Tables with at most this number of columns do not become cards.
   const WIDE = 3;
   window.enlivenTables = (part) => {
     const tables = part.matches && part.matches('table') ? [part] : part.querySelectorAll('table');
@@ -80,7 +80,7 @@
             if (heads[k]) cell.dataset.head = heads[k];
             if (!isNumber(cell)) return;
             cell.tabIndex = first ? 0 : -1;
-            cell.title = 'a click copies all digits';
+            cell.title = 'click to copy all digits';
             first = false;
           });
         }

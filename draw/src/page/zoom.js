@@ -1,12 +1,13 @@
-// One way of zooming for all pictures: wheel, pinch, keys and three buttons zoom, dragging moves, dragging with Shift marks what
-// is to be seen, a double click shows the whole. Places are shares of the picture, 0 to 1 from its left upper corner.
+// Zooms all pictures of a page in the same way. Wheel, pinch, keys and three buttons zoom; dragging moves the picture; dragging
+// with Shift marks the part to show; a double click shows the complete picture. Places are shares of the picture, from 0 to 1,
+// from its upper left corner.
 (() => {
   'use strict';
   document.documentElement.classList.add('scripted');
   let scrolled = -1e9;
   window.addEventListener('scroll', () => { scrolled = performance.now(); }, { passive: true });
 
-  // Buttons of a picture, before all else in `place`.
+  // Adds the buttons of a picture at the beginning of `place`.
   const buttons = (place, shown) => {
     const tools = document.createElement('span');
     tools.className = 'tools';
@@ -21,14 +22,16 @@
     };
     button('+', 'zoom in', () => shown.zoom(0.5, 0.5, 0.5));
     button('\u2212', 'zoom out', () => shown.zoom(2, 0.5, 0.5));
-    button('\u27F2', 'the whole', () => shown.whole());
+    button('\u27F2', 'show all', () => shown.whole());
     place.prepend(tools);
   };
 
-  // Lets a reader zoom what lies in `element`. `shown` does it: `zoom(factor, x, y)` shows `factor` times as much around a place,
-  // `move(dx, dy)` goes on by shares of what is seen, `whole()` shows all, `isWhole()` says whether all is seen, `part(x0, y0, x1, y1)`
-  // shows what was marked and `marking(x0, y0, x1, y1)` what is being marked; `turn(dx, dy)`, where there is one, is what
-  // dragging and arrows do in the place of moving; a key goes on by `step`.
+  // Makes the content of `element` zoomable through the methods of `shown`:
+  // - `zoom(factor, x, y)` shows `factor` times as much around a place.
+  // - `move(dx, dy)` moves by shares of the visible part.
+  // - `whole()` shows everything; `isWhole()` returns whether everything is visible.
+  // - `part(x0, y0, x1, y1)` shows the marked part; `marking(x0, y0, x1, y1)` draws the mark while it is drawn by the pointer.
+  // - `turn(dx, dy)` (optional) replaces `move` for dragging and arrows. A key moves by `step`.
   window.zoomable = (element, shown, place) => {
     if (place) buttons(place, shown);
     if (!element.hasAttribute('tabindex')) element.setAttribute('tabindex', '0');
@@ -37,7 +40,7 @@
       return [(event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height];
     };
     element.addEventListener('wheel', (event) => {
-      // A page that is being scrolled goes on scrolling although a picture comes under the pointer, or has nothing more to show.
+      // Scrolling of the page continues if a picture comes under the pointer, or if the picture is shown completely.
       if (performance.now() - scrolled < 250 && document.activeElement !== element) return;
       if (event.deltaY > 0 && shown.isWhole() && !event.deltaX) return;
       event.preventDefault();
@@ -54,7 +57,7 @@
     };
     element.addEventListener('pointerdown', (event) => {
       if (event.button > 0) return;
-      try { element.setPointerCapture(event.pointerId); } catch { /* A made-up pointer cannot be captured. */ }
+      try { element.setPointerCapture(event.pointerId); } catch { /* A simulated pointer cannot be captured. */ }
       down.set(event.pointerId, at(event));
       mark = event.shiftKey && shown.part && down.size === 1 ? at(event) : null;
       if (down.size === 2) apart = reach();
@@ -98,8 +101,8 @@
     });
   };
 
-  // How a picture that no script draws is seen: through its viewBox. `svg()` is the one that stands there now; one that takes
-  // its place is seen in the same way by `again()`.
+  // The view of a static picture, through its viewBox. `svg()` returns the current picture; `again()` applies the same view
+  // to a picture that replaced it.
   window.seen = (svg) => {
     let box = null;
     const all = () => {
@@ -138,7 +141,7 @@
     };
   };
 
-  // Pictures of a part of the page that stand as they are.
+  // Makes the static pictures of a part of the page zoomable.
   window.enlivenPictures = (part) => {
     for (const svg of part.querySelectorAll('figure:not(.plot) svg')) {
       if ('zooms' in svg.dataset || !svg.getAttribute('viewBox')) continue;

@@ -1,65 +1,64 @@
-//! Controllers with the same gains and different knowledge, and the loop that runs them on the plant.
+//! Controllers with the same gains and different models, and the loop that runs them on the plant.
 
 use std::error::Error;
 use std::f64::consts::TAU;
 
 use modelmill_generated::spidermill;
-use modelmill_rig::{Plant, Rig};
+use modelmill_rig::{Rig, RigPlant};
 use modelmill_runtime::PoseError;
 
-use crate::reference::Reference;
+use crate::reference::ReferenceMotion;
 use crate::spidermill_with_friction as with_friction;
 
-/// Time between two calls of the controller, s; forces are held in between.
+/// Time between two calls of the controller, s; forces are constant in between.
 pub(crate) const CYCLE: f64 = 2e-3;
-/// Frequency of the closed loop, rad/s, critically damped.
+/// Natural frequency of the closed loop, rad/s; it is critically damped.
 const SPEED: f64 = 5.0 * TAU;
-/// Turns of 20 bits.
+/// Smallest step of the encoders, rad: one revolution has 2^20 steps.
 const RESOLUTION: f64 = TAU / 1_048_576.0;
 
-/// Where the robot is and where it should be.
+/// Measured and desired motion at one time.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Situation {
+pub(crate) struct ControlState {
+    /// Measured coordinates, rad.
     q: [f64; 2],
-    wanted: [[f64; 2]; 3],
-    /// Rate of the error.
+    /// Desired coordinates, rates and accelerations: rad, rad/s and rad/s^2.
+    desired: [[f64; 2]; 3],
+    /// Rate of the tracking error, rad/s.
     error_rate: [f64; 2],
 }
 
-impl Situation {
-    /// Acceleration that lets the error die out.
+impl ControlState {
+    /// Acceleration that reduces the tracking error to zero, rad/s^2.
     fn correction(&self) -> [f64; 2] {
         std::array::from_fn(|k| {
-            let error = self.wanted[0][k] - self.q[k];
+            let error = self.desired[0][k] - self.q[k];
             SPEED * SPEED * error + 2.0 * SPEED * self.error_rate[k]
         })
     }
 
-    /// Acceleration to ask of the model.
+    /// Acceleration that the model has to produce, rad/s^2: the desired one plus the correction.
     fn acceleration(&self) -> [f64; 2] {
         let correction = self.correction();
-        std::array::from_fn(|k| self.wanted[2][k] + correction[k])
+        std::array::from_fn(|k| self.desired[2][k] + correction[k])
     }
 }
 
-/// Forces of the spindles for a situation.
-pub(crate) struct Controller<'a>(Box<Law<'a>>);
+/// A controller: it computes the forces of the spindles.
+pub(crate) struct TorqueController<'a>(Box<ControlLaw<'a>>);
 
-/// Forces of the spindles, N, in a situation.
-type Law<'a> = dyn Fn(&Situation) -> Result<[f64; 2], PoseError> + 'a;
+/// Forces of the spindles, N, for the measured and desired motion.
+type ControlLaw<'a> = dyn Fn(&ControlState) -> Result<[f64; 2], PoseError> + 'a;
 
-impl<'a> Controller<'a> {
-    /// Knows the mass that each crank feels, and the weight, at the nominal pose only.
+impl<'a> TorqueController<'a> {
+    /// Without a model: it uses the effective inertia of each crank, and the weight, at one pose only.
     pub(crate) fn without_model(
         dynamics: &spidermill::InverseDynamics<f64>,
         drives: &'a spidermill::Model<f64>,
     ) -> Result<Self, PoseError> {
-        let q = Reference::task().at(0.0)[0];
-        let still = |qdd| spidermill::State {
-            q,
-            qd: [0.0; 2],
-            qdd,
-        };
+        // Everything is computed once, at the beginning of the task.
+        let q = ReferenceMotion::task().state_at(0.0)[0];
+        let still = |qdd| spidermill::State { q, qd: [0.0; 2], qdd };
         let weight = dynamics.forces(&still([0.0; 2]))?;
         let jacobian = drives.drives(&still([0.0; 2]))?.jacobian;
         // Moments at the cranks for one rad/s^2 of each.
@@ -68,9 +67,7 @@ impl<'a> Controller<'a> {
             let mut qdd = [0.0; 2];
             qdd[k] = 1.0;
             let forces = dynamics.forces(&still(qdd))?;
-            inertia[k] = (0..2)
-                .map(|d| jacobian[d][k] * (forces[d] - weight[d]))
-                .sum();
+            inertia[k] = (0..2).map(|d| jacobian[d][k] * (forces[d] - weight[d])).sum();
         }
         Ok(Self(Box::new(move |now| {
             let state = spidermill::State {
@@ -80,50 +77,52 @@ impl<'a> Controller<'a> {
             };
             let jacobian = drives.drives(&state)?.jacobian;
             let correction = now.correction();
-            // Each spindle moves its own crank.
+            // Each spindle moves its own crank, so the coupling of the cranks is neglected.
             Ok(std::array::from_fn(|k| {
                 weight[k] + inertia[k] * correction[k] / jacobian[k][k]
             }))
         })))
     }
 
-    /// Computed torque with the reduced model as it comes from CAD.
-    pub(crate) fn nominal(dynamics: &'a spidermill::InverseDynamics<f64>) -> Self {
+    /// Computed torque with the reduced model and its nominal parameters, as from CAD.
+    pub(crate) fn with_nominal(dynamics: &'a spidermill::InverseDynamics<f64>) -> Self {
         Self(Box::new(|now| {
             dynamics.forces(&spidermill::State {
                 q: now.q,
-                qd: now.wanted[1],
+                qd: now.desired[1],
                 qdd: now.acceleration(),
             })
         }))
     }
 
-    /// Computed torque with what was identified. Friction goes by the rates that are wanted, which have no noise.
-    pub(crate) fn identified(dynamics: &'a with_friction::InverseDynamics<f64>) -> Self {
+    /// Computed torque with the identified parameters. Friction is computed from the desired rates, which have no
+    /// noise.
+    pub(crate) fn with_identified(dynamics: &'a with_friction::InverseDynamics<f64>) -> Self {
         Self(Box::new(|now| {
             dynamics.forces(&with_friction::State {
                 q: now.q,
-                qd: now.wanted[1],
+                qd: now.desired[1],
                 qdd: now.acceleration(),
             })
         }))
     }
 }
 
-/// What was read and set in each cycle.
+/// Measured coordinates and forces of all cycles.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Recording {
+pub(crate) struct ControlRecording {
+    /// Times of the cycles, s.
     pub(crate) t: Vec<f64>,
-    /// Readings of the encoders, per coordinate.
+    /// Readings of the encoders, per coordinate, rad.
     pub(crate) q: [Vec<f64>; 2],
-    /// Forces that were set, per drive.
+    /// Forces that were set, per drive, N.
     pub(crate) forces: [Vec<f64>; 2],
-    /// True error, per coordinate.
+    /// True tracking error, per coordinate, rad.
     error: [Vec<f64>; 2],
 }
 
-impl Recording {
-    /// Root mean square of the true error behind the first second, rad.
+impl ControlRecording {
+    /// Root mean square of the true tracking error after the first second, rad.
     pub(crate) fn rms_error(&self) -> [f64; 2] {
         self.error.each_ref().map(|e| {
             let settled = e.iter().zip(&self.t).filter(|(_, t)| **t > 1.0);
@@ -133,24 +132,25 @@ impl Recording {
     }
 }
 
-/// Runs a controller on the rig, from the motion's own start.
+/// Runs a controller on the rig, from the start of the reference motion.
 pub(crate) fn run(
     rig: &Rig,
-    controller: &Controller<'_>,
-    reference: &Reference,
-) -> Result<Recording, Box<dyn Error>> {
-    let [q, qd, _] = reference.at(0.0);
-    let mut plant = Plant::new(rig, &q, &qd)?;
-    let mut recording = Recording::default();
+    controller: &TorqueController<'_>,
+    reference: &ReferenceMotion,
+) -> Result<ControlRecording, Box<dyn Error>> {
+    let [q, qd, _] = reference.state_at(0.0);
+    let mut plant = RigPlant::new(rig, &q, &qd)?;
+    let mut recording = ControlRecording::default();
+    // Encoders round to their resolution.
     let read = |q: &[f64]| [0, 1].map(|k| (q[k] / RESOLUTION).round() * RESOLUTION);
     let mut before = [0.0; 2];
     let mut error_rate = [0.0; 2];
     let mut t = 0.0;
     while t < reference.duration {
         let q = read(plant.q());
-        let wanted = reference.at(t);
-        // Differences through a low-pass of 100 Hz: of the error rather than of the reading, whose rate would come late
-        // and be taken for an error.
+        let wanted = reference.state_at(t);
+        // The rate is a difference through a low-pass of 100 Hz. It is taken of the error and not of the reading: the
+        // delayed rate of the reading would appear as an error.
         let share = 1.0 - f64::exp(-TAU * 100.0 * CYCLE);
         for k in 0..2 {
             let error = wanted[0][k] - q[k];
@@ -159,15 +159,17 @@ pub(crate) fn run(
             }
             before[k] = error;
         }
-        let forces = controller.0(&Situation {
+        // The forces are constant during the cycle.
+        let forces = controller.0(&ControlState {
             q,
-            wanted,
+            desired: wanted,
             error_rate,
         })?;
         recording.t.push(t);
         for k in 0..2 {
             recording.q[k].push(q[k]);
             recording.forces[k].push(forces[k]);
+            // The true error is known here because the plant is simulated.
             recording.error[k].push(wanted[0][k] - plant.q()[k]);
         }
         plant.step(&forces, CYCLE)?;

@@ -1,9 +1,9 @@
-//! Computed-torque control of a robot in numbers, with emitted code: without the model, with its nominal parameters, and
-//! with what was identified from the robot's own recording.
+//! Computed-torque control of a simulated robot with emitted code: without the model, with its nominal parameters, and
+//! with parameters that were identified from the robot's own recording.
 //!
-//! The plant is the rig: all bodies of the parallel robot SpiderMill, with rods and friction that the nominal model does
-//! not know of; it shares no mechanics with the emitted code. The controller runs at 500 Hz, reads encoders of 20 bits and
-//! sets forces of the spindles. All three controllers have the same gains.
+//! The plant is the rig: all bodies of the parallel robot SpiderMill, with rods and friction that the nominal model
+//! does not contain. It shares no mechanics with the emitted code. The controller runs at 500 Hz, reads encoders of 20
+//! bits and sets the forces of the spindles. All three controllers have the same gains.
 //!
 //! `cargo run --release -p modelmill-example-computed-torque`
 
@@ -16,42 +16,42 @@ include!(concat!(env!("OUT_DIR"), "/models.rs"));
 use std::error::Error;
 use std::path::Path;
 
-use control::{Controller, run};
+use control::{TorqueController, run};
 use identification::identify;
 use modelmill_generated::spidermill;
-use reference::Reference;
+use reference::ReferenceMotion;
 
+/// Loads the rig and prints the tracking errors of the three controllers.
 fn main() -> Result<(), Box<dyn Error>> {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("rig.toml");
     let rig = modelmill_rig::load_file(&file)
         .map_err(|failure| failure.render(false))?
         .rig;
-    for line in report(&rig, &Reference::task())? {
+    for line in report(&rig, &ReferenceMotion::task())? {
         println!("{line}");
     }
     Ok(())
 }
 
-/// Runs everything; the lines that are printed.
-fn report(rig: &modelmill_rig::Rig, task: &Reference) -> Result<Vec<String>, Box<dyn Error>> {
+/// Runs the three controllers along a task; returns the lines that are printed.
+fn report(rig: &modelmill_rig::Rig, task: &ReferenceMotion) -> Result<Vec<String>, Box<dyn Error>> {
     let geometry = spidermill::Geometry::default();
+    // The nominal model, as it is known before any measurement.
     let nominal = spidermill::base_parameters(&geometry, &spidermill::Parameters::default())?;
     let nominal = spidermill::InverseDynamics::new(&geometry, &nominal);
     let drives = spidermill::Model::new(&geometry);
 
-    let without = Controller::without_model(&nominal, &drives)?;
-    let with = Controller::nominal(&nominal);
-    // The robot's own recording, while the nominal model controls it along another motion.
-    let recording = run(rig, &with, &Reference::exciting())?;
+    let without = TorqueController::without_model(&nominal, &drives)?;
+    let with = TorqueController::with_nominal(&nominal);
+    // The robot's own recording: the nominal model controls it along another motion.
+    let recording = run(rig, &with, &ReferenceMotion::excitation())?;
     let base = identify(&recording)?;
-    let known = spidermill_with_friction::InverseDynamics::new(
-        &spidermill_with_friction::Geometry::default(),
-        &base,
-    );
-    let identified = Controller::identified(&known);
+    // The identified model also has friction.
+    let known = spidermill_with_friction::InverseDynamics::new(&spidermill_with_friction::Geometry::default(), &base);
+    let identified = TorqueController::with_identified(&known);
 
-    let mut lines =
-        vec!["root mean square of the tracking error, mrad        theta1    theta2".to_owned()];
+    let mut lines = vec!["root mean square of the tracking error, mrad        theta1    theta2".to_owned()];
+    // All controllers follow the same task on the same plant.
     for (name, controller) in [
         ("without the model (constant gains per drive)", &without),
         ("computed torque, nominal parameters", &with),
@@ -67,7 +67,7 @@ fn report(rig: &modelmill_rig::Rig, task: &Reference) -> Result<Vec<String>, Box
 mod tests {
     use super::*;
 
-    /// As the figures in the guide, over a shorter time.
+    /// The same comparison as in the guide, over a shorter time.
     #[test]
     fn each_step_lowers_the_error() {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("rig.toml");
@@ -75,7 +75,7 @@ mod tests {
             .map_err(|f| f.render(false))
             .unwrap()
             .rig;
-        let mut task = Reference::task();
+        let mut task = ReferenceMotion::task();
         task.duration = 2.0;
         let lines = report(&rig, &task).unwrap();
         let errors: Vec<Vec<f64>> = lines[1..]

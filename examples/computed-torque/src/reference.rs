@@ -1,23 +1,26 @@
-//! Motions that are wanted: sums of sines around the nominal pose, with their derivatives.
+//! Desired motions: sums of sines around the nominal pose, with their derivatives.
 
 use std::f64::consts::TAU;
 
-/// Amplitude, rad, number of the harmonic, and phase, rad.
-type Sine = (f64, f64, f64);
+/// Amplitude in rad, number of the harmonic, and phase in rad.
+type SineTerm = (f64, f64, f64);
 
 /// A periodic motion of both cranks.
 #[derive(Clone, Debug)]
-pub(crate) struct Reference {
+pub(crate) struct ReferenceMotion {
+    /// Period of the first harmonic, s.
     period: f64,
-    /// How long it goes on, s.
+    /// Duration of the motion, s.
     pub(crate) duration: f64,
+    /// Mean angle of each crank, rad.
     centre: [f64; 2],
-    sines: [&'static [Sine]; 2],
+    /// Sines of each crank.
+    sines: [&'static [SineTerm]; 2],
 }
 
-impl Reference {
-    /// A motion that shows what parameters do: fast and slow, both cranks together and apart.
-    pub(crate) fn exciting() -> Self {
+impl ReferenceMotion {
+    /// A motion for identification: fast and slow, with both cranks together and separately.
+    pub(crate) fn excitation() -> Self {
         Self {
             period: 5.0,
             duration: 5.0,
@@ -29,7 +32,7 @@ impl Reference {
         }
     }
 
-    /// The motion that the controllers are asked for.
+    /// The motion that the controllers have to follow.
     pub(crate) fn task() -> Self {
         Self {
             period: 4.0,
@@ -42,8 +45,8 @@ impl Reference {
         }
     }
 
-    /// Coordinates, rates and accelerations at a time, s.
-    pub(crate) fn at(&self, t: f64) -> [[f64; 2]; 3] {
+    /// Coordinates, rates and accelerations at time `t` (s): rad, rad/s and rad/s^2.
+    pub(crate) fn state_at(&self, t: f64) -> [[f64; 2]; 3] {
         let mut state = [self.centre, [0.0; 2], [0.0; 2]];
         for (k, sines) in self.sines.iter().enumerate() {
             for (amplitude, harmonic, phase) in *sines {

@@ -1,9 +1,9 @@
-//! A controller that watches its own model: the dry friction of one spindle grows, an alarm is raised, and the parameter
-//! is named.
+//! A controller that monitors its own model: the dry friction of one spindle grows, an alarm is raised, and the changed
+//! parameter is identified.
 //!
-//! The machine is the rig: all bodies of the parallel robot SpiderMill with rods and friction, read at 1 kHz by encoders
-//! of 20 bits and sensors of the forces whose noise is partly coloured; it shares no mechanics with the emitted code. The
-//! watch starts from the parameters that a controller uses, which are not the true ones.
+//! The machine is the rig: all bodies of the parallel robot SpiderMill with rods and friction. Encoders of 20 bits and
+//! force sensors with partly coloured noise are read at 1 kHz. The rig shares no mechanics with the emitted code. The
+//! watch starts from the parameters of a controller, which are not the true ones.
 //!
 //! `cargo run --release -p modelmill-example-live`, or with `-- 10` for ten hours in which nothing happens.
 
@@ -18,32 +18,33 @@ include!(concat!(env!("OUT_DIR"), "/models.rs"));
 use std::error::Error;
 use std::time::Instant;
 
-use machine::{CYCLE, Machine, Wear, in_use};
-use modelmill_rig::Law;
+use machine::{CYCLE, FrictionWear, SimulatedMachine, parameters_in_use};
+use modelmill_rig::RigLaw;
 use modelmill_runtime::PoseError;
-use modelmill_runtime::live::{Change, Options, Verdict};
-use smoothing::{Smoothed, Smoother};
+use modelmill_runtime::live::{Options, WatchChange, WatchVerdict};
+use smoothing::{MotionSmoother, SmoothedState};
 use spidermill_worn as model;
 
-/// Rate of a spindle below which its friction may be anything, m/s.
+/// Below this rate of a spindle, m/s, its friction is unknown.
 const STANDSTILL: f64 = 5e-3;
 
+/// Runs the machine with wear; or, with a number of hours as the argument, without any change.
 fn main() -> Result<(), Box<dyn Error>> {
     if let Some(hours) = std::env::args().nth(1) {
-        let mut sitting = Sitting::new(Machine::new(1)?)?;
-        sitting.go_on_until(3600.0 * hours.parse::<f64>()?)?;
+        let mut sitting = WatchSession::new(SimulatedMachine::new(1)?)?;
+        sitting.run_until(3600.0 * hours.parse::<f64>()?)?;
         println!("{} false alarms in {hours} hours", sitting.alarms.len());
         return Ok(());
     }
-    let wear = Wear {
+    let wear = FrictionWear {
         drive: 0,
-        growth: Law::CoulombFriction { Fc: 15.0 },
+        growth: RigLaw::CoulombFriction { Fc: 15.0 },
         from: 90.0,
         duration: 2.0,
     };
     println!("from 90 s to 92 s the dry friction of the left spindle grows from 40 N to 55 N");
-    let mut sitting = Sitting::new(Machine::new(1)?.wearing(wear)?)?;
-    sitting.go_on_until(105.0)?;
+    let mut sitting = WatchSession::new(SimulatedMachine::new(1)?.with_wear(wear)?)?;
+    sitting.run_until(105.0)?;
     for line in sitting.lines() {
         println!("{line}");
     }
@@ -51,71 +52,75 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// A machine with a watch over it, and what the watch has said.
+/// A machine with its watch, and the results of the watch.
 #[derive(Clone, Debug)]
-struct Sitting {
-    machine: Machine,
-    smoother: Smoother,
+struct WatchSession {
+    /// The simulated machine.
+    machine: SimulatedMachine,
+    /// Differentiates its readings.
+    smoother: MotionSmoother,
+    /// Computes drive rates and regressors; emitted.
     model: model::Model<f64>,
+    /// Compares forces and model; emitted.
     watch: model::Watch<f64>,
-    /// When the watch had learned, s.
+    /// End of the watch's learning, s.
     learned: Option<f64>,
     /// Times of alarms, s.
     alarms: Vec<f64>,
-    /// Changes whose parameter was told, with the time of that, s.
-    told: Vec<(f64, Change<f64, { model::N_BASE }>)>,
-    /// Time that steps took, s; of the first hundred thousand.
+    /// Changes whose parameter was identified, with the time of that, s.
+    identified: Vec<(f64, WatchChange<f64, { model::N_BASE }>)>,
+    /// Times that steps of the watch took, s; of the first hundred thousand.
     steps: Vec<f64>,
 }
 
-impl Sitting {
-    fn new(machine: Machine) -> Result<Self, Box<dyn Error>> {
+impl WatchSession {
+    /// Starts the watch with the parameters of the controller.
+    fn new(machine: SimulatedMachine) -> Result<Self, Box<dyn Error>> {
         let geometry = model::Geometry::default();
         let options = Options::at_rate(1.0 / CYCLE);
         Ok(Self {
             machine,
-            smoother: Smoother::new(CYCLE),
+            smoother: MotionSmoother::new(CYCLE),
             model: model::Model::new(&geometry),
-            watch: model::Watch::new(&geometry, &in_use()?, &options),
+            watch: model::Watch::new(&geometry, &parameters_in_use()?, &options),
             learned: None,
             alarms: Vec::new(),
-            told: Vec::new(),
+            identified: Vec::new(),
             steps: Vec::new(),
         })
     }
 
-    /// Lets the machine move until a time, s. A change is accepted ten seconds after its alarm.
-    fn go_on_until(&mut self, end: f64) -> Result<(), Box<dyn Error>> {
+    /// Runs the machine until a time, s. A change is accepted ten seconds after its alarm.
+    fn run_until(&mut self, end: f64) -> Result<(), Box<dyn Error>> {
         const PATIENCE: f64 = 10.0;
         let mut is_raised = false;
         while self.machine.time() < end {
             let t = self.machine.time();
             let reading = self.machine.read();
-            let Some(motion) = self.smoother.take(reading.q, reading.forces) else {
+            // The smoother has a delay: its first state comes after half a window.
+            let Some(motion) = self.smoother.add_readings(reading.q, reading.forces) else {
                 continue;
             };
             let (state, forces) = sample(&self.model, &motion)?;
+            // Only the watch is timed, with the regressor that it computes.
             let start = Instant::now();
             let verdict = *self.watch.step(&state, &forces)?;
             if self.steps.len() < 100_000 {
                 self.steps.push(start.elapsed().as_secs_f64());
             }
             match verdict {
-                Verdict::Learning => {}
-                Verdict::Quiet => self.learned = self.learned.or(Some(t)),
-                Verdict::Changed(change) => {
+                WatchVerdict::Learning => {}
+                WatchVerdict::Quiet => self.learned = self.learned.or(Some(t)),
+                // The first sample of a change is an alarm. Later ones identify the parameter.
+                WatchVerdict::Changed(change) => {
                     if !is_raised {
                         self.alarms.push(t);
                         is_raised = true;
                     }
-                    if change.is_told() && self.told.len() < self.alarms.len() {
-                        self.told.push((t, change));
+                    if change.is_identified() && self.identified.len() < self.alarms.len() {
+                        self.identified.push((t, change));
                     }
-                    if self
-                        .alarms
-                        .last()
-                        .is_some_and(|raised| t > raised + PATIENCE)
-                    {
+                    if self.alarms.last().is_some_and(|raised| t > raised + PATIENCE) {
                         self.watch.live.accept();
                         is_raised = false;
                     }
@@ -125,15 +130,15 @@ impl Sitting {
         Ok(())
     }
 
-    /// What was said, as it is printed.
+    /// The results as lines of text.
     fn lines(&self) -> Vec<String> {
         let mut lines = Vec::new();
         if let Some(t) = self.learned {
             lines.push(format!(
-                "{t:7.2} s  the watch has learned how this machine moves"
+                "{t:7.2} s  the watch has learned the usual motion of this machine"
             ));
         }
-        let mut told = self.told.iter();
+        let mut told = self.identified.iter();
         for alarm in &self.alarms {
             lines.push(format!("{alarm:7.2} s  alarm"));
             let Some((t, change)) = told.next() else {
@@ -141,9 +146,9 @@ impl Sitting {
             };
             let parameter = &model::BASE_PARAMETERS[change.parameter];
             lines.push(format!(
-                "{t:7.2} s  it is {}, by {:+.1} +- {:.1} {}; this alone explains {:.0} % of what changed",
+                "{t:7.2} s  {} changed by {:+.1} +- {:.1} {}; this parameter alone explains {:.0} % of the change",
                 parameter.expression,
-                change.by,
+                change.amount,
                 change.deviation,
                 parameter.unit,
                 100.0 * change.share
@@ -152,24 +157,21 @@ impl Sitting {
         lines
     }
 
-    /// What a step costs, regressor included.
+    /// Mean time of a step of the watch, and the time that 99.9 % of the steps do not exceed.
     fn times(&self) -> String {
         let mut sorted = self.steps.clone();
         sorted.sort_by(f64::total_cmp);
         let mean = 1e6 * sorted.iter().sum::<f64>() / sorted.len() as f64;
         let most = 1e6 * sorted[sorted.len() * 999 / 1000];
         format!(
-            "a step of 1000 us takes {mean:.2} us in the mean, regressor included, and 999 of 1000 take less than \
-             {most:.2} us"
+            "a step of the watch with its regressor takes {mean:.2} us on average, and 999 of 1000 steps take less \
+             than {most:.2} us; the cycle is 1000 us"
         )
     }
 }
 
-/// A state and its forces for the watch; drives that hardly move are left out.
-fn sample(
-    model: &model::Model<f64>,
-    motion: &Smoothed,
-) -> Result<(model::State<f64>, [f64; 2]), PoseError> {
+/// A state and its forces for the watch; NaN stands for the force of a drive that hardly moves.
+fn sample(model: &model::Model<f64>, motion: &SmoothedState) -> Result<(model::State<f64>, [f64; 2]), PoseError> {
     let state = model::State {
         q: motion.q,
         qd: motion.qd,
@@ -188,14 +190,14 @@ fn sample(
 mod tests {
     use super::*;
 
-    /// Each friction of each spindle, from the same state of the watch.
+    /// Every friction parameter of every spindle, from the same state of the watch.
     #[test]
     fn friction_that_grows_is_named_within_ten_seconds() {
-        let mut sitting = Sitting::new(Machine::new(1).unwrap()).unwrap();
-        sitting.go_on_until(240.0).unwrap();
+        let mut sitting = WatchSession::new(SimulatedMachine::new(1).unwrap()).unwrap();
+        sitting.run_until(240.0).unwrap();
         assert!(sitting.learned.is_some() && sitting.alarms.is_empty());
-        let dry = Law::CoulombFriction { Fc: 10.0 };
-        let viscous = Law::ViscousFriction { Fv: 120.0 };
+        let dry = RigLaw::CoulombFriction { Fc: 10.0 };
+        let viscous = RigLaw::ViscousFriction { Fv: 120.0 };
         for (name, drive, growth) in [
             ("Fc_spindle_left", 0, dry),
             ("Fc_spindle_right", 1, dry),
@@ -205,15 +207,15 @@ mod tests {
             let mut now = sitting.clone();
             now.machine = now
                 .machine
-                .wearing(Wear {
+                .with_wear(FrictionWear {
                     drive,
                     growth,
                     from: 240.0,
                     duration: 1.0,
                 })
                 .unwrap();
-            now.go_on_until(250.0).unwrap();
-            let found = now.told.first();
+            now.run_until(250.0).unwrap();
+            let found = now.identified.first();
             let (t, change) = found.unwrap_or_else(|| panic!("{name}: {:?}", now.lines()));
             let parameter = &model::BASE_PARAMETERS[change.parameter];
             assert_eq!(parameter.expression, name, "{:?}", now.lines());
@@ -223,8 +225,8 @@ mod tests {
 
     #[test]
     fn nothing_is_named_where_nothing_changes() {
-        let mut sitting = Sitting::new(Machine::new(2).unwrap()).unwrap();
-        sitting.go_on_until(300.0).unwrap();
+        let mut sitting = WatchSession::new(SimulatedMachine::new(2).unwrap()).unwrap();
+        sitting.run_until(300.0).unwrap();
         assert!(sitting.alarms.is_empty(), "{:?}", sitting.lines());
     }
 
@@ -233,8 +235,8 @@ mod tests {
     #[ignore = "ten hours of the machine take minutes"]
     fn there_is_less_than_one_false_alarm_in_ten_hours() {
         for seed in 1..=4 {
-            let mut sitting = Sitting::new(Machine::new(seed).unwrap()).unwrap();
-            sitting.go_on_until(36_000.0).unwrap();
+            let mut sitting = WatchSession::new(SimulatedMachine::new(seed).unwrap()).unwrap();
+            sitting.run_until(36_000.0).unwrap();
             assert!(sitting.alarms.is_empty(), "{seed}: {:?}", sitting.lines());
         }
     }

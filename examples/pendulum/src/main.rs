@@ -1,19 +1,26 @@
-//! Computes the torque that holds and moves a pendulum, with code generated from `models/pendulum.toml`.
+//! Computes the torque that a pendulum needs to stay or to accelerate, with code generated from `models/pendulum.toml`.
+//!
+//! `build.rs` generates the module `pendulum` from the model file. Numbers are in SI units.
+//! The program prints the base parameters, then the torque at three angles.
 
 include!(concat!(env!("OUT_DIR"), "/models.rs"));
 
 use modelmill_runtime::SpecialGeometry;
 use pendulum::{BASE_PARAMETERS, Geometry, InverseDynamics, Parameters, State, base_parameters};
 
+/// Prints the base parameters with the file's values, and the torque at three angles.
 fn main() -> Result<(), SpecialGeometry> {
+    // Constants and parameters have the values of the model file as defaults.
     let geometry = Geometry::<f64>::default();
     let base = base_parameters(&geometry, &Parameters::default())?;
+    // Each base parameter with its formula in the parameters of the model.
     for (parameter, value) in BASE_PARAMETERS.iter().zip(&base) {
         println!(
             "{} = {} = {value:.4} {}",
             parameter.name, parameter.expression, parameter.unit
         );
     }
+    // The inverse dynamics: coordinates, rates and accelerations go in, torques come out.
     let dynamics = InverseDynamics::new(&geometry, &base);
     for q in [0.0, 0.5, 1.0] {
         match dynamics.forces(&State {
@@ -22,6 +29,7 @@ fn main() -> Result<(), SpecialGeometry> {
             qdd: [1.0],
         }) {
             Ok([torque]) => println!("q = {q:.1} rad, 1 rad/s^2: {torque:.4} N m"),
+            // A model with closed loops may have no solution at a pose; this one always has.
             Err(error) => println!("q = {q:.1} rad: {error}"),
         }
     }
@@ -32,6 +40,7 @@ fn main() -> Result<(), SpecialGeometry> {
 mod tests {
     use super::*;
 
+    /// The torque of the emitted code is that of the equation of motion in a textbook.
     #[test]
     fn the_torque_is_that_of_the_textbook() {
         let geometry = Geometry::<f64>::default();

@@ -1,11 +1,11 @@
-//! `modelmill-fleet-ballista`: a fleet's aggregates over several computers. Scheduler and executors of Ballista with the functions
-//! of a plan in their registries, and a client that puts a query to them.
+//! `modelmill-fleet-ballista`: the aggregates of a fleet on several computers. It has a scheduler and an executor of
+//! Ballista with the functions of a plan, and a client that sends queries.
 //!
-//! All of them are started with the same plan; summaries bear its mark, so that one that was started with another is found out
-//! when summaries are added.
+//! All processes are started with the same plan. Summaries have the checksum of their plan, so a process with another
+//! plan is detected when summaries are added.
 //!
-//! An executor may be lost at any time. The scheduler then ends what runs ([`scheduler`]), and the client puts its query again
-//! ([`client`]).
+//! An executor may be lost at any time. The scheduler then cancels running jobs ([`scheduler`]), and the client sends
+//! its query again ([`client`]).
 
 mod client;
 mod scheduler;
@@ -21,40 +21,43 @@ use ballista_core::registry::BallistaFunctionRegistry;
 use ballista_executor::executor_process::{ExecutorProcessConfig, start_executor_process};
 use clap::{Parser, Subcommand};
 use datafusion::prelude::SessionConfig;
-use modelmill_fleet::{Fault, Ground, Plan};
+use modelmill_fleet::{FleetFault, FleetModel, FleetPlan};
 use modelmill_fleet_datafusion::aggregates;
 
-/// A fleet's aggregates over several computers.
+/// Compute aggregates of a fleet on several computers.
 #[derive(Parser)]
 #[command(name = "modelmill-fleet-ballista", version)]
-struct Cli {
-    /// The plan, as `modelmill-fleet plan` writes it; the same for all processes.
+struct BallistaCli {
+    /// The plan that `modelmill-fleet plan` wrote; the same for all processes.
     #[arg(long, global = true, default_value = "plan.json")]
     plan: PathBuf,
+    /// The command to run.
     #[command(subcommand)]
-    command: Command,
+    command: BallistaCommand,
 }
 
+/// The commands.
 #[derive(Subcommand)]
-enum Command {
-    /// The scheduler.
+enum BallistaCommand {
+    /// Run the scheduler.
     Scheduler {
-        /// Host that it listens on.
+        /// Host on which it listens.
         #[arg(long, default_value = "127.0.0.1")]
         host: String,
-        /// Its port.
+        /// Port on which it listens.
         #[arg(long, default_value_t = 50050)]
         port: u16,
-        /// An executor that is not heard of for so long is taken for dead, s; one that works is heard of every five.
+        /// Time without a message after which an executor counts as lost, s. A working executor sends a message every
+        /// five seconds.
         #[arg(long, default_value_t = 20)]
         timeout: u64,
     },
-    /// An executor.
+    /// Run an executor.
     Executor {
-        /// Host that it listens on.
+        /// Host on which it listens.
         #[arg(long, default_value = "127.0.0.1")]
         host: String,
-        /// Port of its data; the next one is for its tasks.
+        /// Port for its data; the next port is for its tasks.
         #[arg(long, default_value_t = 50051)]
         port: u16,
         /// Host of the scheduler.
@@ -63,32 +66,32 @@ enum Command {
         /// Port of the scheduler.
         #[arg(long, default_value_t = 50050)]
         scheduler_port: u16,
-        /// Tasks at a time.
+        /// Number of tasks at a time.
         #[arg(long, default_value_t = 1)]
         tasks: usize,
-        /// Where it keeps what goes to others, in a folder of its own that the next one does not take up.
+        /// Folder for intermediate results. Each executor uses a new folder inside it.
         #[arg(long)]
         work: Option<PathBuf>,
     },
-    /// Put a query to a scheduler, or answer it in this process, as CSV; structs become columns.
+    /// Send a query to a scheduler, or run it in this process, and print the result as CSV; structs become columns.
     Query {
         /// The query.
         sql: String,
-        /// A folder of Parquet, `NAME=FOLDER`, with partitions `robot=`, `day=` and `recording=`; a path, or `s3://BUCKET/FOLDER/`
-        /// with what `AWS_ACCESS_KEY_ID` and its like say; may be given again.
+        /// A folder of Parquet, `NAME=FOLDER`, with partitions `robot=`, `day=` and `recording=`: a path, or
+        /// `s3://BUCKET/FOLDER/` with the variables `AWS_ACCESS_KEY_ID` etc.; may be repeated.
         #[arg(long = "table", value_name = "NAME=FOLDER")]
         tables: Vec<String>,
-        /// The scheduler, such as `df://127.0.0.1:50050`; this process where it is not given.
+        /// The scheduler, such as `df://127.0.0.1:50050`; without it the query runs in this process.
         #[arg(long)]
         scheduler: Option<String>,
-        /// Into how many partitions the work falls.
+        /// Number of partitions of the work.
         #[arg(long, default_value_t = 4)]
         partitions: usize,
     },
 }
 
 fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
+    let cli = match BallistaCli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {
             let status = u8::try_from(error.exit_code()).unwrap_or(2);
@@ -96,14 +99,14 @@ fn main() -> ExitCode {
             return ExitCode::from(status);
         }
     };
-    warnings::show();
-    // Plans are deep, and planners recurse.
+    warnings::show_warnings();
+    // Query plans are deep and planners recurse, so threads need a large stack.
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .enable_all()
         .thread_stack_size(16 << 20)
         .build();
     let done = runtime
-        .map_err(Fault::new)
+        .map_err(FleetFault::new)
         .and_then(|runtime| runtime.block_on(run(cli)));
     match done {
         Ok(()) => ExitCode::SUCCESS,
@@ -114,30 +117,28 @@ fn main() -> ExitCode {
     }
 }
 
-fn ground(path: &Path) -> Result<Arc<Ground>, Fault> {
+/// Reads a plan and derives its model.
+fn load_fleet_model(path: &Path) -> Result<Arc<FleetModel>, FleetFault> {
     let text = std::fs::read_to_string(path).map_err(|error| {
-        Fault::new(format!(
+        FleetFault::new(format!(
             "{} cannot be read: {error}; make a plan with `modelmill-fleet plan`",
             path.display()
         ))
     })?;
     Ok(Arc::new(
-        Plan::parse(&path.display().to_string(), &text)?.ground()?,
+        FleetPlan::parse(&path.display().to_string(), &text)?.derive_model()?,
     ))
 }
 
-/// Samples of a recording are long: messages between processes may be so large, in bytes.
+/// Largest message between processes, bytes; it must have room for the samples of a recording.
 pub(crate) const LONGEST_MESSAGE: u32 = 256 << 20;
 
-async fn run(cli: Cli) -> Result<(), Fault> {
-    let ground = ground(&cli.plan)?;
+/// Runs a command.
+async fn run(cli: BallistaCli) -> Result<(), FleetFault> {
+    let ground = load_fleet_model(&cli.plan)?;
     match cli.command {
-        Command::Scheduler {
-            host,
-            port,
-            timeout,
-        } => scheduler::serve(&ground, &host, port, timeout).await,
-        Command::Executor {
+        BallistaCommand::Scheduler { host, port, timeout } => scheduler::serve(&ground, &host, port, timeout).await,
+        BallistaCommand::Executor {
             host,
             port,
             scheduler,
@@ -153,18 +154,18 @@ async fn run(cli: Cli) -> Result<(), Fault> {
             }
             let longest = LONGEST_MESSAGE;
             let usual = ExecutorProcessConfig::default();
-            // What one that was killed has left is never handed out by the one that takes its place.
+            // A new folder for each executor, so that it never delivers results of a killed one.
             let work = work.map(|path| path.join(&usual.executor_id));
             if let Some(work) = &work {
                 std::fs::create_dir_all(work).map_err(|error| {
-                    Fault::new(format!(
-                        "{} cannot be made: {error}; choose another folder with `--work`",
+                    FleetFault::new(format!(
+                        "{} cannot be created: {error}; choose another folder with `--work`",
                         work.display()
                     ))
                 })?;
             }
             let spilled = work.clone();
-            let runtime = move |_: &SessionConfig| stores::runtime(spilled.as_deref());
+            let runtime = move |_: &SessionConfig| stores::runtime_environment(spilled.as_deref());
             let config = ExecutorProcessConfig {
                 bind_host: host,
                 port,
@@ -181,23 +182,21 @@ async fn run(cli: Cli) -> Result<(), Fault> {
                 override_runtime_producer: Some(Arc::new(runtime)),
                 ..usual
             };
-            start_executor_process(Arc::new(config))
-                .await
-                .map_err(Fault::new)
+            start_executor_process(Arc::new(config)).await.map_err(FleetFault::new)
         }
-        Command::Query {
+        BallistaCommand::Query {
             sql,
             tables,
             scheduler,
             partitions,
         } => {
-            let asked = client::Asked {
+            let asked = client::QueryRequest {
                 sql: &sql,
                 tables: &tables,
                 scheduler: scheduler.as_deref(),
                 partitions,
             };
-            client::query(&ground, &asked).await.map_err(Fault::new)
+            client::run_query(&ground, &asked).await.map_err(FleetFault::new)
         }
     }
 }

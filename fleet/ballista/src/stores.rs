@@ -1,4 +1,4 @@
-//! Where samples lie: paths of this computer, and buckets of S3 or what speaks as it does, by their URL.
+//! Access to samples: paths of this computer, and buckets of S3 or a compatible store, by their URL.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -10,28 +10,26 @@ use object_store::ObjectStore;
 use object_store::aws::AmazonS3Builder;
 use url::Url;
 
-/// What a process runs on: stores by URL, and a folder for what does not fit into memory, that of the system where none is given.
-pub(crate) fn runtime(spilled: Option<&Path>) -> Result<Arc<RuntimeEnv>> {
-    let runtime = RuntimeEnvBuilder::new().with_object_store_registry(Arc::new(Stores::default()));
+/// The environment of a process: stores by URL, and a folder for data that do not fit into memory (that of the system
+/// if not given).
+pub(crate) fn runtime_environment(spilled: Option<&Path>) -> Result<Arc<RuntimeEnv>> {
+    let runtime = RuntimeEnvBuilder::new().with_object_store_registry(Arc::new(ObjectStores::default()));
     match spilled {
         Some(folder) => runtime.with_temp_file_path(folder).build_arc(),
         None => runtime.build_arc(),
     }
 }
 
-/// Stores that were registered, and a bucket where it is first asked for: `AWS_ACCESS_KEY_ID`, `AWS_SECRET_ACCESS_KEY`,
-/// `AWS_REGION`, `AWS_ENDPOINT`, `AWS_ALLOW_HTTP` and their like say who asks and where it is.
+/// Registered stores. A bucket of S3 is registered at its first use, with the variables `AWS_ACCESS_KEY_ID`,
+/// `AWS_SECRET_ACCESS_KEY`, `AWS_REGION`, `AWS_ENDPOINT`, `AWS_ALLOW_HTTP` etc.
 #[derive(Debug, Default)]
-struct Stores {
+struct ObjectStores {
+    /// The stores so far.
     known: DefaultObjectStoreRegistry,
 }
 
-impl ObjectStoreRegistry for Stores {
-    fn register_store(
-        &self,
-        url: &Url,
-        store: Arc<dyn ObjectStore>,
-    ) -> Option<Arc<dyn ObjectStore>> {
+impl ObjectStoreRegistry for ObjectStores {
+    fn register_store(&self, url: &Url, store: Arc<dyn ObjectStore>) -> Option<Arc<dyn ObjectStore>> {
         self.known.register_store(url, store)
     }
 
@@ -39,6 +37,7 @@ impl ObjectStoreRegistry for Stores {
         self.known.deregister_store(url)
     }
 
+    /// The store of a URL; registers a bucket of S3 at its first use.
     fn get_store(&self, url: &Url) -> Result<Arc<dyn ObjectStore>> {
         let known = self.known.get_store(url);
         if known.is_ok() || url.scheme() != "s3" {
@@ -46,7 +45,7 @@ impl ObjectStoreRegistry for Stores {
         }
         let Some(bucket) = url.host_str() else {
             return Err(DataFusionError::Configuration(format!(
-                "{url} names no bucket; write it as s3://BUCKET/FOLDER/"
+                "{url} has no bucket; write it as s3://BUCKET/FOLDER/"
             )));
         };
         let bucket = AmazonS3Builder::from_env().with_bucket_name(bucket);

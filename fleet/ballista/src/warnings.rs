@@ -1,21 +1,18 @@
-//! Warnings of the engines on standard error, such as that of an executor that is lost; nothing else of what they tell.
+//! Prints warnings and errors of the engines on standard error, such as the loss of an executor, and no other messages.
 
 use log::{LevelFilter, Log, Metadata, Record};
 
-struct Warnings;
+/// A logger that prints level and text.
+struct WarningLogger;
 
-impl Log for Warnings {
+impl Log for WarningLogger {
     fn enabled(&self, about: &Metadata<'_>) -> bool {
         about.level() <= log::max_level()
     }
 
     fn log(&self, record: &Record<'_>) {
         if self.enabled(record.metadata()) {
-            eprintln!(
-                "{}: {}",
-                record.level().as_str().to_lowercase(),
-                record.args()
-            );
+            eprintln!("{}: {}", record.level().as_str().to_lowercase(), record.args());
         }
     }
 
@@ -23,9 +20,9 @@ impl Log for Warnings {
 }
 
 /// Shows warnings from now on.
-pub(crate) fn show() {
-    // A second logger could only come from a second call.
-    if log::set_logger(&Warnings).is_ok() {
+pub(crate) fn show_warnings() {
+    // Setting the logger fails only at a second call, and then it is set already.
+    if log::set_logger(&WarningLogger).is_ok() {
         log::set_max_level(LevelFilter::Warn);
     }
 }

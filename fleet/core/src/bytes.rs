@@ -1,46 +1,52 @@
-//! Numbers and texts as bytes, little end first, and back; a checksum tells bytes that were cut or changed.
+//! The binary format of summaries: numbers and texts to little-endian bytes, and back. A checksum detects bytes that
+//! were cut off or changed.
 
-use modelmill_identify::changes::Moments;
+use modelmill_identify::changes::NormalEquations;
 
-use crate::Fault;
+use crate::FleetFault;
 
-/// Writes.
+/// Writes numbers and texts one after the other.
 #[derive(Default)]
-pub(crate) struct Writer(Vec<u8>);
+pub(crate) struct SummaryWriter(Vec<u8>);
 
-impl Writer {
+impl SummaryWriter {
+    /// Bytes as they are.
     pub(crate) fn bytes(&mut self, bytes: &[u8]) {
         self.0.extend_from_slice(bytes);
     }
 
-    pub(crate) fn whole(&mut self, number: u64) {
+    /// An integer of eight bytes.
+    pub(crate) fn integer(&mut self, number: u64) {
         self.bytes(&number.to_le_bytes());
     }
 
+    /// A number of eight bytes.
     pub(crate) fn float(&mut self, number: f64) {
         self.bytes(&number.to_le_bytes());
     }
 
+    /// A list of numbers after its length.
     pub(crate) fn floats(&mut self, numbers: &[f64]) {
-        self.whole(numbers.len() as u64);
+        self.integer(numbers.len() as u64);
         for number in numbers {
             self.float(*number);
         }
     }
 
+    /// A text in UTF-8 after its length in bytes.
     pub(crate) fn text(&mut self, text: &str) {
-        self.whole(text.len() as u64);
+        self.integer(text.len() as u64);
         self.bytes(text.as_bytes());
     }
 
-    /// Sums without the columns that are zero throughout, and of a symmetric table one half.
-    pub(crate) fn moments(&mut self, sums: &Moments) {
+    /// Normal equations without columns that are zero in all rows, and only the upper half of the symmetric matrix.
+    pub(crate) fn moments(&mut self, sums: &NormalEquations) {
         let n = sums.rhs.len();
         let kept: Vec<usize> = (0..n).filter(|k| sums.gram[(*k, *k)] != 0.0).collect();
-        self.whole(n as u64);
-        self.whole(kept.len() as u64);
+        self.integer(n as u64);
+        self.integer(kept.len() as u64);
         for k in &kept {
-            self.whole(*k as u64);
+            self.integer(*k as u64);
         }
         for (i, a) in kept.iter().enumerate() {
             for b in &kept[i..] {
@@ -49,26 +55,28 @@ impl Writer {
             self.float(sums.rhs[*a]);
         }
         self.float(sums.total);
-        self.whole(sums.rows as u64);
+        self.integer(sums.rows as u64);
     }
 
-    /// All that was written, with its checksum.
+    /// The bytes with the checksum at their end.
     pub(crate) fn finish(mut self) -> Vec<u8> {
         let sum = checksum(&self.0);
-        self.whole(sum);
+        self.integer(sum);
         self.0
     }
 }
 
-/// Reads.
-pub(crate) struct Reader<'a> {
+/// Reads what [`SummaryWriter`] wrote, in the same order. All methods fail if bytes are missing.
+pub(crate) struct SummaryReader<'a> {
+    /// The bytes that are not read yet.
     bytes: &'a [u8],
+    /// Name of the data in messages.
     what: &'a str,
 }
 
-impl<'a> Reader<'a> {
-    /// Fails where the checksum is another; `what` is what messages call the bytes.
-    pub(crate) fn new(bytes: &'a [u8], what: &'a str) -> Result<Self, Fault> {
+impl<'a> SummaryReader<'a> {
+    /// Starts reading; fails if the checksum does not match. `what` is the name of the data in messages.
+    pub(crate) fn new(bytes: &'a [u8], what: &'a str) -> Result<Self, FleetFault> {
         let reader = Self { bytes, what };
         let at = bytes.len().checked_sub(8).ok_or_else(|| reader.fault())?;
         let (bytes, sum) = bytes.split_at(at);
@@ -78,14 +86,16 @@ impl<'a> Reader<'a> {
         Ok(Self { bytes, what })
     }
 
-    fn fault(&self) -> Fault {
-        Fault::new(format!(
-            "{} is cut off or was changed: its bytes are none that this program wrote; make it again",
+    /// The fault of bytes that do not have the format.
+    fn fault(&self) -> FleetFault {
+        FleetFault::new(format!(
+            "{} is incomplete or was changed: this program did not write these bytes; make it again",
             self.what
         ))
     }
 
-    fn take(&mut self, n: usize) -> Result<&'a [u8], Fault> {
+    /// The next `n` bytes.
+    fn take_bytes(&mut self, n: usize) -> Result<&'a [u8], FleetFault> {
         if n > self.bytes.len() {
             return Err(self.fault());
         }
@@ -94,53 +104,59 @@ impl<'a> Reader<'a> {
         Ok(taken)
     }
 
-    pub(crate) fn fixed<const N: usize>(&mut self) -> Result<[u8; N], Fault> {
-        let taken = self.take(N)?;
+    /// The next `N` bytes as an array.
+    pub(crate) fn array<const N: usize>(&mut self) -> Result<[u8; N], FleetFault> {
+        let taken = self.take_bytes(N)?;
         taken.try_into().map_err(|_| self.fault())
     }
 
-    pub(crate) fn whole(&mut self) -> Result<u64, Fault> {
-        Ok(u64::from_le_bytes(self.fixed()?))
+    /// The next integer.
+    pub(crate) fn integer(&mut self) -> Result<u64, FleetFault> {
+        Ok(u64::from_le_bytes(self.array()?))
     }
 
-    /// A number of things of so many bytes at least, of which there cannot be more than bytes are left.
-    pub(crate) fn count(&mut self, each: usize) -> Result<usize, Fault> {
-        let n = usize::try_from(self.whole()?).map_err(|_| self.fault())?;
+    /// A number of elements of at least `each` bytes; fails if the remaining bytes cannot contain so many.
+    pub(crate) fn element_count(&mut self, each: usize) -> Result<usize, FleetFault> {
+        let n = usize::try_from(self.integer()?).map_err(|_| self.fault())?;
         if n.saturating_mul(each) > self.bytes.len() {
             return Err(self.fault());
         }
         Ok(n)
     }
 
-    pub(crate) fn size(&mut self) -> Result<usize, Fault> {
-        usize::try_from(self.whole()?).map_err(|_| self.fault())
+    /// The next integer as a size.
+    pub(crate) fn size(&mut self) -> Result<usize, FleetFault> {
+        usize::try_from(self.integer()?).map_err(|_| self.fault())
     }
 
-    pub(crate) fn float(&mut self) -> Result<f64, Fault> {
-        Ok(f64::from_le_bytes(self.fixed()?))
+    /// The next number.
+    pub(crate) fn float(&mut self) -> Result<f64, FleetFault> {
+        Ok(f64::from_le_bytes(self.array()?))
     }
 
-    pub(crate) fn floats(&mut self) -> Result<Vec<f64>, Fault> {
-        let n = self.count(8)?;
+    /// The next list of numbers.
+    pub(crate) fn floats(&mut self) -> Result<Vec<f64>, FleetFault> {
+        let n = self.element_count(8)?;
         (0..n).map(|_| self.float()).collect()
     }
 
-    pub(crate) fn text(&mut self) -> Result<String, Fault> {
-        let n = self.count(1)?;
-        let bytes = self.take(n)?;
+    /// The next text.
+    pub(crate) fn text(&mut self) -> Result<String, FleetFault> {
+        let n = self.element_count(1)?;
+        let bytes = self.take_bytes(n)?;
         String::from_utf8(bytes.to_vec()).map_err(|_| self.fault())
     }
 
-    /// Sums over `columns` columns.
-    pub(crate) fn moments(&mut self, columns: usize) -> Result<Moments, Fault> {
+    /// Normal equations with `columns` columns; fails if they have another number.
+    pub(crate) fn moments(&mut self, columns: usize) -> Result<NormalEquations, FleetFault> {
         let n = self.size()?;
         if n != columns {
-            return Err(Fault::new(format!(
-                "{} has {n} columns where the plan has {columns}: it is of another model; make it again with this plan",
+            return Err(FleetFault::new(format!(
+                "{} has {n} columns, but the plan has {columns}: it belongs to another model; make it again with this plan",
                 self.what
             )));
         }
-        let many = self.count(8)?;
+        let many = self.element_count(8)?;
         let mut kept = Vec::with_capacity(many);
         for _ in 0..many {
             let k = self.size()?;
@@ -149,7 +165,7 @@ impl<'a> Reader<'a> {
             }
             kept.push(k);
         }
-        let mut sums = Moments::new(n);
+        let mut sums = NormalEquations::new(n);
         for (i, a) in kept.iter().enumerate() {
             for b in &kept[i..] {
                 let x = self.float()?;
@@ -163,8 +179,8 @@ impl<'a> Reader<'a> {
         Ok(sums)
     }
 
-    /// Fails where bytes are left.
-    pub(crate) fn finish(self) -> Result<(), Fault> {
+    /// Ends reading; fails if bytes remain.
+    pub(crate) fn finish(self) -> Result<(), FleetFault> {
         if self.bytes.is_empty() {
             Ok(())
         } else {
@@ -173,7 +189,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// FNV-1a of 64 bits (Fowler, Noll, Vo): no secret, but no slip passes it either.
+/// The checksum FNV-1a of 64 bits (Fowler, Noll, Vo). It detects accidental changes, not deliberate ones.
 pub(crate) fn checksum(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xcbf2_9ce4_8422_2325, |sum, byte| {
         (sum ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3)

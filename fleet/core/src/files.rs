@@ -1,38 +1,42 @@
-//! The files of a plan, and recordings from disk beside them.
+//! The source of files for a plan: model files come from the plan, recordings from disk.
 
 use std::path::{Path, PathBuf};
 
-use modelmill::files::{Disk, FileError, Files, Kind, Memory, Opened};
+use modelmill::files::{DiskFiles, FileError, FileSource, MemoryFiles, OpenFile, PathKind};
 
-/// What is in the plan comes from memory, all else from disk.
-pub(crate) struct Both {
-    pub(crate) memory: Memory,
-    pub(crate) disk: Disk,
+/// Files of the plan in memory, and all others on disk.
+pub(crate) struct PlanFiles {
+    /// The model files of the plan.
+    pub(crate) memory: MemoryFiles,
+    /// The disk.
+    pub(crate) disk: DiskFiles,
 }
 
-impl Both {
-    fn at(&self, path: &Path) -> &dyn Files {
+impl PlanFiles {
+    /// The source of a path: memory if the plan has the file, else the disk.
+    fn files_for(&self, path: &Path) -> &dyn FileSource {
         match self.memory.kind(path) {
-            Kind::File => &self.memory,
+            PathKind::File => &self.memory,
             _ => &self.disk,
         }
     }
 }
 
-impl Files for Both {
+impl FileSource for PlanFiles {
     fn read(&self, path: &Path, most: u64) -> Result<Vec<u8>, FileError> {
-        self.at(path).read(path, most)
+        self.files_for(path).read(path, most)
     }
 
-    fn kind(&self, path: &Path) -> Kind {
-        self.at(path).kind(path)
+    fn kind(&self, path: &Path) -> PathKind {
+        self.files_for(path).kind(path)
     }
 
+    /// Folders are on disk only.
     fn list(&self, folder: &Path) -> Result<Vec<PathBuf>, FileError> {
         self.disk.list(folder)
     }
 
-    fn open(&self, path: &Path, most: u64) -> Result<Opened, FileError> {
-        self.at(path).open(path, most)
+    fn open(&self, path: &Path, most: u64) -> Result<OpenFile, FileError> {
+        self.files_for(path).open(path, most)
     }
 }

@@ -1,81 +1,83 @@
-//! Folders of recordings: which robot and which day a file belongs to, by its path.
+//! Folders of recordings: a folder goes in, its recordings by robot and day come out. The path of a file determines
+//! both.
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use modelmill::recording::has_ending_of_a_recording;
+use modelmill::recording::has_recording_extension;
 
-use crate::Fault;
+use crate::FleetFault;
 
 /// A recording that is a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct File {
-    /// Its path below the folder, with `/`; what messages call it.
+pub struct FleetFile {
+    /// Its path below the folder, with `/`; its name in messages.
     pub name: String,
-    /// Where it is.
+    /// The path to open.
     pub path: PathBuf,
-    /// Its day.
+    /// Its day, as the path states it.
     pub day: String,
-    /// Name, size and time of change: a file that was written anew is another recording.
+    /// Name, size and time of change. A file that was written again thus counts as another recording.
     pub key: String,
 }
 
-/// Recordings below a folder by robot, each in the order of day and name.
+/// Recordings below a folder by robot, each sorted by day and name.
 ///
-/// Fails where the folder cannot be read, or holds no recording whose robot is known.
-pub fn robots(folder: &Path) -> Result<BTreeMap<String, Vec<File>>, Fault> {
+/// Fails if the folder cannot be read, or has no recording, or a path names no robot.
+pub fn robots(folder: &Path) -> Result<BTreeMap<String, Vec<FleetFile>>, FleetFault> {
     let mut paths = Vec::new();
     walk(folder, &mut paths)?;
     let mut found = Vec::new();
     for path in paths {
         let below = path.strip_prefix(folder).unwrap_or(&path);
         let parts: Vec<_> = below.iter().map(|part| part.to_string_lossy()).collect();
-        let about = fs::metadata(&path).map_err(|error| unread(&path, &error))?;
+        // Size and time of change distinguish versions of a file.
+        let about = fs::metadata(&path).map_err(|error| read_fault(&path, &error))?;
         let changed = about.modified().ok();
         let changed = changed.and_then(|at| at.duration_since(std::time::UNIX_EPOCH).ok());
-        found.push(Found {
+        found.push(FolderEntry {
             name: parts.join("/"),
             version: format!("{} {}", about.len(), changed.map_or(0, |at| at.as_nanos())),
             path,
         });
     }
-    by_robot(&folder.display(), found)
+    group_by_robot(&folder.display(), found)
 }
 
-/// A file or object that was found below a folder.
+/// A file of a folder, or an object of a store.
 #[derive(Clone, Debug)]
-pub struct Found {
+pub struct FolderEntry {
     /// Its path below the folder, with `/`.
     pub name: String,
-    /// Where it is.
+    /// The path to open.
     pub path: PathBuf,
-    /// What changes when it is written anew, such as its size and time.
+    /// A text that changes when the file is written again, such as its size and time.
     pub version: String,
 }
 
-/// What was found by robot, each in the order of day and name; `folder` is what messages call the place. Of what is no recording, by
-/// the endings of names, nothing is said.
+/// Groups recordings by robot, each sorted by day and name. `folder` is the name of the place in messages. Files
+/// without the ending of a recording are ignored.
 ///
-/// Fails where there is no recording, or the path of one names no robot.
-pub fn by_robot(
+/// Fails if there is no recording, or the path of one names no robot.
+pub fn group_by_robot(
     folder: &dyn std::fmt::Display,
-    found: impl IntoIterator<Item = Found>,
-) -> Result<BTreeMap<String, Vec<File>>, Fault> {
-    let mut robots: BTreeMap<String, Vec<File>> = BTreeMap::new();
+    found: impl IntoIterator<Item = FolderEntry>,
+) -> Result<BTreeMap<String, Vec<FleetFile>>, FleetFault> {
+    let mut robots: BTreeMap<String, Vec<FleetFile>> = BTreeMap::new();
     for one in found {
-        if !has_ending_of_a_recording(&one.path) {
+        if !has_recording_extension(&one.path) {
             continue;
         }
         let parts: Vec<String> = one.name.split('/').map(str::to_owned).collect();
-        let Some((robot, day)) = place(&parts) else {
-            return Err(Fault::new(format!(
-                "{folder}: the path of {} names no robot; put recordings below folders such as `robot=R1/day=2026-03-01`, or \
+        let Some((robot, day)) = robot_and_day(&parts) else {
+            return Err(FleetFault::new(format!(
+                "{folder}: the path of {} names no robot; put recordings into folders such as `robot=R1/day=2026-03-01`, or \
                  `R1/2026-03-01`",
                 one.name
             )));
         };
-        robots.entry(robot).or_default().push(File {
+        robots.entry(robot).or_default().push(FleetFile {
             key: format!("{} {}", one.name, one.version),
             name: one.name,
             path: one.path,
@@ -83,8 +85,8 @@ pub fn by_robot(
         });
     }
     if robots.is_empty() {
-        return Err(Fault::new(format!(
-            "{folder} holds no recordings (Parquet, CSV, MATLAB, HDF5, MCAP); give the folder above those of the robots"
+        return Err(FleetFault::new(format!(
+            "{folder} has no recordings (Parquet, CSV, MATLAB, HDF5, MCAP); give the folder that contains those of the robots"
         )));
     }
     for files in robots.values_mut() {
@@ -93,19 +95,21 @@ pub fn by_robot(
     Ok(robots)
 }
 
-fn unread(path: &Path, error: &std::io::Error) -> Fault {
-    Fault::new(format!(
-        "{} cannot be read: {error}; check the path and who may read it",
+/// The fault of a path that cannot be read.
+fn read_fault(path: &Path, error: &std::io::Error) -> FleetFault {
+    FleetFault::new(format!(
+        "{} cannot be read: {error}; check the path and its permissions",
         path.display()
     ))
 }
 
-fn walk(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), Fault> {
-    let entries = fs::read_dir(folder).map_err(|error| unread(folder, &error))?;
+/// Adds all files below a folder to `found`, in the order of their names.
+fn walk(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), FleetFault> {
+    let entries = fs::read_dir(folder).map_err(|error| read_fault(folder, &error))?;
     let mut entries: Vec<PathBuf> = entries
         .map(|entry| entry.map(|entry| entry.path()))
         .collect::<Result<_, _>>()
-        .map_err(|error| unread(folder, &error))?;
+        .map_err(|error| read_fault(folder, &error))?;
     entries.sort();
     for path in entries {
         if path.is_dir() {
@@ -117,16 +121,14 @@ fn walk(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), Fault> {
     Ok(())
 }
 
-/// Robot and day of a path: by `robot=` and `day=`, else by the first folder and the second, or what the name begins with.
-fn place(parts: &[String]) -> Option<(String, String)> {
-    let named = |key: &str| {
-        parts
-            .iter()
-            .find_map(|part| part.strip_prefix(key).map(str::to_owned))
-    };
+/// Robot and day of a path: from `robot=` and `day=`, else from the first and the second folder, or from the date at
+/// the start of the file name.
+fn robot_and_day(parts: &[String]) -> Option<(String, String)> {
+    let named = |key: &str| parts.iter().find_map(|part| part.strip_prefix(key).map(str::to_owned));
     if let (Some(robot), Some(day)) = (named("robot="), named("day=")) {
         return Some((robot, day));
     }
+    // Otherwise folders have the names of robots, and days are folders or part of the file name.
     let (file, folders) = parts.split_last()?;
     let robot = folders.first()?.clone();
     let day = folders.get(1).cloned().unwrap_or_else(|| {
@@ -147,12 +149,12 @@ fn place(parts: &[String]) -> Option<(String, String)> {
     Some((robot, day))
 }
 
-/// Writes a file as a whole or not at all. Fails where the place cannot be written to.
-pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Fault> {
+/// Writes a file atomically: to a file next to it, which then replaces it. Fails if the folder cannot be written to.
+pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), FleetFault> {
     let beside = path.with_extension("part");
     let written = fs::write(&beside, bytes).and_then(|()| fs::rename(&beside, path));
     written.map_err(|error| {
-        Fault::new(format!(
+        FleetFault::new(format!(
             "{} cannot be written: {error}; choose another place, or make room",
             path.display()
         ))
@@ -161,13 +163,13 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Fault> {
 
 #[cfg(test)]
 mod tests {
-    use super::place;
+    use super::robot_and_day;
 
     #[track_caller]
     fn check(path: &str, expected: Option<(&str, &str)>) {
         let parts: Vec<String> = path.split('/').map(str::to_owned).collect();
         let expected = expected.map(|(robot, day)| (robot.to_owned(), day.to_owned()));
-        assert_eq!(place(&parts), expected);
+        assert_eq!(robot_and_day(&parts), expected);
     }
 
     #[test]

@@ -1,21 +1,22 @@
-//! Recordings of many machines of one kind, each as a small summary; summaries add, and what a robot, a day or a part says is
-//! solved from their sum.
+//! Evaluates recordings of many machines of one kind. Each recording becomes a small summary with additive statistics;
+//! the parameters of a robot, a day or a part are solved from the sum of its summaries.
 //!
-//! 1. [`Plan`] - how every recording is prepared and what its columns mean, made once from a few reference recordings. It is
-//!    one JSON document: whoever has it, on whichever computer, makes the same summaries.
-//! 2. [`Ground::summarise`] - one recording, its rows in any order, to a [`Summary`]: triangle of the base columns, products of
-//!    all columns, counts, and what was wrong. A recording that gives no answer is a summary that says so.
-//! 3. [`Summary::merge`] - the summary of both; associative and commutative up to rounding.
-//! 4. [`Ground::solve`] - base parameters with deviations.
-//! 5. [`robot`] - the days of one robot: when something changed and stayed changed, and which sensors died;
-//!    [`outliers`] - which robots differ from the others, and in what. Neither looks at a recording again.
+//! 1. [`FleetPlan`]: how every recording is prepared and what its columns mean, made once from a few reference
+//!    recordings. It is one JSON document; with the same plan, every computer makes the same summaries.
+//! 2. [`FleetModel::summarise`]: one recording, its rows in any order, to a [`FleetSummary`]: R factor of the base
+//!    columns, products of all columns, counts, and faults. A recording that cannot be evaluated gives a summary with
+//!    the reason.
+//! 3. [`FleetSummary::merge`]: adds summaries; associative and commutative up to rounding.
+//! 4. [`FleetModel::solve`]: base parameters with standard deviations.
+//! 5. [`robot`]: the days of one robot, with permanent changes and dead sensors. [`outliers`]: which robots differ from
+//!    the others, and in what. Neither reads a recording again.
 //!
-//! No engine is needed for any of this; those that spread it over computers stand in crates beside this one.
+//! This needs no query engine; crates for engines on several computers are next to this one.
 
 mod bytes;
 mod files;
+mod fleet_model;
 pub mod folder;
-mod ground;
 mod onset;
 pub mod outliers;
 mod plan;
@@ -25,37 +26,37 @@ mod summary;
 
 use modelmill::print::Message;
 
-pub use ground::{Fit, Ground};
-pub use modelmill::runs::Fitted;
-pub use plan::{Plan, Reference};
-pub use sensors::{SensorFault, Silence};
-pub use summary::{Bad, Summary};
+pub use fleet_model::{FleetFit, FleetModel};
+pub use modelmill::runs::FittedValue;
+pub use plan::{FleetPlan, FleetReference};
+pub use sensors::{FrozenReading, SensorFault};
+pub use summary::{BadRecording, FleetSummary};
 
-/// Why something cannot be done, in one sentence with a remedy.
+/// A fault: one sentence with the reason and a remedy.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Fault(Message);
+pub struct FleetFault(Message);
 
-impl Fault {
-    /// A fault from anything that can say what it is.
+impl FleetFault {
+    /// A fault with a text.
     pub fn new(says: impl std::fmt::Display) -> Self {
         Self(says.to_string().into())
     }
 
-    /// What is wrong, with what a front end spells in its own words.
+    /// The message, in which a front end spells options and commands in its own way.
     pub fn message(&self) -> &Message {
         &self.0
     }
 }
 
-impl std::fmt::Display for Fault {
+impl std::fmt::Display for FleetFault {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(&self.0.in_library_words())
     }
 }
 
-impl std::error::Error for Fault {}
+impl std::error::Error for FleetFault {}
 
-impl From<modelmill::Error> for Fault {
+impl From<modelmill::Error> for FleetFault {
     fn from(error: modelmill::Error) -> Self {
         Self(error.message())
     }

@@ -1,68 +1,71 @@
-//! Which robots differ from the others of their kind, and in what: by summaries alone.
+//! Detects robots that differ from the others of their kind: summaries of robots go in, outliers with the physical
+//! change come out.
 
-use modelmill::runs::{Changed, Fitted};
-use modelmill_identify::changes::Moments;
+use modelmill::runs::{FittedValue, RunChange};
+use modelmill_identify::changes::NormalEquations;
 use serde_json::{Value, json};
 
 use crate::robot::change_json;
-use crate::{Fault, Ground, Summary};
+use crate::{FleetFault, FleetModel, FleetSummary};
 
-/// Robots that stand in for the others are summed up in so many parts.
+/// Number of parts into which the similar robots, the reference, are summed up.
 const PARTS: usize = 8;
-/// Robots are alike up to so many robust deviations in each parameter.
-const ALIKE: f64 = 3.5;
-/// What a change explains of a robot must lie, as a root, so many median distances above the median over the robots: a change of
-/// one value of robots that are distributed normally does so once in a million.
-const BEYOND: f64 = 12.0;
-/// Changes that stand for this part of the clearest one are told together, by the name of the one that explains most.
-const BESIDE: f64 = 0.5;
+/// Largest distance of a similar robot from the median in each parameter, in robust standard deviations.
+const SIMILARITY_LIMIT: f64 = 3.5;
+/// Smallest distance of an outlier: the square root of the gain of a change above its median over the robots, in median
+/// absolute deviations. With normally distributed values one robot in a million exceeds it by chance.
+const OUTLIER_LIMIT: f64 = 12.0;
+/// Changes with at least this share of the largest distance are reported together, under the name of the one that
+/// explains most.
+const ASSOCIATED_SHARE: f64 = 0.5;
 
-/// A robot as it is held against others.
+/// A robot for the comparison with others.
 #[derive(Clone, Debug)]
-pub struct One {
-    /// What it is called.
+pub struct RobotSummary {
+    /// Its name.
     pub name: String,
-    /// Its recordings.
-    pub summary: Summary,
+    /// The sum of its recordings.
+    pub summary: FleetSummary,
 }
 
-/// A robot that differs.
+/// A robot that differs from the others.
 #[derive(Clone, Debug)]
-pub struct Outlier {
-    /// Which, by place.
-    pub which: usize,
-    /// In what, the clearest first.
-    pub changes: Vec<Changed>,
+pub struct RobotOutlier {
+    /// Index of the robot.
+    pub robot: usize,
+    /// The physical changes relative to the others, the most significant first.
+    pub changes: Vec<RunChange>,
 }
 
-/// What is usual in a fleet, and who differs.
+/// The usual values of a fleet, and its outliers.
 #[derive(Clone, Debug)]
-pub struct Outliers {
-    /// For each base parameter the median over the robots and the robust deviation of a robot from it, 1.4826 times the median
-    /// distance; `None` where no robot determines it.
-    pub usual: Vec<Option<Fitted>>,
-    /// For each robot and base parameter how far it lies from the median, in deviations of the robots and of its own.
-    pub apart: Vec<Vec<Option<f64>>>,
-    /// Robots that differ in something that physics has a name for, by far more than robots of this fleet do.
-    pub found: Vec<Outlier>,
+pub struct FleetOutliers {
+    /// For each base parameter the median over the robots with the robust standard deviation between robots (1.4826
+    /// times the median absolute deviation); `None` if no robot determines it.
+    pub usual: Vec<Option<FittedValue>>,
+    /// `[robot][parameter]`: distance from the median, in standard deviations between robots and of the estimate
+    /// combined.
+    pub distances: Vec<Vec<Option<f64>>>,
+    /// Robots that differ by a physical change much larger than the differences between the robots of this fleet.
+    pub found: Vec<RobotOutlier>,
 }
 
-/// Holds robots against each other. None differs where there are fewer than eight.
+/// Compares robots with each other. With fewer than eight similar robots there are no outliers.
 ///
-/// Fails where summaries are of another plan.
-pub fn outliers(ground: &Ground, robots: &[One]) -> Result<Outliers, Fault> {
-    let mut fits: Vec<Option<Vec<Fitted>>> = Vec::new();
+/// Fails if summaries belong to another plan.
+pub fn outliers(ground: &FleetModel, robots: &[RobotSummary]) -> Result<FleetOutliers, FleetFault> {
+    let mut fits: Vec<Option<Vec<FittedValue>>> = Vec::new();
     for one in robots {
-        ground.check(&one.summary)?;
+        ground.check_plan(&one.summary)?;
         fits.push(ground.solve(&one.summary).ok().map(|fit| fit.parameters));
     }
     let n = ground.parameters().len();
-    let usual: Vec<Option<Fitted>> = (0..n)
+    let usual: Vec<Option<FittedValue>> = (0..n)
         .map(|k| {
-            middle(
+            robust_centre(
                 fits.iter()
                     .flatten()
-                    .filter_map(|fit| told(fit[k]))
+                    .filter_map(|fit| value_and_deviation(fit[k]))
                     .map(|(x, _)| x)
                     .collect(),
             )
@@ -72,7 +75,7 @@ pub fn outliers(ground: &Ground, robots: &[One]) -> Result<Outliers, Fault> {
         .iter()
         .map(|fit| {
             let of = |k: usize| {
-                let (value, deviation) = told(fit.as_ref()?[k])?;
+                let (value, deviation) = value_and_deviation(fit.as_ref()?[k])?;
                 let usual = usual[k]?;
                 let spread = usual.deviation?.hypot(deviation);
                 (spread > 0.0).then(|| (value - usual.value) / spread)
@@ -80,73 +83,75 @@ pub fn outliers(ground: &Ground, robots: &[One]) -> Result<Outliers, Fault> {
             (0..n).map(of).collect()
         })
         .collect();
-    let is_alike = |k: &usize| {
-        fits[*k].is_some() && apart[*k].iter().flatten().all(|apart| apart.abs() < ALIKE)
-    };
+    // Similar robots serve as reference: none of their parameters is far from the median.
+    let is_alike =
+        |k: &usize| fits[*k].is_some() && apart[*k].iter().flatten().all(|apart| apart.abs() < SIMILARITY_LIMIT);
     let alike: Vec<usize> = (0..robots.len()).filter(is_alike).collect();
     let mut found = Vec::new();
     if alike.len() >= PARTS {
-        let mut parts = vec![ground.empty(); PARTS];
+        // The scatter between the parts shows how much the reference varies.
+        let mut parts = vec![ground.empty_summary(); PARTS];
         for (i, k) in alike.iter().enumerate() {
             parts[i % PARTS].merge(&robots[*k].summary)?;
         }
-        let parts: Vec<Moments> = parts.into_iter().map(|part| part.whole).collect();
+        let parts: Vec<NormalEquations> = parts.into_iter().map(|part| part.all_columns).collect();
         let known: Vec<usize> = (0..robots.len()).filter(|k| fits[*k].is_some()).collect();
-        // Roots of gains are proportional to differences.
+        // Square roots of gains are proportional to the size of a change.
         let roots: Vec<Vec<f64>> = known
             .iter()
             .map(|k| {
-                let gains = ground.common.gains(&parts, &robots[*k].summary.whole);
+                let gains = ground.common.gains(&parts, &robots[*k].summary.all_columns);
                 gains.into_iter().map(|gain| gain.max(0.0).sqrt()).collect()
             })
             .collect();
         let possible = roots.first().map_or(0, Vec::len);
+        // For each possible change, median and median absolute deviation over all robots.
         let bounds: Vec<(f64, f64)> = (0..possible)
             .map(|g| {
-                let of_all = middle(roots.iter().map(|roots| roots[g]).collect());
-                let (median, spread) =
-                    of_all.map_or((0.0, 0.0), |all| (all.value, all.deviation.unwrap_or(0.0)));
+                let of_all = robust_centre(roots.iter().map(|roots| roots[g]).collect());
+                let (median, spread) = of_all.map_or((0.0, 0.0), |all| (all.value, all.deviation.unwrap_or(0.0)));
                 (median, (spread / 1.4826).max(1.0))
             })
             .collect();
         for (which, roots) in known.iter().zip(&roots) {
             let beyond = |g: usize| (roots[g] - bounds[g].0) / bounds[g].1;
             let clearest = (0..possible).map(beyond).fold(0.0, f64::max);
-            // What robots hardly differ in, such as the zero of a sensor, stands clear of them even where it explains little of a load:
-            // the name is that of the change that explains most.
-            let clear = |g: &usize| beyond(*g) > BEYOND && beyond(*g) > BESIDE * clearest;
+            // A change in which robots hardly differ, such as the zero of a sensor, is significant even if it explains
+            // only little of the difference. So the change that explains most gives the name.
+            let clear = |g: &usize| beyond(*g) > OUTLIER_LIMIT && beyond(*g) > ASSOCIATED_SHARE * clearest;
             let named = (0..possible)
                 .filter(clear)
                 .max_by(|a, b| roots[*a].total_cmp(&roots[*b]));
             if let Some(g) = named {
                 let mut change = ground
                     .common
-                    .alone(&parts, &robots[*which].summary.whole, g);
+                    .single_change(&parts, &robots[*which].summary.all_columns, g);
                 let rivals = (0..possible).filter(|other| *other != g && clear(other));
                 let rivals = rivals.map(|other| ground.common.name_of_change(other));
                 change.rivals = rivals.collect();
-                found.push(Outlier {
-                    which: *which,
+                found.push(RobotOutlier {
+                    robot: *which,
                     changes: vec![change],
                 });
             }
         }
     }
-    let gain = |one: &Outlier| one.changes.first().map_or(0.0, |change| change.gain);
+    let gain = |one: &RobotOutlier| one.changes.first().map_or(0.0, |change| change.gain);
     found.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
-    Ok(Outliers {
+    Ok(FleetOutliers {
         usual,
-        apart,
+        distances: apart,
         found,
     })
 }
 
-fn told(fitted: Fitted) -> Option<(f64, f64)> {
+/// Value and standard deviation; none for a value that is not determined.
+fn value_and_deviation(fitted: FittedValue) -> Option<(f64, f64)> {
     Some((fitted.value, fitted.deviation?))
 }
 
-/// Median and robust deviation.
-fn middle(mut values: Vec<f64>) -> Option<Fitted> {
+/// Median, and robust standard deviation (1.4826 times the median absolute deviation).
+fn robust_centre(mut values: Vec<f64>) -> Option<FittedValue> {
     if values.is_empty() {
         return None;
     }
@@ -157,15 +162,15 @@ fn middle(mut values: Vec<f64>) -> Option<Fitted> {
     };
     let value = median(&mut values);
     let mut distances: Vec<f64> = values.iter().map(|x| (x - value).abs()).collect();
-    Some(Fitted {
+    Some(FittedValue {
         value,
         deviation: Some(1.4826 * median(&mut distances)),
     })
 }
 
-impl Outliers {
-    /// What is usual and who differs, as JSON.
-    pub fn json(&self, ground: &Ground, robots: &[One]) -> Value {
+impl FleetOutliers {
+    /// JSON: `usual` has median and spread of each parameter, `differ` the outliers with their changes.
+    pub fn json(&self, ground: &FleetModel, robots: &[RobotSummary]) -> Value {
         let infos = ground.parameters();
         let usual = infos.iter().zip(&self.usual).map(|(info, usual)| {
             json!({
@@ -177,9 +182,9 @@ impl Outliers {
             })
         });
         let found = self.found.iter().map(|one| {
-            let apart = infos.iter().zip(&self.apart[one.which]);
+            let apart = infos.iter().zip(&self.distances[one.robot]);
             json!({
-                "robot": robots[one.which].name,
+                "robot": robots[one.robot].name,
                 "changes": one.changes.iter().map(change_json).collect::<Vec<_>>(),
                 "apart": apart.map(|(info, apart)| (info.name.clone(), json!(apart))).collect::<serde_json::Map<_, _>>(),
             })

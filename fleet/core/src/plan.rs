@@ -1,74 +1,80 @@
-//! How every recording of a fleet is summed up: model, preparation, and the reference that columns are built on. A plan is one
-//! JSON document; summaries of two plans do not add.
+//! The plan of a fleet: model, preparation of recordings, and the reference values that define the columns. Reference
+//! recordings go in, one JSON document comes out. Summaries of different plans cannot be added.
 
 use std::path::Path;
 use std::sync::Arc;
 
-use modelmill::files::{Disk, Memory};
-use modelmill::recording::{Preparation, Reading, Recording, Smoothing};
-use modelmill::runs::CommonGround;
+use modelmill::files::{DiskFiles, MemoryFiles};
+use modelmill::recording::{PreparedRecording, RecordingOptions, SmoothingMethod, StatePreparation};
+use modelmill::runs::ReferenceFit;
 use modelmill::{Host, Model};
-use modelmill_identify::changes::Moments;
+use modelmill_identify::changes::NormalEquations;
 use serde::{Deserialize, Serialize};
 
-use crate::files::Both;
-use crate::sensors::Silence;
-use crate::{Fault, Ground};
+use crate::files::PlanFiles;
+use crate::sensors::FrozenReading;
+use crate::{FleetFault, FleetModel};
 
-/// The version of the document, and of what summaries hold.
+/// Version of the document and of the summaries.
 pub(crate) const VERSION: u32 = 1;
 
-/// How every recording is summed up.
+/// How every recording is prepared and summed up.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Plan {
-    /// 1.
+pub struct FleetPlan {
+    /// Version of the document, 1.
     pub version: u32,
-    /// What messages call the model file.
+    /// Path of the model file, for messages.
     pub model: String,
-    /// The text of the model file and, behind it, of those that it extends, each with its name.
+    /// Name and text of the model file and, after it, of the files that it extends.
     pub files: Vec<(String, String)>,
-    /// Our columns with what the recordings call them, as in [`Reading::columns`].
+    /// Names of the model with the columns of the recordings, as in [`RecordingOptions::columns`].
     #[serde(default)]
     pub columns: Vec<(String, String)>,
-    /// How states are prepared; everything is settled, so that all recordings are prepared alike.
-    pub preparation: Preparation,
-    /// Whether samples with NaN or empty fields are left out; a recording that has them is a bad one otherwise.
+    /// How states are prepared; all values are fixed, so that all recordings are prepared in the same way.
+    pub preparation: StatePreparation,
+    /// Whether samples with NaN or empty fields are left out; otherwise a recording with such samples is bad.
     #[serde(default)]
     pub skip_bad_samples: bool,
-    /// What the reference recordings say.
-    pub reference: Reference,
+    /// Results of the reference recordings.
+    pub reference: FleetReference,
 }
 
-/// What reference recordings say, and all columns are built on.
+/// Results of the reference recordings, which define all columns.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Reference {
-    /// What the recordings are called.
+pub struct FleetReference {
+    /// Names of the recordings.
     pub recordings: Vec<String>,
-    /// Base parameters that are no known numbers, in the order and units of the model.
+    /// Values of the estimated base parameters, in the order and units of the model.
     pub values: Vec<f64>,
-    /// Sums over the rows of each drive.
-    pub sizes: Vec<Sums>,
-    /// For each coordinate and drive the longest time for which its reading stood still, as a part of the recording.
+    /// For each drive, sums over its rows.
+    pub sizes: Vec<ReferenceSums>,
+    /// For each coordinate and drive the longest interval with a constant reading, as a share of the recording.
     pub still: Vec<(String, f64)>,
 }
 
-/// Sums over rows, without the columns that are zero throughout.
+/// Normal equations over rows, without columns that are zero in all rows.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Sums {
+pub struct ReferenceSums {
+    /// Number of all columns.
     columns: usize,
+    /// Number of rows.
     rows: usize,
+    /// Sum of the squares of the measured forces.
     total: f64,
+    /// Indices of the columns that are not zero.
     kept: Vec<usize>,
-    /// Of each kept column its products with itself and all kept ones behind it, then with the measured force.
+    /// For each kept column its products with itself and the kept ones after it, then with the measured force.
     products: Vec<Vec<f64>>,
 }
 
-impl Sums {
-    fn of(sums: &Moments) -> Self {
+impl ReferenceSums {
+    /// The compact form of normal equations.
+    fn from_moments(sums: &NormalEquations) -> Self {
         let n = sums.rhs.len();
+        // A column that is zero in all rows has a zero on the diagonal.
         let kept: Vec<usize> = (0..n).filter(|k| sums.gram[(*k, *k)] != 0.0).collect();
         let products = (0..kept.len()).map(|i| {
             let a = kept[i];
@@ -84,8 +90,9 @@ impl Sums {
         }
     }
 
-    fn moments(&self) -> Option<Moments> {
-        let mut sums = Moments::new(self.columns);
+    /// The normal equations; `None` if the numbers of products and columns do not match.
+    fn moments(&self) -> Option<NormalEquations> {
+        let mut sums = NormalEquations::new(self.columns);
         (sums.total, sums.rows) = (self.total, self.rows);
         if self.products.len() != self.kept.len() || self.kept.iter().any(|k| *k >= self.columns) {
             return None;
@@ -106,13 +113,15 @@ impl Sums {
     }
 }
 
-impl Plan {
-    /// The plan that reference recordings make, which should be of sound machines: how the first is best prepared is how all
-    /// are, and columns are built on the parameters that all of them say. What `reading` leaves open is settled here. Those that
-    /// cannot be read are left out; [`Reference::recordings`] names the others.
+impl FleetPlan {
+    /// Makes a plan from reference recordings, which should be of faultless machines. The best preparation of the first
+    /// recording is used for all, and the columns are defined by the parameters of all of them. Options that `reading`
+    /// does not specify are fixed here. Recordings that cannot be read are left out; [`FleetReference::recordings`]
+    /// names the others.
     ///
-    /// Fails where the model has no meaning, or none of the recordings can be read and evaluated.
-    pub fn make(model: &Path, reading: &Reading, reference: &[&Path]) -> Result<Self, Fault> {
+    /// Fails if the model has faults, or none of the recordings can be read and evaluated.
+    pub fn from_recordings(model: &Path, reading: &RecordingOptions, reference: &[&Path]) -> Result<Self, FleetFault> {
+        // The model with its files, so that the plan needs no other file.
         let host = Host::new();
         let derived = host.model(model)?;
         let files = derived.loaded.sources.files.iter();
@@ -120,8 +129,8 @@ impl Plan {
             .map(|file| (file.path.display().to_string(), file.text.clone()))
             .collect();
         let path = model.display().to_string();
-        let mut last =
-            Fault::new("there is no reference recording; name one or more of sound machines");
+        let mut last = FleetFault::new("there is no reference recording; give one or more of faultless machines");
+        // The first recording that can be read determines the preparation.
         let mut readable = reference.iter().filter_map(|path| {
             let read = derived.recording(path, reading);
             read.map_err(|error| last = error.into()).ok()
@@ -129,7 +138,7 @@ impl Plan {
         let chosen = readable.next();
         drop(readable);
         let chosen = chosen.ok_or(last)?;
-        let settled = settled(&chosen, reading)?;
+        let settled = fixed_preparation(&chosen, reading)?;
         let mut plan = Self {
             version: VERSION,
             model: path,
@@ -137,41 +146,43 @@ impl Plan {
             columns: reading.columns.clone(),
             preparation: settled,
             skip_bad_samples: reading.skip_bad_samples,
-            reference: Reference {
+            reference: FleetReference {
                 recordings: Vec::new(),
                 values: Vec::new(),
                 sizes: Vec::new(),
                 still: Vec::new(),
             },
         };
+        // Read all reference recordings with the fixed preparation.
         let reading = plan.reading();
-        let recordings: Vec<Recording> = reference
+        let recordings: Vec<PreparedRecording> = reference
             .iter()
             .filter_map(|path| derived.recording(path, &reading).ok())
             .collect();
-        let all: Vec<&Recording> = recordings.iter().collect();
-        let ground = CommonGround::of(&derived, &all)?;
-        plan.reference = Reference {
+        let all: Vec<&PreparedRecording> = recordings.iter().collect();
+        let ground = ReferenceFit::from_reference_runs(&derived, &all)?;
+        plan.reference = FleetReference {
             recordings: recordings.iter().map(|one| one.file().to_owned()).collect(),
             values: ground.values().to_vec(),
-            sizes: ground.sizes().iter().map(Sums::of).collect(),
-            still: still(&derived, &recordings),
+            sizes: ground.sizes().iter().map(ReferenceSums::from_moments).collect(),
+            still: standstill_shares(&derived, &recordings),
         };
         Ok(plan)
     }
 
-    /// Reads a plan from its JSON; `name` is what messages call it.
+    /// Reads a plan from JSON; `name` is its name in messages.
     ///
-    /// Fails where it is none, or of another version.
-    pub fn parse(name: &str, text: &str) -> Result<Self, Fault> {
+    /// Fails if the text is not a plan, or has another version.
+    pub fn parse(name: &str, text: &str) -> Result<Self, FleetFault> {
         let plan: Self = serde_json::from_str(text).map_err(|error| {
-            Fault::new(format!(
-                "{name} is no plan of a fleet: {error}; make one with `modelmill-fleet plan`"
+            FleetFault::new(format!(
+                "{name} is not a plan of a fleet: {error}; make one with `modelmill-fleet plan`"
             ))
         })?;
         if plan.version != VERSION {
-            return Err(Fault::new(format!(
-                "{name} is a plan of version {}, and this program knows version {VERSION}; make it anew",
+            return Err(FleetFault::new(format!(
+                "{name} is a plan of version {}, but this program reads version {VERSION}; make the plan again with \
+                 `modelmill-fleet plan`",
                 plan.version
             )));
         }
@@ -180,66 +191,68 @@ impl Plan {
 
     /// The plan as JSON.
     pub fn json(&self) -> String {
-        // Maps with text keys and finite numbers have a text.
+        // Serialisation cannot fail: all keys are texts.
         let mut text = serde_json::to_string(self).unwrap_or_default();
         text.push('\n');
         text
     }
 
-    /// How recordings are read.
-    pub fn reading(&self) -> Reading {
-        Reading {
+    /// The options for reading recordings. Recordings of a fleet are read without the audit.
+    pub fn reading(&self) -> RecordingOptions {
+        RecordingOptions {
             columns: self.columns.clone(),
-            preparation: Preparation {
+            preparation: StatePreparation {
                 unexamined: true,
                 ..self.preparation.clone()
             },
             skip_bad_samples: self.skip_bad_samples,
-            ..Reading::default()
+            ..RecordingOptions::default()
         }
     }
 
-    /// What summaries of this plan bear, so that others are not added to them.
+    /// The checksum of the plan. Every summary has it, so that summaries of different plans are not added.
     pub fn mark(&self) -> u64 {
         crate::bytes::checksum(self.json().as_bytes())
     }
 
-    /// The model that is in the plan, derived, and all that is computed once.
+    /// Derives the model of the plan, and computes everything that recordings share.
     ///
-    /// Fails where the model has no meaning or the reference is of another.
-    pub fn ground(&self) -> Result<Ground, Fault> {
-        let mut files = Both {
-            memory: Memory::default(),
-            disk: Disk::default(),
+    /// Fails if the model has faults, or the reference belongs to another model.
+    pub fn derive_model(&self) -> Result<FleetModel, FleetFault> {
+        // The model comes from the plan, not from disk.
+        let mut files = PlanFiles {
+            memory: MemoryFiles::default(),
+            disk: DiskFiles::default(),
         };
         for (name, text) in &self.files {
             files.memory.insert(name, text.as_bytes());
         }
         let host = Host::new().with_files(Arc::new(files));
         let model = host.model(&self.model)?;
-        let sizes: Option<Vec<Moments>> = self.reference.sizes.iter().map(Sums::moments).collect();
+        let sizes: Option<Vec<NormalEquations>> = self.reference.sizes.iter().map(ReferenceSums::moments).collect();
         let sizes = sizes.ok_or_else(|| {
-            Fault::new("the plan's reference does not fit itself: its sums lack products; make it anew with `modelmill-fleet plan`")
+            FleetFault::new("the reference of the plan is inconsistent: its sums lack products; make the plan again with `modelmill-fleet plan`")
         })?;
-        let ground = CommonGround::kept(&model, &self.reference.values, sizes)?;
-        Ok(Ground::new(self.clone(), ground))
+        let ground = ReferenceFit::from_parts(&model, &self.reference.values, sizes)?;
+        Ok(FleetModel::new(self.clone(), ground))
     }
 }
 
-/// A low-pass that is to leave the highest harmonic of a motion as it is stands so many times higher.
-const ABOVE: f64 = 3.5;
-/// One sample is kept of so many as leave this many in a period of the cut-off.
-const KEPT: f64 = 8.0;
+/// Ratio of the cut-off to the highest harmonic of a motion, so that the low-pass does not change that harmonic.
+const CUTOFF_RATIO: f64 = 3.5;
+/// Samples per period of the cut-off that remain after decimation.
+const DECIMATION_RATIO: f64 = 8.0;
 
-/// The preparation with nothing left open: the cut-off and decimation that suit the first recording, by the filter that all can be
-/// given alike. Where the first is best taken for a Fourier series, which others need not share, a low-pass well above its highest
-/// harmonic stands in.
-fn settled(chosen: &Recording, reading: &Reading) -> Result<Preparation, Fault> {
+/// A preparation with all values fixed: cut-off and decimation of the first recording, with a filter that can be
+/// applied to all. If a Fourier series is best for the first recording, others need not be periodic; then a low-pass
+/// well above its highest harmonic is used instead.
+fn fixed_preparation(chosen: &PreparedRecording, reading: &RecordingOptions) -> Result<StatePreparation, FleetFault> {
     let run = chosen
-        .stretches
+        .segments
         .first()
-        .map(|stretch| &stretch.run)
-        .ok_or_else(|| Fault::new(format!("{} holds no samples", chosen.file())))?;
+        .map(|segment| &segment.run)
+        .ok_or_else(|| FleetFault::new(format!("{} has no samples", chosen.file())))?;
+    // Values that are specified have priority over those of the first recording.
     let (prepared, asked) = (&run.prepared, &reading.preparation);
     let mut cutoff_hz = asked.cutoff_hz.or(prepared.cutoff_hz);
     let mut decimate = prepared.decimate.max(asked.decimate).max(1);
@@ -248,36 +261,34 @@ fn settled(chosen: &Recording, reading: &Reading) -> Result<Preparation, Fault> 
             [first, .., last] => (run.time.len() - 1) as f64 / (last - first),
             _ => 0.0,
         };
-        let cutoff = ABOVE * highest;
-        // Beyond a quarter of the rate no filter can be designed; motion is there no more.
+        let cutoff = CUTOFF_RATIO * highest;
+        // The cut-off stays below a quarter of the sampling rate, where the filter can be designed; motion has lower
+        // frequencies.
         let cutoff = cutoff.min(0.2 * rate);
         let every = (1..=1_000_000)
-            .take_while(|every| KEPT * cutoff * f64::from(*every) <= rate)
+            .take_while(|every| DECIMATION_RATIO * cutoff * f64::from(*every) <= rate)
             .last();
-        decimate = decimate.max(
-            every
-                .and_then(|every: u32| usize::try_from(every).ok())
-                .unwrap_or(1),
-        );
+        decimate = decimate.max(every.and_then(|every: u32| usize::try_from(every).ok()).unwrap_or(1));
         cutoff_hz = Some(cutoff);
     }
-    Ok(Preparation {
+    Ok(StatePreparation {
         cutoff_hz,
         decimate,
         smoothing: match asked.smoothing {
-            Smoothing::SavitzkyGolay => Smoothing::SavitzkyGolay,
-            _ => Smoothing::Butterworth,
+            SmoothingMethod::SavitzkyGolay => SmoothingMethod::SavitzkyGolay,
+            _ => SmoothingMethod::Butterworth,
         },
         ..asked.clone()
     })
 }
 
-/// For how long the readings of recordings stood still, at most.
-fn still(model: &Model, recordings: &[Recording]) -> Vec<(String, f64)> {
-    let names = model.active().into_iter().chain(model.drives());
+/// For each coordinate and drive the longest interval with a constant reading in any recording, as a share of that
+/// recording.
+fn standstill_shares(model: &Model, recordings: &[PreparedRecording]) -> Vec<(String, f64)> {
+    let names = model.active_coordinates().into_iter().chain(model.drives());
     names
         .map(|name| {
-            let of = |one: &Recording| one.raw_column(&name).map_or(0.0, Silence::longest);
+            let of = |one: &PreparedRecording| one.raw_column(&name).map_or(0.0, FrozenReading::longest_share);
             let most = recordings.iter().map(of).fold(0.0, f64::max);
             (name, most)
         })

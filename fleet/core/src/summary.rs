@@ -1,92 +1,97 @@
-//! One recording, or many, as sums: what a robot, a day or a part says, in some kB.
+//! The summary of one or many recordings: additive statistics of some kB, from which parameters and changes are
+//! computed.
 
-use modelmill_identify::Triangle;
-use modelmill_identify::changes::Moments;
+use modelmill_identify::RFactor;
+use modelmill_identify::changes::NormalEquations;
 
-use crate::Fault;
-use crate::bytes::{Reader, Writer};
+use crate::FleetFault;
+use crate::bytes::{SummaryReader, SummaryWriter};
 use crate::sensors::SensorFault;
 
-/// The first bytes of a summary, then its version.
+/// The first bytes of a summary.
 const BEGIN: &[u8; 4] = b"MMFS";
+/// Version of the binary format, after the first bytes.
 const VERSION: u64 = 1;
 
-/// A recording that gave no answer.
+/// A recording that could not be evaluated.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Bad {
-    /// What messages call it.
+pub struct BadRecording {
+    /// Its name.
     pub recording: String,
-    /// Why.
+    /// The reason, one sentence.
     pub says: String,
 }
 
-/// Sums over the rows of recordings. [`Summary::merge`] adds them.
+/// Additive statistics over the rows of recordings. [`FleetSummary::merge`] adds them.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Summary {
-    /// [`Plan::mark`](crate::Plan::mark) of the plan by which it was made.
+pub struct FleetSummary {
+    /// The checksum of its plan, [`FleetPlan::mark`](crate::FleetPlan::mark).
     pub mark: u64,
-    /// Recordings that gave an answer.
+    /// Number of recordings that were evaluated.
     pub recordings: u64,
-    /// Their samples, as they were recorded.
+    /// Number of their samples, before decimation.
     pub samples: u64,
-    /// How long they are, s.
+    /// Their total duration, s.
     pub seconds: f64,
-    /// Products of all columns, over rows of variance 1.
-    pub whole: Moments,
-    /// The triangle of the base columns over the same rows; `None` without recordings.
-    pub base: Option<Triangle>,
-    /// By what parts of one recording differ among themselves, at most.
+    /// Normal equations of all columns, over rows scaled to variance 1.
+    pub all_columns: NormalEquations,
+    /// The R factor of the base columns over the same rows; `None` without recordings.
+    pub base: Option<RFactor>,
+    /// The largest scatter between parts of one recording.
     pub within: f64,
-    /// For each drive the sum over samples of the square of what the recording's own parameters leave of its force, as a part of
-    /// it.
-    pub left: Vec<f64>,
-    /// Sensors that died, by recording and name.
+    /// For each drive the squared relative residual of its force with the recording's own parameters, times the number
+    /// of samples.
+    pub residual_squares: Vec<f64>,
+    /// Dead sensors, sorted by recording and name.
     pub sensors: Vec<SensorFault>,
-    /// Remarks, such as contacts and pushes, each with its recording.
+    /// Recording and text of each remark, such as contacts and pushes.
     pub remarks: Vec<(String, String)>,
-    /// Recordings that gave none, by name.
-    pub bad: Vec<Bad>,
+    /// Recordings that could not be evaluated, sorted by name.
+    pub bad: Vec<BadRecording>,
 }
 
-impl Summary {
-    /// Of no recordings, for so many columns and drives.
+impl FleetSummary {
+    /// The summary of no recordings, for a number of columns and drives.
     pub(crate) fn empty(mark: u64, columns: usize, drives: usize) -> Self {
         Self {
             mark,
             recordings: 0,
             samples: 0,
             seconds: 0.0,
-            whole: Moments::new(columns),
+            all_columns: NormalEquations::new(columns),
             base: None,
             within: 0.0,
-            left: vec![0.0; drives],
+            residual_squares: vec![0.0; drives],
             sensors: Vec::new(),
             remarks: Vec::new(),
             bad: Vec::new(),
         }
     }
 
-    /// Adds the recordings of another one. The order in which summaries are added changes nothing but the last digits.
+    /// Adds the recordings of another summary. The order of additions changes rounding only.
     ///
-    /// Fails where the other is of another plan.
-    pub fn merge(&mut self, other: &Self) -> Result<(), Fault> {
-        if self.mark != other.mark || self.whole.rhs.len() != other.whole.rhs.len() {
-            return Err(Fault::new(
-                "summaries of two plans do not add: their columns mean different things; make all of them with one plan",
+    /// Fails if the other summary belongs to another plan.
+    pub fn merge(&mut self, other: &Self) -> Result<(), FleetFault> {
+        if self.mark != other.mark || self.all_columns.rhs.len() != other.all_columns.rhs.len() {
+            return Err(FleetFault::new(
+                "summaries of different plans cannot be added, because their columns have different meanings; make all of them \
+                 with one plan",
             ));
         }
+        // R factors are merged; if one side has none, the other is used.
         self.base = match (self.base.take(), &other.base) {
-            (Some(mine), Some(theirs)) => Some(mine.merged(theirs).map_err(Fault::new)?),
+            (Some(mine), Some(theirs)) => Some(mine.merge_with(theirs).map_err(FleetFault::new)?),
             (mine, theirs) => mine.or_else(|| theirs.clone()),
         };
         self.recordings += other.recordings;
         self.samples += other.samples;
         self.seconds += other.seconds;
-        self.whole.merge(&other.whole);
+        self.all_columns.merge(&other.all_columns);
         self.within = self.within.max(other.within);
-        for (mine, theirs) in self.left.iter_mut().zip(&other.left) {
+        for (mine, theirs) in self.residual_squares.iter_mut().zip(&other.residual_squares) {
             *mine += theirs;
         }
+        // Sorted lists do not depend on the order of additions.
         self.sensors.extend(other.sensors.iter().cloned());
         self.sensors
             .sort_by(|a, b| (&a.recording, &a.of).cmp(&(&b.recording, &b.of)));
@@ -97,48 +102,50 @@ impl Summary {
         Ok(())
     }
 
-    /// What the recordings' own parameters leave of the force of a drive, as a part of it: the effective value over all samples.
-    pub fn left(&self, drive: usize) -> f64 {
-        let squares = self.left.get(drive).copied().unwrap_or(0.0);
+    /// The residual of a drive's force relative to the force, with the parameters of each recording: rms over all
+    /// samples.
+    pub fn residual_share(&self, drive: usize) -> f64 {
+        let squares = self.residual_squares.get(drive).copied().unwrap_or(0.0);
         (squares / (self.samples as f64).max(1.0)).sqrt()
     }
 
-    /// The summary as bytes; what [`Summary::of_bytes`] reads of them has the same bytes again.
+    /// The summary as bytes, for [`FleetSummary::from_bytes`].
     pub fn bytes(&self) -> Vec<u8> {
-        let mut to = Writer::default();
+        let mut to = SummaryWriter::default();
+        // Version and plan first, so that other summaries are recognised.
         to.bytes(BEGIN);
-        to.whole(VERSION);
-        to.whole(self.mark);
-        to.whole(self.recordings);
-        to.whole(self.samples);
+        to.integer(VERSION);
+        to.integer(self.mark);
+        to.integer(self.recordings);
+        to.integer(self.samples);
         to.float(self.seconds);
-        to.whole(self.whole.rhs.len() as u64);
-        to.moments(&self.whole);
+        to.integer(self.all_columns.rhs.len() as u64);
+        to.moments(&self.all_columns);
         match &self.base {
-            None => to.whole(0),
+            None => to.integer(0),
             Some(base) => {
-                to.whole(1);
-                to.whole(base.n_parameters() as u64);
-                to.whole(base.rows() as u64);
+                to.integer(1);
+                to.integer(base.n_parameters() as u64);
+                to.integer(base.rows() as u64);
                 to.floats(&base.entries());
             }
         }
         to.float(self.within);
-        to.floats(&self.left);
-        to.whole(self.sensors.len() as u64);
+        to.floats(&self.residual_squares);
+        to.integer(self.sensors.len() as u64);
         for one in &self.sensors {
             to.text(&one.recording);
             to.text(&one.of);
-            to.whole(u64::from(one.is_force));
+            to.integer(u64::from(one.is_force));
             to.float(one.still);
             to.float(one.since);
         }
-        to.whole(self.remarks.len() as u64);
+        to.integer(self.remarks.len() as u64);
         for (recording, says) in &self.remarks {
             to.text(recording);
             to.text(says);
         }
-        to.whole(self.bad.len() as u64);
+        to.integer(self.bad.len() as u64);
         for one in &self.bad {
             to.text(&one.recording);
             to.text(&one.says);
@@ -146,79 +153,81 @@ impl Summary {
         to.finish()
     }
 
-    /// Reads what [`Summary::bytes`] wrote.
+    /// Reads the bytes of [`FleetSummary::bytes`].
     ///
-    /// Fails where bytes are missing or were changed, and where another version wrote them.
-    pub fn of_bytes(bytes: &[u8]) -> Result<Self, Fault> {
+    /// Fails if bytes are missing or were changed, or have another version.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, FleetFault> {
         let what = "a summary";
         if !bytes.starts_with(BEGIN) {
-            return Err(Fault::new(
-                "these bytes are no summary of recordings; give what `modelmill_summarise` or `summarise` made",
+            return Err(FleetFault::new(
+                "these bytes are not a summary of recordings; give the result of `modelmill_summarise` or `summarise`",
             ));
         }
-        let mut from = Reader::new(bytes, what)?;
-        let _: [u8; 4] = from.fixed()?;
-        let version = from.whole()?;
+        let mut from = SummaryReader::new(bytes, what)?;
+        let _: [u8; 4] = from.array()?;
+        // Another version has other contents.
+        let version = from.integer()?;
         if version != VERSION {
-            return Err(Fault::new(format!(
-                "this summary is of version {version}, and this program knows version {VERSION}; summarise the recordings again"
+            return Err(FleetFault::new(format!(
+                "this summary has version {version}, but this program reads version {VERSION}; summarise the recordings again"
             )));
         }
-        let mark = from.whole()?;
-        let recordings = from.whole()?;
-        let samples = from.whole()?;
+        let mark = from.integer()?;
+        let recordings = from.integer()?;
+        let samples = from.integer()?;
         let seconds = from.float()?;
         let columns = from.size()?;
-        // A column costs bytes only where it is not zero; no model has more than this.
+        // Zero columns take no bytes, so the number of columns is limited here, to protect memory.
         if columns > 100_000 {
-            return Err(Fault::new(format!(
-                "{what} claims {columns} columns, which no model has; make it again"
+            return Err(FleetFault::new(format!(
+                "{what} has {columns} columns, more than any model; make it again"
             )));
         }
+        // The same sequence as in `bytes`.
         let whole = from.moments(columns)?;
-        let base = match from.whole()? {
+        let base = match from.integer()? {
             0 => None,
             _ => {
                 let n = from.size()?;
                 let rows = from.size()?;
                 let entries = from.floats()?;
-                Some(Triangle::from_entries(n, rows, &entries).map_err(Fault::new)?)
+                Some(RFactor::from_entries(n, rows, &entries).map_err(FleetFault::new)?)
             }
         };
         let within = from.float()?;
         let left = from.floats()?;
-        let n = from.count(40)?;
+        let n = from.element_count(40)?;
         let sensors = (0..n).map(|_| {
             Ok(SensorFault {
                 recording: from.text()?,
                 of: from.text()?,
-                is_force: from.whole()? != 0,
+                is_force: from.integer()? != 0,
                 still: from.float()?,
                 since: from.float()?,
             })
         });
-        let sensors = sensors.collect::<Result<_, Fault>>()?;
-        let n = from.count(16)?;
+        let sensors = sensors.collect::<Result<_, FleetFault>>()?;
+        let n = from.element_count(16)?;
         let remarks = (0..n).map(|_| Ok((from.text()?, from.text()?)));
-        let remarks = remarks.collect::<Result<_, Fault>>()?;
-        let n = from.count(16)?;
+        let remarks = remarks.collect::<Result<_, FleetFault>>()?;
+        let n = from.element_count(16)?;
         let bad = (0..n).map(|_| {
-            Ok(Bad {
+            Ok(BadRecording {
                 recording: from.text()?,
                 says: from.text()?,
             })
         });
-        let bad = bad.collect::<Result<_, Fault>>()?;
+        let bad = bad.collect::<Result<_, FleetFault>>()?;
         from.finish()?;
         Ok(Self {
             mark,
             recordings,
             samples,
             seconds,
-            whole,
+            all_columns: whole,
             base,
             within,
-            left,
+            residual_squares: left,
             sensors,
             remarks,
             bad,

@@ -1,5 +1,5 @@
-//! A folder of recordings as a table of summaries, on disk or in an object store that the session knows: one file is in memory for
-//! each partition.
+//! A table function that reads a folder of recordings as a table of summaries. The folder is on disk or in an object
+//! store of the session. One file per partition is in memory.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -18,47 +18,49 @@ use datafusion::physical_plan::ExecutionPlan;
 use datafusion::physical_plan::stream::RecordBatchStreamAdapter;
 use datafusion::physical_plan::streaming::PartitionStream;
 use futures::{StreamExt, TryStreamExt};
-use modelmill_fleet::folder::{File, Found, by_robot, robots};
-use modelmill_fleet::{Ground, Summary};
+use modelmill_fleet::folder::{FleetFile, FolderEntry, group_by_robot, robots};
+use modelmill_fleet::{FleetModel, FleetSummary};
 
-use crate::samples::external;
+use crate::samples::external_error;
 
-/// `modelmill_recordings('folder')`: `robot`, `day`, `recording`, `summary`, and `bad` with the reason where it gave no answer. The
-/// folder is a path or the URL of one, such as `s3://bucket/folder`, in a store that the session knows.
+/// `modelmill_recordings('folder')`: `robot`, `day`, `recording`, `summary`, and `bad` with the reason if the recording
+/// could not be evaluated. The folder is a path, or a URL such as `s3://bucket/folder` in a store of the session.
 #[derive(Clone)]
-pub struct Recordings {
-    ground: Arc<Ground>,
+pub struct RecordingsFunction {
+    /// The plan with its derived model.
+    ground: Arc<FleetModel>,
 }
 
-impl Recordings {
+impl RecordingsFunction {
     /// The function over a plan.
-    pub fn new(ground: Arc<Ground>) -> Self {
+    pub fn new(ground: Arc<FleetModel>) -> Self {
         Self { ground }
     }
 }
 
-impl std::fmt::Debug for Recordings {
+impl std::fmt::Debug for RecordingsFunction {
+    /// Shows the name of the function.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str("modelmill_recordings")
     }
 }
 
-impl TableFunctionImpl for Recordings {
+impl TableFunctionImpl for RecordingsFunction {
+    /// The table of a folder; its files are not listed yet.
     fn call_with_args(&self, args: TableFunctionArgs<'_, '_>) -> Result<Arc<dyn TableProvider>> {
-        let [
-            Expr::Literal(ScalarValue::Utf8(Some(folder)) | ScalarValue::Utf8View(Some(folder)), _),
-        ] = args.exprs()
+        let [Expr::Literal(ScalarValue::Utf8(Some(folder)) | ScalarValue::Utf8View(Some(folder)), _)] = args.exprs()
         else {
             return plan_err!(
-                "modelmill_recordings takes one text, the folder above those of the robots"
+                "modelmill_recordings needs one text argument: the folder that contains those of the robots"
             );
         };
+        // A URL has a scheme, a path has none.
         let folder = if folder.contains("://") {
-            Folder::Stored(ListingTableUrl::parse(folder)?)
+            RecordingsFolder::Stored(ListingTableUrl::parse(folder)?)
         } else {
-            Folder::Path(folder.into())
+            RecordingsFolder::Path(folder.into())
         };
-        Ok(Arc::new(Table {
+        Ok(Arc::new(RecordingsTable {
             ground: self.ground.clone(),
             folder,
             schema: schema(),
@@ -66,40 +68,40 @@ impl TableFunctionImpl for Recordings {
     }
 }
 
-/// Where the recordings lie.
-enum Folder {
+/// The folder of the recordings.
+enum RecordingsFolder {
+    /// A path on disk.
     Path(PathBuf),
+    /// A URL in an object store.
     Stored(ListingTableUrl),
 }
 
-impl Folder {
-    /// All recordings, and what they are read from.
-    async fn files(&self, session: &dyn Session) -> Result<(Source, Vec<(String, File)>)> {
+impl RecordingsFolder {
+    /// The source of the files, and all recordings with their robots.
+    async fn files(&self, session: &dyn Session) -> Result<(RecordingsSource, Vec<(String, FleetFile)>)> {
         let (source, robots) = match self {
-            Self::Path(folder) => (Source::Disk, robots(folder).map_err(external)?),
+            Self::Path(folder) => (RecordingsSource::Disk, robots(folder).map_err(external_error)?),
             Self::Stored(url) => {
+                // All objects below the URL.
                 let store = session.runtime_env().object_store(url)?;
                 let above = url.prefix();
                 let found: Vec<ObjectMeta> = store.list(Some(above)).try_collect().await?;
                 let found = found.into_iter().map(|object| {
+                    // The name of an object is its path below the folder.
                     let below = object.location.prefix_match(above);
                     let parts: Vec<_> = below
                         .into_iter()
                         .flatten()
                         .map(|part| part.as_ref().to_owned())
                         .collect();
-                    Found {
+                    FolderEntry {
                         name: parts.join("/"),
                         path: object.location.as_ref().into(),
-                        version: format!(
-                            "{} {}",
-                            object.size,
-                            object.last_modified.timestamp_micros()
-                        ),
+                        version: format!("{} {}", object.size, object.last_modified.timestamp_micros()),
                     }
                 });
-                let robots = by_robot(url, found).map_err(external)?;
-                (Source::Store(store), robots)
+                let robots = group_by_robot(url, found).map_err(external_error)?;
+                (RecordingsSource::Store(store), robots)
             }
         };
         let files = robots
@@ -109,16 +111,20 @@ impl Folder {
     }
 }
 
-/// What files are read from.
+/// The source of files.
 #[derive(Clone)]
-enum Source {
+enum RecordingsSource {
+    /// The disk of this computer.
     Disk,
+    /// An object store.
     Store(Arc<dyn ObjectStore>),
 }
 
-impl Source {
-    /// The summary of a file. What is wrong with a recording stands in it; a store that does not answer is a fault.
-    async fn summary(&self, ground: Arc<Ground>, file: File) -> Result<Summary> {
+impl RecordingsSource {
+    /// The summary of a file. A fault of the recording is part of the summary; a store that does not answer is an
+    /// error.
+    async fn summary(&self, ground: Arc<FleetModel>, file: FleetFile) -> Result<FleetSummary> {
+        // Objects of a store are read completely; files are opened by the library.
         let bytes = match self {
             Self::Disk => None,
             Self::Store(store) => {
@@ -126,42 +132,47 @@ impl Source {
                 Some(store.get(&place).await?.bytes().await?)
             }
         };
+        // Computing takes long, so that it must not block the threads of the engine.
         let summed = tokio::task::spawn_blocking(move || match bytes {
             None => ground.summarise_file(&file.name, &file.path),
             Some(bytes) => ground.summarise_bytes(&file.name, bytes.into()),
         });
-        summed
-            .await
-            .map_err(|error| DataFusionError::External(Box::new(error)))
+        summed.await.map_err(|error| DataFusionError::External(Box::new(error)))
     }
 }
 
-/// The table. Files are listed when it is scanned, since only then a store may be asked.
-struct Table {
-    ground: Arc<Ground>,
-    folder: Folder,
+/// The table. Files are listed when it is scanned, because a store is only accessible then.
+struct RecordingsTable {
+    /// The plan with its derived model.
+    ground: Arc<FleetModel>,
+    /// The folder of the recordings.
+    folder: RecordingsFolder,
+    /// Columns of the table.
     schema: SchemaRef,
 }
 
-impl std::fmt::Debug for Table {
+impl std::fmt::Debug for RecordingsTable {
+    /// Shows the folder.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match &self.folder {
-            Folder::Path(folder) => write!(f, "recordings below {}", folder.display()),
-            Folder::Stored(url) => write!(f, "recordings below {url}"),
+            RecordingsFolder::Path(folder) => write!(f, "recordings below {}", folder.display()),
+            RecordingsFolder::Stored(url) => write!(f, "recordings below {url}"),
         }
     }
 }
 
 #[async_trait]
-impl TableProvider for Table {
+impl TableProvider for RecordingsTable {
     fn schema(&self) -> SchemaRef {
         self.schema.clone()
     }
 
+    /// It is computed and has no data of its own.
     fn table_type(&self) -> TableType {
         TableType::View
     }
 
+    /// Lists the files and distributes them over partitions.
     async fn scan(
         &self,
         session: &dyn Session,
@@ -170,10 +181,11 @@ impl TableProvider for Table {
         limit: Option<usize>,
     ) -> Result<Arc<dyn ExecutionPlan>> {
         let (source, files) = self.folder.files(session).await?;
+        // One partition per core, with about the same number of files.
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let each = files.len().div_ceil(cores).max(1);
         let partitions = files.chunks(each).map(|files| {
-            Arc::new(Part {
+            Arc::new(RecordingsPartition {
                 ground: self.ground.clone(),
                 schema: self.schema.clone(),
                 source: source.clone(),
@@ -185,6 +197,7 @@ impl TableProvider for Table {
     }
 }
 
+/// Columns of the table.
 fn schema() -> SchemaRef {
     let text = |name: &str, nullable: bool| Field::new(name, DataType::Utf8, nullable);
     Arc::new(Schema::new(vec![
@@ -196,43 +209,46 @@ fn schema() -> SchemaRef {
     ]))
 }
 
-/// Some of the files.
-struct Part {
-    ground: Arc<Ground>,
+/// A partition of the table: some of the files.
+struct RecordingsPartition {
+    /// The plan with its derived model.
+    ground: Arc<FleetModel>,
+    /// Columns of the table.
     schema: SchemaRef,
-    source: Source,
-    files: Vec<(String, File)>,
+    /// The source of the files.
+    source: RecordingsSource,
+    /// Robots with their files.
+    files: Vec<(String, FleetFile)>,
 }
 
-impl std::fmt::Debug for Part {
+impl std::fmt::Debug for RecordingsPartition {
+    /// Shows the number of files.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{} recordings", self.files.len())
     }
 }
 
-impl PartitionStream for Part {
+impl PartitionStream for RecordingsPartition {
     fn schema(&self) -> &SchemaRef {
         &self.schema
     }
 
+    /// One batch with one row per file, read when it is requested.
     fn execute(&self, _: Arc<TaskContext>) -> SendableRecordBatchStream {
-        let (ground, schema, source) = (
-            self.ground.clone(),
-            self.schema.clone(),
-            self.source.clone(),
-        );
+        let (ground, schema, source) = (self.ground.clone(), self.schema.clone(), self.source.clone());
         let batches = futures::stream::iter(self.files.clone()).then(move |(robot, file)| {
             let (ground, schema, source) = (ground.clone(), schema.clone(), source.clone());
             async move {
                 let summary = source.summary(ground, file.clone()).await?;
-                row(schema, &robot, &file, &summary)
+                summary_row(schema, &robot, &file, &summary)
             }
         });
         Box::pin(RecordBatchStreamAdapter::new(self.schema.clone(), batches))
     }
 }
 
-fn row(schema: SchemaRef, robot: &str, file: &File, summary: &Summary) -> Result<RecordBatch> {
+/// The row of one recording.
+fn summary_row(schema: SchemaRef, robot: &str, file: &FleetFile, summary: &FleetSummary) -> Result<RecordBatch> {
     let text = |text: &str| Arc::new(StringArray::from(vec![text])) as ArrayRef;
     let bad = summary.bad.first().map(|bad| bad.says.as_str());
     let columns: Vec<ArrayRef> = vec![

@@ -9,11 +9,11 @@ use datafusion::arrow::datatypes::{Float64Type, UInt64Type};
 use datafusion::object_store::memory::InMemory;
 use datafusion::object_store::{ObjectStore, ObjectStoreExt};
 use datafusion::prelude::{SessionConfig, SessionContext};
-use modelmill::recording::Reading;
-use modelmill_fleet::folder::{File, robots};
-use modelmill_fleet::{Ground, Plan};
+use modelmill::recording::RecordingOptions;
+use modelmill_fleet::folder::{FleetFile, robots};
+use modelmill_fleet::{FleetModel, FleetPlan};
 use modelmill_fleet_datafusion::register;
-use modelmill_fleet_program::generate::{Size, generate};
+use modelmill_fleet_program::generate::{FleetSize, generate};
 
 /// Values by robot and day.
 type Answer = BTreeMap<(String, String), Vec<Option<f64>>>;
@@ -23,11 +23,7 @@ async fn answer(session: &SessionContext, sql: &str) -> Answer {
     let mut all = BTreeMap::new();
     for batch in batches {
         let [robot, day] = [0, 1].map(|k| {
-            datafusion::arrow::compute::cast(
-                batch.column(k),
-                &datafusion::arrow::datatypes::DataType::Utf8,
-            )
-            .unwrap()
+            datafusion::arrow::compute::cast(batch.column(k), &datafusion::arrow::datatypes::DataType::Utf8).unwrap()
         });
         let fits = batch.column(2).as_struct();
         for row in 0..batch.num_rows() {
@@ -46,7 +42,7 @@ async fn answer(session: &SessionContext, sql: &str) -> Answer {
 }
 
 /// All files of a fleet as objects of a store, below `site/recordings`, and one elsewhere that is no recording.
-async fn stored(files: &BTreeMap<String, Vec<File>>) -> Arc<dyn ObjectStore> {
+async fn stored(files: &BTreeMap<String, Vec<FleetFile>>) -> Arc<dyn ObjectStore> {
     let store = InMemory::new();
     for file in files.values().flatten() {
         let place = format!("site/recordings/{}", file.name).into();
@@ -59,20 +55,16 @@ async fn stored(files: &BTreeMap<String, Vec<File>>) -> Arc<dyn ObjectStore> {
 }
 
 /// The answer that files give, one after the other.
-fn of_files(ground: &Ground, files: &BTreeMap<String, Vec<File>>) -> Answer {
+fn of_files(ground: &FleetModel, files: &BTreeMap<String, Vec<FleetFile>>) -> Answer {
     let mut expected = Answer::new();
     for (robot, files) in files {
         for day in files.chunk_by(|a, b| a.day == b.day) {
-            let mut sum = ground.empty();
+            let mut sum = ground.empty_summary();
             for file in day {
-                sum.merge(&ground.summarise_file(&file.name, &file.path))
-                    .unwrap();
+                sum.merge(&ground.summarise_file(&file.name, &file.path)).unwrap();
             }
             let fit = ground.solve(&sum).unwrap();
-            let values = fit
-                .parameters
-                .iter()
-                .flat_map(|one| [Some(one.value), one.deviation]);
+            let values = fit.parameters.iter().flat_map(|one| [Some(one.value), one.deviation]);
             let counts = [sum.recordings as f64, sum.bad.len() as f64].map(Some);
             expected.insert(
                 (robot.clone(), day[0].day.clone()),
@@ -83,18 +75,18 @@ fn of_files(ground: &Ground, files: &BTreeMap<String, Vec<File>>) -> Answer {
     expected
 }
 
-async fn faults_are_told(ground: &Arc<Ground>, store: Arc<dyn ObjectStore>) {
+async fn faults_are_told(ground: &Arc<FleetModel>, store: Arc<dyn ObjectStore>) {
     let session = SessionContext::new();
     register(&session, ground);
     session.register_object_store(&"s3://fleet".parse().unwrap(), store);
     let faults = [
         (
             "SELECT modelmill_identify(arrow_cast('no summary', 'Binary'))",
-            "no summary of recordings",
+            "not a summary of recordings",
         ),
         (
             "SELECT * FROM modelmill_recordings('s3://fleet/site/elsewhere')",
-            "holds no recordings",
+            "has no recordings",
         ),
         (
             "SELECT * FROM modelmill_recordings('s3://unknown/recordings')",
@@ -111,7 +103,7 @@ async fn faults_are_told(ground: &Arc<Ground>, store: Arc<dyn ObjectStore>) {
 #[tokio::test(flavor = "multi_thread")]
 async fn partitions_change_nothing() {
     let folder = std::env::temp_dir().join(format!("modelmill-partitions-{}", std::process::id()));
-    let size = Size {
+    let size = FleetSize {
         robots: 3,
         days: 6,
         per_day: 2,
@@ -124,8 +116,8 @@ async fn partitions_change_nothing() {
     generate(&folder, &size).unwrap();
     let data = folder.join("recordings");
     let first = data.join("robot=R00000/day=2026-03-01/recording=0/data.parquet");
-    let plan = Plan::make(&folder.join("model.toml"), &Reading::default(), &[&first]).unwrap();
-    let ground: Arc<Ground> = Arc::new(plan.ground().unwrap());
+    let plan = FleetPlan::from_recordings(&folder.join("model.toml"), &RecordingOptions::default(), &[&first]).unwrap();
+    let ground: Arc<FleetModel> = Arc::new(plan.derive_model().unwrap());
     let files = robots(&data).unwrap();
     let store = stored(&files).await;
     let expected = of_files(&ground, &files);

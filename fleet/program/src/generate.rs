@@ -1,17 +1,18 @@
-//! A fleet with a truth: robots of one kind that differ a little, some of which wear, carry another load from a day on, or lose a
-//! sensor.
+//! Simulates a fleet with known changes: robots of one kind that differ slightly. Some wear, carry another load from a
+//! day on, or lose a sensor.
 //!
-//! The five-bar stands in as a rig, so that nothing of its mechanics is the mill's: the rig goes along each motion once, and
-//! says what each mass, first moment and inertia of a body adds to the forces, which are linear in them. A robot is a set of
-//! these numbers, with friction; a recording is one of the motions from some moment on, through the rig's sensors.
+//! The robot is a five-bar, simulated as a rig, so that its mechanics are independent of the derived model. The rig
+//! follows each motion once and gives the contribution of each mass, first moment and inertia of a body to the forces,
+//! which are linear in them. A robot is a set of these numbers, with friction. A recording is one of the motions from
+//! some moment on, through the rig's sensors.
 
 use std::fs;
 use std::io::BufWriter;
 use std::path::Path;
 use std::sync::Arc;
 
-use modelmill_fleet::Fault;
-use modelmill_rig::{Body, Channel, Noise, State, Tracker, forces};
+use modelmill_fleet::FleetFault;
+use modelmill_rig::{GaussianNoise, RigBody, RigState, RigTracker, SensorChannel, forces};
 use nalgebra::{Matrix3, Vector3};
 use parquet::basic::{Compression, Repetition, Type as Physical};
 use parquet::data_type::{DoubleType, FloatType};
@@ -23,8 +24,9 @@ use serde_json::{Value, json};
 
 /// The machine as a rig.
 const RIG: &str = include_str!("../five_bar.rig.toml");
-/// The bundled model, and what the fleet's model has besides.
+/// The bundled model.
 const MODEL: &str = include_str!("../../../model-spec/models/five_bar.toml");
+/// The model of the fleet: the bundled one with friction.
 const FRICTION: &str = r#"# The bundled five-bar with friction of both motors.
 schema = 1
 name = "five_bar_friction"
@@ -55,99 +57,111 @@ at = ["motor_right"]
 parameters = { Fv = { name = "Fv_right", nominal = 0.6 } }
 "#;
 
-/// ZZ, MX, MY and M of each link about its joint, as the bundled model has them.
+/// ZZ, MX, MY and M of each link about its joint, as in the bundled model.
 const LINKS: [[f64; 4]; 4] = [
     [0.14, 0.45, 0.01, 2.0],
     [0.13, 0.33, 0.005, 1.1],
     [0.15, 0.47, -0.01, 2.1],
     [0.14, 0.36, 0.004, 1.2],
 ];
-/// Dry friction, N m, and viscous friction, N m s/rad, of the motors.
+/// Coulomb friction of the motors, N m.
 const DRY: [f64; 2] = [0.8, 0.7];
+/// Viscous friction of the motors, N m s/rad.
 const VISCOUS: [f64; 2] = [0.5, 0.6];
-/// From the elbow to the tip, m.
+/// Distance from the elbow to the tip, m.
 const TO_TIP: f64 = 0.6;
-/// Each motion repeats itself after so long, s.
+/// Period of each motion, s.
 const PERIOD: f64 = 6.0;
+/// Harmonics of each motion.
 const HARMONICS: usize = 6;
+/// Number of motions in the fleet.
 const MOTIONS: usize = 4;
-/// About which angles motors move, and how far at most, rad.
+/// Mean angles of the motors, rad.
 const MIDDLE: [f64; 2] = [1.95, 1.19];
+/// Largest deflection from the mean angles, rad.
 const REACH: f64 = 0.3;
-/// Robots differ by this part in each number, deviations.
+/// Relative standard deviation of masses and inertias between robots.
 const ROBOTS: f64 = 0.01;
+/// Relative standard deviation of friction between robots.
 const FRICTIONS: f64 = 0.05;
-/// Friction of one robot differs from recording to recording by this part.
+/// Relative standard deviation of friction between recordings of one robot.
 const DAILY: f64 = 0.005;
-/// Encoders: 17 bits; noise in rad. Torques: noise in N m.
-const ENCODER: Channel = Channel {
+/// Encoders: 17 bits, noise in rad.
+const ENCODER: SensorChannel = SensorChannel {
     noise: 2e-5,
     resolution: std::f64::consts::TAU / 131_072.0,
     delay: 0.0,
 };
-const TORQUE: Channel = Channel {
+/// Torque sensors, noise and resolution in N m.
+const TORQUE: SensorChannel = SensorChannel {
     noise: 0.05,
     resolution: 1.0 / 1024.0,
     delay: 0.0,
 };
 
-/// How large a fleet, and from which seed.
+/// Size and seed of a fleet.
 #[derive(Clone, Debug)]
-pub struct Size {
-    /// How many robots.
+pub struct FleetSize {
+    /// Number of robots.
     pub robots: usize,
-    /// On how many days, six or more.
+    /// Number of days, six or more.
     pub days: usize,
-    /// Recordings of a robot on a day.
+    /// Recordings per robot and day.
     pub per_day: usize,
-    /// How long each is, s.
+    /// Duration of each recording, s.
     pub seconds: f64,
-    /// Samples a second.
+    /// Sampling rate, Hz.
     pub rate: f64,
-    /// Another seed makes another fleet.
+    /// Seed; another seed gives another fleet.
     pub seed: u64,
-    /// How many recordings are cut off.
+    /// Number of recordings that are cut off.
     pub bad: usize,
-    /// How large changes of friction and load are: 1 as in the guide, less for smaller ones.
+    /// Size of the changes of friction and load: 1 as in the guide, less for smaller ones.
     pub changes: f64,
 }
 
-/// What a robot has beyond small differences.
+/// The known change of a robot.
 #[derive(Clone, Debug)]
-enum Planted {
+enum PlantedChange {
+    /// No change.
     Nothing,
-    /// Friction of a motor grows by so large a part of its own each day, from a day on.
+    /// Friction of a motor grows every day by the share `per_day` of its first value, from a day on.
     Wear {
+        /// Index of the motor.
         drive: usize,
+        /// Index of the first day.
         day: usize,
+        /// Growth per day relative to the first value.
         per_day: f64,
     },
-    /// A mass at the tip, kg, from a day on.
+    /// A mass at the tip from a day on.
     Load {
+        /// Index of the first day.
         day: usize,
+        /// Mass, kg.
         mass: f64,
     },
-    /// The torque sensor of a motor stands still from a day on.
+    /// The torque sensor of a motor is constant from a day on.
     Dead {
+        /// Index of the motor.
         drive: usize,
+        /// Index of the first day.
         day: usize,
     },
-    /// A mass at the tip, kg, from the first day on: it differs from the others.
+    /// A mass at the tip on all days, so that the robot differs from the others.
     Odd {
+        /// Mass, kg.
         mass: f64,
     },
 }
 
-impl Planted {
+impl PlantedChange {
+    /// The change as JSON for `truth.json`; `days` are the names of the days.
     fn json(&self, days: &[String]) -> Value {
         let motor = |drive: &usize| ["motor_left", "motor_right"][*drive];
         match self {
             Self::Nothing => json!({ "kind": "none" }),
-            Self::Wear {
-                drive,
-                day,
-                per_day,
-            } => {
+            Self::Wear { drive, day, per_day } => {
                 json!({ "kind": "wear", "at": motor(drive), "day": days[*day], "place": day, "per_day": per_day })
             }
             Self::Load { day, mass } => {
@@ -161,18 +175,21 @@ impl Planted {
     }
 }
 
-/// One period of a motion: positions and rates of the motors, and what each number of each link adds to their torques.
-struct Motion {
+/// One period of a motion, with the contribution of each number of each link to the torques.
+struct FleetMotion {
+    /// Positions of the motors, rad.
     q: [Vec<f64>; 2],
+    /// Rates of the motors, rad/s.
     qd: [Vec<f64>; 2],
-    /// `[link][number][drive][sample]`.
+    /// `[link][number][drive][sample]`: torque for a number (ZZ, MX, MY, M) of one.
     columns: Vec<[[Vec<f64>; 2]; 4]>,
 }
 
-/// Makes a fleet in a folder: a model file, Parquet by robot, day and recording, and the truth, which comes back too.
+/// Writes a fleet into a folder: a model file, Parquet by robot, day and recording, and `truth.json`, which is also
+/// returned.
 ///
-/// Fails where the size makes no fleet, or the folder cannot be written to.
-pub fn generate(folder: &Path, size: &Size) -> Result<Value, Fault> {
+/// Fails if the size is too small, or the folder cannot be written to.
+pub fn generate(folder: &Path, size: &FleetSize) -> Result<Value, FleetFault> {
     let is_large_enough = size.robots > 0
         && size.days >= 6
         && size.per_day > 0
@@ -180,49 +197,46 @@ pub fn generate(folder: &Path, size: &Size) -> Result<Value, Fault> {
         && size.rate >= 20.0
         && size.changes >= 0.0;
     if !is_large_enough {
-        return Err(Fault::new(
-            "a fleet has one robot or more, six days or more, one recording a day or more, each of 5 s or more at 20 Hz or more, and no changes of less than nothing",
+        return Err(FleetFault::new(
+            "the fleet is too small: at least one robot, six days, one recording per day of 5 s at 20 Hz, and changes of at least 0 are needed",
         ));
     }
-    write(&folder.join("five_bar.toml"), MODEL)?;
-    write(&folder.join("model.toml"), FRICTION)?;
+    write_text(&folder.join("five_bar.toml"), MODEL)?;
+    write_text(&folder.join("model.toml"), FRICTION)?;
     let data = folder.join("recordings");
-    let motions: Vec<Motion> = (0..MOTIONS)
+    // The motions that all robots share; then the robots with their changes.
+    let motions: Vec<FleetMotion> = (0..MOTIONS)
         .into_par_iter()
         .map(|k| motion(size, k))
         .collect::<Result<_, _>>()?;
     let days: Vec<String> = (0..size.days).map(date).collect();
-    let robots: Vec<(String, Planted)> = (0..size.robots)
-        .map(|r| (format!("R{r:05}"), planted(size, r)))
+    let robots: Vec<(String, PlantedChange)> = (0..size.robots)
+        .map(|r| (format!("R{r:05}"), planted_change(size, r)))
         .collect();
     let bad = bad_recordings(size);
-    robots
-        .par_iter()
-        .enumerate()
-        .try_for_each(|(r, (name, planted))| {
-            let robot = robot(size, r);
-            for day in 0..size.days {
-                for k in 0..size.per_day {
-                    let path = data
-                        .join(format!("robot={name}"))
-                        .join(format!("day={}", days[day]))
-                        .join(format!("recording={k}"));
-                    fs::create_dir_all(&path).map_err(|error| unwritten(&path, &error))?;
-                    let path = path.join("data.parquet");
-                    record(&path, size, &motions, &robot, planted, (r, day, k))?;
-                    if bad.contains(&(r, day, k)) {
-                        spoil(&path)?;
-                    }
+    robots.par_iter().enumerate().try_for_each(|(r, (name, planted))| {
+        // One file for each recording, in folders by robot and day.
+        let robot = robot_parameters(size, r);
+        for day in 0..size.days {
+            for k in 0..size.per_day {
+                let path = data
+                    .join(format!("robot={name}"))
+                    .join(format!("day={}", days[day]))
+                    .join(format!("recording={k}"));
+                fs::create_dir_all(&path).map_err(|error| write_fault(&path, &error))?;
+                let path = path.join("data.parquet");
+                write_recording(&path, size, &motions, &robot, planted, (r, day, k))?;
+                if bad.contains(&(r, day, k)) {
+                    truncate_file(&path)?;
                 }
             }
-            Ok::<_, Fault>(())
-        })?;
-    let bad = bad.iter().map(|(r, day, k)| {
-        format!(
-            "robot={}/day={}/recording={k}/data.parquet",
-            robots[*r].0, days[*day]
-        )
-    });
+        }
+        Ok::<_, FleetFault>(())
+    })?;
+    // The names of the recordings that were cut off.
+    let bad = bad
+        .iter()
+        .map(|(r, day, k)| format!("robot={}/day={}/recording={k}/data.parquet", robots[*r].0, days[*day]));
     let truth = json!({
         "seed": size.seed,
         "changes": size.changes,
@@ -232,36 +246,38 @@ pub fn generate(folder: &Path, size: &Size) -> Result<Value, Fault> {
         "samples": samples(size),
         "bad": bad.collect::<Vec<_>>(),
     });
-    write(&folder.join("truth.json"), &format!("{truth:#}\n"))?;
+    write_text(&folder.join("truth.json"), &format!("{truth:#}\n"))?;
     Ok(truth)
 }
 
-/// The whole number nearest to one that is none or more.
+/// A number of at least zero, rounded to an integer.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
     reason = "sizes of a fleet"
 )]
-fn count(x: f64) -> usize {
+fn rounded_count(x: f64) -> usize {
     x.round() as usize
 }
 
-/// One of so many places, all alike.
+/// A random index below `n`, uniformly distributed.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
     reason = "below n, which is one"
 )]
-fn one_of(noise: &mut Noise, n: usize) -> usize {
+fn random_index(noise: &mut GaussianNoise, n: usize) -> usize {
     ((noise.uniform() * n as f64) as usize).min(n - 1)
 }
 
-fn samples(size: &Size) -> usize {
-    count(size.seconds * size.rate)
+/// Number of samples of a recording.
+fn samples(size: &FleetSize) -> usize {
+    rounded_count(size.seconds * size.rate)
 }
 
-/// Days from the first of March 2026 on.
+/// The date of a day, counted from 1 March 2026.
 fn date(day: usize) -> String {
+    // Lengths of the months from March to December.
     let lengths = [31, 30, 31, 30, 31, 31, 30, 31, 30, 31];
     let (mut month, mut left) = (3, day);
     for length in lengths {
@@ -274,27 +290,30 @@ fn date(day: usize) -> String {
     format!("2026-{month:02}-{:02}", left + 1)
 }
 
-fn write(path: &Path, text: &str) -> Result<(), Fault> {
+/// Writes a text file, and creates its folder.
+fn write_text(path: &Path, text: &str) -> Result<(), FleetFault> {
     if let Some(folder) = path.parent() {
-        fs::create_dir_all(folder).map_err(|error| unwritten(folder, &error))?;
+        fs::create_dir_all(folder).map_err(|error| write_fault(folder, &error))?;
     }
-    fs::write(path, text).map_err(|error| unwritten(path, &error))
+    fs::write(path, text).map_err(|error| write_fault(path, &error))
 }
 
-fn unwritten(path: &Path, error: &dyn std::fmt::Display) -> Fault {
-    Fault::new(format!(
-        "{} cannot be written: {error}; choose another folder, or make room",
+/// The fault of a file that cannot be written.
+fn write_fault(path: &Path, error: &dyn std::fmt::Display) -> FleetFault {
+    FleetFault::new(format!(
+        "{} cannot be written: {error}; choose another folder, or free disk space",
         path.display()
     ))
 }
 
-/// A motion, and the forces of the rig along it.
-fn motion(size: &Size, k: usize) -> Result<Motion, Fault> {
-    let files = modelmill::files::Memory::default();
+/// Motion `k` of the fleet: a random Fourier series for each motor, and the torques of the rig along it.
+fn motion(size: &FleetSize, k: usize) -> Result<FleetMotion, FleetFault> {
+    let files = modelmill::files::MemoryFiles::default();
     let mut rig = modelmill_rig::load("five_bar.rig.toml", RIG, &files)
-        .map_err(|failure| Fault::new(failure.render(false)))?
+        .map_err(|failure| FleetFault::new(failure.render(false)))?
         .rig;
-    let mut noise = Noise::new(size.seed, 1_000 + k as u64);
+    let mut noise = GaussianNoise::new(size.seed, 1_000 + k as u64);
+    // Random amplitudes of sine and cosine, scaled so that no deflection exceeds the reach.
     let mut waves = [[[0.0; 2]; HARMONICS]; 2];
     for waves in &mut waves {
         let mut largest = 0.0;
@@ -306,8 +325,9 @@ fn motion(size: &Size, k: usize) -> Result<Motion, Fault> {
             *x *= REACH / largest;
         }
     }
+    // Angles, rates and accelerations of the series.
     let state = |t: f64| {
-        let mut state = State {
+        let mut state = RigState {
             q: MIDDLE.to_vec(),
             qd: vec![0.0; 2],
             qdd: vec![0.0; 2],
@@ -323,35 +343,36 @@ fn motion(size: &Size, k: usize) -> Result<Motion, Fault> {
         }
         state
     };
-    let n = count(PERIOD * size.rate);
-    // The motions of all bodies once; then forces for one number after the other.
+    let n = rounded_count(PERIOD * size.rate);
+    // Track the motion of all bodies once; then compute the torques for one number after the other.
     let tracked = rig.clone();
-    let mut tracker = Tracker::new(&tracked).map_err(Fault::new)?;
-    let mut one = Motion {
+    let mut tracker = RigTracker::new(&tracked).map_err(FleetFault::new)?;
+    let mut one = FleetMotion {
         q: [Vec::with_capacity(n), Vec::with_capacity(n)],
         qd: [Vec::with_capacity(n), Vec::with_capacity(n)],
         columns: (0..LINKS.len())
             .map(|_| std::array::from_fn(|_| [Vec::new(), Vec::new()]))
             .collect(),
     };
+    // All links without mass; then one number of one link at a time.
     for body in &mut rig.bodies {
-        set(body, [0.0; 4]);
+        set_link(body, [0.0; 4]);
     }
     for i in 0..n {
         let state = state(i as f64 / size.rate);
-        let moved = tracker.follow(&state).map_err(Fault::new)?;
+        let moved = tracker.follow(&state).map_err(FleetFault::new)?;
         for j in 0..2 {
             one.q[j].push(state.q[j]);
             one.qd[j].push(state.qd[j]);
         }
         for link in 0..LINKS.len() {
             let mut of = |numbers: [f64; 4]| {
-                set(&mut rig.bodies[link], numbers);
-                let found = forces(&rig, &moved).map_err(Fault::new);
-                set(&mut rig.bodies[link], [0.0; 4]);
+                set_link(&mut rig.bodies[link], numbers);
+                let found = forces(&rig, &moved).map_err(FleetFault::new);
+                set_link(&mut rig.bodies[link], [0.0; 4]);
                 found
             };
-            // ZZ, MX, MY, M.
+            // Torques are linear in ZZ, MX, MY and M. First moments need a mass, so their columns are differences.
             let zz = of([1.0, 0.0, 0.0, 0.0])?;
             let m = of([0.0, 0.0, 0.0, 1.0])?;
             let with_x = of([1.0, 1.0, 0.0, 1.0])?;
@@ -370,8 +391,8 @@ fn motion(size: &Size, k: usize) -> Result<Motion, Fault> {
     Ok(one)
 }
 
-/// Gives a body of the rig the numbers ZZ, MX, MY and M about its joint.
-fn set(body: &mut Body, [zz, mx, my, m]: [f64; 4]) {
+/// Sets the numbers ZZ, MX, MY and M of a body of the rig, about its joint.
+fn set_link(body: &mut RigBody, [zz, mx, my, m]: [f64; 4]) {
     body.mass = m;
     body.centre = if m == 0.0 {
         Vector3::zeros()
@@ -382,60 +403,66 @@ fn set(body: &mut Body, [zz, mx, my, m]: [f64; 4]) {
     body.inertia = Matrix3::from_diagonal(&Vector3::new(0.0, 0.0, about_centre));
 }
 
-/// Numbers of a robot.
-struct Robot {
+/// Parameters of a robot.
+struct RobotParameters {
+    /// ZZ, MX, MY and M of each link.
     links: [[f64; 4]; 4],
+    /// Coulomb friction of each motor, N m.
     dry: [f64; 2],
+    /// Viscous friction of each motor, N m s/rad.
     viscous: [f64; 2],
 }
 
-fn robot(size: &Size, r: usize) -> Robot {
-    let mut noise = Noise::new(size.seed, 10_000 + r as u64);
+/// Random parameters of robot `r` around those of the model.
+fn robot_parameters(size: &FleetSize, r: usize) -> RobotParameters {
+    let mut noise = GaussianNoise::new(size.seed, 10_000 + r as u64);
     let mut links = LINKS;
     for link in &mut links {
+        // All numbers of a link vary together, and a little by themselves.
         let heavier = 1.0 + ROBOTS * noise.normal();
         for number in link {
             *number *= heavier * (1.0 + 0.3 * ROBOTS * noise.normal());
         }
     }
     let mut friction = |of: [f64; 2]| of.map(|f| f * (1.0 + FRICTIONS * noise.normal()));
-    Robot {
+    RobotParameters {
         links,
         dry: friction(DRY),
         viscous: friction(VISCOUS),
     }
 }
 
-/// Of a hundred robots three wear, three get a load, two lose a sensor and one is odd.
-fn planted(size: &Size, r: usize) -> Planted {
-    let mut noise = Noise::new(size.seed, 5_000_000 + r as u64);
+/// The change of robot `r`: of a hundred robots three wear, three get a load, two lose a sensor, and one has a load on
+/// all days.
+fn planted_change(size: &FleetSize, r: usize) -> PlantedChange {
+    let mut noise = GaussianNoise::new(size.seed, 5_000_000 + r as u64);
     let drive = usize::from(noise.uniform() < 0.5);
-    // Two days before and three after, so that there is something to tell.
-    let day = 2 + one_of(&mut noise, size.days - 4);
+    // At least two days before and some after, so that the change can be detected.
+    let day = 2 + random_index(&mut noise, size.days - 4);
     let much = noise.uniform();
     // Small fleets have one of each as well.
     match r % 100 {
-        7 | 38 | 71 => Planted::Wear {
+        7 | 38 | 71 => PlantedChange::Wear {
             drive,
             day,
             per_day: size.changes * (0.08 + 0.10 * much),
         },
-        3 | 45 | 82 => Planted::Load {
+        3 | 45 | 82 => PlantedChange::Load {
             day,
             mass: size.changes * (0.15 + 0.25 * much),
         },
-        5 | 60 => Planted::Dead { drive, day },
-        9 => Planted::Odd {
+        5 | 60 => PlantedChange::Dead { drive, day },
+        9 => PlantedChange::Odd {
             mass: size.changes * (0.25 + 0.2 * much),
         },
-        _ => Planted::Nothing,
+        _ => PlantedChange::Nothing,
     }
 }
 
-/// Which recordings are cut off, as by a full disk.
-fn bad_recordings(size: &Size) -> Vec<(usize, usize, usize)> {
-    let mut noise = Noise::new(size.seed, 9_000_000);
-    let mut place = |n: usize| one_of(&mut noise, n);
+/// Robot, day and number of the recordings that are cut off, as by a full disk.
+fn bad_recordings(size: &FleetSize) -> Vec<(usize, usize, usize)> {
+    let mut noise = GaussianNoise::new(size.seed, 9_000_000);
+    let mut place = |n: usize| random_index(&mut noise, n);
     let mut all: Vec<_> = (0..size.bad)
         .map(|_| (place(size.robots), place(size.days), place(size.per_day)))
         .collect();
@@ -444,35 +471,38 @@ fn bad_recordings(size: &Size) -> Vec<(usize, usize, usize)> {
     all
 }
 
-/// Cuts a file off.
-fn spoil(path: &Path) -> Result<(), Fault> {
+/// Cuts off the last third of a file.
+fn truncate_file(path: &Path) -> Result<(), FleetFault> {
     let file = fs::OpenOptions::new().write(true).open(path);
     let cut = file.and_then(|file| file.set_len(file.metadata()?.len() * 2 / 3));
-    cut.map_err(|error| unwritten(path, &error))
+    cut.map_err(|error| write_fault(path, &error))
 }
 
-/// Writes one recording.
-fn record(
+/// Writes recording `k` of robot `r` on a day: torques from its parameters and change, then noise and resolution of the
+/// sensors.
+fn write_recording(
     path: &Path,
-    size: &Size,
-    motions: &[Motion],
-    robot: &Robot,
-    planted: &Planted,
+    size: &FleetSize,
+    motions: &[FleetMotion],
+    robot: &RobotParameters,
+    planted: &PlantedChange,
     (r, day, k): (usize, usize, usize),
-) -> Result<(), Fault> {
-    let seed = size.seed
-        ^ ((r as u64) << 24 | (day as u64) << 8 | k as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    let mut noise = Noise::new(seed, 3);
-    let motion = &motions[one_of(&mut noise, MOTIONS)];
+) -> Result<(), FleetFault> {
+    let seed = size.seed ^ ((r as u64) << 24 | (day as u64) << 8 | k as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    // A different part of one of the motions for each recording.
+    let mut noise = GaussianNoise::new(seed, 3);
+    let motion = &motions[random_index(&mut noise, MOTIONS)];
     let n = motion.q[0].len();
-    let start = one_of(&mut noise, n);
+    let start = random_index(&mut noise, n);
     let mut links = robot.links;
+    // Friction varies from recording to recording.
     let daily = 1.0 + DAILY * noise.normal();
     let [mut dry, mut viscous] = [robot.dry, robot.viscous].map(|f| f.map(|f| f * daily));
+    // The change of the robot, if it is present on this day.
     let mut dead = None;
     let mut load = 0.0;
     match planted {
-        Planted::Wear {
+        PlantedChange::Wear {
             drive,
             day: from,
             per_day,
@@ -481,15 +511,16 @@ fn record(
             dry[*drive] *= grown;
             viscous[*drive] *= grown;
         }
-        Planted::Load { day: from, mass } if day >= *from => load = *mass,
-        Planted::Dead { drive, day: from } if day >= *from => dead = Some(*drive),
-        Planted::Odd { mass } => load = *mass,
+        PlantedChange::Load { day: from, mass } if day >= *from => load = *mass,
+        PlantedChange::Dead { drive, day: from } if day >= *from => dead = Some(*drive),
+        PlantedChange::Odd { mass } => load = *mass,
         _ => {}
     }
+    // The load at the tip of the second link changes ZZ, MX and M.
     links[1][0] += load * TO_TIP * TO_TIP;
     links[1][1] += load * TO_TIP;
     links[1][3] += load;
-    // One period without noise.
+    // Torques over one period, without noise.
     let torque: Vec<Vec<f64>> = (0..2)
         .map(|d| {
             let mut sum: Vec<f64> = (motion.qd[d].iter())
@@ -505,6 +536,7 @@ fn record(
             sum
         })
         .collect();
+    // Readings of the sensors; the motion is repeated after its period.
     let all = samples(size);
     let time: Vec<f64> = (0..all).map(|i| i as f64 / size.rate).collect();
     let mut positions = [Vec::with_capacity(all), Vec::with_capacity(all)];
@@ -513,37 +545,36 @@ fn record(
         let at = (start + i) % n;
         for j in 0..2 {
             positions[j].push(ENCODER.read(motion.q[j][at], &mut noise));
-            #[allow(
-                clippy::cast_possible_truncation,
-                reason = "torques are stored with fewer digits"
-            )]
+            #[allow(clippy::cast_possible_truncation, reason = "torques are stored with fewer digits")]
             torques[j].push(TORQUE.read(torque[j][at], &mut noise) as f32);
         }
     }
     if let Some(drive) = dead {
-        // It dies a tenth into the first recording of its day, and keeps its last reading.
+        // The sensor fails after a tenth of the first recording of its first day, and keeps its last reading.
         let from = match planted {
-            Planted::Dead { day: first, .. } if day == *first && k == 0 => all / 10,
+            PlantedChange::Dead { day: first, .. } if day == *first && k == 0 => all / 10,
             _ => 0,
         };
         let last = torques[drive][from];
         torques[drive][from..].fill(last);
     }
-    store(path, &time, &positions, &torques)
+    write_parquet(path, &time, &positions, &torques)
 }
 
+/// The sign of a number; zero for zero.
 fn sign(x: f64) -> f64 {
     if x == 0.0 { 0.0 } else { x.signum() }
 }
 
-/// The columns as Parquet.
-fn store(
+/// Writes the columns as Parquet: time in s, positions in rad, torques in N m.
+fn write_parquet(
     path: &Path,
     time: &[f64],
     positions: &[Vec<f64>; 2],
     torques: &[Vec<f32>; 2],
-) -> Result<(), Fault> {
-    let fault = |error: &dyn std::fmt::Display| unwritten(path, error);
+) -> Result<(), FleetFault> {
+    let fault = |error: &dyn std::fmt::Display| write_fault(path, error);
+    // No column has empty values.
     let column = |name: &str, kind: Physical| {
         Type::primitive_type_builder(name, kind)
             .with_repetition(Repetition::REQUIRED)
@@ -560,34 +591,26 @@ fn store(
     .into_iter()
     .map(|(name, kind)| column(name, kind))
     .collect();
-    let schema = fields.and_then(|fields| {
-        Type::group_type_builder("recording")
-            .with_fields(fields)
-            .build()
-    });
+    let schema = fields.and_then(|fields| Type::group_type_builder("recording").with_fields(fields).build());
     let schema = Arc::new(schema.map_err(|error| fault(&error))?);
     let properties = WriterProperties::builder()
         .set_compression(Compression::UNCOMPRESSED)
         .set_dictionary_enabled(false)
         .build();
     let file = fs::File::create(path).map_err(|error| fault(&error))?;
+    // One row group, with the columns in the order of the schema.
     let written = (|| {
-        let mut writer =
-            SerializedFileWriter::new(BufWriter::new(file), schema, Arc::new(properties))?;
+        let mut writer = SerializedFileWriter::new(BufWriter::new(file), schema, Arc::new(properties))?;
         let mut group = writer.next_row_group()?;
         for values in [time, &positions[0], &positions[1]] {
             if let Some(mut column) = group.next_column()? {
-                column
-                    .typed::<DoubleType>()
-                    .write_batch(values, None, None)?;
+                column.typed::<DoubleType>().write_batch(values, None, None)?;
                 column.close()?;
             }
         }
         for values in torques {
             if let Some(mut column) = group.next_column()? {
-                column
-                    .typed::<FloatType>()
-                    .write_batch(values, None, None)?;
+                column.typed::<FloatType>().write_batch(values, None, None)?;
                 column.close()?;
             }
         }
@@ -604,7 +627,7 @@ mod tests {
     /// The rig's columns add up to the rig's forces with all links as they are.
     #[test]
     fn columns_of_the_rig_add_up_to_its_forces() {
-        let size = Size {
+        let size = FleetSize {
             robots: 1,
             days: 6,
             per_day: 1,
@@ -615,20 +638,20 @@ mod tests {
             changes: 1.0,
         };
         let motion = motion(&size, 1).expect("a motion");
-        let files = modelmill::files::Memory::default();
+        let files = modelmill::files::MemoryFiles::default();
         let mut rig = modelmill_rig::load("rig", RIG, &files).expect("a rig").rig;
         for (body, numbers) in rig.bodies.iter_mut().zip(LINKS) {
-            set(body, numbers);
+            set_link(body, numbers);
         }
         // Positions and rates of a sample; accelerations from their neighbours.
         let i = 40;
         let qdd = (0..2).map(|j| (motion.qd[j][i + 1] - motion.qd[j][i - 1]) * size.rate / 2.0);
-        let state = State {
+        let state = RigState {
             q: vec![motion.q[0][i], motion.q[1][i]],
             qd: vec![motion.qd[0][i], motion.qd[1][i]],
             qdd: qdd.collect(),
         };
-        let moved = Tracker::new(&rig).unwrap().follow(&state).unwrap();
+        let moved = RigTracker::new(&rig).unwrap().follow(&state).unwrap();
         let expected = forces(&rig, &moved).unwrap();
         for d in 0..2 {
             let sum: f64 = LINKS

@@ -1,102 +1,112 @@
-//! A folder of recordings to results: every recording is summed up once, robots are looked at one after the other, and then held
-//! against each other. Memory holds the summaries of the robots that are looked at just now, and one small summary of each.
+//! Evaluates a folder of recordings: each recording is summarised once, each robot is evaluated over its days, and then
+//! robots are compared with each other. In memory are the summaries of the robots that are being evaluated, and one
+//! small summary of each other.
 
 use std::fs;
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-use modelmill::recording::Reading;
-use modelmill_fleet::folder::{self, File};
-use modelmill_fleet::outliers::{One, outliers};
-use modelmill_fleet::robot::{Robot, robot};
-use modelmill_fleet::{Fault, Ground, Plan, Summary};
+use modelmill::recording::RecordingOptions;
+use modelmill_fleet::folder::{self, FleetFile};
+use modelmill_fleet::outliers::{RobotSummary, outliers};
+use modelmill_fleet::robot::{RobotHistory, robot_history};
+use modelmill_fleet::{FleetFault, FleetModel, FleetPlan, FleetSummary};
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
 use crate::page;
-use crate::state::State;
+use crate::state::SummaryStore;
 
-/// Robots of which a plan is made.
+/// Number of robots whose recordings are used for a new plan.
 const REFERENCE: usize = 8;
 
-/// What is asked.
-pub struct Asked<'a> {
+/// Files and options of a run.
+pub struct FleetRequest<'a> {
     /// The model file.
     pub model: &'a Path,
     /// The folder of recordings.
     pub recordings: &'a Path,
-    /// Where states, results and page go.
+    /// Folder for summaries, results and page.
     pub out: &'a Path,
-    /// The plan; made from recordings of several robots where there is none.
+    /// The plan; if not given, one is made from recordings of several robots.
     pub plan: Option<&'a Path>,
-    /// How recordings are read, where no plan says it.
-    pub reading: &'a Reading,
+    /// How recordings are read, if there is no plan.
+    pub reading: &'a RecordingOptions,
 }
 
-/// What was found.
-pub(crate) struct Found {
-    pub(crate) ground: Ground,
-    pub(crate) robots: Vec<Robot>,
-    pub(crate) ones: Vec<One>,
-    pub(crate) outliers: modelmill_fleet::outliers::Outliers,
+/// Results of a fleet.
+pub(crate) struct FleetResults {
+    /// The plan with its derived model.
+    pub(crate) ground: FleetModel,
+    /// The robots over their days.
+    pub(crate) robots: Vec<RobotHistory>,
+    /// The robots before their first change, in the same order.
+    pub(crate) ones: Vec<RobotSummary>,
+    /// Usual values and robots that differ.
+    pub(crate) outliers: modelmill_fleet::outliers::FleetOutliers,
+    /// Number of recordings in the folder.
     pub(crate) recordings: usize,
+    /// Number of samples of all recordings that were evaluated.
     pub(crate) samples: u64,
 }
 
-impl Found {
-    pub(crate) fn bad(&self) -> impl Iterator<Item = &modelmill_fleet::Bad> {
+impl FleetResults {
+    /// Recordings that could not be evaluated, of all robots.
+    pub(crate) fn bad(&self) -> impl Iterator<Item = &modelmill_fleet::BadRecording> {
         self.robots
             .iter()
             .flat_map(|robot| robot.days.iter().flat_map(|day| &day.bad))
     }
 }
 
-/// Identifies a fleet; the result is what is said in the end.
+/// Evaluates a fleet, writes `results.json` and `fleet.html`, and returns a text for the terminal.
 ///
-/// Fails where the folder holds no recordings, the model has no meaning, or results cannot be written.
-pub fn identify(asked: &Asked<'_>) -> Result<String, Fault> {
+/// Fails if the folder has no recordings, the model has faults, or results cannot be written.
+pub fn identify(asked: &FleetRequest<'_>) -> Result<String, FleetFault> {
     let begin = Instant::now();
+    // Files by robot, and the folder for stored summaries.
     let robots = folder::robots(asked.recordings)?;
     let states = asked.out.join("state");
     fs::create_dir_all(&states).map_err(|error| {
-        Fault::new(format!(
-            "{} cannot be made: {error}; choose another place",
+        FleetFault::new(format!(
+            "{} cannot be created: {error}; choose another folder with `--out`",
             states.display()
         ))
     })?;
-    let plan = plan(
-        asked,
-        &robots.values().map(Vec::as_slice).collect::<Vec<_>>(),
-    )?;
-    let ground = plan.ground()?;
+    let plan = plan(asked, &robots.values().map(Vec::as_slice).collect::<Vec<_>>())?;
+    let ground = plan.derive_model()?;
     let total: usize = robots.values().map(Vec::len).sum();
+    // Counters for the progress and for the summaries that were stored by an earlier run.
     let [done, kept_ones] = [AtomicUsize::new(0), AtomicUsize::new(0)];
     let planned = begin.elapsed();
-    let looked_at: Vec<Robot> = robots
+    let looked_at: Vec<RobotHistory> = robots
         .par_iter()
         .map(|(name, files)| {
-            let days = days(&ground, &states, name, files, &kept_ones)?;
-            let robot = robot(&ground, name, &days)?;
+            // One robot after the other on each thread, so that few summaries are in memory.
+            let days = daily_summaries(&ground, &states, name, files, &kept_ones)?;
+            let robot = robot_history(&ground, name, &days)?;
             let before = done.fetch_add(files.len(), Ordering::Relaxed);
             let now = before + files.len();
+            // A line of progress at every twentieth.
             if now * 20 / total != before * 20 / total {
                 eprintln!("{now} of {total} recordings");
             }
             Ok(robot)
         })
-        .collect::<Result<_, Fault>>()?;
+        .collect::<Result<_, FleetFault>>()?;
     let summed = begin.elapsed();
-    let ones: Vec<One> = looked_at
+    let ones: Vec<RobotSummary> = looked_at
         .iter()
-        .map(|robot| One {
+        .map(|robot| RobotSummary {
             name: robot.name.clone(),
             summary: robot.before.clone(),
         })
         .collect();
+    // Compare the robots with each other.
     let outliers = outliers(&ground, &ones)?;
     let samples = looked_at.iter().map(|robot| robot.samples).sum();
-    let found = Found {
+    let found = FleetResults {
         ground,
         robots: looked_at,
         ones,
@@ -104,18 +114,20 @@ pub fn identify(asked: &Asked<'_>) -> Result<String, Fault> {
         recordings: total,
         samples,
     };
-    folder::write(
+    // Write the results.
+    folder::write_atomic(
         &asked.out.join("results.json"),
         format!("{}\n", json(&found)).as_bytes(),
     )?;
-    folder::write(&asked.out.join("fleet.html"), page::page(&found).as_bytes())?;
+    folder::write_atomic(&asked.out.join("fleet.html"), page::page(&found).as_bytes())?;
     let kept = kept_ones.into_inner();
     let seconds = summed.saturating_sub(planned).as_secs_f64();
+    // Samples per second without the recordings whose summaries were stored.
     let rate = found.samples as f64 * (total - kept) as f64 / total as f64 / seconds.max(1e-9);
     Ok(format!(
-        "{}\n{} recordings, {} of which were done before; {:.3e} samples; {seconds:.1} s to sum them up{}; {:.1} s in all; \
+        "{}\n{} recordings, {} of which were done before; {:.3e} samples; {seconds:.1} s to summarise them{}; {:.1} s in total; \
          at most {} in memory\n{} and {} written\n",
-        says(&found),
+        summary_sentence(&found),
         total,
         kept,
         found.samples as f64,
@@ -131,103 +143,97 @@ pub fn identify(asked: &Asked<'_>) -> Result<String, Fault> {
     ))
 }
 
-/// In one sentence.
-pub(crate) fn says(found: &Found) -> String {
-    let changed = found
-        .robots
-        .iter()
-        .filter(|robot| !robot.since.is_empty())
-        .count();
-    let dead = found
-        .robots
-        .iter()
-        .filter(|robot| !robot.dead.is_empty())
-        .count();
+/// The results in one sentence.
+pub(crate) fn summary_sentence(found: &FleetResults) -> String {
+    let changed = found.robots.iter().filter(|robot| !robot.changes.is_empty()).count();
+    let dead = found.robots.iter().filter(|robot| !robot.dead.is_empty()).count();
     format!(
-        "{} robots: {changed} changed on some day, {dead} lost a sensor, {} differ from the others; {} recordings gave no answer",
+        "{} robots: {changed} changed on some day, {dead} lost a sensor, {} differ from the others; {} recordings gave no result",
         found.robots.len(),
         found.outliers.found.len(),
         found.bad().count()
     )
 }
 
-/// The most memory that the process has had, in words; Linux says it.
+/// The largest memory of the process so far, as text (from `/proc`, on Linux only).
 fn most_memory() -> String {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
-    line.map_or_else(
-        || "an unknown part".to_owned(),
-        |most| most.trim().to_owned(),
-    )
+    line.map_or_else(|| "an unknown part".to_owned(), |most| most.trim().to_owned())
 }
 
-/// The plan of the folder: the one that is given, the one that is there, or a new one.
-fn plan(asked: &Asked<'_>, robots: &[&[File]]) -> Result<Plan, Fault> {
+/// The plan: the one that is given, the one in the folder, or a new one, which is written there.
+fn plan(asked: &FleetRequest<'_>, robots: &[&[FleetFile]]) -> Result<FleetPlan, FleetFault> {
     let there = asked.out.join("plan.json");
     let path = asked.plan.unwrap_or(&there);
     if asked.plan.is_some() || path.exists() {
         let text = fs::read_to_string(path).map_err(|error| {
-            Fault::new(format!(
-                "{} cannot be read: {error}; name a plan that is there",
+            FleetFault::new(format!(
+                "{} cannot be read: {error}; give an existing plan with `--plan`",
                 path.display()
             ))
         })?;
-        let plan = Plan::parse(&path.display().to_string(), &text)?;
+        let plan = FleetPlan::parse(&path.display().to_string(), &text)?;
         let model = fs::read_to_string(asked.model).map_err(|error| {
-            Fault::new(format!(
-                "{} cannot be read: {error}; name the model file",
+            FleetFault::new(format!(
+                "{} cannot be read: {error}; give the model file",
                 asked.model.display()
             ))
         })?;
+        // A plan belongs to one model; its first file is the model file.
         if plan.files.first().is_none_or(|(_, text)| *text != model) {
-            return Err(Fault::new(format!(
-                "{} is of another model than {}: what was summed up by it does not fit; choose another folder with `--out`, or \
-                 the model as it was",
+            return Err(FleetFault::new(format!(
+                "{} was made with another model than {}, so its summaries cannot be used; choose another folder with `--out`, or \
+                 use the model of the plan",
                 path.display(),
                 asked.model.display()
             )));
         }
+        // Keep the plan with the summaries that are made with it.
         if asked.plan.is_some() {
-            folder::write(&there, text.as_bytes())?;
+            folder::write_atomic(&there, text.as_bytes())?;
         }
         return Ok(plan);
     }
-    // Robots from all over the fleet, and their first recordings; those that cannot be read are passed over.
+    // The first recordings of robots evenly distributed over the fleet; unreadable ones are left out of the plan.
     let every = robots.len().div_ceil(REFERENCE).max(1);
     let reference: Vec<&Path> = robots
         .iter()
         .step_by(every)
         .filter_map(|files| Some(files.first()?.path.as_path()))
         .collect();
-    let plan = Plan::make(asked.model, asked.reading, &reference)?;
-    folder::write(&there, plan.json().as_bytes())?;
+    let plan = FleetPlan::from_recordings(asked.model, asked.reading, &reference)?;
+    folder::write_atomic(&there, plan.json().as_bytes())?;
     Ok(plan)
 }
 
-/// The summaries of a robot's recordings, day by day; those that are not kept are made.
-fn days(
-    ground: &Ground,
+/// The summaries of a robot by day. Recordings without a stored summary are summarised, and the summary is stored.
+fn daily_summaries(
+    ground: &FleetModel,
     states: &Path,
     name: &str,
-    files: &[File],
+    files: &[FleetFile],
     kept_ones: &AtomicUsize,
-) -> Result<Vec<(String, Summary)>, Fault> {
-    let (state, mut kept) = State::open(states, name, ground.empty().mark)?;
-    let done: Vec<Option<Summary>> = files.iter().map(|file| kept.remove(&file.key)).collect();
+) -> Result<Vec<(String, FleetSummary)>, FleetFault> {
+    // Summaries of an earlier run.
+    let (state, mut kept) = SummaryStore::open(states, name, ground.empty_summary().mark)?;
+    let done: Vec<Option<FleetSummary>> = files.iter().map(|file| kept.remove(&file.key)).collect();
     kept_ones.fetch_add(done.iter().flatten().count(), Ordering::Relaxed);
-    let summaries: Vec<Summary> = files
+    let summaries: Vec<FleetSummary> = files
         .par_iter()
         .zip(done)
         .map(|(file, done)| match done {
             Some(summary) => Ok(summary),
             None => {
+                // A new summary is stored at once, so that an interrupted job loses little.
                 let summary = ground.summarise_file(&file.name, &file.path);
-                state.keep(&file.key, &summary)?;
+                state.append(&file.key, &summary)?;
                 Ok(summary)
             }
         })
-        .collect::<Result<_, Fault>>()?;
-    let mut days: Vec<(String, Summary)> = Vec::new();
+        .collect::<Result<_, FleetFault>>()?;
+    // Files are sorted by day, so that each day is a sequence of files.
+    let mut days: Vec<(String, FleetSummary)> = Vec::new();
     for (file, summary) in files.iter().zip(summaries) {
         match days.last_mut() {
             Some((day, sum)) if *day == file.day => sum.merge(&summary)?,
@@ -237,8 +243,8 @@ fn days(
     Ok(days)
 }
 
-/// All that was found.
-fn json(found: &Found) -> Value {
+/// All results as JSON.
+fn json(found: &FleetResults) -> Value {
     let ground = &found.ground;
     let parameters = ground.parameters();
     let parameters = parameters

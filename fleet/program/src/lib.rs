@@ -1,5 +1,6 @@
-//! What `modelmill-fleet` does: [`generate`] makes a fleet with a truth, [`identify`] sums up a folder of recordings and says what
-//! every robot is and what changed, and [`score`] holds that against a truth.
+//! The commands of `modelmill-fleet`: [`generate`] simulates a fleet with known changes, [`identify`] summarises a
+//! folder of recordings and reports parameters and changes of every robot, and [`score`] compares results with the
+//! known changes.
 
 pub mod generate;
 pub mod identify;

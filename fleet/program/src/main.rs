@@ -1,82 +1,84 @@
-//! `modelmill-fleet`: recordings of many machines of one kind, on one computer.
+//! `modelmill-fleet`: evaluates recordings of many machines of one kind, on one computer.
 //!
-//! `make` makes a fleet with a truth, `plan` settles how recordings are summed up, `identify` sums them up and says what every
-//! robot is and what changed, and `score` holds that against a truth.
+//! `make` simulates a fleet with known changes, `plan` fixes how recordings are prepared, `identify` summarises them
+//! and reports parameters and changes of every robot, and `score` compares results with the known changes.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use modelmill::print::{CommandName, LibrarySpelling, OptionName, OptionSetting, RemedySpelling};
-use modelmill::recording::{Preparation, Reading};
-use modelmill_fleet::{Fault, folder};
+use modelmill::recording::{RecordingOptions, StatePreparation};
+use modelmill_fleet::{FleetFault, folder};
 use modelmill_fleet_program::{generate, identify, score};
 
-/// Recordings of many machines of one kind: parameters per robot and day, what changed and when, and who differs.
+/// Evaluate recordings of many machines of one kind: parameters per robot and day, changes and their days, outliers.
 #[derive(Parser)]
 #[command(name = "modelmill-fleet", version)]
-struct Cli {
+struct FleetCli {
+    /// The command to run.
     #[command(subcommand)]
-    command: Command,
+    command: FleetCommand,
 }
 
+/// The commands.
 #[derive(Subcommand)]
-enum Command {
-    /// Make a fleet of five-bars with a truth, as Parquet.
-    Make(Make),
-    /// Settle how every recording is summed up, from a few of sound machines.
+enum FleetCommand {
+    /// Simulate a fleet of five-bars with known changes, as Parquet.
+    Make(MakeArgs),
+    /// Fix how every recording is prepared, from a few recordings of faultless machines.
     Plan(PlanArgs),
-    /// Sum up a folder of recordings and say what is different.
-    Identify(Identify),
-    /// Hold what `identify` found against the truth of `make`.
+    /// Summarise a folder of recordings and report changes, outliers and dead sensors.
+    Identify(FleetIdentifyArgs),
+    /// Compare the results of `identify` with the known changes of `make`.
     Score {
         /// The folder that `identify` wrote.
         found: PathBuf,
-        /// `truth.json`.
+        /// `truth.json`, which `make` wrote.
         truth: PathBuf,
     },
 }
 
+/// `make`.
 #[derive(clap::Args)]
-struct Make {
-    /// Where it goes.
+struct MakeArgs {
+    /// Folder for the fleet.
     folder: PathBuf,
-    /// How many robots.
+    /// Number of robots.
     #[arg(long, default_value_t = 100)]
     robots: usize,
-    /// On how many days.
+    /// Number of days, at least 6.
     #[arg(long, default_value_t = 10)]
     days: usize,
-    /// Recordings of a robot on a day.
+    /// Recordings per robot and day.
     #[arg(long, default_value_t = 2)]
     per_day: usize,
-    /// How long each is, s.
+    /// Duration of each recording, s.
     #[arg(long, default_value_t = 60.0)]
     seconds: f64,
-    /// Samples a second.
+    /// Sampling rate, Hz.
     #[arg(long, default_value_t = 250.0)]
     rate: f64,
-    /// Another seed makes another fleet.
+    /// Seed; another seed gives another fleet.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// How many recordings are cut off.
+    /// Number of recordings that are cut off.
     #[arg(long, default_value_t = 2)]
     bad: usize,
-    /// How large the changes of friction and load are; 1 as in the guide, 0.5 for half of that.
+    /// Size of the changes of friction and load: 1 as in the guide, 0.5 for half of that.
     #[arg(long, default_value_t = 1.0)]
     changes: f64,
 }
 
-/// How recordings are read, where no plan says it.
+/// How recordings are read, if there is no plan.
 #[derive(clap::Args, Clone)]
 struct ReadingArgs {
-    /// Our column and what recordings call it, such as `q1=pos_left`; may be given again.
+    /// Column of the recordings for a name of the model, such as `q1=pos_left`; may be repeated.
     #[arg(long = "map", value_name = "OURS=THEIRS")]
     map: Vec<String>,
-    /// Cut-off of the low-pass on positions, Hz; chosen by the first reference recording where it is not given.
+    /// Cut-off of the low-pass on positions, Hz. Default: chosen from the first reference recording.
     #[arg(long)]
     cutoff: Option<f64>,
-    /// Every how many samples one is kept; chosen likewise.
+    /// Keep every n-th sample; 1 chooses it from the first reference recording.
     #[arg(long, default_value_t = 1)]
     decimate: usize,
     /// Leave out samples with NaN or empty fields.
@@ -85,55 +87,58 @@ struct ReadingArgs {
 }
 
 impl ReadingArgs {
-    fn reading(&self) -> Result<Reading, Fault> {
+    /// The same as options of the library; fails for a `--map` without `=`.
+    fn reading(&self) -> Result<RecordingOptions, FleetFault> {
         let columns = self.map.iter().map(|text| {
             let (ours, theirs) = text.split_once('=').ok_or_else(|| {
-                Fault::new(format!(
-                    "`--map {text}` names no column; write it as `--map q1=pos_left`"
-                ))
+                FleetFault::new(format!("`--map {text}` has no column; write it as `--map q1=pos_left`"))
             })?;
             Ok((ours.to_owned(), theirs.to_owned()))
         });
-        Ok(Reading {
-            columns: columns.collect::<Result<_, Fault>>()?,
-            preparation: Preparation {
+        Ok(RecordingOptions {
+            columns: columns.collect::<Result<_, FleetFault>>()?,
+            preparation: StatePreparation {
                 cutoff_hz: self.cutoff,
                 decimate: self.decimate.max(1),
-                ..Preparation::default()
+                ..StatePreparation::default()
             },
             skip_bad_samples: self.skip_bad_samples,
-            ..Reading::default()
+            ..RecordingOptions::default()
         })
     }
 }
 
+/// `plan`.
 #[derive(clap::Args)]
 struct PlanArgs {
     /// The model file.
     model: PathBuf,
-    /// Recordings of sound machines; the first decides how all are prepared.
+    /// Recordings of faultless machines; the first determines how all are prepared.
     #[arg(required = true)]
     reference: Vec<PathBuf>,
-    /// Where the plan goes.
+    /// Write the plan to this file.
     #[arg(long, default_value = "plan.json")]
     out: PathBuf,
     #[command(flatten)]
     reading: ReadingArgs,
 }
 
+/// `identify`.
 #[derive(clap::Args)]
-struct Identify {
+struct FleetIdentifyArgs {
     /// The model file.
     model: PathBuf,
-    /// The folder: `robot=R/day=D/.../FILE`, `R/D/FILE`, or `R/FILE` with the day at the front of the file's name.
+    /// Folder with recordings: `robot=R/day=D/.../FILE`, `R/D/FILE`, or `R/FILE` with the day at the start of the file
+    /// name.
     recordings: PathBuf,
-    /// Where states, results and page go. Called again with the same folder, it goes on from the recordings that are done.
+    /// Folder for summaries, results and page. With the same folder again, recordings that are summarised already are
+    /// not read again.
     #[arg(long)]
     out: PathBuf,
-    /// The plan; made from recordings of eight robots where it is not given.
+    /// The plan. Default: made from recordings of eight robots.
     #[arg(long)]
     plan: Option<PathBuf>,
-    /// Threads; all cores where it is not given.
+    /// Number of threads. Default: all cores.
     #[arg(long)]
     threads: Option<usize>,
     #[command(flatten)]
@@ -141,7 +146,7 @@ struct Identify {
 }
 
 fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
+    let cli = match FleetCli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {
             let status = u8::try_from(error.exit_code()).unwrap_or(2);
@@ -155,42 +160,17 @@ fn main() -> ExitCode {
             ExitCode::SUCCESS
         }
         Err(fault) => {
-            eprintln!("error: {}", fault.message().spell(&FleetSpelling));
+            eprintln!("error: {fault}");
             ExitCode::from(1)
         }
     }
 }
 
-/// Options that this program has, as its flags; commands as those of `modelmill`.
-struct FleetSpelling;
-
-impl RemedySpelling for FleetSpelling {
-    fn spell_options(&self, settings: &[OptionSetting]) -> String {
-        let one = |setting: &OptionSetting| {
-            let flag = match setting.name {
-                OptionName::Columns => "--map",
-                OptionName::CutoffHz => "--cutoff",
-                OptionName::Decimate => "--decimate",
-                OptionName::SkipBadSamples => "--skip-bad-samples",
-                _ => return LibrarySpelling.spell_options(std::slice::from_ref(setting)),
-            };
-            match &setting.value {
-                None => format!("`{flag}`"),
-                Some(value) => format!("`{flag} \"{value}\"`"),
-            }
-        };
-        settings.iter().map(one).collect::<Vec<_>>().join(" ")
-    }
-
-    fn spell_command(&self, command: CommandName) -> String {
-        format!("`modelmill {}`", command.name())
-    }
-}
-
-fn run(command: Command) -> Result<String, Fault> {
+/// Runs a command; returns the text for standard output.
+fn run(command: FleetCommand) -> Result<String, FleetFault> {
     match command {
-        Command::Make(args) => {
-            let size = generate::Size {
+        FleetCommand::Make(args) => {
+            let size = generate::FleetSize {
                 robots: args.robots,
                 days: args.days,
                 per_day: args.per_day,
@@ -208,14 +188,12 @@ fn run(command: Command) -> Result<String, Fault> {
                 args.folder.display()
             ))
         }
-        Command::Plan(args) => {
-            let reference: Vec<&std::path::Path> =
-                args.reference.iter().map(PathBuf::as_path).collect();
-            let plan =
-                modelmill_fleet::Plan::make(&args.model, &args.reading.reading()?, &reference)?;
-            folder::write(&args.out, plan.json().as_bytes())?;
+        FleetCommand::Plan(args) => {
+            let reference: Vec<&std::path::Path> = args.reference.iter().map(PathBuf::as_path).collect();
+            let plan = modelmill_fleet::FleetPlan::from_recordings(&args.model, &args.reading.reading()?, &reference)?;
+            folder::write_atomic(&args.out, plan.json().as_bytes())?;
             Ok(format!(
-                "{} from {} reference recordings: cut-off {} Hz, one in {} samples kept\n",
+                "{} from {} reference recordings: cut-off {} Hz, every {}. sample kept\n",
                 args.out.display(),
                 plan.reference.recordings.len(),
                 plan.preparation
@@ -224,14 +202,12 @@ fn run(command: Command) -> Result<String, Fault> {
                 plan.preparation.decimate
             ))
         }
-        Command::Identify(args) => {
+        FleetCommand::Identify(args) => {
             if let Some(threads) = args.threads {
-                let pool = rayon::ThreadPoolBuilder::new()
-                    .num_threads(threads)
-                    .build_global();
-                pool.map_err(Fault::new)?;
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+                pool.map_err(FleetFault::new)?;
             }
-            identify::identify(&identify::Asked {
+            identify::identify(&identify::FleetRequest {
                 model: &args.model,
                 recordings: &args.recordings,
                 out: &args.out,
@@ -239,6 +215,6 @@ fn run(command: Command) -> Result<String, Fault> {
                 reading: &args.reading.reading()?,
             })
         }
-        Command::Score { found, truth } => score::score(&found, &truth),
+        FleetCommand::Score { found, truth } => score::score(&found, &truth),
     }
 }

@@ -1,44 +1,50 @@
-//! What was found beside what was planted.
+//! Compares results with the known changes of a simulated fleet: `results.json` and `truth.json` go in, a table of
+//! detection rates comes out.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-use modelmill_fleet::Fault;
+use modelmill_fleet::FleetFault;
 use serde_json::Value;
 
-fn read(path: &Path) -> Result<Value, Fault> {
+/// Reads a JSON file.
+fn read(path: &Path) -> Result<Value, FleetFault> {
     let text = fs::read_to_string(path).map_err(|error| {
-        Fault::new(format!(
-            "{} cannot be read: {error}; name what `identify` or `make` wrote",
+        FleetFault::new(format!(
+            "{} cannot be read: {error}; give a file or folder that `identify` or `make` wrote",
             path.display()
         ))
     })?;
-    serde_json::from_str(&text).map_err(|error| Fault::new(format!("{}: {error}", path.display())))
+    serde_json::from_str(&text).map_err(|error| FleetFault::new(format!("{}: {error}", path.display())))
 }
 
-/// How many of a kind there are, how many were found, and with their day within a day.
+/// Counts for one kind of change.
 #[derive(Default)]
-struct Tally {
+struct ScoreTally {
+    /// Number of simulated changes.
     planted: usize,
+    /// Number of changes that were detected.
     found: usize,
+    /// Number of changes that were detected within one day of the right day.
     in_time: usize,
+    /// Number of changes that were detected with the right name.
     named: usize,
+    /// Changes with a miss in any of these, one line each.
     missed: Vec<String>,
 }
 
-/// Holds results, in a folder that [`crate::identify`] wrote, against a truth.
+/// Compares results, in a folder that [`crate::identify`] wrote, with the known changes.
 ///
-/// Fails where either cannot be read, or they are of two fleets.
-pub fn score(found: &Path, truth: &Path) -> Result<String, Fault> {
+/// Fails if either cannot be read, or they belong to different fleets.
+pub fn score(found: &Path, truth: &Path) -> Result<String, FleetFault> {
     let results = read(&found.join("results.json"))?;
     let truth = read(truth)?;
+    // Days by name, so that distances between days can be counted.
     let days: Vec<String> = list(&truth["days"]).iter().map(text).collect();
-    let place = |day: &Value| {
-        days.iter()
-            .position(|one| Some(one.as_str()) == day.as_str())
-    };
+    let place = |day: &Value| days.iter().position(|one| Some(one.as_str()) == day.as_str());
+    // Results by the name of the robot.
     let robots: BTreeMap<String, Value> = list(&results["robots"])
         .into_iter()
         .map(|robot| (text(&robot["robot"]), robot))
@@ -47,22 +53,22 @@ pub fn score(found: &Path, truth: &Path) -> Result<String, Fault> {
         .into_iter()
         .map(|one| (text(&one["robot"]), one))
         .collect();
-    let mut tallies: BTreeMap<String, Tally> = BTreeMap::new();
+    let mut tallies: BTreeMap<String, ScoreTally> = BTreeMap::new();
     let (mut sound, mut alarms) = (0_u32, Vec::new());
+    // Compare each robot with what was simulated for it.
     for one in list(&truth["robots"]) {
         let (name, planted) = (text(&one["robot"]), &one["planted"]);
         let Some(robot) = robots.get(&name) else {
-            return Err(Fault::new(format!(
-                "{} has no robot {name}; the truth is of another fleet",
+            return Err(FleetFault::new(format!(
+                "{} has no robot {name}; `truth.json` belongs to another fleet",
                 found.display()
             )));
         };
         let (since, dead) = (list(&robot["since"]), list(&robot["dead_sensors"]));
         let kind = text(&planted["kind"]);
         let tally = tallies.entry(kind.clone()).or_default();
-        let at = planted["place"]
-            .as_u64()
-            .and_then(|day| usize::try_from(day).ok());
+        let at = planted["place"].as_u64().and_then(|day| usize::try_from(day).ok());
+        // A day counts as right if it is at most one day off.
         let is_near = |day: &Value| {
             place(day)
                 .zip(at)
@@ -70,6 +76,7 @@ pub fn score(found: &Path, truth: &Path) -> Result<String, Fault> {
         };
         let (is_found, in_time, is_named) = match kind.as_str() {
             "none" => {
+                // Any result for an unchanged robot is a false alarm.
                 sound += 1;
                 if !since.is_empty() || !dead.is_empty() || differ.contains_key(&name) {
                     let changes = since
@@ -78,10 +85,7 @@ pub fn score(found: &Path, truth: &Path) -> Result<String, Fault> {
                         .or(differ.get(&name).map(|one| &one["changes"]));
                     alarms.push(format!(
                         "{name}: {} {}",
-                        since
-                            .first()
-                            .map(|one| text(&one["day"]))
-                            .unwrap_or_default(),
+                        since.first().map(|one| text(&one["day"])).unwrap_or_default(),
                         changes
                             .and_then(|changes| changes[0]["says"].as_str())
                             .unwrap_or("a parameter changed")
@@ -90,27 +94,28 @@ pub fn score(found: &Path, truth: &Path) -> Result<String, Fault> {
                 continue;
             }
             "dead_sensor" => {
-                let own: Vec<&Value> = dead
-                    .iter()
-                    .filter(|one| one["sensor"] == planted["at"])
-                    .collect();
+                // The sensor itself must be reported, not only any sensor.
+                let own: Vec<&Value> = dead.iter().filter(|one| one["sensor"] == planted["at"]).collect();
                 let near = own.iter().any(|one| is_near(&one["day"]));
                 (!own.is_empty(), near, !own.is_empty())
             }
             "odd" => {
+                // It differs on all days, so that a change on some day would be wrong.
                 let own = differ.get(&name);
-                let is_named = own.is_some_and(|one| names(&one["changes"], "payload", None));
+                let is_named = own.is_some_and(|one| has_change(&one["changes"], "payload", None));
                 (own.is_some(), own.is_some() && since.is_empty(), is_named)
             }
             _ => {
+                // Wear and loads begin on a day.
                 let near = since.iter().any(|one| is_near(&one["day"]));
                 let is_named = since.iter().any(|one| match kind.as_str() {
-                    "wear" => names(&one["changes"], "friction", planted["at"].as_str()),
-                    _ => names(&one["changes"], "payload", None),
+                    "wear" => has_change(&one["changes"], "friction", planted["at"].as_str()),
+                    _ => has_change(&one["changes"], "payload", None),
                 });
                 (!since.is_empty(), near, is_named)
             }
         };
+        // Count the result, and describe it if anything is wrong.
         tally.planted += 1;
         tally.found += usize::from(is_found);
         tally.in_time += usize::from(is_found && in_time);
@@ -124,41 +129,39 @@ pub fn score(found: &Path, truth: &Path) -> Result<String, Fault> {
                 .collect::<Vec<_>>();
             tally
                 .missed
-                .push(format!("{name} planted {planted}, found {days:?} {says:?}"));
+                .push(format!("{name} simulated {planted}, found {days:?} {says:?}"));
         }
     }
-    let mut says = told(&tallies, sound, &alarms);
-    says.push_str(&of_bad(&results, &truth));
+    let mut says = score_text(&tallies, sound, &alarms);
+    says.push_str(&bad_recordings_text(&results, &truth));
     Ok(says)
 }
 
 /// Whether one of the changes is of a kind, at a place if one is named.
-fn names(changes: &Value, kind: &str, at: Option<&str>) -> bool {
+fn has_change(changes: &Value, kind: &str, at: Option<&str>) -> bool {
     list(changes).iter().any(|change| {
-        let is_there = at.is_none_or(|at| {
-            list(&change["at"])
-                .iter()
-                .any(|one| one.as_str() == Some(at))
-        });
+        let is_there = at.is_none_or(|at| list(&change["at"]).iter().any(|one| one.as_str() == Some(at)));
         change["kind"].as_str() == Some(kind) && is_there
     })
 }
 
+/// The elements of a JSON array; none for other values.
 fn list(value: &Value) -> Vec<Value> {
     value.as_array().cloned().unwrap_or_default()
 }
 
+/// The text of a JSON value; empty for other values.
 fn text(value: &Value) -> String {
     value.as_str().unwrap_or_default().to_owned()
 }
 
-/// What was found of each kind, and which sound robots raised an alarm.
-fn told(tallies: &BTreeMap<String, Tally>, sound: u32, alarms: &[String]) -> String {
+/// Detection rates of each kind, and the unchanged robots with a false alarm.
+fn score_text(tallies: &BTreeMap<String, ScoreTally>, sound: u32, alarms: &[String]) -> String {
     let mut says = String::new();
     for (kind, tally) in tallies.iter().filter(|(_, tally)| tally.planted > 0) {
         let _ = writeln!(
             says,
-            "{kind}: {} planted, {} found, {} with their day within a day, {} with the right name",
+            "{kind}: {} simulated, {} found, {} with the day within one day, {} with the right name",
             tally.planted, tally.found, tally.in_time, tally.named
         );
         for missed in &tally.missed {
@@ -167,7 +170,7 @@ fn told(tallies: &BTreeMap<String, Tally>, sound: u32, alarms: &[String]) -> Str
     }
     let _ = writeln!(
         says,
-        "sound: {sound}, of which {} raised an alarm ({:.2} %)",
+        "unchanged robots: {sound}, of which {} raised an alarm ({:.2} %)",
         alarms.len(),
         100.0 * alarms.len() as f64 / f64::from(sound.max(1))
     );
@@ -177,8 +180,8 @@ fn told(tallies: &BTreeMap<String, Tally>, sound: u32, alarms: &[String]) -> Str
     says
 }
 
-/// Which recordings were said to give no answer.
-fn of_bad(results: &Value, truth: &Value) -> String {
+/// How many of the recordings that were cut off are reported, and how many others.
+fn bad_recordings_text(results: &Value, truth: &Value) -> String {
     let mut bad: Vec<String> = list(&results["bad"])
         .iter()
         .map(|one| text(&one["recording"]))
@@ -186,10 +189,11 @@ fn of_bad(results: &Value, truth: &Value) -> String {
     let mut planted: Vec<String> = list(&truth["bad"]).iter().map(text).collect();
     bad.sort();
     planted.sort();
+    // Both lists by name.
     let missed = planted.iter().filter(|one| !bad.contains(one)).count();
     let further = bad.iter().filter(|one| !planted.contains(one)).count();
     format!(
-        "bad recordings: {} planted, {missed} not named, {further} named that are sound\n",
+        "bad recordings: {} simulated, {missed} not reported, {further} others reported\n",
         planted.len()
     )
 }

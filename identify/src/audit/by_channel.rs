@@ -1,5 +1,5 @@
-//! Rows of a regressor, channel by channel: of a channel only the columns that act on it are kept, as the joints of a leg know
-//! nothing of the other, and friction acts on one drive.
+//! A regressor stored by channel: for each channel only the columns that are not zero. This saves most of the work, as
+//! the joints of one leg do not depend on those of another, and friction acts on one drive.
 
 use std::ops::Range;
 
@@ -7,29 +7,35 @@ use nalgebra::{DMatrix, DVector};
 
 /// A regressor whose rows are those of some channels at some samples.
 #[derive(Debug, Clone)]
-pub struct ByChannel {
+pub struct ChannelRegressor {
+    /// Number of all columns.
     columns: usize,
-    channels: Vec<Channel>,
+    /// Rows of each channel.
+    channels: Vec<ChannelRows>,
 }
 
-/// Rows of a channel, `[sample, own column]`, and which columns these are.
+/// Rows of one channel with its own columns.
 #[derive(Debug, Clone)]
-struct Channel {
-    which: Vec<usize>,
+struct ChannelRows {
+    /// Indices of its columns among all columns.
+    column_indices: Vec<usize>,
+    /// Values, `[sample, own column]`.
     rows: DMatrix<f64>,
 }
 
-impl ByChannel {
-    /// From rows interleaved per sample, `row = sample * channels + channel`.
+impl ChannelRegressor {
+    /// Splits a regressor whose rows are interleaved per sample, `row = sample * channels + channel`.
     pub fn new(regressor: &DMatrix<f64>, channels: usize) -> Self {
         let samples = regressor.nrows() / channels.max(1);
         let one = |c: usize| {
+            // A column belongs to a channel if it is not zero in all of its rows.
             let acts = |k: &usize| (0..samples).any(|i| regressor[(i * channels + c, *k)] != 0.0);
             let which: Vec<usize> = (0..regressor.ncols()).filter(acts).collect();
-            let rows = DMatrix::from_fn(samples, which.len(), |i, k| {
-                regressor[(i * channels + c, which[k])]
-            });
-            Channel { which, rows }
+            let rows = DMatrix::from_fn(samples, which.len(), |i, k| regressor[(i * channels + c, which[k])]);
+            ChannelRows {
+                column_indices: which,
+                rows,
+            }
         };
         Self {
             columns: regressor.ncols(),
@@ -52,12 +58,13 @@ impl ByChannel {
         self.channels.first().map_or(0, |c| c.rows.nrows())
     }
 
-    /// One sample of so many each.
+    /// Keeps every `step`-th sample.
     #[must_use]
-    pub fn every(&self, step: usize) -> Self {
+    pub fn subsample(&self, step: usize) -> Self {
+        // The columns of a channel stay the same, even if one becomes zero.
         let kept: Vec<usize> = (0..self.samples()).step_by(step).collect();
-        let channels = self.channels.iter().map(|channel| Channel {
-            which: channel.which.clone(),
+        let channels = self.channels.iter().map(|channel| ChannelRows {
+            column_indices: channel.column_indices.clone(),
             rows: channel.rows.select_rows(&kept),
         });
         Self {
@@ -66,23 +73,23 @@ impl ByChannel {
         }
     }
 
-    /// With further columns behind the others, each of which takes what is given of the channels that `takes` says.
-    pub(super) fn with(
-        &self,
-        further: usize,
-        takes: impl Fn(usize) -> usize,
-        of: &DVector<f64>,
-    ) -> Self {
+    /// Appends `further` columns. Channel `c` gets the values of `of` (interleaved per sample) in the new column
+    /// `takes(c)`.
+    pub(super) fn append_columns(&self, further: usize, takes: impl Fn(usize) -> usize, of: &DVector<f64>) -> Self {
         let n = self.channels.len();
         let channels = self.channels.iter().enumerate().map(|(c, channel)| {
-            let own = channel.which.len();
-            let mut which = channel.which.clone();
+            // The new column is the last one of each channel.
+            let own = channel.column_indices.len();
+            let mut which = channel.column_indices.clone();
             which.push(self.columns + takes(c));
             let mut rows = channel.rows.clone().resize_horizontally(own + 1, 0.0);
             for i in 0..rows.nrows() {
                 rows[(i, own)] = of[i * n + c];
             }
-            Channel { which, rows }
+            ChannelRows {
+                column_indices: which,
+                rows,
+            }
         });
         Self {
             channels: channels.collect(),
@@ -90,14 +97,15 @@ impl ByChannel {
         }
     }
 
-    /// What values of the columns give, interleaved per sample.
-    pub fn times(&self, values: &[f64]) -> DVector<f64> {
+    /// Product of the regressor with parameter values, interleaved per sample.
+    pub fn multiply(&self, values: &[f64]) -> DVector<f64> {
         let n = self.channels.len();
         let mut result = DVector::zeros(self.samples() * n);
         for (c, channel) in self.channels.iter().enumerate() {
+            // Values of the columns of this channel.
             let own = DVector::from_iterator(
-                channel.which.len(),
-                channel.which.iter().map(|k| values[*k]),
+                channel.column_indices.len(),
+                channel.column_indices.iter().map(|k| values[*k]),
             );
             for (i, value) in (&channel.rows * own).iter().enumerate() {
                 result[i * n + c] = *value;
@@ -106,21 +114,23 @@ impl ByChannel {
         result
     }
 
-    /// Inner products of all columns with what is given, interleaved per sample.
-    pub(super) fn transposed_times(&self, of: &DVector<f64>) -> DVector<f64> {
+    /// Inner products of all columns with a vector that is interleaved per sample.
+    pub(super) fn multiply_transposed(&self, of: &DVector<f64>) -> DVector<f64> {
         let n = self.channels.len();
         let mut result = DVector::zeros(self.columns);
         for (c, channel) in self.channels.iter().enumerate() {
+            // Entries of this channel.
             let own = DVector::from_fn(channel.rows.nrows(), |i, _| of[i * n + c]);
-            for (k, column) in channel.which.iter().zip(channel.rows.column_iter()) {
+            for (k, column) in channel.column_indices.iter().zip(channel.rows.column_iter()) {
                 result[*k] += column.dot(&own);
             }
         }
         result
     }
 
-    /// Normal equations of some samples with weighted rows: their matrix and right side.
-    pub(super) fn normal(
+    /// Normal equations of a range of samples: matrix and right side. `weights` and `measured` are interleaved per
+    /// sample.
+    pub(super) fn normal_equations(
         &self,
         weights: &DVector<f64>,
         measured: &DVector<f64>,
@@ -130,17 +140,20 @@ impl ByChannel {
         let mut normal = DMatrix::zeros(self.columns, self.columns);
         let mut right = DVector::zeros(self.columns);
         for (c, channel) in self.channels.iter().enumerate() {
+            // Interleaved index of a sample of the range.
             let at = |i: usize| (samples.start + i) * n + c;
+            // Transposed rows times their weights.
             let mut weighted = channel.rows.rows_range(samples.clone()).transpose();
             for (i, mut column) in weighted.column_iter_mut().enumerate() {
                 column *= weights[at(i)];
             }
+            // Products among the columns of this channel, then added to their places in the complete matrix.
             let own = &weighted * channel.rows.rows_range(samples.clone());
             let forces = DVector::from_fn(samples.len(), |i, _| measured[at(i)]);
             let own_right = &weighted * forces;
-            for (j, column) in channel.which.iter().enumerate() {
+            for (j, column) in channel.column_indices.iter().enumerate() {
                 right[*column] += own_right[j];
-                for (i, row) in channel.which.iter().enumerate() {
+                for (i, row) in channel.column_indices.iter().enumerate() {
                     normal[(*row, *column)] += own[(i, j)];
                 }
             }
@@ -148,23 +161,20 @@ impl ByChannel {
         (normal, right)
     }
 
-    /// Rows of some channels that count, below each other, times a weight of each channel; with their places,
-    /// `sample * channels + channel`. Only columns that act on these channels.
-    pub(super) fn dense(
-        &self,
-        of: &[usize],
-        counts: &[bool],
-        weights: &[f64],
-    ) -> (DMatrix<f64>, Vec<usize>) {
+    /// Used rows of some channels as one dense matrix, each multiplied by the weight of its channel; with their
+    /// indices, `sample * channels + channel`. It has only the columns of these channels.
+    pub(super) fn dense_rows(&self, of: &[usize], counts: &[bool], weights: &[f64]) -> (DMatrix<f64>, Vec<usize>) {
         let n = self.channels.len();
         let mut place = vec![None; self.columns];
         let mut width = 0;
-        for k in of.iter().flat_map(|c| &self.channels[*c].which) {
+        // Number the columns of these channels in the order in which they first appear.
+        for k in of.iter().flat_map(|c| &self.channels[*c].column_indices) {
             place[*k].get_or_insert_with(|| {
                 width += 1;
                 width - 1
             });
         }
+        // Used rows, channel by channel.
         let rows: Vec<usize> = (of.iter())
             .flat_map(|c| (0..self.samples()).map(move |i| i * n + c))
             .filter(|row| counts[*row])
@@ -173,7 +183,8 @@ impl ByChannel {
         for (to, row) in rows.iter().enumerate() {
             let channel = &self.channels[row % n];
             let weight = weights[row % n];
-            for (j, k) in channel.which.iter().enumerate() {
+            for (j, k) in channel.column_indices.iter().enumerate() {
+                // Each value goes to the column with the new number.
                 if let Some(at) = place[*k] {
                     matrix[(to, at)] = weight * channel.rows[(row / n, j)];
                 }
@@ -186,45 +197,41 @@ impl ByChannel {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
 
-    /// Products channel by channel are those of the whole matrix.
+    /// Products channel by channel equal those of the complete matrix.
     #[test]
     fn products_are_those_of_the_whole_matrix() {
-        let mut noise = Noise::new(5);
+        let mut noise = TestNoise::new(5);
         let (n, samples, columns) = (3, 40, 7);
         let whole = DMatrix::from_fn(n * samples, columns, |row, k| {
-            if (row % n + k) % 2 == 0 {
-                noise.normal()
-            } else {
-                0.0
-            }
+            if (row % n + k) % 2 == 0 { noise.normal() } else { 0.0 }
         });
         let weights = DVector::from_fn(n * samples, |_, _| noise.normal().abs());
         let measured = DVector::from_fn(n * samples, |_, _| noise.normal());
-        let rows = ByChannel::new(&whole, n);
-        assert!(rows.channels.iter().all(|c| c.which.len() < columns));
+        let rows = ChannelRegressor::new(&whole, n);
+        assert!(rows.channels.iter().all(|c| c.column_indices.len() < columns));
         let values = DVector::from_fn(columns, |_, _| noise.normal());
         let close = |a: &DMatrix<f64>, b: &DMatrix<f64>| (a - b).amax() < 1e-12;
         let column = |v: DVector<f64>| DMatrix::from_column_slice(v.len(), 1, v.as_slice());
         assert!(close(
-            &column(rows.times(values.as_slice())),
+            &column(rows.multiply(values.as_slice())),
             &column(&whole * &values)
         ));
         assert!(close(
-            &column(rows.transposed_times(&measured)),
+            &column(rows.multiply_transposed(&measured)),
             &column(whole.transpose() * &measured)
         ));
-        let (normal, right) = rows.normal(&weights, &measured, 10..samples);
+        let (normal, right) = rows.normal_equations(&weights, &measured, 10..samples);
         let part = whole.rows_range(10 * n..);
         let weighted = DMatrix::from_diagonal(&weights.rows_range(10 * n..).into_owned()) * part;
         assert!(close(&normal, &(part.transpose() * &weighted)));
         let expected = weighted.transpose() * measured.rows_range(10 * n..);
         assert!(close(&column(right), &column(expected)));
-        let further = rows.with(1, |_| 0, &measured);
+        let further = rows.append_columns(1, |_| 0, &measured);
         assert_eq!(further.columns(), columns + 1);
         let mut one = vec![0.0; columns + 1];
         one[columns] = 1.0;
-        assert!(close(&column(further.times(&one)), &column(measured)));
+        assert!(close(&column(further.multiply(&one)), &column(measured)));
     }
 }

@@ -1,6 +1,6 @@
-//! The clock of a recording, held against rates that the machine recorded itself: a position changes by the integral of its
-//! rate, whatever the joint does, so that all coordinates tell of one time. Samples that were written twice show where all
-//! positions stay while the rates go on.
+//! Checks the times of a recording against recorded rates: a position changes by the integral of its rate, whatever the
+//! joint does, so that all coordinates show the same clock error. Samples that were written twice are visible where all
+//! positions stay equal while the rates continue. Input: a recording; output: warnings.
 
 use std::collections::BTreeMap;
 
@@ -8,40 +8,37 @@ use crate::motion::mean_rate;
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
 
-use crate::recording::{Note, Recording};
+use super::thresholds::{
+    CLOCK_AGREEING_OF_THREE, CLOCK_AGREEMENT_SHARE, CLOCK_RATIOS, CLOCK_SQUARED_CORRELATION, MIN_CLOCK_ERROR,
+    REPEATED_CHANCE_FACTOR, REPEATED_FEWEST_POSITIONS, REPEATED_FEWEST_SAMPLES, REPEATED_LEAST_SHARE,
+};
+use crate::recording::{RecordingNote, SignalRecording};
 use crate::signal::median;
-use crate::words::{list, with_digits};
+use crate::words::{backquoted_list, with_digits};
 
-/// A clock that is off by less may be the scale of a sensor, or its noise.
-const OFF: f64 = 0.005;
-/// Two thirds of the coordinates must see this part of what the clock is off: one that walks is off otherwise at other times, when
-/// others move.
-const AGREE: f64 = 0.4;
-/// Ratios beyond are slips of units, which are told elsewhere.
-const CLOCKS: std::ops::Range<f64> = 0.9..1.1;
-/// Pieces of the recording, at most, over which rates are summed.
+/// Largest number of pieces of the recording over which rates are integrated.
 const PIECES: usize = 400;
-/// A piece has at least so many samples.
+/// Least number of samples of a piece.
 const SHORTEST: usize = 8;
-/// Part of all samples that repeat their neighbour before it is told.
-const REPEATED: f64 = 0.02;
 
-impl Recording {
-    /// Warnings about the times of samples. `coordinates` are names of positions.
-    pub(crate) fn clock(&self, coordinates: &[&str]) -> Vec<Note> {
+impl SignalRecording {
+    /// Warnings about the times of samples. `coordinates` are the names of the positions; rates have the suffix `_d`.
+    pub(crate) fn clock_notes(&self, coordinates: &[&str]) -> Vec<RecordingNote> {
         let Ok(time) = self.column("t") else {
             return Vec::new();
         };
-        let mut notes: Vec<Note> = self.wrong_clock(time, coordinates).into_iter().collect();
-        notes.extend(self.repeated(time, coordinates));
+        let mut notes: Vec<RecordingNote> = self.clock_error_note(time, coordinates).into_iter().collect();
+        notes.extend(self.repeated_samples_note(time, coordinates));
         notes
     }
 
-    fn wrong_clock(&self, time: &[f64], coordinates: &[&str]) -> Option<Note> {
+    /// Warning about a clock that runs too fast or too slowly; `None` if it agrees with the rates.
+    fn clock_error_note(&self, time: &[f64], coordinates: &[&str]) -> Option<RecordingNote> {
+        // One ratio for each coordinate with a recorded rate.
         let mut ratios: BTreeMap<String, f64> = BTreeMap::new();
         for name in coordinates {
             let rate = format!("{name}_d");
-            let (Ok(q), true) = (self.column(name), self.has(&rate)) else {
+            let (Ok(q), true) = (self.column(name), self.has_column(&rate)) else {
                 continue;
             };
             if let Ok(qd) = self.column(&rate)
@@ -50,15 +47,17 @@ impl Recording {
                 ratios.insert(rate, ratio);
             }
         }
+        // The median over the coordinates is not affected by a single wrong sensor.
         let middle = median(ratios.values().copied().collect());
         let off = middle - 1.0;
-        if ratios.is_empty() || !CLOCKS.contains(&middle) || off.abs() < OFF {
+        if ratios.is_empty() || !CLOCK_RATIOS.contains(&middle) || off.abs() < MIN_CLOCK_ERROR {
             return None;
         }
+        // Coordinates that show a clock error of the same sign and of similar size.
         let agree = ratios
             .values()
-            .filter(|ratio| (*ratio - 1.0) * off.signum() > AGREE * off.abs());
-        if 3 * agree.count() < 2 * ratios.len() {
+            .filter(|ratio| (*ratio - 1.0) * off.signum() > CLOCK_AGREEMENT_SHARE * off.abs());
+        if 3 * agree.count() < CLOCK_AGREEING_OF_THREE * ratios.len() {
             return None;
         }
         let names: Vec<String> = ratios.keys().cloned().collect();
@@ -67,14 +66,15 @@ impl Recording {
         } else {
             ("too fast", "shorter")
         };
+        // The true duration is the recorded one times the ratio.
         let duration = time[time.len() - 1] - time[0];
-        Some(Note::warning(format!(
-            "`t` in {} runs {runs}: positions change by {} times what the recorded {} tell, so that the run takes {} s rather \
-             than {} s, {should} by {} %. Are samples counted (steps of {} s) instead of stamps read? Give the true times as `t`; \
-             derivatives made of positions are off by as much, accelerations twice.",
+        Some(RecordingNote::warning(format!(
+            "`t` in {} runs {runs}: positions change by {} times the integral of the recorded {}. So the run takes {} s \
+             and not {} s, {should} by {} %. Rates from positions have the same relative error, accelerations twice that. \
+             Provide the true times as `t`; the steps of {} s may come from a sample counter.",
             self.file(),
             with_digits(middle, 4),
-            list(&names),
+            backquoted_list(&names),
             with_digits(duration * middle, 5),
             with_digits(duration, 5),
             with_digits(100.0 * off.abs(), 2),
@@ -82,20 +82,23 @@ impl Recording {
         )))
     }
 
-    fn repeated(&self, time: &[f64], coordinates: &[&str]) -> Option<Note> {
+    /// Warning about samples that were written twice; `None` if there are few.
+    fn repeated_samples_note(&self, time: &[f64], coordinates: &[&str]) -> Option<RecordingNote> {
         let positions: Vec<&[f64]> = coordinates
             .iter()
             .filter_map(|name| self.column(name).ok())
             .filter(|q| q.iter().any(|v| v.total_cmp(&q[0]).is_ne()))
             .collect();
         let n = time.len();
-        if positions.len() < 2 || n < 100 {
+        // A single position may repeat by chance, and so may few samples.
+        if positions.len() < REPEATED_FEWEST_POSITIONS || n < REPEATED_FEWEST_SAMPLES {
             return None;
         }
+        // Bitwise equality: any noise of a new measurement would change the value.
         let same = |q: &[f64], i: usize| q[i].total_cmp(&q[i - 1]).is_eq();
         let all = (1..n)
             .filter(|i| positions.iter().all(|q| same(q, *i)))
-            // At rest everything stays.
+            // At standstill all positions stay equal, so a neighbouring step must show motion.
             .filter(|i| {
                 let around = [i.saturating_sub(2), (*i + 1).min(n - 1)];
                 positions
@@ -105,17 +108,18 @@ impl Recording {
                     > 0
             })
             .count();
-        // Steps of an encoder stay by chance, each by itself.
+        // Quantised positions repeat by chance, independently of each other.
         let by_chance: f64 = positions
             .iter()
             .map(|q| (1..n).filter(|i| same(q, *i)).count() as f64 / n as f64)
             .product();
+        // Report only if repetitions are clearly more frequent than by chance.
         let part = all as f64 / n as f64;
-        (part > REPEATED + 3.0 * by_chance).then(|| {
-            Note::warning(message!(
-                "In {all} of {n} samples of {} all positions stay exactly as they were while the mechanism moves: samples were \
-                 written twice, or read later than they are stamped. Derivatives of positions hear of it; recorded rates, \
-                 or a lower cut-off ({}), help.",
+        (part > REPEATED_LEAST_SHARE + REPEATED_CHANCE_FACTOR * by_chance).then(|| {
+            RecordingNote::warning(message!(
+                "In {all} of {n} samples of {} all positions are equal to those of the sample before, while the mechanism \
+                 moves. Samples were written twice, or read later than their times state. This disturbs derivatives of \
+                 positions: use recorded rates, or a lower cut-off ({}).",
                 self.file(),
                 Remedy::option(OptionName::CutoffHz),
             ))
@@ -123,10 +127,12 @@ impl Recording {
     }
 }
 
-/// How many times as far as its rate tells a position changes, over pieces of the recording; `None` where it hardly moves.
+/// Ratio of the change of a position to the integral of its rate, over pieces of the recording; `None` if it hardly
+/// moves or the rate does not explain it.
 fn change_by_integral(time: &[f64], q: &[f64], qd: &[f64]) -> Option<f64> {
     let n = time.len();
     let piece = (n / PIECES).next_multiple_of(2).max(SHORTEST);
+    // Change of the position and integral of the rate, piece by piece.
     let pairs: Vec<(f64, f64)> = (0..n.saturating_sub(piece))
         .step_by(piece)
         .map(|start| {
@@ -136,14 +142,16 @@ fn change_by_integral(time: &[f64], q: &[f64], qd: &[f64]) -> Option<f64> {
                     .map(|i| 0.5 * (qd[i] + qd[i + step]) * (time[i + step] - time[i]))
                     .sum()
             };
-            // Richardson: motion that is fast beside the steps is summed up too short by a quarter of what two steps lose.
+            // Richardson extrapolation: the trapezoidal rule with single and double steps cancels the error of second
+            // order.
             let integral = (4.0 * by(1) - by(2)) / 3.0;
             (q[start + piece] - q[start], integral)
         })
         .collect();
-    // A rate may have an offset.
+    // A rate may have an offset, so means are subtracted.
     let mean = |of: fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / pairs.len() as f64;
     let (change, integral) = (mean(|pair| pair.0), mean(|pair| pair.1));
+    // Sums of products of both, around their means.
     let (mut qi, mut ii, mut qq) = (0.0, 0.0, 0.0);
     for (q, i) in &pairs {
         let (q, i) = (q - change, i - integral);
@@ -151,12 +159,13 @@ fn change_by_integral(time: &[f64], q: &[f64], qd: &[f64]) -> Option<f64> {
         ii += i * i;
         qq += q * q;
     }
-    // What the rate does not explain is no matter of the clock.
-    let is_explained = qi * qi > 0.95 * qq * ii;
+    // If the rate does not explain the position, the clock is not the reason.
+    let is_explained = qi * qi > CLOCK_SQUARED_CORRELATION * qq * ii;
     if ii <= 0.0 || !is_explained {
         return None;
     }
-    // Noise of the rate makes the one too small, noise of the position the other too large: the truth lies between.
+    // Noise of the rate makes one ratio too small, noise of the position the other too large: the true value lies
+    // between them.
     let (low, high) = (qi / ii, qq / qi);
     Some(1.0_f64.clamp(low.min(high), low.max(high)))
 }
@@ -168,7 +177,7 @@ mod tests {
     use super::*;
     use crate::ReadOptions;
 
-    fn recording(stamp: impl Fn(u32) -> f64, repeated: bool) -> Vec<Note> {
+    fn recording(stamp: impl Fn(u32) -> f64, repeated: bool) -> Vec<RecordingNote> {
         let mut text = "t,a,a_d,b,b_d\n".to_owned();
         for i in 0..4000 {
             let k = if repeated && i % 40 == 7 { i - 1 } else { i };
@@ -178,8 +187,8 @@ mod tests {
             let (a_d, b_d) = (2.0 * (2.0 * t).cos(), -3.0 * (3.0 * t).sin());
             writeln!(text, "{},{a},{a_d},{b},{b_d}", stamp(i)).unwrap();
         }
-        let read = Recording::from_bytes(text.as_bytes(), "run.csv", &ReadOptions::default());
-        read.unwrap().clock(&["a", "b"])
+        let read = SignalRecording::from_bytes(text.as_bytes(), "run.csv", &ReadOptions::default());
+        read.unwrap().clock_notes(&["a", "b"])
     }
 
     #[test]
@@ -188,17 +197,10 @@ mod tests {
         let counted = recording(|i| 1e-3 * f64::from(i), false);
         assert_eq!(counted.len(), 1);
         let says = counted[0].says.in_library_words();
-        assert!(
-            says.contains("too slowly") && says.contains("1.02 times"),
-            "{says}"
-        );
+        assert!(says.contains("too slowly") && says.contains("1.02 times"), "{says}");
         let repeated = recording(|i| 1.02e-3 * f64::from(i), true);
         assert!(
-            repeated.len() == 1
-                && repeated[0]
-                    .says
-                    .in_library_words()
-                    .contains("In 100 of 4000"),
+            repeated.len() == 1 && repeated[0].says.in_library_words().contains("In 100 of 4000"),
             "{repeated:?}"
         );
     }

@@ -1,30 +1,27 @@
-//! What looks wrong with a recording although every number can be read: a recording goes in, warnings come out.
+//! Columns that look wrong. Input: a recording; output: warnings.
 //!
-//! Angles that are wrapped, rates that are not the derivatives of their positions (with the slip of units that
-//! explains it), and times that can hardly be in seconds.
+//! Checks for wrapped angles, for rates that are not the derivatives of their positions (with the unit error that
+//! explains it), and for times that are hardly in seconds.
 
 use std::f64::consts::PI;
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{Message, OptionName, OptionSetting, Remedy};
 
-use crate::motion::{DerivativeSource, Run};
-use crate::recording::{GAP, Note, Recording};
+use super::thresholds::{
+    LONGEST_STEP_S, RATE_FEWEST_SAMPLES, RATE_MOST_MISFIT, RATE_MOST_NOISE, RATE_RATIO_TOLERANCE, SAME_RATIO_TOLERANCE,
+    SHORTEST_STEP_S, WRAP_LEAST_STEPS, WRAP_TOLERANCE_DEG, WRAP_TOLERANCE_RAD,
+};
+use crate::motion::{DerivativeSource, PreparedRun};
+use crate::recording::{GAP_LEAST_STEPS, RecordingNote, SignalRecording};
 use crate::signal::median;
-use crate::words::{list, with_digits};
+use crate::words::{backquoted_list, with_digits};
 
-/// Ratios of a rate to the derivative of its position that pass as 1; drift and coarse sampling make a few per cent.
-const RATIO_TOLERANCE: f64 = 0.1;
-/// Part of a rate's integral that the position may leave unexplained.
-const MISFIT: f64 = 0.3;
-/// No drive is sampled as slowly as this, s.
-const SLOWEST: f64 = 0.5;
-/// Nobody samples forces of a machine in shorter steps, s.
-const FASTEST: f64 = 2e-6;
-
-impl Run {
-    /// Warnings about measured forces of the given drives that are 0 throughout, which fit parameters of 0 exactly.
-    pub fn suspicious_forces(&self, drives: &[String], undriven: &[String]) -> Vec<Note> {
+impl PreparedRun {
+    /// Warnings about measured forces that are 0 in every sample; parameters of 0 would explain them exactly.
+    /// `undriven` are drives whose force is known to be zero.
+    pub fn zero_force_notes(&self, drives: &[String], undriven: &[String]) -> Vec<RecordingNote> {
+        // Forces may be missing from the recording.
         let forces = self.force.iter().flatten();
         let idle: Vec<String> = drives
             .iter()
@@ -35,75 +32,79 @@ impl Run {
         if idle.is_empty() {
             return Vec::new();
         }
-        vec![Note::warning(message!(
-            "The measured force of {} in {} is 0 throughout: nothing was measured, or the column is another one ({}); \
-             errors relative to it have no value, and it pulls parameters to 0.",
-            list(&idle),
+        vec![RecordingNote::warning(message!(
+            "The measured force of {} in {} is 0 in every sample. Estimated parameters become too small, and errors \
+             relative to it are undefined. Check which column is the force ({}).",
+            backquoted_list(&idle),
             self.file,
             Remedy::option(OptionName::Columns),
         ))]
     }
 }
 
-impl Recording {
-    /// Warnings about columns that can be read but hardly are what they should be. `coordinates` are
-    /// `(name, whether it is an angle)`; columns that cannot be used are passed over.
-    pub fn suspicions(
-        &self,
-        coordinates: &[(String, bool)],
-        source: DerivativeSource,
-    ) -> Vec<Note> {
+impl SignalRecording {
+    /// Warnings about columns that can be read but are probably wrong. `coordinates` are `(name, whether it is an
+    /// angle)`; columns that cannot be used are skipped.
+    pub fn suspicious_columns(&self, coordinates: &[(String, bool)], source: DerivativeSource) -> Vec<RecordingNote> {
         let Ok(time) = self.column("t") else {
             return Vec::new();
         };
-        let mut notes: Vec<Note> = coordinates
+        let mut notes: Vec<RecordingNote> = coordinates
             .iter()
             .filter(|(_, is_angle)| *is_angle)
-            .filter_map(|(name, _)| self.wrapped(name, time))
+            .filter_map(|(name, _)| self.wrapped_angle_note(name, time))
             .collect();
+        // Recorded rates are compared only if they are used.
         let (rates, settled) = if source == DerivativeSource::Positions {
             (Vec::new(), false)
         } else {
-            self.rates(coordinates, time)
+            self.rate_mismatch_notes(coordinates, time)
         };
+        // Unit of the time: unless the rates show that it is right.
         let step = median(time.windows(2).map(|w| w[1] - w[0]).collect());
         // One sample has no steps.
-        if time.len() > 1 && step <= FASTEST {
-            notes.push(Note::warning(format!(
-                "The steps of `t` in {} are {} s, which is fast for a recording of forces; time must be in s.",
+        if time.len() > 1 && step <= SHORTEST_STEP_S {
+            notes.push(RecordingNote::warning(format!(
+                "`t` in {} has steps of {} s, which is too short for a recording of forces. Check its unit: times must \
+                 be in s.",
                 self.file(),
                 with_digits(step, 3)
             )));
         }
-        if step >= SLOWEST && rates.is_empty() && !settled {
-            notes.push(Note::warning(format!(
-                "The steps of `t` in {} are {} s, which is slow for a recording of forces; time must be in s: is it in ms?",
+        if step >= LONGEST_STEP_S && rates.is_empty() && !settled {
+            notes.push(RecordingNote::warning(message!(
+                "`t` in {} has steps of {} s, which is too long for a recording of forces. Times must be in s; if they \
+                 are in ms, convert them ({}).",
                 self.file(),
-                with_digits(step, 3)
+                with_digits(step, 3),
+                Remedy::option(OptionName::Columns).with_value("t=t [ms]"),
             )));
         }
         notes.extend(rates);
+        // The clock is compared with the recorded rates.
         let names: Vec<&str> = coordinates.iter().map(|(name, _)| name.as_str()).collect();
-        notes.extend(self.clock(&names));
+        notes.extend(self.clock_notes(&names));
         notes
     }
 
-    /// The options that read an angle recorded in degrees, and with it those of its recorded derivatives that are in
-    /// degrees too: all but those that are the derivatives in rad of what stands beside them.
-    pub fn maps_from_degrees(&self, name: &str) -> Vec<OptionSetting> {
-        let map = |column: &str, unit: &str| {
-            OptionSetting::new(OptionName::Columns, format!("{column}={column} [{unit}]"))
-        };
+    /// Options that convert an angle recorded in degrees, and those of its recorded derivatives that are in degrees
+    /// too: all except those that are the derivatives in rad of the recorded signal before them.
+    pub fn degree_conversion_options(&self, name: &str) -> Vec<OptionSetting> {
+        // An option that reads a column in another unit.
+        let map =
+            |column: &str, unit: &str| OptionSetting::new(OptionName::Columns, format!("{column}={column} [{unit}]"));
         let mut maps = vec![map(name, "deg")];
         for (of, order, unit) in [("", "_d", "deg/s"), ("_d", "_dd", "deg/s^2")] {
             let [of, rate] = [of, order].map(|suffix| format!("{name}{suffix}"));
             let Ok(values) = self.column(&rate) else {
                 continue;
             };
+            // A derivative that is 180/pi times too small is in rad already; the next one is then relative to rad as
+            // well.
             let beside = self.column("t").ok().zip(self.column(&of).ok());
-            let compared = beside.and_then(|(time, of)| compare(time, of, values));
+            let compared = beside.and_then(|(time, of)| compare_rate(time, of, values));
             let is_rad = compared.is_some_and(|(ratio, misfit)| {
-                misfit < MISFIT && (ratio * 180.0 / PI - 1.0).abs() < RATIO_TOLERANCE
+                misfit < RATE_MOST_MISFIT && (ratio * 180.0 / PI - 1.0).abs() < RATE_RATIO_TOLERANCE
             });
             if is_rad {
                 break;
@@ -113,19 +114,21 @@ impl Recording {
         maps
     }
 
-    /// Jumps by a whole turn between neighbouring samples.
-    fn wrapped(&self, name: &str, time: &[f64]) -> Option<Note> {
+    /// Warning about jumps by a full turn between neighbouring samples; `None` without any.
+    fn wrapped_angle_note(&self, name: &str, time: &[f64]) -> Option<RecordingNote> {
         let q = self.column(name).ok()?;
         let steps: Vec<f64> = q.windows(2).map(|w| w[1] - w[0]).collect();
+        // A jump is about a full turn and far larger than a usual step.
         let usual = median(steps.iter().map(|step| step.abs()).collect());
         for (turn, slack, name_of_turn, besides) in [
-            (2.0 * PI, 0.5, "2 pi", ""),
-            (360.0, 20.0, "360", " and in degrees"),
+            (2.0 * PI, WRAP_TOLERANCE_RAD, "2 pi", ""),
+            (360.0, WRAP_TOLERANCE_DEG, "360", " and in degrees"),
         ] {
-            let jumps = |step: &f64| (step.abs() - turn).abs() < slack && step.abs() > 10.0 * usual;
+            let jumps = |step: &f64| (step.abs() - turn).abs() < slack && step.abs() > WRAP_LEAST_STEPS * usual;
             let Some(first) = steps.iter().position(jumps) else {
                 continue;
             };
+            // The message gives the first jump and the number of all.
             let n = steps.iter().filter(|step| jumps(step)).count();
             let times = if n == 1 { "once" } else { "first" };
             let all = if n == 1 {
@@ -133,10 +136,10 @@ impl Recording {
             } else {
                 format!(", {n} times in all")
             };
-            return Some(Note::warning(format!(
+            return Some(RecordingNote::warning(format!(
                 "`{name}` in {} jumps by {name_of_turn}, {times} from {} to {} at t = {} s (line {}){all}: the angle \
-                 seems to be wrapped{besides}. Record it without jumps, or add whole turns; derivatives and filters \
-                 take them for motion.",
+                 seems to be wrapped{besides}. Derivatives and filters treat the jumps as motion. Record the angle \
+                 without jumps, or add full turns.",
                 self.file(),
                 q[first],
                 q[first + 1],
@@ -147,31 +150,35 @@ impl Recording {
         None
     }
 
-    /// Rates and accelerations that are not the derivatives of what stands beside them, one note for each
-    /// explanation; and whether there were any rates that are.
-    fn rates(&self, coordinates: &[(String, bool)], time: &[f64]) -> (Vec<Note>, bool) {
+    /// Warnings about rates and accelerations that are not the derivatives of the recorded signal before them, one for
+    /// each explanation; and whether any rates are.
+    fn rate_mismatch_notes(&self, coordinates: &[(String, bool)], time: &[f64]) -> (Vec<RecordingNote>, bool) {
         let mut found: Vec<(Message, Vec<String>, Vec<String>, f64)> = Vec::new();
         let mut settled = false;
         for (name, is_angle) in coordinates {
+            // Rates are compared with positions, accelerations with rates.
             for (of, rate) in [("", "_d"), ("_d", "_dd")] {
                 let [of, rate] = [of, rate].map(|suffix| format!("{name}{suffix}"));
                 let (Ok(q), Ok(qd)) = (self.column(&of), self.column(&rate)) else {
                     continue;
                 };
-                let Some((ratio, misfit)) = compare(time, q, qd) else {
+                let Some((ratio, misfit)) = compare_rate(time, q, qd) else {
                     continue;
                 };
-                if misfit < MISFIT && (ratio - 1.0).abs() < RATIO_TOLERANCE {
+                // The column is the derivative.
+                if misfit < RATE_MOST_MISFIT && (ratio - 1.0).abs() < RATE_RATIO_TOLERANCE {
                     settled = true;
                     continue;
                 }
-                let why = if misfit < MISFIT {
-                    explain(ratio, *is_angle)
+                // A ratio has an explanation only if the rate is a multiple of the derivative.
+                let why = if misfit < RATE_MOST_MISFIT {
+                    explain_ratio(ratio, *is_angle)
                 } else {
                     Message::new()
                 };
+                // Columns with the same explanation and ratio share one warning.
                 match found.iter_mut().find(|(other, .., r)| {
-                    *other == why && (why.is_empty() || (r / ratio - 1.0).abs() < 0.05)
+                    *other == why && (why.is_empty() || (r / ratio - 1.0).abs() < SAME_RATIO_TOLERANCE)
                 }) {
                     Some((_, ofs, rates, _)) => {
                         ofs.push(of);
@@ -181,12 +188,14 @@ impl Recording {
                 }
             }
         }
+        // One sentence for all columns with the same explanation.
         let notes = found.into_iter().map(|(why, ofs, rates, ratio)| {
             let (is, derivative) = if rates.len() == 1 {
                 ("is", "the derivative")
             } else {
                 ("are", "the derivatives")
             };
+            // Without an explanation the columns may be mixed up.
             let how = if why.is_empty() {
                 message!(
                     "nor a multiple of it: check which column is which ({})",
@@ -195,12 +204,12 @@ impl Recording {
             } else {
                 message!("but about {} times as large: {}", with_digits(ratio, 3), why)
             };
-            Note::warning(message!(
-                "{} in {} {is} not {derivative} of {} with respect to `t`, {}. Mend the columns, or take derivatives \
-                 from positions ({}).",
-                list(&rates),
+            RecordingNote::warning(message!(
+                "{} in {} {is} not {derivative} of {} with respect to `t`, {}. Correct the columns, or compute \
+                 derivatives from the positions ({}).",
+                backquoted_list(&rates),
                 self.file(),
-                list(&ofs),
+                backquoted_list(&ofs),
                 how,
                 Remedy::option(OptionName::Source).with_value("positions"),
             ))
@@ -209,26 +218,29 @@ impl Recording {
     }
 }
 
-/// How many times as large a rate is as the derivative of a position, and the part of it that the position does not
-/// explain; `None` where the position hardly moves or is mostly noise.
+/// Ratio of a rate to the derivative of a position, and the share of the rate's integral that the position does not
+/// explain; `None` if the position hardly moves or is mostly noise.
 ///
-/// The integral of the rate is held against the position, for differences of the position would amplify its noise.
-/// Each stretch between gaps counts from its own mean.
-fn compare(time: &[f64], position: &[f64], rate: &[f64]) -> Option<(f64, f64)> {
+/// The integral of the rate is compared with the position, since differences of the position would amplify its noise.
+/// Each segment between gaps is compared relative to its own mean.
+fn compare_rate(time: &[f64], position: &[f64], rate: &[f64]) -> Option<(f64, f64)> {
     let usual = median(time.windows(2).map(|w| w[1] - w[0]).collect());
     let (mut qq, mut qi, mut ii, mut steps) = (0.0, 0.0, 0.0, 0.0);
     let largest = position.iter().fold(0.0_f64, |most, q| most.max(q.abs()));
     let mut start = 0;
     for end in 1..=time.len() {
-        if end < time.len() && time[end] - time[end - 1] <= GAP * usual {
+        // Continue up to a gap or the end.
+        if end < time.len() && time[end] - time[end - 1] <= GAP_LEAST_STEPS * usual {
             continue;
         }
+        // Trapezoidal rule.
         let mut integral = vec![0.0];
         for i in start + 1..end {
             let sum = integral[i - start - 1];
             integral.push(sum + 0.5 * (rate[i] + rate[i - 1]) * (time[i] - time[i - 1]));
             steps += (position[i] - position[i - 1]).powi(2);
         }
+        // Sums of squares and products of the deviations from the means.
         let n = (end - start) as f64;
         let mean_q = position[start..end].iter().sum::<f64>() / n;
         let mean_i = integral.iter().sum::<f64>() / n;
@@ -240,33 +252,37 @@ fn compare(time: &[f64], position: &[f64], rate: &[f64]) -> Option<(f64, f64)> {
         }
         start = end;
     }
-    // A coordinate that rests away from zero differs from its mean by rounding, which is no motion.
+    // A coordinate at standstill away from zero differs from its mean by rounding, which is no motion.
     let rounding = (1e-12 * largest).powi(2) * time.len() as f64;
-    // What changes as much from sample to sample as over the whole is noise, or sampled too coarsely to tell.
-    if time.len() < 16 || qq <= rounding || steps > 0.5 * qq {
+    // A signal that changes as much between samples as in total is noise, or sampled too coarsely.
+    if time.len() < RATE_FEWEST_SAMPLES || qq <= rounding || steps > RATE_MOST_NOISE * qq {
         return None;
     }
+    // The rate is zero, although the position moves.
     if ii <= 0.0 {
         return Some((0.0, 1.0));
     }
+    // Least squares ratio, and the share that a linear relation does not explain.
     let ratio = qi / qq;
     Some((ratio, (1.0 - qi * qi / (qq * ii)).max(0.0).sqrt()))
 }
 
-/// The slip of units behind a ratio of a rate to the derivative of its position.
-fn explain(ratio: f64, is_angle: bool) -> Message {
+/// The unit error that explains a ratio of a rate to the derivative of its position, as a clause of a sentence.
+/// Empty if the ratio is 1; a negative ratio adds that the signs differ.
+fn explain_ratio(ratio: f64, is_angle: bool) -> Message {
     let degree = 180.0 / PI;
-    let is = |value: f64| (ratio.abs() / value - 1.0).abs() < RATIO_TOLERANCE;
+    // Whether the ratio is near a value, with either sign.
+    let is = |value: f64| (ratio.abs() / value - 1.0).abs() < RATE_RATIO_TOLERANCE;
     let why = if is(1.0) {
         Message::new()
     } else if is(degree) && is_angle {
-        "it seems to be per second in degrees, where what it derives from is in rad".into()
+        "it seems to be in degrees, and the signal that it is the derivative of in rad".into()
     } else if is(1.0 / degree) && is_angle {
-        "what it derives from seems to be in degrees".into()
+        "the signal that it is the derivative of seems to be in degrees".into()
     } else if is(1e3) && is_angle {
         "time seems to be in ms, and must be in s".into()
     } else if is(1e3) {
-        "time seems to be in ms, or lengths differ by m and mm".into()
+        "time seems to be in ms, or one of both lengths is in mm and the other in m".into()
     } else if is(1e3 * degree) && is_angle {
         "time seems to be in ms and the rate in degrees".into()
     } else if is(1e3 / degree) && is_angle {
@@ -286,6 +302,7 @@ fn explain(ratio: f64, is_angle: bool) -> Message {
         )
     };
     if ratio < 0.0 {
+        // The sign is reported in addition to the unit.
         let and = if why.is_empty() { "" } else { ", and " };
         return message!("the signs differ{and}{}", why);
     }
@@ -297,8 +314,8 @@ mod tests {
     use std::fmt::Write as _;
 
     use super::*;
-    use crate::test_noise::Noise;
-    use crate::{Preparation, ReadOptions};
+    use crate::test_noise::TestNoise;
+    use crate::{ReadOptions, StatePreparation};
 
     /// A recording of one angle with its rate, each number by its own function of the time.
     fn recording(
@@ -306,18 +323,18 @@ mod tests {
         time: impl Fn(f64) -> f64,
         q: impl Fn(f64) -> f64,
         qd: impl Fn(f64) -> f64,
-    ) -> Recording {
+    ) -> SignalRecording {
         let mut text = "t,q,q_d,motor\n".to_owned();
         for i in 0..samples {
             let t = f64::from(i) * 0.004;
             let _ = writeln!(text, "{},{},{},{}", time(t), q(t), qd(t), t.sin());
         }
-        Recording::from_reader(text.as_bytes(), "run.csv", &ReadOptions::default()).unwrap()
+        SignalRecording::from_reader(text.as_bytes(), "run.csv", &ReadOptions::default()).unwrap()
     }
 
-    fn says(recording: &Recording) -> String {
+    fn says(recording: &SignalRecording) -> String {
         recording
-            .suspicions(&[("q".to_owned(), true)], DerivativeSource::RecordedFirst)
+            .suspicious_columns(&[("q".to_owned(), true)], DerivativeSource::RecordedFirst)
             .iter()
             .map(|note| note.says.in_library_words())
             .collect::<Vec<_>>()
@@ -325,7 +342,7 @@ mod tests {
     }
 
     #[track_caller]
-    fn check(recording: &Recording, expected: &str) {
+    fn check(recording: &SignalRecording, expected: &str) {
         let says = says(recording);
         if expected.is_empty() {
             assert_eq!(says, "");
@@ -347,23 +364,17 @@ mod tests {
     fn slips_of_units_are_named() {
         let n = 2000;
         check(&recording(n, |t| t, q, qd), "");
-        check(
-            &recording(n, |t| t, q, |t| qd(t).to_degrees()),
-            "about 57.3 times",
-        );
+        check(&recording(n, |t| t, q, |t| qd(t).to_degrees()), "about 57.3 times");
         check(&recording(n, |t| t, q, |t| qd(t).to_degrees()), "degrees");
         check(&recording(n, |t| 1e3 * t, q, qd), "time seems to be in ms");
         check(&recording(n, |t| t, q, |t| -qd(t)), "the signs differ");
         check(&recording(n, |t| t, q, |t| 2.0 * qd(t)), "check the units");
-        check(
-            &recording(n, |t| t, q, |t| (7.0 * t).sin()),
-            "which column is which",
-        );
+        check(&recording(n, |t| t, q, |t| (7.0 * t).sin()), "which column is which");
     }
 
     #[test]
     fn noise_bias_and_coarse_steps_are_no_suspicion() {
-        let noise = std::cell::RefCell::new(Noise::new(3));
+        let noise = std::cell::RefCell::new(TestNoise::new(3));
         let draw = |size: f64| size * noise.borrow_mut().normal();
         // A quantised and noisy position, a rate with noise and some offset.
         let rough = recording(
@@ -383,9 +394,13 @@ mod tests {
     #[test]
     fn time_in_milliseconds_is_seen_without_rates() {
         let slow = recording(500, |t| 1e3 * t, q, qd);
-        let notes = slow.suspicions(&[("q".to_owned(), true)], DerivativeSource::Positions);
+        let notes = slow.suspicious_columns(&[("q".to_owned(), true)], DerivativeSource::Positions);
         assert!(
-            notes.len() == 1 && notes[0].says.in_library_words().contains("is it in ms?"),
+            notes.len() == 1
+                && notes[0]
+                    .says
+                    .in_library_words()
+                    .contains("if they are in ms, convert them"),
             "{notes:?}"
         );
     }
@@ -394,7 +409,7 @@ mod tests {
     fn a_wrapped_angle_is_named_with_its_line() {
         let wrap = |t: f64| (0.8 * t + PI).rem_euclid(2.0 * PI) - PI;
         let wrapped = recording(4000, |t| t, wrap, |_| 0.8);
-        let notes = wrapped.suspicions(&[("q".to_owned(), true)], DerivativeSource::Positions);
+        let notes = wrapped.suspicious_columns(&[("q".to_owned(), true)], DerivativeSource::Positions);
         assert!(
             notes.len() == 1
                 && notes[0].says.in_library_words().contains("jumps by 2 pi")
@@ -404,12 +419,12 @@ mod tests {
         );
         // A length may jump as it likes.
         assert_eq!(
-            wrapped.suspicions(&[("q".to_owned(), false)], DerivativeSource::Positions),
+            wrapped.suspicious_columns(&[("q".to_owned(), false)], DerivativeSource::Positions),
             []
         );
     }
 
-    /// Two stretches with a second between them: each is prepared on its own, so no rate shows the jump.
+    /// Two segments with a second between them: each is prepared on its own, so no rate shows the jump.
     #[test]
     fn nothing_is_filtered_across_a_gap() {
         let broken = recording(
@@ -420,18 +435,15 @@ mod tests {
         );
         let names = ["q".to_owned()];
         let drives = ["motor".to_owned()];
-        let positions = Preparation {
+        let positions = StatePreparation {
             source: DerivativeSource::Positions,
-            ..Preparation::default()
+            ..StatePreparation::default()
         };
         let runs = broken.runs_with(&names, &drives, &positions).unwrap();
         assert_eq!(runs.len(), 2);
         assert!(
             runs[0].notes[0].says.in_library_words().contains("1 gap")
-                && runs[0].notes[0]
-                    .says
-                    .in_library_words()
-                    .contains("after line 1251"),
+                && runs[0].notes[0].says.in_library_words().contains("after line 1251"),
             "{:?}",
             runs[0].notes
         );
@@ -444,6 +456,6 @@ mod tests {
         assert_eq!(runs[1].lines.len(), runs[1].samples());
         // Recorded rates need no filter, hence no cut.
         let recorded = recording(100, |t| if t < 0.2 { t } else { t + 1.0 }, q, qd);
-        assert_eq!(recorded.stretches(0.0).len(), 2);
+        assert_eq!(recorded.split_at_gaps(0.0).len(), 2);
     }
 }

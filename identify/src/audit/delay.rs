@@ -1,11 +1,11 @@
-//! How much later than the motion forces were read: a regressor along a recording, its slope in time and the measured forces go
-//! in; delays of all channels together and of each by itself come out, with intervals.
+//! Delays of forces relative to the motion. Input: a regressor along a recording, its derivative with respect to time,
+//! and the measured forces. Output: one delay for all channels and one for each, with 99 % intervals.
 //!
-//! A force that is read at `t` acted at `t - d`: `y(t + d) = W(t) p`. Around a shift `s` by whole steps that is
-//! `y(t + s) = W p - (d - s) W' p`, which is linear in `p` and `d` (Gauss and Newton). So no measured force is ever
-//! differentiated or put between samples, where noise would draw the answer to one side, and the parameters are those that the
-//! delayed forces ask for. Fits are robust; intervals come from fits without one block of time each, as what a fit
-//! leaves resembles its neighbours and is different elsewhere.
+//! A force that is recorded at `t` acted at `t - d`: `y(t + d) = W(t) p`. Around a shift `s` by full steps this is
+//! `y(t + s) = W p - (d - s) W' p`, which is linear in `p` and `d` (Gauss-Newton). So measured forces are never
+//! differentiated or interpolated, which would bias the result by noise, and the parameters fit the delayed forces.
+//! Fits are robust. Intervals come from fits that leave out one block of time each, since residuals are correlated in
+//! time and differ between blocks.
 //!
 //! Decision: friction columns that the model may lack are fitted too. The interval is a jackknife over blocks of
 //! time, because a single fast move can look like a delay. The delay of a single drive must be three times as clear
@@ -13,108 +13,106 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::by_channel::ByChannel;
+use super::by_channel::ChannelRegressor;
 use super::robust::{RobustFit, robust_fit, solve_normal};
+use super::thresholds::{DELAY_RESOLUTION_STEPS, DELAY_STUDENT_FACTOR, FAR_SHIFT_MIN_IMPROVEMENT};
 
-/// Blocks of time that are left out one by one.
+/// Number of blocks of time, which are left out one by one.
 const BLOCKS: usize = 20;
-/// Student's factor for 99 % with one degree of freedom less than there are blocks.
-const STUDENT: f64 = 2.861;
-/// Shifts that are tried on either side before each is refined.
+/// Number of shifts that are tried on either side before the best is refined.
 const COARSE: usize = 40;
-/// Rounds of Gauss and Newton at most, and the part of a step within which shifts by whole steps are left as they are.
+/// Largest number of Gauss-Newton rounds; a remaining delay below this share of a step does not change the shift.
 const ROUNDS: usize = 8;
-const NEAR: f64 = 0.6;
-/// Steps by which a round may move a delay.
-const FARTHEST: f64 = 5.0;
-/// A shift that is far off must leave less by this part.
-const CLEARLY: f64 = 0.05;
-/// No delay is known better than to this part of a step.
-const FINEST: f64 = 0.05;
+const WHOLE_STEP_TOLERANCE: f64 = 0.6;
+/// Largest change of a delay in one round, in steps.
+const MAX_ROUND_STEPS: f64 = 5.0;
 
-/// Rows of a model along a recording, and the forces that they are to explain.
+/// Input of the estimate: the model along a recording and its measured forces.
 #[derive(Debug, Clone)]
 pub struct DelayAudit<'a> {
-    /// The regressor, with columns of whatever the model may lack.
-    pub regressor: ByChannel,
-    /// Its slope in time, per s.
-    pub slope: ByChannel,
+    /// The regressor, with columns of effects that the model may lack.
+    pub regressor: ChannelRegressor,
+    /// Its derivative with respect to time, 1/s.
+    pub slope: ChannelRegressor,
     /// Times of its samples, s.
     pub time: Vec<f64>,
-    /// Rows that count, `sample * channels + channel`.
-    pub counts: Vec<bool>,
-    /// Times of the whole recording, s.
-    pub recorded: &'a [f64],
-    /// Its forces, `[channel][sample]`.
+    /// Whether each row is used, `sample * channels + channel`.
+    pub used_rows: Vec<bool>,
+    /// Times of the complete recording, s.
+    pub recording_time: &'a [f64],
+    /// Its measured forces, `[channel][sample]`, N or N m.
     pub forces: &'a [Vec<f64>],
     /// Forces that were not measured, `[channel][sample]`; empty if all were.
-    pub left_out: &'a [Vec<bool>],
-    /// Longest delay that is looked for, s.
-    pub longest: f64,
+    pub excluded_forces: &'a [Vec<bool>],
+    /// Longest delay that is searched, s.
+    pub max_delay: f64,
 }
 
-/// By how much forces come later than the motion.
+/// Delay of forces relative to the motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Delay {
-    /// The delay, s; negative where the forces come first.
+pub struct DelayEstimate {
+    /// The delay, s; negative if the forces lead.
     pub seconds: f64,
-    /// Half of its interval of 99 %, s.
+    /// Half width of its 99 % interval, s.
     pub half_width: f64,
 }
 
 /// Delays of the forces of a recording.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Delays {
-    /// One that all forces have.
-    pub together: Delay,
-    /// One for each channel.
-    pub alone: Vec<Delay>,
-    /// What is left of each channel, relative to its force: with no delay, with one for all, and with one for each.
-    pub left: [Vec<f64>; 3],
+pub struct ForceDelays {
+    /// One delay for all channels.
+    pub common: DelayEstimate,
+    /// A delay for each channel, `[channel]`.
+    pub by_channel: Vec<DelayEstimate>,
+    /// Residual of each channel relative to its force, `[channel]`: without delay, with one for all, and with one for
+    /// each.
+    pub residuals: [Vec<f64>; 3],
 }
 
 /// A fit with delays.
-struct Fit {
-    delays: Vec<Delay>,
-    left: Vec<f64>,
-    /// Mean over the channels of the logarithm of what is left.
+struct DelayFit {
+    /// Delay of each channel; empty for a fit without delay.
+    delays: Vec<DelayEstimate>,
+    /// Residual of each channel relative to its force, `[channel]`.
+    residuals: Vec<f64>,
+    /// Mean over the channels of the logarithm of the relative residual.
     cost: f64,
 }
 
-impl Delays {
-    /// Looks for delays; `None` where too little is measured or a number is not finite.
-    pub fn of(audit: &DelayAudit<'_>) -> Option<Self> {
+impl ForceDelays {
+    /// Estimates delays; `None` if there are too few samples or a number is not finite.
+    pub fn from_audit(audit: &DelayAudit<'_>) -> Option<Self> {
         let channels = audit.forces.len();
         let step = audit.step()?;
-        let now = audit.refined(&vec![0.0; channels], 0)?;
+        let now = audit.refine_delays(&vec![0.0; channels], 0)?;
         let all: Vec<usize> = (0..channels).collect();
+        // Starting points: no delay, the best common shift, and the best shift of each channel.
         let mut starts = vec![vec![0.0; channels]];
-        starts.push(vec![audit.coarse(&all, &now.left)?; channels]);
+        starts.push(vec![audit.coarse_shift(&all, &now.residuals)?; channels]);
         if channels > 1 {
-            let each = all.iter().map(|c| audit.coarse(&[*c], &now.left));
+            // One shift for each channel by itself.
+            let each = all.iter().map(|c| audit.coarse_shift(&[*c], &now.residuals));
             starts.push(each.map(Option::unwrap_or_default).collect());
         }
+        // Equal starting points need one fit only.
         starts.dedup_by(|a, b| a.iter().zip(b).all(|(a, b)| (*a - *b).abs() < 0.5 * step));
+        // A distant starting point must be clearly better than the one at zero.
         let best = |groups: usize| {
-            let mut fits = (starts.iter()).filter_map(|start| audit.refined(start, groups));
+            let mut fits = (starts.iter()).filter_map(|start| audit.refine_delays(start, groups));
             let near = fits.next()?;
             let far = fits.min_by(|a, b| a.cost.total_cmp(&b.cost));
-            let is_better = |far: &Fit| far.cost < near.cost - CLEARLY;
+            let is_better = |far: &DelayFit| far.cost < near.cost - FAR_SHIFT_MIN_IMPROVEMENT;
             Some(match far {
                 Some(far) if is_better(&far) => far,
                 _ => near,
             })
         };
         let together = best(1)?;
-        let alone = if channels > 1 {
-            best(channels)?
-        } else {
-            best(1)?
-        };
+        let alone = if channels > 1 { best(channels)? } else { best(1)? };
         Some(Self {
-            together: together.delays[0],
-            alone: alone.delays,
-            left: [now.left, together.left, alone.left],
+            common: together.delays[0],
+            by_channel: alone.delays,
+            residuals: [now.residuals, together.residuals, alone.residuals],
         })
     }
 }
@@ -122,31 +120,31 @@ impl Delays {
 impl DelayAudit<'_> {
     /// Mean step of the recording, s.
     fn step(&self) -> Option<f64> {
-        match self.recorded {
-            [first, .., last] => Some((last - first) / (self.recorded.len() - 1) as f64),
+        match self.recording_time {
+            [first, .., last] => Some((last - first) / (self.recording_time.len() - 1) as f64),
             _ => None,
         }
     }
 
-    /// The forces of some channels at times later by a shift of each, and rows that count; the forces of others are zero.
-    fn shifted(&self, shifts: impl Iterator<Item = (usize, f64)>) -> (DVector<f64>, Vec<bool>) {
+    /// Forces of some channels at times that are later by a shift (s) of each, and whether each row counts; forces of
+    /// other channels are zero.
+    fn shift_forces(&self, shifts: impl Iterator<Item = (usize, f64)>) -> (DVector<f64>, Vec<bool>) {
         let channels = self.forces.len();
-        let mut forces = DVector::zeros(self.counts.len());
-        let mut counts = self.counts.clone();
-        let last = self.recorded.len() - 1;
+        let mut forces = DVector::zeros(self.used_rows.len());
+        let mut counts = self.used_rows.clone();
+        // Interpolate the recorded forces linearly at the shifted times.
+        let last = self.recording_time.len() - 1;
         for (c, shift) in shifts {
             let mut above = 1;
             for (k, time) in self.time.iter().enumerate() {
                 let row = k * channels + c;
                 let at = time + shift;
-                above += self.recorded[above..last]
-                    .iter()
-                    .take_while(|t| **t < at)
-                    .count();
-                let [t, next] = [self.recorded[above - 1], self.recorded[above]];
+                // First recorded sample that is not before the shifted time; times ascend.
+                above += self.recording_time[above..last].iter().take_while(|t| **t < at).count();
+                let [t, next] = [self.recording_time[above - 1], self.recording_time[above]];
                 let part = (at - t) / (next - t);
                 let is_in = (-1e-6..=1.0 + 1e-6).contains(&part);
-                // Whole steps must not touch their neighbours by rounding.
+                // A shift by full steps must not use the neighbouring sample because of rounding.
                 let part = if (part - part.round()).abs() < 1e-6 {
                     part.round()
                 } else {
@@ -154,7 +152,8 @@ impl DelayAudit<'_> {
                 };
                 let force = &self.forces[c];
                 forces[row] = (1.0 - part) * force[above - 1] + part * force[above];
-                let lost = |i: usize| self.left_out.get(c).is_some_and(|out| out[i]);
+                // Interpolation needs two measured samples, unless one has no weight.
+                let lost = |i: usize| self.excluded_forces.get(c).is_some_and(|out| out[i]);
                 let is_lost = (part < 1.0 && lost(above - 1)) || (part > 0.0 && lost(above));
                 counts[row] &= is_in && !is_lost;
             }
@@ -162,46 +161,51 @@ impl DelayAudit<'_> {
         (forces, counts)
     }
 
-    /// The forces at times later by the shift of each channel, and rows that count.
-    fn all_shifted(&self, shifts: &[f64]) -> (DVector<f64>, Vec<bool>) {
-        self.shifted(shifts.iter().copied().enumerate())
+    /// The same for all channels, with the shift (s) of each.
+    fn shift_all_forces(&self, shifts: &[f64]) -> (DVector<f64>, Vec<bool>) {
+        self.shift_forces(shifts.iter().copied().enumerate())
     }
 
-    /// The shift by whole steps that leaves least of some channels, each divided by what is left without a shift.
-    fn coarse(&self, channels: &[usize], left: &[f64]) -> Option<f64> {
+    /// The shift by full steps, in s, with the smallest residual of some channels. Channels are weighted by their
+    /// residual without shift, `left`.
+    fn coarse_shift(&self, channels: &[usize], left: &[f64]) -> Option<f64> {
         let n = self.forces.len();
         let step = self.step()?;
+        // Each channel counts relative to its residual.
         let weight = |c: usize| {
             let size = self.forces[c].iter().map(|f| f * f).sum::<f64>().sqrt();
             (left[c] * size).max(f64::MIN_POSITIVE.sqrt()).recip()
         };
         let weights: Vec<f64> = (0..n).map(weight).collect();
-        let (mut weighted, rows) = self.regressor.dense(channels, &self.counts, &weights);
+        let (mut weighted, rows) = self.regressor.dense_rows(channels, &self.used_rows, &weights);
         for mut column in weighted.column_iter_mut() {
             let norm = column.norm();
             if norm > 0.0 {
                 column /= norm;
             }
         }
+        // The regressor does not change with the shift, so one factorisation serves all shifts.
         let transposed = weighted.transpose();
         let mut normal = &transposed * &weighted;
+        // A small ridge keeps dependent columns solvable.
         for i in 0..normal.ncols() {
             normal[(i, i)] += 1e-9;
         }
         let normal = normal.cholesky()?;
         let error = |steps: f64| {
-            let (forces, _) = self.shifted(channels.iter().map(|c| (*c, steps * step)));
+            let (forces, _) = self.shift_forces(channels.iter().map(|c| (*c, steps * step)));
             let of_row = rows.iter().map(|row| forces[*row] * weights[row % n]);
             let forces = DVector::from_iterator(rows.len(), of_row);
             let right = &transposed * &forces;
             let size = forces.norm_squared();
             (size > 0.0).then(|| 1.0 - right.dot(&normal.solve(&right)) / size)
         };
-        let most = (self.longest / step).floor();
+        // Start with about COARSE strides on either side.
+        let most = (self.max_delay / step).floor();
         let mut stride = (most / COARSE as f64).ceil().max(1.0);
         let mut best = (0.0, error(0.0)?);
         let mut span = COARSE;
-        // Smaller strides around what the larger ones found.
+        // Search with smaller strides around the best shift so far.
         loop {
             let centre = best.0;
             for k in 1..=span {
@@ -222,92 +226,95 @@ impl DelayAudit<'_> {
         }
     }
 
-    /// A fit with so many delays, none, one or one for each channel, from some shifts on.
-    fn refined(&self, start: &[f64], delays: usize) -> Option<Fit> {
+    /// Fits the model with 0, 1 or one delay per channel, starting from shifts (s) of the channels.
+    fn refine_delays(&self, start: &[f64], delays: usize) -> Option<DelayFit> {
         let channels = self.forces.len();
         let step = self.step()?;
         let mut shifts: Vec<f64> = start.iter().map(|s| (s / step).round() * step).collect();
+        // One delay for all starts from the mean of the shifts.
         if delays == 1 {
             let mean = shifts.iter().sum::<f64>() / channels as f64;
             shifts = vec![(mean / step).round() * step; channels];
         }
-        let (mut forces, mut counts) = self.all_shifted(&shifts);
+        let (mut forces, mut counts) = self.shift_all_forces(&shifts);
         let mut fit = robust_fit(&self.regressor, &forces, &counts)?;
         let width = self.regressor.columns();
         if delays == 0 {
-            return Some(self.judged(&fit, &forces, &counts, Vec::new()));
+            return Some(self.evaluate_fit(&fit, &forces, &counts, Vec::new()));
         }
         for round in 0..ROUNDS {
-            let late = -self.slope.times(&fit.values.as_slice()[..width]);
-            let columns = self.regressor.with(delays, |c| c % delays, &late);
+            // Derivative of the fitted forces with respect to the delay: an additional column per delay.
+            let late = -self.slope.multiply(&fit.values.as_slice()[..width]);
+            let columns = self.regressor.append_columns(delays, |c| c % delays, &late);
             fit = robust_fit(&columns, &forces, &counts)?;
-            let further: Vec<f64> = (0..channels)
-                .map(|c| fit.values[width + c % delays])
-                .collect();
-            let is_near = further.iter().all(|f| f.abs() < NEAR * step);
+            let further: Vec<f64> = (0..channels).map(|c| fit.values[width + c % delays]).collect();
+            // Finish if the remaining delay is within the range of the linearisation.
+            let is_near = further.iter().all(|f| f.abs() < WHOLE_STEP_TOLERANCE * step);
             if (is_near && round > 0) || round + 1 == ROUNDS {
                 let widths = Self::half_widths(&columns, &fit, &forces, delays)?;
-                let of = |c: usize| Delay {
+                let of = |c: usize| DelayEstimate {
                     seconds: shifts[c] + further[c],
-                    half_width: widths[c % delays].hypot(FINEST * step),
+                    half_width: widths[c % delays].hypot(DELAY_RESOLUTION_STEPS * step),
                 };
                 let found = (0..channels).map(of).collect();
-                return Some(self.judged(&fit, &forces, &counts, found));
+                return Some(self.evaluate_fit(&fit, &forces, &counts, found));
             }
+            // Otherwise move the shifts by full steps and fit again.
             for (shift, further) in shifts.iter_mut().zip(&further) {
-                let steps = (further / step).clamp(-FARTHEST, FARTHEST).round();
-                *shift = (*shift + steps * step).clamp(-self.longest, self.longest);
+                let steps = (further / step).clamp(-MAX_ROUND_STEPS, MAX_ROUND_STEPS).round();
+                *shift = (*shift + steps * step).clamp(-self.max_delay, self.max_delay);
             }
-            (forces, counts) = self.all_shifted(&shifts);
+            (forces, counts) = self.shift_all_forces(&shifts);
         }
         None
     }
 
-    fn judged(
+    /// Residuals and cost of a fit.
+    fn evaluate_fit(
         &self,
         fit: &RobustFit,
         forces: &DVector<f64>,
         counts: &[bool],
-        delays: Vec<Delay>,
-    ) -> Fit {
+        delays: Vec<DelayEstimate>,
+    ) -> DelayFit {
         let channels = self.forces.len();
         let sum = |values: &DVector<f64>, c: usize, power: i32| -> f64 {
-            let rows = (c..values.len())
-                .step_by(channels)
-                .filter(|row| counts[*row]);
+            let rows = (c..values.len()).step_by(channels).filter(|row| counts[*row]);
             rows.map(|row| values[row].abs().powi(power)).sum()
         };
         let part = |c: usize, power: i32| {
             let size = sum(forces, c, power);
             if size > 0.0 {
-                sum(&fit.rest, c, power) / size
+                sum(&fit.residual, c, power) / size
             } else {
                 0.0
             }
         };
-        // Magnitudes rather than squares decide, as a contact is in both fits.
+        // Magnitudes instead of squares limit the influence of contacts, which are in both fits.
         let costs = (0..channels).map(|c| part(c, 1).max(f64::EPSILON).ln());
-        Fit {
+        DelayFit {
             delays,
-            left: (0..channels).map(|c| part(c, 2).sqrt()).collect(),
+            residuals: (0..channels).map(|c| part(c, 2).sqrt()).collect(),
             cost: costs.sum::<f64>() / channels as f64,
         }
     }
 
-    /// Half widths of the last columns of a fit, from the fits that leave out one block of time each (Quenouille's and Tukey's
-    /// jackknife): a swift move that alone tells the delay makes it wide.
+    /// Half widths of the 99 % intervals of the last columns of a fit, s, from fits that leave out one block of time
+    /// each (Quenouille's and Tukey's jackknife). If a single fast move determines the delay, the interval becomes
+    /// wide.
     fn half_widths(
-        columns: &ByChannel,
+        columns: &ChannelRegressor,
         fit: &RobustFit,
         forces: &DVector<f64>,
         last: usize,
     ) -> Option<Vec<f64>> {
         let samples = columns.samples();
+        // Normal equations of each block; their sum minus one block leaves this block out.
         let blocks: Vec<(DMatrix<f64>, DVector<f64>)> = (0..samples)
             .step_by(samples.div_ceil(BLOCKS))
             .map(|from| {
                 let to = (from + samples.div_ceil(BLOCKS)).min(samples);
-                columns.normal(&fit.weights, forces, from..to)
+                columns.normal_equations(&fit.weights, forces, from..to)
             })
             .collect();
         let n = columns.columns();
@@ -324,11 +331,8 @@ impl DelayAudit<'_> {
         let count = without.len() as f64;
         let of = |k: usize| {
             let mean = without.iter().map(|values| values[k]).sum::<f64>() / count;
-            let sum: f64 = without
-                .iter()
-                .map(|values| (values[k] - mean).powi(2))
-                .sum();
-            STUDENT * ((count - 1.0) / count * sum).sqrt()
+            let sum: f64 = without.iter().map(|values| (values[k] - mean).powi(2)).sum();
+            DELAY_STUDENT_FACTOR * ((count - 1.0) / count * sum).sqrt()
         };
         Some((0..last).map(of).collect())
     }
@@ -337,7 +341,7 @@ impl DelayAudit<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
 
     const STEP: f64 = 0.004;
     const TRUTH: [f64; 3] = [2.0, -1.5, 0.7];
@@ -357,10 +361,10 @@ mod tests {
     }
 
     /// Forces that are late by some steps each, with noise that has a memory.
-    fn found(late: [f64; 2], noise: f64, seed: u64) -> Delays {
+    fn found(late: [f64; 2], noise: f64, seed: u64) -> ForceDelays {
         let n = 3000;
         let recorded: Vec<f64> = (0..n).map(|k| STEP * k as f64).collect();
-        let mut random = Noise::new(seed);
+        let mut random = TestNoise::new(seed);
         let forces: Vec<Vec<f64>> = (0..2)
             .map(|c| {
                 let mut coloured = 0.0;
@@ -374,36 +378,31 @@ mod tests {
             .collect();
         let time: Vec<f64> = recorded[200..n - 200].iter().copied().step_by(2).collect();
         let matrix = |which: usize| {
-            let rows = time
-                .iter()
-                .flat_map(|t| row(*t)[which].into_iter().flatten());
-            ByChannel::new(&DMatrix::from_row_iterator(2 * time.len(), 3, rows), 2)
+            let rows = time.iter().flat_map(|t| row(*t)[which].into_iter().flatten());
+            ChannelRegressor::new(&DMatrix::from_row_iterator(2 * time.len(), 3, rows), 2)
         };
         let audit = DelayAudit {
             regressor: matrix(0),
             slope: matrix(1),
-            counts: vec![true; 2 * time.len()],
+            used_rows: vec![true; 2 * time.len()],
             time: time.clone(),
-            recorded: &recorded,
+            recording_time: &recorded,
             forces: &forces,
-            left_out: &[],
-            longest: 150.0 * STEP,
+            excluded_forces: &[],
+            max_delay: 150.0 * STEP,
         };
-        Delays::of(&audit).expect("delays")
+        ForceDelays::from_audit(&audit).expect("delays")
     }
 
     #[test]
     fn delays_are_found_to_a_small_part_of_a_step() {
         for late in [0.0, 0.25, 0.5, 1.0, 7.4, -2.6, 30.0, 100.0] {
             let both = found([late; 2], 0.0, 1);
-            let off = (both.together.seconds / STEP - late).abs();
+            let off = (both.common.seconds / STEP - late).abs();
             assert!(off < 0.02, "{late}: {both:?}");
             let first = found([late, 0.0], 0.0, 1);
-            for (delay, late) in first.alone.iter().zip([late, 0.0]) {
-                assert!(
-                    (delay.seconds / STEP - late).abs() < 0.02,
-                    "{late}: {first:?}"
-                );
+            for (delay, late) in first.by_channel.iter().zip([late, 0.0]) {
+                assert!((delay.seconds / STEP - late).abs() < 0.02, "{late}: {first:?}");
             }
         }
     }
@@ -414,10 +413,10 @@ mod tests {
         let (mut missed, mut sum, mut widths) = (0, 0.0, 0.0);
         for seed in 0..100 {
             let delays = found([0.5, 0.5], 0.05, seed);
-            let off = delays.together.seconds - 0.5 * STEP;
-            missed += usize::from(off.abs() > delays.together.half_width);
+            let off = delays.common.seconds - 0.5 * STEP;
+            missed += usize::from(off.abs() > delays.common.half_width);
             sum += off * off;
-            widths += delays.together.half_width;
+            widths += delays.common.half_width;
         }
         let deviation = (sum / 100.0_f64).sqrt();
         assert!(missed <= 5, "{missed}");

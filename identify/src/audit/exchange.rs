@@ -1,43 +1,47 @@
-//! Forces that are exchanged or turned round: a regressor and the measured forces go in; what swapping or turning round forces
-//! would gain comes out.
+//! Exchanged or reversed force columns. Input: a regressor and measured forces. Output: the exchange or change of sign
+//! that lowers the error of the best fit most.
 //!
-//! What the best fit to any forces `y` leaves is `|y|^2 - y'W (W'W)^-1 W'y`, so that one factorisation of the normal equations
-//! serves every permutation of the forces.
+//! The squared residual of the best fit to any forces `y` is `|y|^2 - y'W (W'W)^-1 W'y`, so that one factorisation of
+//! the normal equations serves every permutation of the forces.
 
 use nalgebra::{Cholesky, DVector, Dyn};
 
-use super::by_channel::ByChannel;
-use super::robust::factored;
+use super::by_channel::ChannelRegressor;
+use super::robust::factor_normal;
+use super::thresholds::WIRING_ROWS_PER_COLUMN;
 
-/// How well a regressor can explain forces.
+/// A factorised regressor, which gives the error of the best fit to any forces.
 #[derive(Debug, Clone)]
 pub struct ForceAudit {
-    regressor: ByChannel,
-    /// Of the normal equations of scaled columns, with the scales.
+    /// The regressor.
+    regressor: ChannelRegressor,
+    /// Factor of the normal equations of scaled columns.
     factor: Cholesky<f64, Dyn>,
+    /// Scales of the columns.
     scale: DVector<f64>,
 }
 
-/// Something about the forces that would explain them better.
+/// A fault of the force columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Suspect {
-    /// Two channels are exchanged.
+pub enum WiringFault {
+    /// Two channels are exchanged; their indices.
     Swapped(usize, usize),
-    /// A channel has another sign than the others; of two channels it is not known which.
-    Turned(usize),
+    /// A channel has the opposite sign of the others; its index. With two channels it is not known which of them.
+    Reversed(usize),
 }
 
 impl ForceAudit {
     /// Factorises a regressor; `None` if it has fewer rows than twice its columns, or a number that is not finite.
-    pub fn new(regressor: ByChannel) -> Option<Self> {
+    pub fn new(regressor: ChannelRegressor) -> Option<Self> {
         let rows = regressor.samples() * regressor.channels();
-        if rows == 0 || rows < 2 * regressor.columns() {
+        if rows == 0 || rows < WIRING_ROWS_PER_COLUMN * regressor.columns() {
             return None;
         }
+        // All rows have equal weight; the forces are not needed for the factor.
         let alike = DVector::from_element(rows, 1.0);
         let none = DVector::zeros(rows);
-        let (normal, _) = regressor.normal(&alike, &none, 0..regressor.samples());
-        let (factor, scale) = factored(normal)?;
+        let (normal, _) = regressor.normal_equations(&alike, &none, 0..regressor.samples());
+        let (factor, scale) = factor_normal(normal)?;
         Some(Self {
             regressor,
             factor,
@@ -48,28 +52,30 @@ impl ForceAudit {
     /// Relative error of the best fit to forces interleaved per sample; `None` where they are all zero.
     pub fn error(&self, forces: &DVector<f64>) -> Option<f64> {
         let size = forces.norm_squared();
-        let right = (self.regressor.transposed_times(forces)).component_mul(&self.scale);
+        let right = (self.regressor.multiply_transposed(forces)).component_mul(&self.scale);
         let explained = right.dot(&self.factor.solve(&right));
         (size > 0.0).then(|| ((size - explained).max(0.0) / size).sqrt())
     }
 
     /// The exchange or change of sign of forces that lowers the error most, with the error without and with it.
-    pub fn suspect(&self, forces: &DVector<f64>) -> Option<(Suspect, [f64; 2])> {
+    pub fn find_wiring_fault(&self, forces: &DVector<f64>) -> Option<(WiringFault, [f64; 2])> {
         let n = self.regressor.channels();
         let now = self.error(forces)?;
-        let changed = |change: Suspect| {
+        // Apply a change to a copy of the forces.
+        let changed = |change: WiringFault| {
             let mut changed = forces.clone();
             for row in 0..forces.len() / n {
                 match change {
-                    Suspect::Swapped(a, b) => changed.swap((row * n + a, 0), (row * n + b, 0)),
-                    Suspect::Turned(a) => changed[row * n + a] *= -1.0,
+                    WiringFault::Swapped(a, b) => changed.swap((row * n + a, 0), (row * n + b, 0)),
+                    WiringFault::Reversed(a) => changed[row * n + a] *= -1.0,
                 }
             }
             changed
         };
-        let swaps = (0..n).flat_map(|a| (a + 1..n).map(move |b| Suspect::Swapped(a, b)));
+        // Try all exchanges of two channels and all changes of one sign, and take the best.
+        let swaps = (0..n).flat_map(|a| (a + 1..n).map(move |b| WiringFault::Swapped(a, b)));
         swaps
-            .chain((0..n).map(Suspect::Turned))
+            .chain((0..n).map(WiringFault::Reversed))
             .filter_map(|change| Some((change, [now, self.error(&changed(change))?])))
             .min_by(|a, b| a.1[1].total_cmp(&b.1[1]))
     }
@@ -80,7 +86,7 @@ mod tests {
     use nalgebra::DMatrix;
 
     use super::*;
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
 
     /// Two joints with inertia and friction each, coupled by gravity.
     fn rows(time: impl Fn(usize) -> f64, samples: &[usize]) -> DMatrix<f64> {
@@ -101,7 +107,7 @@ mod tests {
         let n = 3000;
         let all: Vec<usize> = (0..n).collect();
         let y = rows(|k| k as f64 * 0.002, &all) * DVector::from_row_slice(&TRUTH);
-        let mut random = Noise::new(7);
+        let mut random = TestNoise::new(7);
         let channels = (0..2).map(|c| {
             let values = (0..n).map(|k| y[2 * k + c] + 0.01 * random.normal());
             values.collect()
@@ -113,22 +119,19 @@ mod tests {
     #[test]
     fn exchanged_and_turned_forces_are_found() {
         let (samples, forces) = forces();
-        let explained =
-            ForceAudit::new(ByChannel::new(&rows(|k| k as f64 * 0.002, &samples), 2)).unwrap();
+        let explained = ForceAudit::new(ChannelRegressor::new(&rows(|k| k as f64 * 0.002, &samples), 2)).unwrap();
         let interleaved = |channels: [&Vec<f64>; 2], sign: f64| {
-            let rows = samples
-                .iter()
-                .flat_map(|k| [channels[0][*k], sign * channels[1][*k]]);
+            let rows = samples.iter().flat_map(|k| [channels[0][*k], sign * channels[1][*k]]);
             DVector::from_iterator(2 * samples.len(), rows)
         };
         let swapped = interleaved([&forces[1], &forces[0]], 1.0);
-        let (found, [before, after]) = explained.suspect(&swapped).unwrap();
-        assert_eq!(found, Suspect::Swapped(0, 1));
+        let (found, [before, after]) = explained.find_wiring_fault(&swapped).unwrap();
+        assert_eq!(found, WiringFault::Swapped(0, 1));
         assert!(before > 0.2 && after < 0.02, "{before} {after}");
         let turned = interleaved([&forces[0], &forces[1]], -1.0);
-        // With two channels the one cannot be told from the other: all parameters may change their signs.
-        let (found, [before, after]) = explained.suspect(&turned).unwrap();
-        assert!(matches!(found, Suspect::Turned(_)));
+        // With two channels it is not known which is reversed: all parameters may change their signs.
+        let (found, [before, after]) = explained.find_wiring_fault(&turned).unwrap();
+        assert!(matches!(found, WiringFault::Reversed(_)));
         assert!(before > 0.2 && after < 0.02, "{before} {after}");
     }
 }

@@ -1,5 +1,5 @@
-//! What looks wrong with a recording although every number can be read: columns and signals by themselves, and forces
-//! against a model's regressor.
+//! Faults of recordings whose numbers can all be read. Input: a recording, for some checks with a model's regressor.
+//! Output: warnings about columns, clocks and signals, and estimates of delays, exchanged columns and position faults.
 
 mod by_channel;
 mod clock;
@@ -9,9 +9,10 @@ mod exchange;
 mod positions;
 mod robust;
 mod signals;
+mod thresholds;
 
-pub use by_channel::ByChannel;
-pub use delay::{Delay, DelayAudit, Delays};
-pub use exchange::{ForceAudit, Suspect};
+pub use by_channel::ChannelRegressor;
+pub use delay::{DelayAudit, DelayEstimate, ForceDelays};
+pub use exchange::{ForceAudit, WiringFault};
 pub use positions::PositionFault;
 pub use robust::{RobustFit, robust_fit};

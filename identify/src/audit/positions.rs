@@ -1,77 +1,68 @@
-//! Faults of positions that no smoothing takes away: time stamps that are not when samples were taken, and play between encoder
-//! and load. A position goes in as it was recorded; both are seen beside the cubic that joins a sample's neighbours.
+//! Faults of positions that smoothing cannot remove: wrong time stamps, and backlash between encoder and load. Input:
+//! recorded positions; output: faults. Each sample is compared with the cubic through its neighbours.
 //!
-//! Where stamps are wrong by a time, positions are wrong by that time and their rate: in proportion to the rate, and for all
-//! coordinates by the same time. Where there is play, the reading jumps each time the load changes sides, by one length to and fro.
+//! If time stamps are wrong, the position errors are the time error times the rate, with the same time error for all
+//! coordinates. With backlash, the position jumps each time the load changes sides, by one length to and fro.
 
-use crate::recording::Recording;
+use super::thresholds::{
+    BACKLASH_ALIKE_OF_FIVE, BACKLASH_ALTERNATING_OF_FIVE, BACKLASH_ENCODER_STEPS, BACKLASH_FEWEST_JUMPS,
+    BACKLASH_JUMP_SIGMAS, BACKLASH_SIZE_TOLERANCE, BACKLASH_TRAVEL_SHARE, FAST_RATE_SHARE, JITTER_FEWEST_SAMPLES,
+    JITTER_MIN_AGREEMENT, JITTER_MIN_ERROR_GROWTH, POSITION_FAULT_NEIGHBOURHOODS, SLOW_RATE_SHARE,
+};
+use crate::recording::SignalRecording;
 use crate::signal::median;
 
-/// Neighbours on either side of a sample.
+/// Number of neighbours on either side of a sample.
 const SIDE: usize = 5;
-/// Parts of the largest rate below which a coordinate stands and above which it runs.
-const SLOW: f64 = 0.1;
-const FAST: f64 = 0.4;
-/// How many times as large errors must be where a coordinate runs.
-const GROWS: f64 = 3.0;
-/// How much alike the times must be that two coordinates tell.
-const ALIKE: f64 = 0.7;
-/// Samples on either side of a place from which a jump there is told.
-const ABOUT: usize = 10;
-/// Jumps that must tell of play, and by how many deviations each must stand out.
-const JUMPS: usize = 3;
-const OUT: f64 = 8.0;
-/// An encoder's own steps are no play: jumps must be so many of them.
-const STEPS: f64 = 8.0;
-/// Nor is what is less than this part of the travel.
-const LEAST: f64 = 5e-5;
-/// How much jumps may differ.
-const SPREAD: f64 = 0.35;
-/// Samples that are looked at.
-const LOOKED_AT: usize = 20_000;
+/// Number of samples on either side of a jump that are used to estimate it.
+const JUMP_NEIGHBOURS: usize = 10;
+/// Largest number of samples that are used, from the start.
+const MAX_SAMPLES: usize = 20_000;
 
 /// A fault of the positions of a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PositionFault {
-    /// Samples were taken so many seconds before or after their stamps, in the mean square of neighbours.
+    /// Samples were taken before or after their time stamps; rms value.
     Jitter {
-        /// Seconds.
+        /// The rms time error, s.
         time: f64,
     },
-    /// A coordinate's reading jumps to and fro by so many rad or m.
-    Play {
-        /// The coordinate.
+    /// The position of a coordinate jumps to and fro.
+    Backlash {
+        /// Name of the coordinate.
         coordinate: String,
         /// The jump, rad or m.
         width: f64,
     },
 }
 
-impl Recording {
-    /// Faults of positions; columns that cannot be used are passed over.
+impl SignalRecording {
+    /// Faults of the positions; columns that cannot be used are skipped. Backlash is searched only if there is no
+    /// jitter.
     pub fn position_faults(&self, coordinates: &[String]) -> Vec<PositionFault> {
         let Ok(time) = self.column("t") else {
             return Vec::new();
         };
-        let n = time.len().min(LOOKED_AT);
-        if n < 20 * ABOUT {
+        let n = time.len().min(MAX_SAMPLES);
+        if n < POSITION_FAULT_NEIGHBOURHOODS * JUMP_NEIGHBOURS {
             return Vec::new();
         }
         let time = &time[..n];
+        // Positions that move and are finite.
         let position = |name: &String| {
             let q = self.column(name).ok()?.get(..n)?;
             let moves = q.iter().any(|x| x.total_cmp(&q[0]).is_ne());
             (moves && q.iter().all(|x| x.is_finite())).then_some(q)
         };
-        let beside: Vec<Beside> = (coordinates.iter())
-            .filter_map(|name| Some(Beside::new(time, position(name)?)))
+        let beside: Vec<CubicResidual> = (coordinates.iter())
+            .filter_map(|name| Some(CubicResidual::new(time, position(name)?)))
             .collect();
-        let jitter = jitter(&beside).map(|time| PositionFault::Jitter { time });
+        let jitter = timing_jitter(&beside).map(|time| PositionFault::Jitter { time });
         let mut faults: Vec<PositionFault> = jitter.into_iter().collect();
         if faults.is_empty() {
             for name in coordinates {
-                let width = position(name).and_then(|q| play(time, q));
-                faults.extend(width.map(|width| PositionFault::Play {
+                let width = position(name).and_then(|q| backlash_width(time, q));
+                faults.extend(width.map(|width| PositionFault::Backlash {
                     coordinate: name.clone(),
                     width,
                 }));
@@ -81,19 +72,23 @@ impl Recording {
     }
 }
 
-/// What a sample is beside the cubic through its neighbours, and the rate there.
-struct Beside {
+/// Differences between samples and the cubic through their neighbours.
+struct CubicResidual {
+    /// Sample minus cubic, rad or m.
     errors: Vec<f64>,
+    /// Slope of the cubic at the sample, rad/s or m/s.
     rates: Vec<f64>,
 }
 
-impl Beside {
+impl CubicResidual {
+    /// Fits a cubic around every sample that has enough neighbours; `time` in s.
     fn new(time: &[f64], q: &[f64]) -> Self {
         let (mut errors, mut rates) = (Vec::new(), Vec::new());
         for i in SIDE..q.len() - SIDE {
             let about = (i - SIDE..=i + SIDE).filter(|k| *k != i);
+            // Relative to the sample, so that the value at zero is the error.
             let points = about.map(|k| (time[k] - time[i], q[k] - q[i]));
-            let [value, rate] = cubic(points, 0.0);
+            let [value, rate] = fit_cubic(points, 0.0);
             errors.push(-value);
             rates.push(rate);
         }
@@ -101,13 +96,13 @@ impl Beside {
     }
 }
 
-/// Value and slope at zero of the cubic nearest to some points, with a step of `step` for each unit of the time's sign: the
-/// value becomes the step where that is not zero.
-fn cubic(points: impl Iterator<Item = (f64, f64)>, step: f64) -> [f64; 2] {
+/// Least squares fit of a cubic to points (time, value): value and slope at zero. If `step` is not zero, a jump of that
+/// size times an estimated factor at zero is fitted too, and the factor is returned instead of the value. Zeros if the
+/// fit fails.
+fn fit_cubic(points: impl Iterator<Item = (f64, f64)>, step: f64) -> [f64; 2] {
     let points: Vec<(f64, f64)> = points.collect();
-    let scale = points
-        .iter()
-        .fold(f64::MIN_POSITIVE, |m, (t, _)| m.max(t.abs()));
+    // Scale the times to -1..1.
+    let scale = points.iter().fold(f64::MIN_POSITIVE, |m, (t, _)| m.max(t.abs()));
     let n = if step == 0.0 { 4 } else { 5 };
     let mut gram = nalgebra::DMatrix::<f64>::zeros(n, n);
     let mut right = nalgebra::DVector::<f64>::zeros(n);
@@ -125,32 +120,33 @@ fn cubic(points: impl Iterator<Item = (f64, f64)>, step: f64) -> [f64; 2] {
         return [0.0; 2];
     };
     let found = factor.solve(&right);
-    [
-        if step == 0.0 { found[0] } else { found[4] },
-        found[1] / scale,
-    ]
+    [if step == 0.0 { found[0] } else { found[4] }, found[1] / scale]
 }
 
-/// The time by which stamps are wrong, s, if errors of all coordinates grow with the rate and tell of the same times.
-fn jitter(all: &[Beside]) -> Option<f64> {
+/// The rms time error of the stamps, s, if the errors of all coordinates grow with the rate and agree on the time
+/// error; else `None`.
+fn timing_jitter(all: &[CubicResidual]) -> Option<f64> {
     if all.len() < 2 {
         return None;
     }
     let mut told: Vec<Vec<Option<f64>>> = Vec::new();
     for one in all {
+        // Compare errors at slow and fast motion.
         let fastest = one.rates.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
         let pairs = one.errors.iter().zip(&one.rates);
+        // Median error at samples whose relative rate is wanted.
         let size = |wanted: &dyn Fn(f64) -> bool| {
             let sizes = pairs.clone().filter(|(_, v)| wanted(v.abs() / fastest));
             median(sizes.map(|(e, _)| e.abs()).collect())
         };
-        let [slow, fast] = [size(&|v| v < SLOW), size(&|v| v > FAST)];
-        if fastest <= 0.0 || fast <= GROWS * slow {
+        let [slow, fast] = [size(&|v| v < SLOW_RATE_SHARE), size(&|v| v > FAST_RATE_SHARE)];
+        if fastest <= 0.0 || fast <= JITTER_MIN_ERROR_GROWTH * slow {
             return None;
         }
+        // Time error at each fast sample: position error over rate.
         told.push(
             pairs
-                .map(|(e, v)| (v.abs() > FAST * fastest).then(|| e / v))
+                .map(|(e, v)| (v.abs() > FAST_RATE_SHARE * fastest).then(|| e / v))
                 .collect(),
         );
     }
@@ -163,8 +159,9 @@ fn jitter(all: &[Beside]) -> Option<f64> {
                 .filter_map(|(a, b)| Some(((*a)?, (*b)?)))
                 .collect();
             let sum = |of: &dyn Fn(&(f64, f64)) -> f64| both.iter().map(of).sum::<f64>();
+            // Correlation of the time errors at samples where both coordinates are fast.
             let alike = sum(&|(a, b)| a * b) / (sum(&|(a, _)| a * a) * sum(&|(_, b)| b * b)).sqrt();
-            if both.len() < 30 || alike.is_nan() || alike < ALIKE {
+            if both.len() < JITTER_FEWEST_SAMPLES || alike.is_nan() || alike < JITTER_MIN_AGREEMENT {
                 return None;
             }
             times.extend(both.iter().map(|(a, _)| a * a));
@@ -174,41 +171,44 @@ fn jitter(all: &[Beside]) -> Option<f64> {
     (mean > 0.0).then(|| mean.sqrt())
 }
 
-/// The length by which a reading jumps to and fro, if all jumps are of one length and alternate.
-fn play(time: &[f64], q: &[f64]) -> Option<f64> {
+/// Length of the backlash, rad or m, if the jumps have one size and alternate; else `None`.
+fn backlash_width(time: &[f64], q: &[f64]) -> Option<f64> {
+    // The factor of the step is half of the jump, since the step goes from -1 to 1.
     let jump = |i: usize| {
-        let about = (i - ABOUT..=i + ABOUT).filter(|k| *k != i);
-        2.0 * cubic(about.map(|k| (time[k] - time[i], q[k] - q[i])), 1.0)[0]
+        let about = (i - JUMP_NEIGHBOURS..=i + JUMP_NEIGHBOURS).filter(|k| *k != i);
+        2.0 * fit_cubic(about.map(|k| (time[k] - time[i], q[k] - q[i])), 1.0)[0]
     };
-    let jumps: Vec<f64> = (ABOUT..q.len() - ABOUT).map(jump).collect();
+    let jumps: Vec<f64> = (JUMP_NEIGHBOURS..q.len() - JUMP_NEIGHBOURS).map(jump).collect();
+    // Robust standard deviation of the jump estimates.
     let noise = 1.4826 * median(jumps.iter().map(|x| x.abs()).collect());
     let mut found: Vec<f64> = Vec::new();
     for (i, own) in jumps.iter().enumerate() {
-        let near = i.saturating_sub(ABOUT)..(i + ABOUT + 1).min(jumps.len());
+        let near = i.saturating_sub(JUMP_NEIGHBOURS)..(i + JUMP_NEIGHBOURS + 1).min(jumps.len());
+        // Only the largest jump of a neighbourhood counts.
         let is_largest = jumps[near].iter().all(|x| x.abs() <= own.abs());
-        if is_largest && own.abs() > OUT * noise {
+        if is_largest && own.abs() > BACKLASH_JUMP_SIGMAS * noise {
             found.push(*own);
         }
     }
+    // Size of a typical jump, compared with encoder steps and travel.
     let middle = median(found.iter().map(|x| x.abs()).collect());
     let low = q.iter().copied().fold(f64::INFINITY, f64::min);
     let travel = q.iter().copied().fold(f64::NEG_INFINITY, f64::max) - low;
-    if middle < STEPS * resolution(q) || middle < LEAST * travel {
+    if middle < BACKLASH_ENCODER_STEPS * encoder_resolution(q) || middle < BACKLASH_TRAVEL_SHARE * travel {
         return None;
     }
-    let is_alike = |x: &&f64| (x.abs() - middle).abs() < SPREAD * middle;
-    let alternate = found
-        .windows(2)
-        .filter(|pair| pair[0] * pair[1] < 0.0)
-        .count();
-    let is_play = found.len() >= JUMPS
-        && 5 * found.iter().filter(is_alike).count() >= 4 * found.len()
-        && 5 * alternate >= 4 * (found.len() - 1);
+    let is_alike = |x: &&f64| (x.abs() - middle).abs() < BACKLASH_SIZE_TOLERANCE * middle;
+    // Neighbouring jumps in opposite directions.
+    let alternate = found.windows(2).filter(|pair| pair[0] * pair[1] < 0.0).count();
+    // Four of five jumps must have the same size, and four of five must change the sign.
+    let is_play = found.len() >= BACKLASH_FEWEST_JUMPS
+        && 5 * found.iter().filter(is_alike).count() >= BACKLASH_ALIKE_OF_FIVE * found.len()
+        && 5 * alternate >= BACKLASH_ALTERNATING_OF_FIVE * (found.len() - 1);
     is_play.then_some(middle)
 }
 
-/// The smallest change of a reading from sample to sample, which for an encoder is its step.
-fn resolution(q: &[f64]) -> f64 {
+/// The smallest change of a position between samples, which is the step of an encoder; 0 if it does not move.
+fn encoder_resolution(q: &[f64]) -> f64 {
     let changes = q.windows(2).map(|pair| (pair[1] - pair[0]).abs());
     let largest = changes.clone().fold(0.0, f64::max);
     let least = changes
@@ -220,7 +220,7 @@ fn resolution(q: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
 
     const N: usize = 1800;
 
@@ -236,38 +236,36 @@ mod tests {
     #[test]
     fn a_sound_recording_has_no_fault() {
         for seed in 0..20 {
-            let mut noise = Noise::new(seed);
-            let read = |noise: &mut Noise, k| -> Vec<f64> {
+            let mut noise = TestNoise::new(seed);
+            let read = |noise: &mut TestNoise, k| -> Vec<f64> {
                 let all = time().into_iter();
                 all.map(|t| motion(t, k) + 5e-6 * noise.normal()).collect()
             };
-            let both = [0, 1].map(|k| Beside::new(&time(), &read(&mut noise, k)));
-            assert_eq!(jitter(&both), None);
-            assert_eq!(play(&time(), &read(&mut noise, 0)), None);
+            let both = [0, 1].map(|k| CubicResidual::new(&time(), &read(&mut noise, k)));
+            assert_eq!(timing_jitter(&both), None);
+            assert_eq!(backlash_width(&time(), &read(&mut noise, 0)), None);
         }
     }
 
     #[test]
     fn wrong_stamps_are_told_by_all_coordinates() {
-        let mut noise = Noise::new(3);
+        let mut noise = TestNoise::new(3);
         let late: Vec<f64> = time().iter().map(|t| t + 1e-4 * noise.normal()).collect();
         let both = [0, 1].map(|k| {
-            let read: Vec<f64> = (late.iter())
-                .map(|t| motion(*t, k) + 5e-6 * noise.normal())
-                .collect();
-            Beside::new(&time(), &read)
+            let read: Vec<f64> = (late.iter()).map(|t| motion(*t, k) + 5e-6 * noise.normal()).collect();
+            CubicResidual::new(&time(), &read)
         });
-        let found = jitter(&both).unwrap();
+        let found = timing_jitter(&both).unwrap();
         assert!((0.7e-4..1.4e-4).contains(&found), "{found}");
     }
 
     #[test]
     fn play_is_seen_by_jumps_to_and_fro() {
-        let mut noise = Noise::new(8);
+        let mut noise = TestNoise::new(8);
         let read: Vec<f64> = (time().iter())
             .map(|t| motion(*t, 0) + 2e-4 * (1.9 * t + 0.3).sin().signum() + 5e-6 * noise.normal())
             .collect();
-        let found = play(&time(), &read).unwrap();
+        let found = backlash_width(&time(), &read).unwrap();
         assert!((3e-4..5e-4).contains(&found), "{found}");
     }
 }

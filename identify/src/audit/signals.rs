@@ -1,35 +1,25 @@
-//! What looks wrong with single signals of a recording: values that are held over several samples, forces that stay at
-//! a limit, angles too large for rad.
+//! Single signals that look wrong: values that are repeated over several samples, forces that stay at a limit, angles
+//! too large for rad. Input: a recording; output: warnings.
 
 use std::f64::consts::PI;
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
 
-use crate::recording::{Note, Recording, place_word};
+use super::thresholds::{
+    BEYOND_LIMIT_ONE_IN, EXACT_LIMIT_SHORTEST_RUN, FEWEST_AT_LIMIT, LARGE_ANGLE_RAD, LIMIT_BAND_MOST_SHARE,
+    LIMIT_BAND_SIGMAS, LIMIT_BAND_WIDTHS, LIMIT_CROWDING, NOISY_LIMIT_FEWEST_SAMPLES, NOISY_LIMIT_ONE_IN,
+    PLATEAU_STEEPNESS, SLOW_UPDATE_FEWEST_CHANGES, SLOW_UPDATE_SHARE,
+};
+use crate::recording::{RecordingNote, SignalRecording, sample_place_word};
 use crate::signal::white_noise;
 use crate::words::{count_of, seven_digits, with_digits};
 
-/// Angles beyond this many rad are likely in degrees: two turns to each side.
-const LARGE_ANGLE: f64 = 4.0 * PI;
-/// Samples at a limit before a force counts as saturated.
-const FEWEST_AT_LIMIT: usize = 8;
-/// And so many times as many as at the value next to it: the crest of a wave is at its last step 2.4 times as long as at the one
-/// before.
-const CROWDED: usize = 3;
-
-/// Noise about a limit, in standard deviations of white noise.
-const SPREAD: f64 = 5.0;
-/// What slope times length of a plateau must be of its spread; 8 for the top of a parabola.
-const STEEP: f64 = 30.0;
-
-/// Spread of a limit, as a part of it, at most.
-const SHARP: f64 = 0.01;
-
-impl Recording {
+impl SignalRecording {
     /// Warnings about single signals. `coordinates` are `(name, whether it is an angle)`; columns that cannot be used
-    /// are passed over.
-    pub fn oddities(&self, coordinates: &[(String, bool)], drives: &[String]) -> Vec<Note> {
+    /// are skipped.
+    pub fn signal_notes(&self, coordinates: &[(String, bool)], drives: &[String]) -> Vec<RecordingNote> {
+        // Positions show whether the mechanism moves.
         let positions: Vec<&[f64]> = coordinates
             .iter()
             .filter_map(|(name, _)| self.column(name).ok())
@@ -37,93 +27,105 @@ impl Recording {
         let mut notes = Vec::new();
         for (name, is_angle) in coordinates {
             let Ok(q) = self.column(name) else { continue };
-            notes.extend(self.held(name, q));
+            notes.extend(self.slow_update_note(name, q));
             if *is_angle {
-                notes.extend(self.too_large(name, q));
+                notes.extend(self.large_angle_note(name, q));
             }
         }
         for drive in drives {
             let Ok(force) = self.column(drive) else {
                 continue;
             };
-            notes.extend(self.held(drive, force));
-            let saturated = self.saturated(drive, force, &positions);
-            notes.extend(saturated.or_else(|| self.saturated_in_noise(drive, force, &positions)));
+            notes.extend(self.slow_update_note(drive, force));
+            // An exact limit is searched first; only without one a noisy limit.
+            let saturated = self.saturation_note(drive, force, &positions);
+            notes.extend(saturated.or_else(|| self.noisy_saturation_note(drive, force, &positions)));
         }
         notes
     }
 
-    /// A signal that changes only every so many samples was recorded at a lower rate than it is written.
-    fn held(&self, name: &str, values: &[f64]) -> Option<Note> {
+    /// Warning about a signal that changes only every n samples: it was recorded at a lower rate than the file. `None`
+    /// otherwise.
+    fn slow_update_note(&self, name: &str, values: &[f64]) -> Option<RecordingNote> {
         let changes: Vec<usize> = (1..values.len())
             .filter(|i| values[*i].total_cmp(&values[i - 1]).is_ne())
             .collect();
-        if changes.len() < 20 {
+        if changes.len() < SLOW_UPDATE_FEWEST_CHANGES {
             return None;
         }
+        // Distances between changes: at least nine of ten must be equal and above one sample.
         let mut gaps: Vec<usize> = changes.windows(2).map(|w| w[1] - w[0]).collect();
         let n = gaps.len();
         gaps.sort_unstable();
         let usual = gaps[n / 2];
+        // Most distances are equal if the signal is updated at a fixed rate.
         let share = gaps.iter().filter(|gap| **gap == usual).count() as f64 / n as f64;
-        (usual > 1 && share > 0.9).then(|| {
-            Note::warning(message!(
-                "`{name}` in {} changes only every {usual} samples: each value is repeated, so it was recorded at a lower \
-                 rate than it is written. Rates from such steps are wrong: keep one sample of each, or a lower cut-off \
-                 ({}).",
+        (usual > 1 && share > SLOW_UPDATE_SHARE).then(|| {
+            RecordingNote::warning(message!(
+                "`{name}` in {} changes only every {usual} samples: each value is repeated, so the signal was recorded at \
+                 a lower rate than the file. Rates computed from such steps are wrong. Keep one sample of each value, or \
+                 use a lower cut-off ({}).",
                 self.file(),
                 Remedy::option(OptionName::CutoffHz),
             ))
         })
     }
 
-    fn too_large(&self, name: &str, q: &[f64]) -> Option<Note> {
+    /// Warning about an angle that is too large for rad; `None` otherwise.
+    fn large_angle_note(&self, name: &str, q: &[f64]) -> Option<RecordingNote> {
         let largest = q.iter().map(|v| v.abs()).fold(0.0, f64::max);
+        // One decimal, or seven digits for very large values.
         let rounded = |value: f64| match value {
             value if value < 1e7 => format!("{value:.1}"),
             value => seven_digits(value),
         };
-        (largest > LARGE_ANGLE).then(|| {
-            Note::warning(message!(
-                "`{name}` in {} reaches {}, which is {} turns if it is in rad, as it must be; if it is in \
-                 degrees, say so: {}.",
+        (largest > LARGE_ANGLE_RAD).then(|| {
+            RecordingNote::warning(message!(
+                "`{name}` in {} reaches {}, which is {} turns in rad. Angles must be in rad; if it is in degrees, \
+                 use {}.",
                 self.file(),
                 rounded(largest),
                 rounded(largest / (2.0 * PI)),
-                Remedy::options(self.maps_from_degrees(name))
+                Remedy::options(self.degree_conversion_options(name))
             ))
         })
     }
 
-    /// A force that stays at a limit but for noise, although it comes to it and leaves it at a slope.
-    fn saturated_in_noise(&self, name: &str, force: &[f64], positions: &[&[f64]]) -> Option<Note> {
+    /// Warning about a force that stays at a limit except for noise, although it reaches and leaves the limit with a
+    /// slope.
+    fn noisy_saturation_note(&self, name: &str, force: &[f64], positions: &[&[f64]]) -> Option<RecordingNote> {
         let n = force.len();
-        if n < 20 * FEWEST_AT_LIMIT {
+        if n < NOISY_LIMIT_FEWEST_SAMPLES {
             return None;
         }
         let mut found: Vec<(f64, usize, usize)> = Vec::new();
+        // Search an upper and a lower limit: level, number of samples, first sample.
         for is_high in [true, false] {
-            let (level, spread) = crowded(force, is_high)?;
-            // Friction holds a level too, but not as sharply.
-            if spread > SHARP * level.abs() {
+            let (level, spread) = crowded_level(force, is_high)?;
+            // Friction causes plateaus too, but they are less sharp.
+            if spread > LIMIT_BAND_MOST_SHARE * level.abs() {
                 continue;
             }
-            // Nothing lies beyond a limit but noise.
+            // Only noise lies beyond a limit.
             let sign = if is_high { 1.0 } else { -1.0 };
             let beyond = force.iter().filter(|f| sign * (*f - level) > spread);
-            if beyond.count() > n / 1000 {
+            if beyond.count() > n / BEYOND_LIMIT_ONE_IN {
                 continue;
             }
+            // Whether a sample lies within the band around the level.
             let is_near = |i: usize| (force[i] - level).abs() <= spread;
             let (mut count, mut first) = (0, None);
             let mut i = 0;
+            // Find all runs of samples within the band.
             while i < n {
                 let start = i;
                 while i < n && is_near(i) {
                     i += 1;
                 }
+                // A plateau from `start` to `i`.
                 let length = i - start;
-                // Before the first sample of a plateau and behind its last one, over a few samples.
+                // Slopes just before and just after the plateau, over three steps.
+                // Change per sample over three samples; `None` at the ends of the recording.
                 let slope = |a: Option<usize>, b: usize| {
                     let (a, b) = (force.get(a?)?, force.get(b)?);
                     Some((a - b).abs() / 3.0)
@@ -131,13 +133,12 @@ impl Recording {
                 let before = slope(start.checked_sub(4), start.saturating_sub(1));
                 let behind = slope(Some(i + 3), i);
                 let steepest = [before, behind].into_iter().flatten().fold(0.0, f64::max);
-                // A parabola that leaves the band has 8 times its half width in slope times length.
+                // At the top of a parabola, slope times length is 8 times the half width of the band; a plateau has
+                // more.
+                // A position differs between both ends of the plateau.
                 let moves = |q: &&[f64]| length > 0 && q[start].total_cmp(&q[i - 1]).is_ne();
                 let is_moving = positions.iter().any(moves);
-                if is_moving
-                    && length >= FEWEST_AT_LIMIT
-                    && steepest * length as f64 > STEEP * spread
-                {
+                if is_moving && length >= FEWEST_AT_LIMIT && steepest * length as f64 > PLATEAU_STEEPNESS * spread {
                     count += length;
                     first.get_or_insert(start);
                 }
@@ -147,34 +148,39 @@ impl Recording {
                 found.push((level, count, first));
             }
         }
+        // The upper limit is named first; the lower one is added if both were found.
         let (level, count, first) = *found.first()?;
         let other = found.get(1).map(|(level, count, _)| {
             let samples = count_of(*count, "sample", "samples");
             format!(", and {samples} at {}", with_digits(*level, 5))
         });
-        Some(Note::warning(message!(
-            "The force of `{name}` in {} stays at {} but for noise for {}, first in {} {}{}: the drive or its measurement seems \
-             to be saturated. The true force is not known there; use a gentler motion, or leave these times out ({}).",
+        Some(RecordingNote::warning(message!(
+            "The force of `{name}` in {} stays at {} except for noise for {}, first in {} {}{}: the drive or its \
+             measurement seems to be saturated. The true force is unknown there. Record a motion with smaller \
+             forces, or leave these times out ({}).",
             self.file(),
             with_digits(level, 5),
             count_of(count, "sample", "samples"),
-            place_word(self.file()),
+            sample_place_word(self.file()),
             self.line(first).unwrap_or(0),
             other.unwrap_or_default(),
             Remedy::option(OptionName::Between),
         )))
     }
 
-    /// A force that stays exactly at its largest or smallest value while something moves.
-    fn saturated(&self, name: &str, force: &[f64], positions: &[&[f64]]) -> Option<Note> {
+    /// Warning about a force that stays exactly at its largest or smallest value while the mechanism moves, or is
+    /// constant.
+    fn saturation_note(&self, name: &str, force: &[f64], positions: &[&[f64]]) -> Option<RecordingNote> {
         let low = force.iter().copied().fold(f64::INFINITY, f64::min);
         let high = force.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         if low >= high {
-            // Forces of 0 are said beside the drives' other ones, by `suspicious_forces`.
+            // Forces of 0 are reported for all drives together, by `zero_force_notes`.
             return (force.len() > 1 && low != 0.0).then(|| {
-                Note::warning(format!(
-                    "The force of `{name}` in {} is {low} throughout: it is no measurement of a drive that works.",
-                    self.file()
+                RecordingNote::warning(message!(
+                    "The force of `{name}` in {} is {low} in every sample. The force of a working drive is never constant. \
+                     Check which column is the force ({}).",
+                    self.file(),
+                    Remedy::option(OptionName::Columns),
                 ))
             });
         }
@@ -186,41 +192,44 @@ impl Recording {
             (low, above.fold(f64::INFINITY, f64::min)),
         ];
         let mut found: Vec<(f64, usize, usize)> = Vec::new();
+        // Compare the limit with the next value inside.
         for (limit, next) in ends {
-            let (count, first) = stays(force, limit, positions);
-            // A force that is read in coarse steps stays at each of them.
-            let (at_next, _) = stays(force, next, positions);
+            let (count, first) = count_at_value(force, limit, positions);
+            // A quantised force stays at each of its steps.
+            let (at_next, _) = count_at_value(force, next, positions);
             if let Some(first) = first
                 && count >= FEWEST_AT_LIMIT
-                && count > CROWDED * at_next
+                && count > LIMIT_CROWDING * at_next
             {
                 found.push((limit, count, first));
             }
         }
+        // Both limits are in one message.
         let (limit, count, first) = *found.first()?;
         let other = found
             .get(1)
             .map(|(limit, count, _)| {
                 let samples = count_of(*count, "sample", "samples");
-                format!(", and {samples} at {}", plain(*limit))
+                format!(", and {samples} at {}", format_recorded(*limit))
             })
             .unwrap_or_default();
-        Some(Note::warning(message!(
+        Some(RecordingNote::warning(message!(
             "The force of `{name}` in {} stays exactly at {} for {} while the mechanism moves, first in {} {}{other}: \
-             the drive or its measurement seems to be saturated. The true force is not known there; use a gentler motion, \
-             or leave these times out ({}).",
+             the drive or its measurement seems to be saturated. The true force is unknown there. Record a motion with smaller \
+             forces, or leave these times out ({}).",
             self.file(),
-            plain(limit),
+            format_recorded(limit),
             count_of(count, "sample", "samples"),
-            place_word(self.file()),
+            sample_place_word(self.file()),
             self.line(first).unwrap_or(0),
             Remedy::option(OptionName::Between),
         )))
     }
 }
 
-/// Samples in which a force stays exactly at a value, three of them or more one after the other, while something moves; and the first.
-fn stays(force: &[f64], value: f64, positions: &[&[f64]]) -> (usize, Option<usize>) {
+/// Number of samples in which a force is exactly equal to a value, in runs of three or more while a position changes;
+/// and the first of them.
+fn count_at_value(force: &[f64], value: f64, positions: &[&[f64]]) -> (usize, Option<usize>) {
     let (mut count, mut first) = (0, None);
     let mut i = 0;
     while i < force.len() {
@@ -228,8 +237,9 @@ fn stays(force: &[f64], value: f64, positions: &[&[f64]]) -> (usize, Option<usiz
         while i < force.len() && force[i].total_cmp(&value).is_eq() {
             i += 1;
         }
+        // Something must move during the run of equal values.
         let moves = |q: &&[f64]| i > start && q[start].total_cmp(&q[i - 1]).is_ne();
-        if i - start >= 3 && positions.iter().any(moves) {
+        if i - start >= EXACT_LIMIT_SHORTEST_RUN && positions.iter().any(moves) {
             count += i - start;
             first.get_or_insert(start);
         }
@@ -238,15 +248,19 @@ fn stays(force: &[f64], value: f64, positions: &[&[f64]]) -> (usize, Option<usiz
     (count, first)
 }
 
-/// A level near an end of the range of a force at which samples crowd: its value and how far they spread about it.
-fn crowded(force: &[f64], is_high: bool) -> Option<(f64, f64)> {
+/// A level near an end of the range of a force around which many samples lie: its value, and the half width of the band
+/// around it.
+fn crowded_level(force: &[f64], is_high: bool) -> Option<(f64, f64)> {
     let mut sorted = force.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
+    // In reversed order the end of interest is always the last part.
     if !is_high {
         sorted.reverse();
     }
     let n = sorted.len();
-    let few = (n / 100).max(FEWEST_AT_LIMIT);
+    // The narrowest interval with this many samples, within the outer third of the values.
+    let few = (n / NOISY_LIMIT_ONE_IN).max(FEWEST_AT_LIMIT);
+    // Only the outer third of the values can be at a limit.
     let upper = &sorted[n - n / 3..];
     let crowd = (0..upper.len().checked_sub(few)?).min_by(|a, b| {
         let width = |i: usize| (upper[i + few] - upper[i]).abs();
@@ -254,11 +268,12 @@ fn crowded(force: &[f64], is_high: bool) -> Option<(f64, f64)> {
     })?;
     let width = (upper[crowd + few] - upper[crowd]).abs();
     let level = upper[crowd + few / 2];
-    Some((level, (SPREAD * white_noise(force)).max(2.0 * width)))
+    let spread = (LIMIT_BAND_SIGMAS * white_noise(force)).max(LIMIT_BAND_WIDTHS * width);
+    Some((level, spread))
 }
 
-/// A recorded number as it stands in the file, unless it is very long.
-fn plain(value: f64) -> String {
+/// A recorded number as it is in the file; with seven digits if it is very large.
+fn format_recorded(value: f64) -> String {
     if value.abs() < 1e12 {
         value.to_string()
     } else {
@@ -280,9 +295,8 @@ mod tests {
             let t = f64::from(i) * 0.002;
             let _ = writeln!(text, "{t},{},{}", q(t), force(t));
         }
-        let recording =
-            Recording::from_reader(text.as_bytes(), "run.csv", &ReadOptions::default()).unwrap();
-        let notes = recording.oddities(&[("q".to_owned(), true)], &["motor".to_owned()]);
+        let recording = SignalRecording::from_reader(text.as_bytes(), "run.csv", &ReadOptions::default()).unwrap();
+        let notes = recording.signal_notes(&[("q".to_owned(), true)], &["motor".to_owned()]);
         let says = notes.iter().map(|note| note.says.in_library_words());
         says.collect()
     }
@@ -304,7 +318,7 @@ mod tests {
             let force = |t: f64| (20.0 * (7.0 * t).cos() / step).round() * step;
             assert_eq!(says(|t| (3.0 * t).sin(), force), none, "{step}");
         }
-        // At rest a force may stay where it is.
+        // At standstill a force may be constant.
         assert_eq!(
             says(
                 |t| if t < 1.0 { 0.3 } else { t },
@@ -316,10 +330,7 @@ mod tests {
 
     #[test]
     fn a_clipped_force_is_named_with_its_limit_and_line() {
-        let found = says(
-            |t| (3.0 * t).sin(),
-            |t| (20.0 * (7.0 * t).sin()).clamp(-15.0, 15.0),
-        );
+        let found = says(|t| (3.0 * t).sin(), |t| (20.0 * (7.0 * t).sin()).clamp(-15.0, 15.0));
         assert_eq!(found.len(), 1);
         assert!(
             found[0].contains("stays exactly at 15") && found[0].contains("at -15"),
@@ -329,14 +340,8 @@ mod tests {
             |t| (3.0 * t).sin(),
             |t| (20.0 * (7.0 * t).sin()).clamp(-15.0, 15.0) + 1e-3 * (9e4 * t).sin(),
         );
-        assert!(
-            found.len() == 1 && found[0].contains("but for noise"),
-            "{found:?}"
-        );
-        let found = says(
-            |t| (3.0 * t).sin(),
-            |t| (20.0 * (7.0 * t).sin()).clamp(-15.0, 15.0),
-        );
+        assert!(found.len() == 1 && found[0].contains("except for noise"), "{found:?}");
+        let found = says(|t| (3.0 * t).sin(), |t| (20.0 * (7.0 * t).sin()).clamp(-15.0, 15.0));
         let coarse = |t: f64| ((20.0 * (7.0 * t).sin()).clamp(-15.0, 15.0) / 1.5).round() * 1.5;
         let of_steps = says(|t| (3.0 * t).sin(), coarse);
         assert!(of_steps[0].contains("stays exactly at 15"), "{of_steps:?}");
@@ -355,9 +360,8 @@ mod tests {
                 let (q, rate, acceleration) = (900.0 * sin, 2700.0 * cos, -8100.0 * sin);
                 writeln!(text, "{t},{q},{},{}", scale * rate, scale * acceleration).unwrap();
             }
-            let recording =
-                Recording::from_bytes(text.as_bytes(), "run.csv", &ReadOptions::default());
-            Remedy::options(recording.unwrap().maps_from_degrees("q")).spell(&LibrarySpelling)
+            let recording = SignalRecording::from_bytes(text.as_bytes(), "run.csv", &ReadOptions::default());
+            Remedy::options(recording.unwrap().degree_conversion_options("q")).spell(&LibrarySpelling)
         };
         assert_eq!(
             of(1.0),
@@ -372,19 +376,13 @@ mod tests {
             |t| (3.0 * (t / 0.008 + 1e-9).floor() * 0.008).sin(),
             |t| (5.0 * t).sin(),
         );
-        assert!(
-            held.len() == 1 && held[0].contains("every 4 samples"),
-            "{held:?}"
-        );
+        assert!(held.len() == 1 && held[0].contains("every 4 samples"), "{held:?}");
         let degrees = says(|t| 90.0 * (3.0 * t).sin(), |t| (5.0 * t).sin());
         assert!(
-            degrees.len() == 1 && degrees[0].ends_with("say so: option `columns` = `q=q [deg]`."),
+            degrees.len() == 1 && degrees[0].ends_with("if it is in degrees, use option `columns` = `q=q [deg]`."),
             "{degrees:?}"
         );
         let dead = says(|t| (3.0 * t).sin(), |_| 4.0);
-        assert!(
-            dead.len() == 1 && dead[0].contains("is 4 throughout"),
-            "{dead:?}"
-        );
+        assert!(dead.len() == 1 && dead[0].contains("is 4 in every sample"), "{dead:?}");
     }
 }

@@ -1,41 +1,44 @@
-//! Noise with a memory, and the filter that makes it white.
+//! Coloured noise as an autoregressive process, and the filter that whitens it. Input: a residual; output:
+//! coefficients, and filtered series.
 
-/// The highest order that is tried.
-const HIGHEST: usize = 40;
+/// Highest order of the process that is tried.
+const MAX_ORDER: usize = 40;
 
-/// An autoregression: `e_t = a_1 e_(t-1) + ... + a_p e_(t-p) + w_t` with white `w` (Box and Jenkins, Time Series Analysis).
+/// An autoregression: `e_t = a_1 e_(t-1) + ... + a_p e_(t-p) + w_t` with white `w` (Box and Jenkins, Time Series
+/// Analysis).
 #[derive(Clone, Debug, PartialEq)]
-pub struct Coloured {
+pub struct AutoregressiveNoise {
     /// `a_1` to `a_p`; none for white noise.
     pub coefficients: Vec<f64>,
-    /// Standard deviation of `w`, in the unit of the residual; 0 where the residual is zero.
-    pub deviation: f64,
+    /// Standard deviation of `w`, in the unit of the residual; 0 if the residual is zero.
+    pub standard_deviation: f64,
 }
 
-impl Coloured {
-    /// The autoregression of a residual in stretches, by the equations of Yule and Walker (recursion of Levinson and Durbin),
-    /// with the order that Schwarz' criterion takes. `floor` is the effective value of white noise that is there besides, in
-    /// the unit of the residual: a model that is nearly right leaves so little that what is left is foreseen all too well.
-    pub fn of(stretches: &[&[f64]], floor: f64) -> Self {
-        let n: usize = stretches.iter().map(|s| s.len()).sum();
-        let highest = HIGHEST.min(n / 20);
+impl AutoregressiveNoise {
+    /// Estimates the process from a residual in segments by the Yule-Walker equations (Levinson-Durbin recursion), with
+    /// the order that minimises Schwarz' criterion. `floor` is the rms value of additional white noise, in the unit of
+    /// the residual: the residual of a nearly exact model would otherwise be predicted too well.
+    pub fn from_residual(segments: &[&[f64]], floor: f64) -> Self {
+        let n: usize = segments.iter().map(|s| s.len()).sum();
+        let highest = MAX_ORDER.min(n / 20);
+        // Autocovariances; products never cross the border of a segment.
         let mut covariance: Vec<f64> = (0..=highest)
             .map(|lag| {
                 let of_stretch = |s: &&[f64]| -> f64 {
                     let later = s.get(lag..).unwrap_or_default();
                     later.iter().zip(s.iter()).map(|(a, b)| a * b).sum()
                 };
-                stretches.iter().map(of_stretch).sum::<f64>() / n.max(1) as f64
+                segments.iter().map(of_stretch).sum::<f64>() / n.max(1) as f64
             })
             .collect();
+        // White noise adds to the variance only.
         covariance[0] += floor * floor;
         let mut best = (f64::INFINITY, Vec::new(), covariance[0]);
         let (mut a, mut variance): (Vec<f64>, f64) = (Vec::new(), covariance[0]);
+        // Levinson-Durbin: each order follows from the one before.
         for order in 0..=highest {
             if order > 0 {
-                let known: f64 = (0..order - 1)
-                    .map(|i| a[i] * covariance[order - 1 - i])
-                    .sum();
+                let known: f64 = (0..order - 1).map(|i| a[i] * covariance[order - 1 - i]).sum();
                 let reflection = (covariance[order] - known) / variance;
                 let before = a.clone();
                 for i in 0..order - 1 {
@@ -44,9 +47,11 @@ impl Coloured {
                 a.push(reflection);
                 variance *= 1.0 - reflection * reflection;
             }
+            // The series is predicted exactly up to rounding; higher orders are meaningless.
             if variance <= 1e-12 * covariance[0] {
                 break;
             }
+            // Schwarz' criterion: likelihood and number of coefficients.
             let cost = n as f64 * variance.ln() + order as f64 * (n as f64).ln();
             if cost < best.0 {
                 best = (cost, a.clone(), variance);
@@ -54,13 +59,12 @@ impl Coloured {
         }
         Self {
             coefficients: best.1,
-            deviation: best.2.max(0.0).sqrt(),
+            standard_deviation: best.2.max(0.0).sqrt(),
         }
     }
 
-    /// A series of one stretch as it would be had its noise no memory, in standard deviations of `w`. The first numbers have
-    /// no past and come out as 0.
-    pub fn whitened(&self, series: &[f64]) -> Vec<f64> {
+    /// Whitened series of one segment, in standard deviations of `w`. The first values have no past and are 0.
+    pub fn whiten(&self, series: &[f64]) -> Vec<f64> {
         let order = self.coefficients.len();
         let white = |t: usize| {
             if t < order {
@@ -68,7 +72,7 @@ impl Coloured {
             }
             let past = self.coefficients.iter().enumerate();
             let known: f64 = past.map(|(i, a)| a * series[t - 1 - i]).sum();
-            (series[t] - known) / self.deviation
+            (series[t] - known) / self.standard_deviation
         };
         (0..series.len()).map(white).collect()
     }
@@ -77,47 +81,40 @@ impl Coloured {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
 
     #[test]
     fn noise_through_a_filter_comes_out_white() {
-        let mut noise = Noise::new(4);
+        let mut noise = TestNoise::new(4);
         let truth = [1.6, -0.8];
         let mut series = vec![0.0; 20_000];
         for t in 2..series.len() {
             series[t] = truth[0] * series[t - 1] + truth[1] * series[t - 2] + 0.3 * noise.normal();
         }
         let (first, second) = series.split_at(7_000);
-        let found = Coloured::of(&[first, second], 0.0);
-        assert!((found.deviation - 0.3).abs() < 0.01, "{found:?}");
+        let found = AutoregressiveNoise::from_residual(&[first, second], 0.0);
+        assert!((found.standard_deviation - 0.3).abs() < 0.01, "{found:?}");
         assert_eq!(found.coefficients.len(), 2, "{found:?}");
         for (a, b) in found.coefficients.iter().zip(truth) {
             assert!((a - b).abs() < 0.02, "{found:?}");
         }
-        let white = found.whitened(&series);
+        let white = found.whiten(&series);
         let n = white.len() as f64;
-        let product = |lag: usize| -> f64 {
-            white[lag..]
-                .iter()
-                .zip(&white)
-                .map(|(a, b)| a * b)
-                .sum::<f64>()
-                / n
-        };
+        let product = |lag: usize| -> f64 { white[lag..].iter().zip(&white).map(|(a, b)| a * b).sum::<f64>() / n };
         assert!((product(0) - 1.0).abs() < 0.05);
         assert!((1..20).all(|lag| product(lag).abs() < 0.03));
     }
 
     #[test]
     fn white_noise_and_nothing_have_no_memory() {
-        let mut noise = Noise::new(9);
+        let mut noise = TestNoise::new(9);
         let white: Vec<f64> = (0..5_000).map(|_| noise.normal()).collect();
-        assert!(Coloured::of(&[&white], 0.0).coefficients.len() < 3);
-        let nothing = Coloured::of(&[&[0.0; 100]], 0.0);
-        assert_eq!((nothing.coefficients.len(), nothing.deviation), (0, 0.0));
+        assert!(AutoregressiveNoise::from_residual(&[&white], 0.0).coefficients.len() < 3);
+        let nothing = AutoregressiveNoise::from_residual(&[&[0.0; 100]], 0.0);
+        assert_eq!((nothing.coefficients.len(), nothing.standard_deviation), (0, 0.0));
         // A wave is foreseen without an error, but not below the floor.
         let wave: Vec<f64> = (0..5_000).map(|i| (0.1 * f64::from(i)).sin()).collect();
-        assert!(Coloured::of(&[&wave], 0.0).deviation < 0.01);
-        assert!(Coloured::of(&[&wave], 0.1).deviation > 0.1);
+        assert!(AutoregressiveNoise::from_residual(&[&wave], 0.0).standard_deviation < 0.01);
+        assert!(AutoregressiveNoise::from_residual(&[&wave], 0.1).standard_deviation > 0.1);
     }
 }

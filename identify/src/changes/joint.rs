@@ -1,175 +1,182 @@
-//! One fit of many runs: some coefficients are shared by all, others are each run's own.
+//! A joint fit of many runs: some coefficients are shared by all runs, others belong to one run. Input: additive
+//! statistics of the runs; output: values with covariance.
 //!
 //! ```text
 //! y_rd = s_d (Z_rd [x, o_r, f_r] + e)
 //! ```
 //!
-//! for run r and channel d, with shared `x`, own `o_r`, and `f_r` that are known. The scale `s_d` of a channel is 1, or unknown
-//! as well: a load of known mass in one of the runs then says it (Gautier and Briot, IEEE ICRA 2012). Own values are eliminated
-//! run by run, so that the cost grows with the number of runs and not with its cube.
+//! for run r and channel d, with shared `x`, own `o_r`, and known `f_r`. The scale `s_d` of a channel is 1, or
+//! estimated too: a load of known mass in one of the runs determines it (Gautier and Briot, IEEE ICRA 2012). Own values
+//! are eliminated run by run, so that the cost grows linearly with the number of runs.
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::changes::moments::{Eliminated, Moments};
+use crate::changes::moments::{EliminatedValues, NormalEquations};
 
-/// Steps of Gauss and Newton at most, where scales are unknown.
+/// Largest number of Gauss-Newton steps if scales are estimated.
 const STEPS: usize = 60;
-/// Steps end where they change the sum of squares by less than this part of it.
-const SETTLED: f64 = 1e-12;
+/// Steps end when they change the sum of squares by less than this share of it.
+const CONVERGENCE_TOLERANCE: f64 = 1e-12;
 
 /// One run of a joint fit.
 #[derive(Clone, Debug)]
-pub struct Part {
-    /// Sums over rows of variance 1, channel by channel.
-    pub channels: Vec<Moments>,
-    /// Columns that have values of their own in this run; columns that are neither shared nor own count as 0.
+pub struct JointRun {
+    /// Additive statistics of rows with variance 1, `[channel]`.
+    pub channels: Vec<NormalEquations>,
+    /// Columns with values of their own in this run; columns that are neither shared nor own nor known have the value
+    /// 0.
     pub own: Vec<usize>,
-    /// Columns whose values are known in this run.
+    /// Columns with known values in this run, as (column, value).
     pub known: Vec<(usize, f64)>,
 }
 
 /// Values with their covariance.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Values {
+pub struct JointValues {
     /// The values.
     pub values: DVector<f64>,
     /// Their covariance.
     pub covariance: DMatrix<f64>,
-    /// Which of them the runs tell.
+    /// Which of the values the runs determine.
     pub determined: Vec<bool>,
 }
 
 /// The result of a joint fit.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Joint {
-    /// Shared values, in the order in which they were asked for, and behind them the scales of channels, if these are unknown.
-    pub shared: Values,
-    /// Own values of each run, in the order of [`Part::own`].
-    pub own: Vec<Values>,
+pub struct JointFit {
+    /// Shared values in the requested order, then the scales of the channels if these are estimated.
+    pub shared: JointValues,
+    /// Own values of each run, in the order of [`JointRun::own`].
+    pub own: Vec<JointValues>,
 }
 
-/// Fits all runs at once; with `scaled` the scale of each channel is unknown.
-pub fn joint(parts: &[Part], shared: &[usize], scaled: bool) -> Joint {
-    let mut at = Point {
+/// Fits all runs at once; `shared` are the shared columns. If `scaled`, the scale of each channel is estimated.
+pub fn fit_jointly(parts: &[JointRun], shared: &[usize], scaled: bool) -> JointFit {
+    let mut at = JointIterate {
         shared: DVector::zeros(shared.len()),
         scales: vec![1.0; parts.first().map_or(0, |part| part.channels.len())],
-        own: parts
-            .iter()
-            .map(|part| DVector::zeros(part.own.len()))
-            .collect(),
+        own: parts.iter().map(|part| DVector::zeros(part.own.len())).collect(),
     };
-    let mut step = Step::new(parts, shared, &at, false);
-    at = step.taken(&at, 1.0);
+    // With fixed scales the problem is linear, so one step is exact.
+    let mut step = GaussNewtonStep::new(parts, shared, &at, false);
+    at = step.apply_step(&at, 1.0);
     if scaled {
         for _ in 0..STEPS {
-            step = Step::new(parts, shared, &at, true);
-            let tried = [1.0, 0.5, 0.25, 0.1, 0.01].map(|part| step.taken(&at, part));
-            let rest = |point: &Point| Step::new(parts, shared, point, true).before;
+            step = GaussNewtonStep::new(parts, shared, &at, true);
+            // Shorten the step until the sum of squares falls.
+            let tried = [1.0, 0.5, 0.25, 0.1, 0.01].map(|part| step.apply_step(&at, part));
+            let rest = |point: &JointIterate| GaussNewtonStep::new(parts, shared, point, true).squares_before;
             let best = tried.into_iter().find_map(|point| {
                 let left = rest(&point);
-                (left < step.before).then_some((left, point))
+                (left < step.squares_before).then_some((left, point))
             });
             let Some((left, point)) = best else { break };
             at = point;
-            if step.before - left <= SETTLED * step.before {
+            if step.squares_before - left <= CONVERGENCE_TOLERANCE * step.squares_before {
                 break;
             }
         }
-        step = Step::new(parts, shared, &at, true);
+        step = GaussNewtonStep::new(parts, shared, &at, true);
     }
     step.result(&at)
 }
 
-/// Values on the way.
+/// Present values of an iteration.
 #[derive(Clone)]
-struct Point {
+struct JointIterate {
+    /// Shared values.
     shared: DVector<f64>,
+    /// Scale of each channel.
     scales: Vec<f64>,
+    /// Own values of each run.
     own: Vec<DVector<f64>>,
 }
 
-/// The linear problem around a point.
-struct Step {
-    solved: crate::changes::moments::Solved,
-    /// Own values of each run as they follow from the shared ones.
-    own: Vec<Eliminated>,
+/// The linearised problem at a point, solved.
+struct GaussNewtonStep {
+    /// Solution for the shared values and the scales, relative to the point.
+    solution: crate::changes::moments::NormalSolution,
+    /// Own values of each run as functions of the shared ones.
+    own: Vec<EliminatedValues>,
     /// Sum of squares at the point.
-    before: f64,
-    /// Variance of what is left.
+    squares_before: f64,
+    /// Variance of the residual, at least 1.
     noise: f64,
     scaled: bool,
 }
 
-impl Step {
-    fn new(parts: &[Part], shared: &[usize], at: &Point, scaled: bool) -> Self {
+impl GaussNewtonStep {
+    /// Linearises all runs at a point, eliminates their own values and solves for the shared ones.
+    fn new(parts: &[JointRun], shared: &[usize], at: &JointIterate, scaled: bool) -> Self {
         let n = shared.len() + if scaled { at.scales.len() } else { 0 };
-        let mut sum = Moments::new(n);
+        let mut sum = NormalEquations::new(n);
         let mut before = 0.0;
         let mut own = Vec::new();
         for (part, values) in parts.iter().zip(&at.own) {
-            let around = around(part, shared, at, values, scaled);
+            let around = linearise_run(part, shared, at, values, scaled);
             before += around.total;
+            // Statistics of the shared columns after elimination add up over the runs.
             let (left, one) = around.eliminate(part.own.len());
             sum.merge(&left);
             own.push(one);
         }
         let solved = sum.solve();
-        let rank = solved.rank + own.iter().map(Eliminated::rank).sum::<usize>();
+        let rank = solved.rank + own.iter().map(EliminatedValues::rank).sum::<usize>();
         Self {
-            noise: (solved.rest / (sum.rows as f64 - rank as f64).max(1.0)).max(1.0),
-            solved,
+            noise: (solved.residual_squares / (sum.rows as f64 - rank as f64).max(1.0)).max(1.0),
+            solution: solved,
             own,
-            before,
+            squares_before: before,
             scaled,
         }
     }
 
     /// The point after a part of the step.
-    fn taken(&self, at: &Point, part: f64) -> Point {
+    fn apply_step(&self, at: &JointIterate, part: f64) -> JointIterate {
         let mut next = at.clone();
         let n = next.shared.len();
-        next.shared += part * self.solved.values.rows(0, n);
+        next.shared += part * self.solution.values.rows(0, n);
         if self.scaled {
-            for (scale, step) in next
-                .scales
-                .iter_mut()
-                .zip(self.solved.values.iter().skip(n))
-            {
+            for (scale, step) in next.scales.iter_mut().zip(self.solution.values.iter().skip(n)) {
                 *scale += part * step;
             }
         }
         for (own, one) in next.own.iter_mut().zip(&self.own) {
-            *own += part * one.values(&self.solved.values);
+            *own += part * one.values(&self.solution.values);
         }
         next
     }
 
-    fn result(&self, at: &Point) -> Joint {
+    /// Values at the point with covariances from the linearised problem.
+    fn result(&self, at: &JointIterate) -> JointFit {
         let scales = at.scales.iter().filter(|_| self.scaled);
-        let own = at.own.iter().zip(&self.own).map(|(values, one)| Values {
+        let own = at.own.iter().zip(&self.own).map(|(values, one)| JointValues {
             values: values.clone(),
-            covariance: self.noise * one.covariance(&self.solved.covariance),
-            determined: one.determined(&self.solved.determined),
+            covariance: self.noise * one.covariance(&self.solution.covariance),
+            determined: one.determined_flags(&self.solution.determined),
         });
-        Joint {
-            shared: Values {
-                values: DVector::from_iterator(
-                    self.solved.values.len(),
-                    at.shared.iter().chain(scales).copied(),
-                ),
-                covariance: self.noise * &self.solved.covariance,
-                determined: self.solved.determined.clone(),
+        JointFit {
+            shared: JointValues {
+                values: DVector::from_iterator(self.solution.values.len(), at.shared.iter().chain(scales).copied()),
+                covariance: self.noise * &self.solution.covariance,
+                determined: self.solution.determined.clone(),
             },
             own: own.collect(),
         }
     }
 }
 
-/// The linear problem of one run around a point: columns of its own values, of shared ones, and of scales.
-fn around(part: &Part, shared: &[usize], at: &Point, own: &DVector<f64>, scaled: bool) -> Moments {
+/// Normal equations of one run around a point, with columns in the order: own values, shared values, scales.
+fn linearise_run(
+    part: &JointRun,
+    shared: &[usize],
+    at: &JointIterate,
+    own: &DVector<f64>,
+    scaled: bool,
+) -> NormalEquations {
     let columns: Vec<usize> = part.own.iter().chain(shared).copied().collect();
     let n = columns.len();
-    let mut all = Moments::new(n + if scaled { at.scales.len() } else { 0 });
+    let mut all = NormalEquations::new(n + if scaled { at.scales.len() } else { 0 });
     for (d, (sums, scale)) in part.channels.iter().zip(&at.scales).enumerate() {
         let mut values = DVector::zeros(sums.rhs.len());
         let own = part.own.iter().zip(own.iter());
@@ -179,7 +186,7 @@ fn around(part: &Part, shared: &[usize], at: &Point, own: &DVector<f64>, scaled:
         for (k, x) in &part.known {
             values[*k] = *x;
         }
-        // What the values make of the columns, and what they leave.
+        // Products of the columns with the model's forces, and with the residual.
         let made = &sums.gram * &values;
         let left = &sums.rhs - *scale * &made;
         for (i, a) in columns.iter().enumerate() {
@@ -207,14 +214,12 @@ fn around(part: &Part, shared: &[usize], at: &Point, own: &DVector<f64>, scaled:
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
 
     /// Two channels, two shared columns and one that is a run's own; forces times a scale of each channel.
-    fn part(noise: &mut Noise, shared: [f64; 2], own: f64, scales: [f64; 2]) -> Vec<Moments> {
+    fn part(noise: &mut TestNoise, shared: [f64; 2], own: f64, scales: [f64; 2]) -> Vec<NormalEquations> {
         let channel = |scale: f64| {
-            let z: Vec<Vec<f64>> = (0..3)
-                .map(|_| (0..300).map(|_| noise.normal()).collect())
-                .collect();
+            let z: Vec<Vec<f64>> = (0..3).map(|_| (0..300).map(|_| noise.normal()).collect()).collect();
             let y: Vec<f64> = (0..300)
                 .map(|i| {
                     let force = shared[0] * z[0][i] + shared[1] * z[1][i] + own * z[2][i];
@@ -224,7 +229,7 @@ mod tests {
             let z: Vec<Vec<f64>> = (z.iter())
                 .map(|column| column.iter().map(|x| 100.0 * x).collect())
                 .collect();
-            let mut sums = Moments::new(3);
+            let mut sums = NormalEquations::new(3);
             let z: Vec<Option<&[f64]>> = z.iter().map(|column| Some(&column[..])).collect();
             sums.add_rows(&z, &y);
             sums
@@ -232,7 +237,7 @@ mod tests {
         scales.map(channel).to_vec()
     }
 
-    fn is_near(found: &Values, truth: &[f64]) {
+    fn is_near(found: &JointValues, truth: &[f64]) {
         for (i, truth) in truth.iter().enumerate() {
             let deviation = found.covariance[(i, i)].sqrt();
             assert!(found.determined[i], "{found:?}");
@@ -246,22 +251,22 @@ mod tests {
     #[test]
     fn shared_and_own_values_are_told_apart() {
         for seed in 0..20 {
-            let mut noise = Noise::new(seed);
+            let mut noise = TestNoise::new(seed);
             let owns = [0.0, 0.7, -0.3];
-            let parts: Vec<Part> = (owns.iter())
-                .map(|own| Part {
+            let parts: Vec<JointRun> = (owns.iter())
+                .map(|own| JointRun {
                     channels: part(&mut noise, [2.0, -1.0], *own, [1.0, 1.0]),
                     own: vec![2],
                     known: Vec::new(),
                 })
                 .collect();
-            let found = joint(&parts, &[0, 1], false);
+            let found = fit_jointly(&parts, &[0, 1], false);
             is_near(&found.shared, &[2.0, -1.0]);
             for (own, truth) in found.own.iter().zip(owns) {
                 is_near(own, &[truth]);
             }
             // The same by one problem with all columns.
-            let mut all = Moments::new(5);
+            let mut all = NormalEquations::new(5);
             for (r, part) in parts.iter().enumerate() {
                 for sums in &part.channels {
                     let places = [0, 1, 2 + r];
@@ -283,28 +288,24 @@ mod tests {
         }
     }
 
-    /// A load that is known says the scales of both channels, though the load itself is seen with them alone.
+    /// A known load determines the scales of both channels.
     #[test]
     fn a_known_load_tells_scales() {
-        let mut noise = Noise::new(5);
+        let mut noise = TestNoise::new(5);
         let scales = [0.8, 1.3];
         let unloaded = part(&mut noise, [2.0, -1.0], 0.0, scales);
         let loaded = part(&mut noise, [2.0, -1.0], 0.5, scales);
         let parts = |mass: &[(usize, f64)]| {
-            [
-                (unloaded.clone(), Vec::new()),
-                (loaded.clone(), mass.to_vec()),
-            ]
-            .map(|(channels, known)| Part {
+            [(unloaded.clone(), Vec::new()), (loaded.clone(), mass.to_vec())].map(|(channels, known)| JointRun {
                 channels,
                 own: Vec::new(),
                 known,
             })
         };
-        let found = joint(&parts(&[(2, 0.5)]), &[0, 1], true);
+        let found = fit_jointly(&parts(&[(2, 0.5)]), &[0, 1], true);
         is_near(&found.shared, &[2.0, -1.0, 0.8, 1.3]);
         // Without a load only products are known.
-        let found = joint(&parts(&[])[..1], &[0, 1], true);
+        let found = fit_jointly(&parts(&[])[..1], &[0, 1], true);
         assert!(!found.shared.determined[0] && !found.shared.determined[2]);
     }
 }

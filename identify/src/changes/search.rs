@@ -1,126 +1,118 @@
-//! The fewest changes that explain what a later run does not share with the one before.
+//! Search for the fewest changes that explain the difference between two runs. Input: normal equations of both runs and
+//! possible changes; output: selected changes with values.
 //!
-//! Decision: nothing changed within a run. Standard deviations count noise, and not what a model lacks along one
-//! motion and not along another. So parts of one run are compared like runs; between runs a change must explain
+//! Decision: nothing changed within a run. Standard deviations count noise only, and not model errors that appear along
+//! one motion and not along another. So parts of one run are compared like two runs; between runs a change must explain
 //! twice what it explains there. On four real arms this removes every false change, at the price of small true ones
 //! where the model is poor.
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::changes::moments::{Beside, Moments, Solved};
+use crate::changes::moments::{NormalEquations, NormalSolution, SchurComplement};
+use crate::changes::thresholds::{
+    CHANCE_GAIN_RARITY, CHANGE_VALUE_PRICE, MIN_SIGNIFICANCE, MIN_SPREAD_RATIO, MIN_VALIDATION_SHARE, RIVAL_TOLERANCE,
+};
 
-/// How many times the logarithm of the number of rows a value must gain: 1 is Schwarz' criterion, which holds for white noise;
-/// what is left of real runs is never quite white.
-const STRICTER: f64 = 3.0;
-/// The part of a change's gain that must be there on blocks that had no part in its fit.
-const HELD_OUT: f64 = 0.3;
-/// A change must explain so many times what parts of one run differ by among themselves: motions of two runs have less in
-/// common than parts of one.
-const BEYOND: f64 = 2.0;
-/// A change must stand so many deviations clear of none. Deviations count the noise alone: parts of one run show much of what a
-/// model lacks, but not what it lacks along the other motion.
-const CLEAR: f64 = 12.0;
-/// Changes that differ by less than this part of the gain cannot be told apart.
-const NEAR: f64 = 0.02;
-
-/// Two runs as sums over rows of variance 1, block by block and over the same columns.
+/// Two runs as normal equations of rows with variance 1, block by block and with the same columns.
 #[derive(Clone, Debug)]
-pub struct Runs {
-    /// The run before.
-    pub reference: Vec<Moments>,
-    /// The later run.
-    pub later: Vec<Moments>,
-    /// By what parts of one run differ among themselves: the larger of what [`within`] says of the two.
-    pub within: f64,
+pub struct RunPair {
+    /// Blocks of the earlier run.
+    pub reference: Vec<NormalEquations>,
+    /// Blocks of the later run.
+    pub later: Vec<NormalEquations>,
+    /// Differences within one run: the larger result of [`within_run_spread`] for the two runs.
+    pub within_run_spread: f64,
 }
 
-/// What is asked of two runs.
+/// Possible explanations of the difference of two runs.
 #[derive(Clone, Debug)]
-pub struct Search {
-    /// Columns whose coefficients both runs share: those of the model, and those of what it may lack in both.
+pub struct ChangeHypotheses {
+    /// Columns whose coefficients both runs share: those of the model, and those of effects that it may lack in both.
     pub shared: Vec<usize>,
     /// The changes that are possible.
-    pub changes: Vec<Candidate>,
+    pub changes: Vec<PossibleChange>,
 }
 
 /// A change that is possible.
 #[derive(Clone, Debug)]
-pub struct Candidate {
-    /// Its columns, which have coefficients of their own in the later run.
+pub struct PossibleChange {
+    /// Its columns, which have own coefficients in the later run.
     pub columns: Vec<usize>,
-    /// The most values that it is charged for; fewer than it has where they move together as a rule.
-    pub most: usize,
-    /// What it is charged besides, in values, for being rarer than others.
+    /// Largest number of values in its price; lower than the number of columns if they usually change together.
+    pub max_charged_values: usize,
+    /// Additional price for a rare change, in values.
     pub rarity: f64,
 }
 
 /// A change that was found.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Change {
-    /// Which of the possible ones.
-    pub which: usize,
-    /// The values of its columns.
+pub struct SelectedChange {
+    /// Index among the possible changes.
+    pub candidate: usize,
+    /// Changes of the coefficients of its columns.
     pub values: DVector<f64>,
     /// Their covariance.
     pub covariance: DMatrix<f64>,
-    /// Which values are known by themselves.
+    /// Which of the values are determined individually.
     pub determined: Vec<bool>,
-    /// By how much the sum of squares would rise without it, over the variance of what is left.
+    /// Increase of the sum of squares without it, relative to the variance of the residual.
     pub gain: f64,
-    /// The same on blocks that had no part in the fit.
-    pub held_out: f64,
-    /// Changes that explain nearly as much in its place.
+    /// The same on blocks that were not fitted.
+    pub validation_gain: f64,
+    /// Indices of changes that explain nearly as much in its place.
     pub rivals: Vec<usize>,
 }
 
-/// The fewest changes that explain the later run, the largest first; none where the runs differ by chance alone, or by no more
-/// than parts of one run do.
-pub fn search(runs: &Runs, search: &Search) -> Vec<Change> {
-    let bench = Bench::new(runs, search);
+/// Finds the fewest changes that explain the later run, sorted by gain. Empty if the runs differ by chance only, or by
+/// no more than parts of one run do.
+pub fn search_changes(runs: &RunPair, search: &ChangeHypotheses) -> Vec<SelectedChange> {
+    let bench = ChangeSelector::new(runs, search);
     let mut chosen: Vec<usize> = Vec::new();
     loop {
+        // Forward: add the change with the lowest cost, then exchange members.
         let candidates = (0..search.changes.len()).filter(|g| !chosen.contains(g));
-        let tried = candidates.map(|g| (g, bench.cost(&with(&chosen, g))));
+        let tried = candidates.map(|g| (g, bench.penalised_residual(&add_index(&chosen, g))));
         let Some((best, cost)) = tried.min_by(|a, b| a.1.total_cmp(&b.1)) else {
             break;
         };
-        if cost >= bench.cost(&chosen) || !bench.holds(&chosen, best) {
+        if cost >= bench.penalised_residual(&chosen) || !bench.is_supported(&chosen, best) {
             break;
         }
         chosen.push(best);
-        bench.settle(&mut chosen);
+        bench.improve_selection(&mut chosen);
     }
-    // What the exchanges have made small goes again.
+    // Remove changes whose gain has become too small by the exchanges.
     while let Some(at) = (0..chosen.len()).find(|at| {
-        let rest = without(&chosen, chosen[*at]);
-        bench.gain(&rest, chosen[*at]) < bench.least
+        let rest = remove_index(&chosen, chosen[*at]);
+        bench.squares_gain(&rest, chosen[*at]) < bench.min_gain
     }) {
         chosen.remove(at);
     }
-    let mut found: Vec<Change> = chosen.iter().map(|g| bench.change(&chosen, *g)).collect();
+    let mut found: Vec<SelectedChange> = chosen.iter().map(|g| bench.build_change(&chosen, *g)).collect();
     found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     found
 }
 
-/// By how much each change, with no other beside it, lowers the sum of squares, over the variance of what all of them leave; of
-/// many machines this says what is usual among them.
-pub fn gains(runs: &Runs, search: &Search) -> Vec<f64> {
-    let bench = Bench::new(runs, search);
+/// Decrease of the sum of squares by each change alone, relative to the variance of the residual of all changes. Over
+/// many machines this shows what is usual.
+pub fn single_change_gains(runs: &RunPair, search: &ChangeHypotheses) -> Vec<f64> {
+    let bench = ChangeSelector::new(runs, search);
     (0..search.changes.len())
-        .map(|which| bench.gain(&[], which))
+        .map(|which| bench.squares_gain(&[], which))
         .collect()
 }
 
-/// One change with no other beside it, whatever it explains.
-pub fn alone(runs: &Runs, search: &Search, which: usize) -> Change {
-    Bench::new(runs, search).change(&[which], which)
+/// Fits a single change, however little it explains.
+pub fn fit_single_change(runs: &RunPair, search: &ChangeHypotheses, which: usize) -> SelectedChange {
+    ChangeSelector::new(runs, search).build_change(&[which], which)
 }
 
-/// By what parts of one run differ among themselves: the largest sum of squares that a single change between parts of it explains,
-/// over the rows that a difference of its parts is worth. Noise makes it small; what a model lacks, and friction that drifts, make
-/// it large, and then the same must be expected between two runs.
-pub fn within(blocks: &[Moments], search: &Search) -> f64 {
+/// Differences within one run: the largest sum of squares that a single change between parts of it explains, relative
+/// to the effective number of rows of the difference. Noise alone makes it small. Model errors and drifting friction
+/// make it large, and then the same must be expected between two runs.
+pub fn within_run_spread(blocks: &[NormalEquations], search: &ChangeHypotheses) -> f64 {
     let n = blocks.len();
+    // Compare the first half with the second, and each quarter with the rest.
     let halves = [(0, n / 2)];
     let quarters = (0..4).map(|k| (k * n / 4, (k + 1) * n / 4));
     let mut most = 0.0_f64;
@@ -130,66 +122,65 @@ pub fn within(blocks: &[Moments], search: &Search) -> f64 {
             let some = (0..n).filter(|k| is_later(k) == later);
             some.map(|k| blocks[k].clone()).collect::<Vec<_>>()
         };
-        let runs = Runs {
+        let runs = RunPair {
             reference: part(false),
             later: part(true),
-            within: 0.0,
+            within_run_spread: 0.0,
         };
-        let worth = worth([rows(&runs.reference), rows(&runs.later)]);
+        let worth = effective_rows([count_rows(&runs.reference), count_rows(&runs.later)]);
         if worth == 0.0 {
             continue;
         }
-        let bench = Bench::new(&runs, search);
+        let bench = ChangeSelector::new(&runs, search);
         for (g, candidate) in search.changes.iter().enumerate() {
-            let beyond =
-                bench.gain(&[], g) - by_chance(candidate.columns.len(), search.changes.len());
+            // Only the part above what the best of all changes gains by chance.
+            let beyond = bench.squares_gain(&[], g) - chance_gain(candidate.columns.len(), search.changes.len());
             most = most.max(beyond * bench.noise / worth);
         }
     }
     most
 }
 
-/// What the best of some changes with so many values gains by chance, which it seldom exceeds (Laurent and Massart, Annals of
-/// Statistics 28, 2000).
-fn by_chance(values: usize, changes: usize) -> f64 {
-    let (k, tail) = (values as f64, (10.0 * changes as f64).ln());
+/// Gain of the best of some changes by chance, which is rarely exceeded; `values` is the number of its values (Laurent
+/// and Massart, Annals of Statistics 28, 2000).
+fn chance_gain(values: usize, changes: usize) -> f64 {
+    let (k, tail) = (values as f64, (CHANCE_GAIN_RARITY * changes as f64).ln());
     k + 2.0 * (k * tail).sqrt() + 2.0 * tail
 }
 
-fn rows(blocks: &[Moments]) -> f64 {
+/// Number of rows of all blocks.
+fn count_rows(blocks: &[NormalEquations]) -> f64 {
     blocks.iter().map(|block| block.rows).sum::<usize>() as f64
 }
 
-/// How many rows a difference between two runs is worth.
-fn worth([a, b]: [f64; 2]) -> f64 {
-    if a > 0.0 && b > 0.0 {
-        a * b / (a + b)
-    } else {
-        0.0
-    }
+/// Effective number of rows of a difference between two runs: half the harmonic mean of both.
+fn effective_rows([a, b]: [f64; 2]) -> f64 {
+    if a > 0.0 && b > 0.0 { a * b / (a + b) } else { 0.0 }
 }
 
-/// All blocks but one.
-fn sum(blocks: &[Moments], but: Option<usize>) -> Moments {
-    let mut sum = Moments::new(blocks.first().map_or(0, |block| block.rhs.len()));
+/// Sum of all blocks except one.
+fn sum_except(blocks: &[NormalEquations], but: Option<usize>) -> NormalEquations {
+    let mut sum = NormalEquations::new(blocks.first().map_or(0, |block| block.rhs.len()));
     for (_, block) in blocks.iter().enumerate().filter(|(k, _)| Some(*k) != but) {
         sum.merge(block);
     }
     sum
 }
 
-fn with(chosen: &[usize], further: usize) -> Vec<usize> {
+/// A set with one more index.
+fn add_index(chosen: &[usize], further: usize) -> Vec<usize> {
     chosen.iter().copied().chain([further]).collect()
 }
 
-fn without(chosen: &[usize], one: usize) -> Vec<usize> {
+/// A set without one index.
+fn remove_index(chosen: &[usize], one: usize) -> Vec<usize> {
     chosen.iter().copied().filter(|g| *g != one).collect()
 }
 
-/// Rows of both runs together: the shared columns, and behind them those of changes, which are the later run's alone.
-fn together([reference, later]: [&Moments; 2], shared: &[usize], columns: &[usize]) -> Moments {
-    let mut all = later.of(columns);
-    let reference = reference.of(shared);
+/// Normal equations of both runs together: the shared columns, then those of changes, which only the later run has.
+fn stack_runs([reference, later]: [&NormalEquations; 2], shared: &[usize], columns: &[usize]) -> NormalEquations {
+    let mut all = later.select_columns(columns);
+    let reference = reference.select_columns(shared);
     let n = shared.len();
     let mut gram = all.gram.view_mut((0, 0), (n, n));
     gram += &reference.gram;
@@ -200,112 +191,115 @@ fn together([reference, later]: [&Moments; 2], shared: &[usize], columns: &[usiz
     all
 }
 
-struct Bench<'a> {
-    runs: &'a Runs,
-    search: &'a Search,
-    /// Columns that both runs share and that say something of their own.
+/// Evaluates sets of changes between two runs.
+struct ChangeSelector<'a> {
+    /// Blocks of both runs.
+    runs: &'a RunPair,
+    /// Shared columns and possible changes.
+    search: &'a ChangeHypotheses,
+    /// Shared columns that are independent.
     shared: Vec<usize>,
-    /// All blocks of both runs.
-    sums: [Moments; 2],
-    /// What the columns of all changes, one after the other, say beside the shared ones, and where each change begins.
-    beside: Beside,
+    /// Sums over all blocks of each run.
+    sums: [NormalEquations; 2],
+    /// Columns of all changes, one after the other, with the shared ones eliminated; and the first column of each
+    /// change.
+    complement: SchurComplement,
     starts: Vec<usize>,
-    /// Variance of what no change explains.
+    /// Variance of the residual with all changes fitted, at least 1.
     noise: f64,
-    /// What a value must gain.
-    price: f64,
-    /// What a change must gain, whatever it is.
-    least: f64,
+    /// Price of a value.
+    value_price: f64,
+    /// Least gain of a change.
+    min_gain: f64,
 }
 
-impl<'a> Bench<'a> {
-    fn new(runs: &'a Runs, search: &'a Search) -> Self {
-        let sums = [sum(&runs.reference, None), sum(&runs.later, None)];
-        let mut all = sums[0].of(&search.shared);
-        all.merge(&sums[1].of(&search.shared));
-        let telling = all.solve().kept;
+impl<'a> ChangeSelector<'a> {
+    /// Eliminates the shared columns and determines noise and prices.
+    fn new(runs: &'a RunPair, search: &'a ChangeHypotheses) -> Self {
+        let sums = [sum_except(&runs.reference, None), sum_except(&runs.later, None)];
+        let mut all = sums[0].select_columns(&search.shared);
+        all.merge(&sums[1].select_columns(&search.shared));
+        // Shared columns that are combinations of others are dropped.
+        let telling = all.solve().independent;
         let shared = search.shared.iter().zip(telling);
         let rows = (sums[0].rows + sums[1].rows) as f64;
-        let shared: Vec<usize> = shared
-            .filter(|(_, telling)| *telling)
-            .map(|(k, _)| *k)
-            .collect();
-        let everything = shared
-            .iter()
-            .chain(search.changes.iter().flat_map(|one| &one.columns));
+        let shared: Vec<usize> = shared.filter(|(_, telling)| *telling).map(|(k, _)| *k).collect();
+        let everything = shared.iter().chain(search.changes.iter().flat_map(|one| &one.columns));
         let everything: Vec<usize> = everything.copied().collect();
-        let beside = together(sums.each_ref(), &shared, &everything).beside(shared.len());
+        let beside = stack_runs(sums.each_ref(), &shared, &everything).schur_complement(shared.len());
         let mut starts = vec![0];
         for candidate in &search.changes {
             starts.push(starts[starts.len() - 1] + candidate.columns.len());
         }
         let changes: Vec<usize> = (0..starts[search.changes.len()]).collect();
-        let (rest, kept) = beside.rest(&changes);
+        // The noise is what remains when all changes are fitted at once.
+        let (rest, kept) = beside.residual_squares(&changes);
         let rank = shared.len() + kept.iter().filter(|kept| **kept).count();
         let noise = (rest / (rows - rank as f64).max(1.0)).max(1.0);
-        let worth = worth(sums.each_ref().map(|one| one.rows as f64));
+        let worth = effective_rows(sums.each_ref().map(|one| one.rows as f64));
         Self {
             runs,
             search,
             shared,
-            beside,
+            complement: beside,
             starts,
             noise,
-            price: STRICTER * rows.max(2.0).ln(),
-            least: (BEYOND * runs.within * worth / noise).max(CLEAR * CLEAR),
+            value_price: CHANGE_VALUE_PRICE * rows.max(2.0).ln(),
+            min_gain: (MIN_SPREAD_RATIO * runs.within_run_spread * worth / noise)
+                .max(MIN_SIGNIFICANCE * MIN_SIGNIFICANCE),
             sums,
         }
     }
 
-    /// The shared columns, and once more those of some changes.
+    /// The shared columns, followed by those of some changes.
     fn columns(&self, chosen: &[usize]) -> Vec<usize> {
         let of = |g: &usize| self.search.changes[*g].columns.iter().copied();
         let shared = self.shared.iter().copied();
         shared.chain(chosen.iter().flat_map(of)).collect()
     }
 
-    fn solved(&self, chosen: &[usize]) -> Solved {
-        together(self.sums.each_ref(), &self.shared, &self.columns(chosen)).solve()
+    /// Least squares solution with some changes.
+    fn solve_changes(&self, chosen: &[usize]) -> NormalSolution {
+        stack_runs(self.sums.each_ref(), &self.shared, &self.columns(chosen)).solve()
     }
 
-    /// What some changes leave, over the variance of the noise, and how many values they are charged for.
-    fn left(&self, chosen: &[usize]) -> (f64, f64) {
-        let columns = chosen
-            .iter()
-            .flat_map(|g| self.starts[*g]..self.starts[*g + 1]);
-        let (rest, kept) = self.beside.rest(&columns.collect::<Vec<usize>>());
+    /// Squared residual with some changes, relative to the variance of the noise, and the number of values in their
+    /// price.
+    fn residual_and_charges(&self, chosen: &[usize]) -> (f64, f64) {
+        let columns = chosen.iter().flat_map(|g| self.starts[*g]..self.starts[*g + 1]);
+        let (rest, kept) = self.complement.residual_squares(&columns.collect::<Vec<usize>>());
         let mut kept = kept.into_iter();
         let charged = chosen.iter().map(|g| {
             let candidate = &self.search.changes[*g];
             let own = kept.by_ref().take(candidate.columns.len());
-            own.filter(|kept| *kept).count().min(candidate.most) as f64 + candidate.rarity
+            own.filter(|kept| *kept).count().min(candidate.max_charged_values) as f64 + candidate.rarity
         });
         let charged = charged.sum();
         (rest / self.noise, charged)
     }
 
-    /// By how much a further change lowers the sum of squares, over the variance of the noise.
-    fn gain(&self, chosen: &[usize], further: usize) -> f64 {
-        self.left(chosen).0 - self.left(&with(chosen, further)).0
+    /// Decrease of the sum of squares by a further change, relative to the variance of the noise.
+    fn squares_gain(&self, chosen: &[usize], further: usize) -> f64 {
+        self.residual_and_charges(chosen).0 - self.residual_and_charges(&add_index(chosen, further)).0
     }
 
-    /// What some changes leave, with a price on each value.
-    fn cost(&self, chosen: &[usize]) -> f64 {
-        let (rest, charged) = self.left(chosen);
-        rest + self.price * charged
+    /// Squared residual with some changes plus the price of their values.
+    fn penalised_residual(&self, chosen: &[usize]) -> f64 {
+        let (rest, charged) = self.residual_and_charges(chosen);
+        rest + self.value_price * charged
     }
 
-    /// Takes out and exchanges for as long as that costs less.
-    fn settle(&self, chosen: &mut Vec<usize>) {
+    /// Removes or exchanges changes as long as that lowers the cost.
+    fn improve_selection(&self, chosen: &mut Vec<usize>) {
         loop {
-            let now = self.cost(chosen);
+            let now = self.penalised_residual(chosen);
             let mut better: Option<(f64, Vec<usize>)> = None;
             for one in chosen.clone() {
-                let rest = without(chosen, one);
+                let rest = remove_index(chosen, one);
                 let others = (0..self.search.changes.len()).filter(|g| !chosen.contains(g));
-                let exchanged = others.map(|g| with(&rest, g));
+                let exchanged = others.map(|g| add_index(&rest, g));
                 for tried in exchanged.chain([rest.clone()]) {
-                    let cost = self.cost(&tried);
+                    let cost = self.penalised_residual(&tried);
                     if cost < better.as_ref().map_or(now - 1e-6 * now.abs(), |b| b.0) {
                         better = Some((cost, tried));
                     }
@@ -318,25 +312,23 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// By how much a further change lowers the sum of squares, and by how much on blocks that had no part in the fit.
-    fn gains(&self, chosen: &[usize], further: usize) -> (f64, f64) {
-        let both = with(chosen, further);
-        let gain = self.gain(chosen, further);
+    /// Decrease of the sum of squares by a further change, in the fit and on blocks that were not fitted.
+    fn fit_and_validation_gain(&self, chosen: &[usize], further: usize) -> (f64, f64) {
+        let both = add_index(chosen, further);
+        let gain = self.squares_gain(chosen, further);
         let mut held_out = 0.0;
-        for (run, blocks) in [&self.runs.reference, &self.runs.later]
-            .into_iter()
-            .enumerate()
-        {
+        for (run, blocks) in [&self.runs.reference, &self.runs.later].into_iter().enumerate() {
             for k in 0..blocks.len() {
-                let others = sum(blocks, Some(k));
+                let others = sum_except(blocks, Some(k));
                 let mut sums = self.sums.each_ref();
                 sums[run] = &others;
+                // Squared residual of the omitted block; the earlier run has no changes.
                 let rest = |set: &[usize]| {
-                    let both = together(sums, &self.shared, &self.columns(set));
+                    let both = stack_runs(sums, &self.shared, &self.columns(set));
                     let values = both.solve().values;
                     let columns = self.columns(if run == 0 { &[] } else { set });
                     let own = values.rows(0, columns.len()).into_owned();
-                    blocks[k].of(&columns).rest(&own)
+                    blocks[k].select_columns(&columns).residual_squares(&own)
                 };
                 held_out += (rest(chosen) - rest(&both)) / self.noise;
             }
@@ -344,34 +336,36 @@ impl<'a> Bench<'a> {
         (gain, held_out)
     }
 
-    fn holds(&self, chosen: &[usize], further: usize) -> bool {
-        // Held-out blocks take the most time, and most candidates fail before.
-        if self.gain(chosen, further) <= self.least {
+    /// Whether a further change gains enough, in the fit and on blocks that were not fitted.
+    fn is_supported(&self, chosen: &[usize], further: usize) -> bool {
+        // Validation needs the most time, and most candidates fail before.
+        if self.squares_gain(chosen, further) <= self.min_gain {
             return false;
         }
-        let (gain, held_out) = self.gains(chosen, further);
-        gain > self.least && held_out > HELD_OUT * gain
+        let (gain, held_out) = self.fit_and_validation_gain(chosen, further);
+        gain > self.min_gain && held_out > MIN_VALIDATION_SHARE * gain
     }
 
-    fn change(&self, chosen: &[usize], which: usize) -> Change {
-        let rest = without(chosen, which);
-        let order = with(&rest, which);
-        let solved = self.solved(&order);
+    /// The result for one of the chosen changes: values, gains and rivals.
+    fn build_change(&self, chosen: &[usize], which: usize) -> SelectedChange {
+        let rest = remove_index(chosen, which);
+        let order = add_index(&rest, which);
+        let solved = self.solve_changes(&order);
         let n = self.search.changes[which].columns.len();
         let at = solved.values.len() - n;
-        let (gain, held_out) = self.gains(&rest, which);
-        let cost = self.cost(&order);
-        let near = (NEAR * gain).max(self.price);
+        let (gain, held_out) = self.fit_and_validation_gain(&rest, which);
+        let cost = self.penalised_residual(&order);
+        let near = (RIVAL_TOLERANCE * gain).max(self.value_price);
         let others = (0..self.search.changes.len()).filter(|g| !chosen.contains(g));
-        Change {
-            which,
+        SelectedChange {
+            candidate: which,
             values: solved.values.rows(at, n).into_owned(),
             covariance: self.noise * solved.covariance.view((at, at), (n, n)),
             determined: solved.determined[at..].to_vec(),
             gain,
-            held_out,
+            validation_gain: held_out,
             rivals: others
-                .filter(|g| self.cost(&with(&rest, *g)) < cost + near)
+                .filter(|g| self.penalised_residual(&add_index(&rest, *g)) < cost + near)
                 .collect(),
         }
     }
@@ -380,18 +374,16 @@ impl<'a> Bench<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
 
     const ROWS: usize = 400;
 
-    /// Runs with three base columns; the later one has changes of one, two and one columns, of which the second column of
-    /// the second is a twin of the first base column.
-    fn runs(seed: u64, changed: &[(usize, f64)]) -> Runs {
-        let mut noise = Noise::new(seed);
+    /// Runs with three base columns; the later one has changes of one, two and one columns, of which the second column
+    /// of the second is a twin of the first base column.
+    fn runs(seed: u64, changed: &[(usize, f64)]) -> RunPair {
+        let mut noise = TestNoise::new(seed);
         let mut moments = |extra: bool| {
-            let mut z: Vec<Vec<f64>> = (0..7)
-                .map(|_| (0..ROWS).map(|_| noise.normal()).collect())
-                .collect();
+            let mut z: Vec<Vec<f64>> = (0..7).map(|_| (0..ROWS).map(|_| noise.normal()).collect()).collect();
             z[5] = z[0].clone();
             let y: Vec<f64> = (0..ROWS)
                 .map(|i| {
@@ -400,26 +392,26 @@ mod tests {
                     base + if extra { more } else { 0.0 } + noise.normal()
                 })
                 .collect();
-            let mut one = Moments::new(7);
+            let mut one = NormalEquations::new(7);
             let columns: Vec<Option<&[f64]>> = z.iter().map(|c| Some(&c[..])).collect();
             one.add_rows(&columns, &y);
             one
         };
-        Runs {
+        RunPair {
             reference: (0..5).map(|_| moments(false)).collect(),
             later: (0..5).map(|_| moments(true)).collect(),
-            within: 0.0,
+            within_run_spread: 0.0,
         }
     }
 
-    fn possible() -> Search {
-        Search {
+    fn possible() -> ChangeHypotheses {
+        ChangeHypotheses {
             shared: (0..7).collect(),
             changes: vec![vec![3], vec![4, 5], vec![6]]
                 .into_iter()
-                .map(|columns| Candidate {
+                .map(|columns| PossibleChange {
                     columns,
-                    most: 2,
+                    max_charged_values: 2,
                     rarity: 0.0,
                 })
                 .collect(),
@@ -429,21 +421,19 @@ mod tests {
     #[test]
     fn what_changed_is_found_and_nothing_else() {
         for seed in 0..30 {
-            assert_eq!(search(&runs(seed, &[]), &possible()), []);
-            let found = search(&runs(seed, &[(5, 1.0), (6, 0.6)]), &possible());
-            let which: Vec<usize> = found.iter().map(|c| c.which).collect();
+            assert_eq!(search_changes(&runs(seed, &[]), &possible()), []);
+            let found = search_changes(&runs(seed, &[(5, 1.0), (6, 0.6)]), &possible());
+            let which: Vec<usize> = found.iter().map(|c| c.candidate).collect();
             assert_eq!(which, [1, 2], "seed {seed}");
-            let [pair, single] = &found[..] else {
-                unreachable!()
-            };
+            let [pair, single] = &found[..] else { unreachable!() };
             assert!((pair.values[1] - 1.0).abs() < 5.0 * pair.covariance[(1, 1)].sqrt());
             assert!((single.values[0] - 0.6).abs() < 5.0 * single.covariance[(0, 0)].sqrt());
             assert!(pair.determined[1] && single.determined[0]);
-            assert!(single.held_out > 0.5 * single.gain && single.rivals.is_empty());
-            // Each by itself gains as much as it does beside the other: their columns have little in common.
-            let alone_gain = gains(&runs(seed, &[(5, 1.0), (6, 0.6)]), &possible());
+            assert!(single.validation_gain > 0.5 * single.gain && single.rivals.is_empty());
+            // Each alone gains as much as in addition to the other: their columns have little in common.
+            let alone_gain = single_change_gains(&runs(seed, &[(5, 1.0), (6, 0.6)]), &possible());
             assert!(alone_gain[0] < 0.1 * alone_gain[2] && alone_gain[2] < 1.5 * single.gain);
-            let one = alone(&runs(seed, &[(6, 0.6)]), &possible(), 2);
+            let one = fit_single_change(&runs(seed, &[(6, 0.6)]), &possible(), 2);
             assert!((one.values[0] - 0.6).abs() < 5.0 * one.covariance[(0, 0)].sqrt());
         }
     }
@@ -454,7 +444,7 @@ mod tests {
         for seed in 0..10 {
             let mut both = runs(seed, &[(3, 1.0)]);
             both.reference = runs(seed + 100, &[(3, 1.0)]).later;
-            assert_eq!(search(&both, &possible()), []);
+            assert_eq!(search_changes(&both, &possible()), []);
         }
     }
 
@@ -464,15 +454,15 @@ mod tests {
         let mut drifting = runs(3, &[]);
         drifting.reference[4] = runs(7, &[(3, 0.8)]).later[4].clone();
         drifting.later = runs(9, &[(3, 0.6)]).later;
-        assert_eq!(search(&drifting, &possible()).len(), 1);
-        drifting.within = within(&drifting.reference, &possible());
-        assert_eq!(search(&drifting, &possible()), []);
+        assert_eq!(search_changes(&drifting, &possible()).len(), 1);
+        drifting.within_run_spread = within_run_spread(&drifting.reference, &possible());
+        assert_eq!(search_changes(&drifting, &possible()), []);
         drifting.later = runs(9, &[(3, 1.0)]).later;
-        assert_eq!(search(&drifting, &possible()).len(), 1);
+        assert_eq!(search_changes(&drifting, &possible()).len(), 1);
         // Noise alone hides little.
         let alone = runs(11, &[]);
         for blocks in [&alone.reference, &alone.later] {
-            assert!(within(blocks, &possible()).abs() < f64::EPSILON);
+            assert!(within_run_spread(blocks, &possible()).abs() < f64::EPSILON);
         }
     }
 
@@ -481,6 +471,6 @@ mod tests {
     fn a_single_block_decides_nothing() {
         let mut runs = runs(1, &[]);
         runs.later[2] = self::runs(2, &[(3, 1.0)]).later[0].clone();
-        assert_eq!(search(&runs, &possible()), []);
+        assert_eq!(search_changes(&runs, &possible()), []);
     }
 }

@@ -1,152 +1,157 @@
-//! What a recording cannot tell apart: effects that, put in place of a found one, explain it as well.
+//! Indistinguishable alternatives. Input: the set of effects that was found. Output: for each of its effects the other
+//! effects that, in its place, explain the recording equally well.
 
-use super::bench::{Bench, Pick, Trial, n_columns};
-use super::beside::Beside;
-use super::problem::{Effect, Source};
+use super::bench::{EffectSelector, ScoredEffectSet, SelectedEffect, n_columns};
+use super::conditional::ConditioningSet;
+use super::problem::{ColumnSource, LocatedEffect};
+use super::thresholds::{MIN_DISTINCTION, MIN_SUBSTITUTE_SHARE, NEGLIGIBLE_EFFECT_SHARE, SUBSTITUTE_MOST_RATIO};
 
-/// How much worse (twice the logarithm of the likelihood, with the samples that the residual is worth) a set may be and
-/// still not be told from the best.
-pub(crate) const APART: f64 = 9.0;
-/// What stands in for an effect must take off this share of the squared error that the effect takes off.
-const STANDS_IN: f64 = 0.8;
-/// A wrong reading that leaves less than this factor is looked at with a column of its own size.
-const CLOSE: f64 = 3.0;
-/// What takes off less than this share of squares takes nothing off.
-const NOTHING: f64 = 1e-6;
-
-/// An effect that cannot be told from a found one.
+/// An effect that cannot be distinguished from one that was found.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Alias {
-    pub(crate) effect: Effect,
-    /// How much worse it is, in the units of [`APART`]; negative if better.
-    pub(crate) worse: f64,
-    /// Whether it is part of another way to write the same down, and no other cause.
-    pub(crate) is_rewriting: bool,
+pub(crate) struct EffectAlias {
+    /// Kind and place.
+    pub(crate) effect: LocatedEffect,
+    /// How much worse the criterion is with it, in the units of [`MIN_DISTINCTION`]; negative if better.
+    pub(crate) criterion_loss: f64,
+    /// Whether it is only another form of the same effect, and not another cause.
+    pub(crate) is_equivalent_form: bool,
 }
 
-impl Bench<'_> {
-    /// For each effect of a set, what could stand in its place.
-    pub(crate) fn aliases(&mut self, picks: &[Pick]) -> Vec<Vec<Alias>> {
+impl EffectSelector<'_> {
+    /// The alternatives of each effect of a set, `[effect]`, best first; none if only effects are requested.
+    pub(crate) fn find_aliases(&mut self, picks: &[SelectedEffect]) -> Vec<Vec<EffectAlias>> {
         if self.problem.effects_only {
             return vec![Vec::new(); picks.len()];
         }
-        self.weigh(picks);
-        let (factors, squares) = self.fit(picks, super::pool::On::All);
-        let rest = self.rest(picks, &factors);
+        self.weigh_channels(picks);
+        // Reference: the squared residual of the set.
+        let (factors, squares) = self.fit(picks, super::pool::FitScope::All);
+        let rest = self.residual(picks, &factors);
         let mut all = Vec::new();
         let known = self.pool.len();
         for i in 0..picks.len() {
+            // Compare in the presence of the other effects. Columns of the previous round are released.
             let mut others = picks.to_vec();
             let pick = others.remove(i);
-            self.present.fill(None);
-            self.forget_since(known, []);
-            self.look(&others);
-            let beside = self.beside(&others);
+            self.current_choices.fill(None);
+            self.drop_columns_since(known, []);
+            self.update_choices(&others);
+            let beside = self.conditioning_set(&others);
             let channels: Vec<usize> = (0..rest.len()).collect();
-            let worth = self.worth(&rest, &channels);
-            let table = self.table(picks);
-            // How much worse a set is in place of the found one, if it may stand for what the found one adds to `fewer`.
-            let in_place = |bench: &Self, fewer: &[Pick], trial: &Trial| -> Option<f64> {
-                let left = bench.try_in(&table, fewer.to_vec()).squares;
+            let worth = self.effective_equations(&rest, &channels);
+            let table = self.projected_gram(picks);
+            // Loss of the criterion with another set; `None` if it is distinguishable or does not explain what the
+            // effect adds to `fewer`.
+            let in_place = |bench: &Self, fewer: &[SelectedEffect], trial: &ScoredEffectSet| -> Option<f64> {
+                // Squared residual without the effect, and without its partner if `fewer` lacks two.
+                let left = bench.fit_from_gram(&table, fewer.to_vec()).squares;
                 let worse = worth * (trial.squares / squares.max(f64::MIN_POSITIVE)).ln();
-                // What takes nothing off cannot be stood in for.
+                // An effect that explains nothing cannot be replaced.
                 let own = left - squares;
-                let stands_in = own > NOTHING * left && left - trial.squares > STANDS_IN * own;
-                (worse < APART && stands_in && trial.is_possible()).then_some(worse)
+                let stands_in =
+                    own > NEGLIGIBLE_EFFECT_SHARE * left && left - trial.squares > MIN_SUBSTITUTE_SHARE * own;
+                (worse < MIN_DISTINCTION && stands_in && trial.is_possible()).then_some(worse)
             };
-            let mut found: Vec<Alias> = Vec::new();
-            for candidate in self.present.clone().iter().flatten() {
+            let mut found: Vec<EffectAlias> = Vec::new();
+            // Stage 1: single candidates in place of the effect.
+            for candidate in self.current_choices.clone().iter().flatten() {
                 if picks.iter().any(|p| p.candidate == candidate.candidate) {
                     continue;
                 }
-                // The same kind at more or fewer places is another way to write the set down.
-                let (one, two) = (
-                    &self.candidate(&pick).effect,
-                    &self.candidate(candidate).effect,
-                );
+                // The same kind at more or fewer places is another form of the set.
+                // Kind and place of the effect and of the candidate.
+                let (one, two) = (&self.candidate(&pick).effect, &self.candidate(candidate).effect);
                 if one.kind == two.kind && one.at.iter().any(|place| two.at.contains(place)) {
                     continue;
                 }
-                let more = self.is_within_beside(&pick, candidate, &beside);
+                // A candidate that contains the effect and more is not supported by the data.
+                let more = self.is_in_conditional_span(&pick, candidate, &beside);
                 if more && candidate.rank > pick.rank {
                     continue; // It holds the found one and more, so that nothing speaks for it.
                 }
-                // A curve that is bent by a constant of its own comes near to any that is not.
-                if self.candidate(candidate).searched > self.candidate(&pick).searched {
+                // A curve with a searched constant approximates almost any curve without one.
+                if self.candidate(candidate).searched_constants > self.candidate(&pick).searched_constants {
                     continue;
                 }
+                // Fit the candidate in place of the effect.
                 let mut set = others.clone();
                 set.push(candidate.clone());
-                let tried = self.try_in(&table, set);
-                let trial = self.of_its_size(candidate, tried, squares);
+                let tried = self.fit_from_gram(&table, set);
+                let trial = self.refit_at_size(candidate, tried, squares);
                 if let Some(worse) = in_place(self, &others, &trial) {
-                    found.push(Alias {
+                    found.push(EffectAlias {
                         effect: self.candidate(candidate).effect.clone(),
-                        worse,
-                        is_rewriting: false,
+                        criterion_loss: worse,
+                        is_equivalent_form: false,
                     });
                 }
             }
-            // One effect may stand for two, as friction that differs by direction for friction and an offset.
+            // Stage 2: one effect in place of two, such as friction that depends on the direction for friction and an
+            // offset.
             for j in 0..others.len() {
                 let mut fewer = others.clone();
                 let second = fewer.remove(j);
-                for candidate in self.present.iter().flatten() {
+                for candidate in self.current_choices.iter().flatten() {
                     let is_new = picks.iter().all(|p| p.candidate != candidate.candidate);
+                    // The candidate must not have more parameters than both effects together.
                     let size = n_columns(&[pick.clone(), second.clone()]);
                     if !is_new || candidate.columns.len() > size {
                         continue;
                     }
                     let mut set = fewer.clone();
                     set.push(candidate.clone());
-                    let trial = self.try_in(&table, set);
+                    let trial = self.fit_from_gram(&table, set);
                     let effect = &self.candidate(candidate).effect;
                     if let Some(worse) = in_place(self, &fewer, &trial)
                         && found.iter().all(|alias| alias.effect != *effect)
                     {
-                        found.push(Alias {
+                        found.push(EffectAlias {
                             effect: effect.clone(),
-                            worse,
-                            is_rewriting: self.is_within(&pick, candidate)
-                                && self.is_within(&second, candidate),
+                            criterion_loss: worse,
+                            is_equivalent_form: self.is_in_span(&pick, candidate)
+                                && self.is_in_span(&second, candidate),
                         });
                     }
                 }
             }
-            for (one, worse) in self.halves(&pick, picks, &others, in_place) {
+            // Stage 3: pairs of simpler effects that together are the effect.
+            for (one, worse) in self.equivalent_pairs(&pick, picks, &others, in_place) {
                 if found.iter().all(|alias| alias.effect != one) {
-                    found.push(Alias {
+                    found.push(EffectAlias {
                         effect: one,
-                        worse,
-                        is_rewriting: true,
+                        criterion_loss: worse,
+                        is_equivalent_form: true,
                     });
                 }
             }
-            found.sort_by(|a, b| a.worse.total_cmp(&b.worse));
+            // The closest alternative comes first.
+            found.sort_by(|a, b| a.criterion_loss.total_cmp(&b.criterion_loss));
             all.push(found);
         }
         all
     }
 
-    /// Pairs of simpler effects that say together what one of a set says, each with how much worse the pair is.
-    fn halves(
+    /// Pairs of simpler effects that together are equivalent to one effect of a set; each effect is returned with the
+    /// loss of its pair.
+    fn equivalent_pairs(
         &self,
-        pick: &Pick,
-        picks: &[Pick],
-        others: &[Pick],
-        in_place: impl Fn(&Self, &[Pick], &Trial) -> Option<f64>,
-    ) -> Vec<(Effect, f64)> {
-        let halves: Vec<&Pick> = (self.present.iter().flatten())
-            .filter(|one| one.rank < pick.rank && self.candidate(one).searched == 0)
+        pick: &SelectedEffect,
+        picks: &[SelectedEffect],
+        others: &[SelectedEffect],
+        in_place: impl Fn(&Self, &[SelectedEffect], &ScoredEffectSet) -> Option<f64>,
+    ) -> Vec<(LocatedEffect, f64)> {
+        // Simpler effects whose columns lie in the span of the effect.
+        let halves: Vec<&SelectedEffect> = (self.current_choices.iter().flatten())
+            .filter(|one| one.rank < pick.rank && self.candidate(one).searched_constants == 0)
             .filter(|one| picks.iter().all(|p| p.candidate != one.candidate))
-            .filter(|one| self.is_within(one, pick))
+            .filter(|one| self.is_in_span(one, pick))
             .collect();
         let mut found = Vec::new();
         for (k, one) in halves.iter().enumerate() {
             for two in &halves[k + 1..] {
                 let mut set = others.to_vec();
                 set.extend([(*one).clone(), (*two).clone()]);
-                if let Some(worse) = in_place(self, others, &self.trial(set)) {
+                if let Some(worse) = in_place(self, others, &self.fit_set(set)) {
                     let both = [one, two].map(|half| (self.candidate(half).effect.clone(), worse));
                     found.extend(both);
                 }
@@ -155,41 +160,49 @@ impl Bench<'_> {
         found
     }
 
-    /// A set with a wrong reading or a further body that comes near to what is found, by columns of its own size.
-    fn of_its_size(&mut self, candidate: &Pick, tried: Trial, squares: f64) -> Trial {
+    /// A set with a force signal fault or a body that is nearly as good, fitted again with columns at the estimated
+    /// values.
+    fn refit_at_size(&mut self, candidate: &SelectedEffect, tried: ScoredEffectSet, squares: f64) -> ScoredEffectSet {
         let source = &self.candidate(candidate).source;
-        let is_sized = matches!(source, Source::Reading(_) | Source::Body(_));
-        if !is_sized || tried.squares > CLOSE * squares {
+        // Only these have columns that change with their estimates.
+        let is_sized = matches!(source, ColumnSource::ReadingFault(_) | ColumnSource::Body(_));
+        if !is_sized || tried.squares > SUBSTITUTE_MOST_RATIO * squares {
             return tried;
         }
-        let refreshed = self.refresh(tried.picks);
-        self.trial(refreshed)
+        let refreshed = self.refresh_columns(tried.picks);
+        self.fit_set(refreshed)
     }
 
-    /// Whether all columns of one effect lie in the span of the base and another one.
-    pub(crate) fn is_within(&self, one: &Pick, other: &Pick) -> bool {
+    /// Whether all columns of one effect lie in the span of the base and of another effect; results are stored.
+    pub(crate) fn is_in_span(&self, one: &SelectedEffect, other: &SelectedEffect) -> bool {
+        // Span tests are repeated often, so their results are stored.
         let key = (one.columns.clone(), other.columns.clone());
-        let known = self.within.borrow().get(&key).copied();
+        let known = self.span_cache.borrow().get(&key).copied();
         known.unwrap_or_else(|| {
-            let found = self.is_within_beside(one, other, &self.alone);
-            self.within.borrow_mut().insert(key, found);
+            let found = self.is_in_conditional_span(one, other, &self.base_set);
+            self.span_cache.borrow_mut().insert(key, found);
             found
         })
     }
 
-    /// Whether all columns of one effect lie in the span of a set and another one.
-    pub(crate) fn is_within_beside(&self, one: &Pick, other: &Pick, beside: &Beside) -> bool {
+    /// Whether all columns of one effect lie in the span of a set and of another effect.
+    pub(crate) fn is_in_conditional_span(
+        &self,
+        one: &SelectedEffect,
+        other: &SelectedEffect,
+        beside: &ConditioningSet,
+    ) -> bool {
         if one.columns == other.columns {
             return true;
         }
-        // Bodies of other channels may be the same beside the base; friction is not.
+        // Forces of bodies on different channels may be equal after the base is projected out; friction forces are not.
         if !self.candidate(one).is_part_of_load {
-            let reached = self.acted_on(std::slice::from_ref(other));
-            let acted = self.acted_on(std::slice::from_ref(one));
+            let reached = self.affected_channels(std::slice::from_ref(other));
+            let acted = self.affected_channels(std::slice::from_ref(one));
             if acted.iter().any(|d| !reached.contains(d)) {
                 return false;
             }
         }
-        self.lies_within(&one.columns, &other.columns, beside)
+        self.is_in_joint_span(&one.columns, &other.columns, beside)
     }
 }

@@ -1,164 +1,176 @@
-//! The bench on which sets of effects are tried: which columns they have, and what each set leaves.
+//! Fits sets of effects. Input: a diagnosis problem and a provider of columns. Output: for each set its factors,
+//! weighted squared residual, and whether its estimates are physically possible.
 
 use std::cell::RefCell;
 use std::collections::{HashMap, HashSet};
 
 use nalgebra::{DMatrix, DVector};
 
-use super::beside::Beside;
-use super::column::Column;
-use super::factored::Factored;
+use super::column::ForceColumn;
+use super::conditional::ConditioningSet;
+use super::factored::GramFactor;
 use super::noise::effective_samples;
-use super::pool::{On, Pool, dot, solve};
-use super::problem::{Candidate, Choice, EffectParameter, Problem, Sign, Source, Supply};
+use super::pool::{ColumnPool, FitScope, dot, solve_gram};
+use super::problem::{
+    CandidateEffect, ColumnChoice, ColumnProvider, ColumnSource, DiagnosisProblem, EffectParameter, SignConstraint,
+};
+use super::thresholds::{CANCELLATION_SHARE, RANDOM_SIGN_SHARE};
 
-/// If an estimate of the wrong sign takes off less than this share of the squared error, the sign is chance.
-const SIGN_IS_CHANCE: f64 = 0.05;
-
-/// Two effects of which so much of the squares of either is left together are one, badly written.
-const CANCELLED: f64 = 0.25;
-
-/// An effect that was picked, with the columns that it has for its choice of constants.
+/// A candidate with the columns for one choice of its constants.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Pick {
-    /// Which candidate.
+pub(crate) struct SelectedEffect {
+    /// Index of the candidate.
     pub(crate) candidate: usize,
-    /// Its searched constants.
+    /// Its searched constants, as (symbol, value).
     pub(crate) constants: Vec<(String, f64)>,
-    /// Its columns in the pool.
+    /// Indices of its columns in the pool, one per parameter.
     pub(crate) columns: Vec<usize>,
-    /// How many of them say something that others do not say already.
+    /// Number of its columns that are independent of the other columns of the set.
     pub(crate) rank: usize,
 }
 
-/// Columns that lie in the span of others and the base.
-type Within = HashMap<(Vec<usize>, Vec<usize>), bool>;
+/// Results of span tests, by the tested columns and the columns of the other effect: whether the first lie in the span
+/// of the second and the base.
+type SpanCache = HashMap<(Vec<usize>, Vec<usize>), bool>;
 
 /// A set of effects, fitted to all samples with the base parameters.
 #[derive(Clone, Debug)]
-pub(crate) struct Trial {
-    pub(crate) picks: Vec<Pick>,
-    /// Weighted sum of squares that is left.
+pub(crate) struct ScoredEffectSet {
+    /// Its effects.
+    pub(crate) picks: Vec<SelectedEffect>,
+    /// Weighted sum of squares of the residual, without unit.
     pub(crate) squares: f64,
-    /// Numbers that are free in the effects.
+    /// Number of estimated values in the effects, searched constants included.
     pub(crate) freedoms: usize,
     /// Effects whose estimates have the wrong sign, by position.
     pub(crate) wrong_sign: Vec<usize>,
     /// Effects that do little but cancel another one at their place, by position.
     pub(crate) cancelling: Vec<usize>,
-    /// The information criterion by which sets are compared; less is better.
+    /// Information criterion by which sets are compared (less is better); infinite until it is computed.
     pub(crate) score: f64,
 }
 
-impl Trial {
-    /// Whether a machine could be so.
+impl ScoredEffectSet {
+    /// Whether the estimates are physically possible.
     pub(crate) fn is_possible(&self) -> bool {
         self.wrong_sign.is_empty() && self.cancelling.is_empty()
     }
 }
 
-/// Columns, weights, and what every candidate looks like at present.
-pub(crate) struct Bench<'a> {
-    pub(crate) problem: &'a Problem,
-    pub(crate) pool: Pool<'a>,
+/// Columns and weights of a diagnosis, with the present columns of each candidate.
+pub(crate) struct EffectSelector<'a> {
+    /// The problem to solve.
+    pub(crate) problem: &'a DiagnosisProblem,
+    /// All columns with their inner products.
+    pub(crate) pool: ColumnPool<'a>,
+    /// Pool columns of the base parameters.
     pub(crate) base: Vec<usize>,
+    /// Pool column of the measured forces.
     pub(crate) measured: usize,
-    /// A column of zeros, for parameters of an effect that are held at zero.
+    /// A column of zeros, for parameters of an effect that are fixed at zero.
     zero: usize,
-    /// One over the variance of each channel.
+    /// Weight of each channel: one over the variance of its residual, 1/N^2 or 1/(N m)^2.
     pub(crate) weights: Vec<f64>,
-    /// The best choice of each candidate for the present residual; `None` if the model says it all already.
-    pub(crate) present: Vec<Option<Pick>>,
-    pub(crate) supply: &'a dyn Supply,
+    /// The best choice of each candidate for the present residual; `None` if the model already explains all of it.
+    pub(crate) current_choices: Vec<Option<SelectedEffect>>,
+    /// Computes columns that depend on the fit or on a searched constant.
+    pub(crate) provider: &'a dyn ColumnProvider,
+    /// Pool columns of the friction of every drive, which are fitted when the load is estimated.
     pub(crate) friction: Vec<usize>,
-    /// The base alone, at the present weights.
-    pub(crate) alone: Beside,
+    /// The base parameters alone, fitted with the present weights.
+    pub(crate) base_set: ConditioningSet,
     /// Pool columns by candidate and choice.
     choices: Vec<Vec<Vec<usize>>>,
-    /// How many columns do not depend on what is found.
-    pub(crate) known: usize,
-    /// Which columns lie in the span of others and the base.
-    pub(crate) within: RefCell<Within>,
+    /// Number of columns that stay in the pool during the search.
+    pub(crate) permanent_columns: usize,
+    /// Span tests that have been done.
+    pub(crate) span_cache: RefCell<SpanCache>,
 }
 
-impl<'a> Bench<'a> {
-    pub(crate) fn new(problem: &'a Problem, supply: &'a dyn Supply) -> Self {
-        let mut pool = Pool::new(&problem.layout).without(&problem.undecided());
+impl<'a> EffectSelector<'a> {
+    /// Fills the pool with the known columns and sets the first weights.
+    pub(crate) fn new(problem: &'a DiagnosisProblem, supply: &'a dyn ColumnProvider) -> Self {
+        let mut pool = ColumnPool::new(&problem.layout).exclude_samples(&problem.undecided_samples());
         let base = problem.base.iter().map(|c| pool.add(c)).collect();
-        pool.prior.clone_from(&problem.prior);
+        pool.prior_equations.clone_from(&problem.prior);
         let measured = pool.add(&problem.measured);
-        let zero = pool.add(Column(vec![None; problem.layout.channels.len()]));
+        let zero = pool.add(ForceColumn(vec![None; problem.layout.channels.len()]));
         let friction = problem.friction.iter().map(|c| pool.add(c)).collect();
-        let mut of_choice =
-            |choice: &'a Choice| choice.columns.iter().map(|c| pool.add(c)).collect();
-        let of_candidate = |candidate: &'a Candidate| match &candidate.source {
-            Source::Columns(choices) => choices.iter().map(&mut of_choice).collect(),
+        // Known columns enter the pool once, for every choice of the constants.
+        let mut of_choice = |choice: &'a ColumnChoice| choice.columns.iter().map(|c| pool.add(c)).collect();
+        let of_candidate = |candidate: &'a CandidateEffect| match &candidate.source {
+            ColumnSource::Columns(choices) => choices.iter().map(&mut of_choice).collect(),
             _ => Vec::new(),
         };
         let choices = problem.candidates.iter().map(of_candidate).collect();
         let mut bench = Self {
             problem,
-            supply,
+            provider: supply,
             friction,
-            alone: Beside::default(),
+            base_set: ConditioningSet::default(),
             pool,
             base,
             measured,
             zero,
             weights: vec![1.0; problem.layout.channels.len()],
-            present: vec![None; problem.candidates.len()],
+            current_choices: vec![None; problem.candidates.len()],
             choices,
-            known: 0,
-            within: RefCell::default(),
+            permanent_columns: 0,
+            span_cache: RefCell::default(),
         };
-        // Channels of very different forces count alike from the start.
-        bench.weigh(&[]);
-        bench.weigh(&[]);
-        bench.begin();
-        bench.known = bench.pool.len();
+        // Weight channels by their residual, so that channels of very different force count equally. The second pass
+        // uses the weights of the first.
+        bench.weigh_channels(&[]);
+        bench.weigh_channels(&[]);
+        bench.initialise_columns();
+        bench.permanent_columns = bench.pool.len();
         bench
     }
 
-    /// The columns with which bodies and constants are looked at before they are picked: at the origin of a body's frame, and
-    /// without an error, with what the base says alone. Only what is picked is worth columns of its own size.
-    fn begin(&mut self) {
+    /// Adds the columns with which bodies and constants are tried before they are selected: a body at the origin of its
+    /// frame, a constant without error, with factors of the base alone. Only selected candidates get columns at their
+    /// estimated values.
+    fn initialise_columns(&mut self) {
         let problem = self.problem;
-        let factors = self.alone.factors.clone();
+        let factors = self.base_set.factors.clone();
         for (k, candidate) in problem.candidates.iter().enumerate() {
-            if let Source::Body(_) | Source::Constant(_) = candidate.source {
-                let columns = self.changed(k, &[], &factors).columns;
+            if let ColumnSource::Body(_) | ColumnSource::Constant(_) = candidate.source {
+                let columns = self.linearise_model_change(k, &[], &factors).columns;
                 self.choices[k].push(columns);
             }
         }
     }
 
-    pub(crate) fn candidate(&self, pick: &Pick) -> &'a Candidate {
+    /// The candidate of a selected effect.
+    pub(crate) fn candidate(&self, pick: &SelectedEffect) -> &'a CandidateEffect {
         &self.problem.candidates[pick.candidate]
     }
 
-    /// Columns of the base and of some effects.
-    pub(crate) fn columns(&self, picks: &[Pick]) -> Vec<usize> {
+    /// Pool columns of the base and of some effects, base first.
+    pub(crate) fn columns(&self, picks: &[SelectedEffect]) -> Vec<usize> {
         let of_picks = picks.iter().flat_map(|pick| &pick.columns);
         self.base.iter().chain(of_picks).copied().collect()
     }
 
-    /// Factors of the base and of some effects, and the weighted sum of squares they leave.
-    pub(crate) fn fit(&self, picks: &[Pick], on: On) -> (DVector<f64>, f64) {
+    /// Factors of the base and of some effects, in the order of [`Self::columns`], and the weighted sum of squares of
+    /// the residual.
+    pub(crate) fn fit(&self, picks: &[SelectedEffect], on: FitScope) -> (DVector<f64>, f64) {
         let mut which = self.columns(picks);
         which.push(self.measured);
-        solve(&self.pool.gram(&which, &self.weights, on))
+        solve_gram(&self.pool.gram(&which, &self.weights, on))
     }
 
-    /// What some effects with given factors leave, `[channel][sample]`.
-    pub(crate) fn rest(&self, picks: &[Pick], factors: &DVector<f64>) -> Vec<Vec<f64>> {
+    /// Residual of some effects with given factors, `[channel][sample]`.
+    pub(crate) fn residual(&self, picks: &[SelectedEffect], factors: &DVector<f64>) -> Vec<Vec<f64>> {
         self.pool
-            .rest(self.measured, &self.columns(picks), factors.as_slice())
+            .residual(self.measured, &self.columns(picks), factors.as_slice())
     }
 
-    /// Weighs each channel by the variance of what a set leaves, but not below its noise.
-    pub(crate) fn weigh(&mut self, picks: &[Pick]) {
-        let (factors, _) = self.fit(picks, On::All);
-        let rest = self.rest(picks, &factors);
+    /// Weights each channel by the variance of the residual of a set, but not below that of its noise or of rounding.
+    pub(crate) fn weigh_channels(&mut self, picks: &[SelectedEffect]) {
+        let (factors, _) = self.fit(picks, FitScope::All);
+        let rest = self.residual(picks, &factors);
+        // Mean square of a series.
         let size = |values: &[f64]| dot(values, values) / values.len().max(1) as f64;
         let measured = self.pool.column(self.measured);
         for (d, values) in rest.iter().enumerate() {
@@ -167,40 +179,42 @@ impl<'a> Bench<'a> {
             let variance = size(values).max(noise).max(rounding);
             self.weights[d] = if variance > 0.0 { 1.0 / variance } else { 1.0 };
         }
-        self.alone = self.beside(&[]);
+        self.base_set = self.conditioning_set(&[]);
     }
 
-    /// How many independent equations the residual of a set is worth, on some channels.
-    pub(crate) fn worth(&self, rest: &[Vec<f64>], channels: &[usize]) -> f64 {
+    /// Number of independent equations to which the residual of a set is equivalent on some channels, at least 2.
+    pub(crate) fn effective_equations(&self, rest: &[Vec<f64>], channels: &[usize]) -> f64 {
         let mut worth = 0.0;
         for d in channels {
             let mut start = 0;
-            for stretch in &self.problem.layout.stretches {
-                worth += effective_samples(&rest[*d][start..start + stretch.samples]);
-                start += stretch.samples;
+            for segment in &self.problem.layout.segments {
+                worth += effective_samples(&rest[*d][start..start + segment.samples]);
+                start += segment.samples;
             }
         }
         worth.max(2.0)
     }
 
-    /// Chooses the constants of every candidate that suit what a set leaves best, and makes the columns of those that
+    /// Chooses the constants of every candidate that explain the residual of a set best, and computes columns that
     /// depend on the fit.
-    pub(crate) fn look(&mut self, picks: &[Pick]) {
-        self.present = self.looked_at(picks, &|_| true);
+    pub(crate) fn update_choices(&mut self, picks: &[SelectedEffect]) {
+        self.current_choices = self.choose_candidates(picks, &|_| true);
     }
 
-    /// The same of some candidates only, by their place; the others are not there.
-    pub(crate) fn looked_at(
+    /// The same for the candidates for which `is_asked` is true, `[candidate]`; `None` for the others.
+    pub(crate) fn choose_candidates(
         &mut self,
-        picks: &[Pick],
+        picks: &[SelectedEffect],
         is_asked: &dyn Fn(usize) -> bool,
-    ) -> Vec<Option<Pick>> {
-        let beside = self.beside(picks);
+    ) -> Vec<Option<SelectedEffect>> {
+        // What the set explains already.
+        let beside = self.conditioning_set(picks);
         let problem = self.problem;
         let candidates = problem.candidates.iter().enumerate();
         let mut asked = candidates.clone().filter(|(k, _)| is_asked(*k));
-        let carried = if asked.any(|(_, candidate)| candidate.source == Source::Carried) {
-            self.carried(picks)
+        // Load-dependent columns of all candidates come from one evaluation.
+        let carried = if asked.any(|(_, candidate)| candidate.source == ColumnSource::LoadDependent) {
+            self.load_dependent_effects(picks)
         } else {
             HashMap::new()
         };
@@ -211,48 +225,54 @@ impl<'a> Bench<'a> {
                 continue;
             }
             let pick = match &candidate.source {
-                Source::Columns(_) => self
+                // Known columns: take the best choice of the constants.
+                ColumnSource::Columns(_) => self
                     .best_choice(k, &beside)
-                    .map(|(best, _)| self.pick(k, best)),
-                Source::Body(_) | Source::Constant(_) if picks.iter().all(|p| p.candidate != k) => {
-                    Some(Pick {
+                    .map(|(best, _)| self.select_choice(k, best)),
+                // Columns that were added at the start, since the effect is not selected yet.
+                ColumnSource::Body(_) | ColumnSource::Constant(_) if picks.iter().all(|p| p.candidate != k) => {
+                    Some(SelectedEffect {
                         candidate: k,
                         constants: Vec::new(),
                         columns: self.choices[k][0].clone(),
                         rank: candidate.parameters.len(),
                     })
                 }
-                Source::Tilt(_) | Source::Reading(_) | Source::Body(_) | Source::Constant(_) => {
-                    Some(self.changed(k, picks, &beside.factors))
-                }
-                Source::Carried => carried.get(&k).cloned(),
+                // Columns that are linearised at the present estimates.
+                ColumnSource::Tilt(_)
+                | ColumnSource::ReadingFault(_)
+                | ColumnSource::Body(_)
+                | ColumnSource::Constant(_) => Some(self.linearise_model_change(k, picks, &beside.factors)),
+                ColumnSource::LoadDependent => carried.get(&k).cloned(),
             };
+            // Candidates whose columns are combinations of those of the set explain nothing new.
             seen.push(pick.and_then(|mut pick| {
-                pick.rank = self.rank(&pick.columns, &beside);
+                pick.rank = self.conditional_rank(&pick.columns, &beside);
                 (pick.rank > 0).then_some(pick)
             }));
         }
         seen
     }
 
-    /// The choice of a candidate that explains most beside a set, and how much; an only one is not asked.
-    pub(crate) fn best_choice(&self, candidate: usize, beside: &Beside) -> Option<(usize, f64)> {
+    /// The choice of a candidate that explains most in addition to a set, and how much; a single choice is returned
+    /// with 0 without a test.
+    pub(crate) fn best_choice(&self, candidate: usize, beside: &ConditioningSet) -> Option<(usize, f64)> {
         let choices = &self.choices[candidate];
         if choices.len() == 1 {
             return Some((0, 0.0));
         }
-        let score = |columns: &Vec<usize>| self.explained(columns, beside);
+        let score = |columns: &Vec<usize>| self.explained_squares(columns, beside);
         let scored = choices.iter().map(score).enumerate();
         scored.max_by(|a, b| a.1.total_cmp(&b.1))
     }
 
-    /// A candidate with one of its choices.
-    pub(crate) fn pick(&self, candidate: usize, choice: usize) -> Pick {
-        let Source::Columns(choices) = &self.problem.candidates[candidate].source else {
+    /// A candidate with the constants and columns of one of its choices.
+    pub(crate) fn select_choice(&self, candidate: usize, choice: usize) -> SelectedEffect {
+        let ColumnSource::Columns(choices) = &self.problem.candidates[candidate].source else {
             unreachable!("only known columns have choices")
         };
         let columns = self.choices[candidate][choice].clone();
-        Pick {
+        SelectedEffect {
             candidate,
             constants: choices[choice].constants.clone(),
             rank: columns.len(),
@@ -260,26 +280,33 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// A set of effects, fitted to all samples.
-    pub(crate) fn trial(&self, picks: Vec<Pick>) -> Trial {
-        self.signed(picks, |picks| self.fit(picks, On::All))
+    /// Fits a set of effects to all samples.
+    pub(crate) fn fit_set(&self, picks: Vec<SelectedEffect>) -> ScoredEffectSet {
+        self.fit_with_signs(picks, |picks| self.fit(picks, FitScope::All))
     }
 
-    /// A set of effects by some fit. Of an effect with several parameters, one whose sign makes no physical sense is zero
-    /// if next to nothing speaks against that: half of the time an estimate of what is not there has the wrong sign.
-    /// Not so where a kind refines another or is bent by a constant: without one of its parameters it is another kind.
-    fn signed(&self, mut picks: Vec<Pick>, fit: impl Fn(&[Pick]) -> (DVector<f64>, f64)) -> Trial {
+    /// Scores a set of effects by some fit. If one of several parameters of an effect has a sign that is physically
+    /// impossible, it is set to zero, provided this changes the residual little: half of the estimates of absent
+    /// parameters have the wrong sign. This does not apply to a kind that refines another or has a searched constant:
+    /// without one of its parameters it is another kind.
+    fn fit_with_signs(
+        &self,
+        mut picks: Vec<SelectedEffect>,
+        fit: impl Fn(&[SelectedEffect]) -> (DVector<f64>, f64),
+    ) -> ScoredEffectSet {
         let (mut factors, squares) = fit(&picks);
         if self.wrong_parameters(&picks, factors.as_slice()).is_empty() {
-            return self.judged(picks, factors.as_slice(), squares);
+            return self.score_set(picks, factors.as_slice(), squares);
         }
-        let mut trial = self.judged(picks.clone(), factors.as_slice(), squares);
+        let mut trial = self.score_set(picks.clone(), factors.as_slice(), squares);
         loop {
+            // Whether an effect may lose a parameter.
             let several = |i: usize| {
                 let columns = picks[i].columns.iter().filter(|k| **k != self.zero);
                 let candidate = self.candidate(&picks[i]);
-                candidate.refines.is_none() && candidate.searched == 0 && columns.count() > 1
+                candidate.refines.is_none() && candidate.searched_constants == 0 && columns.count() > 1
             };
+            // Set one parameter with a wrong sign to zero and fit again, as long as the residual allows it.
             let wrong = self.wrong_parameters(&picks, factors.as_slice());
             let Some((i, j)) = wrong.into_iter().find(|(i, _)| several(*i)) else {
                 break;
@@ -288,27 +315,27 @@ impl<'a> Bench<'a> {
             picks[i].rank = picks[i].rank.saturating_sub(1).max(1);
             let less;
             (factors, less) = fit(&picks);
-            if less > squares * (1.0 + SIGN_IS_CHANCE) {
+            if less > squares * (1.0 + RANDOM_SIGN_SHARE) {
                 break;
             }
-            trial = self.judged(picks.clone(), factors.as_slice(), less);
+            trial = self.score_set(picks.clone(), factors.as_slice(), less);
         }
         trial
     }
 
-    /// Numbers that are free in an effect.
-    pub(crate) fn freedoms(&self, pick: &Pick) -> usize {
-        pick.rank + self.candidate(pick).searched
+    /// Number of estimated values in an effect: independent columns and searched constants.
+    pub(crate) fn freedoms(&self, pick: &SelectedEffect) -> usize {
+        pick.rank + self.candidate(pick).searched_constants
     }
 
-    /// A trial from factors of base and effects.
-    fn judged(&self, picks: Vec<Pick>, factors: &[f64], squares: f64) -> Trial {
+    /// Assembles a scored set from factors of base and effects; `squares` is its weighted squared residual.
+    fn score_set(&self, picks: Vec<SelectedEffect>, factors: &[f64], squares: f64) -> ScoredEffectSet {
         let wrong = self.wrong_parameters(&picks, factors);
         let mut wrong_sign: Vec<usize> = wrong.into_iter().map(|(i, _)| i).collect();
         wrong_sign.dedup();
         let freedoms = picks.iter().map(|p| self.freedoms(p)).sum();
-        let cancelling = self.cancelling(&picks, factors);
-        Trial {
+        let cancelling = self.find_cancelling(&picks, factors);
+        ScoredEffectSet {
             picks,
             squares,
             freedoms,
@@ -318,9 +345,10 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// Effects at the place of an earlier one whose forces together are less than half of what either has alone: nearly the
-    /// same curve twice, of which only the difference is seen.
-    fn cancelling(&self, picks: &[Pick], factors: &[f64]) -> Vec<usize> {
+    /// Effects that cancel an earlier effect at their place: the sum of both has less than half of the amplitude of the
+    /// larger one. They are nearly the same curve twice, of which only the difference is visible. Returns positions in
+    /// `picks`.
+    fn find_cancelling(&self, picks: &[SelectedEffect], factors: &[f64]) -> Vec<usize> {
         let first = factors.len() - n_columns(picks);
         let starts: Vec<usize> = (picks.iter())
             .scan(first, |at, pick| {
@@ -329,52 +357,52 @@ impl<'a> Bench<'a> {
                 Some(start)
             })
             .collect();
+        // Inner product of the forces of two effects, from products of their columns.
         let product = |i: usize, j: usize| -> f64 {
             let (one, other) = (&picks[i].columns, &picks[j].columns);
             let rows = one.iter().zip(&factors[starts[i]..]);
             rows.map(|(a, x)| {
                 let columns = other.iter().zip(&factors[starts[j]..]);
                 columns
-                    .map(|(b, y)| x * y * self.pool.product(*a, *b, &self.weights))
+                    .map(|(b, y)| x * y * self.pool.weighted_product(*a, *b, &self.weights))
                     .sum::<f64>()
             })
             .sum()
         };
         let effect = |i: usize| &self.candidate(&picks[i]).effect;
+        // Squares of the sum of both forces, compared with the larger of the two.
         let cancels = |j: &usize| {
             (0..*j).any(|i| {
                 if effect(i).at != effect(*j).at || effect(i).kind == effect(*j).kind {
                     return false;
                 }
                 let (a, b) = (product(i, i), product(*j, *j));
-                a + 2.0 * product(i, *j) + b < CANCELLED * a.max(b)
+                a + 2.0 * product(i, *j) + b < CANCELLATION_SHARE * a.max(b)
             })
         };
         (0..picks.len()).filter(cancels).collect()
     }
 
-    /// Estimates whose sign makes no physical sense, by position of effect and parameter.
-    fn wrong_parameters(&self, picks: &[Pick], factors: &[f64]) -> Vec<(usize, usize)> {
+    /// Estimates that are physically impossible, by position of effect and parameter: a wrong sign, or a body whose
+    /// centre is out of reach.
+    fn wrong_parameters(&self, picks: &[SelectedEffect], factors: &[f64]) -> Vec<(usize, usize)> {
         let mut at = factors.len() - n_columns(picks);
         let mut wrong = Vec::new();
         for (i, pick) in picks.iter().enumerate() {
             let parameters = &self.candidate(pick).parameters;
             let own = &factors[at..at + parameters.len()];
             at += parameters.len();
+            // Values that are zero up to rounding have no sign.
             let largest = own.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
             let is_wrong = |(p, x): (&EffectParameter, &f64)| match p.sign {
-                Sign::Positive => *x < -1e-9 * largest,
-                Sign::Negative => *x > 1e-9 * largest,
-                Sign::Any => false,
+                SignConstraint::Positive => *x < -1e-9 * largest,
+                SignConstraint::Negative => *x > 1e-9 * largest,
+                SignConstraint::Any => false,
             };
             let of_pick = parameters.iter().zip(own).map(is_wrong).enumerate();
-            wrong.extend(
-                of_pick
-                    .filter(|(_, is_wrong)| *is_wrong)
-                    .map(|(j, _)| (i, j)),
-            );
-            if let Source::Body(body) = &self.candidate(pick).source
-                && body.is_beyond(own)
+            wrong.extend(of_pick.filter(|(_, is_wrong)| *is_wrong).map(|(j, _)| (i, j)));
+            if let ColumnSource::Body(body) = &self.candidate(pick).source
+                && body.is_out_of_reach(own)
             {
                 wrong.push((i, 0));
             }
@@ -382,30 +410,32 @@ impl<'a> Bench<'a> {
         wrong
     }
 
-    /// All present candidates and some picks at once: what the base leaves of their inner products, so that sets are
-    /// tried without it.
-    pub(crate) fn table(&self, also: &[Pick]) -> Table {
+    /// Inner products of the columns of all present candidates and of `also`, with the base projected out, so that sets
+    /// are tried without the base.
+    pub(crate) fn projected_gram(&self, also: &[SelectedEffect]) -> ProjectedGram {
         let mut columns: Vec<usize> = Vec::new();
+        // Each column once, zero and the measured forces at the end.
         let mut known = HashSet::new();
-        for pick in self.present.iter().flatten().chain(also) {
+        for pick in self.current_choices.iter().flatten().chain(also) {
             columns.extend(pick.columns.iter().filter(|k| known.insert(**k)));
         }
         columns.retain(|k| *k != self.zero);
         columns.extend([self.zero, self.measured]);
         let mut which = self.base.clone();
         which.extend(&columns);
-        self.pool.fill(&which);
-        let gram = self.pool.gram(&which, &self.weights, On::All);
+        self.pool.compute_products(&which);
+        // Schur complement: G_cc - G_bc' G_bb^-1 G_bc, with b the base and c the other columns.
+        let gram = self.pool.gram(&which, &self.weights, FitScope::All);
         let n = self.base.len();
         let m = columns.len();
-        let factor = Factored::new(&gram.view((0, 0), (n, n)).into_owned());
+        let factor = GramFactor::new(&gram.view((0, 0), (n, n)).into_owned());
         let mut left = gram.view((n, n), (m, m)).into_owned();
         if n > 0 {
-            let halves = factor.halves(&gram.view((0, n), (n, m)).into_owned());
+            let halves = factor.forward_substitute(&gram.view((0, n), (n, m)).into_owned());
             left -= halves.transpose() * halves;
         }
         for i in 0..m {
-            // What is rounding beside the column itself is no information.
+            // A remainder at the level of rounding is set to zero.
             if left[(i, i)] < 1e-10 * gram[(n + i, n + i)] {
                 left.row_mut(i).fill(0.0);
                 left.column_mut(i).fill(0.0);
@@ -415,34 +445,38 @@ impl<'a> Bench<'a> {
         for (i, k) in columns.iter().enumerate() {
             place[*k] = i;
         }
-        Table { left, place }
+        ProjectedGram {
+            gram: left,
+            row_of_column: place,
+        }
     }
 
-    /// A set of effects, fitted by a table that holds its columns.
-    pub(crate) fn try_in(&self, table: &Table, picks: Vec<Pick>) -> Trial {
-        self.signed(picks, |picks| {
+    /// Fits a set of effects by a table that contains its columns.
+    pub(crate) fn fit_from_gram(&self, table: &ProjectedGram, picks: Vec<SelectedEffect>) -> ScoredEffectSet {
+        self.fit_with_signs(picks, |picks| {
             let mut which: Vec<usize> = picks
                 .iter()
                 .flat_map(|p| &p.columns)
-                .map(|k| table.place[*k])
+                .map(|k| table.row_of_column[*k])
                 .collect();
-            which.push(table.left.nrows() - 1);
+            which.push(table.gram.nrows() - 1);
             let n = which.len();
-            // Number by number: whole rows of the table would be read for a few numbers each.
-            let part = DMatrix::from_fn(n, n, |i, j| table.left[(which[i], which[j])]);
-            solve(&part)
+            // Entries are read one by one; copying complete rows of the table would read far more numbers.
+            let part = DMatrix::from_fn(n, n, |i, j| table.gram[(which[i], which[j])]);
+            solve_gram(&part)
         })
     }
 }
 
-/// Inner products of the effects' columns and the measured forces once the base is taken off.
-pub(crate) struct Table {
-    /// The measured forces come last.
-    pub(crate) left: DMatrix<f64>,
-    /// Where the columns of the pool stand in it.
-    pub(crate) place: Vec<usize>,
+/// Weighted inner products of the effects' columns and the measured forces, with the base projected out.
+pub(crate) struct ProjectedGram {
+    /// Symmetric matrix; the measured forces are the last row.
+    pub(crate) gram: DMatrix<f64>,
+    /// Row of each column of the pool; `usize::MAX` for columns that are not in the table.
+    pub(crate) row_of_column: Vec<usize>,
 }
 
-pub(crate) fn n_columns(picks: &[Pick]) -> usize {
+/// Total number of columns of some effects.
+pub(crate) fn n_columns(picks: &[SelectedEffect]) -> usize {
     picks.iter().map(|p| p.columns.len()).sum()
 }

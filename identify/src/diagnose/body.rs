@@ -1,35 +1,37 @@
-//! A further body: forces are linear in its mass, first moments and inertia, of which the inertia follows from where its mass
-//! is. So it is posed as a mass at a place, with what it spreads about that, and is possible whenever these are positive.
+//! An additional body (payload). Forces are linear in its mass, first moments and inertia, and the inertia depends on
+//! the position of its mass. So its parameters are a mass at a position and the spread about it; the body is physically
+//! possible if these are positive.
 //!
-//! Decision: ten free parameters span what a spring, a weight or a gear does, and most of their values are no
-//! possible body. Mass and first moments with the inertia that follows from them are four, possible by one sign;
-//! how the mass spreads is three more, tried afterwards. Forces are of first degree in all of them, so columns that
-//! are derivatives add up to the whole force (Euler), and a few iterations find the place. With free base
-//! parameters a payload adds nothing, exactly, and is not tried.
+//! Decision: ten independent parameters span what a spring, a weight or a gear does, and most of their values are no
+//! possible body. Mass and first moments with the inertia that follows from them are four, possible by one sign; the
+//! spread of the mass is three more, tried afterwards. Forces are homogeneous of degree one in all of them, so columns
+//! that are derivatives add up to the complete force (Euler), and a few iterations find the position. With estimated
+//! base parameters a payload adds nothing, exactly, and is not tried.
 
-use super::column::Column;
+use super::column::ForceColumn;
 
 /// Entries of an inertia matrix in the order of columns, by axes.
 const ENTRIES: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
 
-/// A body that is added to one that the model has; its parameters are the mass (kg), the first moments along x, y and z
-/// (kg m), and the second moments about its centre along x, y and z (kg m^2), those of them that are free.
+/// A body that is attached to a body of the model. Its parameters are the mass (kg), the first moments along x, y and z
+/// (kg m), and the second moments about its centre along x, y and z (kg m^2); `estimated` selects some of them.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Body {
-    /// What each of its ten parameters about the frame's origin adds to the forces: mass, first moments x, y, z, entries of the
+pub struct AttachedBody {
+    /// Columns of its ten inertial parameters about the frame's origin: mass, first moments x, y, z, entries of the
     /// inertia matrix xx, xy, xz, yy, yz, zz.
-    pub ten: [Column; 10],
-    /// Which of the seven are free, in order.
-    pub free: Vec<usize>,
-    /// The farthest from the frame's origin that its centre may be, m.
-    pub reach: f64,
+    pub inertial_columns: [ForceColumn; 10],
+    /// Which of the seven parameters are estimated, in order.
+    pub estimated: Vec<usize>,
+    /// Largest distance of its centre from the frame's origin, m.
+    pub max_distance: f64,
 }
 
-impl Body {
-    /// Where the centre is for values of the free parameters; the origin where no mass is free or found.
+impl AttachedBody {
+    /// Position of the centre in the frame, m, for values of the estimated parameters; the origin if the mass is not
+    /// estimated or not positive.
     pub(crate) fn centre(&self, values: &[f64]) -> [f64; 3] {
         let value = |of: usize| {
-            let at = self.free.iter().position(|free| *free == of);
+            let at = self.estimated.iter().position(|free| *free == of);
             at.map_or(0.0, |at| values[at])
         };
         let mass = value(0);
@@ -38,23 +40,24 @@ impl Body {
         }
         let centre = [1, 2, 3].map(|k| value(k) / mass);
         let far = centre.iter().map(|c| c * c).sum::<f64>().sqrt();
-        // A mass that is all but none may seem to be anywhere.
-        centre.map(|c| c * (self.reach / far.max(f64::MIN_POSITIVE)).min(1.0))
+        // A very small mass has an ill-determined centre, which is limited to the largest distance.
+        centre.map(|c| c * (self.max_distance / far.max(f64::MIN_POSITIVE)).min(1.0))
     }
 
-    /// Whether values of the free parameters put the centre where nothing of the machine is.
-    pub(crate) fn is_beyond(&self, values: &[f64]) -> bool {
-        let of = |quantity: usize| self.free.iter().position(|free| *free == quantity);
+    /// Whether values of the estimated parameters put the centre beyond the largest distance.
+    pub(crate) fn is_out_of_reach(&self, values: &[f64]) -> bool {
+        let of = |quantity: usize| self.estimated.iter().position(|free| *free == quantity);
         let Some(mass) = of(0).map(|at| values[at]) else {
             return false;
         };
         let moments = [1, 2, 3].map(|k| of(k).map_or(0.0, |at| values[at]));
-        moments.iter().map(|h| h * h).sum::<f64>().sqrt() > self.reach * mass
+        moments.iter().map(|h| h * h).sum::<f64>().sqrt() > self.max_distance * mass
     }
 
-    /// Columns of the free parameters with the centre at a place: what forces change by with each. They add up to the whole
-    /// force there, since the inertia is of first degree in mass and first moments (Euler).
-    pub(crate) fn columns(&self, centre: [f64; 3]) -> Vec<Column> {
+    /// Columns of the estimated parameters: derivatives of the forces at a position of the centre, m. Times the
+    /// parameters they add up to the complete force, since the inertia is homogeneous of degree one in mass and first
+    /// moments (Euler).
+    pub(crate) fn columns(&self, centre: [f64; 3]) -> Vec<ForceColumn> {
         let squares: f64 = centre.iter().map(|c| c * c).sum();
         let one = |i: usize, j: usize| if i == j { 1.0 } else { 0.0 };
         let of = |free: &usize| {
@@ -68,10 +71,10 @@ impl Body {
                 k => one(i, j) * (1.0 - one(k - 4, i)),
             };
             let mut column = match *free {
-                k @ 0..=3 => self.ten[k].clone(),
-                _ => Column(vec![None; self.ten[0].0.len()]),
+                k @ 0..=3 => self.inertial_columns[k].clone(),
+                _ => ForceColumn(vec![None; self.inertial_columns[0].0.len()]),
             };
-            for (inertia, (i, j)) in self.ten[4..].iter().zip(ENTRIES) {
+            for (inertia, (i, j)) in self.inertial_columns[4..].iter().zip(ENTRIES) {
                 let factor = entry(i, j);
                 if factor != 0.0 {
                     column.add(factor, inertia);
@@ -79,7 +82,7 @@ impl Body {
             }
             column
         };
-        self.free.iter().map(of).collect()
+        self.estimated.iter().map(of).collect()
     }
 }
 
@@ -87,22 +90,22 @@ impl Body {
 mod tests {
     use super::*;
 
-    /// Ten columns that tell the ten parameters apart.
-    fn told() -> [Column; 10] {
+    /// Ten columns that distinguish the ten parameters.
+    fn told() -> [ForceColumn; 10] {
         std::array::from_fn(|k| {
             let mut values = vec![0.0; 10];
             values[k] = 1.0;
-            Column(vec![Some(values)])
+            ForceColumn(vec![Some(values)])
         })
     }
 
     /// At the body's own centre the columns give its inertia about the origin by Steiner's theorem.
     #[test]
     fn columns_add_up_to_the_ten_parameters_of_the_body() {
-        let body = Body {
-            ten: told(),
-            free: (0..7).collect(),
-            reach: 2.0,
+        let body = AttachedBody {
+            inertial_columns: told(),
+            estimated: (0..7).collect(),
+            max_distance: 2.0,
         };
         let (mass, centre, spread) = (2.8, [0.1, -0.2, 0.4], [0.01, 0.02, 0.03]);
         let values = [
@@ -116,7 +119,7 @@ mod tests {
         ];
         let found = body.centre(&values);
         assert!(found.iter().zip(centre).all(|(a, b)| (a - b).abs() < 1e-14));
-        let mut sum = Column(vec![None]);
+        let mut sum = ForceColumn(vec![None]);
         for (column, value) in body.columns(found).iter().zip(values) {
             sum.add(value, column);
         }
@@ -140,16 +143,16 @@ mod tests {
         }
     }
 
-    /// Columns are what forces change by: differences of the whole force agree with them.
+    /// Columns are derivatives of the forces: differences of the complete force agree with them.
     #[test]
     fn columns_are_derivatives() {
-        let body = Body {
-            ten: told(),
-            free: (0..4).collect(),
-            reach: 2.0,
+        let body = AttachedBody {
+            inertial_columns: told(),
+            estimated: (0..4).collect(),
+            max_distance: 2.0,
         };
         let force = |values: &[f64]| {
-            let mut sum = Column(vec![Some(vec![0.0; 10])]);
+            let mut sum = ForceColumn(vec![Some(vec![0.0; 10])]);
             for (column, value) in body.columns(body.centre(values)).iter().zip(values) {
                 sum.add(*value, column);
             }
@@ -173,12 +176,12 @@ mod tests {
 
     #[test]
     fn a_centre_beyond_reach_is_no_place() {
-        let body = Body {
-            ten: told(),
-            free: vec![0, 1],
-            reach: 1.0,
+        let body = AttachedBody {
+            inertial_columns: told(),
+            estimated: vec![0, 1],
+            max_distance: 1.0,
         };
-        assert!(!body.is_beyond(&[1.0, 0.9]) && body.is_beyond(&[1.0, -1.1]));
-        assert!(body.is_beyond(&[-1.0, 0.1]));
+        assert!(!body.is_out_of_reach(&[1.0, 0.9]) && body.is_out_of_reach(&[1.0, -1.1]));
+        assert!(body.is_out_of_reach(&[-1.0, 0.1]));
     }
 }

@@ -1,55 +1,50 @@
-//! What is taken off the measured forces before anything is looked for, since no least squares bears it: single outliers, and
-//! what is periodic in time (`hum`). Both are told by name.
+//! Removes from the measured forces what least squares cannot tolerate: single outliers, and oscillations that are
+//! periodic in time (`hum`). Both are reported by name.
 //!
-//! Both are looked for in what base parameters and friction leave. An outlier stands above its neighbours' median by many
-//! robust deviations, and not where a drive reverses.
+//! Both are searched in the residual of base parameters and friction. An outlier differs from the median of its
+//! neighbours by many robust standard deviations, and is not next to a reversal of the drive.
 
-use super::disturbance::{Disturbance, Quantity};
-use super::hum::{self, Line};
-use super::pool::{On, Pool, dot, solve};
-use super::problem::Problem;
+use super::disturbance::{Disturbance, EstimatedQuantity};
+use super::hum::{self, SlowSpectralLine};
+use super::pool::{ColumnPool, FitScope, dot, solve_gram};
+use super::problem::DiagnosisProblem;
+use super::thresholds::{
+    FORCE_OUTLIER_DEVIATIONS, OUTLIER_LEAST_FORCE_SHARE, OUTLIERS_MOST_SHARE, QUANTISED_FEWEST_REPEATS,
+    QUANTISED_FEWEST_VALUES, QUANTISED_LEAST_NOISE_PART, QUANTISED_MOST_OFF_STEP, REVERSAL_OUTLIER_SAMPLES,
+    REVERSAL_UNDECIDED_SAMPLES, REVERSALS_MOST_SHARE,
+};
 use crate::signal::median;
 
-/// Samples whose median an outlier stands out from.
+/// Number of samples around an outlier whose median it is compared with.
 const NEIGHBOURS: usize = 9;
-/// By how many robust deviations.
-const OUT: f64 = 7.0;
-/// What is less than this part of the force is rounding.
-const SLIGHT: f64 = 1e-3;
-/// What happens more often is how the force is.
-const RARE: f64 = 0.05;
-/// Samples about a reversal that are left alone.
-const REVERSAL: usize = 4;
-/// Samples on either side of a reversal that count no more, and the part of all that they may be.
-const JUMP: usize = 1;
-const MOST_JUMPS: f64 = 0.1;
 
-/// Takes outliers and lines off the measured forces and says which there were.
-pub(crate) fn clean(problem: &mut Problem) -> Vec<Disturbance> {
-    counted(problem, |problem| {
-        let mut found = outliers(problem);
-        let left = rest(problem);
-        found.extend(hum::lines(problem, &left));
+/// Removes outliers and spectral lines from the measured forces and reports them.
+pub(crate) fn clean_forces(problem: &mut DiagnosisProblem) -> Vec<Disturbance> {
+    count_removed_squares(problem, |problem| {
+        let mut found = remove_outliers(problem);
+        let left = base_residual(problem);
+        found.extend(hum::remove_lines(problem, &left));
         found
     })
 }
 
-/// Takes slow lines off forces that were not cleaned yet, and cleans what they leave: their crests are taken for outliers where
-/// nobody knows of them. Says what there was.
-pub(crate) fn clean_beside(problem: &mut Problem, slow: &[Line]) -> Vec<Disturbance> {
-    let mut found = counted(problem, |problem| {
+/// Removes slow spectral lines from forces that have not been cleaned, then cleans the rest, and reports all. In this
+/// order, since the crests of an unknown line would be taken for outliers.
+pub(crate) fn clean_with_slow_lines(problem: &mut DiagnosisProblem, slow: &[SlowSpectralLine]) -> Vec<Disturbance> {
+    let mut found = count_removed_squares(problem, |problem| {
         let lines = slow.iter();
-        lines.filter_map(|line| line.take_off(problem)).collect()
+        lines.filter_map(|line| line.remove_from_force(problem)).collect()
     });
-    found.extend(clean(problem));
+    found.extend(clean_forces(problem));
     found
 }
 
-/// Counts what `clean` takes off among what was removed.
-fn counted(
-    problem: &mut Problem,
-    clean: impl FnOnce(&mut Problem) -> Vec<Disturbance>,
+/// Adds the mean square of what `clean` removes from each channel to the problem's `removed`.
+fn count_removed_squares(
+    problem: &mut DiagnosisProblem,
+    clean: impl FnOnce(&mut DiagnosisProblem) -> Vec<Disturbance>,
 ) -> Vec<Disturbance> {
+    // Compare the forces before and after cleaning.
     let before = problem.measured.clone();
     let found = clean(problem);
     let squares = |(old, new): (&Option<Vec<f64>>, &Option<Vec<f64>>)| {
@@ -64,26 +59,25 @@ fn counted(
     found
 }
 
-/// What base parameters and friction leave, channels weighed alike.
-fn rest(problem: &Problem) -> Vec<Vec<f64>> {
-    let mut pool = Pool::new(&problem.layout).without(&problem.undecided());
+/// Residual of base parameters and friction, `[channel][sample]`, with all channels weighted equally.
+fn base_residual(problem: &DiagnosisProblem) -> Vec<Vec<f64>> {
+    // Fit base and friction to all samples, except those that decide nothing.
+    let mut pool = ColumnPool::new(&problem.layout).exclude_samples(&problem.undecided_samples());
     let columns = problem.base.iter().chain(&problem.friction);
     let mut which: Vec<usize> = columns.map(|c| pool.add(c)).collect();
     let measured = pool.add(&problem.measured);
-    let size = |values: &Option<Vec<f64>>| {
-        values
-            .as_ref()
-            .map_or(0.0, |v| dot(v, v) / v.len().max(1) as f64)
-    };
+    let size = |values: &Option<Vec<f64>>| values.as_ref().map_or(0.0, |v| dot(v, v) / v.len().max(1) as f64);
+    // First weights from the size of the forces.
     let weight = |values: &Option<Vec<f64>>| 1.0 / size(values).max(f64::MIN_POSITIVE);
     let mut weights: Vec<f64> = problem.measured.0.iter().map(weight).collect();
     which.push(measured);
     let mut rest = Vec::new();
+    // Two passes: the second uses weights from the residual of the first.
     for _ in 0..2 {
-        let (factors, _) = solve(&pool.gram(&which, &weights, On::All));
-        rest = pool.rest(measured, &which[..which.len() - 1], factors.as_slice());
+        let (factors, _) = solve_gram(&pool.gram(&which, &weights, FitScope::All));
+        rest = pool.residual(measured, &which[..which.len() - 1], factors.as_slice());
         for (weight, rest) in weights.iter_mut().zip(&rest) {
-            // The middle of squares is none of the outliers'.
+            // The median of the squares is not affected by outliers.
             let middle = median(rest.iter().map(|r| r * r).collect());
             *weight = 1.0 / middle.max(f64::MIN_POSITIVE);
         }
@@ -91,28 +85,34 @@ fn rest(problem: &Problem) -> Vec<Vec<f64>> {
     rest
 }
 
-fn outliers(problem: &mut Problem) -> Vec<Disturbance> {
-    let mut flagged: Vec<Vec<bool>> =
-        vec![vec![false; problem.layout.samples()]; problem.layout.channels.len()];
+/// Replaces outliers by the median of their neighbours and reports their share and rms size per channel.
+fn remove_outliers(problem: &mut DiagnosisProblem) -> Vec<Disturbance> {
+    let mut flagged: Vec<Vec<bool>> = vec![vec![false; problem.layout.samples()]; problem.layout.channels.len()];
+    // Distances of the outliers of each channel, for the report.
     let mut sizes: Vec<Vec<f64>> = vec![Vec::new(); flagged.len()];
+    // Large outliers hide smaller ones, so the search is repeated.
     for _ in 0..3 {
-        let rest = rest(problem);
+        let rest = base_residual(problem);
         let mut more = false;
         for (d, rest) in rest.iter().enumerate() {
-            let reverses = reversals(problem, d, REVERSAL);
-            let apart = from_neighbours(problem, rest);
+            let reverses = reversal_samples(problem, d, REVERSAL_OUTLIER_SAMPLES);
+            // Distance from the local median, compared with the noise of the channel.
+            let apart = deviation_from_neighbours(problem, rest);
+            // 1.4826 times the median of absolute values is the standard deviation of normal noise.
             let spread = 1.4826 * median(apart.iter().map(|x| x.abs()).collect());
-            let force = problem.force(d);
+            let force = problem.measured_force(d);
             let size = (dot(&force, &force) / force.len().max(1) as f64).sqrt();
-            let bound = (OUT * spread.max(problem.noise[d])).max(SLIGHT * size);
+            let bound = (FORCE_OUTLIER_DEVIATIONS * spread.max(problem.noise[d])).max(OUTLIER_LEAST_FORCE_SHARE * size);
             let new: Vec<usize> = (0..rest.len())
                 .filter(|i| apart[*i].abs() > bound && !reverses[*i])
                 .collect();
-            let is_rare = (new.len() as f64) < RARE * rest.len() as f64;
+            // Frequent large distances belong to the force, for example stick-slip.
+            let is_rare = (new.len() as f64) < OUTLIERS_MOST_SHARE * rest.len() as f64;
             let Some(values) = problem.measured.0[d].as_mut().filter(|_| is_rare) else {
                 continue;
             };
             for i in new {
+                // Move the sample to the median of its neighbours.
                 values[i] -= apart[i];
                 sizes[d].push(apart[i]);
                 flagged[d][i] = true;
@@ -124,6 +124,7 @@ fn outliers(problem: &mut Problem) -> Vec<Disturbance> {
         }
     }
     let channels = flagged.iter().zip(&sizes).enumerate();
+    // Report channels with outliers.
     let told = channels.filter(|(_, (_, sizes))| !sizes.is_empty());
     told.map(|(d, (flagged, sizes))| {
         let count = flagged.iter().filter(|f| **f).count() as f64;
@@ -132,25 +133,27 @@ fn outliers(problem: &mut Problem) -> Vec<Disturbance> {
             kind: "outliers".to_owned(),
             at: vec![problem.layout.channels[d].clone()],
             estimates: vec![
-                Quantity::new("share", count / flagged.len().max(1) as f64, "1"),
-                Quantity::new("size", size, ""),
+                EstimatedQuantity::new("share", count / flagged.len().max(1) as f64, "1"),
+                EstimatedQuantity::new("size", size, ""),
             ],
             recordings: Vec::new(),
             interval: None,
-            says: None,
+            description: None,
         }
     })
     .collect()
 }
 
-/// Samples about which a channel's drive reverses, where friction jumps.
-fn reversals(problem: &Problem, channel: usize, samples: usize) -> Vec<bool> {
+/// Whether each sample is within some samples of a reversal of the channel's drive, where friction jumps.
+fn reversal_samples(problem: &DiagnosisProblem, channel: usize, samples: usize) -> Vec<bool> {
     let n = problem.layout.samples();
     let mut about = vec![false; n];
+    // The second friction column of a drive is the sign of its rate.
     let sign = problem.friction.get(3 * channel + 1);
     let Some(sign) = sign.and_then(|column| column.0[channel].as_ref()) else {
         return about;
     };
+    // The sign of the rate changes or is zero between two samples.
     for i in 1..n {
         if sign[i] * sign[i - 1] <= 0.0 {
             let end = (i + samples).min(n);
@@ -160,46 +163,53 @@ fn reversals(problem: &Problem, channel: usize, samples: usize) -> Vec<bool> {
     about
 }
 
-/// How far each sample is from the middle of those about it.
-fn from_neighbours(problem: &Problem, rest: &[f64]) -> Vec<f64> {
+/// Distance of each sample from the median of its neighbours within the segment.
+fn deviation_from_neighbours(problem: &DiagnosisProblem, rest: &[f64]) -> Vec<f64> {
     let mut apart = Vec::with_capacity(rest.len());
     let mut start = 0;
-    for stretch in &problem.layout.stretches {
-        let part = &rest[start..start + stretch.samples];
+    for segment in &problem.layout.segments {
+        let part = &rest[start..start + segment.samples];
         for i in 0..part.len() {
+            // The window is shifted at the ends of a segment.
             let low = i.saturating_sub(NEIGHBOURS / 2);
             let high = (low + NEIGHBOURS).min(part.len());
             apart.push(part[i] - median(part[low..high].to_vec()));
         }
-        start += stretch.samples;
+        start += segment.samples;
     }
     apart
 }
 
-/// The step in which a force is read, if all of its values are multiples of one that is coarser than its noise; in its unit.
-pub fn step_of_values(values: &[f64], noise: f64) -> Option<f64> {
+/// Step of a quantised force signal, in its unit: the common divisor of its values, if it is coarser than the noise.
+/// `None` otherwise.
+pub fn quantisation_step(values: &[f64], noise: f64) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
+    // Values that differ by rounding only are equal.
     let largest = sorted.first()?.abs().max(sorted.last()?.abs());
     sorted.dedup_by(|a, b| (*a - *b).abs() <= 1e-9 * largest);
-    if sorted.len() < 3 || 4 * sorted.len() > values.len() {
+    // Quantised values repeat; many different values mean a fine resolution.
+    if sorted.len() < QUANTISED_FEWEST_VALUES || QUANTISED_FEWEST_REPEATS * sorted.len() > values.len() {
         return None;
     }
     let gaps = sorted.windows(2).map(|pair| pair[1] - pair[0]);
+    // The smallest difference is the step, if all others are multiples of it.
     let step = gaps.fold(f64::INFINITY, f64::min);
-    let is_multiple = |gap: f64| (gap / step - (gap / step).round()).abs() < 1e-3;
+    let is_multiple = |gap: f64| (gap / step - (gap / step).round()).abs() < QUANTISED_MOST_OFF_STEP;
     let all = sorted.windows(2).all(|pair| is_multiple(pair[1] - pair[0]));
-    (all && step / 12.0_f64.sqrt() > 0.3 * noise).then_some(step)
+    // A quantisation step q adds an error of standard deviation q / sqrt(12).
+    (all && step / 12.0_f64.sqrt() > QUANTISED_LEAST_NOISE_PART * noise).then_some(step)
 }
 
-impl Problem {
-    /// Finds the samples next to a reversal of their drive, unless these are many: friction jumps there, and on which side of the
-    /// jump a sample lies no derivative of positions tells.
-    pub(crate) fn find_jumps(&mut self) {
+impl DiagnosisProblem {
+    /// Finds the samples next to a reversal of their drive, unless these are many: friction jumps there, and no
+    /// derivative of positions shows on which side of the jump a sample lies.
+    pub(crate) fn find_reversal_samples(&mut self) {
         let of = |d: usize| {
-            let jumps = reversals(self, d, JUMP);
+            let jumps = reversal_samples(self, d, REVERSAL_UNDECIDED_SAMPLES);
+            // Leave out reversals only if few samples are lost.
             let count = jumps.iter().filter(|jumps| **jumps).count() as f64;
-            if count < MOST_JUMPS * jumps.len() as f64 {
+            if count < REVERSALS_MOST_SHARE * jumps.len() as f64 {
                 jumps
             } else {
                 Vec::new()
@@ -208,19 +218,12 @@ impl Problem {
         self.jumps = (0..self.layout.channels.len()).map(of).collect();
     }
 
-    /// Samples that decide nothing, by channel.
-    pub(crate) fn undecided(&self) -> Vec<Vec<bool>> {
+    /// Samples that decide nothing, `[channel][sample]`: those left out and those next to reversals.
+    pub(crate) fn undecided_samples(&self) -> Vec<Vec<bool>> {
         let of = |d: usize| {
-            let out = |all: &[Vec<bool>], i: usize| {
-                all.get(d)
-                    .and_then(|out| out.get(i))
-                    .copied()
-                    .unwrap_or(false)
-            };
+            let out = |all: &[Vec<bool>], i: usize| all.get(d).and_then(|out| out.get(i)).copied().unwrap_or(false);
             let samples = 0..self.layout.samples();
-            samples
-                .map(|i| out(&self.left_out, i) || out(&self.jumps, i))
-                .collect()
+            samples.map(|i| out(&self.left_out, i) || out(&self.jumps, i)).collect()
         };
         (0..self.layout.channels.len()).map(of).collect()
     }
@@ -231,12 +234,12 @@ mod tests {
     use std::f64::consts::TAU;
 
     use super::*;
-    use crate::diagnose::column::Column;
-    use crate::diagnose::problem::{Layout, Stretch};
-    use crate::test_noise::Noise;
+    use crate::diagnose::column::ForceColumn;
+    use crate::diagnose::problem::{SampleLayout, SampleSegment};
+    use crate::test_noise::TestNoise;
 
-    fn problem(seed: u64, more: impl Fn(usize, &mut Noise) -> f64) -> Problem {
-        let mut noise = Noise::new(seed);
+    fn problem(seed: u64, more: impl Fn(usize, &mut TestNoise) -> f64) -> DiagnosisProblem {
+        let mut noise = TestNoise::new(seed);
         let n = 2000;
         let base: Vec<f64> = (0..n).map(|i| (0.02 * f64::from(i)).sin()).collect();
         let measured: Vec<f64> = base
@@ -244,30 +247,30 @@ mod tests {
             .enumerate()
             .map(|(i, b)| 50.0 * b + noise.normal() + more(i, &mut noise))
             .collect();
-        Problem {
-            layout: Layout {
+        DiagnosisProblem {
+            layout: SampleLayout {
                 channels: vec!["a".into()],
-                stretches: vec![Stretch {
+                segments: vec![SampleSegment {
                     name: "run".into(),
                     samples: base.len(),
                     step: 0.004,
-                    sampled: 0.004,
+                    recorded_step: 0.004,
                     is_check: false,
                 }],
                 left_out: Vec::new(),
             },
-            measured: Column(vec![Some(measured)]),
-            base: vec![Column(vec![Some(base)])],
+            measured: ForceColumn(vec![Some(measured)]),
+            base: vec![ForceColumn(vec![Some(base)])],
             noise: vec![1.0],
             removed: vec![0.0],
-            ..Problem::default()
+            ..DiagnosisProblem::default()
         }
     }
 
     #[test]
     fn noise_has_neither_outliers_nor_lines() {
         for seed in 0..40 {
-            assert_eq!(clean(&mut problem(seed, |_, _| 0.0)), [], "seed {seed}");
+            assert_eq!(clean_forces(&mut problem(seed, |_, _| 0.0)), [], "seed {seed}");
         }
     }
 
@@ -277,13 +280,13 @@ mod tests {
             let hum = |i: usize| 3.0 * (TAU * 50.02 * 0.004 * i as f64 + 0.4).sin();
             let wild = |i: usize| if i % 211 == 17 { 90.0 } else { 0.0 };
             let mut problem = problem(seed, |i, _| hum(i) + wild(i));
-            let found = clean(&mut problem);
+            let found = clean_forces(&mut problem);
             let kinds: Vec<&str> = found.iter().map(|one| one.kind.as_str()).collect();
             assert_eq!(kinds, ["outliers", "periodic_in_time"], "seed {seed}");
             let values = &found[1].estimates;
             assert!((values[0].value - 3.0).abs() < 0.2, "{values:?}");
             assert!((values[1].value - 50.02).abs() < 0.02, "{values:?}");
-            let rest = rest(&problem);
+            let rest = base_residual(&problem);
             let left = dot(&rest[0], &rest[0]) / rest[0].len() as f64;
             assert!((0.85..1.15).contains(&left), "{left}");
         }
@@ -291,14 +294,14 @@ mod tests {
 
     #[test]
     fn steps_of_a_reading_are_seen() {
-        let mut noise = Noise::new(5);
+        let mut noise = TestNoise::new(5);
         let force: Vec<f64> = (0..3000)
             .map(|i| 300.0 * (0.01 * f64::from(i)).sin() + noise.normal())
             .collect();
         let coarse: Vec<f64> = force.iter().map(|f| 20.0 * (f / 20.0).round()).collect();
-        assert_eq!(step_of_values(&coarse, 1.0), Some(20.0));
-        assert_eq!(step_of_values(&force, 1.0), None);
+        assert_eq!(quantisation_step(&coarse, 1.0), Some(20.0));
+        assert_eq!(quantisation_step(&force, 1.0), None);
         let fine: Vec<f64> = force.iter().map(|f| 0.1 * (f / 0.1).round()).collect();
-        assert_eq!(step_of_values(&fine, 1.0), None);
+        assert_eq!(quantisation_step(&fine, 1.0), None);
     }
 }

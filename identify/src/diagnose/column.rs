@@ -1,15 +1,16 @@
-//! What an effect adds to the forces along all recordings.
+//! Columns: what a parameter adds to the forces along all recordings, per unit of the parameter.
 
 use std::borrow::Cow;
 
-/// Numbers along all recordings, for each channel one for every sample: recordings of the fit first, then those of the
-/// check; `None` for a channel on which the column is zero throughout.
+/// Values along all recordings, `[channel][sample]`: recordings of the fit first, then validation runs. `None` for a
+/// channel on which the column is zero throughout.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Column(pub Vec<Option<Vec<f64>>>);
+pub struct ForceColumn(pub Vec<Option<Vec<f64>>>);
 
-impl Column {
+impl ForceColumn {
     /// A column from all of its channels; those that are zero throughout are left out.
     pub fn new(channels: Vec<Vec<f64>>) -> Self {
+        // A channel of zeros needs no memory.
         let sparse = |values: Vec<f64>| values.iter().any(|x| *x != 0.0).then_some(values);
         Self(channels.into_iter().map(sparse).collect())
     }
@@ -19,6 +20,7 @@ impl Column {
         for (slot, values) in self.0.iter_mut().zip(&other.0) {
             let Some(values) = values else { continue };
             match slot {
+                // A channel that is zero so far takes a copy of the other column.
                 Some(sum) => {
                     for (s, x) in sum.iter_mut().zip(values) {
                         *s += factor * x;
@@ -38,10 +40,11 @@ impl Column {
     }
 
     /// Channels on which both columns act, with the values of both.
-    pub(crate) fn common<'a>(
+    pub(crate) fn common_channels<'a>(
         &'a self,
         other: &'a Self,
     ) -> impl Iterator<Item = (usize, &'a [f64], &'a [f64])> {
+        // Channels on which one of both is zero are left out.
         let pairs = self.0.iter().zip(&other.0).enumerate();
         pairs.filter_map(|(d, (a, b))| Some((d, a.as_deref()?, b.as_deref()?)))
     }
@@ -52,14 +55,14 @@ impl Column {
     }
 }
 
-impl<'a> From<&'a Column> for Cow<'a, Column> {
-    fn from(column: &'a Column) -> Self {
+impl<'a> From<&'a ForceColumn> for Cow<'a, ForceColumn> {
+    fn from(column: &'a ForceColumn) -> Self {
         Cow::Borrowed(column)
     }
 }
 
-impl From<Column> for Cow<'_, Column> {
-    fn from(column: Column) -> Self {
+impl From<ForceColumn> for Cow<'_, ForceColumn> {
+    fn from(column: ForceColumn) -> Self {
         Cow::Owned(column)
     }
 }

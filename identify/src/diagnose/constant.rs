@@ -1,27 +1,28 @@
-//! A number of the model that is off, such as a length: forces bend as it moves, by their first and second derivatives.
+//! A constant of the model with a wrong value, such as a length. Its effect on the forces is described by their first
+//! and second derivatives.
 
-use super::column::Column;
-use super::tilt::Sensitivity;
+use super::column::ForceColumn;
+use super::tilt::ForceSensitivity;
 
-/// A constant of the model whose value may be wrong; its parameter is what it is too small by.
+/// A constant whose value may be wrong; its parameter is the true value minus the value of the model.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Constant {
-    /// What forces change by with it, for each unit.
-    pub slope: Sensitivity,
-    /// What that changes by, for each unit.
-    pub bend: Sensitivity,
+pub struct ConstantCorrection {
+    /// First derivative of the forces with respect to it.
+    pub first_derivative: ForceSensitivity,
+    /// Second derivative of the forces with respect to it.
+    pub second_derivative: ForceSensitivity,
 }
 
-impl Constant {
-    /// What forces change by, for each unit, between no error and one of a size: times the error it is the whole change, up to
-    /// its third power. `base` are the parameters of the base columns.
-    pub(crate) fn column(&self, error: f64, base: &[f64], channels: usize) -> Column {
-        let mut sum = Column(vec![None; channels]);
-        for (part, share) in [(&self.slope, 1.0), (&self.bend, 0.5 * error)] {
+impl ConstantCorrection {
+    /// Change of the forces per unit of the error, between no error and `error`: times the error it is the complete
+    /// change up to the third power. `base` are the factors of the base columns.
+    pub(crate) fn secant_column(&self, error: f64, base: &[f64], channels: usize) -> ForceColumn {
+        let mut sum = ForceColumn(vec![None; channels]);
+        for (part, share) in [(&self.first_derivative, 1.0), (&self.second_derivative, 0.5 * error)] {
             if share == 0.0 {
                 continue;
             }
-            sum.add(share, &part.held);
+            sum.add(share, &part.fixed);
             for (change, factor) in part.base.iter().zip(base) {
                 sum.add(share * factor, change);
             }
@@ -34,21 +35,21 @@ impl Constant {
 mod tests {
     use super::*;
 
-    /// The square of a number, of which the base column and a held force have one part each.
+    /// The square of a number, of which the base column and the force of a fixed parameter each have a part.
     #[test]
     fn the_column_times_the_error_is_the_change() {
-        let one = |value: f64| Column(vec![Some(vec![value])]);
+        let one = |value: f64| ForceColumn(vec![Some(vec![value])]);
         let (constant, factor) = (3.0, 5.0);
-        let held = |value: f64| Sensitivity {
+        let held = |value: f64| ForceSensitivity {
             base: vec![one(value)],
-            held: one(2.0 * value),
+            fixed: one(2.0 * value),
         };
-        let square = Constant {
-            slope: held(2.0 * constant),
-            bend: held(2.0),
+        let square = ConstantCorrection {
+            first_derivative: held(2.0 * constant),
+            second_derivative: held(2.0),
         };
         let error = 0.4_f64;
-        let column = square.column(error, &[factor], 1);
+        let column = square.secant_column(error, &[factor], 1);
         let change = error * column.0[0].as_deref().unwrap_or_default()[0];
         let expected = (factor + 2.0) * ((constant + error).powi(2) - constant.powi(2));
         assert!((change - expected).abs() < 1e-12, "{change} {expected}");

@@ -1,30 +1,31 @@
-//! What recordings have that no part of the model is: faults of sensors, of the day, of the recording.
+//! Disturbances of recordings, which are no part of the model, and the origin of the residual of each channel.
 
-use super::bench::{Bench, Pick};
+use super::bench::{EffectSelector, SelectedEffect};
 use super::noise::effective_samples;
 use super::pool::dot;
-use super::problem::{Nature, Problem};
+use super::problem::{CandidateNature, DiagnosisProblem};
+use super::thresholds::{COLOURED_LEAST_VARIANCE_RATIO, COLOURED_MOST_EFFECTIVE_SHARE};
 
-/// A value of a disturbance or an effect.
+/// A named value of a disturbance or an effect.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Quantity {
-    /// What it is.
+pub struct EstimatedQuantity {
+    /// Name of the quantity.
     pub name: String,
     /// Its value.
     pub value: f64,
     /// Its standard deviation, where it is known.
-    pub deviation: Option<f64>,
-    /// Unit of both.
+    pub standard_deviation: Option<f64>,
+    /// Unit of both; empty if it is that of the force.
     pub unit: String,
 }
 
-impl Quantity {
-    /// A value without a deviation.
+impl EstimatedQuantity {
+    /// A value without a standard deviation.
     pub fn new(name: &str, value: f64, unit: &str) -> Self {
         Self {
             name: name.to_owned(),
             value,
-            deviation: None,
+            standard_deviation: None,
             unit: unit.to_owned(),
         }
     }
@@ -33,92 +34,90 @@ impl Quantity {
 /// A fault of a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Disturbance {
-    /// What scripts call it.
+    /// Name of the kind in JSON and in scripts.
     pub kind: String,
-    /// Drives or coordinates that have it.
+    /// Names of the drives or coordinates that have it.
     pub at: Vec<String>,
     /// How large it is.
-    pub estimates: Vec<Quantity>,
+    pub estimates: Vec<EstimatedQuantity>,
     /// Which recordings have it; empty for all.
     pub recordings: Vec<String>,
     /// When it acts, s; `None` for all of the time.
     pub interval: Option<[f64; 2]>,
-    /// What it is, in words, where whoever found it has some of its own.
-    pub says: Option<String>,
+    /// Description for people, if it was given one.
+    pub description: Option<String>,
 }
 
-/// What is left of a force, by where it comes from; effective values in its unit.
+/// Residual of a force by its origin: rms values in the unit of the force.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Budget {
-    /// Noise, white or coloured: it does not come again.
+pub struct ResidualBudget {
+    /// Noise, white or coloured: it is not repeatable.
     pub noise: f64,
-    /// What does not repeat with the state: drift, hum, outliers, events, another day.
-    pub not_repeating: f64,
-    /// What comes again with the state, and the model does not say.
+    /// Disturbances that are not a function of the state: drift, hum, outliers, events, differences between recordings.
+    pub non_repeatable: f64,
+    /// Repeatable residual, which the model does not explain.
     pub model: f64,
     /// The measured force itself.
     pub force: f64,
 }
 
-/// Noise of a residual counts as coloured where it is worth fewer samples than this share of them.
-const COLOURED: f64 = 0.5;
-/// And where its variance is so many times that of the white noise.
-const ABOVE_WHITE: f64 = 1.5;
-
-/// Whether noise of a variance is no more than the white noise of its channel.
-pub(crate) fn is_white(problem: &Problem, channel: usize, variance: f64) -> bool {
-    variance < ABOVE_WHITE * problem.noise[channel].powi(2)
+/// Whether a variance is not larger than that of the white noise of its channel.
+pub(crate) fn is_white(problem: &DiagnosisProblem, channel: usize, variance: f64) -> bool {
+    variance < COLOURED_LEAST_VARIANCE_RATIO * problem.noise[channel].powi(2)
 }
 
-impl Bench<'_> {
-    /// Members of a set that are faults of the recordings, with what they are worth.
-    pub(crate) fn disturbances(&self, picks: &[Pick]) -> Vec<Disturbance> {
-        let fitted = self.estimates(picks, super::pool::On::All);
+impl EffectSelector<'_> {
+    /// Members of a set that are disturbances, with their estimates.
+    pub(crate) fn disturbances(&self, picks: &[SelectedEffect]) -> Vec<Disturbance> {
+        let fitted = self.estimate_parameters(picks, super::pool::FitScope::All);
         let mut found: Vec<Disturbance> = Vec::new();
         for (pick, values) in picks.iter().zip(fitted) {
             let candidate = self.candidate(pick);
-            if candidate.nature == Nature::Effect {
+            if candidate.nature == CandidateNature::Effect {
                 continue;
             }
             let parameters = candidate.parameters.iter().zip(values);
-            let estimates = parameters.map(|(p, (value, deviation))| Quantity {
+            let estimates = parameters.map(|(p, (value, deviation))| EstimatedQuantity {
                 name: p.symbol.clone(),
                 value,
-                deviation,
+                standard_deviation: deviation,
                 unit: p.unit.clone(),
             });
             let constants = pick.constants.iter();
-            let constants = constants.map(|(name, value)| Quantity::new(name, *value, ""));
+            let constants = constants.map(|(name, value)| EstimatedQuantity::new(name, *value, ""));
             found.push(Disturbance {
                 kind: candidate.effect.kind.clone(),
                 at: candidate.effect.at.clone(),
                 estimates: estimates.chain(constants).collect(),
                 recordings: Vec::new(),
                 interval: None,
-                says: None,
+                description: None,
             });
         }
         found
     }
 
-    /// Where the noise of each channel comes from, and noise that has a memory by name.
-    pub(crate) fn budgets(
+    /// Splits the residual of each channel by its origin, and reports coloured noise. `rest` is `[channel][sample]`,
+    /// `again` the repeatable share of its squares.
+    pub(crate) fn residual_budgets(
         &self,
-        picks: &[Pick],
+        picks: &[SelectedEffect],
         rest: &[Vec<f64>],
         again: &[f64],
-    ) -> (Vec<Budget>, Vec<Disturbance>) {
+    ) -> (Vec<ResidualBudget>, Vec<Disturbance>) {
         let problem = self.problem;
-        let (factors, _) = self.fit(picks, super::pool::On::All);
+        let (factors, _) = self.fit(picks, super::pool::FitScope::All);
         let size = |values: &[f64]| dot(values, values) / values.len().max(1) as f64;
         let mut budgets = Vec::new();
         let mut coloured = Vec::new();
         for (d, rest) in rest.iter().enumerate() {
+            // Force of all members of the set that are disturbances.
             let mut disturbed = vec![0.0; rest.len()];
+            // Factors of the effects follow those of the base.
             let mut at = self.base.len();
             for pick in picks {
                 for k in &pick.columns {
-                    if self.candidate(pick).nature == Nature::Disturbance
+                    if self.candidate(pick).nature == CandidateNature::Disturbance
                         && let Some(values) = &self.pool.column(*k).0[d]
                     {
                         for (sum, x) in disturbed.iter_mut().zip(values) {
@@ -128,59 +127,63 @@ impl Bench<'_> {
                     at += 1;
                 }
             }
+            // Split the mean square of the residual into the repeatable part and noise.
             let left = size(rest);
             let model = left * again[d];
-            let force = problem.force(d);
+            let force = problem.measured_force(d);
             let removed = problem.removed.get(d).copied().unwrap_or(0.0);
-            let budget = Budget {
+            let budget = ResidualBudget {
                 noise: (left - model).max(0.0).sqrt(),
-                not_repeating: (size(&disturbed) + removed).sqrt(),
+                non_repeatable: (size(&disturbed) + removed).sqrt(),
                 model: model.sqrt(),
                 force: size(&force).sqrt(),
             };
-            coloured.extend(self.coloured(d, rest, again[d]));
+            coloured.extend(self.coloured_noise(d, rest, again[d]));
             budgets.push(budget);
         }
         (budgets, coloured)
     }
 
-    /// Noise of a channel whose samples resemble their neighbours, and what comes again with the state is not most of it.
-    fn coloured(&self, channel: usize, rest: &[f64], again: f64) -> Option<Disturbance> {
+    /// Coloured noise of a channel: its samples are correlated, and most of it is not repeatable. `None` if the noise
+    /// is white.
+    fn coloured_noise(&self, channel: usize, rest: &[f64], again: f64) -> Option<Disturbance> {
         let layout = &self.problem.layout;
         let variance = dot(rest, rest) / rest.len().max(1) as f64;
         if is_white(self.problem, channel, variance * (1.0 - again)) {
             return None;
         }
+        // Share of samples that are independent.
         let worth = effective_samples(rest) / rest.len().max(1) as f64;
-        if worth > COLOURED {
+        if worth > COLOURED_MOST_EFFECTIVE_SHARE {
             return None;
         }
-        // Of a first-order process with that many samples to one that counts.
+        // Coefficient a of a first-order process with (1 + a) / (1 - a) samples per independent one; it gives the
+        // corner frequency.
         let memory = worth.recip();
         let keeps = (memory - 1.0) / (memory + 1.0);
-        let step = layout.stretches.first().map_or(1.0, |s| s.step);
+        let step = layout.segments.first().map_or(1.0, |s| s.step);
         let corner = -keeps.ln() / (std::f64::consts::TAU * step);
         Some(Disturbance {
             kind: "coloured_noise".to_owned(),
             at: vec![layout.channels[channel].clone()],
             estimates: vec![
-                Quantity::new("noise", (variance * (1.0 - again)).sqrt(), ""),
-                Quantity::new("corner", corner, "Hz"),
+                EstimatedQuantity::new("noise", (variance * (1.0 - again)).sqrt(), ""),
+                EstimatedQuantity::new("corner", corner, "Hz"),
             ],
             recordings: Vec::new(),
             interval: None,
-            says: None,
+            description: None,
         })
     }
 }
 
-impl Problem {
-    /// The measured force of a channel, with that of held parameters.
-    pub(crate) fn force(&self, channel: usize) -> Vec<f64> {
+impl DiagnosisProblem {
+    /// Measured force of a channel with the forces of fixed parameters added, N or N m.
+    pub(crate) fn measured_force(&self, channel: usize) -> Vec<f64> {
         let mut force = self.measured.0[channel]
             .clone()
             .unwrap_or_else(|| vec![0.0; self.layout.samples()]);
-        let held = self.held.as_ref().and_then(|held| held.0[channel].as_ref());
+        let held = self.fixed_forces.as_ref().and_then(|held| held.0[channel].as_ref());
         for (sum, x) in force.iter_mut().zip(held.into_iter().flatten()) {
             *sum += x;
         }

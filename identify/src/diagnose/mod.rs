@@ -1,248 +1,270 @@
-//! Which effect is missing: columns of what a model could lack go in; the smallest set that explains what it cannot say
-//! comes out, with what cannot be told apart, and an honest answer where nothing explains it.
+//! Which effect is missing. Input: measured forces, columns of the model and columns of candidates. Output: the
+//! smallest set of effects that explains the residual, with indistinguishable alternatives, or the statement that no
+//! candidate explains it.
 //!
-//! 1. [`Problem`] - measured forces, columns of the model, candidates with the constants that are searched for.
-//! 2. `pool`, `factored`, `beside`, `bench` - inner products of all columns, so that a set of effects is fitted in microseconds;
-//!    `tuning` finds constants, `following` makes columns that depend on the fit, `readings` those of forces that are read
-//!    wrongly, `tilt` turns gravity, `body` places a further mass, `constant` moves a number of the model.
-//! 3. `search` - forward over sets, with exchanges; `evidence` decides on time that was not fitted; `settle` makes the last
-//!    set as small and simple as it can be.
-//! 4. `aliases` - what this recording cannot tell apart; `reproducible` - what no candidate explains and no noise is.
-//! 5. [`Diagnosis`] - the answer.
+//! 1. [`DiagnosisProblem`] - measured forces, columns of the model, candidates with the constants that are searched
+//!    for.
+//! 2. `pool`, `factored`, `conditional`, `bench` - inner products of all columns, so that a set of effects is fitted in
+//!    microseconds; `tuning` finds constants, `fit_dependent` computes columns that depend on the fit, `force_signals` those of
+//!    faulty force signals, `tilt` rotates gravity, `body` places an additional mass, `constant` corrects a number of
+//!    the model.
+//! 3. `search` - forward search over sets, with exchanges; `evidence` decides on time that was not fitted; `simplification`
+//!    makes the last set as small and simple as possible.
+//! 4. `aliases` - effects that this recording cannot distinguish; `reproducible` - the repeatable residual that no
+//!    candidate explains.
+//! 5. [`ModelDiagnosis`] - the answer.
 //!
-//! What recordings have and the model does not lack is told by name too: `cleaning` takes outliers and `hum` off beforehand,
-//! `drifts` and `readings` are candidates among the others, and `disturbance` says what is left, and of which sort.
+//! Disturbances of the recordings are reported by name too: `cleaning` removes outliers and `hum` beforehand, `drifts`
+//! and `force_signals` are candidates among the others, and `disturbance` splits the residual by its origin.
 //!
-//! Decision: disturbances of recordings compete with effects. An encoder error, a drift or a wrong scale resembles
-//! some effect at any size, so they are candidates like all others, and only effects make the verdict. What least
-//! squares cannot bear (outliers, hum) or what one recording alone has (a push, another day) is removed beforehand.
+//! Decision: disturbances of recordings compete with effects. An encoder error, a drift or a wrong scale resembles some
+//! effect at any size, so they are candidates like all others, and only effects decide the verdict. Disturbances that
+//! least squares cannot tolerate (outliers, hum) or that only one recording has (a push, another day) are removed
+//! beforehand.
 //!
 //! Decision: samples at reversals decide nothing. Dry friction jumps there, and no derivative of positions shows on
 //! which side of the jump a sample lies. They count in the figures.
 
 mod aliases;
 mod bench;
-mod beside;
 mod body;
 mod bounds;
 mod cleaning;
 mod column;
+mod conditional;
 mod constant;
 mod disturbance;
 mod drifts;
 mod estimates;
 mod evidence;
 mod factored;
-mod following;
+mod fit_dependent;
+mod force_signals;
 mod hum;
-mod idle;
 mod laws;
 mod noise;
 mod numbered;
 mod pool;
 mod problem;
-mod readings;
 mod reproducible;
 mod search;
-mod settle;
+mod simplification;
+mod thresholds;
 mod tile;
 mod tilt;
 mod tuning;
-mod untold;
+mod undetermined;
+mod zero_columns;
 
 use serde::Serialize;
 
-pub use body::Body;
-pub use cleaning::step_of_values;
-pub use column::Column;
-pub use constant::Constant;
-pub use disturbance::{Budget, Disturbance, Quantity};
-pub use drifts::drifts;
-pub use evidence::Evidence;
-pub use laws::{Factor, Law, Product, Proposal, Shape, Site, Term, Variable};
-pub use noise::{ROUNDING, effective_samples, white_noise};
+pub use body::AttachedBody;
+pub use cleaning::quantisation_step;
+pub use column::ForceColumn;
+pub use constant::ConstantCorrection;
+pub use disturbance::{Disturbance, EstimatedQuantity, ResidualBudget};
+pub use drifts::drift_candidates;
+pub use evidence::SelectionEvidence;
+pub use force_signals::reading_fault_candidates;
+pub use laws::{LawFactor, LawProduct, LawProposal, LawShape, LawSite, LawTerm, LawVariable, SiteLaw};
+pub use noise::{effective_samples, white_noise};
 pub use problem::{
-    Candidate, Carried, Choice, Effect, EffectParameter, Fault, Layout, Nature, NoSupply, Problem,
-    Reading, Sign, Source, Stretch, Supply,
+    CandidateEffect, CandidateNature, ColumnChoice, ColumnProvider, ColumnSource, DiagnosisProblem, EffectParameter,
+    ForceReadingFault, LoadDependentQuery, LocatedEffect, NoColumnProvider, ReadingFaultKind, SampleLayout,
+    SampleSegment, SignConstraint,
 };
-pub use readings::readings;
-pub use tilt::{Sensitivity, Tilt};
+pub use thresholds::FORCE_ROUNDING;
+pub use tilt::{ForceSensitivity, TiltCandidate};
 
-use bench::{Bench, Pick};
-use evidence::LEAST_GAIN;
-use pool::{On, dot};
-use reproducible::reproducible;
+use bench::{EffectSelector, SelectedEffect};
+use pool::{FitScope, dot};
+use reproducible::repeatable_shares;
+use thresholds::{EFFECT_LEAST_UNEXPLAINED_RATIO, LEAST_GAIN, REPLACING_LAW_LEAST_SHARE};
 
 /// Kinds of friction of which a drift is a change.
 const FRICTION: [&str; 2] = ["viscous_friction", "coulomb_friction"];
 
-/// A law for so much of what is left says what effects that it makes needless were part of.
-const MOST_OF_THE_REST: f64 = 0.5;
+/// Reason for rejecting an effect whose estimate has a sign that is physically impossible. Reasons are values of the
+/// JSON, which stay; printers spell them out.
+const WRONG_SIGN: &str = "sign";
 
-/// Why an effect is refused that does nothing but take back another.
+/// Reason for rejecting an effect that is less useful than another one.
+const EXPLAINED_BETTER: &str = "another explains more";
+
+/// Reason for rejecting an effect that only cancels another one.
 const CANCELS: &str = "it would only cancel another effect at its place";
 
-/// The answer.
+/// Verdict of a diagnosis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Verdict {
-    /// What the model leaves is noise as far as the recordings can tell.
+pub enum DiagnosisVerdict {
+    /// The residual of the model is noise as far as the recordings can show.
     Adequate,
     /// Effects are missing, and with them the model is adequate.
     MissingEffect,
-    /// What is left comes again, and no candidate explains it.
+    /// A repeatable part of the residual remains that no candidate explains.
     Unexplained,
 }
 
-/// A step of the ladder.
+/// A step of the search: the change of the set of effects and the error after it.
 #[derive(Clone, Debug)]
-pub struct Rung {
-    /// What was added; `None` for the model as it is.
-    pub added: Vec<Effect>,
-    /// What it replaced.
-    pub dropped: Vec<Effect>,
-    /// Relative error on the recordings of the fit.
+pub struct SelectionStep {
+    /// Effects that were added; empty for the first step, the model as it is.
+    pub added: Vec<LocatedEffect>,
+    /// Effects that were removed in exchange.
+    pub dropped: Vec<LocatedEffect>,
+    /// Error on the recordings of the fit, relative to the measured force (0.1 = 10 %).
     pub fit: f64,
-    /// The same on those of the check, or of cross-validation if there are none.
+    /// The same on the validation runs, or by cross-validation if there are none.
     pub check: f64,
-    /// As `check`, of each channel beside its own force.
+    /// As `check`, for each channel relative to its own force, `[channel]`.
     pub check_by_channel: Vec<f64>,
-    /// What spoke for it.
-    pub evidence: Option<Evidence>,
+    /// Evidence that supports the step; `None` where a smaller set replaces a larger one.
+    pub evidence: Option<SelectionEvidence>,
 }
 
 /// An effect that is missing.
 #[derive(Clone, Debug)]
-pub struct FoundEffect {
-    /// What and where.
-    pub effect: Effect,
-    /// Position in [`Problem::candidates`].
+pub struct IdentifiedEffect {
+    /// Kind and place.
+    pub effect: LocatedEffect,
+    /// Index into [`DiagnosisProblem::candidates`].
     pub candidate: usize,
-    /// Constants that were searched for.
+    /// Constants that were searched for, as (symbol, value).
     pub constants: Vec<(String, f64)>,
-    /// Estimates of the parameters, from the recordings of the fit.
+    /// Estimates of the parameters from the recordings of the fit, in the order and units of the candidate's
+    /// parameters.
     pub estimates: Vec<f64>,
-    /// Their standard deviations, where they are known.
-    pub deviations: Vec<Option<f64>>,
-    /// How likely it is that it is there.
+    /// Their standard deviations, in the same units; `None` where other columns explain the same.
+    pub standard_deviations: Vec<Option<f64>>,
+    /// Probability that the effect is present, 0 to 1.
     pub probability: f64,
-    /// What cannot be told from it.
-    pub indistinguishable_from: Vec<Effect>,
+    /// Effects that explain the data equally well.
+    pub indistinguishable_from: Vec<LocatedEffect>,
 }
 
-/// What became of a candidate.
+/// A candidate with the result of the search.
 #[derive(Clone, Debug)]
-pub struct Considered {
-    /// What and where.
-    pub effect: Effect,
-    /// Share of the squared error of the model as it is that it explains alone.
+pub struct CandidateOutcome {
+    /// Kind and place.
+    pub effect: LocatedEffect,
+    /// Share of the squared error of the unchanged model that it explains alone, 0 to 1.
     pub explained: f64,
-    /// Held-out gain beside the effects that were found; for a found one, what is lost without it.
+    /// Gain in addition to the effects found, on data that was not fitted where it was tested there; for an effect that
+    /// was found, the loss without it.
     pub gain: f64,
-    /// Why it was refused; `None` if it was not.
-    pub refused: Option<String>,
+    /// Why it was rejected, in words; `None` if it was found.
+    pub rejection_reason: Option<String>,
 }
 
-/// What a diagnosis says.
+/// Result of a diagnosis.
 #[derive(Clone, Debug)]
-pub struct Diagnosis {
-    /// The answer.
-    pub verdict: Verdict,
-    /// Noise of all channels relative to the measured forces, white or coloured.
+pub struct ModelDiagnosis {
+    /// The verdict.
+    pub verdict: DiagnosisVerdict,
+    /// Noise of all channels, white or coloured, relative to the measured forces (0.01 = 1 %).
     pub noise_floor: f64,
-    /// What is left of each channel, by where it comes from.
-    pub budgets: Vec<Budget>,
-    /// What the recordings have and the model does not lack.
+    /// Residual of each channel, split by its origin.
+    pub budgets: Vec<ResidualBudget>,
+    /// Disturbances of the recordings, which are not model errors.
     pub disturbances: Vec<Disturbance>,
-    /// The ladder, from the model as it is.
-    pub ladder: Vec<Rung>,
+    /// Steps of the search; the first is the model as it is.
+    pub steps: Vec<SelectionStep>,
     /// Effects that are missing.
-    pub effects: Vec<FoundEffect>,
-    /// All candidates, those that explain most first.
-    pub candidates: Vec<Considered>,
-    /// What the recordings leave open: effects as large as a drive's force would hide in what the model has.
-    pub untold: Vec<Effect>,
-    /// What is left in the end, `[channel][sample]`.
-    pub rest: Vec<Vec<f64>>,
-    /// Share of each channel's squared rest that comes again where it was not fitted.
-    pub reproducible: Vec<f64>,
-    /// Channels whose rest is unexplained.
+    pub effects: Vec<IdentifiedEffect>,
+    /// All candidates: first those that were found, then by the share that they explain alone.
+    pub candidates: Vec<CandidateOutcome>,
+    /// Effects that the recordings cannot decide: a force as large as the drive's own would be absorbed by columns of
+    /// the model.
+    pub undetermined_effects: Vec<LocatedEffect>,
+    /// Residual of the last set, `[channel][sample]`, N or N m.
+    pub residual: Vec<Vec<f64>>,
+    /// Share of each channel's squared residual that is repeatable on data that was not fitted, 0 to 1.
+    pub repeatable_share: Vec<f64>,
+    /// Indices of the channels whose residual is unexplained.
     pub unexplained: Vec<usize>,
-    /// Places on which laws may act, where something is unexplained.
-    pub sites: Vec<Site>,
-    /// Laws that no library holds and that would explain it.
-    pub laws: Vec<Proposal>,
+    /// Places on which proposed laws may act; empty unless something is unexplained.
+    pub sites: Vec<LawSite>,
+    /// Proposed laws that are in no library and would explain the unexplained residual.
+    pub laws: Vec<LawProposal>,
 }
 
-/// Finds what is missing. `supply` makes columns that are not known from the start. Outliers and hum are taken off the measured
-/// forces of the problem, and what is to be left out becomes zero.
-pub fn diagnose(problem: &mut Problem, supply: &dyn Supply) -> Diagnosis {
+/// Finds the missing effects. `supply` computes columns that are not known from the start. Outliers and hum are
+/// subtracted from the measured forces of the problem, and samples to be left out become zero.
+pub fn diagnose(problem: &mut DiagnosisProblem, supply: &dyn ColumnProvider) -> ModelDiagnosis {
     problem.removed.resize(problem.layout.channels.len(), 0.0);
-    problem.find_jumps();
-    problem.find_noise_of_idle();
+    problem.find_reversal_samples();
+    problem.estimate_idle_noise();
+    // The uncleaned forces are kept for a second cleaning, if slow hum shows in the residual of the first diagnosis.
     let known = problem.disturbances.clone();
     let raw = (problem.measured.clone(), problem.removed.clone());
     let with = |found: Vec<Disturbance>| known.iter().cloned().chain(found).collect();
-    let cleaned = cleaning::clean(problem);
-    let diagnosis = search_all(problem, supply, with(cleaned));
-    let Diagnosis {
-        rest,
-        reproducible: again,
+    let cleaned = cleaning::clean_forces(problem);
+    let diagnosis = diagnose_cleaned(problem, supply, with(cleaned));
+    let ModelDiagnosis {
+        residual: rest,
+        repeatable_share: again,
         unexplained,
         ..
     } = &diagnosis;
+    // A hum among the frequencies of the motion is visible only after the model has been fitted.
     let slow = hum::slow_lines(problem, rest, again, unexplained);
     if slow.is_empty() {
         return diagnosis;
     }
+    // Start again from the original forces without that hum.
     (problem.measured, problem.removed) = raw;
-    let cleaned = cleaning::clean_beside(problem, &slow);
-    search_all(problem, supply, with(cleaned))
+    let cleaned = cleaning::clean_with_slow_lines(problem, &slow);
+    diagnose_cleaned(problem, supply, with(cleaned))
 }
 
 /// The diagnosis of a problem whose forces were cleaned from `disturbances`.
-fn search_all(
-    problem: &Problem,
-    supply: &dyn Supply,
+fn diagnose_cleaned(
+    problem: &DiagnosisProblem,
+    supply: &dyn ColumnProvider,
     mut disturbances: Vec<Disturbance>,
-) -> Diagnosis {
-    let mut bench = Bench::new(problem, supply);
-    bench.look(&[]);
-    let alone = bench.explained_alone();
-    let found = bench.search();
+) -> ModelDiagnosis {
+    let mut bench = EffectSelector::new(problem, supply);
+    bench.update_choices(&[]);
+    // Stage 1: forward search over sets of effects.
+    let alone = bench.explained_by_each();
+    let found = bench.search_sets();
     let picks = found.steps.last().map_or(Vec::new(), |s| s.picks.clone());
-    let mut ladder = vec![bench.rung(&[], &[], None)];
-    let mut before: Vec<Pick> = Vec::new();
+    // Report the steps with their errors; the first entry is the model without any effect.
+    let mut ladder = vec![bench.selection_step(&[], &[], None)];
+    let mut before: Vec<SelectedEffect> = Vec::new();
     for step in &found.steps {
-        ladder.push(bench.rung(&before, &step.picks, step.evidence));
+        ladder.push(bench.selection_step(&before, &step.picks, step.evidence));
         before.clone_from(&step.picks);
     }
-    let (mut picks, mut left) = bench.above_the_unexplained(picks);
+    // Stage 2: drop effects that explain less than what stays unexplained on their channels.
+    let (mut picks, mut left) = bench.drop_below_unexplained(picks);
     if picks.len() < before.len() {
-        ladder.push(bench.rung(&before, &picks, None));
+        ladder.push(bench.selection_step(&before, &picks, None));
     }
-    let (mut sites, mut laws) = bench.laws(&picks, &left);
-    let needed = bench.beside_laws(&picks, &laws);
+    // Stage 3: propose laws for the unexplained residual. Effects that such a law contains are dropped, if the law
+    // still explains as much without them.
+    let (mut sites, mut laws) = bench.find_laws(&picks, &left);
+    let needed = bench.effects_outside_laws(&picks, &laws);
     if needed.len() < picks.len() {
-        let left_then = bench.left(&needed);
-        let (sites_then, laws_then) = bench.laws(&needed, &left_then);
-        let stands = |law: &Proposal| {
-            let is_its = |then: &Proposal| {
-                then.channels == law.channels && then.law.gain >= MOST_OF_THE_REST
-            };
-            law.law.gain < MOST_OF_THE_REST || laws_then.iter().any(is_its)
+        let left_then = bench.set_residual(&needed);
+        let (sites_then, laws_then) = bench.find_laws(&needed, &left_then);
+        let stands = |law: &LawProposal| {
+            let is_its =
+                |then: &LawProposal| then.channels == law.channels && then.law.gain >= REPLACING_LAW_LEAST_SHARE;
+            law.law.gain < REPLACING_LAW_LEAST_SHARE || laws_then.iter().any(is_its)
         };
         if laws.iter().all(stands) {
-            ladder.push(bench.rung(&picks, &needed, None));
+            ladder.push(bench.selection_step(&picks, &needed, None));
             (picks, left, sites, laws) = (needed, left_then, sites_then, laws_then);
         }
     }
-    let Left {
-        rest,
-        mut again,
+    let SetResidual {
+        residual: rest,
+        repeatable_share: mut again,
         mut unexplained,
     } = left;
-    // What a law foretells comes again.
+    // The part of the residual that a law predicts is repeatable.
     for proposal in &laws {
         for d in &proposal.channels {
             again[*d] = again[*d].max(proposal.law.gain);
@@ -252,62 +274,64 @@ fn search_all(
         }
     }
     unexplained.sort_unstable();
-    let aliases = bench.aliases(&picks);
-    bench.weigh(&picks);
-    let (budgets, coloured) = bench.budgets(&picks, &rest, &again);
+    // Stage 4: indistinguishable alternatives, the origin of the residual, disturbances and estimates.
+    let aliases = bench.find_aliases(&picks);
+    bench.weigh_channels(&picks);
+    let (budgets, coloured) = bench.residual_budgets(&picks, &rest, &again);
     disturbances.extend(bench.disturbances(&picks));
     disturbances.extend(coloured);
-    let estimates = bench.estimates(&picks, On::Fit);
+    let estimates = bench.estimate_parameters(&picks, FitScope::Fit);
     let mut effects = Vec::new();
     for (i, (pick, aliases)) in picks.iter().zip(aliases).enumerate() {
         let candidate = bench.candidate(pick);
-        if candidate.nature == Nature::Disturbance {
+        if candidate.nature == CandidateNature::Disturbance {
             continue;
         }
-        let rivals = aliases.iter().filter(|alias| !alias.is_rewriting);
-        let rivals: Vec<f64> = rivals.map(|alias| alias.worse).collect();
+        // Only other causes share the probability; another form of the same effect does not.
+        let rivals = aliases.iter().filter(|alias| !alias.is_equivalent_form);
+        let rivals: Vec<f64> = rivals.map(|alias| alias.criterion_loss).collect();
         let (values, deviations) = estimates[i].iter().copied().unzip();
-        effects.push(FoundEffect {
+        effects.push(IdentifiedEffect {
             effect: candidate.effect.clone(),
             candidate: pick.candidate,
             constants: pick.constants.clone(),
             estimates: values,
-            deviations,
+            standard_deviations: deviations,
             probability: bench.probability(&picks, i, &rivals, &unexplained),
             indistinguishable_from: aliases.into_iter().map(|alias| alias.effect).collect(),
         });
     }
-    friction_in_time(&mut effects, &mut disturbances);
+    merge_drifting_friction(&mut effects, &mut disturbances);
+    // Unexplained residual decides before effects that were found.
     let verdict = match (unexplained.is_empty(), effects.is_empty()) {
-        (false, _) => Verdict::Unexplained,
-        (true, true) => Verdict::Adequate,
-        (true, false) => Verdict::MissingEffect,
+        (false, _) => DiagnosisVerdict::Unexplained,
+        (true, true) => DiagnosisVerdict::Adequate,
+        (true, false) => DiagnosisVerdict::MissingEffect,
     };
-    let candidates = bench.considered(&picks, &found, &alone);
-    let untold = bench.untold(&picks, &rest);
-    Diagnosis {
+    let candidates = bench.candidate_outcomes(&picks, &found, &alone);
+    let untold = bench.find_undetermined(&picks, &rest);
+    ModelDiagnosis {
         verdict,
         noise_floor: noise_floor(&budgets),
         budgets,
         disturbances,
-        ladder,
+        steps: ladder,
         effects,
         candidates,
-        untold,
-        rest,
-        reproducible: again,
+        undetermined_effects: untold,
+        residual: rest,
+        repeatable_share: again,
         unexplained,
         sites,
         laws,
     }
 }
 
-/// Friction that the model lacks and that drifts besides is one effect: friction that changes with time.
-fn friction_in_time(effects: &mut Vec<FoundEffect>, disturbances: &mut Vec<Disturbance>) {
+/// Joins friction that is missing and also drifts into one effect: friction that changes with time.
+fn merge_drifting_friction(effects: &mut Vec<IdentifiedEffect>, disturbances: &mut Vec<Disturbance>) {
     disturbances.retain(|drift| {
-        let is_its = |found: &FoundEffect| {
-            found.effect.at == drift.at && FRICTION.contains(&found.effect.kind.as_str())
-        };
+        let is_its =
+            |found: &IdentifiedEffect| found.effect.at == drift.at && FRICTION.contains(&found.effect.kind.as_str());
         let Some(at) = effects.iter().position(is_its) else {
             return true;
         };
@@ -318,14 +342,14 @@ fn friction_in_time(effects: &mut Vec<FoundEffect>, disturbances: &mut Vec<Distu
         effects.retain(|found| !is_its(found));
         drift.kind.clone_into(&mut merged.effect.kind);
         effects.insert(at.min(effects.len()), merged);
-        // What it changes by is told besides.
+        // The drift stays in the list of disturbances, which reports by how much the friction changes.
         true
     });
 }
 
-/// Noise of all channels relative to the measured forces.
-fn noise_floor(budgets: &[Budget]) -> f64 {
-    let sum = |of: &dyn Fn(&Budget) -> f64| budgets.iter().map(|b| of(b).powi(2)).sum::<f64>();
+/// Root of the summed squares of the channels' noise, relative to that of their forces; 0 without force.
+fn noise_floor(budgets: &[ResidualBudget]) -> f64 {
+    let sum = |of: &dyn Fn(&ResidualBudget) -> f64| budgets.iter().map(|b| of(b).powi(2)).sum::<f64>();
     let force = sum(&|budget| budget.force);
     if force > 0.0 {
         (sum(&|budget| budget.noise) / force).sqrt()
@@ -334,89 +358,92 @@ fn noise_floor(budgets: &[Budget]) -> f64 {
     }
 }
 
-/// What a set leaves.
-struct Left {
-    /// `[channel][sample]`
-    rest: Vec<Vec<f64>>,
-    /// Share of each channel's squares that comes again.
-    again: Vec<f64>,
-    /// Channels of which that is more than noise.
+/// Residual of a set of effects.
+struct SetResidual {
+    /// `[channel][sample]`, N or N m.
+    residual: Vec<Vec<f64>>,
+    /// Repeatable share of each channel's squares, 0 to 1.
+    repeatable_share: Vec<f64>,
+    /// Indices of the channels whose repeatable residual is more than noise.
     unexplained: Vec<usize>,
 }
 
-impl Bench<'_> {
-    fn left(&mut self, picks: &[Pick]) -> Left {
-        self.weigh(picks);
-        let (factors, _) = self.fit(picks, On::All);
-        let rest = self.rest(picks, &factors);
+impl EffectSelector<'_> {
+    /// Residual of a set that is fitted to all samples, with its repeatable share; sets the weights of the channels
+    /// from it.
+    fn set_residual(&mut self, picks: &[SelectedEffect]) -> SetResidual {
+        self.weigh_channels(picks);
+        let (factors, _) = self.fit(picks, FitScope::All);
+        let rest = self.residual(picks, &factors);
         let problem = self.problem;
-        let again = reproducible(&problem.layout, &problem.variables, &rest);
+        let again = repeatable_shares(&problem.layout, &problem.variables, &rest);
         let unexplained = (0..rest.len())
             .filter(|d| self.is_unexplained(*d, &rest[*d], again[*d]))
             .collect();
-        Left {
-            rest,
-            again,
+        SetResidual {
+            residual: rest,
+            repeatable_share: again,
             unexplained,
         }
     }
 
-    /// Laws for what a set leaves, and where they may act.
-    fn laws(&self, picks: &[Pick], left: &Left) -> (Vec<Site>, Vec<Proposal>) {
+    /// Proposes laws for the residual of a set, with the places where they may act; empty if only effects are
+    /// requested.
+    fn find_laws(&self, picks: &[SelectedEffect], left: &SetResidual) -> (Vec<LawSite>, Vec<LawProposal>) {
         if self.problem.effects_only {
             return (Vec::new(), Vec::new());
         }
-        let left = laws::Left {
-            rest: &left.rest,
-            again: &left.again,
+        let left = laws::ResidualView {
+            residual: &left.residual,
+            repeatable_share: &left.repeatable_share,
             unexplained: &left.unexplained,
         };
-        laws::propose(self, picks, &left, self.supply)
+        laws::propose_laws(self, picks, &left, self.provider)
     }
 
-    /// The members of a set that laws do not make needless: an effect that goes where a law for most of the rest comes is part of
-    /// that law, if it acts on drives that feel the law.
-    fn beside_laws(&self, picks: &[Pick], laws: &[Proposal]) -> Vec<Pick> {
-        let is_part = |pick: &Pick, proposal: &Proposal| {
-            let channels = self.acted_on(std::slice::from_ref(pick));
+    /// Members of a set that proposed laws do not make unnecessary. An effect that a law replaces is part of it, if the
+    /// law explains most of the residual and acts on all channels of the effect.
+    fn effects_outside_laws(&self, picks: &[SelectedEffect], laws: &[LawProposal]) -> Vec<SelectedEffect> {
+        let is_part = |pick: &SelectedEffect, proposal: &LawProposal| {
+            let channels = self.affected_channels(std::slice::from_ref(pick));
             let effect = &self.candidate(pick).effect;
-            proposal.law.gain >= MOST_OF_THE_REST
-                && proposal.law.instead_of.contains(effect)
+            proposal.law.gain >= REPLACING_LAW_LEAST_SHARE
+                && proposal.law.replaced_effects.contains(effect)
                 && channels.iter().all(|d| proposal.channels.contains(d))
         };
-        let is_needed = |pick: &&Pick| !laws.iter().any(|proposal| is_part(pick, proposal));
+        let is_needed = |pick: &&SelectedEffect| !laws.iter().any(|proposal| is_part(pick, proposal));
         picks.iter().filter(is_needed).cloned().collect()
     }
 
-    /// A set without members that explain less than what stays unexplained where they act, and what it leaves: part of a law that
-    /// nobody knows is as likely there as the effect.
-    fn above_the_unexplained(&mut self, mut picks: Vec<Pick>) -> (Vec<Pick>, Left) {
+    /// Drops members that explain less than what stays unexplained on their channels, the weakest first, and returns
+    /// the set with its residual. There an unknown law is as likely as the effect.
+    fn drop_below_unexplained(&mut self, mut picks: Vec<SelectedEffect>) -> (Vec<SelectedEffect>, SetResidual) {
         loop {
-            let left = self.left(&picks);
-            let mut least: Option<(f64, Vec<Pick>)> = None;
+            let left = self.set_residual(&picks);
+            // Find the member whose gain is smallest relative to the unexplained repeatable squares on its channels.
+            let mut least: Option<(f64, Vec<SelectedEffect>)> = None;
             for i in 0..picks.len() {
-                let channels = self.acted_on(&picks[i..=i]);
-                let squares =
-                    |rest: &[Vec<f64>], d: usize| self.weights[d] * dot(&rest[d], &rest[d]);
+                let channels = self.affected_channels(&picks[i..=i]);
+                let squares = |rest: &[Vec<f64>], d: usize| self.weights[d] * dot(&rest[d], &rest[d]);
                 let unexplained = channels.iter().filter(|d| left.unexplained.contains(d));
                 let stays: f64 = unexplained
-                    .map(|d| left.again[*d] * squares(&left.rest, *d))
+                    .map(|d| left.repeatable_share[*d] * squares(&left.residual, *d))
                     .sum();
                 if stays <= 0.0 {
                     continue;
                 }
+                // Gain of the member: squares that come back when the set is fitted without it.
                 let mut fewer = picks.clone();
                 fewer.remove(i);
-                let fewer = self.refresh(fewer);
-                let (factors, _) = self.fit(&fewer, On::All);
-                let rest = self.rest(&fewer, &factors);
-                let squares =
-                    |rest: &[Vec<f64>], d: usize| self.weights[d] * dot(&rest[d], &rest[d]);
+                let fewer = self.refresh_columns(fewer);
+                let (factors, _) = self.fit(&fewer, FitScope::All);
+                let rest = self.residual(&fewer, &factors);
+                let squares = |rest: &[Vec<f64>], d: usize| self.weights[d] * dot(&rest[d], &rest[d]);
                 let gains = channels
                     .iter()
-                    .map(|d| squares(&rest, *d) - squares(&left.rest, *d));
+                    .map(|d| squares(&rest, *d) - squares(&left.residual, *d));
                 let share = gains.sum::<f64>() / stays;
-                if share < 1.0 && least.as_ref().is_none_or(|(other, _)| share < *other) {
+                if share < EFFECT_LEAST_UNEXPLAINED_RATIO && least.as_ref().is_none_or(|(other, _)| share < *other) {
                     least = Some((share, fewer));
                 }
             }
@@ -427,36 +454,39 @@ impl Bench<'_> {
         }
     }
 
-    /// Whether what is left of a channel is more than noise: it comes again with the state, by a share that an effect would be
-    /// added for.
+    /// Whether the residual of a channel is more than noise: a part of it is repeatable, and that share would be enough
+    /// to add an effect. `again` is the repeatable share.
     fn is_unexplained(&self, channel: usize, rest: &[f64], again: f64) -> bool {
         let squares = dot(rest, rest) / rest.len().max(1) as f64;
         let noise = self.problem.noise[channel].powi(2);
         squares > noise && again > LEAST_GAIN
     }
 
-    /// Share of the squared error of the model as it is that each candidate explains alone.
-    fn explained_alone(&self) -> Vec<f64> {
-        let table = self.table(&[]);
-        let total = self.try_in(&table, Vec::new()).squares;
-        let share = |pick: &Option<Pick>| match pick {
-            Some(pick) if total > 0.0 => {
-                1.0 - self.try_in(&table, vec![pick.clone()]).squares / total
-            }
+    /// Share of the squared error of the unchanged model that each candidate explains alone, `[candidate]`, 0 to 1.
+    fn explained_by_each(&self) -> Vec<f64> {
+        let table = self.projected_gram(&[]);
+        let total = self.fit_from_gram(&table, Vec::new()).squares;
+        let share = |pick: &Option<SelectedEffect>| match pick {
+            Some(pick) if total > 0.0 => 1.0 - self.fit_from_gram(&table, vec![pick.clone()]).squares / total,
             _ => 0.0,
         };
-        self.present.iter().map(share).collect()
+        self.current_choices.iter().map(share).collect()
     }
 
-    fn rung(&self, before: &[Pick], after: &[Pick], evidence: Option<Evidence>) -> Rung {
-        let effects = |set: &[Pick], other: &[Pick]| -> Vec<Effect> {
-            let is_new = |pick: &&Pick| other.iter().all(|p| p.candidate != pick.candidate);
+    /// A step from one set to another, with the errors of the later one.
+    fn selection_step(
+        &self,
+        before: &[SelectedEffect],
+        after: &[SelectedEffect],
+        evidence: Option<SelectionEvidence>,
+    ) -> SelectionStep {
+        let effects = |set: &[SelectedEffect], other: &[SelectedEffect]| -> Vec<LocatedEffect> {
+            let is_new = |pick: &&SelectedEffect| other.iter().all(|p| p.candidate != pick.candidate);
             let new = set.iter().filter(is_new);
-            new.map(|pick| self.candidate(pick).effect.clone())
-                .collect()
+            new.map(|pick| self.candidate(pick).effect.clone()).collect()
         };
-        let (fit, check, check_by_channel) = self.errors(after);
-        Rung {
+        let (fit, check, check_by_channel) = self.relative_errors(after);
+        SelectionStep {
             added: effects(after, before),
             dropped: effects(before, after),
             fit,
@@ -466,20 +496,20 @@ impl Bench<'_> {
         }
     }
 
-    /// Relative errors on fit and check, and of each channel on the check, fitted to the fit; without a check by cross-validation.
-    fn errors(&self, picks: &[Pick]) -> (f64, f64, Vec<f64>) {
+    /// Relative errors of a set that is fitted to the recordings of the fit: on these, on the validation runs, and per
+    /// channel on the validation runs. Without any, cross-validation gives the last two.
+    fn relative_errors(&self, picks: &[SelectedEffect]) -> (f64, f64, Vec<f64>) {
         let layout = &self.problem.layout;
         let split = layout.fit_samples();
-        let rest = self.whole(picks);
+        let rest = self.full_residual(picks);
         let channels = 0..rest.len();
-        let forces: Vec<Vec<f64>> = channels.clone().map(|d| self.problem.force(d)).collect();
+        let forces: Vec<Vec<f64>> = channels.clone().map(|d| self.problem.measured_force(d)).collect();
         let norm = |part: &[f64]| dot(part, part);
         let squares = |of: &[Vec<f64>], range: std::ops::Range<usize>| -> Vec<f64> {
             of.iter().map(|all| norm(&all[range.clone()])).collect()
         };
         let relative = |error: f64, force: f64| (error / force.max(f64::MIN_POSITIVE)).sqrt();
-        let whole =
-            |errors: &[f64], forces: &[f64]| relative(errors.iter().sum(), forces.iter().sum());
+        let whole = |errors: &[f64], forces: &[f64]| relative(errors.iter().sum(), forces.iter().sum());
         let fit = whole(&squares(&rest, 0..split), &squares(&forces, 0..split));
         let judged = if layout.has_check() {
             split..layout.samples()
@@ -489,9 +519,8 @@ impl Bench<'_> {
         let errors = if layout.has_check() {
             squares(&rest, judged.clone())
         } else {
-            // Weights differ by channel, figures do not.
-            let held_out =
-                |d: usize| self.held_out(picks, &[d], true).iter().sum::<f64>() / self.weights[d];
+            // Validation errors are weighted by channel; reported errors are not.
+            let held_out = |d: usize| self.validation_errors(picks, &[d], true).iter().sum::<f64>() / self.weights[d];
             channels.map(held_out).collect()
         };
         let forces = squares(&forces, judged);
@@ -500,11 +529,12 @@ impl Bench<'_> {
         (fit, whole(&errors, &forces), by_channel.collect())
     }
 
-    /// What a set leaves where it is fitted to the fit. What decides nothing counts, but for what is left out altogether.
-    fn whole(&self, picks: &[Pick]) -> Vec<Vec<f64>> {
-        let (factors, _) = self.fit(picks, On::Fit);
+    /// Residual of a set that is fitted to the recordings of the fit, `[channel][sample]`. Samples at reversals count
+    /// here; samples that are left out of the diagnosis are zero.
+    fn full_residual(&self, picks: &[SelectedEffect]) -> Vec<Vec<f64>> {
+        let (factors, _) = self.fit(picks, FitScope::Fit);
         let columns = self.columns(picks);
-        let mut rest = (self.pool).whole_rest(self.measured, &columns, factors.as_slice());
+        let mut rest = (self.pool).full_residual(self.measured, &columns, factors.as_slice());
         for (rest, out) in rest.iter_mut().zip(&self.problem.left_out) {
             for (r, _) in rest.iter_mut().zip(out).filter(|(_, out)| **out) {
                 *r = 0.0;
@@ -513,15 +543,16 @@ impl Bench<'_> {
         rest
     }
 
-    /// Whether a change makes what is left larger where everything counts, in the fit and in the check: then it explains what
-    /// decides at the cost of what lies next to reversals, where an effect would be seen, too.
-    fn costs_more(&self, before: &[Pick], after: &[Pick], channels: &[usize]) -> bool {
+    /// Whether a change raises the squared residual over all samples, reversals included, in the fit and in the
+    /// validation runs. Then it explains the samples that decide at the cost of those next to reversals, where an
+    /// effect would act too.
+    fn is_worse_overall(&self, before: &[SelectedEffect], after: &[SelectedEffect], channels: &[usize]) -> bool {
         if self.problem.jumps.is_empty() {
             return false;
         }
         let layout = &self.problem.layout;
         let split = layout.fit_samples();
-        let [old, new] = [before, after].map(|picks| self.whole(picks));
+        let [old, new] = [before, after].map(|picks| self.full_residual(picks));
         let rises = |range: std::ops::Range<usize>| {
             let of = |rest: &[Vec<f64>], d: usize| {
                 let part = &rest[d][range.clone()];
@@ -533,72 +564,69 @@ impl Bench<'_> {
         rises(0..split) && (!layout.has_check() || rises(split..layout.samples()))
     }
 
-    /// What became of every candidate.
-    fn considered(
+    /// Result for every candidate: found, or rejected with the reason.
+    fn candidate_outcomes(
         &mut self,
-        picks: &[Pick],
-        found: &search::Found,
+        picks: &[SelectedEffect],
+        found: &search::EffectSearchResult,
         alone: &[f64],
-    ) -> Vec<Considered> {
+    ) -> Vec<CandidateOutcome> {
         if self.problem.effects_only {
             return Vec::new();
         }
-        self.look(picks);
+        self.update_choices(picks);
         let has_check = self.problem.layout.has_check();
-        let table = self.table(picks);
-        let now = self.try_in(&table, picks.to_vec()).squares;
-        let mut considered: Vec<Considered> = Vec::new();
+        let table = self.projected_gram(picks);
+        let now = self.fit_from_gram(&table, picks.to_vec()).squares;
+        let mut considered: Vec<CandidateOutcome> = Vec::new();
         for (k, candidate) in self.problem.candidates.iter().enumerate() {
             let picked = picks.iter().position(|p| p.candidate == k);
+            // Three cases: part of the final set, tested and rejected by the search, or never among the best.
             let (gain, refused) = if let Some(i) = picked {
                 let mut without = picks.to_vec();
                 let pick = without.remove(i);
-                let channels = self.acted_on(&[pick]);
+                let channels = self.affected_channels(&[pick]);
                 (self.evidence(&without, picks, &channels).gain, None)
-            } else if let Some(refused) = found.refused.iter().find(|r| r.pick.candidate == k) {
+            } else if let Some(refused) = found.rejected.iter().find(|r| r.pick.candidate == k) {
                 let why = if refused.wrong_sign {
-                    "sign"
+                    WRONG_SIGN
                 } else if refused.cancels {
                     CANCELS
                 } else {
                     refused
                         .evidence
-                        .lacks(has_check)
-                        .unwrap_or("another explains more")
+                        .insufficiency_reason(has_check)
+                        .unwrap_or(EXPLAINED_BETTER)
                 };
                 (refused.evidence.gain, Some(why.to_owned()))
-            } else if let Some(pick) = &self.present[k] {
+            } else if let Some(pick) = &self.current_choices[k] {
                 let mut with = picks.to_vec();
                 with.push(pick.clone());
-                let trial = self.try_in(&table, with);
-                let gain = if now > 0.0 {
-                    1.0 - trial.squares / now
-                } else {
-                    0.0
-                };
+                let trial = self.fit_from_gram(&table, with);
+                let gain = if now > 0.0 { 1.0 - trial.squares / now } else { 0.0 };
                 let why = if trial.wrong_sign.contains(&picks.len()) {
-                    "sign"
+                    WRONG_SIGN
                 } else if trial.cancelling.contains(&picks.len()) {
                     CANCELS
                 } else if gain < LEAST_GAIN {
                     "explains nothing that is left"
                 } else {
-                    "another explains more"
+                    EXPLAINED_BETTER
                 };
                 (gain, Some(why.to_owned()))
             } else {
                 (0.0, Some("the model says it already".to_owned()))
             };
-            considered.push(Considered {
+            considered.push(CandidateOutcome {
                 effect: candidate.effect.clone(),
                 explained: alone[k],
                 gain,
-                refused,
+                rejection_reason: refused,
             });
         }
+        // Found effects first, then by the share that each explains alone.
         considered.sort_by(|a, b| {
-            (b.refused.is_none().cmp(&a.refused.is_none()))
-                .then(b.explained.total_cmp(&a.explained))
+            (b.rejection_reason.is_none().cmp(&a.rejection_reason.is_none())).then(b.explained.total_cmp(&a.explained))
         });
         considered
     }

@@ -1,12 +1,9 @@
-//! How noisy a force is by itself, and how many of its residuals are worth counting.
+//! White noise of a force, and the effective number of samples of a residual.
 
 pub use crate::signal::white_noise;
 
-/// Errors below this share of a force are rounding, of the recording or of whatever simulated it.
-pub const ROUNDING: f64 = 3e-6;
-
-/// How many independent values a series is worth: `n / (1 + 2 sum of its autocorrelations)`, summed as long as pairs of
-/// neighbours stay positive (C. J. Geyer, Statistical Science 7, 1992).
+/// Effective number of independent values of a series: `n / (1 + 2 sum of its autocorrelations)`, summed as long as the
+/// sum of two neighbouring autocorrelations is positive (C. J. Geyer, Statistical Science 7, 1992). Between 2 and `n`.
 pub fn effective_samples(values: &[f64]) -> f64 {
     let n = values.len();
     let mean = values.iter().sum::<f64>() / n.max(1) as f64;
@@ -15,8 +12,8 @@ pub fn effective_samples(values: &[f64]) -> f64 {
     if n < 4 || variance == 0.0 {
         return n as f64;
     }
-    let correlation =
-        |lag: usize| super::pool::dot(&centred[..n - lag], &centred[lag..]) / variance;
+    let correlation = |lag: usize| super::pool::dot(&centred[..n - lag], &centred[lag..]) / variance;
+    // The sum starts at 1; pairs of lags follow up to a quarter of the series.
     let mut sum = 1.0;
     let mut lag = 1;
     while lag + 1 < n / 4 {
@@ -33,11 +30,11 @@ pub fn effective_samples(values: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
 
     #[test]
     fn noise_is_seen_under_motion_and_jumps() {
-        let mut noise = Noise::new(3);
+        let mut noise = TestNoise::new(3);
         let signal: Vec<f64> = (0..4000)
             .map(|i| {
                 let t = 0.004 * f64::from(i);
@@ -49,7 +46,7 @@ mod tests {
 
     #[test]
     fn a_filtered_series_is_worth_less() {
-        let mut noise = Noise::new(5);
+        let mut noise = TestNoise::new(5);
         let mut last = 0.0;
         let white: Vec<f64> = (0..20_000).map(|_| noise.normal()).collect();
         let red: Vec<f64> = white

@@ -1,19 +1,20 @@
-//! Maps by the place of a column: places are numbers that nobody chooses to collide, and are looked up millions of times.
+//! Hash maps with column indices as keys. The indices come from the program itself, so a fast hash function without
+//! protection against collisions is enough for millions of look-ups.
 
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
-/// What is known of columns, by their places.
-pub(crate) type ByPlace<T> = HashMap<usize, T, BuildHasherDefault<Spread>>;
+/// Values by column index.
+pub(crate) type ColumnMap<T> = HashMap<usize, T, BuildHasherDefault<ColumnHasher>>;
 
-/// Spreads numbers by a multiplication (D. Knuth, The Art of Computer Programming 3, 1973, sec. 6.4).
+/// Hash function that multiplies by a constant (D. Knuth, The Art of Computer Programming 3, 1973, sec. 6.4).
 #[derive(Default)]
-pub(crate) struct Spread(u64);
+pub(crate) struct ColumnHasher(u64);
 
-/// 2^64 over the golden ratio.
+/// 2^64 divided by the golden ratio.
 const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
 
-impl Hasher for Spread {
+impl Hasher for ColumnHasher {
     fn write(&mut self, bytes: &[u8]) {
         for byte in bytes {
             self.write_u64(u64::from(*byte));

@@ -1,17 +1,17 @@
-//! What a diagnosis starts from: measured forces, the columns that the model has, and those that effects would add.
+//! Input of a diagnosis: measured forces, the columns of the model, and the columns that candidate effects would add.
 
 use nalgebra::DMatrix;
 
-use super::body::Body;
-use super::column::Column;
-use super::constant::Constant;
+use super::body::AttachedBody;
+use super::column::ForceColumn;
+use super::constant::ConstantCorrection;
 use super::disturbance::Disturbance;
-use super::laws::Site;
-use super::tilt::Tilt;
+use super::laws::LawSite;
+use super::tilt::TiltCandidate;
 
-/// A stretch of samples that follow each other in time.
+/// A segment: samples without gaps in time.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Stretch {
+pub struct SampleSegment {
     /// The recording it comes from.
     pub name: String,
     /// Number of samples.
@@ -19,57 +19,58 @@ pub struct Stretch {
     /// Mean time between them, s.
     pub step: f64,
     /// Time between samples as recorded, before any were left out, s.
-    pub sampled: f64,
-    /// Whether it belongs to the check.
+    pub recorded_step: f64,
+    /// Whether it belongs to a validation run.
     pub is_check: bool,
 }
 
-/// Channels and stretches of time, those of the fit first.
+/// Channels and segments of a problem; the segments of the fit come first.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Layout {
+pub struct SampleLayout {
     /// Names of the drives.
     pub channels: Vec<String>,
-    /// Stretches in the order in which columns hold them.
-    pub stretches: Vec<Stretch>,
-    /// Forces that were not measured, `[channel][sample]`: what stands in their place has no say. Empty if all were.
+    /// Segments in the order in which columns contain them.
+    pub segments: Vec<SampleSegment>,
+    /// Forces that were not measured, `[channel][sample]`: the values in their place are ignored. Empty if all were
+    /// measured.
     pub left_out: Vec<Vec<bool>>,
 }
 
-/// Blocks that even a short stretch is cut into.
+/// Least number of blocks of a segment, however short.
 const FEWEST_BLOCKS: usize = 6;
 
-impl Layout {
-    /// Samples of each channel.
+impl SampleLayout {
+    /// Number of samples of each channel.
     pub fn samples(&self) -> usize {
-        self.stretches.iter().map(|s| s.samples).sum()
+        self.segments.iter().map(|s| s.samples).sum()
     }
 
-    /// Samples of the fit, which come first.
+    /// Number of samples of the fit, which come first.
     pub fn fit_samples(&self) -> usize {
-        let fit = self.stretches.iter().filter(|s| !s.is_check);
+        let fit = self.segments.iter().filter(|s| !s.is_check);
         fit.map(|s| s.samples).sum()
     }
 
-    /// Whether there is a recording to check on.
+    /// Whether there is a validation run.
     pub fn has_check(&self) -> bool {
         self.fit_samples() < self.samples()
     }
 
-    /// Contiguous blocks, about `per_stretch` in each stretch, as ranges of samples.
+    /// Contiguous blocks as ranges of samples, at most `per_stretch` in each segment.
     pub fn blocks(&self, per_stretch: usize) -> Vec<std::ops::Range<usize>> {
         let mut blocks = Vec::new();
         let mut start = 0;
-        for stretch in &self.stretches {
-            // Of a short stretch a few short ones: of one block nothing is learned.
+        for segment in &self.segments {
+            // A short segment gets a few short blocks, since one block alone has no spread.
             let count = per_stretch
-                .min((stretch.samples / 20).max(FEWEST_BLOCKS))
-                .min(stretch.samples)
+                .min((segment.samples / 20).max(FEWEST_BLOCKS))
+                .min(segment.samples)
                 .max(1);
             for k in 0..count {
-                let at = |k: usize| start + k * stretch.samples / count;
+                let at = |k: usize| start + k * segment.samples / count;
                 blocks.push(at(k)..at(k + 1));
             }
-            start += stretch.samples;
+            start += segment.samples;
         }
         blocks
     }
@@ -77,16 +78,16 @@ impl Layout {
 
 /// A kind of effect at its places, which share the parameters.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
-pub struct Effect {
+pub struct LocatedEffect {
     /// Name of the kind.
     pub kind: String,
-    /// Where it acts.
+    /// Names of the places where it acts.
     pub at: Vec<String>,
 }
 
-/// The sign that an estimate must have.
+/// The sign that an estimate must have to be physically possible.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Sign {
+pub enum SignConstraint {
     /// Not below zero.
     Positive,
     /// Not above zero.
@@ -95,177 +96,180 @@ pub enum Sign {
     Any,
 }
 
-/// A parameter of an effect.
+/// A parameter of an effect, which scales one column.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EffectParameter {
-    /// Its symbol in the kind.
+    /// Its symbol in the kind of effect.
     pub symbol: String,
     /// SI unit.
     pub unit: String,
-    /// The sign that makes physical sense.
-    pub sign: Sign,
+    /// The sign that is physically possible.
+    pub sign: SignConstraint,
 }
 
 /// The columns of an effect for one choice of its constants.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Choice {
-    /// Constants that are searched for, with their values.
+pub struct ColumnChoice {
+    /// Constants that are searched for, as (symbol, value).
     pub constants: Vec<(String, f64)>,
     /// A column for each parameter.
-    pub columns: Vec<Column>,
+    pub columns: Vec<ForceColumn>,
 }
 
 /// Where the columns of an effect come from.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Source {
-    /// They are known, for each choice of the constants.
-    Columns(Vec<Choice>),
-    /// The base does not stand level; the parameters are angles, rad.
-    Tilt(Tilt),
-    /// Forces are not read as they act.
-    Reading(Reading),
-    /// A further body on one that the model has.
-    Body(Body),
-    /// A number of the model is off; the parameter is by how much.
-    Constant(Constant),
-    /// They depend on what the drives carry, which the fit says: see [`Supply::carried`].
-    Carried,
+pub enum ColumnSource {
+    /// They are known, for each choice of the searched constants.
+    Columns(Vec<ColumnChoice>),
+    /// The base is tilted; the parameters are angles, rad.
+    Tilt(TiltCandidate),
+    /// The force signal is faulty.
+    ReadingFault(ForceReadingFault),
+    /// An additional body on a body of the model.
+    Body(AttachedBody),
+    /// A constant of the model has a wrong value; the parameter is its error.
+    Constant(ConstantCorrection),
+    /// They depend on the load of the drives, which the fit estimates: see [`ColumnProvider::load_dependent_columns`].
+    LoadDependent,
 }
 
-/// A way in which forces are read wrongly.
+/// A fault of a force signal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fault {
-    /// Later than they act; the parameter is the delay, s.
-    Late,
-    /// Through a low-pass of first order; the parameter is its time constant, s.
-    Lagging,
-    /// Larger than they are; the parameter is the part by which they are.
+pub enum ReadingFaultKind {
+    /// The signal is delayed; the parameter is the delay, s.
+    Delayed,
+    /// The signal went through a first-order low-pass; the parameter is its time constant, s.
+    LowPassed,
+    /// The signal is too large; the parameter is the relative error (0.1 = 10 %).
     Scaled,
 }
 
-/// What reads forces wrongly, and where.
+/// A fault of a force signal and its channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Reading {
-    /// How.
-    pub fault: Fault,
-    /// The channel; `None` for all of them alike.
+pub struct ForceReadingFault {
+    /// Kind of the fault.
+    pub kind: ReadingFaultKind,
+    /// Index of the channel; `None` if all channels have the same fault.
     pub channel: Option<usize>,
 }
 
-/// What it means for the model that a candidate is there.
+/// Whether a candidate is an effect or a disturbance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Nature {
-    /// The model lacks it.
+pub enum CandidateNature {
+    /// A physical effect that the model lacks.
     Effect,
-    /// The recordings have it, and the model lacks nothing by that.
+    /// A disturbance of the recordings, which is not a model error.
     Disturbance,
 }
 
-/// Which candidates that depend on what the drives carry are asked for.
+/// Selects the load-dependent candidates whose columns are requested.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Carried {
-    /// All, with one value of each constant.
+pub enum LoadDependentQuery {
+    /// All of them, with one value of each constant.
     All,
-    /// One, with a value of its constant if it has one.
+    /// One candidate by index, with a value of its constant if it has one.
     One(usize, Option<f64>),
 }
 
-/// Columns that are made while the search goes on.
-pub trait Supply {
-    /// Columns of a candidate for another value of the constant that is searched for, if they can be had.
-    fn finer(&self, candidate: usize, constant: f64) -> Option<Vec<Column>>;
+/// Computes columns during the search.
+pub trait ColumnProvider {
+    /// Columns of a candidate for another value of its searched constant; `None` if they cannot be computed.
+    fn columns_for_constant(&self, candidate: usize, constant: f64) -> Option<Vec<ForceColumn>>;
 
-    /// Columns of candidates that depend on what the drives carry.
-    fn carried(&self, load: &Column, which: Carried) -> Vec<(usize, Choice)>;
+    /// Columns of load-dependent candidates, as (index of the candidate, columns). `load` is the force that each drive
+    /// carries, N or N m.
+    fn load_dependent_columns(&self, load: &ForceColumn, which: LoadDependentQuery) -> Vec<(usize, ColumnChoice)>;
 
-    /// Places on which laws that no library holds may act; asked where something stays unexplained.
-    fn sites(&self) -> Vec<Site> {
+    /// Places on which proposed laws may act; requested only if a residual stays unexplained.
+    fn sites(&self) -> Vec<LawSite> {
         Vec::new()
     }
 }
 
-/// For problems in which all columns are known from the start.
-pub struct NoSupply;
+/// Provider for problems in which all columns are known from the start.
+pub struct NoColumnProvider;
 
-impl Supply for NoSupply {
-    fn finer(&self, _: usize, _: f64) -> Option<Vec<Column>> {
+impl ColumnProvider for NoColumnProvider {
+    fn columns_for_constant(&self, _: usize, _: f64) -> Option<Vec<ForceColumn>> {
         None
     }
 
-    fn carried(&self, _: &Column, _: Carried) -> Vec<(usize, Choice)> {
+    fn load_dependent_columns(&self, _: &ForceColumn, _: LoadDependentQuery) -> Vec<(usize, ColumnChoice)> {
         Vec::new()
     }
 }
 
 /// An effect that may be missing.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Candidate {
+pub struct CandidateEffect {
     /// What and where.
-    pub effect: Effect,
-    /// Its parameters, one for each column.
+    pub effect: LocatedEffect,
+    /// Its parameters, one per column and in the same order.
     pub parameters: Vec<EffectParameter>,
-    /// Constants that are searched for; they count as parameters.
-    pub searched: usize,
-    /// Whether what it adds is part of what the drives carry: masses and weight, rather than friction.
+    /// Number of searched constants; they count as parameters.
+    pub searched_constants: usize,
+    /// Whether its forces are part of the load of the drives: masses and weight do, friction does not.
     pub is_part_of_load: bool,
-    /// A simpler kind that it holds as a special case and that comes before it.
+    /// A simpler kind that it contains as a special case and that is preferred.
     pub refines: Option<String>,
-    /// Whether the model lacks it or the recordings have it.
-    pub nature: Nature,
-    /// Whether each recording has parameters of its own, so that one cannot speak for another.
+    /// Whether it is an effect or a disturbance.
+    pub nature: CandidateNature,
+    /// Whether each recording has its own parameters, so that one recording cannot validate another.
     pub is_per_run: bool,
-    /// Its columns.
-    pub source: Source,
+    /// Where its columns come from.
+    pub source: ColumnSource,
 }
 
-/// Everything that a diagnosis needs to know.
+/// Complete input of a diagnosis. The unit of forces is N or N m, by channel.
 #[derive(Clone, Debug, Default)]
-pub struct Problem {
-    /// Channels and stretches.
-    pub layout: Layout,
-    /// Measured forces, without those that are known.
-    pub measured: Column,
-    /// Forces of the parameters that are held, if any are; already taken off `measured`.
-    pub held: Option<Column>,
-    /// Columns of the parameters that are free.
-    pub base: Vec<Column>,
-    /// What is known of these parameters beforehand, beside that zero is expected: the inverse of their covariance. Without it
-    /// they are free.
+pub struct DiagnosisProblem {
+    /// Channels and segments.
+    pub layout: SampleLayout,
+    /// Measured forces, minus those of fixed parameters.
+    pub measured: ForceColumn,
+    /// Forces of the fixed parameters, if there are any; already subtracted from `measured`.
+    pub fixed_forces: Option<ForceColumn>,
+    /// Columns of the estimated parameters.
+    pub base: Vec<ForceColumn>,
+    /// Prior knowledge of these parameters with mean zero: the inverse of their covariance. Without it they are
+    /// unconstrained.
     pub prior: Option<DMatrix<f64>>,
-    /// Which of them are part of what the drives carry.
+    /// Which of them are part of the load of the drives.
     pub base_is_part_of_load: Vec<bool>,
-    /// Friction of every drive by itself, beside which the load is estimated.
-    pub friction: Vec<Column>,
-    /// What may be missing.
-    pub candidates: Vec<Candidate>,
-    /// Variables on which forces may depend, by name: positions, rates, accelerations, loads; one number per sample.
+    /// Friction of every drive, which is fitted when the load is estimated: rate, sign of the rate and constant of one
+    /// drive after the other.
+    pub friction: Vec<ForceColumn>,
+    /// Candidates that the diagnosis tries.
+    pub candidates: Vec<CandidateEffect>,
+    /// Variables on which forces may depend, by name: positions, rates, accelerations, loads; one value per sample.
     pub variables: Vec<(String, Vec<f64>)>,
-    /// White noise of each channel's force; that of idle channels is found by a diagnosis.
+    /// Standard deviation of the white noise of each channel; for idle channels the diagnosis estimates it.
     pub noise: Vec<f64>,
-    /// Channels of which no force is read, since nothing drives there; empty where all are read.
+    /// Channels without a force signal, since nothing drives there; empty if all have one.
     pub idle: Vec<bool>,
-    /// Samples that say nothing of the model, as those of a push, `[channel][sample]`; empty where all count.
+    /// Samples that are left out, such as those of a push, `[channel][sample]`; empty if all count.
     pub left_out: Vec<Vec<bool>>,
-    /// Samples next to reversals, which do not decide but count in figures, `[channel][sample]`; a diagnosis finds them.
+    /// Samples next to reversals, `[channel][sample]`, which do not decide but count in figures. The diagnosis finds
+    /// them.
     pub jumps: Vec<Vec<bool>>,
-    /// Squares per sample that were taken off each channel before, since they do not repeat with the state.
+    /// Mean square of the forces that were removed from each channel, since they are not a function of the state.
     pub removed: Vec<f64>,
-    /// What is known to be wrong with the recordings.
+    /// Disturbances of the recordings that are known already.
     pub disturbances: Vec<Disturbance>,
-    /// Whether only verdict, steps and effects are asked for: no laws, no doubles, and nothing of what was refused.
+    /// Whether only verdict, steps and effects are requested: no laws, no alternatives and no rejected candidates.
     pub effects_only: bool,
 }
 
-impl Problem {
-    /// What was asked, without the columns: they take most of the memory, and nobody needs them once a diagnosis is made.
+impl DiagnosisProblem {
+    /// The problem without its columns, which need most of the memory and are not used after the diagnosis.
     #[must_use]
     pub fn without_columns(mut self) -> Self {
         for candidate in &mut self.candidates {
-            candidate.source = Source::Columns(Vec::new());
+            candidate.source = ColumnSource::Columns(Vec::new());
         }
         Self {
-            measured: Column::default(),
-            held: None,
+            measured: ForceColumn::default(),
+            fixed_forces: None,
             base: Vec::new(),
             friction: Vec::new(),
             variables: Vec::new(),
@@ -278,20 +282,20 @@ impl Problem {
 mod tests {
     use super::*;
 
-    /// Of a single block no spread over blocks can be had.
+    /// A single block has no spread, so short segments have several.
     #[test]
     fn a_short_stretch_has_several_blocks() {
-        let stretch = |samples| Stretch {
+        let segment = |samples| SampleSegment {
             name: String::new(),
             samples,
             step: 0.01,
-            sampled: 0.01,
+            recorded_step: 0.01,
             is_check: false,
         };
         for (samples, blocks) in [(30, 6), (90, 6), (200, 10), (5000, 12), (3, 3)] {
-            let layout = Layout {
+            let layout = SampleLayout {
                 channels: Vec::new(),
-                stretches: vec![stretch(samples)],
+                segments: vec![segment(samples)],
                 left_out: Vec::new(),
             };
             let cut = layout.blocks(12);

@@ -1,90 +1,91 @@
-//! The search for the smallest set of effects that explains what the model cannot say: forward over sets, with every
-//! member tried against every other candidate, back again, and simpler ones preferred.
+//! Search for the smallest set of effects that explains what the model cannot: forward over sets, with every member
+//! tried against every other candidate, then backward, with simpler effects preferred.
 
 use std::collections::HashSet;
 
-use super::bench::{Bench, Pick, Table, Trial};
-use super::evidence::Evidence;
-use super::pool::On;
-use super::problem::{Problem, Source};
+use super::bench::{EffectSelector, ProjectedGram, ScoredEffectSet, SelectedEffect};
+use super::evidence::SelectionEvidence;
+use super::pool::FitScope;
+use super::problem::{ColumnSource, DiagnosisProblem};
+use super::thresholds::{
+    OTHER_KIND_SHARE, OTHER_SET_LEAST_ADVANTAGE, OTHER_SET_LEAST_GAIN, PLACE_PRICE, RIVAL_FINER_GAIN_FACTOR,
+    RIVAL_MOST_GRID_RATIO, RIVAL_MOST_RATIO, SIMPLER_KIND_SHARE, SIMPLER_SET_MOST_LOSS,
+};
 
-/// Sets that are followed at once.
+/// Sets that are followed at the same time (width of the beam).
 const BEAM: usize = 6;
-/// Sets of a size that are put to the test before the search gives up.
+/// Sets of one size that are tested on validation data before the search stops.
 const TESTED: usize = 10;
-/// A rival whose squares are within this factor is tried with finer constants.
-const CLOSE: f64 = 1.5;
-/// The same for one whose constant has been looked for on a grid only.
-const CLOSE_ON_A_GRID: f64 = 20.0;
-/// A rival is tried with finer constants if so many times what it explains with those of a grid would be enough.
-const FINER_EXPLAINS: f64 = 2.0;
-/// A simpler kind that brings this share of what one that holds it brings comes first.
-const NEARLY_ALL_OF: f64 = 0.97;
-/// Another simple kind that brings this share of what a refinement of a member brings comes first.
-const MOST_OF: f64 = 0.7;
-/// By how much (in the logarithm of the likelihood, twice) another set must be better than one that only grows.
-const MUCH_BETTER: f64 = 20.0;
-/// Which share of the squared error on its channels it must take off beside that.
-const LARGE_CHANGE: f64 = 0.1;
-/// Candidates of which all pairs are tried whole, those that explain most beside one other.
+/// Number of candidates whose pairs are all tried: those that explain most in addition to the accepted set.
 const PAIRED: usize = 140;
-/// Pairs that go on.
+/// Number of pairs that join the other trial sets.
 const BEST_PAIRS: usize = 12;
-/// Most effects that are looked for.
+/// Largest number of effects in a set.
 const MOST: usize = 40;
 
-/// A step of the ladder: the set of effects after it, with what spoke for the change.
+/// A step of the search: the set of effects after it, with the evidence for the change.
 #[derive(Clone, Debug)]
-pub(crate) struct Step {
-    pub(crate) picks: Vec<Pick>,
-    /// `None` where the last set is made smaller, for which the lack of evidence speaks.
-    pub(crate) evidence: Option<Evidence>,
+pub(crate) struct EffectSetChange {
+    /// The effects after the step.
+    pub(crate) picks: Vec<SelectedEffect>,
+    /// `None` for the step that reduces the last set: it is justified by the lack of evidence for what is removed.
+    pub(crate) evidence: Option<SelectionEvidence>,
 }
 
-/// A set that evidence speaks for.
-struct Next {
-    /// The candidates that were tried; once their columns are settled they may be others.
-    tried: Vec<usize>,
-    trial: Trial,
-    evidence: Evidence,
+/// A set that is supported by evidence.
+struct SupportedEffectSet {
+    /// Indices of the candidates that were tried. The fitted set may have others after its columns are computed again.
+    candidates: Vec<usize>,
+    /// The set, fitted.
+    trial: ScoredEffectSet,
+    /// Evidence for it, compared with the accepted set.
+    evidence: SelectionEvidence,
 }
 
-/// Why the best candidates of a step were refused.
+/// A candidate that was tested and rejected, with the reason.
 #[derive(Clone, Debug)]
-pub(crate) struct Refused {
-    pub(crate) pick: Pick,
-    pub(crate) evidence: Evidence,
+pub(crate) struct RejectedCandidate {
+    /// The candidate with its columns.
+    pub(crate) pick: SelectedEffect,
+    /// Evidence for it, which is not sufficient unless one of the flags below is set.
+    pub(crate) evidence: SelectionEvidence,
+    /// Whether an estimate has a sign that is physically impossible.
     pub(crate) wrong_sign: bool,
+    /// Whether an effect of the set does little but cancel another one.
     pub(crate) cancels: bool,
 }
 
-/// What the search found.
-pub(crate) struct Found {
-    /// Sets, one change after the other; the last is the answer.
-    pub(crate) steps: Vec<Step>,
-    /// What was best of the rest, and why it was refused.
-    pub(crate) refused: Vec<Refused>,
+/// Result of the search.
+pub(crate) struct EffectSearchResult {
+    /// Sets in the order in which they were accepted; the last one is the result.
+    pub(crate) steps: Vec<EffectSetChange>,
+    /// The best candidates that were rejected in the last step.
+    pub(crate) rejected: Vec<RejectedCandidate>,
 }
 
-impl Bench<'_> {
-    /// Searches forward until nothing more is supported.
-    pub(crate) fn search(&mut self) -> Found {
-        let mut accepted: Vec<Pick> = Vec::new();
+impl EffectSelector<'_> {
+    /// Searches forward until no further set is supported, then exchanges and removes members.
+    pub(crate) fn search_sets(&mut self) -> EffectSearchResult {
+        // The accepted set grows from step to step; the beam contains other good sets that are extended as well.
+        let mut accepted: Vec<SelectedEffect> = Vec::new();
         let mut steps = Vec::new();
-        let mut beam: Vec<Vec<Pick>> = vec![Vec::new()];
+        let mut beam: Vec<Vec<SelectedEffect>> = vec![Vec::new()];
         let mut refused;
         loop {
-            let of_steps = steps.iter().flat_map(|step: &Step| &step.picks);
+            // Columns of accepted and followed sets stay in the pool; all others are released and computed again for
+            // this step.
+            let of_steps = steps.iter().flat_map(|step: &EffectSetChange| &step.picks);
             let kept = of_steps.chain(beam.iter().flatten());
-            self.present.fill(None);
-            self.forget_since(self.known, kept);
-            self.weigh(&accepted);
-            self.look(&accepted);
-            let mut trials = self.grow(&accepted, &beam);
+            self.current_choices.fill(None);
+            self.drop_columns_since(self.permanent_columns, kept);
+            self.weigh_channels(&accepted);
+            self.update_choices(&accepted);
+            let mut trials = self.grow_sets(&accepted, &beam);
             refused = Vec::new();
-            let Some(step) = self.step(&accepted, &mut trials, &mut refused) else {
+            let Some(step) = self.next_step(&accepted, &mut trials, &mut refused) else {
                 break;
             };
+            // The best possible sets of this step are extended in the next one, and so is the accepted set.
             beam = trials
                 .iter()
                 .filter(|other| other.is_possible())
@@ -92,17 +93,20 @@ impl Bench<'_> {
                 .map(|other| other.picks.clone())
                 .collect();
             accepted.clone_from(&step.picks);
+            // The accepted set is always extended, even if other sets have better scores.
             if !beam.contains(&accepted) {
                 beam.insert(0, accepted.clone());
             }
             steps.push(step);
+            // A limit for recordings that no set explains.
             if accepted.len() >= MOST {
                 break;
             }
         }
+        // Backward: exchange members for better or simpler ones, then remove those that are not needed.
         let exchanged = self.exchange(accepted.clone());
         let pruned = self.prune(exchanged);
-        // Smaller and simpler, but not worse: else nothing is exchanged.
+        // The result must not be worse than the accepted set; otherwise keep its members, and at last the set itself.
         let pruned = if self.is_worse(&pruned, &accepted) {
             self.prune(accepted.clone())
         } else {
@@ -113,134 +117,150 @@ impl Bench<'_> {
         } else {
             pruned
         };
-        let pruned = self.trial(pruned).picks;
+        // Parameters with random signs are set to zero in the result as well.
+        let pruned = self.fit_set(pruned).picks;
         if pruned != accepted {
-            steps.push(Step {
+            steps.push(EffectSetChange {
                 picks: pruned,
                 evidence: None,
             });
         }
-        Found { steps, refused }
+        EffectSearchResult {
+            steps,
+            rejected: refused,
+        }
     }
 
-    /// The next step from what is accepted, with all constants and columns that depend on the fit made anew. What does not keep
-    /// then what it promised leaves the trials.
-    fn step(
+    /// The next step from the accepted set. Constants and columns that depend on the fit are computed again; a set that
+    /// does not keep its gain then is removed from the trials. `None` if no trial is supported.
+    fn next_step(
         &mut self,
-        accepted: &[Pick],
-        trials: &mut Vec<Trial>,
-        refused: &mut Vec<Refused>,
-    ) -> Option<Step> {
+        accepted: &[SelectedEffect],
+        trials: &mut Vec<ScoredEffectSet>,
+        refused: &mut Vec<RejectedCandidate>,
+    ) -> Option<EffectSetChange> {
         loop {
-            let next = self.next(accepted, trials, refused)?;
+            // The first set that is supported by evidence.
+            let next = self.next_supported_set(accepted, trials, refused)?;
+            // Prefer simple effects, then refine constants and compare with close rivals.
             let (trial, evidence) = self
-                .simple_first(accepted, &next.trial)
+                .simplest_single_effect(accepted, &next.trial)
                 .unwrap_or((next.trial, next.evidence));
-            let (picks, _) = self.simplest(accepted, trial, evidence, trials);
-            let refined = self.refine(picks);
-            let polished = self.polish(refined);
-            let refreshed = self.refresh(polished);
-            let settled = self.trial(refreshed);
-            let evidence = self.between(accepted, &settled.picks);
-            let channels = self.changed_on(accepted, &settled.picks);
+            let (picks, _) = self.simplest_set(accepted, trial, evidence, trials);
+            let refined = self.refine_constants(picks);
+            let polished = self.exchange_finely(refined);
+            let refreshed = self.refresh_columns(polished);
+            // The set has changed since it was tested, so the evidence is computed again.
+            let settled = self.fit_set(refreshed);
+            let evidence = self.evidence_between(accepted, &settled.picks);
+            let channels = self.differing_channels(accepted, &settled.picks);
             if settled.is_possible()
-                && evidence.holds()
-                && !self.costs_more(accepted, &settled.picks, &channels)
+                && evidence.is_sufficient()
+                && !self.is_worse_overall(accepted, &settled.picks, &channels)
             {
-                return Some(Step {
+                return Some(EffectSetChange {
                     picks: settled.picks,
                     evidence: Some(evidence),
                 });
             }
-            trials.retain(|trial| members(&trial.picks) != next.tried);
+            // The set has lost its support; try the next one without it.
+            trials.retain(|trial| candidate_indices(&trial.picks) != next.candidates);
         }
     }
 
-    /// The first of the trials that evidence speaks for.
-    fn next(
+    /// The first trial that is supported by evidence. Sets that add one effect come first; `refused` receives the
+    /// single effects that were rejected.
+    fn next_supported_set(
         &mut self,
-        accepted: &[Pick],
-        trials: &[Trial],
-        refused: &mut Vec<Refused>,
-    ) -> Option<Next> {
-        let (grown, exchanged): (Vec<&Trial>, Vec<&Trial>) =
+        accepted: &[SelectedEffect],
+        trials: &[ScoredEffectSet],
+        refused: &mut Vec<RejectedCandidate>,
+    ) -> Option<SupportedEffectSet> {
+        // Sets that only add an effect, and all others.
+        let (grown, exchanged): (Vec<&ScoredEffectSet>, Vec<&ScoredEffectSet>) =
             trials.iter().partition(|t| self.is_addition(accepted, t));
         let mut additions = grown.into_iter();
         refused.clear();
-        let chosen = self.first_that_holds(accepted, &mut additions, refused);
-        // Another set altogether must be much better than one that only grows.
+        let chosen = self.first_supported_set(accepted, &mut additions, refused);
+        // A set with other members must be much better than one that only grows.
+        // Sets with other members are tested only if their criterion is far below.
         let bound = chosen
             .as_ref()
-            .map_or(f64::INFINITY, |next| next.trial.score - MUCH_BETTER);
+            .map_or(f64::INFINITY, |next| next.trial.score - OTHER_SET_LEAST_ADVANTAGE);
         let mut others = exchanged.into_iter().filter(|t| t.score < bound);
-        let other = self.first_that_holds(accepted, &mut others, &mut Vec::new());
+        let other = self.first_supported_set(accepted, &mut others, &mut Vec::new());
+        // Compare the other set directly with the grown one.
         let other = other.filter(|other| {
             chosen.as_ref().is_none_or(|grown| {
-                let evidence = self.between(&grown.trial.picks, &other.trial.picks);
-                evidence.holds() && evidence.gain > LARGE_CHANGE
+                let evidence = self.evidence_between(&grown.trial.picks, &other.trial.picks);
+                evidence.is_sufficient() && evidence.gain > OTHER_SET_LEAST_GAIN
             })
         });
         other.or(chosen)
     }
 
-    /// Evidence for one set beside another, on the channels on which they differ.
-    fn between(&self, before: &[Pick], after: &[Pick]) -> Evidence {
-        self.evidence(before, after, &self.changed_on(before, after))
+    /// Evidence for the set `after` compared with `before`, on the channels on which they differ.
+    fn evidence_between(&self, before: &[SelectedEffect], after: &[SelectedEffect]) -> SelectionEvidence {
+        self.evidence(before, after, &self.differing_channels(before, after))
     }
 
-    /// Channels on which two sets differ.
-    fn changed_on(&self, before: &[Pick], after: &[Pick]) -> Vec<usize> {
-        let mut differ = difference(after, before);
-        differ.extend(difference(before, after));
-        self.acted_on(&differ)
+    /// Channels on which effects act that only one of two sets has.
+    fn differing_channels(&self, before: &[SelectedEffect], after: &[SelectedEffect]) -> Vec<usize> {
+        let mut differ = set_difference(after, before);
+        differ.extend(set_difference(before, after));
+        self.affected_channels(&differ)
     }
 
-    /// Whether evidence speaks for one set beside another that is to take its place. What was found step by step need not prove
-    /// itself again as a whole: a large loss that its parameters are worth is enough.
-    pub(crate) fn is_worse(&mut self, settled: &[Pick], before: &[Pick]) -> bool {
-        self.weigh(before);
+    /// Whether the set `before` is clearly better than `settled`, which is to replace it. What was accepted step by
+    /// step need not be significant again in total: a large gain that justifies its parameters is enough.
+    pub(crate) fn is_worse(&mut self, settled: &[SelectedEffect], before: &[SelectedEffect]) -> bool {
+        self.weigh_channels(before);
         let channels: Vec<usize> = (0..self.weights.len()).collect();
-        self.evidence(settled, before, &channels).would_be_missed()
+        self.evidence(settled, before, &channels).is_worth_keeping()
     }
 
-    /// Whether a set is another one and a further effect, which may take the place of what it holds.
-    fn is_addition(&self, accepted: &[Pick], trial: &Trial) -> bool {
-        let is_new = |pick: &&Pick| accepted.iter().all(|p| p.candidate != pick.candidate);
+    /// Whether a trial adds exactly one effect to the accepted set; the new effect may replace members that it
+    /// contains.
+    fn is_addition(&self, accepted: &[SelectedEffect], trial: &ScoredEffectSet) -> bool {
+        let is_new = |pick: &&SelectedEffect| accepted.iter().all(|p| p.candidate != pick.candidate);
         let mut news = trial.picks.iter().filter(is_new);
         let (Some(new), None) = (news.next(), news.next()) else {
             return false;
         };
-        let replaced = Self::replaced(accepted, &trial.picks);
-        replaced.iter().all(|p| self.is_within(p, new))
+        let replaced = Self::replaced_effects(accepted, &trial.picks);
+        replaced.iter().all(|p| self.is_in_span(p, new))
     }
 
-    /// The first of some sets that evidence speaks for; why single effects were refused goes into a list.
-    fn first_that_holds(
+    /// The first of some sets that is supported by evidence; rejected single effects are added to `refused`.
+    fn first_supported_set(
         &mut self,
-        accepted: &[Pick],
-        trials: &mut dyn Iterator<Item = &Trial>,
-        refused: &mut Vec<Refused>,
-    ) -> Option<Next> {
+        accepted: &[SelectedEffect],
+        trials: &mut dyn Iterator<Item = &ScoredEffectSet>,
+        refused: &mut Vec<RejectedCandidate>,
+    ) -> Option<SupportedEffectSet> {
+        // Stop after a number of tests, since each needs fits on blocks.
         let mut tested = 0;
         for trial in trials {
             if tested == TESTED {
                 break;
             }
-            let tried = members(&trial.picks);
-            let trial = self.settled(trial);
-            // What turns out impossible once its columns have its own size was no test.
+            // Columns that depend on the fit are computed for this set before it is tested.
+            let tried = candidate_indices(&trial.picks);
+            let trial = self.refit_dependent_columns(trial);
+            // A set that is impossible once its columns have the right size does not count as a test.
             tested += usize::from(trial.is_possible());
-            let news: Vec<Pick> = difference(&trial.picks, accepted);
-            let evidence = self.evidence(accepted, &trial.picks, &self.acted_on(&news));
-            if evidence.holds() && trial.is_possible() {
-                return Some(Next {
-                    tried,
+            let news: Vec<SelectedEffect> = set_difference(&trial.picks, accepted);
+            let evidence = self.evidence(accepted, &trial.picks, &self.affected_channels(&news));
+            if evidence.is_sufficient() && trial.is_possible() {
+                return Some(SupportedEffectSet {
+                    candidates: tried,
                     trial,
                     evidence,
                 });
             }
+            // Only single effects are reported as rejected; a pair has no reason of its own.
             if let [pick] = news.as_slice() {
-                refused.push(Refused {
+                refused.push(RejectedCandidate {
                     pick: pick.clone(),
                     evidence,
                     wrong_sign: !trial.wrong_sign.is_empty(),
@@ -251,78 +271,89 @@ impl Bench<'_> {
         None
     }
 
-    /// All sets that one more effect makes of those in the beam, the best of them improved by exchanges; best first.
-    fn grow(&mut self, accepted: &[Pick], beam: &[Vec<Pick>]) -> Vec<Trial> {
-        let all: Vec<Pick> = beam.iter().flatten().cloned().collect();
-        let table = self.table(&all);
-        let (factors, _) = self.fit(accepted, On::All);
-        let rest = self.rest(accepted, &factors);
+    /// All sets with one more effect than those in the beam, and the best pairs. The best of them are improved by
+    /// exchanges. Returns at most 40, best first.
+    fn grow_sets(&mut self, accepted: &[SelectedEffect], beam: &[Vec<SelectedEffect>]) -> Vec<ScoredEffectSet> {
+        // One table of inner products serves all trials; the number of independent equations comes from the accepted
+        // set.
+        let all: Vec<SelectedEffect> = beam.iter().flatten().cloned().collect();
+        let table = self.projected_gram(&all);
+        let (factors, _) = self.fit(accepted, FitScope::All);
+        let rest = self.residual(accepted, &factors);
         let channels: Vec<usize> = (0..rest.len()).collect();
-        let worth = self.worth(&rest, &channels);
-        let mut trials: Vec<Trial> = Vec::new();
+        // Number of independent equations for the information criterion.
+        let worth = self.effective_equations(&rest, &channels);
+        let mut trials: Vec<ScoredEffectSet> = Vec::new();
         let mut known: HashSet<Vec<usize>> = HashSet::new();
+        // Stage 1: every set of the beam with every candidate.
         for set in beam {
-            for pick in self.present.iter().flatten() {
+            for pick in self.current_choices.iter().flatten() {
                 if set.iter().any(|p| p.candidate == pick.candidate) {
                     continue;
                 }
                 let mut picks = set.clone();
-                // What holds more than a member takes its place.
+                // An effect that contains a member replaces it.
                 let mut pick = pick.clone();
                 if pick.columns.len() > 1 {
-                    let (within, rest): (Vec<Pick>, Vec<Pick>) =
-                        picks.into_iter().partition(|p| self.is_within(p, &pick));
-                    // Its rank beside the accepted set does not count what it replaces.
+                    let (within, rest): (Vec<SelectedEffect>, Vec<SelectedEffect>) =
+                        picks.into_iter().partition(|p| self.is_in_span(p, &pick));
+                    // Its rank relative to the accepted set does not count the members that it replaces.
                     let more: usize = within.iter().map(|p| p.rank).sum();
                     pick.rank = (pick.rank + more).min(pick.columns.len());
                     picks = rest;
                 }
                 picks.push(pick);
-                if known.insert(members(&picks)) {
-                    trials.push(self.try_in(&table, picks));
+                // The same set may be reached from several sets of the beam.
+                if known.insert(candidate_indices(&picks)) {
+                    trials.push(self.fit_from_gram(&table, picks));
                 }
             }
         }
-        let pairs = self.pairs(accepted, &table, worth);
+        // Stage 2: pairs of candidates.
+        let pairs = self.best_pairs(accepted, &table, worth);
         trials.extend(
             (pairs.into_iter())
-                .filter(|pair| beam.iter().all(|set| !same(set, &pair.picks)))
-                .collect::<Vec<Trial>>(),
+                .filter(|pair| beam.iter().all(|set| !is_same_set(set, &pair.picks)))
+                .collect::<Vec<ScoredEffectSet>>(),
         );
-        // The best set says what is noise: beside what it explains, neighbours resemble each other less.
+        // The best set gives the best estimate of the noise: with its residual, samples are less correlated and worth
+        // more.
         let best = trials.iter().filter(|trial| trial.is_possible());
         let worth = best
             .min_by(|a, b| a.squares.total_cmp(&b.squares))
             .map_or(worth, |best| {
-                let (factors, _) = self.fit(&best.picks, On::All);
-                worth.max(self.worth(&self.rest(&best.picks, &factors), &channels))
+                let (factors, _) = self.fit(&best.picks, FitScope::All);
+                worth.max(self.effective_equations(&self.residual(&best.picks, &factors), &channels))
             });
         let problem = self.problem;
-        let score = |trial: &Trial| criterion(problem, trial, worth);
+        // Sort by the criterion and keep the best sets.
+        let score = |trial: &ScoredEffectSet| criterion(problem, trial, worth);
         trials.sort_by(|a, b| score(a).total_cmp(&score(b)));
-        trials.dedup_by(|a, b| same(&a.picks, &b.picks));
+        trials.dedup_by(|a, b| is_same_set(&a.picks, &b.picks));
         trials.truncate(40);
-        // Constants that suited other sets may suit these less.
+        // Constants chosen for other sets may be wrong for these.
         for k in 0..trials.len().min(BEAM) {
-            let tuned = self.retune(trials[k].picks.clone());
+            let tuned = self.choose_constants(trials[k].picks.clone());
             if tuned != trials[k].picks {
-                trials[k] = self.trial(tuned);
+                trials[k] = self.fit_set(tuned);
             }
         }
         trials.sort_by(|a, b| score(a).total_cmp(&score(b)));
-        let all: Vec<Pick> = trials.iter().flat_map(|t| t.picks.clone()).collect();
-        let table = self.table(&all);
-        // Every member of the best sets against every other candidate.
+        let all: Vec<SelectedEffect> = trials.iter().flat_map(|t| t.picks.clone()).collect();
+        let table = self.projected_gram(&all);
+        // Stage 3: exchange every member of the best sets for every other candidate, as long as a set gets better.
         for k in 0..trials.len().min(BEAM) {
+            // Repeat as long as any exchange improves the set.
             let mut best = trials[k].clone();
             loop {
-                let mut better: Option<Trial> = None;
+                let mut better: Option<ScoredEffectSet> = None;
                 let mut bound = score(&best) - 1e-9;
                 for i in 0..best.picks.len() {
                     let mut others = best.picks.clone();
                     others.remove(i);
-                    let beyond = self.beyond(&table, &others);
-                    for pick in self.present.iter().flatten() {
+                    // A lower bound of the criterion excludes most exchanges without a fit.
+                    let beyond = self.extension_bound(&table, &others);
+                    for pick in self.current_choices.iter().flatten() {
                         if best.picks.iter().any(|p| p.candidate == pick.candidate)
                             || self.least_criterion(&beyond, &[pick], worth) > bound
                         {
@@ -330,12 +361,13 @@ impl Bench<'_> {
                         }
                         let mut picks = best.picks.clone();
                         let mut pick = pick.clone();
-                        if pick.columns.len() > 1 && self.is_within(&picks[i], &pick) {
+                        if pick.columns.len() > 1 && self.is_in_span(&picks[i], &pick) {
                             pick.rank = (pick.rank + picks[i].rank).min(pick.columns.len());
                         }
                         picks[i] = pick;
-                        let trial = self.try_in(&table, picks);
+                        let trial = self.fit_from_gram(&table, picks);
                         let own = score(&trial);
+                        // The best exchange of this round.
                         if own < bound {
                             bound = own;
                             better = Some(trial);
@@ -347,7 +379,7 @@ impl Bench<'_> {
                     None => break,
                 }
             }
-            if trials.iter().all(|known| !same(&known.picks, &best.picks)) {
+            if trials.iter().all(|known| !is_same_set(&known.picks, &best.picks)) {
                 trials.push(best);
             }
         }
@@ -359,31 +391,37 @@ impl Bench<'_> {
         trials
     }
 
-    /// The best of all pairs of further effects beside the accepted ones, and in place of any of these: a pair may explain all
-    /// where neither does much alone, and where what is shared by two places comes first.
-    fn pairs(&self, accepted: &[Pick], table: &Table, worth: f64) -> Vec<Trial> {
-        let is_new = |pick: &&Pick| accepted.iter().all(|p| p.candidate != pick.candidate);
-        let alone = |pick: &Pick| {
+    /// The best pairs of further effects, added to the accepted set or to this set without one member. A pair may
+    /// explain everything where neither effect explains much alone, and where an effect that two places share was
+    /// accepted first.
+    fn best_pairs(&self, accepted: &[SelectedEffect], table: &ProjectedGram, worth: f64) -> Vec<ScoredEffectSet> {
+        let is_new = |pick: &&SelectedEffect| accepted.iter().all(|p| p.candidate != pick.candidate);
+        // Weighted squared residual of the accepted set with one more effect.
+        let alone = |pick: &SelectedEffect| {
             let mut set = accepted.to_vec();
             set.push(pick.clone());
-            self.try_in(table, set).squares
+            self.fit_from_gram(table, set).squares
         };
-        let simple = self.present.iter().flatten().filter(is_new);
+        // Only effects with at most two estimated numbers take part in pairs.
+        let simple = self.current_choices.iter().flatten().filter(is_new);
         let simple = simple.filter(|pick| self.freedoms(pick) <= 2);
-        let mut further: Vec<(f64, &Pick)> = simple.map(|pick| (alone(pick), pick)).collect();
+        let mut further: Vec<(f64, &SelectedEffect)> = simple.map(|pick| (alone(pick), pick)).collect();
         further.sort_by(|a, b| a.0.total_cmp(&b.0));
         further.truncate(PAIRED);
-        let mut kept: Vec<Vec<Pick>> = vec![accepted.to_vec()];
+        // The accepted set and every subset with one member less.
+        let mut kept: Vec<Vec<SelectedEffect>> = vec![accepted.to_vec()];
         kept.extend((0..accepted.len()).map(|i| {
             let mut fewer = accepted.to_vec();
             fewer.remove(i);
             fewer
         }));
-        let mut best: Vec<(f64, Trial)> = Vec::new();
+        // Sorted list of the best pairs with their criterion.
+        let mut best: Vec<(f64, ScoredEffectSet)> = Vec::new();
         for set in kept {
-            let beyond = self.beyond(table, &set);
+            let beyond = self.extension_bound(table, &set);
             for (i, (_, one)) in further.iter().enumerate() {
                 for (_, two) in &further[i + 1..] {
+                    // Once the list is full, skip pairs whose lower bound is above its last entry.
                     if best.len() == BEST_PAIRS {
                         let least = self.least_criterion(&beyond, &[one, two], worth);
                         if best.last().is_some_and(|(last, _)| least > *last) {
@@ -392,9 +430,10 @@ impl Bench<'_> {
                     }
                     let mut picks = set.clone();
                     picks.extend([(*one).clone(), (*two).clone()]);
-                    let trial = self.try_in(table, picks);
+                    let trial = self.fit_from_gram(table, picks);
                     let own = criterion(self.problem, &trial, worth);
                     if best.len() < BEST_PAIRS || best.last().is_some_and(|(last, _)| own < *last) {
+                        // Insert in order, so that the last entry is the worst of the list.
                         let at = best.partition_point(|(other, _)| *other < own);
                         best.insert(at, (own, trial));
                         best.truncate(BEST_PAIRS);
@@ -405,24 +444,28 @@ impl Bench<'_> {
         best.into_iter().map(|(_, trial)| trial).collect()
     }
 
-    /// Tries members of a set against candidates that come close, each with constants that are searched finely: on their
-    /// grids the wrong one may have been nearer to its best value.
-    fn polish(&mut self, mut picks: Vec<Pick>) -> Vec<Pick> {
-        let is_searched = |bench: &Self, pick: &Pick| bench.candidate(pick).searched > 0;
-        let mut table = self.table(&picks);
+    /// Exchanges members of a set for candidates that are nearly as good, each with finely searched constants: on the
+    /// grids, the wrong candidate may have been nearer to its best value.
+    fn exchange_finely(&mut self, mut picks: Vec<SelectedEffect>) -> Vec<SelectedEffect> {
+        // Whether a candidate has constants that are searched.
+        let is_searched = |bench: &Self, pick: &SelectedEffect| bench.candidate(pick).searched_constants > 0;
+        let mut table = self.projected_gram(&picks);
         for i in 0..picks.len() {
             let mut others = picks.clone();
+            // Compare rivals in the presence of all other members.
             let own = others.remove(i);
-            let now = self.try_in(&table, picks.clone());
-            // The constants of others may suit this member and no kin of it.
+            let now = self.fit_from_gram(&table, picks.clone());
+            // The constants of the other members were chosen with this member, which may put similar effects at a
+            // disadvantage.
             let others_are_searched = others.iter().any(|other| is_searched(self, other));
-            let is_kin = |bench: &Self, rival: &Pick| {
+            let is_kin = |bench: &Self, rival: &SelectedEffect| {
                 let [one, two] = [rival, &own].map(|pick| &bench.candidate(pick).effect);
-                others_are_searched
-                    && (one.kind == two.kind || one.at.iter().any(|place| two.at.contains(place)))
+                others_are_searched && (one.kind == two.kind || one.at.iter().any(|place| two.at.contains(place)))
             };
-            let rivals: Vec<Pick> = self
-                .present
+            // Rivals with no more estimated numbers, if one of both has searched constants or if they are similar
+            // effects.
+            let rivals: Vec<SelectedEffect> = self
+                .current_choices
                 .iter()
                 .flatten()
                 .filter(|rival| {
@@ -433,46 +476,56 @@ impl Bench<'_> {
                 .filter(|rival| self.freedoms(rival) <= self.freedoms(&own))
                 .cloned()
                 .collect();
-            let without = self.trial(others.clone()).squares;
+            // Squared residual without the member: the reference for what a rival explains.
+            let without = self.fit_set(others.clone()).squares;
             let mut best = now;
             for rival in rivals {
                 let mut set = others.clone();
                 set.insert(i, rival);
-                // On another set's constants a rival is judged by its own.
+                // A rival with a searched constant is compared at its own best constant.
                 let tuned = if is_searched(self, &set[i]) || is_kin(self, &set[i]) {
-                    self.retune(set)
-                } else if self.try_in(&table, set.clone()).squares > CLOSE * best.squares {
+                    self.choose_constants(set)
+                } else if self.fit_from_gram(&table, set.clone()).squares > RIVAL_MOST_RATIO * best.squares {
                     continue;
                 } else {
                     set
                 };
-                let kind = |pick: &Pick| self.candidate(pick).effect.kind.clone();
-                let squares = self.trial(tuned.clone()).squares;
+                // Another kind must be closer on the grid than another place of the same kind.
+                let kind = |pick: &SelectedEffect| self.candidate(pick).effect.kind.clone();
+                let squares = self.fit_set(tuned.clone()).squares;
+                // Only rivals that are close on the grid are worth a fine search.
                 let is_close = if kind(&tuned[i]) == kind(&own) {
-                    squares <= CLOSE_ON_A_GRID * best.squares
+                    squares <= RIVAL_MOST_GRID_RATIO * best.squares
                 } else {
-                    squares <= CLOSE * best.squares
-                        && FINER_EXPLAINS * (without - squares) >= without - best.squares
+                    squares <= RIVAL_MOST_RATIO * best.squares
+                        && RIVAL_FINER_GAIN_FACTOR * (without - squares) >= without - best.squares
                 };
                 if !is_close {
                     continue;
                 }
-                let tuned = self.refine_around(tuned, i);
-                let trial = self.trial(tuned);
+                let tuned = self.refine_around_member(tuned, i);
+                let trial = self.fit_set(tuned);
+                // Compare the squared residuals with finely searched constants.
                 if trial.is_possible() && trial.squares < best.squares {
                     best = trial;
                 }
             }
             if best.picks != picks {
                 picks = best.picks;
-                table = self.table(&picks);
+                table = self.projected_gram(&picks);
             }
         }
         picks
     }
 
-    /// Where several simple effects with no more freedoms than a large one explain more, the first of them.
-    fn simple_first(&self, accepted: &[Pick], best: &Trial) -> Option<(Trial, Evidence)> {
+    /// If several simple effects with no more estimated numbers than one large effect explain more, returns the set
+    /// with the first of them and its evidence.
+    fn simplest_single_effect(
+        &self,
+        accepted: &[SelectedEffect],
+        best: &ScoredEffectSet,
+    ) -> Option<(ScoredEffectSet, SelectionEvidence)> {
+        // Estimated numbers that the large effect adds: the budget for simple ones.
         let before: usize = accepted.iter().map(|p| self.freedoms(p)).sum();
         let budget = best.freedoms.checked_sub(before)?;
         if budget < 2 {
@@ -480,19 +533,21 @@ impl Bench<'_> {
         }
         let mut all = accepted.to_vec();
         all.extend(best.picks.iter().cloned());
-        let table = self.table(&all);
-        let simple: Vec<&Pick> = self
-            .present
+        let table = self.projected_gram(&all);
+        // Simple effects have one estimated number and are no sensor faults or wrong constants.
+        let simple: Vec<&SelectedEffect> = self
+            .current_choices
             .iter()
             .flatten()
             .filter(|p| {
                 self.freedoms(p) == 1
                     && !matches!(
                         self.candidate(p).source,
-                        Source::Reading(_) | Source::Constant(_)
+                        ColumnSource::ReadingFault(_) | ColumnSource::Constant(_)
                     )
             })
             .collect();
+        // Add the best simple effect, one by one, as long as the set has no more estimated numbers than the large one.
         let mut set = accepted.to_vec();
         let mut first = None;
         for _ in 0..budget {
@@ -502,39 +557,42 @@ impl Bench<'_> {
                 .map(|pick| {
                     let mut picks = set.clone();
                     picks.push((*pick).clone());
-                    self.try_in(&table, picks)
+                    self.fit_from_gram(&table, picks)
                 })
-                .filter(Trial::is_possible);
+                .filter(ScoredEffectSet::is_possible);
             let next = trials.min_by(|a, b| a.squares.total_cmp(&b.squares))?;
             set.clone_from(&next.picks);
             first.get_or_insert_with(|| next.clone());
+            // The simple effects together explain more; accept the first one, if it is supported.
             if next.squares < best.squares {
                 let first = first?;
-                let news = difference(&first.picks, accepted);
-                let evidence = self.evidence(accepted, &first.picks, &self.acted_on(&news));
-                return evidence.holds().then_some((first, evidence));
+                let news = set_difference(&first.picks, accepted);
+                let evidence = self.evidence(accepted, &first.picks, &self.affected_channels(&news));
+                return evidence.is_sufficient().then_some((first, evidence));
             }
         }
         None
     }
 
-    /// Of the sets that are as good as the best as far as the blocks can tell, the one with the fewest freedoms; of several
-    /// the first, for kinds come in the order of the library.
-    fn simplest(
+    /// Of the sets that the blocks cannot distinguish from the best one, the set with the fewest estimated numbers; of
+    /// several the first, since kinds come in the order of the library.
+    fn simplest_set(
         &self,
-        accepted: &[Pick],
-        best: Trial,
-        evidence: Evidence,
-        trials: &[Trial],
-    ) -> (Vec<Pick>, Evidence) {
+        accepted: &[SelectedEffect],
+        best: ScoredEffectSet,
+        evidence: SelectionEvidence,
+        trials: &[ScoredEffectSet],
+    ) -> (Vec<SelectedEffect>, SelectionEvidence) {
         let mut chosen = (best, evidence);
-        // A kind that holds a simpler one, such as friction that differs by direction, comes after it.
-        // So does what refines a member, after other simple kinds.
-        let refines = !Self::replaced(accepted, &chosen.0.picks).is_empty();
-        let beside = self.beside(accepted);
+        // A kind that contains a simpler one, such as friction that depends on the direction, comes after it. A
+        // refinement of a member comes after other simple kinds.
+        // Whether the best set replaces a member by a more general effect.
+        let refines = !Self::replaced_effects(accepted, &chosen.0.picks).is_empty();
+        let beside = self.conditioning_set(accepted);
         let nested = trials.iter().filter(|trial| {
-            let news = difference(&trial.picks, accepted);
-            let bests = difference(&chosen.0.picks, accepted);
+            let news = set_difference(&trial.picks, accepted);
+            let bests = set_difference(&chosen.0.picks, accepted);
+            // Both sets must differ from the accepted one by exactly one effect.
             let [simple] = news.as_slice() else {
                 return false;
             };
@@ -542,25 +600,28 @@ impl Bench<'_> {
                 return false;
             };
             trial.is_possible()
-                && Self::replaced(accepted, &trial.picks).is_empty()
+                && Self::replaced_effects(accepted, &trial.picks).is_empty()
                 && simple.rank < own.rank
-                && self.candidate(simple).searched <= self.candidate(own).searched
-                && (refines || self.is_within_beside(simple, own, &beside))
+                && self.candidate(simple).searched_constants <= self.candidate(own).searched_constants
+                && (refines || self.is_in_conditional_span(simple, own, &beside))
         });
-        let mut simpler: Vec<(Trial, Evidence)> = Vec::new();
+        // Simpler kinds that reach most of the gain of the best one.
+        let mut simpler: Vec<(ScoredEffectSet, SelectionEvidence)> = Vec::new();
         for trial in nested {
-            let news = difference(&trial.picks, accepted);
-            let own = self.evidence(accepted, &trial.picks, &self.acted_on(&news));
+            let news = set_difference(&trial.picks, accepted);
+            let own = self.evidence(accepted, &trial.picks, &self.affected_channels(&news));
             let kind = &self.candidate(&news[0]).effect.kind;
-            let is_refined = difference(&chosen.0.picks, accepted)
+            let is_refined = set_difference(&chosen.0.picks, accepted)
                 .iter()
                 .any(|best| self.candidate(best).refines.as_ref() == Some(kind));
+            // Share of the gain that the simpler kind must reach.
             let most_of = if refines || is_refined {
-                MOST_OF
+                OTHER_KIND_SHARE
             } else {
-                NEARLY_ALL_OF
+                SIMPLER_KIND_SHARE
             };
-            if own.holds() && own.gain > most_of * chosen.1.gain {
+            // The simpler kind must be supported and reach most of the gain.
+            if own.is_sufficient() && own.gain > most_of * chosen.1.gain {
                 simpler.push((trial.clone(), own));
             }
         }
@@ -568,33 +629,36 @@ impl Bench<'_> {
         if let Some(simple) = simpler.into_iter().next() {
             chosen = simple;
         }
+        // Other sets with fewer estimated numbers whose squared error is not significantly larger.
         for trial in trials.iter().take(40) {
             if trial.freedoms >= chosen.0.freedoms || !trial.is_possible() {
                 continue;
             }
-            let news = difference(&trial.picks, accepted);
-            let channels = self.acted_on(&news);
+            let news = set_difference(&trial.picks, accepted);
+            let channels = self.affected_channels(&news);
+            // Twice the logarithm of the likelihood ratio must be small.
             let ratio = trial.squares / chosen.0.squares.max(f64::MIN_POSITIVE);
-            if chosen.1.effective_samples * ratio.ln() > 2.0 {
+            if chosen.1.effective_samples * ratio.ln() > SIMPLER_SET_MOST_LOSS {
                 continue;
             }
             let own = self.evidence(accepted, &trial.picks, &channels);
-            if own.holds() {
+            if own.is_sufficient() {
                 chosen = (trial.clone(), own);
             }
         }
         (chosen.0.picks, chosen.1)
     }
 
-    /// Members of a set that are no longer in another.
-    fn replaced(accepted: &[Pick], picks: &[Pick]) -> Vec<Pick> {
-        let gone = |pick: &&Pick| picks.iter().all(|p| p.candidate != pick.candidate);
+    /// Members of the accepted set that are not in `picks`.
+    fn replaced_effects(accepted: &[SelectedEffect], picks: &[SelectedEffect]) -> Vec<SelectedEffect> {
+        let gone = |pick: &&SelectedEffect| picks.iter().all(|p| p.candidate != pick.candidate);
         accepted.iter().filter(gone).cloned().collect()
     }
 }
 
-/// The information criterion of a set, with as many samples as the residual is worth; sets with impossible signs come last.
-pub(crate) fn criterion(problem: &Problem, trial: &Trial, worth: f64) -> f64 {
+/// Information criterion of a set (less is better), with `worth` independent equations. Sets that are physically
+/// impossible come last.
+pub(crate) fn criterion(problem: &DiagnosisProblem, trial: &ScoredEffectSet, worth: f64) -> f64 {
     let wrong = if trial.is_possible() { 0.0 } else { 1e12 };
     worth * trial.squares.max(f64::MIN_POSITIVE).ln()
         + trial.freedoms as f64 * worth.ln().max(1.0)
@@ -602,42 +666,37 @@ pub(crate) fn criterion(problem: &Problem, trial: &Trial, worth: f64) -> f64 {
         + wrong
 }
 
-/// What another place costs, where nothing else decides between sets that say the same.
-const PLACE: f64 = 0.01;
-
-/// A little against sets in which one kind acts twice at a place, which say what others say more plainly; and against many
+/// Small penalty for sets in which one kind acts twice at a place, which a simpler set describes as well, and for many
 /// places.
-fn overlap(problem: &Problem, picks: &[Pick]) -> f64 {
-    let effect = |pick: &Pick| &problem.candidates[pick.candidate].effect;
-    let twice = |(i, one): (usize, &Pick)| {
+fn overlap(problem: &DiagnosisProblem, picks: &[SelectedEffect]) -> f64 {
+    let effect = |pick: &SelectedEffect| &problem.candidates[pick.candidate].effect;
+    // Number of later effects of the same kind that share a place.
+    let twice = |(i, one): (usize, &SelectedEffect)| {
         let others = picks[i + 1..].iter().filter(|other| {
             effect(one).kind == effect(other).kind
-                && effect(one)
-                    .at
-                    .iter()
-                    .any(|place| effect(other).at.contains(place))
+                && effect(one).at.iter().any(|place| effect(other).at.contains(place))
         });
         others.count() as f64
     };
     let places: usize = picks.iter().map(|pick| effect(pick).at.len()).sum();
-    picks.iter().enumerate().map(twice).sum::<f64>() + PLACE * places as f64
+    picks.iter().enumerate().map(twice).sum::<f64>() + PLACE_PRICE * places as f64
 }
 
-/// Picks of a set whose candidate is not in another.
-pub(crate) fn difference(set: &[Pick], other: &[Pick]) -> Vec<Pick> {
-    let is_new = |pick: &&Pick| other.iter().all(|p| p.candidate != pick.candidate);
-    let new: Vec<Pick> = set.iter().filter(is_new).cloned().collect();
+/// Members of a set whose candidate is not in another; the complete set if there are none.
+pub(crate) fn set_difference(set: &[SelectedEffect], other: &[SelectedEffect]) -> Vec<SelectedEffect> {
+    let is_new = |pick: &&SelectedEffect| other.iter().all(|p| p.candidate != pick.candidate);
+    let new: Vec<SelectedEffect> = set.iter().filter(is_new).cloned().collect();
     if new.is_empty() { set.to_vec() } else { new }
 }
 
-/// The candidates of a set, in order.
-fn members(picks: &[Pick]) -> Vec<usize> {
+/// Indices of the candidates of a set, sorted.
+fn candidate_indices(picks: &[SelectedEffect]) -> Vec<usize> {
     let mut members: Vec<usize> = picks.iter().map(|pick| pick.candidate).collect();
     members.sort_unstable();
     members
 }
 
-/// Whether two sets hold the same candidates.
-fn same(a: &[Pick], b: &[Pick]) -> bool {
+/// Whether two sets have the same candidates.
+fn is_same_set(a: &[SelectedEffect], b: &[SelectedEffect]) -> bool {
     a.len() == b.len() && (a.iter()).all(|p| b.iter().any(|q| q.candidate == p.candidate))
 }

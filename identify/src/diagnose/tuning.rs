@@ -1,32 +1,36 @@
-//! Constants of effects that no linear fit finds: the best of a grid beside the rest of a set, and between its values.
+//! Searched constants of effects, such as a transition velocity. Input: a set of effects. Output: the set with the
+//! constants that explain most, from a grid or between its values.
 
-use super::bench::{Bench, Pick};
-use super::column::Column;
-use super::problem::{Carried, Source};
+use super::bench::{EffectSelector, SelectedEffect};
+use super::column::ForceColumn;
+use super::problem::{ColumnSource, LoadDependentQuery};
 
-/// Where values of a constant are costly one is looked at, and others up to this factor away.
-const AROUND: f64 = 4.0;
+/// Load-dependent columns are costly: the search starts at one value and goes up to this factor below and above it.
+const COARSE_SEARCH_FACTOR: f64 = 4.0;
 
-impl Bench<'_> {
-    /// Chooses the constants of each effect of a set anew, beside those of the others.
-    pub(crate) fn retune(&mut self, mut picks: Vec<Pick>) -> Vec<Pick> {
+impl EffectSelector<'_> {
+    /// Chooses the constants of each effect of a set from its grid, with the other effects fixed; two rounds at most.
+    pub(crate) fn choose_constants(&mut self, mut picks: Vec<SelectedEffect>) -> Vec<SelectedEffect> {
         let problem = self.problem;
+        // The constants of one effect depend on those of the others, so there is a second round.
         for _ in 0..2 {
             let before = picks.clone();
             for i in 0..picks.len() {
                 let candidate = picks[i].candidate;
+                // Only effects with a grid of constants have a choice.
                 match &problem.candidates[candidate].source {
-                    Source::Columns(choices) if choices.len() > 1 => {}
+                    ColumnSource::Columns(choices) if choices.len() > 1 => {}
                     _ => continue,
                 }
                 let mut others = picks.clone();
                 let old = others.remove(i);
-                let beside = self.beside(&others);
+                let beside = self.conditioning_set(&others);
+                // The best choice of the grid must explain more than the present one.
                 let Some((best, explained)) = self.best_choice(candidate, &beside) else {
                     continue;
                 };
-                if explained > self.explained(&old.columns, &beside) {
-                    picks[i] = self.pick(candidate, best);
+                if explained > self.explained_squares(&old.columns, &beside) {
+                    picks[i] = self.select_choice(candidate, best);
                 }
             }
             if picks == before {
@@ -36,94 +40,105 @@ impl Bench<'_> {
         picks
     }
 
-    /// Searches for the constants of a set's effects between the values of their grids.
-    pub(crate) fn refine(&mut self, picks: Vec<Pick>) -> Vec<Pick> {
+    /// Searches the constants of a set's effects between the values of their grids.
+    pub(crate) fn refine_constants(&mut self, picks: Vec<SelectedEffect>) -> Vec<SelectedEffect> {
         let all = 0..picks.len();
-        self.refine_some(picks, all)
+        self.refine_members(picks, all)
     }
 
-    /// The same where one member is new in a set: of those that act on a drive on which it acts. Others feel it through the
-    /// base alone.
-    pub(crate) fn refine_around(&mut self, picks: Vec<Pick>, member: usize) -> Vec<Pick> {
-        let channels = self.acted_on(&picks[member..=member]);
-        let acts_there = |pick: &Pick| {
-            let own = self.acted_on(std::slice::from_ref(pick));
+    /// The same for one new member and for members that act on the same channels. Other members are affected through
+    /// the base only.
+    pub(crate) fn refine_around_member(&mut self, picks: Vec<SelectedEffect>, member: usize) -> Vec<SelectedEffect> {
+        let channels = self.affected_channels(&picks[member..=member]);
+        // Members that act on at least one of the channels of the new one.
+        let acts_there = |pick: &SelectedEffect| {
+            let own = self.affected_channels(std::slice::from_ref(pick));
             own.iter().any(|channel| channels.contains(channel))
         };
-        let near: Vec<usize> = (0..picks.len())
-            .filter(|i| acts_there(&picks[*i]))
-            .collect();
-        self.refine_some(picks, near)
+        let near: Vec<usize> = (0..picks.len()).filter(|i| acts_there(&picks[*i])).collect();
+        self.refine_members(picks, near)
     }
 
-    /// The same of some members.
-    pub(crate) fn refine_some(
+    /// The same for the members at some positions, one after the other. Members with none or several constants stay as
+    /// they are.
+    pub(crate) fn refine_members(
         &mut self,
-        mut picks: Vec<Pick>,
+        mut picks: Vec<SelectedEffect>,
         which: impl IntoIterator<Item = usize>,
-    ) -> Vec<Pick> {
+    ) -> Vec<SelectedEffect> {
         let problem = self.problem;
-        let supply = self.supply;
+        let supply = self.provider;
         for i in which {
             let candidate = picks[i].candidate;
+            // Exactly one searched constant is refined.
             let [(name, value)] = picks[i].constants.as_slice() else {
                 continue;
             };
             let (name, value) = (name.clone(), *value);
+            // Values of the constant that are known already.
             let mut grid: Vec<f64> = match &problem.candidates[candidate].source {
-                Source::Columns(choices) => choices.iter().map(|c| c.constants[0].1).collect(),
-                Source::Carried => vec![value / AROUND, value, value * AROUND],
+                ColumnSource::Columns(choices) => choices.iter().map(|c| c.constants[0].1).collect(),
+                ColumnSource::LoadDependent => vec![value / COARSE_SEARCH_FACTOR, value, value * COARSE_SEARCH_FACTOR],
                 _ => continue,
             };
+            // The grid limits the search: its ends and the neighbours of the present value.
             grid.sort_by(f64::total_cmp);
-            // Between its neighbours on the grid, but not far; beyond the grid's ends there is nothing to look for.
+            // Search between the neighbours on the grid, but not far, and not beyond the ends of the grid.
             let below = grid.iter().copied().filter(|x| *x < value);
             let above = grid.iter().copied().filter(|x| *x > value);
             let (mut low, mut high) = (
                 below.fold(f64::NEG_INFINITY, f64::max),
                 above.fold(f64::INFINITY, f64::min),
             );
-            // What is positive throughout is searched by its logarithm.
+            // A positive constant is searched on a logarithmic scale.
             let is_positive = grid.first().is_some_and(|first| *first > 0.0);
             if is_positive {
-                let is_costly = problem.candidates[candidate].source == Source::Carried;
+                let is_costly = problem.candidates[candidate].source == ColumnSource::LoadDependent;
+                // Limits relative to the present value; wider for the coarse search of load-dependent effects.
                 let [under, over] = if is_costly {
-                    [1.0 / AROUND, AROUND]
+                    [1.0 / COARSE_SEARCH_FACTOR, COARSE_SEARCH_FACTOR]
                 } else {
                     [0.7, 1.4]
                 };
                 low = low.max(under * value).max(grid[0]);
                 high = high.min(over * value).min(grid[grid.len() - 1]);
             }
+            // At an end of the grid the search stays on one side.
             low = if low.is_finite() { low } else { value };
             high = if high.is_finite() { high } else { value };
             if high <= low {
                 continue;
             }
+            // The search runs on the logarithm of a positive constant.
             let scale = |x: f64| if is_positive { x.ln() } else { x };
             let unscale = |x: f64| if is_positive { x.exp() } else { x };
             let mut others = picks.clone();
             others.remove(i);
-            let beside = self.beside(&others);
-            let load = (problem.candidates[candidate].source == Source::Carried)
-                .then(|| self.load(&picks));
-            let at = |x: f64| -> Option<(f64, Vec<Column>)> {
+            let beside = self.conditioning_set(&others);
+            // The load is that of the set with its present constants.
+            let load = (problem.candidates[candidate].source == ColumnSource::LoadDependent).then(|| self.load(&picks));
+            // What the effect explains in addition to the others with one value of the constant; `None` if it has no
+            // columns there.
+            let at = |x: f64| -> Option<(f64, Vec<ForceColumn>)> {
+                // Load-dependent columns need the load; others depend on the constant only.
                 let columns = match &load {
                     Some(load) => {
-                        let which = Carried::One(candidate, Some(unscale(x)));
-                        supply.carried(load, which).pop()?.1.columns
+                        let which = LoadDependentQuery::One(candidate, Some(unscale(x)));
+                        supply.load_dependent_columns(load, which).pop()?.1.columns
                     }
-                    None => supply.finer(candidate, unscale(x))?,
+                    None => supply.columns_for_constant(candidate, unscale(x))?,
                 };
-                Some((self.explained_by(&columns, &beside), columns))
+                Some((self.explained_by_columns(&columns, &beside), columns))
             };
-            let Some(best) = largest(scale(low), scale(high), &at) else {
+            let Some(best) = maximise(scale(low), scale(high), &at) else {
                 continue;
             };
-            let now = self.explained(&picks[i].columns, &beside);
+            // What the effect explains with its present constant.
+            let now = self.explained_squares(&picks[i].columns, &beside);
             let (x, (explained, columns)) = best;
+            // Only an improvement is kept, so that only its columns enter the pool.
             if explained > now {
-                picks[i] = Pick {
+                picks[i] = SelectedEffect {
                     candidate,
                     constants: vec![(name, unscale(x))],
                     rank: picks[i].rank,
@@ -135,36 +150,39 @@ impl Bench<'_> {
     }
 }
 
-/// Half of how near the place of a largest value is found at worst, as a share of the interval.
+/// Half of the tolerance of the position of a maximum, as a share of the interval.
 const NEAR: f64 = 0.003;
-/// How often a function is asked for its largest value; no more than golden sections alone would need.
-const ASKED: usize = 14;
+/// Largest number of evaluations of a function, which is no more than golden section search would need.
+const MAX_EVALUATIONS: usize = 14;
 
-/// Where a function is largest between two bounds, and what it is there: by parabolas through the best three values, and by
-/// golden sections where these lead nowhere (R. P. Brent, Algorithms for Minimization without Derivatives, 1973, ch. 5).
-fn largest<T>(
-    mut low: f64,
-    mut high: f64,
-    at: &dyn Fn(f64) -> Option<(f64, T)>,
-) -> Option<(f64, (f64, T))> {
+/// Maximum of a function between two bounds: its position and the value there, with what `at` returned. Uses parabolas
+/// through the best three points, and golden section steps where these fail (R. P. Brent, Algorithms for Minimization
+/// without Derivatives, 1973, ch. 5). `None` if the function has no value at a point.
+fn maximise<T>(mut low: f64, mut high: f64, at: &dyn Fn(f64) -> Option<(f64, T)>) -> Option<(f64, (f64, T))> {
     let golden = 0.5 * (3.0 - 5.0_f64.sqrt());
+    // Tolerance of the position.
     let near = NEAR * (high - low);
+    // The first point divides the interval in the golden section.
     let mut best = low + golden * (high - low);
     let mut of_best = at(best)?;
-    // The second and the third best, with their values; there are no parabolas before there are three.
+    // The second and third best points with their values; parabolas need three points.
     let mut second = (best, f64::NEG_INFINITY);
     let mut third = second;
     let (mut step, mut step_before) = (0.0_f64, 0.0_f64);
-    for _ in 1..ASKED {
+    for _ in 1..MAX_EVALUATIONS {
+        // Stop when the interval around the best point is small enough.
         let middle = 0.5 * (low + high);
         if (best - middle).abs() + 0.5 * (high - low) <= 2.0 * near {
             break;
         }
+        // Vertex of the parabola through the three points, relative to the best one.
         let r = (best - second.0) * (third.1 - of_best.0);
         let q = (best - third.0) * (second.1 - of_best.0);
         let p = (best - third.0) * q - (best - second.0) * r;
         let q = 2.0 * (q - r);
         let parabola = -p / q;
+        // Accept it if it lies inside the interval and the steps shrink; else take a golden section step into the
+        // larger part.
         let halves = parabola.abs() < 0.5 * step_before.abs();
         let is_inside = (low + near..=high - near).contains(&(best + parabola));
         (step_before, step) = if halves && is_inside {
@@ -173,13 +191,10 @@ fn largest<T>(
             let side = if best < middle { high } else { low } - best;
             (side, golden * side)
         };
-        let x = best
-            + if step.abs() < near {
-                near.copysign(step)
-            } else {
-                step
-            };
+        // Points closer than the tolerance are not distinguished.
+        let x = best + if step.abs() < near { near.copysign(step) } else { step };
         let of_x = at(x)?;
+        // Narrow the interval and keep the three best points.
         if of_x.0 >= of_best.0 {
             *(if x < best { &mut high } else { &mut low }) = best;
             third = second;
@@ -204,8 +219,8 @@ mod tests {
 
     use super::*;
 
-    /// Curves with one top, of which some are flat, bent or at an end: the place is found, and more seldom asked for than by
-    /// golden sections alone.
+    /// Curves with one maximum, some of them flat, with a kink or with the maximum at an end: it is found with fewer
+    /// evaluations than by golden section search.
     #[test]
     fn largest_values_are_found() {
         type Curve = fn(f64) -> f64;
@@ -222,13 +237,13 @@ mod tests {
                 asked.set(asked.get() + 1);
                 Some((curve(x), ()))
             };
-            let (x, (value, ())) = largest(0.0, 1.0, &at).expect("a value");
+            let (x, (value, ())) = maximise(0.0, 1.0, &at).expect("a value");
             assert!((x - top).abs() <= 2.0 * NEAR, "{name}: {x}");
             assert!((value - curve(x)).abs() < 1e-15, "{name}");
-            assert!(asked.get() <= ASKED, "{name}: {}", asked.get());
+            assert!(asked.get() <= MAX_EVALUATIONS, "{name}: {}", asked.get());
         }
         let asked = Cell::new(0);
-        largest(0.0, 1.0, &|x: f64| {
+        maximise(0.0, 1.0, &|x: f64| {
             asked.set(asked.get() + 1);
             Some((1.0 - (x - 0.3).powi(2), ()))
         });
@@ -237,6 +252,6 @@ mod tests {
 
     #[test]
     fn nothing_is_found_where_nothing_is_said() {
-        assert!(largest::<()>(0.0, 1.0, &|_| None).is_none());
+        assert!(maximise::<()>(0.0, 1.0, &|_| None).is_none());
     }
 }

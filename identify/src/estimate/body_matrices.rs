@@ -1,4 +1,4 @@
-//! Bodies as matrices that must be positive definite: pseudo-inertias, and how far a body is from its nominal one.
+//! Matrices that are positive definite for possible bodies: pseudo-inertias, and their distance from the nominal ones.
 
 use nalgebra::DMatrix;
 
@@ -7,18 +7,18 @@ use crate::estimate::error::PhysicalError;
 /// A matrix as a function of the physical parameters.
 pub type MatrixMap<'a> = Box<dyn Fn(&[f64]) -> DMatrix<f64> + 'a>;
 
-/// What must be positive definite for a body to be possible, as a function of the physical parameters.
+/// A matrix that is positive definite if a body is possible, as a function of the physical parameters.
 pub struct BodyMatrix<'a> {
-    /// Its name for people.
+    /// Name of the body in messages.
     pub name: String,
-    /// A symmetric matrix of fixed size; a mass or an inertia alone is one number.
+    /// Symmetric matrix of fixed size; 1 x 1 for a mass or an inertia alone.
     pub matrix: MatrixMap<'a>,
-    /// How often the matrix holds each of its numbers: 2 for [`planar_pseudo_inertia`], else 1.
+    /// How often the matrix contains each of its numbers: 2 for [`planar_pseudo_inertia`], else 1.
     pub copies: f64,
 }
 
-/// The pseudo-inertia of a body in space from mass, first moment (kg m) and inertia about the origin (xx, xy, xz, yy, yz,
-/// zz).
+/// Pseudo-inertia of a body in space from mass (kg), first moment (kg m) and inertia about the origin (xx, xy, xz, yy,
+/// yz, zz; kg m^2).
 pub fn pseudo_inertia(mass: f64, moment: [f64; 3], inertia: [f64; 6]) -> DMatrix<f64> {
     let [xx, xy, xz, yy, yz, zz] = inertia;
     let half = 0.5 * (xx + yy + zz);
@@ -47,8 +47,8 @@ pub fn pseudo_inertia(mass: f64, moment: [f64; 3], inertia: [f64; 6]) -> DMatrix
     )
 }
 
-/// The same for a body that is only seen turning about one axis: positive definite exactly if the mass is positive and so
-/// is the inertia about the axis through the centre. Every number stands in it twice.
+/// The same for a body that rotates about one axis only: positive definite exactly if the mass and the inertia about
+/// the axis through the centre are positive. It contains every number twice.
 pub fn planar_pseudo_inertia(mass: f64, moment: [f64; 2], inertia: f64) -> DMatrix<f64> {
     let [x, y] = moment;
     DMatrix::from_row_slice(
@@ -60,20 +60,22 @@ pub fn planar_pseudo_inertia(mass: f64, moment: [f64; 2], inertia: f64) -> DMatr
     )
 }
 
-/// The nominal matrix of a body, by its inverse root.
-pub(crate) struct Reference {
+/// Nominal matrix of a body, stored by its inverse root.
+pub(crate) struct NominalBodyMatrix {
     /// `L^-1` of `P0 = L L'`.
     root_inverse: DMatrix<f64>,
+    /// How often the matrix contains each of its numbers.
     pub(crate) copies: f64,
 }
 
-impl Reference {
+impl NominalBodyMatrix {
+    /// Factors the matrix at the nominal values; fails if the body is impossible there.
     pub(crate) fn new(body: &BodyMatrix<'_>, nominal: &[f64]) -> Result<Self, PhysicalError> {
         let matrix = (body.matrix)(nominal);
         let n = matrix.nrows();
         let impossible = || PhysicalError::NominalImpossible {
             body: body.name.clone(),
-            why: why_impossible(&matrix),
+            why: impossibility_reason(&matrix),
         };
         let cholesky = matrix.clone().cholesky().ok_or_else(impossible)?;
         let root_inverse = cholesky
@@ -82,10 +84,7 @@ impl Reference {
             .filter(|inverse| inverse.iter().all(|x| x.is_finite()))
             .ok_or_else(impossible)?;
         let copies = body.copies;
-        Ok(Self {
-            root_inverse,
-            copies,
-        })
+        Ok(Self { root_inverse, copies })
     }
 
     /// `L^-1 P L'^-1`, the identity at the nominal values.
@@ -100,7 +99,8 @@ impl Reference {
     }
 }
 
-fn why_impossible(matrix: &DMatrix<f64>) -> String {
+/// Why a matrix is not that of a possible body, as a clause for people.
+fn impossibility_reason(matrix: &DMatrix<f64>) -> String {
     let n = matrix.nrows();
     if n == 1 {
         return format!("{} is not positive", matrix[(0, 0)]);
@@ -109,7 +109,7 @@ fn why_impossible(matrix: &DMatrix<f64>) -> String {
     if mass.is_nan() || mass <= 0.0 {
         return format!("its mass {mass} kg is not positive");
     }
-    "its inertia about the centre of mass is not that of any distribution of mass (principal moments must be positive, and \
-     each at most the sum of the other two)"
+    "its inertia about the centre of mass is impossible (principal moments must be positive, and each at most the sum of \
+     the other two)"
         .to_owned()
 }

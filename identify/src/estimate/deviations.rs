@@ -1,10 +1,10 @@
-//! Standard deviations that allow for autocorrelated residuals: a solution and a second showing
-//! of its rows go in, the covariance of the parameters comes out.
+//! Standard deviations that allow for autocorrelated residuals. Input: a solution and a second pass over its rows;
+//! output: the covariance of the parameters.
 //!
-//! The residual of an identified mechanism is mostly what the model lacks, not white noise, so
-//! neighbouring samples repeat each other and the classical formula promises far too much.
-//! Each sample's influence on the parameters is `u_t = (W'W)^-1 sum_channels w_tc e_tc`, and
-//! the covariance of their sum is estimated from all `E[u_t u_(t+l)']`:
+//! The residual of an identified mechanism is mostly model error and not white noise. Neighbouring samples are
+//! therefore correlated, and the classical formula gives far too small standard deviations. Each sample's influence on
+//! the parameters is `u_t = (W'W)^-1 sum_channels w_tc e_tc`, and the covariance of their sum is estimated from all
+//! `E[u_t u_(t+l)']`:
 //!
 //! 1. Prewhitening of each parameter's influence by its own AR(1) coefficient `a`, at most 0.97
 //!    in size: D. W. K. Andrews and J. C. Monahan, Econometrica 60 (1992).
@@ -16,85 +16,82 @@
 //!    weights; never below `n + 1`, and never above a tenth of the samples.
 //! 4. Recolouring by `1/(1 - a)` and the factor `T/(T - n_parameters)`.
 //!
-//! All this is a limit of many samples: residuals of a fit are orthogonal to its columns, so with few of them their
-//! influences cancel and the estimate goes to nothing. [`Deviations::few_samples`] says when; then a deviation is never
-//! below the classical one, which takes the degrees of freedom off exactly.
+//! This is valid for many samples. Residuals of a fit are orthogonal to its columns, so with few samples their
+//! influences cancel and the estimate approaches zero. [`ParameterUncertainty::few_samples`] shows this case; then a
+//! standard deviation is never below the classical one, which uses the exact degrees of freedom.
 //!
-//! Bartlett's sum over lags is computed as the sum over all windows of `L` samples of
-//! `S_t S_t'/L`, `S_t` being the sum of the window: the same number, at a cost and a memory
-//! that do not grow with the lags times the parameters squared.
+//! Bartlett's sum over lags is computed as the sum over all windows of `L` samples of `S_t S_t'/L`, where `S_t` is the
+//! sum of the window: the same number, at a cost and a memory that do not grow with the lags times the parameters
+//! squared.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::estimate::error::LeastSquaresError;
-use crate::estimate::lags::{LagProducts, Windows, bandwidth, lags_for_bandwidth};
-use crate::estimate::rows::{Visit, check_rows};
-use crate::estimate::solution::Solution;
+use crate::estimate::lags::{BartlettWindows, LagProducts, bandwidth, lags_for_bandwidth};
+use crate::estimate::rows::{RowVisitor, check_rows};
+use crate::estimate::solution::RegressionSolution;
+use crate::estimate::thresholds::FEWEST_ROWS;
 
 /// Uncertainty of a solution. Lists are in the order of the regressor's columns.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Deviations {
-    /// Standard deviations; infinite for parameters that are not determined, NaN where there are no more rows than
-    /// parameters, for then residuals are rounding and say nothing.
+pub struct ParameterUncertainty {
+    /// Standard deviations; infinite for parameters that are not determined. NaN if there are no more rows than
+    /// parameters, since residuals are then rounding.
     pub std: Vec<f64>,
-    /// Covariance of the parameters; where a parameter is not determined, only of the part that is.
+    /// Covariance of the parameters; for an undetermined parameter only of the determined part.
     pub covariance: DMatrix<f64>,
-    /// For each parameter, how many independent samples would give the same deviation under the
+    /// For each parameter, the number of independent samples that would give the same standard deviation by the
     /// classical formula: `samples * (classical / std)^2`.
     pub effective_samples: Vec<f64>,
-    /// Correlation of each channel's residual with itself one sample later.
+    /// Correlation of each channel's residual with itself one sample later, `[channel]`.
     pub residual_lag1: Vec<f64>,
     /// Bandwidth of Bartlett's kernel, samples.
     pub bandwidth: usize,
-    /// Samples, each of all channels; rows of zeros do not count.
+    /// Number of samples, each of all channels; rows of zeros do not count.
     pub samples: usize,
-    /// True where there are fewer than [`FEWEST_ROWS`] equations for each parameter: the deviations are then no smaller
-    /// than the classical ones, and still too small if neighbouring residuals resemble each other.
+    /// True if there are fewer than [`FEWEST_ROWS`] equations for each parameter. The standard deviations are then at
+    /// least the classical ones, and still too small if neighbouring residuals are correlated.
     pub few_samples: bool,
 }
 
-/// Equations for each parameter below which the influences of samples cancel too much to be summed over lags.
-pub const FEWEST_ROWS: usize = 20;
-
-/// Standard deviations of `solution`, whose rows `show` presents again, block by block and in
-/// order of time; it is called twice.
+/// Standard deviations of `solution`. `show` presents its rows again, block by block and in order of time; it is called
+/// twice.
 ///
-/// Several recordings may be shown one after the other: the few products across the seams do
-/// not matter.
-/// Fails when `show` fails, or shows other rows than the solution was made from.
+/// Several recordings may be shown one after the other: the few products across their borders do not matter.
+/// Fails if `show` fails, or shows other rows than those of the solution.
 ///
 /// ```
-/// use modelmill_identify::{LeastSquares, LeastSquaresError, estimate::autocorrelated_deviations};
+/// use modelmill_identify::{LeastSquares, LeastSquaresError, estimate::uncertainty_with_autocorrelation};
 /// let regressor: Vec<f64> = (0..400).flat_map(|i| [1.0, f64::from(i)]).collect();
 /// let measured: Vec<f64> = (0..400).map(|i| 3.0 + 2.0 * f64::from(i) + f64::from(i % 7)).collect();
 /// let mut regression = LeastSquares::new(2);
 /// regression.add_rows(&regressor, &measured)?;
 /// let solution = regression.solve()?;
-/// let deviations = autocorrelated_deviations(&solution, 1, |visit| visit(&regressor, &measured))?;
+/// let deviations = uncertainty_with_autocorrelation(&solution, 1, |visit| visit(&regressor, &measured))?;
 /// assert!(deviations.std[1] < 1e-2);
 /// # Ok::<(), LeastSquaresError>(())
 /// ```
-pub fn autocorrelated_deviations<E: From<LeastSquaresError>>(
-    solution: &Solution,
+pub fn uncertainty_with_autocorrelation<E: From<LeastSquaresError>>(
+    solution: &RegressionSolution,
     channels: usize,
-    mut show: impl FnMut(&mut Visit<'_>) -> Result<(), E>,
-) -> Result<Deviations, E> {
-    let mut scores = Scores::new(solution, channels.max(1));
-    from_influences(solution, channels, |take| scores.run(&mut show, take))
+    mut show: impl FnMut(&mut RowVisitor<'_>) -> Result<(), E>,
+) -> Result<ParameterUncertainty, E> {
+    let mut scores = InfluenceScores::new(solution, channels.max(1));
+    from_influences(solution, channels, |take| scores.show_influences(&mut show, take))
 }
 
-/// Takes each sample's influence on the parameters and its residuals.
-pub(crate) type Take<'a> = dyn FnMut(&[f64], &[f64]) + 'a;
+/// Receives each sample's influence on the parameters and its residuals.
+pub(crate) type InfluenceSink<'a> = dyn FnMut(&[f64], &[f64]) + 'a;
 
-/// Deviations from a showing of each sample's influence, which is made twice.
+/// Standard deviations from each sample's influence; `run` presents the influences and is called twice.
 pub(crate) fn from_influences<E>(
-    solution: &Solution,
+    solution: &RegressionSolution,
     channels: usize,
-    mut run: impl FnMut(&mut Take<'_>) -> Result<(), E>,
-) -> Result<Deviations, E> {
+    mut run: impl FnMut(&mut InfluenceSink<'_>) -> Result<(), E>,
+) -> Result<ParameterUncertainty, E> {
     let n = solution.values.len();
     let channels = channels.max(1);
-    // Lags are counted in time, which goes on where rows are left out; what the rows are worth is not.
+    // Lags are counted in time, including rows that are left out; the number of samples excludes these.
     let samples = solution.rows.div_ceil(channels);
     let steps = solution.shown / channels;
     let lags = lags_for_bandwidth(steps);
@@ -105,29 +102,24 @@ pub(crate) fn from_influences<E>(
         residuals.push(errors);
     })?;
 
-    let whitening: Vec<f64> = (0..n)
-        .map(|j| memory.correlation(1, j).clamp(-0.97, 0.97))
-        .collect();
+    // Second pass: prewhitened influences, summed with Bartlett's kernel.
+    let whitening: Vec<f64> = (0..n).map(|j| memory.correlation(1, j).clamp(-0.97, 0.97)).collect();
     let bandwidth = bandwidth(&memory, &whitening, lags, steps);
 
-    let mut windows = Windows::new(n, bandwidth);
+    let mut windows = BartlettWindows::new(n, bandwidth);
     let mut previous = vec![0.0; n];
     let mut white = vec![0.0; n];
     let mut first = true;
     run(&mut |influence, _| {
         for j in 0..n {
-            white[j] = influence[j]
-                - if first {
-                    0.0
-                } else {
-                    whitening[j] * previous[j]
-                };
+            white[j] = influence[j] - if first { 0.0 } else { whitening[j] * previous[j] };
         }
         previous.copy_from_slice(influence);
         first = false;
         windows.push(&white);
     })?;
 
+    // Recolour, and correct for the degrees of freedom.
     let freedom = samples.saturating_sub(n.div_ceil(channels)).max(1);
     let correction = samples as f64 / freedom as f64;
     let sum = windows.finish();
@@ -154,28 +146,26 @@ pub(crate) fn from_influences<E>(
         .zip(&solution.classical_std)
         .map(|(std, classical)| {
             if std.is_finite() {
-                // Residuals that alternate make deviations smaller than independent ones, but no more samples.
+                // Residuals that alternate in sign reduce the standard deviation, but do not add samples.
                 samples as f64 * (classical / std).powi(2).min(1.0)
             } else {
                 0.0
             }
         })
         .collect();
-    Ok(Deviations {
+    Ok(ParameterUncertainty {
         std,
         covariance,
         effective_samples,
-        residual_lag1: (0..channels)
-            .map(|channel| residuals.correlation(1, channel))
-            .collect(),
+        residual_lag1: (0..channels).map(|channel| residuals.correlation(1, channel)).collect(),
         bandwidth,
         samples,
         few_samples,
     })
 }
 
-/// Raises variances that lie below the classical ones up to them; correlations stay.
-fn raise_to_classical(covariance: &mut DMatrix<f64>, solution: &Solution) {
+/// Raises variances that are below the classical ones; correlations stay.
+fn raise_to_classical(covariance: &mut DMatrix<f64>, solution: &RegressionSolution) {
     for i in 0..solution.values.len() {
         let classical = solution.classical_std[i].powi(2);
         let variance = covariance[(i, i)];
@@ -193,21 +183,22 @@ fn raise_to_classical(covariance: &mut DMatrix<f64>, solution: &Solution) {
     }
 }
 
-/// Shows each sample's influence on the parameters and its residuals.
-struct Scores<'a> {
-    solution: &'a Solution,
+/// Computes each sample's influence on the parameters and its residuals.
+struct InfluenceScores<'a> {
+    solution: &'a RegressionSolution,
     channels: usize,
 }
 
-impl<'a> Scores<'a> {
-    fn new(solution: &'a Solution, channels: usize) -> Self {
+impl<'a> InfluenceScores<'a> {
+    fn new(solution: &'a RegressionSolution, channels: usize) -> Self {
         Self { solution, channels }
     }
 
-    fn run<E: From<LeastSquaresError>>(
+    /// Passes influence and residuals of every sample to `take`; fails if the rows differ from those of the solution.
+    fn show_influences<E: From<LeastSquaresError>>(
         &mut self,
-        show: &mut impl FnMut(&mut Visit<'_>) -> Result<(), E>,
-        take: &mut Take<'_>,
+        show: &mut impl FnMut(&mut RowVisitor<'_>) -> Result<(), E>,
+        take: &mut InfluenceSink<'_>,
     ) -> Result<(), E> {
         let n = self.solution.values.len();
         let to_parameters = self.solution.unit_covariance();
@@ -228,13 +219,10 @@ impl<'a> Scores<'a> {
                 .chunks_exact(n * self.channels)
                 .zip(measured.chunks_exact(self.channels));
             for (sample, measured) in samples {
+                // Gradient of the sample: its rows times their residuals, summed over the channels.
                 gradient.fill(0.0);
                 for (channel, row) in sample.chunks_exact(n).enumerate() {
-                    let model: f64 = row
-                        .iter()
-                        .zip(&self.solution.values)
-                        .map(|(w, p)| w * p)
-                        .sum();
+                    let model: f64 = row.iter().zip(&self.solution.values).map(|(w, p)| w * p).sum();
                     let error = measured[channel] - model;
                     errors[channel] = error;
                     for (g, w) in gradient.iter_mut().zip(row) {
@@ -251,7 +239,7 @@ impl<'a> Scores<'a> {
         } else {
             Err(LeastSquaresError::PassesDiffer {
                 first: self.solution.shown,
-                now: rows,
+                this_pass: rows,
             }
             .into())
         }
@@ -262,26 +250,27 @@ impl<'a> Scores<'a> {
 mod tests {
     use super::*;
     use crate::LeastSquares;
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
 
-    /// As many rows as parameters leave residuals of rounding, from which nothing can be said.
+    /// With as many rows as parameters, residuals are rounding and contain no information.
     #[test]
     fn without_a_row_to_spare_there_is_no_deviation() {
         let (w, y) = ([1.0, 0.0, 1.0, 1.0], [1.0, 3.0]);
         let mut regression = LeastSquares::new(2);
         regression.add_rows(&w, &y).unwrap();
         let solution = regression.solve().unwrap();
-        let found: Result<Deviations, LeastSquaresError> =
-            autocorrelated_deviations(&solution, 1, |visit| visit(&w, &y));
+        let found: Result<ParameterUncertainty, LeastSquaresError> =
+            uncertainty_with_autocorrelation(&solution, 1, |visit| visit(&w, &y));
         assert!(found.unwrap().std.iter().all(|std| std.is_nan()));
     }
 
-    /// The classical deviation is exact for independent residuals, however few: `(y - W p) / std` then follows Student's
-    /// distribution, whose 2-sigma coverage for two degrees of freedom is 81.6 %, for eight 91.9 % (any table of t).
+    /// The classical deviation is exact for independent residuals, however few: `(y - W p) / std` then follows
+    /// Student's distribution, whose 2-sigma coverage for two degrees of freedom is 81.6 %, for eight 91.9 % (any table
+    /// of t).
     #[test]
     fn few_samples_cover_as_students_distribution_says() {
         for (samples, expected) in [(4, 0.816), (10, 0.919)] {
-            let mut noise = Noise::new(5);
+            let mut noise = TestNoise::new(5);
             let trials = 4000;
             let mut hits = 0;
             for _ in 0..trials {
@@ -292,8 +281,8 @@ mod tests {
                 let mut regression = LeastSquares::new(2);
                 regression.add_rows(&w, &y).unwrap();
                 let solution = regression.solve().unwrap();
-                let found: Result<Deviations, LeastSquaresError> =
-                    autocorrelated_deviations(&solution, 1, |visit| visit(&w, &y));
+                let found: Result<ParameterUncertainty, LeastSquaresError> =
+                    uncertainty_with_autocorrelation(&solution, 1, |visit| visit(&w, &y));
                 let found = found.unwrap();
                 assert!(found.few_samples);
                 for j in 0..2 {
@@ -311,10 +300,10 @@ mod tests {
 
     #[test]
     fn windows_are_bartletts_sum_over_lags() {
-        let mut noise = Noise::new(3);
+        let mut noise = TestNoise::new(3);
         let u: Vec<[f64; 2]> = (0..50).map(|_| [noise.normal(), noise.normal()]).collect();
         let length = 7;
-        let mut windows = Windows::new(2, length);
+        let mut windows = BartlettWindows::new(2, length);
         for values in &u {
             windows.push(values);
         }
@@ -323,8 +312,7 @@ mod tests {
             let mut expected = 0.0;
             for s in 0..50_usize {
                 for t in 0..50_usize {
-                    expected +=
-                        (1.0 - s.abs_diff(t) as f64 / length as f64).max(0.0) * u[s][i] * u[t][j];
+                    expected += (1.0 - s.abs_diff(t) as f64 / length as f64).max(0.0) * u[s][i] * u[t][j];
                 }
             }
             assert!((sum[(i, j)] - expected).abs() < 1e-10);
@@ -332,12 +320,12 @@ mod tests {
         }
     }
 
-    /// How often `|estimate - truth| <= 2 std` holds, by the honest and by the classical formula.
+    /// How often `|estimate - truth| <= 2 std` is true, by the autocorrelated and by the classical formula.
     fn coverage(correlation: f64, channels: usize) -> ([f64; 3], [f64; 3]) {
         let (trials, samples) = (400, 1500);
         let truth = [4.0, -2.0, 1.0];
         let mut hits = ([0.0; 3], [0.0; 3]);
-        let mut noise = Noise::new(11);
+        let mut noise = TestNoise::new(11);
         for _ in 0..trials {
             let (mut w, mut y) = (Vec::new(), Vec::new());
             let mut state = vec![0.0; channels];
@@ -357,13 +345,11 @@ mod tests {
             let mut regression = LeastSquares::new(3);
             regression.add_rows(&w, &y).unwrap();
             let solution = regression.solve().unwrap();
-            let honest =
-                autocorrelated_deviations(&solution, channels, |visit| visit(&w, &y)).unwrap();
+            let honest = uncertainty_with_autocorrelation(&solution, channels, |visit| visit(&w, &y)).unwrap();
             for j in 0..3 {
                 let error = (solution.values[j] - truth[j]).abs();
                 hits.0[j] += f64::from(u8::from(error <= 2.0 * honest.std[j])) / f64::from(trials);
-                hits.1[j] += f64::from(u8::from(error <= 2.0 * solution.classical_std[j]))
-                    / f64::from(trials);
+                hits.1[j] += f64::from(u8::from(error <= 2.0 * solution.classical_std[j])) / f64::from(trials);
             }
         }
         hits
@@ -373,19 +359,14 @@ mod tests {
     fn two_deviations_cover_95_percent_under_autocorrelation() {
         for (correlation, channels) in [(0.0, 1), (0.7, 1), (0.9, 1), (0.9, 2)] {
             let (honest, classical) = coverage(correlation, channels);
-            println!(
-                "correlation {correlation}, {channels} channels: honest {honest:.3?}, classical {classical:.3?}"
-            );
+            println!("correlation {correlation}, {channels} channels: honest {honest:.3?}, classical {classical:.3?}");
             for j in 0..3 {
                 assert!(
                     (0.90..=0.985).contains(&honest[j]),
                     "correlation {correlation}: {honest:?}"
                 );
                 if correlation >= 0.7 {
-                    assert!(
-                        classical[j] < 0.80,
-                        "correlation {correlation}: {classical:?}"
-                    );
+                    assert!(classical[j] < 0.80, "correlation {correlation}: {classical:?}");
                 }
             }
         }
@@ -393,23 +374,20 @@ mod tests {
 
     #[test]
     fn what_is_not_determined_has_no_finite_deviation() {
-        let w: Vec<f64> = (0..100)
-            .flat_map(|i| [1.0, f64::from(i % 3), 0.0])
-            .collect();
+        let w: Vec<f64> = (0..100).flat_map(|i| [1.0, f64::from(i % 3), 0.0]).collect();
         let y: Vec<f64> = (0..100).map(|i| f64::from(i % 5)).collect();
         let mut regression = LeastSquares::new(3);
         regression.add_rows(&w, &y).unwrap();
         let solution = regression.solve().unwrap();
-        let deviations = autocorrelated_deviations(&solution, 1, |visit| visit(&w, &y)).unwrap();
+        let deviations = uncertainty_with_autocorrelation(&solution, 1, |visit| visit(&w, &y)).unwrap();
         assert!(deviations.std[0].is_finite() && deviations.std[1].is_finite());
         assert!(deviations.std[2].is_infinite());
-        let other =
-            autocorrelated_deviations(&solution, 1, |visit| visit(&w[..30], &y[..10])).unwrap_err();
+        let other = uncertainty_with_autocorrelation(&solution, 1, |visit| visit(&w[..30], &y[..10])).unwrap_err();
         assert_eq!(
             other,
             LeastSquaresError::PassesDiffer {
                 first: 100,
-                now: 10
+                this_pass: 10
             }
         );
     }

@@ -1,15 +1,16 @@
-//! The minimum of misfit and divergence over physical parameters; the function is in [`physical`](super::physical).
+//! Minimum of misfit plus divergence over physical parameters; the function is in [`physical`](super::physical).
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::estimate::body_matrices::{BodyMatrix, Reference};
+use crate::estimate::body_matrices::{BodyMatrix, NominalBodyMatrix};
 use crate::estimate::error::PhysicalError;
 
-/// The base parameters for given physical parameters with their derivatives (rows: base parameters), in the order of the
+/// Base parameters as a function of physical parameters, with derivatives (rows: base parameters), in the order of the
 /// regressor's columns.
 pub type BaseMap<'a> = dyn Fn(&[f64]) -> (DVector<f64>, DMatrix<f64>) + 'a;
 
-/// Steps for differences: matrices are polynomials of low degree, so that central differences are nearly exact.
+/// Steps for central differences, in the units of the parameters; the matrices are polynomials of low degree, so the
+/// differences are nearly exact.
 pub(crate) fn step_scales(nominal: &[f64]) -> Vec<f64> {
     nominal
         .iter()
@@ -18,27 +19,35 @@ pub(crate) fn step_scales(nominal: &[f64]) -> Vec<f64> {
 }
 
 /// Misfit and divergence as a function of the physical parameters.
-pub(crate) struct Misfit<'a> {
-    /// In units of the noise.
+pub(crate) struct MisfitFunction<'a> {
+    /// R factor of the rows, divided by the standard deviation of the noise.
     pub(crate) r: DMatrix<f64>,
+    /// Right side, divided in the same way.
     pub(crate) right: DVector<f64>,
+    /// Base parameters of physical parameters.
     pub(crate) base: &'a BaseMap<'a>,
+    /// Matrices that must be positive definite.
     pub(crate) bodies: &'a [BodyMatrix<'a>],
-    pub(crate) references: Vec<Reference>,
+    /// The same matrices at the nominal values.
+    pub(crate) references: Vec<NominalBodyMatrix>,
+    /// Steps for differences, one per physical parameter.
     pub(crate) scales: Vec<f64>,
 }
 
 /// Value and derivatives at a point.
-pub(crate) struct Point {
+pub(crate) struct MisfitPoint {
+    /// Misfit plus weighted divergence.
     pub(crate) value: f64,
+    /// Its gradient with respect to the physical parameters.
     pub(crate) gradient: DVector<f64>,
-    /// Second derivatives by the recording (Gauss and Newton) and by the divergence.
+    /// Second derivatives of the misfit (Gauss-Newton).
     pub(crate) data: DMatrix<f64>,
+    /// Second derivatives of the divergence.
     pub(crate) prior: DMatrix<f64>,
 }
 
-impl Misfit<'_> {
-    /// The value; none outside.
+impl MisfitFunction<'_> {
+    /// Value at a point with a weight of the divergence; `None` if a body is impossible there.
     pub(crate) fn value(&self, x: &DVector<f64>, weight: f64) -> Option<f64> {
         let (p, _) = (self.base)(x.as_slice());
         let mut value = 0.5 * (&self.r * p - &self.right).norm_squared();
@@ -47,18 +56,14 @@ impl Misfit<'_> {
             let trace = relative.trace();
             let n = relative.nrows() as f64;
             let cholesky = relative.cholesky()?;
-            let log_det: f64 = cholesky
-                .l_dirty()
-                .diagonal()
-                .iter()
-                .map(|d| 2.0 * d.ln())
-                .sum();
+            let log_det: f64 = cholesky.l_dirty().diagonal().iter().map(|d| 2.0 * d.ln()).sum();
             value += weight * (trace - log_det - n) / reference.copies;
         }
         value.is_finite().then_some(value)
     }
 
-    pub(crate) fn at(&self, x: &DVector<f64>, weight: f64) -> Option<Point> {
+    /// Value and derivatives at a point; `None` if a body is impossible there.
+    pub(crate) fn evaluate_at(&self, x: &DVector<f64>, weight: f64) -> Option<MisfitPoint> {
         let n = x.len();
         let (p, jacobian) = (self.base)(x.as_slice());
         let residual = &self.r * p - &self.right;
@@ -70,7 +75,7 @@ impl Misfit<'_> {
             let relative = reference.relative(&(body.matrix)(x.as_slice()));
             let inverse = relative.cholesky()?.inverse();
             let mut moved = x.clone();
-            // Derivatives of the relative matrix, only by what it depends on.
+            // Derivatives of the relative matrix, only with respect to parameters on which it depends.
             let mut slopes: Vec<(usize, DMatrix<f64>)> = Vec::new();
             for i in 0..n {
                 let h = self.scales[i];
@@ -85,8 +90,8 @@ impl Misfit<'_> {
                 }
             }
             let factor = weight / reference.copies;
-            let turned: Vec<DMatrix<f64>> =
-                slopes.iter().map(|(_, slope)| &inverse * slope).collect();
+            // Gradient tr(S) - tr(P^-1 S) and second derivative tr(P^-1 S_i P^-1 S_j) of the divergence.
+            let turned: Vec<DMatrix<f64>> = slopes.iter().map(|(_, slope)| &inverse * slope).collect();
             for (k, (i, slope)) in slopes.iter().enumerate() {
                 gradient[*i] += factor * (slope.trace() - turned[k].trace());
                 for (l, (j, _)) in slopes.iter().enumerate().take(k + 1) {
@@ -98,7 +103,7 @@ impl Misfit<'_> {
                 }
             }
         }
-        Some(Point {
+        Some(MisfitPoint {
             value: self.value(x, weight)?,
             gradient,
             data,
@@ -106,21 +111,18 @@ impl Misfit<'_> {
         })
     }
 
-    /// Levenberg and Marquardt, with steps that stay where all bodies are possible.
-    pub(crate) fn minimise(
-        &self,
-        x: &mut DVector<f64>,
-        weight: f64,
-    ) -> Result<usize, PhysicalError> {
+    /// Minimises by the Levenberg-Marquardt method, with steps that keep all bodies possible. Returns the number of
+    /// iterations.
+    pub(crate) fn minimise(&self, x: &mut DVector<f64>, weight: f64) -> Result<usize, PhysicalError> {
         let mut damping = 1e-9;
         for iteration in 0..500 {
-            let point = self.at(x, weight).ok_or(PhysicalError::NoConvergence)?;
+            let point = self.evaluate_at(x, weight).ok_or(PhysicalError::NoConvergence)?;
             let second = &point.data + &point.prior;
             let mut moved = false;
             while !moved && damping < 1e9 {
                 let mut damped = second.clone();
                 for i in 0..x.len() {
-                    // What nothing depends on stays where it is.
+                    // A parameter without any influence stays constant.
                     damped[(i, i)] += damping * second[(i, i)];
                     if damped[(i, i)] == 0.0 {
                         damped[(i, i)] = 1.0;
@@ -132,10 +134,11 @@ impl Misfit<'_> {
                     continue;
                 };
                 let slope = point.gradient.dot(&step);
-                // Far below what shows: a unit is half a squared standard deviation.
+                // Negligible decrease: one unit is half a squared standard deviation.
                 if -slope <= 1e-8 * (1.0 + point.value.abs().min(1e4)) {
                     return Ok(iteration);
                 }
+                // Shorten the step until all bodies are possible and the value decreases enough.
                 let mut length = 1.0;
                 while length > 1e-6 {
                     let next = &*x + length * &step;
@@ -149,13 +152,14 @@ impl Misfit<'_> {
                     }
                     length *= 0.5;
                 }
+                // Short steps mean that the quadratic model is poor there.
                 damping = if length < 0.1 {
                     damping * 100.0
                 } else {
                     (damping * 0.01).max(1e-9)
                 };
             }
-            // Rounding hides what is left of the slope.
+            // No step decreases the value beyond rounding.
             if !moved {
                 return Ok(iteration);
             }
@@ -166,9 +170,7 @@ impl Misfit<'_> {
 
 /// Solves a positive definite system after scaling its diagonal to 1, since parameters differ in units.
 fn solve_scaled(matrix: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
-    let scale = matrix
-        .diagonal()
-        .map(|d| if d > 0.0 { d.sqrt().recip() } else { 1.0 });
+    let scale = matrix.diagonal().map(|d| if d > 0.0 { d.sqrt().recip() } else { 1.0 });
     let scaled = DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| {
         scale[i] * matrix[(i, j)] * scale[j]
     });

@@ -1,4 +1,4 @@
-//! Why parameters cannot be estimated, with what to do.
+//! Errors of estimates, with remedies.
 
 use std::fmt;
 
@@ -8,16 +8,16 @@ use std::fmt;
 pub enum LeastSquaresError {
     /// The regressor has no columns.
     NoParameters,
-    /// Rows and measured values do not fit together.
+    /// Rows and measured values do not match.
     Shape {
-        /// Numbers of the regressor given.
+        /// Number of values of the regressor.
         regressor: usize,
-        /// Measured values given.
+        /// Number of measured values.
         measured: usize,
-        /// Columns of the regressor.
+        /// Number of columns of the regressor.
         columns: usize,
     },
-    /// A block does not hold whole samples of all channels.
+    /// A block does not contain complete samples of all channels.
     Channels {
         /// Rows of the block.
         rows: usize,
@@ -26,7 +26,7 @@ pub enum LeastSquaresError {
     },
     /// A number of the regressor or of the measured values is NaN or infinite.
     NotFinite {
-        /// Row among all that were given, from 0.
+        /// Index of the row among all rows.
         row: usize,
         /// Column of the regressor; `None` for the measured value.
         column: Option<usize>,
@@ -42,17 +42,17 @@ pub enum LeastSquaresError {
     },
     /// The singular value iteration did not converge; only extreme numbers can cause it.
     NoConvergence,
-    /// The instruments say too little about the regressor.
+    /// The instruments contain too little information about the regressor.
     WeakInstruments {
         /// The smallest canonical correlation between both.
         correlation: f64,
     },
-    /// The second pass over the rows did not show the rows of the first.
+    /// The second pass over the rows differs from the first.
     PassesDiffer {
         /// Rows of the first pass.
         first: usize,
         /// Rows of this pass.
-        now: usize,
+        this_pass: usize,
     },
 }
 
@@ -60,35 +60,45 @@ impl fmt::Display for LeastSquaresError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NoParameters => f.write_str("there is no parameter to identify; the regressor has no columns"),
-            Self::Shape { regressor, measured, columns } => write!(
+            Self::Shape {
+                regressor,
+                measured,
+                columns,
+            } => write!(
                 f,
-                "{regressor} numbers of the regressor do not make {measured} rows of {columns} columns"
+                "the regressor has {regressor} numbers, but {measured} measured values need {measured} rows of {columns} columns"
             ),
             Self::Channels { rows, channels } => {
-                write!(f, "{rows} rows are not whole samples of {channels} channels; give whole samples in each block")
+                write!(
+                    f,
+                    "{rows} rows are not complete samples of {channels} channels; pass complete samples in each block"
+                )
             }
-            Self::NotFinite { row, column: Some(column) } => write!(
+            Self::NotFinite {
+                row,
+                column: Some(column),
+            } => write!(
                 f,
                 "column {column} of the regressor is not finite in row {row}; \
-                 is the mechanism out of reach or singular there?"
+                 check whether the mechanism is out of reach or singular there"
             ),
             Self::NotFinite { row, column: None } => write!(f, "the measured value of row {row} is not finite"),
             Self::NoRows => f.write_str("there are no samples to identify from"),
             Self::NominalLength { have, expected } => {
                 write!(f, "{have} nominal values were given for {expected} parameters")
             }
-            Self::NoConvergence => f.write_str(
-                "the singular values do not converge; the numbers of the regressor differ too much in size",
-            ),
+            Self::NoConvergence => {
+                f.write_str("the singular values do not converge; the numbers of the regressor differ too much in size")
+            }
             Self::WeakInstruments { correlation } => write!(
                 f,
                 "the instruments do not determine the parameters: the smallest canonical correlation between them and the \
-                 regressor is {correlation:.1e}; are they of the same motion, and in step with the recording? Does the \
-                 recording itself determine all parameters? Identify without instruments to see"
+                 regressor is {correlation:.1e}. Check that they belong to the same motion and are synchronous with the \
+                 recording. Identify without instruments to see whether the recording itself determines all parameters"
             ),
-            Self::PassesDiffer { first, now } => write!(
+            Self::PassesDiffer { first, this_pass: now } => write!(
                 f,
-                "the second pass showed {now} rows where the first showed {first}; show the same rows in all passes"
+                "the second pass had {now} rows, but the first had {first}; pass the same rows each time"
             ),
         }
     }
@@ -96,18 +106,18 @@ impl fmt::Display for LeastSquaresError {
 
 impl std::error::Error for LeastSquaresError {}
 
-/// Why no possible parameters were found.
+/// Why no physically possible parameters were found.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum PhysicalError {
-    /// A body is not possible with its nominal values, so that nothing can be near to them.
+    /// A body is impossible with its nominal values, which are the start of the search.
     NominalImpossible {
         /// The body.
         body: String,
         /// What is wrong with it.
         why: String,
     },
-    /// The iteration did not settle; only extreme numbers can cause it.
+    /// The iteration did not converge; only extreme numbers can cause it.
     NoConvergence,
 }
 
@@ -116,12 +126,12 @@ impl fmt::Display for PhysicalError {
         match self {
             Self::NominalImpossible { body, why } => write!(
                 f,
-                "the nominal values of {body} are those of no body: {why}; give nominal values that a body can have, as a \
-                 CAD system prints them"
+                "the nominal values of {body} are physically impossible: {why}; give values that a body can have, for \
+                 example from a CAD system"
             ),
-            Self::NoConvergence => {
-                f.write_str("the search for physical parameters did not settle; are the nominal values of the right size?")
-            }
+            Self::NoConvergence => f.write_str(
+                "the search for physical parameters did not converge; check the magnitudes of the nominal values",
+            ),
         }
     }
 }

@@ -1,59 +1,59 @@
-//! Essential parameters: a solution with its deviations goes in, the parameters that the recording
-//! supports come out, the others held at what was known of them before, or at zero.
+//! Essential parameters. Input: a solution with its uncertainty; output: the parameters that the recording supports.
+//! The others are fixed at their prior values, or at zero.
 //!
-//! Backward elimination by the largest relative standard deviation, as M. Gautier, "Optimal
-//! motion planning for robot's inertial parameters identification", CDC 1992, and A. Janot,
-//! P.-O. Vandanjon and M. Gautier, "A generic instrumental variable approach for industrial robot
-//! identification", IEEE Trans. CST 22 (2014), section V do it, until what has been left out
-//! would be missed. Their F-test counts every sample as independent, which on recordings finds
-//! everything significant; here the deviations allow for autocorrelation: Wald's statistic
-//! `d' C_DD^-1 d / q` of all parameters left out, `d` from where they are held, against
-//! `F(q, effective samples - n)`.
+//! Backward elimination by the largest relative standard deviation, following M. Gautier, "Optimal motion planning for
+//! robot's inertial parameters identification", CDC 1992, and A. Janot, P.-O. Vandanjon and M. Gautier, "A generic
+//! instrumental variable approach for industrial robot identification", IEEE Trans. CST 22 (2014), section V, until the
+//! omitted parameters would be significant. Their F-test counts every sample as independent, which finds everything
+//! significant on recordings. Here the standard deviations allow for autocorrelation: Wald's statistic `d' C_DD^-1 d /
+//! q` of all omitted parameters, with `d` relative to their fixed values, is compared with `F(q, effective samples -
+//! n)`.
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::estimate::deviations::Deviations;
+use crate::estimate::deviations::ParameterUncertainty;
 use crate::estimate::error::LeastSquaresError;
-use crate::estimate::solution::Solution;
-use crate::estimate::triangle::Triangle;
+use crate::estimate::solution::RegressionSolution;
+use crate::estimate::thresholds::{ESSENTIAL_SIGNIFICANCE, ESSENTIAL_WELL_DETERMINED};
+use crate::estimate::triangle::RFactor;
 
-/// When a parameter counts as essential.
+/// Limits for essential parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EssentialOptions {
     /// Parameters whose relative standard deviation is below this stay without a test.
     pub well_determined: f64,
-    /// A set whose absence is less probable by chance than this is not left out.
+    /// A set of parameters is not left out if its probability by chance is below this.
     pub significance: f64,
 }
 
 impl Default for EssentialOptions {
     fn default() -> Self {
         Self {
-            well_determined: 0.1,
-            significance: 0.05,
+            well_determined: ESSENTIAL_WELL_DETERMINED,
+            significance: ESSENTIAL_SIGNIFICANCE,
         }
     }
 }
 
 /// A parameter that was left out.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Dropped {
-    /// Its position.
+pub struct DroppedParameter {
+    /// Its index.
     pub parameter: usize,
-    /// Its standard deviation over its value when it was left out; infinite for what is not determined.
+    /// Its relative standard deviation when it was left out; infinite if it is not determined.
     pub relative_std: f64,
-    /// Probability that all left out so far are what they are held at and show as much by chance.
+    /// Probability that all parameters left out so far have their fixed values, and differ from them by chance only.
     pub probability: f64,
 }
 
 /// The parameters that a recording supports.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Essential {
-    /// Positions of those that stay, ascending.
+pub struct EssentialParameters {
+    /// Indices of those that stay, ascending.
     pub kept: Vec<usize>,
     /// Those that were left out, in that order.
-    pub dropped: Vec<Dropped>,
-    /// Values of all parameters; those left out are what they are held at.
+    pub dropped: Vec<DroppedParameter>,
+    /// Values of all parameters; those left out have their fixed values.
     pub values: Vec<f64>,
     /// Standard deviations that allow for autocorrelation; infinite for those left out.
     pub std: Vec<f64>,
@@ -63,29 +63,30 @@ pub struct Essential {
     pub condition_number: f64,
     /// The same for columns of norm 1.
     pub scaled_condition_number: f64,
-    /// Norm of the residual over that of all parameters, less 1.
-    pub rise: f64,
+    /// Relative increase of the norm of the residual (0.01 = 1 %).
+    pub residual_rise: f64,
 }
 
-/// Leaves out parameters until all others are needed.
+/// Leaves out parameters until all remaining ones are needed.
 ///
-/// `solution` and `deviations` are those of `triangle`; `held` is what parameters are that are left out: their nominal
-/// values, 0 where there is none. Fails only where a reduced problem cannot be solved.
-pub fn essential(
-    triangle: &Triangle,
-    solution: &Solution,
-    deviations: &Deviations,
+/// `solution` and `deviations` belong to `triangle`; `held` are the values at which omitted parameters are fixed:
+/// nominal values, or 0 without one. Fails only if a reduced problem cannot be solved.
+pub fn select_essential(
+    triangle: &RFactor,
+    solution: &RegressionSolution,
+    deviations: &ParameterUncertainty,
     held: &[f64],
     options: &EssentialOptions,
-) -> Result<Essential, LeastSquaresError> {
+) -> Result<EssentialParameters, LeastSquaresError> {
     let n = triangle.n_parameters();
     let mut dropped = Vec::new();
-    // Each undetermined direction starts with a parameter that no other one contains: without it nothing is lost.
+    // Each undetermined direction starts with a parameter that no other direction contains: it can be left out without
+    // loss.
     let mut kept: Vec<usize> = (0..n).collect();
     for direction in &solution.undetermined {
         let pivot = direction.changes[0].0;
         kept.retain(|j| *j != pivot);
-        dropped.push(Dropped {
+        dropped.push(DroppedParameter {
             parameter: pivot,
             relative_std: f64::INFINITY,
             probability: 1.0,
@@ -93,9 +94,9 @@ pub fn essential(
     }
     let r = triangle.r();
     let information = r.transpose() * &r;
-    // The covariance of the gradients is a property of the residuals; each choice of columns sees its own part.
+    // The covariance of the gradients depends on the residuals only; each choice of columns uses its part.
     let scores = &information * &deviations.covariance * &information;
-    let full = Choice::fit(triangle, &scores, held, kept)?;
+    let full = ReducedRegression::fit(triangle, &scores, held, kept)?;
     let mut effective: Vec<f64> = deviations
         .effective_samples
         .iter()
@@ -103,6 +104,7 @@ pub fn essential(
         .filter(|x| *x > 0.0)
         .collect();
     effective.sort_by(f64::total_cmp);
+    // Degrees of freedom from the median of the effective samples.
     let samples = effective
         .get(effective.len() / 2)
         .copied()
@@ -114,31 +116,26 @@ pub fn essential(
         let relative: Vec<f64> = (0..choice.columns.len())
             .map(|i| choice.relative_std(held, i))
             .collect();
-        let worst = (0..relative.len()).fold(0, |best, i| {
-            if relative[i] > relative[best] {
-                i
-            } else {
-                best
-            }
-        });
+        // Candidate: the parameter with the largest relative standard deviation.
+        let worst = (0..relative.len()).fold(0, |best, i| if relative[i] > relative[best] { i } else { best });
         if relative[worst] <= options.well_determined {
             break;
         }
         tested.push(choice.columns[worst]);
-        let probability = full.probability_of_zero(&tested, freedom);
+        let probability = full.wald_probability(&tested, freedom);
         if probability < options.significance {
             break;
         }
-        dropped.push(Dropped {
+        dropped.push(DroppedParameter {
             parameter: choice.columns[worst],
             relative_std: relative[worst],
             probability,
         });
         let mut columns = choice.columns.clone();
         columns.remove(worst);
-        choice = Choice::fit(triangle, &scores, held, columns)?;
+        choice = ReducedRegression::fit(triangle, &scores, held, columns)?;
     }
-    let mut found = Essential {
+    let mut found = EssentialParameters {
         kept: choice.columns.clone(),
         dropped,
         values: held.to_vec(),
@@ -146,37 +143,41 @@ pub fn essential(
         classical_std: vec![f64::INFINITY; n],
         condition_number: choice.solution.condition_number,
         scaled_condition_number: choice.solution.scaled_condition_number,
-        rise: choice.solution.residual_norm / solution.residual_norm - 1.0,
+        residual_rise: choice.solution.residual_norm / solution.residual_norm - 1.0,
     };
     for (i, j) in choice.columns.iter().enumerate() {
         found.values[*j] += choice.solution.values[i];
         found.std[*j] = choice.covariance[(i, i)].sqrt();
         found.classical_std[*j] = choice.solution.classical_std[i];
     }
-    if !found.rise.is_finite() {
-        found.rise = 0.0;
+    if !found.residual_rise.is_finite() {
+        found.residual_rise = 0.0;
     }
     Ok(found)
 }
 
-/// Some of the columns with their own solution: how far they are from what they would be held at.
+/// A regression with some of the columns; values are relative to the fixed ones.
 #[derive(Debug, Clone)]
-struct Choice {
+struct ReducedRegression {
+    /// Indices of the columns.
     columns: Vec<usize>,
-    solution: Solution,
+    /// Solution for them.
+    solution: RegressionSolution,
+    /// Covariance that allows for autocorrelation.
     covariance: DMatrix<f64>,
 }
 
-impl Choice {
+impl ReducedRegression {
+    /// Solves for some columns with the others fixed.
     fn fit(
-        triangle: &Triangle,
+        triangle: &RFactor,
         scores: &DMatrix<f64>,
         held: &[f64],
         columns: Vec<usize>,
     ) -> Result<Self, LeastSquaresError> {
         let solution = triangle
-            .from(held)
-            .only(&columns)?
+            .relative_to(held)
+            .select_columns(&columns)?
             .solve_near(&vec![0.0; columns.len()])?;
         let inverse = solution.unit_covariance();
         let part = scores.select_rows(&columns).select_columns(&columns);
@@ -187,19 +188,16 @@ impl Choice {
         })
     }
 
+    /// Standard deviation relative to the value of the i-th column.
     fn relative_std(&self, held: &[f64], i: usize) -> f64 {
         let value = held[self.columns[i]] + self.solution.values[i];
         let relative = self.covariance[(i, i)].sqrt() / value.abs();
-        // Nothing over nothing is a parameter that nobody misses.
-        if relative.is_nan() {
-            f64::INFINITY
-        } else {
-            relative
-        }
+        // A parameter with neither value nor deviation is not needed.
+        if relative.is_nan() { f64::INFINITY } else { relative }
     }
 
-    /// Wald's test of several parameters at once.
-    fn probability_of_zero(&self, parameters: &[usize], freedom: f64) -> f64 {
+    /// Probability by Wald's test that several parameters have their fixed values.
+    fn wald_probability(&self, parameters: &[usize], freedom: f64) -> f64 {
         let at: Vec<usize> = parameters
             .iter()
             .filter_map(|p| self.columns.iter().position(|column| column == p))
@@ -207,7 +205,7 @@ impl Choice {
         let values = DVector::from_fn(at.len(), |i, _| self.solution.values[at[i]]);
         let covariance = self.covariance.select_rows(&at).select_columns(&at);
         let Some(cholesky) = covariance.cholesky() else {
-            // Without noise everything that is not exactly zero is needed.
+            // Without noise every value that differs at all is needed.
             return if values.norm() > 0.0 { 0.0 } else { 1.0 };
         };
         let wald = values.dot(&cholesky.solve(&values));
@@ -232,9 +230,7 @@ fn incomplete_beta(x: f64, a: f64, b: f64) -> f64 {
     if x > (a + 1.0) / (a + b + 2.0) {
         return 1.0 - incomplete_beta(1.0 - x, b, a);
     }
-    let front = (a * x.ln() + b * (1.0 - x).ln() + log_gamma(a + b) - log_gamma(a) - log_gamma(b))
-        .exp()
-        / a;
+    let front = (a * x.ln() + b * (1.0 - x).ln() + log_gamma(a + b) - log_gamma(a) - log_gamma(b)).exp() / a;
     let tiny = 1e-300;
     let away = |value: f64| if value.abs() < tiny { tiny } else { value };
     let (mut c, mut d) = (1.0, 1.0 / away(1.0 - (a + b) * x / (a + 1.0)));
@@ -256,8 +252,8 @@ fn incomplete_beta(x: f64, a: f64, b: f64) -> f64 {
     front * fraction
 }
 
-/// Logarithm of the gamma function for positive arguments: Stirling's series (Abramowitz and Stegun, 6.1.41), shifted to
-/// where it is exact.
+/// Logarithm of the gamma function for positive arguments: Stirling's series (Abramowitz and Stegun, 6.1.41), shifted
+/// to arguments where it is exact.
 fn log_gamma(x: f64) -> f64 {
     let (mut x, mut shift) = (x, 0.0);
     while x < 12.0 {
@@ -272,8 +268,8 @@ fn log_gamma(x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimate::deviations::autocorrelated_deviations;
-    use crate::test_noise::Noise;
+    use crate::estimate::deviations::uncertainty_with_autocorrelation;
+    use crate::test_noise::TestNoise;
     use crate::{LeastSquares, LeastSquaresError};
 
     /// Tables of the F distribution (5 and 1 %), and its closed form for two degrees of freedom above.
@@ -293,12 +289,12 @@ mod tests {
         }
     }
 
-    /// Seven columns, of which two have no effect on the force and one repeats another; AR(1) noise. How often is the right
-    /// set found? A test that takes samples for independent would keep both null columns nearly always.
+    /// Seven columns, of which two have no effect on the force and one repeats another; AR(1) noise. How often is the
+    /// right set found? A test that takes samples for independent would keep both null columns nearly always.
     #[test]
     fn what_has_no_effect_is_left_out_also_under_autocorrelated_noise() {
         let truth = [4.0, -2.0, 0.0, 1.5, 0.0, 3.0, 0.0];
-        let mut noise = Noise::new(5);
+        let mut noise = TestNoise::new(5);
         let (mut right, trials) = (0, 60);
         for _ in 0..trials {
             let (mut w, mut y, mut e) = (Vec::new(), Vec::new(), 0.0);
@@ -322,9 +318,9 @@ mod tests {
             regression.add_rows(&w, &y).unwrap();
             let solution = regression.solve().unwrap();
             let deviations: Result<_, LeastSquaresError> =
-                autocorrelated_deviations(&solution, 1, |visit| visit(&w, &y));
-            let triangle = Triangle::new(&regression);
-            let found = essential(
+                uncertainty_with_autocorrelation(&solution, 1, |visit| visit(&w, &y));
+            let triangle = RFactor::new(&regression);
+            let found = select_essential(
                 &triangle,
                 &solution,
                 &deviations.unwrap(),
@@ -334,25 +330,22 @@ mod tests {
             .unwrap();
             assert!(found.dropped.iter().any(|d| d.relative_std.is_infinite()));
             // Of the two equal columns one stays, whichever.
-            let kept: Vec<usize> = found
-                .kept
-                .iter()
-                .map(|j| if *j == 6 { 0 } else { *j })
-                .collect();
+            let kept: Vec<usize> = found.kept.iter().map(|j| if *j == 6 { 0 } else { *j }).collect();
             right += i32::from([1, 3, 5, 0].iter().all(|j| kept.contains(j)) && kept.len() == 4);
             for j in [1, 3, 5] {
                 assert!((found.values[j] - truth[j]).abs() < 5.0 * found.std[j]);
             }
-            assert!(found.rise < 0.02);
+            assert!(found.residual_rise < 0.02);
         }
         assert!(right >= trials * 85 / 100, "{right} of {trials}");
     }
 
-    /// What the rows hardly tell stays at what is known of it, also where another column takes part of its place.
+    /// A parameter that the rows hardly determine stays at its prior value, even if another column could replace it in
+    /// part.
     #[test]
     fn what_is_not_supported_stays_where_it_is_held() {
         let truth = [4.0, 8.0, -3.0];
-        let mut noise = Noise::new(11);
+        let mut noise = TestNoise::new(11);
         let (mut w, mut y) = (Vec::new(), Vec::new());
         for i in 0..4000 {
             let t = 0.01 * f64::from(i);
@@ -365,26 +358,19 @@ mod tests {
         regression.add_rows(&w, &y).unwrap();
         let solution = regression.solve().unwrap();
         let deviations: Result<_, LeastSquaresError> =
-            autocorrelated_deviations(&solution, 1, |visit| visit(&w, &y));
+            uncertainty_with_autocorrelation(&solution, 1, |visit| visit(&w, &y));
         let deviations = deviations.unwrap();
-        let triangle = Triangle::new(&regression);
+        let triangle = RFactor::new(&regression);
         let options = EssentialOptions::default();
         let held = [0.0, 8.0, 0.0];
-        let found = essential(&triangle, &solution, &deviations, &held, &options).unwrap();
+        let found = select_essential(&triangle, &solution, &deviations, &held, &options).unwrap();
         assert_eq!(found.kept, [0, 2]);
         assert_eq!(found.values[1].to_bits(), 8.0_f64.to_bits());
         for j in [0, 2] {
             assert!((found.values[j] - truth[j]).abs() < 5.0 * found.std[j]);
         }
-        // What is well told moves away from where it would be held.
-        let found = essential(
-            &triangle,
-            &solution,
-            &deviations,
-            &[1.0, 8.0, 5.0],
-            &options,
-        )
-        .unwrap();
+        // A well determined parameter moves away from its fixed value.
+        let found = select_essential(&triangle, &solution, &deviations, &[1.0, 8.0, 5.0], &options).unwrap();
         assert_eq!(found.kept, [0, 2]);
     }
 }

@@ -1,30 +1,26 @@
 //! Least squares, eq. (12) of the paper: `p_min = argmin |W p - y|`, from a stream of rows.
 //!
-//! Rows go in block by block and are reduced at once by Householder reflections to the upper
-//! triangle `[R | Q'y]` with the residual norm in its corner, so the memory needed does not
-//! depend on the number of samples and the normal equations, which would square the condition
-//! number, are never formed. Rows of one channel are reduced together: the force of a joint does
-//! not depend on the links before it, and columns that are zero in a whole block cost nothing.
-//! Sources: G. H. Golub, "Numerical methods for solving linear least squares problems", Numer.
-//! Math. 7 (1965); J. Demmel et al., "Communication-optimal parallel and sequential QR and LU
-//! factorizations", SIAM J. Sci. Comput. 34 (2012) for the sequential tall-skinny form;
-//! A. van der Sluis (1969) for scaling columns to equal norm.
+//! Rows are added block by block and reduced at once by Householder reflections to the upper triangle `[R | Q'y]` with
+//! the residual norm in its corner. So the memory does not depend on the number of samples, and the normal equations,
+//! which would square the condition number, are never formed. Rows of one channel are reduced together: the force of a
+//! joint does not depend on the links before it, and columns that are zero in a complete block cost nothing.
+//! Sources: G. H. Golub, "Numerical methods for solving linear least squares problems", Numer. Math. 7 (1965); J.
+//! Demmel et al., "Communication-optimal parallel and sequential QR and LU factorizations", SIAM J. Sci. Comput. 34
+//! (2012) for the sequential tall-skinny form; A. van der Sluis (1969) for scaling columns to equal norm.
 
 use nalgebra::DMatrix;
 
 use crate::estimate::error::LeastSquaresError;
-use crate::estimate::reflections::{Block, LANES, fold};
-use crate::estimate::rows::{all_finite, check_rows, is_left_out};
-use crate::estimate::solution::{RowCount, Solution, solve_triangle};
+use crate::estimate::reflections::{HouseholderBlock, LANES, fold_into_factor};
+use crate::estimate::rows::{all_finite, check_rows, is_uninformative};
+use crate::estimate::solution::{RegressionSolution, RowCount, solve_r_factor};
 
-/// Numbers that are reduced together at most, so that they stay in the fastest caches.
+/// Largest number of values that are reduced together, so that they fit into the fastest caches.
 const BLOCK_NUMBERS: usize = 4096;
 
-/// Rows that are reduced together for that many columns.
+/// Number of rows that are reduced together for a number of columns.
 fn block_rows(width: usize) -> usize {
-    (BLOCK_NUMBERS / width)
-        .clamp(64, 512)
-        .next_multiple_of(LANES)
+    (BLOCK_NUMBERS / width).clamp(64, 512).next_multiple_of(LANES)
 }
 
 /// A regression that takes its rows block by block.
@@ -42,19 +38,19 @@ fn block_rows(width: usize) -> usize {
 pub struct LeastSquares {
     n_parameters: usize,
     rows: usize,
-    /// Rows of zeros among them.
-    idle: usize,
+    /// Number of rows of zeros among them.
+    zero_rows: usize,
     /// `(n + 1) x (n + 1)`, row-major upper triangle `[R, Q'y; 0, +-|residual|]`.
-    triangle: Vec<f64>,
+    augmented_factor: Vec<f64>,
     /// Rows per block.
     block_rows: usize,
-    /// For each channel a block of rows.
-    channels: Vec<Pending>,
+    /// A block of pending rows for each channel.
+    channels: Vec<PendingRows>,
 }
 
-/// Rows that wait to be reduced: `n + 1` columns of `block_rows`, filled up to `rows`.
+/// Pending rows: `n + 1` columns of `block_rows` values, filled up to `rows`.
 #[derive(Debug, Clone)]
-struct Pending {
+struct PendingRows {
     block: Vec<f64>,
     rows: usize,
 }
@@ -65,20 +61,20 @@ impl LeastSquares {
         Self::with_channels(n_parameters, 1)
     }
 
-    /// The same for rows that take turns between channels (`row = sample * channels + channel`): those of one channel are
-    /// reduced together, which saves work where a channel does not depend on all parameters. The result is the same.
+    /// The same for rows that are interleaved by channel (`row = sample * channels + channel`). Those of one channel
+    /// are reduced together, which saves work if a channel does not depend on all parameters. The result is the same.
     pub fn with_channels(n_parameters: usize, channels: usize) -> Self {
         let width = n_parameters + 1;
         let block_rows = block_rows(width);
-        let pending = Pending {
+        let pending = PendingRows {
             block: vec![0.0; width * block_rows],
             rows: 0,
         };
         Self {
             n_parameters,
             rows: 0,
-            idle: 0,
-            triangle: vec![0.0; width * width],
+            zero_rows: 0,
+            augmented_factor: vec![0.0; width * width],
             block_rows,
             channels: vec![pending; channels.max(1)],
         }
@@ -89,26 +85,23 @@ impl LeastSquares {
         self.n_parameters
     }
 
-    /// Rows taken so far.
+    /// Number of rows so far.
     pub fn rows(&self) -> usize {
         self.rows
     }
 
+    /// Number of all rows, and of those that are not zero.
     pub(crate) fn row_count(&self) -> RowCount {
         RowCount {
             shown: self.rows,
-            telling: self.rows - self.idle,
+            informative: self.rows - self.zero_rows,
         }
     }
 
-    /// Takes rows: `regressor[row * n_parameters + column]` and `measured[row]`.
-    /// To weigh a row, scale it and its measured value.
-    /// Fails when the lengths do not fit or a number is not finite; nothing is taken then.
-    pub fn add_rows(
-        &mut self,
-        regressor: &[f64],
-        measured: &[f64],
-    ) -> Result<(), LeastSquaresError> {
+    /// Adds rows: `regressor[row * n_parameters + column]` and `measured[row]`.
+    /// To weight a row, scale it and its measured value.
+    /// Fails if the lengths do not match or a number is not finite; then nothing is added.
+    pub fn add_rows(&mut self, regressor: &[f64], measured: &[f64]) -> Result<(), LeastSquaresError> {
         let n = self.n_parameters;
         check_rows(regressor, measured, n, self.rows)?;
         let n_channels = self.channels.len();
@@ -120,7 +113,7 @@ impl LeastSquares {
             }
             pending.block[n * stride + pending.rows] = *y;
             pending.rows += 1;
-            self.idle += usize::from(is_left_out(row, *y));
+            self.zero_rows += usize::from(is_uninformative(row, *y));
             if pending.rows == stride {
                 self.reduce_block(channel);
             }
@@ -129,8 +122,8 @@ impl LeastSquares {
         Ok(())
     }
 
-    /// Takes rows of one channel, column by column: the fastest way in. All columns are as long as `measured`.
-    /// Fails as [`LeastSquares::add_rows`] does; nothing is taken then.
+    /// Adds rows of one channel, column by column, which is the fastest way. All columns have the length of `measured`.
+    /// Fails as [`LeastSquares::add_rows`] does; then nothing is added.
     ///
     /// ```
     /// use modelmill_identify::LeastSquares;
@@ -157,10 +150,7 @@ impl LeastSquares {
                 columns: n,
             });
         }
-        let all = columns
-            .iter()
-            .map(|column| (*column, true))
-            .chain([(measured, false)]);
+        let all = columns.iter().map(|column| (*column, true)).chain([(measured, false)]);
         for (place, (column, is_regressor)) in all.enumerate() {
             if !all_finite(column)
                 && let Some(i) = column.iter().position(|value| !value.is_finite())
@@ -171,9 +161,9 @@ impl LeastSquares {
                 });
             }
         }
-        // Few measured values are zero, so that this costs next to nothing.
+        // Few measured values are zero, so this test costs little.
         let silent = measured.iter().enumerate().filter(|(_, y)| **y == 0.0);
-        self.idle += silent
+        self.zero_rows += silent
             .filter(|(i, _)| columns.iter().all(|column| column[*i] == 0.0))
             .count();
         let channel = channel % self.channels.len();
@@ -196,8 +186,8 @@ impl LeastSquares {
         Ok(())
     }
 
-    /// Folds in another regression for the same parameters, e.g. one that ran on another core.
-    /// Fails when the numbers of parameters differ.
+    /// Merges another regression for the same parameters, for example one that ran on another core. Fails if the
+    /// numbers of parameters differ.
     pub fn merge(&mut self, mut other: Self) -> Result<(), LeastSquaresError> {
         let n = self.n_parameters;
         if other.n_parameters != n {
@@ -207,62 +197,61 @@ impl LeastSquares {
             });
         }
         other.reduce();
-        let (rows, idle) = (self.rows + other.rows, self.idle + other.idle);
-        for row in other.triangle.chunks_exact(n + 1) {
+        let (rows, idle) = (self.rows + other.rows, self.zero_rows + other.zero_rows);
+        for row in other.augmented_factor.chunks_exact(n + 1) {
             self.add_rows(&row[..n], &row[n..])?;
         }
-        (self.rows, self.idle) = (rows, idle);
+        (self.rows, self.zero_rows) = (rows, idle);
         Ok(())
     }
 
-    /// Folds the pending rows of a channel into the triangle.
+    /// Reduces the pending rows of a channel into the R factor.
     fn reduce_block(&mut self, channel: usize) {
         let (stride, pending) = (self.block_rows, &mut self.channels[channel]);
         let rows = pending.rows.next_multiple_of(LANES);
         for column in pending.block.chunks_exact_mut(stride) {
             column[pending.rows..rows].fill(0.0);
         }
-        let block = Block {
+        let block = HouseholderBlock {
             columns: &mut pending.block,
             stride,
             rows,
         };
-        fold(&mut self.triangle, block);
+        fold_into_factor(&mut self.augmented_factor, block);
         pending.rows = 0;
     }
 
-    /// Folds all pending rows into the triangle.
+    /// Reduces all pending rows into the R factor.
     fn reduce(&mut self) {
         for channel in 0..self.channels.len() {
             self.reduce_block(channel);
         }
     }
 
-    /// The whole triangle `[R, Q'y; 0, +-|residual|]`, `(n + 1) x (n + 1)` by rows.
-    pub(crate) fn reduced(&self) -> Vec<f64> {
+    /// The complete factor `[R, Q'y; 0, +-|residual|]`, `(n + 1) x (n + 1)` by rows.
+    pub(crate) fn augmented_factor(&self) -> Vec<f64> {
         let mut complete = self.clone();
         complete.reduce();
-        complete.triangle
+        complete.augmented_factor
     }
 
-    /// The triangle `R` of the regressor, `n x n`: same singular values, same column norms and
-    /// same dependencies as the stacked regressor.
-    pub fn triangle(&self) -> DMatrix<f64> {
-        let (n, triangle) = (self.n_parameters, self.reduced());
+    /// The R factor of the regressor, `n x n`: it has the same singular values, column norms and dependencies as the
+    /// stacked regressor.
+    pub fn r_factor(&self) -> DMatrix<f64> {
+        let (n, triangle) = (self.n_parameters, self.augmented_factor());
         DMatrix::from_fn(n, n, |i, j| triangle[i * (n + 1) + j])
     }
 
-    /// The least-squares solution. Where the rows do not determine all parameters, the
-    /// undetermined directions keep the value 0 (in columns of equal norm: the shortest
-    /// solution), and [`Solution::undetermined`] names them.
-    /// Fails when there are no rows or no parameters.
-    pub fn solve(&self) -> Result<Solution, LeastSquaresError> {
+    /// The least squares solution. If the rows do not determine all parameters, the undetermined directions keep the
+    /// value 0 (in columns of equal norm: the shortest solution), and [`RegressionSolution::undetermined`] lists them.
+    /// Fails if there are no rows or no parameters.
+    pub fn solve(&self) -> Result<RegressionSolution, LeastSquaresError> {
         self.solve_near(&vec![0.0; self.n_parameters])
     }
 
-    /// [`LeastSquares::solve`], but undetermined directions stay at `nominal`. Determined
-    /// parameters do not depend on `nominal`.
-    pub fn solve_near(&self, nominal: &[f64]) -> Result<Solution, LeastSquaresError> {
+    /// As [`LeastSquares::solve`], but undetermined directions stay at `nominal`. Determined parameters do not depend
+    /// on `nominal`.
+    pub fn solve_near(&self, nominal: &[f64]) -> Result<RegressionSolution, LeastSquaresError> {
         let n = self.n_parameters;
         if n == 0 {
             return Err(LeastSquaresError::NoParameters);
@@ -276,7 +265,7 @@ impl LeastSquares {
         if self.rows == 0 {
             return Err(LeastSquaresError::NoRows);
         }
-        solve_triangle(&self.reduced(), self.row_count(), nominal)
+        solve_r_factor(&self.augmented_factor(), self.row_count(), nominal)
     }
 }
 
@@ -285,7 +274,7 @@ mod tests {
     use nalgebra::DVector;
 
     use super::*;
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
 
     #[track_caller]
     fn near(actual: f64, expected: f64, relative: f64) {
@@ -298,21 +287,16 @@ mod tests {
     /// 1 to degree 6 in 1000 points, in one go and in odd pieces, against nalgebra's own QR.
     #[test]
     fn streaming_equals_a_dense_solution() {
-        let mut noise = Noise::new(1);
+        let mut noise = TestNoise::new(1);
         let (n, rows) = (7, 1003);
-        let w = DMatrix::from_fn(rows, n, |i, j| {
-            (i as f64 / 500.0 - 1.0).powi(i32::try_from(j).unwrap())
-        });
+        let w = DMatrix::from_fn(rows, n, |i, j| (i as f64 / 500.0 - 1.0).powi(i32::try_from(j).unwrap()));
         let y = DVector::from_fn(rows, |i, _| (i as f64 / 100.0).sin() + 0.1 * noise.normal());
         let flat: Vec<f64> = w.transpose().iter().copied().collect();
         let mut pieces = LeastSquares::new(n);
         let mut done = 0;
         for size in [1, 2, 300, 5, 255, 256, 184] {
             pieces
-                .add_rows(
-                    &flat[done * n..(done + size) * n],
-                    &y.as_slice()[done..done + size],
-                )
+                .add_rows(&flat[done * n..(done + size) * n], &y.as_slice()[done..done + size])
                 .unwrap();
             done += size;
         }
@@ -329,39 +313,26 @@ mod tests {
         let covariance = (w.transpose() * &w).try_inverse().unwrap();
         let variance = (&w * &dense - &y).norm_squared() / (rows - n) as f64;
         for j in 0..n {
-            near(
-                solution.classical_std[j],
-                (variance * covariance[(j, j)]).sqrt(),
-                1e-9,
-            );
+            near(solution.classical_std[j], (variance * covariance[(j, j)]).sqrt(), 1e-9);
         }
         let mut halves = LeastSquares::new(n);
         let mut second = LeastSquares::new(n);
-        halves
-            .add_rows(&flat[..401 * n], &y.as_slice()[..401])
-            .unwrap();
-        second
-            .add_rows(&flat[401 * n..], &y.as_slice()[401..])
-            .unwrap();
+        halves.add_rows(&flat[..401 * n], &y.as_slice()[..401]).unwrap();
+        second.add_rows(&flat[401 * n..], &y.as_slice()[401..]).unwrap();
         halves.merge(second).unwrap();
         assert_eq!(halves.rows(), rows);
         near(halves.solve().unwrap().values[3], dense[3], 1e-11);
     }
 
-    /// Rows of three channels, of which the later ones do not see the first columns: by rows, by channels and by columns.
+    /// Rows of three channels, of which the later ones do not see the first columns: by rows, by channels and by
+    /// columns.
     #[test]
     fn channels_and_columns_reduce_to_the_same_triangle() {
-        let mut noise = Noise::new(6);
+        let mut noise = TestNoise::new(6);
         let (n, samples) = (11, 777);
         let sees = |channel: usize, j: usize| j >= 4 * channel;
         let w: Vec<f64> = (0..3 * samples * n)
-            .map(|i| {
-                if sees(i / n % 3, i % n) {
-                    noise.normal()
-                } else {
-                    0.0
-                }
-            })
+            .map(|i| if sees(i / n % 3, i % n) { noise.normal() } else { 0.0 })
             .collect();
         let y: Vec<f64> = (0..3 * samples).map(|_| noise.normal()).collect();
         let mut by_rows = LeastSquares::new(n);
@@ -416,9 +387,7 @@ mod tests {
         for i in 0..1000 {
             let t = f64::from(i) / 1000.0;
             let row = [1.0, 1.0 + 1e-8 * t];
-            regression
-                .add_rows(&row, &[3.0 * row[0] - 2.0 * row[1]])
-                .unwrap();
+            regression.add_rows(&row, &[3.0 * row[0] - 2.0 * row[1]]).unwrap();
         }
         let solution = regression.solve().unwrap();
         near(solution.values[0], 3.0, 1e-6);
@@ -432,7 +401,7 @@ mod tests {
         for i in 0..200 {
             let t = f64::from(i);
             let (a, b) = ((0.1 * t).sin(), (0.23 * t).cos());
-            // Columns: a, b, 2 a - or so they say - and nothing at all.
+            // Columns: a, b, 2 a, and zeros.
             regression
                 .add_rows(&[a, b, 2.0 * a, 0.0], &[7.0 * a + 5.0 * b])
                 .unwrap();
@@ -473,16 +442,8 @@ mod tests {
                 column: Some(1)
             }
         );
-        let error = regression
-            .add_rows(&[1.0, 2.0], &[f64::INFINITY])
-            .unwrap_err();
-        assert_eq!(
-            error,
-            LeastSquaresError::NotFinite {
-                row: 0,
-                column: None
-            }
-        );
+        let error = regression.add_rows(&[1.0, 2.0], &[f64::INFINITY]).unwrap_err();
+        assert_eq!(error, LeastSquaresError::NotFinite { row: 0, column: None });
         assert_eq!(regression.rows(), 0);
         assert_eq!(
             LeastSquares::new(0).solve().unwrap_err(),

@@ -1,14 +1,15 @@
-//! Base parameters from rows of a regressor and measured values, with what they are worth.
+//! Estimation of base parameters. Input: rows of a regressor and measured values; output: parameters with their
+//! uncertainty.
 //!
-//! Every estimator shows the rows again and again rather than keep them, or works on the triangle that they leave.
+//! Estimators read the rows several times instead of storing them, or work on the R factor of the rows.
 //!
-//! 1. [`LeastSquares`]: rows to a triangle, channel by channel, so that columns that are zero for a joint cost nothing;
-//!    [`Triangle`] is that triangle as a value, [`Solution`] what it says.
+//! 1. [`LeastSquares`]: QR factorisation of the rows, channel by channel, so that columns that are zero for a joint
+//!    cost nothing; [`RFactor`] is its result as a value, [`RegressionSolution`] the solution.
 //! 2. [`estimate`]: weights of channels and Huber's function by reweighted rows.
-//! 3. [`autocorrelated_deviations`]: covariance from the influence of each sample, whichever estimator made it.
-//! 4. On the triangle alone: [`with_prior`] (nominal values as soft constraints), [`essential`] (what the recording
-//!    supports), [`physical_parameters`] (what bodies can have).
-//! 5. [`instrumental`]: the triangle of instruments and regressor side by side, for states that are noisy themselves.
+//! 3. [`uncertainty_with_autocorrelation`]: covariance from the influence of each sample, for every estimator.
+//! 4. On the R factor alone: [`solve_with_prior`] (nominal values as soft constraints), [`select_essential`]
+//!    (parameters that the recording supports), [`physical_parameters`] (physically possible parameters).
+//! 5. [`estimate_with_instruments`]: R factor of instruments and regressor together, for noisy states.
 //!
 //! [`numeric_rank`] is eq. (9) on given values, and [`reduce_numerically`] the numeric fallback reduction.
 
@@ -28,27 +29,29 @@ mod reflections;
 mod reweighted;
 mod rows;
 mod solution;
+mod thresholds;
 mod triangle;
 mod undetermined;
 mod weighted_rows;
 
 pub use body_matrices::{BodyMatrix, MatrixMap, planar_pseudo_inertia, pseudo_inertia};
-pub use deviations::{Deviations, FEWEST_ROWS, autocorrelated_deviations};
+pub use deviations::{ParameterUncertainty, uncertainty_with_autocorrelation};
 pub use divergence::BaseMap;
 pub use error::{LeastSquaresError, PhysicalError};
-pub use essential::{Dropped, Essential, EssentialOptions, essential};
-pub use instruments::{Instrumented, instrumental};
+pub use essential::{DroppedParameter, EssentialOptions, EssentialParameters, select_essential};
+pub use instruments::{InstrumentalEstimate, estimate_with_instruments};
 pub use least_squares::LeastSquares;
 pub use numeric_rank::{
-    Dependency, NumericReduction, RegressorRank, condition_number, numeric_rank, reduce_numerically,
+    NumericDependency, NumericReduction, RegressorRank, condition_number, numeric_rank, reduce_numerically,
 };
 pub use physical::{NOMINAL_WEIGHT, PhysicalParameters, physical_parameters};
-pub use prior::{Belief, with_prior};
-pub use reweighted::{Estimate, EstimateOptions, HUBER_BOUND, estimate};
-pub use rows::Visit;
-pub use solution::{RANK_TOLERANCE, Solution};
-pub use triangle::Triangle;
-pub use undetermined::Direction;
-pub use weighted_rows::Weighting;
+pub use prior::{ParameterPrior, solve_with_prior};
+pub use reweighted::{EstimateOptions, WeightedEstimate, estimate};
+pub use rows::RowVisitor;
+pub use solution::RegressionSolution;
+pub use thresholds::{FEWEST_ROWS, HUBER_BOUND, RANK_TOLERANCE};
+pub use triangle::RFactor;
+pub use undetermined::NullDirection;
+pub use weighted_rows::RowWeighting;
 
 pub(crate) use undetermined::null_directions;

@@ -1,6 +1,5 @@
-//! Rank of a regressor on given values, eq. (9) of the paper, and the reduction that pivoted QR
-//! offers on them. Numeric throughout: valid for these values and these samples, to rounding;
-//! the exact reduction is another matter and another crate.
+//! Rank of a regressor at given values, eq. (9) of the paper, and the reduction by QR with column pivoting. Both are
+//! numeric: valid for these values and samples, up to rounding. The exact reduction is in another crate.
 //!
 //! Sources: G. H. Golub and C. F. Van Loan, "Matrix Computations", 5.5; M. Gautier, "Numerical
 //! calculation of the base inertial parameters of robots", J. Robotic Systems 8 (1991).
@@ -9,51 +8,49 @@ use nalgebra::{ColPivQR, DMatrix};
 use serde::{Deserialize, Serialize};
 
 use crate::estimate::error::LeastSquaresError;
+use crate::estimate::thresholds::NOISE_COLUMN_TOLERANCE;
 
 /// Rank of a regressor by its singular values.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RegressorRank {
-    /// Singular values of the regressor with all columns scaled to norm 1, largest first;
-    /// columns that are zero throughout add zeros.
+    /// Singular values of the regressor with all columns scaled to norm 1, largest first; columns of zeros add zeros.
     pub singular_values: Vec<f64>,
-    /// How many of them stand above the largest gap.
+    /// Number of singular values above the largest gap.
     pub rank: usize,
-    /// Ratio of the last singular value that counts to the first that does not (or to the level
-    /// of rounding, when that is higher or all count). Below some 1e3 the rank is a matter of
-    /// opinion.
+    /// Ratio of the last singular value that counts to the first that does not (or to the level of rounding, if that is
+    /// higher or all count). Below about 1e3 the rank is uncertain.
     pub gap: f64,
-    /// Ratio of the first singular value to the last one that counts, of the scaled columns.
+    /// Ratio of the largest singular value to the last one that counts, of the scaled columns.
     pub scaled_condition_number: f64,
     /// The same for the regressor as it is, in its units.
     pub condition_number: f64,
 }
 
-/// A numeric reduction: columns that are kept, and the others as combinations of them.
+/// A numeric reduction: columns that are kept, and the others as linear combinations of them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NumericReduction {
     /// Columns kept, in ascending order; as many as the rank.
     pub kept: Vec<usize>,
     /// The other columns, in ascending order.
-    pub dependencies: Vec<Dependency>,
+    pub dependencies: Vec<NumericDependency>,
     /// Largest residual of a dependency, relative to the norm of its column.
     pub largest_residual: f64,
 }
 
 /// `column = sum of factor * kept column`; no factors for a column that is zero throughout.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Dependency {
+pub struct NumericDependency {
     /// The column that is not kept.
     pub column: usize,
     /// `(kept column, factor)`, without factors that are zero to rounding.
     pub factors: Vec<(usize, f64)>,
 }
 
-/// The numeric rank of a stacked regressor, or of the triangle
-/// [`LeastSquares::triangle`](crate::LeastSquares::triangle) that stands for it.
+/// The numeric rank of a stacked regressor, or of its [`LeastSquares::r_factor`](crate::LeastSquares::r_factor).
 ///
-/// The rank is where the singular values of the scaled columns fall by the largest ratio; values
-/// below the level of rounding, `max(rows, columns) * epsilon * largest`, are taken as being at it.
-/// Fails when an entry is not finite or there are no columns.
+/// The rank is where the singular values of the scaled columns decrease by the largest ratio. Values below the level of
+/// rounding, `max(rows, columns) * epsilon * largest`, are treated as equal to it.
+/// Fails if an entry is not finite or there are no columns.
 pub fn numeric_rank(w: &DMatrix<f64>) -> Result<RegressorRank, LeastSquaresError> {
     let (scaled, _) = scale(w)?;
     let singular_values = singular_values(&scaled)?;
@@ -87,11 +84,11 @@ pub fn numeric_rank(w: &DMatrix<f64>) -> Result<RegressorRank, LeastSquaresError
     })
 }
 
-/// Ratio of the largest to the least singular value of a matrix as it is, in its units; `None` where the least one is at
-/// the level of rounding, so that the columns depend on each other.
-/// Fails when an entry is not finite or there are no columns.
+/// Ratio of the largest to the smallest singular value of a matrix in its units; `None` if the smallest is at the level
+/// of rounding, so that columns are dependent.
+/// Fails if an entry is not finite or there are no columns.
 pub fn condition_number(w: &DMatrix<f64>) -> Result<Option<f64>, LeastSquaresError> {
-    // Columns of unlike units are no sign of dependence: that is looked for once they are scaled.
+    // Different units are no dependence, so this is tested on scaled columns.
     let (scaled, _) = scale(w)?;
     let scaled = singular_values(&scaled)?;
     let floor = scaled[0] * f64::EPSILON * w.nrows().max(w.ncols()) as f64;
@@ -102,13 +99,10 @@ pub fn condition_number(w: &DMatrix<f64>) -> Result<Option<f64>, LeastSquaresErr
     Ok(Some(plain[0] / plain[plain.len() - 1]).filter(|c| c.is_finite()))
 }
 
-/// Which `rank` columns to keep, by QR with column pivoting on columns of norm 1, and the numeric
-/// factors of the others: the fallback where no exact reduction is at hand.
-/// Fails when an entry is not finite or there are no columns; `rank` is cut to what there is.
-pub fn reduce_numerically(
-    w: &DMatrix<f64>,
-    rank: usize,
-) -> Result<NumericReduction, LeastSquaresError> {
+/// Chooses `rank` columns by QR with column pivoting on columns of norm 1, with the numeric factors of the others: the
+/// fallback without an exact reduction.
+/// Fails if an entry is not finite or there are no columns; `rank` is limited to the possible rank.
+pub fn reduce_numerically(w: &DMatrix<f64>, rank: usize) -> Result<NumericReduction, LeastSquaresError> {
     let (scaled, norms) = scale(w)?;
     let n = w.ncols();
     let rank = rank
@@ -120,7 +114,7 @@ pub fn reduce_numerically(
     qr.p().permute_columns(&mut order);
     let mut kept: Vec<usize> = order.iter().copied().take(rank).collect();
     kept.sort_unstable();
-    // Once the columns are chosen, their own QR gives the factors in the order of the file.
+    // A QR factorisation of the chosen columns in the order of the file gives the factors.
     let basis = scaled.select_columns(&kept).qr();
     let (q, r) = (basis.q(), basis.r());
     let mut largest_residual: f64 = 0.0;
@@ -140,7 +134,7 @@ pub fn reduce_numerically(
                 }
             }
         }
-        dependencies.push(Dependency { column, factors });
+        dependencies.push(NumericDependency { column, factors });
     }
     Ok(NumericReduction {
         kept,
@@ -149,15 +143,11 @@ pub fn reduce_numerically(
     })
 }
 
-/// Columns whose norm is below this fraction of the largest one's are rounding noise, and count as zero: scaled to norm 1
-/// they would look like information.
-pub(crate) const NOISE_TOLERANCE: f64 = 1e-12;
-
-/// Sets norms that are rounding noise beside the largest one to zero.
-pub(crate) fn without_noise(norms: &mut [f64]) {
+/// Sets norms to zero that are rounding noise relative to the largest one.
+pub(crate) fn zero_noise_columns(norms: &mut [f64]) {
     let largest = norms.iter().copied().fold(0.0, f64::max);
     for norm in norms {
-        if *norm < NOISE_TOLERANCE * largest {
+        if *norm < NOISE_COLUMN_TOLERANCE * largest {
             *norm = 0.0;
         }
     }
@@ -178,7 +168,7 @@ fn scale(w: &DMatrix<f64>) -> Result<(DMatrix<f64>, Vec<f64>), LeastSquaresError
         });
     }
     let mut norms: Vec<f64> = w.column_iter().map(|column| column.norm()).collect();
-    without_noise(&mut norms);
+    zero_noise_columns(&mut norms);
     let mut scaled = w.clone();
     for (mut column, norm) in scaled.column_iter_mut().zip(&norms) {
         if *norm > 0.0 {
@@ -192,7 +182,7 @@ fn scale(w: &DMatrix<f64>) -> Result<(DMatrix<f64>, Vec<f64>), LeastSquaresError
 
 /// As many singular values as there are columns, largest first.
 fn singular_values(w: &DMatrix<f64>) -> Result<Vec<f64>, LeastSquaresError> {
-    // A tall matrix is reduced to its triangle first: same values, far less work.
+    // A tall matrix is reduced to its R factor first: same singular values, far less work.
     let small = if w.nrows() > w.ncols() {
         w.clone().qr().r()
     } else {
@@ -211,11 +201,11 @@ fn singular_values(w: &DMatrix<f64>) -> Result<Vec<f64>, LeastSquaresError> {
 mod tests {
     use super::*;
     use crate::LeastSquares;
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
 
     /// Six columns of rank 3 in very different units, one of them zero.
     fn sample() -> DMatrix<f64> {
-        let mut noise = Noise::new(8);
+        let mut noise = TestNoise::new(8);
         let free = DMatrix::from_fn(80, 3, |_, _| noise.normal());
         DMatrix::from_fn(80, 6, |i, j| match j {
             0 => free[(i, 0)],
@@ -231,10 +221,7 @@ mod tests {
     fn the_rank_stands_at_the_gap() {
         let rank = numeric_rank(&sample()).unwrap();
         assert_eq!(rank.rank, 3);
-        assert!(
-            rank.gap > 1e10 && rank.scaled_condition_number < 10.0,
-            "{rank:?}"
-        );
+        assert!(rank.gap > 1e10 && rank.scaled_condition_number < 10.0, "{rank:?}");
         assert_eq!(rank.singular_values.len(), 6);
         let full = numeric_rank(&sample().columns(0, 3).into_owned()).unwrap();
         assert_eq!(full.rank, 3);
@@ -265,10 +252,7 @@ mod tests {
             let row: Vec<f64> = row.iter().copied().collect();
             regression.add_rows(&row, &[0.0]).unwrap();
         }
-        let (direct, streamed) = (
-            numeric_rank(&w).unwrap(),
-            numeric_rank(&regression.triangle()).unwrap(),
-        );
+        let (direct, streamed) = (numeric_rank(&w).unwrap(), numeric_rank(&regression.r_factor()).unwrap());
         assert_eq!(direct.rank, streamed.rank);
         for (a, b) in direct.singular_values.iter().zip(&streamed.singular_values) {
             assert!((a - b).abs() < 1e-13);
@@ -299,7 +283,7 @@ mod tests {
     /// A column of rounding noise was scaled to norm 1 and counted.
     #[test]
     fn rounding_noise_is_no_column() {
-        let mut noise = Noise::new(5);
+        let mut noise = TestNoise::new(5);
         let w = DMatrix::from_fn(80, 3, |_, j| noise.normal() * [1e3, 1e-4, 1e-13][j]);
         let rank = numeric_rank(&w).unwrap();
         assert_eq!(rank.rank, 2);
@@ -313,10 +297,7 @@ mod tests {
             regression.add_rows(&row, &[row[0] + 2.0 * row[1]]).unwrap();
         }
         let solution = regression.solve_near(&[0.0, 0.0, 7.0]).unwrap();
-        assert_eq!(
-            (solution.rank, solution.values[2].to_bits()),
-            (2, 7.0_f64.to_bits())
-        );
+        assert_eq!((solution.rank, solution.values[2].to_bits()), (2, 7.0_f64.to_bits()));
         assert_eq!(solution.determined, [true, true, false]);
         assert!((solution.values[1] - 2.0).abs() < 1e-6);
     }
@@ -327,18 +308,7 @@ mod tests {
         assert!(numeric_rank(&DMatrix::zeros(0, 3)).is_err());
         assert!(numeric_rank(&DMatrix::from_element(3, 2, f64::NAN)).is_err());
         assert_eq!(numeric_rank(&DMatrix::zeros(5, 3)).unwrap().rank, 0);
-        assert_eq!(
-            reduce_numerically(&DMatrix::zeros(5, 3), 2)
-                .unwrap()
-                .kept
-                .len(),
-            0
-        );
-        assert_eq!(
-            numeric_rank(&DMatrix::from_element(2, 5, 1.0))
-                .unwrap()
-                .rank,
-            1
-        );
+        assert_eq!(reduce_numerically(&DMatrix::zeros(5, 3), 2).unwrap().kept.len(), 0);
+        assert_eq!(numeric_rank(&DMatrix::from_element(2, 5, 1.0)).unwrap().rank, 1);
     }
 }

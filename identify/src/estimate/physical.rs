@@ -1,6 +1,5 @@
-//! Parameters that bodies can have: reduced rows and a description of the bodies go in, physical
-//! parameters with positive definite pseudo-inertias come out, nearest to the nominal ones among
-//! those that fit the recording.
+//! Physically possible parameters. Input: reduced rows and a description of the bodies; output: physical parameters
+//! with positive definite pseudo-inertias that fit the recording and are nearest to the nominal ones.
 //!
 //! A body is possible if and only if its pseudo-inertia `[S h; h' m]`, `S = 1/2 tr(I) 1 - I`, is
 //! positive definite: P. M. Wensing, S. Kim and J.-J. E. Slotine, "Linear matrix inequalities for
@@ -9,72 +8,72 @@
 //! `1/2 |R p(x) - Q'y|^2 / s^2 + g sum_b D(P_b(x) | P_b(nominal))`,
 //! `D(P | P0) = tr(P0^-1 P) - log det(P0^-1 P) - 4`,
 //!
-//! is looked for over the physical parameters `x`, where `s` is the residuals' standard deviation
-//! with autocorrelation allowed for. `D` is the entropic (Bregman) divergence of T. Lee, P. M.
-//! Wensing and F. C. Park, "Geometric robot dynamic identification", IEEE T-RO 36 (2020): free of
-//! units and of the choice of frames, and infinite where a body ends to be possible, so that it
-//! keeps all of them inside; unlike the log-Cholesky parametrisation of C. Rucker and P. M. Wensing
-//! (RA-L 7, 2022) it needs no body with ten parameters of its own, so that parameters may be shared
-//! between bodies, and planar and lumped ones are treated alike. With a small `g` it decides only
-//! what the recording does not. The minimum is found by Gauss's and Newton's steps, damped after
-//! Levenberg and Marquardt and shortened to stay inside, with `g` falling from where both terms weigh alike.
+//! is taken over the physical parameters `x`, where `s` is the residuals' standard deviation with autocorrelation
+//! allowed for. `D` is the entropic (Bregman) divergence of T. Lee, P. M. Wensing and F. C. Park, "Geometric robot
+//! dynamic identification", IEEE T-RO 36 (2020). It does not depend on units or on the choice of frames, and it is
+//! infinite at the limit of possible bodies, so that all bodies stay possible. Unlike the log-Cholesky parametrisation
+//! of C. Rucker and P. M. Wensing (RA-L 7, 2022) it does not need ten parameters per body, so that parameters may be
+//! shared between bodies, and planar and lumped ones need no special treatment. With a small `g` it decides only what
+//! the recording does not. The minimum is found by Gauss-Newton steps, damped after Levenberg and Marquardt and
+//! shortened to stay inside, with `g` decreasing from a value at which both terms are equal.
 //!
-//! Decision: a physical parameter is determined by itself if its unit vector lies in the span of the rows. A
-//! variance that falls is no proof of that, because the limits of possible bodies and the nominal values of other
-//! parameters lower it too.
+//! Decision: a physical parameter is determined individually if its unit vector lies in the span of the rows. A lower
+//! variance is no proof of that, because the limits of possible bodies and the nominal values of other parameters lower
+//! it too.
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::estimate::body_matrices::{BodyMatrix, Reference};
-use crate::estimate::deviations::Deviations;
-use crate::estimate::divergence::{BaseMap, Misfit, step_scales};
+use crate::estimate::body_matrices::{BodyMatrix, NominalBodyMatrix};
+use crate::estimate::deviations::ParameterUncertainty;
+use crate::estimate::divergence::{BaseMap, MisfitFunction, step_scales};
 use crate::estimate::error::PhysicalError;
-use crate::estimate::prior::inflation;
-use crate::estimate::solution::Solution;
-use crate::estimate::triangle::Triangle;
+use crate::estimate::prior::variance_inflation;
+use crate::estimate::solution::RegressionSolution;
+use crate::estimate::thresholds::{INDIVIDUAL_MOST_OUTSIDE, PHYSICAL_SPAN_TOLERANCE};
+use crate::estimate::triangle::RFactor;
 
-/// Weight of the nominal values in the end; see the module.
+/// Final weight `g` of the nominal values.
 pub const NOMINAL_WEIGHT: f64 = 0.01;
 
-/// Directions below this share of the largest singular value are told by rounding only.
-const WITHIN_SPAN: f64 = 1e-10;
-
-/// Physical parameters that are possible.
+/// Physically possible parameters with their uncertainty.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PhysicalParameters {
-    /// All physical parameters.
+    /// Values of all physical parameters.
     pub parameters: Vec<f64>,
-    /// Their standard deviations if nominal values may be off by their own size (`g = 1`).
+    /// Their standard deviations if nominal values may be wrong by their own size (`g = 1`).
     pub std: Vec<f64>,
-    /// By how much the recording lowers the variance that the nominal values alone leave, 0 to 1; near 0 it is the nominal
-    /// value that one sees. What is not [`alone`](Self::alone) owes some of it to nominal values of others.
+    /// Relative decrease of the variance by the recording, compared with the nominal values alone, 0 to 1; near 0 the
+    /// value is the nominal one. For a parameter that is not
+    /// [`individually_determined`](Self::individually_determined), a part of it comes from nominal values of others.
     pub from_recording: Vec<f64>,
-    /// Whether the recording tells a parameter by itself. If not, it tells combinations of it with others only, and what
-    /// bodies can be and nominal values of the others share them out.
-    pub alone: Vec<bool>,
-    /// The base parameters that follow.
+    /// Whether the recording determines a parameter individually. If not, it determines only combinations with others,
+    /// and the limits of possible bodies and the nominal values divide them.
+    pub individually_determined: Vec<bool>,
+    /// Base parameters of these physical parameters.
     pub base: Vec<f64>,
     /// Their standard deviations.
     pub base_std: Vec<f64>,
     /// Norm of the residual.
     pub residual_norm: f64,
-    /// For each body the smallest eigenvalue of its matrix relative to the nominal one.
+    /// For each body the smallest eigenvalue of its matrix relative to the nominal one; near 0 the body is nearly
+    /// impossible.
     pub margins: Vec<f64>,
-    /// Steps that were made.
+    /// Number of iterations.
     pub iterations: usize,
 }
 
-/// Possible physical parameters that fit the rows of `triangle`, whose solution and deviations are given, nearest to
-/// `nominal`, at which every body must be possible.
+/// Finds possible physical parameters that fit the rows of `triangle` and are nearest to `nominal`, at which every body
+/// must be possible. `solution` and `deviations` belong to `triangle`.
 pub fn physical_parameters(
-    triangle: &Triangle,
-    solution: &Solution,
-    deviations: &Deviations,
+    triangle: &RFactor,
+    solution: &RegressionSolution,
+    deviations: &ParameterUncertainty,
     nominal: &[f64],
     base: &BaseMap<'_>,
     bodies: &[BodyMatrix<'_>],
 ) -> Result<PhysicalParameters, PhysicalError> {
-    let noise = (solution.residual_variance() * inflation(solution, deviations)).sqrt();
+    let noise = (solution.residual_variance() * variance_inflation(solution, deviations)).sqrt();
+    // Without noise the misfit would have infinite weight, so the noise is limited from below.
     let least = 1e-7 * solution.measured_norm / (solution.rows.max(1) as f64).sqrt();
     let noise = if noise > least {
         noise
@@ -83,11 +82,11 @@ pub fn physical_parameters(
     };
     let references = bodies
         .iter()
-        .map(|body| Reference::new(body, nominal))
+        .map(|body| NominalBodyMatrix::new(body, nominal))
         .collect::<Result<Vec<_>, _>>()?;
-    let problem = Misfit {
+    let problem = MisfitFunction {
         r: triangle.r() / noise,
-        right: triangle.right() / noise,
+        right: triangle.right_side() / noise,
         base,
         bodies,
         references,
@@ -95,19 +94,19 @@ pub fn physical_parameters(
     };
     let mut x = DVector::from_column_slice(nominal);
     let mut iterations = 0;
-    // From where nominal values and recording weigh alike, along the path of minima.
+    // Start with equal weights of nominal values and recording, then follow the minima as the weight decreases.
     let mut weight = problem.value(&x, 0.0).unwrap_or(1.0).max(1.0);
     while weight > NOMINAL_WEIGHT {
         weight = (weight * 0.1_f64).max(NOMINAL_WEIGHT);
         iterations += problem.minimise(&mut x, weight)?;
     }
-    // What is left open if nominal values may be off by their own size.
-    let point = problem.at(&x, 1.0).ok_or(PhysicalError::NoConvergence)?;
-    let inverse = invert(&(&point.data + &point.prior));
-    let before = invert(&point.prior);
+    // Uncertainty if nominal values may be wrong by their own size.
+    let point = problem.evaluate_at(&x, 1.0).ok_or(PhysicalError::NoConvergence)?;
+    let inverse = pseudo_inverse(&(&point.data + &point.prior));
+    let before = pseudo_inverse(&point.prior);
     let (p, slopes) = base(x.as_slice());
     let spread = &slopes * &inverse * slopes.transpose();
-    let misfit = triangle.right() - triangle.r() * &p;
+    let misfit = triangle.right_side() - triangle.r() * &p;
     let n = nominal.len();
     Ok(PhysicalParameters {
         std: (0..n).map(|i| inverse[(i, i)].max(0.0).sqrt()).collect(),
@@ -120,14 +119,10 @@ pub fn physical_parameters(
                 }
             })
             .collect(),
-        alone: told_alone(&(&problem.r * &slopes)),
-        residual_norm: misfit.norm().hypot(triangle.corner()),
+        individually_determined: individually_determined(&(&problem.r * &slopes)),
+        residual_norm: misfit.norm().hypot(triangle.residual_norm()),
         base: p.iter().copied().collect(),
-        base_std: spread
-            .diagonal()
-            .iter()
-            .map(|v| v.max(0.0).sqrt())
-            .collect(),
+        base_std: spread.diagonal().iter().map(|v| v.max(0.0).sqrt()).collect(),
         margins: problem
             .references
             .iter()
@@ -139,8 +134,9 @@ pub fn physical_parameters(
     })
 }
 
-/// Which unknowns of linear equations have a value of their own: those whose unit vector lies in the span of the rows.
-fn told_alone(rows: &DMatrix<f64>) -> Vec<bool> {
+/// Which unknowns of linear equations are determined individually: those whose unit vector lies in the span of the
+/// rows.
+fn individually_determined(rows: &DMatrix<f64>) -> Vec<bool> {
     let mut scaled = rows.clone();
     for mut column in scaled.column_iter_mut() {
         let norm = column.norm();
@@ -155,21 +151,22 @@ fn told_alone(rows: &DMatrix<f64>) -> Vec<bool> {
     };
     let mut within = vec![0.0; rows.ncols()];
     for (direction, value) in span.row_iter().zip(svd.singular_values.iter()) {
-        if *value > WITHIN_SPAN * largest {
+        if *value > PHYSICAL_SPAN_TOLERANCE * largest {
             for (sum, component) in within.iter_mut().zip(direction.iter()) {
                 *sum += component * component;
             }
         }
     }
-    within.iter().map(|share| *share > 1.0 - 1e-6).collect()
+    within
+        .iter()
+        .map(|share| *share > 1.0 - INDIVIDUAL_MOST_OUTSIDE)
+        .collect()
 }
 
-/// Inverse of a symmetric matrix where it has one; nothing is known along the rest, which is left away.
-fn invert(matrix: &DMatrix<f64>) -> DMatrix<f64> {
+/// Pseudo-inverse of a symmetric matrix with its diagonal scaled to 1; directions without information are left out.
+fn pseudo_inverse(matrix: &DMatrix<f64>) -> DMatrix<f64> {
     let n = matrix.nrows();
-    let scale = matrix
-        .diagonal()
-        .map(|d| if d > 0.0 { d.sqrt().recip() } else { 0.0 });
+    let scale = matrix.diagonal().map(|d| if d > 0.0 { d.sqrt().recip() } else { 0.0 });
     let scaled = DMatrix::from_fn(n, n, |i, j| scale[i] * matrix[(i, j)] * scale[j]);
     let eigen = scaled.symmetric_eigen();
     let mut inverse = DMatrix::zeros(n, n);
@@ -185,21 +182,17 @@ fn invert(matrix: &DMatrix<f64>) -> DMatrix<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimate::deviations::autocorrelated_deviations;
+    use crate::estimate::deviations::uncertainty_with_autocorrelation;
     use crate::estimate::{planar_pseudo_inertia, pseudo_inertia};
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
     use crate::{LeastSquares, LeastSquaresError};
 
     /// The pseudo-inertia of point masses: always possible, and exactly what a body is.
-    fn random_body(noise: &mut Noise) -> [f64; 10] {
+    fn random_body(noise: &mut TestNoise) -> [f64; 10] {
         let mut body = [0.0; 10];
         for _ in 0..6 {
             let m = noise.uniform();
-            let [x, y, z] = [
-                0.3 * noise.normal(),
-                0.2 * noise.normal(),
-                0.1 + 0.4 * noise.normal(),
-            ];
+            let [x, y, z] = [0.3 * noise.normal(), 0.2 * noise.normal(), 0.1 + 0.4 * noise.normal()];
             let one = [
                 m,
                 m * x,
@@ -220,11 +213,7 @@ mod tests {
     }
 
     fn matrix_of(x: &[f64]) -> DMatrix<f64> {
-        pseudo_inertia(
-            x[0],
-            [x[1], x[2], x[3]],
-            [x[4], x[5], x[6], x[7], x[8], x[9]],
-        )
+        pseudo_inertia(x[0], [x[1], x[2], x[3]], [x[4], x[5], x[6], x[7], x[8], x[9]])
     }
 
     /// Two bodies; of their 20 parameters 14 combinations are seen through a random regressor with noise.
@@ -238,7 +227,7 @@ mod tests {
     }
 
     fn case(seed: u64, sigma: f64) -> Case {
-        let mut noise = Noise::new(seed);
+        let mut noise = TestNoise::new(seed);
         let truth: Vec<f64> = [random_body(&mut noise), random_body(&mut noise)].concat();
         let nominal: Vec<f64> = [random_body(&mut noise), random_body(&mut noise)].concat();
         let map = DMatrix::from_fn(14, 20, |_, _| noise.normal());
@@ -246,9 +235,7 @@ mod tests {
         let (mut w, mut y) = (Vec::new(), Vec::new());
         for _ in 0..400 {
             let row: Vec<f64> = (0..14).map(|_| noise.normal()).collect();
-            y.push(
-                row.iter().zip(p.iter()).map(|(w, p)| w * p).sum::<f64>() + sigma * noise.normal(),
-            );
+            y.push(row.iter().zip(p.iter()).map(|(w, p)| w * p).sum::<f64>() + sigma * noise.normal());
             w.extend(row);
         }
         let mut regression = LeastSquares::new(14);
@@ -273,29 +260,17 @@ mod tests {
             .collect()
     }
 
-    fn solved(case: &Case) -> (Triangle, Solution, Deviations) {
+    fn solved(case: &Case) -> (RFactor, RegressionSolution, ParameterUncertainty) {
         let solution = case.regression.solve().unwrap();
-        let deviations: Result<Deviations, LeastSquaresError> =
-            autocorrelated_deviations(&solution, 1, |visit| visit(&case.w, &case.y));
-        (
-            Triangle::new(&case.regression),
-            solution,
-            deviations.unwrap(),
-        )
+        let deviations: Result<ParameterUncertainty, LeastSquaresError> =
+            uncertainty_with_autocorrelation(&solution, 1, |visit| visit(&case.w, &case.y));
+        (RFactor::new(&case.regression), solution, deviations.unwrap())
     }
 
     fn find(case: &Case) -> PhysicalParameters {
         let (triangle, solution, deviations) = solved(case);
         let base = |x: &[f64]| (&case.map * DVector::from_column_slice(x), case.map.clone());
-        physical_parameters(
-            &triangle,
-            &solution,
-            &deviations,
-            &case.nominal,
-            &base,
-            &bodies(),
-        )
-        .unwrap()
+        physical_parameters(&triangle, &solution, &deviations, &case.nominal, &base, &bodies()).unwrap()
     }
 
     #[test]
@@ -309,10 +284,7 @@ mod tests {
             }
             assert!(found.margins.iter().all(|margin| *margin > 0.0));
             // The truth is possible and fits to the noise, so that possible parameters can as well.
-            assert!(
-                found.residual_norm < 1.05 * solution.residual_norm,
-                "seed {seed}"
-            );
+            assert!(found.residual_norm < 1.05 * solution.residual_norm, "seed {seed}");
             assert!(found.residual_norm >= solution.residual_norm * (1.0 - 1e-9));
             let p = &case.map * DVector::from_column_slice(&case.truth);
             for (found, p) in found.base.iter().zip(p.iter()) {
@@ -327,60 +299,44 @@ mod tests {
         let case = case(40, 3.0);
         let (triangle, solution, deviations) = solved(&case);
         let found = find(&case);
-        let noise = (solution.residual_variance() * inflation(&solution, &deviations)).sqrt();
-        let references: Vec<Reference> = bodies()
+        let noise = (solution.residual_variance() * variance_inflation(&solution, &deviations)).sqrt();
+        let references: Vec<NominalBodyMatrix> = bodies()
             .iter()
-            .map(|body| Reference::new(body, &case.nominal).unwrap())
+            .map(|body| NominalBodyMatrix::new(body, &case.nominal).unwrap())
             .collect();
         let objective = |x: &[f64]| -> f64 {
-            let misfit = (triangle.r() * (&case.map * DVector::from_column_slice(x))
-                - triangle.right())
-                / noise;
+            let misfit = (triangle.r() * (&case.map * DVector::from_column_slice(x)) - triangle.right_side()) / noise;
             let prior: f64 = (0..2)
                 .map(|k| {
                     let relative = references[k].relative(&matrix_of(&x[10 * k..10 * k + 10]));
                     let eigenvalues = relative.symmetric_eigenvalues();
                     eigenvalues
                         .iter()
-                        .map(|l| {
-                            if *l > 0.0 {
-                                l - l.ln() - 1.0
-                            } else {
-                                f64::INFINITY
-                            }
-                        })
+                        .map(|l| if *l > 0.0 { l - l.ln() - 1.0 } else { f64::INFINITY })
                         .sum::<f64>()
                 })
                 .sum();
             0.5 * misfit.norm_squared() + NOMINAL_WEIGHT * prior
         };
         let best = objective(&found.parameters);
-        let mut random = Noise::new(9);
+        let mut random = TestNoise::new(9);
         for size in [1e-1, 1e-2, 1e-3, 1e-4] {
             for _ in 0..2000 {
-                let near: Vec<f64> = found
-                    .parameters
-                    .iter()
-                    .map(|x| x + size * random.normal())
-                    .collect();
+                let near: Vec<f64> = found.parameters.iter().map(|x| x + size * random.normal()).collect();
                 assert!(objective(&near) >= best - 1e-7 * best.abs().max(1.0));
             }
         }
         assert!(best <= objective(&case.nominal) && best <= objective(&case.truth));
     }
 
-    /// What the recording does not say stays at its nominal value, and is known to do so.
+    /// A parameter that the recording does not determine stays at its nominal value, and is marked so.
     #[test]
     fn without_information_the_nominal_values_stay() {
         let mut case = case(7, 1e-4);
         // Only the first body is seen.
         let unseen = case.map.columns(10, 10) * DVector::from_column_slice(&case.truth[10..]);
         for (row, y) in case.w.chunks_exact(14).zip(&mut case.y) {
-            *y -= row
-                .iter()
-                .zip(unseen.iter())
-                .map(|(w, p)| w * p)
-                .sum::<f64>();
+            *y -= row.iter().zip(unseen.iter()).map(|(w, p)| w * p).sum::<f64>();
         }
         case.regression = LeastSquares::new(14);
         case.regression.add_rows(&case.w, &case.y).unwrap();
@@ -391,47 +347,35 @@ mod tests {
             assert!(found.from_recording[j] < 1e-9);
         }
         assert!(found.from_recording[..10].iter().all(|share| *share > 0.5));
-        // Fourteen combinations of ten numbers tell each of them.
-        assert_eq!(found.alone, [[true; 10], [false; 10]].concat());
+        // Fourteen combinations of ten numbers determine each of them.
+        assert_eq!(found.individually_determined, [[true; 10], [false; 10]].concat());
     }
 
-    /// Of `x + y` and `z` only the last has a value of its own, whatever nominal values say beside.
+    /// Of `x + y` and `z` only the last is determined individually, whatever the nominal values are.
     #[test]
     fn what_is_told_in_sums_only_is_not_told_alone() {
-        let rows = DMatrix::from_row_slice(
-            3,
-            4,
-            &[1e3, 1e3, 0.0, 0.0, 2e3, 2e3, 1e-3, 0.0, 0.0, 0.0, 1e-3, 0.0],
-        );
-        assert_eq!(told_alone(&rows), [false, false, true, false]);
-        assert_eq!(told_alone(&DMatrix::zeros(2, 2)), [false, false]);
-        // Fourteen combinations of twenty numbers tell none of them.
-        assert_eq!(find(&case(3, 0.05)).alone, [false; 20]);
+        let rows = DMatrix::from_row_slice(3, 4, &[1e3, 1e3, 0.0, 0.0, 2e3, 2e3, 1e-3, 0.0, 0.0, 0.0, 1e-3, 0.0]);
+        assert_eq!(individually_determined(&rows), [false, false, true, false]);
+        assert_eq!(individually_determined(&DMatrix::zeros(2, 2)), [false, false]);
+        // Fourteen combinations of twenty numbers determine none of them.
+        assert_eq!(find(&case(3, 0.05)).individually_determined, [false; 20]);
     }
 
     #[test]
     fn planar_bodies_need_inertia_about_their_centre() {
-        assert!(
-            planar_pseudo_inertia(2.0, [0.6, 0.8], 0.51)
-                .cholesky()
-                .is_some()
-        );
-        assert!(
-            planar_pseudo_inertia(2.0, [0.6, 0.8], 0.49)
-                .cholesky()
-                .is_none()
-        );
+        assert!(planar_pseudo_inertia(2.0, [0.6, 0.8], 0.51).cholesky().is_some());
+        assert!(planar_pseudo_inertia(2.0, [0.6, 0.8], 0.49).cholesky().is_none());
         let body = BodyMatrix {
             name: "link".to_owned(),
             matrix: Box::new(|x: &[f64]| planar_pseudo_inertia(x[0], [x[1], 0.0], x[2])),
             copies: 2.0,
         };
-        let error = Reference::new(&body, &[2.0, 1.0, 0.4]).err().unwrap();
+        let error = NominalBodyMatrix::new(&body, &[2.0, 1.0, 0.4]).err().unwrap();
         assert!(
             error.to_string().contains("link") && error.to_string().contains("inertia"),
             "{error}"
         );
-        let error = Reference::new(&body, &[0.0, 0.0, 0.4]).err().unwrap();
+        let error = NominalBodyMatrix::new(&body, &[0.0, 0.0, 0.4]).err().unwrap();
         assert!(error.to_string().contains("mass"), "{error}");
     }
 }

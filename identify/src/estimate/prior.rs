@@ -1,45 +1,44 @@
-//! Nominal values as soft constraints: a solution and what is believed beforehand go in, the most
-//! plausible parameters of both come out.
+//! Nominal values as soft constraints. Input: a solution and prior values; output: the most probable parameters given
+//! both.
 //!
-//! Each belief is one more row, `p_j / s_j = nominal_j / s_j`, in units of the residuals' standard
-//! deviation (generalised Tikhonov regularisation; A. Tarantola, "Inverse Problem Theory", 2005,
-//! section 3.2). As neighbouring residuals repeat each other, a recording weighs only as much as
-//! its effective samples: the residuals' variance is inflated by the median of
-//! `(std / classical)^2` before the two are balanced.
+//! Each prior value is an additional row, `p_j / s_j = nominal_j / s_j`, in units of the residuals' standard deviation
+//! (generalised Tikhonov regularisation; A. Tarantola, "Inverse Problem Theory", 2005, section 3.2). As neighbouring
+//! residuals are correlated, a recording counts only with its effective samples: the residuals' variance is multiplied
+//! by the median of `(std / classical)^2` before both are balanced.
 
 use nalgebra::DMatrix;
 
-use crate::estimate::deviations::Deviations;
+use crate::estimate::deviations::ParameterUncertainty;
 use crate::estimate::error::LeastSquaresError;
-use crate::estimate::solution::Solution;
-use crate::estimate::triangle::Triangle;
+use crate::estimate::solution::RegressionSolution;
+use crate::estimate::triangle::RFactor;
 
-/// What is believed of one parameter.
+/// Prior knowledge of one parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Belief {
-    /// The parameter, by position.
+pub struct ParameterPrior {
+    /// Index of the parameter.
     pub parameter: usize,
-    /// Its value beforehand.
+    /// Its prior value.
     pub value: f64,
     /// The standard deviation of that value; positive.
     pub std: f64,
 }
 
-/// The solution and its deviations when `beliefs` count as measurements.
+/// The solution and its uncertainty with `beliefs` as additional measurements.
 ///
-/// `solution` and `deviations` are those of `triangle` alone. Parameters without a belief that the rows do not determine
+/// `solution` and `deviations` belong to `triangle` alone. Parameters without a prior that the rows do not determine
 /// stay at `nominal`. The residual norm and the condition numbers remain those of the measured rows.
-/// Fails when a list has the wrong length or a number is not finite.
-pub fn with_prior(
-    triangle: &Triangle,
-    solution: &Solution,
-    deviations: &Deviations,
+/// Fails if a list has the wrong length or a number is not finite.
+pub fn solve_with_prior(
+    triangle: &RFactor,
+    solution: &RegressionSolution,
+    deviations: &ParameterUncertainty,
     nominal: &[f64],
-    beliefs: &[Belief],
-) -> Result<(Solution, Deviations), LeastSquaresError> {
+    beliefs: &[ParameterPrior],
+) -> Result<(RegressionSolution, ParameterUncertainty), LeastSquaresError> {
     let n = triangle.n_parameters();
-    let noise = (solution.residual_variance() * inflation(solution, deviations)).sqrt();
-    // Without residuals the recording is believed as far as rounding allows.
+    let noise = (solution.residual_variance() * variance_inflation(solution, deviations)).sqrt();
+    // Without residuals the recording counts up to its rounding error.
     let least = 1e-9 * solution.measured_norm / (solution.rows.max(1) as f64).sqrt();
     let noise = if noise > least {
         noise
@@ -64,6 +63,7 @@ pub fn with_prior(
     for belief in beliefs {
         prior[(belief.parameter, belief.parameter)] += (noise / belief.std).powi(2) * noise * noise;
     }
+    // Covariance from the gradients of samples and priors.
     let covariance = &inverse * (scores + prior) * &inverse;
     let mut after = deviations.clone();
     after.std = (0..n)
@@ -76,8 +76,8 @@ pub fn with_prior(
         })
         .collect();
     after.covariance = covariance;
-    let misfit = triangle.right() - &r * nalgebra::DVector::from_column_slice(&found.values);
-    found.residual_norm = misfit.norm().hypot(triangle.corner());
+    let misfit = triangle.right_side() - &r * nalgebra::DVector::from_column_slice(&found.values);
+    found.residual_norm = misfit.norm().hypot(triangle.residual_norm());
     found.measured_norm = solution.measured_norm;
     found.condition_number = solution.condition_number;
     found.scaled_condition_number = solution.scaled_condition_number;
@@ -94,8 +94,8 @@ pub fn with_prior(
     Ok((found, after))
 }
 
-/// How much larger the variances are than for independent residuals: the median over the parameters, at least 1.
-pub(crate) fn inflation(solution: &Solution, deviations: &Deviations) -> f64 {
+/// Ratio of the variances to those for independent residuals: the median over the parameters, at least 1.
+pub(crate) fn variance_inflation(solution: &RegressionSolution, deviations: &ParameterUncertainty) -> f64 {
     let mut ratios: Vec<f64> = deviations
         .std
         .iter()
@@ -104,7 +104,5 @@ pub(crate) fn inflation(solution: &Solution, deviations: &Deviations) -> f64 {
         .filter(|ratio| ratio.is_finite())
         .collect();
     ratios.sort_by(f64::total_cmp);
-    ratios
-        .get(ratios.len() / 2)
-        .map_or(1.0, |ratio| ratio.max(1.0))
+    ratios.get(ratios.len() / 2).map_or(1.0, |ratio| ratio.max(1.0))
 }

@@ -1,5 +1,5 @@
-//! Householder reflections of a block of rows into an upper triangle, in the widest vectors of the processor that runs
-//! it: the inner loop of [`LeastSquares`](crate::LeastSquares).
+//! Householder reflections of a block of rows into an R factor, with the widest vector instructions of the processor:
+//! the inner loop of [`LeastSquares`](crate::LeastSquares).
 //!
 //! Decision: `pulp` compiles this loop for several instruction sets from safe code. Sums in wider vectors round
 //! differently, so identified values agree between machines to rounding only.
@@ -9,8 +9,8 @@ use pulp::{Arch, Simd, WithSimd};
 /// Numbers of a block are padded with zero rows to a multiple of this, which no vector exceeds.
 pub(crate) const LANES: usize = 8;
 
-/// Columns of rows that are reduced together; `stride` numbers per column, a multiple of [`LANES`].
-pub(crate) struct Block<'a> {
+/// Columns of a block of rows; `stride` numbers per column, a multiple of [`LANES`].
+pub(crate) struct HouseholderBlock<'a> {
     /// Column after column.
     pub(crate) columns: &'a mut [f64],
     /// Numbers per column.
@@ -19,34 +19,34 @@ pub(crate) struct Block<'a> {
     pub(crate) rows: usize,
 }
 
-/// Folds a block into the row-major upper triangle of as many columns; the block is used up.
-pub(crate) fn fold(triangle: &mut [f64], block: Block<'_>) {
-    Arch::new().dispatch(Fold { triangle, block });
+/// Reduces a block into the row-major R factor with the same number of columns; the block is overwritten.
+pub(crate) fn fold_into_factor(triangle: &mut [f64], block: HouseholderBlock<'_>) {
+    Arch::new().dispatch(HouseholderFold {
+        factor: triangle,
+        block,
+    });
 }
 
-struct Fold<'a> {
-    triangle: &'a mut [f64],
-    block: Block<'a>,
+/// Arguments of the reduction, as `pulp` needs them in one value.
+struct HouseholderFold<'a> {
+    factor: &'a mut [f64],
+    block: HouseholderBlock<'a>,
 }
 
-impl WithSimd for Fold<'_> {
+impl WithSimd for HouseholderFold<'_> {
     type Output = ();
 
-    #[allow(clippy::inline_always, reason = "the trait's manual asks for it")]
+    #[allow(clippy::inline_always, reason = "the trait's manual requires it")]
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Block {
-            columns,
-            stride,
-            rows,
-        } = self.block;
-        let triangle = self.triangle;
+        let HouseholderBlock { columns, stride, rows } = self.block;
+        let triangle = self.factor;
         let width = columns.len() / stride;
         for k in 0..width {
             let (head, tail) = columns.split_at_mut((k + 1) * stride);
             let pivot = &head[k * stride..k * stride + rows];
             let [below] = dots(simd, pivot, [pivot]);
-            // Columns that are zero in all these rows, as those of links before a joint, cost nothing.
+            // Columns that are zero in all these rows, such as those of links before a joint, cost nothing.
             if below == 0.0 {
                 continue;
             }
@@ -57,6 +57,7 @@ impl WithSimd for Fold<'_> {
             let v0 = alpha - beta;
             let (tau, inverse) = (-v0 / beta, v0.recip());
             row[k] = beta;
+            // Apply the reflection to the columns behind, four at a time.
             let mut entries = row[k + 1..].chunks_exact_mut(4);
             let mut fours = tail.chunks_exact_mut(4 * stride);
             for (entries, four) in (&mut entries).zip(&mut fours) {
@@ -73,6 +74,7 @@ impl WithSimd for Fold<'_> {
                 }
                 add_scaled(simd, factors, pivot, [a, b, c, d]);
             }
+            // The remaining one to three columns.
             let entries = entries.into_remainder().iter_mut();
             let ones = fours.into_remainder().chunks_exact_mut(stride);
             for (entry, column) in entries.zip(ones) {
@@ -86,12 +88,13 @@ impl WithSimd for Fold<'_> {
     }
 }
 
-/// Dot products of one column with `N` others, all of whole vectors.
+/// Dot products of one column with `N` others, all with complete vectors.
 #[allow(clippy::inline_always, reason = "part of the loop above")]
 #[inline(always)]
 fn dots<S: Simd, const N: usize>(simd: S, pivot: &[f64], columns: [&[f64]; N]) -> [f64; N] {
     let (pivot, _) = S::as_simd_f64s(pivot);
     let columns = columns.map(|column| &S::as_simd_f64s(column).0[..pivot.len()]);
+    // Two sums per product hide the latency of the additions.
     let mut even = [simd.splat_f64s(0.0); N];
     let mut odd = even;
     let pairs = pivot.len() / 2;
@@ -113,12 +116,7 @@ fn dots<S: Simd, const N: usize>(simd: S, pivot: &[f64], columns: [&[f64]; N]) -
 /// `column += factor * pivot` for `N` columns.
 #[allow(clippy::inline_always, reason = "part of the loop above")]
 #[inline(always)]
-fn add_scaled<S: Simd, const N: usize>(
-    simd: S,
-    factors: [f64; N],
-    pivot: &[f64],
-    columns: [&mut [f64]; N],
-) {
+fn add_scaled<S: Simd, const N: usize>(simd: S, factors: [f64; N], pivot: &[f64], columns: [&mut [f64]; N]) {
     let (pivot, _) = S::as_simd_f64s(pivot);
     let factors = factors.map(|factor| simd.splat_f64s(factor));
     let columns = columns.map(|column| &mut S::as_mut_simd_f64s(column).0[..pivot.len()]);

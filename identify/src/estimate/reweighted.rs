@@ -1,5 +1,5 @@
-//! Weighted and robust least squares by reweighting: showings of the rows go in, a solution with
-//! deviations and the weights that it was made with come out. Memory does not grow with the rows.
+//! Weighted and robust least squares by reweighting. Input: passes over the rows; output: a solution with its
+//! uncertainty and weights. Memory does not grow with the rows.
 //!
 //! Weights of channels are the inverse standard deviations of their residuals, iterated from the
 //! unweighted solution: M. Gautier and P. Poignet, Control Engineering Practice 9 (2001), section
@@ -9,30 +9,27 @@
 //! estimates follow from `psi' w w'` in place of `w w'` in the inverse: P. J. Huber, "Robust
 //! Statistics" (1981), section 7.6.
 
-use crate::estimate::deviations::{Deviations, autocorrelated_deviations};
+use crate::estimate::deviations::{ParameterUncertainty, uncertainty_with_autocorrelation};
 use crate::estimate::error::LeastSquaresError;
 use crate::estimate::least_squares::LeastSquares;
-use crate::estimate::rows::Visit;
-use crate::estimate::solution::Solution;
-use crate::estimate::triangle::Triangle;
+use crate::estimate::rows::RowVisitor;
+use crate::estimate::solution::RegressionSolution;
+use crate::estimate::triangle::RFactor;
 use crate::estimate::weighted_rows::{
-    WeightedRows, Weighting, outliers, reweighted, scales, show_weighted,
+    RowWeighting, WeightedRows, outlier_share, residual_scales, reweight_rows, show_weighted,
 };
 
-/// Huber's bound for 95 % efficiency under normal residuals, in standard deviations.
-pub const HUBER_BOUND: f64 = 1.345;
+/// Solutions that change by less than this share of a standard deviation have converged.
+const CONVERGENCE_TOLERANCE: f64 = 1e-3;
 
-/// Solutions that move by less than this part of a standard deviation have settled.
-const SETTLED: f64 = 1e-3;
-
-/// What is estimated, and how.
+/// Options of an estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EstimateOptions {
     /// Divide each channel by the standard deviation of its residuals.
     pub by_channel: bool,
-    /// Huber's bound in standard deviations; none for ordinary least squares.
+    /// Huber's bound in standard deviations; `None` for ordinary least squares.
     pub huber: Option<f64>,
-    /// Solutions at most.
+    /// Largest number of solutions.
     pub iterations: usize,
 }
 
@@ -46,24 +43,24 @@ impl Default for EstimateOptions {
     }
 }
 
-/// A solution, what it is worth, and how it came about.
+/// A solution with its uncertainty and weights.
 #[derive(Debug, Clone)]
-pub struct Estimate {
+pub struct WeightedEstimate {
     /// The solution; its norms are those of the weighted rows.
-    pub solution: Solution,
-    /// Its deviations.
-    pub deviations: Deviations,
-    /// The weights.
-    pub weighting: Weighting,
-    /// The reduced rows that it was made from, weighted.
-    pub triangle: Triangle,
+    pub solution: RegressionSolution,
+    /// Its standard deviations.
+    pub uncertainty: ParameterUncertainty,
+    /// Weights of the rows.
+    pub weighting: RowWeighting,
+    /// R factor of the weighted rows.
+    pub r_factor: RFactor,
 }
 
-/// Estimates `nominal.len()` parameters from the rows that `show` presents, interleaved per sample, in order of time,
-/// the same in every showing; undetermined directions stay at `nominal`.
+/// Estimates `nominal.len()` parameters from the rows that `show` presents, interleaved per sample, in order of time
+/// and the same in every pass. Undetermined directions stay at `nominal`.
 ///
-/// Ordinary least squares shows the rows three times, each reweighting twice more.
-/// Fails when `show` fails, when there are no rows, or when a number is not finite.
+/// Ordinary least squares needs three passes, each reweighting two more.
+/// Fails if `show` fails, if there are no rows, or if a number is not finite.
 ///
 /// ```
 /// use modelmill_identify::estimate::{EstimateOptions, HUBER_BOUND, estimate};
@@ -80,71 +77,59 @@ pub fn estimate<E: From<LeastSquaresError>>(
     nominal: &[f64],
     channels: usize,
     options: &EstimateOptions,
-    mut show: impl FnMut(&mut Visit<'_>) -> Result<(), E>,
-) -> Result<Estimate, E> {
+    mut show: impl FnMut(&mut RowVisitor<'_>) -> Result<(), E>,
+) -> Result<WeightedEstimate, E> {
     let n = nominal.len();
     let channels = channels.max(1);
     let mut regression = LeastSquares::with_channels(n, channels);
     show(&mut |w, y| regression.add_rows(w, y))?;
     let mut solution = regression.solve_near(nominal)?;
-    let mut weighting = Weighting {
+    let mut weighting = RowWeighting {
         scales: vec![1.0; channels],
         by_channel: options.by_channel,
         huber: options.huber,
         outliers: 0.0,
         iterations: 1,
-        settled: true,
+        converged: true,
     };
     if options.by_channel || options.huber.is_some() {
-        weighting.settled = false;
-        while !weighting.settled && weighting.iterations < options.iterations.max(2) {
-            weighting.scales = scales(&solution, &weighting, &mut show)?;
+        weighting.converged = false;
+        while !weighting.converged && weighting.iterations < options.iterations.max(2) {
+            weighting.scales = residual_scales(&solution, &weighting, &mut show)?;
             let before = solution;
-            regression = reweighted(
-                &before.values,
-                channels,
-                &weighting,
-                WeightedRows::Weighted,
-                &mut show,
-            )?;
+            regression = reweight_rows(&before.values, channels, &weighting, WeightedRows::Weighted, &mut show)?;
             solution = regression.solve_near(nominal)?;
             weighting.iterations += 1;
-            weighting.settled = (0..n).all(|j| {
+            weighting.converged = (0..n).all(|j| {
                 let moved = (solution.values[j] - before.values[j]).abs();
                 !solution.determined[j]
-                    || moved <= SETTLED * solution.classical_std[j]
+                    || moved <= CONVERGENCE_TOLERANCE * solution.classical_std[j]
                     || moved <= 1e-13 * solution.values[j].abs()
             });
         }
     }
-    let triangle = Triangle::new(&regression);
+    // Robust estimates use the second derivatives of Huber's function in the covariance.
+    let triangle = RFactor::new(&regression);
     if weighting.huber.is_some() {
-        let curvature = reweighted(
+        let curvature = reweight_rows(
             &solution.values,
             channels,
             &weighting,
             WeightedRows::Curvature,
             &mut show,
         )?;
-        solution.take_inverse_of(curvature.solve_near(nominal)?);
-        weighting.outliers = outliers(&solution.values, channels, &weighting, &mut show)?;
+        solution.adopt_inverse(curvature.solve_near(nominal)?);
+        weighting.outliers = outlier_share(&solution.values, channels, &weighting, &mut show)?;
     }
     let values = solution.values.clone();
-    let deviations = autocorrelated_deviations(&solution, channels, |visit| {
-        show_weighted(
-            &values,
-            channels,
-            &weighting,
-            WeightedRows::Weighted,
-            &mut show,
-            visit,
-        )
+    let deviations = uncertainty_with_autocorrelation(&solution, channels, |visit| {
+        show_weighted(&values, channels, &weighting, WeightedRows::Weighted, &mut show, visit)
     })?;
-    Ok(Estimate {
+    Ok(WeightedEstimate {
         solution,
-        deviations,
+        uncertainty: deviations,
         weighting,
-        triangle,
+        r_factor: triangle,
     })
 }
 
@@ -153,9 +138,10 @@ mod tests {
     use nalgebra::{DMatrix, DVector};
 
     use super::*;
-    use crate::estimate::prior::{Belief, with_prior};
+    use crate::estimate::prior::{ParameterPrior, solve_with_prior};
+    use crate::estimate::thresholds::HUBER_BOUND;
     use crate::estimate::weighted_rows::dot;
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
 
     const TRUTH: [f64; 3] = [4.0, -2.0, 1.0];
 
@@ -165,15 +151,14 @@ mod tests {
     }
 
     /// Two channels with errors of different size, correlated in time by `memory`; a share of `spoilt` is far off.
-    fn rows(noise: &mut Noise, samples: i32, sizes: [f64; 2], memory: f64, spoilt: f64) -> Rows {
+    fn rows(noise: &mut TestNoise, samples: i32, sizes: [f64; 2], memory: f64, spoilt: f64) -> Rows {
         let (mut w, mut y, mut state) = (Vec::new(), Vec::new(), [0.0; 2]);
         for i in 0..samples {
             for channel in 0..2 {
                 let t = 0.01 * f64::from(i) + 3.1 * channel as f64;
                 let row = [1.0, t.sin(), (1.3 * t).cos().signum()];
                 state[channel] = memory * state[channel] + sizes[channel] * noise.normal();
-                let mut value =
-                    row.iter().zip(TRUTH).map(|(w, p)| w * p).sum::<f64>() + state[channel];
+                let mut value = row.iter().zip(TRUTH).map(|(w, p)| w * p).sum::<f64>() + state[channel];
                 if noise.uniform() < spoilt {
                     value += 30.0 + 20.0 * noise.uniform();
                 }
@@ -184,19 +169,14 @@ mod tests {
         Rows { w, y }
     }
 
-    fn run(rows: &Rows, options: &EstimateOptions) -> Estimate {
-        estimate(
-            &[0.0; 3],
-            2,
-            options,
-            |visit| -> Result<(), LeastSquaresError> {
-                // Odd blocks, as they come.
-                for (w, y) in rows.w.chunks(3 * 2 * 37).zip(rows.y.chunks(2 * 37)) {
-                    visit(w, y)?;
-                }
-                Ok(())
-            },
-        )
+    fn run(rows: &Rows, options: &EstimateOptions) -> WeightedEstimate {
+        estimate(&[0.0; 3], 2, options, |visit| -> Result<(), LeastSquaresError> {
+            // Odd blocks, as they come.
+            for (w, y) in rows.w.chunks(3 * 2 * 37).zip(rows.y.chunks(2 * 37)) {
+                visit(w, y)?;
+            }
+            Ok(())
+        })
         .unwrap()
     }
 
@@ -214,12 +194,12 @@ mod tests {
     /// The fixed point is a weighted least squares problem, which normal equations of the dense one solve.
     #[test]
     fn channel_weights_agree_with_a_dense_solution_and_beat_plain_ones() {
-        let mut noise = Noise::new(21);
+        let mut noise = TestNoise::new(21);
         let (mut plain, mut weighted) = (0.0, 0.0);
         for _ in 0..40 {
             let rows = rows(&mut noise, 800, [1.0, 0.05], 0.0, 0.0);
             let found = run(&rows, &WEIGHTED);
-            assert!(found.weighting.settled);
+            assert!(found.weighting.converged);
             let scales = &found.weighting.scales;
             assert!(
                 (scales[0] - 1.0).abs() < 0.15 && (scales[1] - 0.05).abs() < 0.0075,
@@ -245,7 +225,7 @@ mod tests {
     /// Rows of zeros among the others change neither the scales nor the values, in one channel or in both.
     #[test]
     fn rows_that_are_left_out_are_no_residuals() {
-        let all = rows(&mut Noise::new(8), 1200, [1.0, 0.2], 0.0, 0.05);
+        let all = rows(&mut TestNoise::new(8), 1200, [1.0, 0.2], 0.0, 0.05);
         let mut with_zeros = Rows {
             w: Vec::new(),
             y: Vec::new(),
@@ -267,18 +247,13 @@ mod tests {
             },
         ] {
             let (expected, found) = (run(&all, &options), run(&with_zeros, &options));
-            for (found, expected) in found
-                .weighting
-                .scales
-                .iter()
-                .zip(&expected.weighting.scales)
-            {
+            for (found, expected) in found.weighting.scales.iter().zip(&expected.weighting.scales) {
                 assert!((found / expected - 1.0).abs() < 1e-6, "{found} {expected}");
             }
             assert!((found.weighting.outliers - expected.weighting.outliers).abs() < 1e-12);
             assert_eq!(found.solution.rows, expected.solution.rows);
             assert_eq!(found.solution.shown, 3200);
-            assert_eq!(found.deviations.samples, 1200);
+            assert_eq!(found.uncertainty.samples, 1200);
             for (found, expected) in found
                 .solution
                 .classical_std
@@ -293,7 +268,7 @@ mod tests {
             }
         }
         // Half of one channel left out: its scale stays that of the noise.
-        let mut half = rows(&mut Noise::new(8), 1200, [1.0, 0.2], 0.0, 0.0);
+        let mut half = rows(&mut TestNoise::new(8), 1200, [1.0, 0.2], 0.0, 0.0);
         for row in (1..1200).step_by(2) {
             half.w[3 * row..3 * row + 3].fill(0.0);
             half.y[row] = 0.0;
@@ -304,17 +279,17 @@ mod tests {
 
     #[test]
     fn a_robust_estimate_is_not_moved_by_what_is_far_off() {
-        let rows = rows(&mut Noise::new(4), 2000, [0.5, 0.5], 0.0, 0.08);
+        let rows = rows(&mut TestNoise::new(4), 2000, [0.5, 0.5], 0.0, 0.08);
         let plain = run(&rows, &EstimateOptions::default());
         let robust = run(&rows, &ROBUST);
-        let error = |e: &Estimate| (e.solution.values[0] - TRUTH[0]).abs();
+        let error = |e: &WeightedEstimate| (e.solution.values[0] - TRUTH[0]).abs();
         assert!(
             error(&plain) > 2.0 && error(&robust) < 0.12,
             "{} and {}",
             error(&plain),
             error(&robust)
         );
-        assert!(robust.weighting.settled && robust.weighting.outliers > 0.2);
+        assert!(robust.weighting.converged && robust.weighting.outliers > 0.2);
         // At the minimum of Huber's function its gradient vanishes.
         let (values, scales) = (&robust.solution.values, &robust.weighting.scales);
         let mut gradient = [0.0; 3];
@@ -325,24 +300,19 @@ mod tests {
                 *g += seen * w;
             }
         }
-        assert!(
-            gradient.iter().all(|g| g.abs() < 4000.0 * 1e-4),
-            "{gradient:?}"
-        );
+        assert!(gradient.iter().all(|g| g.abs() < 4000.0 * 1e-4), "{gradient:?}");
     }
 
-    /// How often the truth is within two deviations, of 200.
+    /// How often the true value is within two standard deviations, of 200.
     fn coverage(options: &EstimateOptions, memory: f64, spoilt: f64) -> f64 {
-        let mut noise = Noise::new(77);
+        let mut noise = TestNoise::new(77);
         let mut inside = 0;
         for _ in 0..200 {
             let rows = rows(&mut noise, 1200, [0.6, 0.2], memory, spoilt);
             let found = run(&rows, options);
             // A constant force is what one-sided spoilt values look like; the others are free of that bias.
             inside += (1..3)
-                .filter(|j| {
-                    (found.solution.values[*j] - TRUTH[*j]).abs() <= 2.0 * found.deviations.std[*j]
-                })
+                .filter(|j| (found.solution.values[*j] - TRUTH[*j]).abs() <= 2.0 * found.uncertainty.std[*j])
                 .count();
         }
         f64::from(u32::try_from(inside).unwrap()) / 400.0
@@ -368,29 +338,28 @@ mod tests {
     /// With independent errors of known size the most plausible values have a textbook formula.
     #[test]
     fn a_prior_balances_recording_and_nominal_values() {
-        let rows = rows(&mut Noise::new(8), 400, [0.5, 0.5], 0.0, 0.0);
+        let rows = rows(&mut TestNoise::new(8), 400, [0.5, 0.5], 0.0, 0.0);
         let found = run(&rows, &EstimateOptions::default());
-        let beliefs: Vec<Belief> = (0..3)
-            .map(|j| Belief {
+        let beliefs: Vec<ParameterPrior> = (0..3)
+            .map(|j| ParameterPrior {
                 parameter: j,
                 value: 0.5,
                 std: [0.02, 0.5, 1e6][j],
             })
             .collect();
-        let (solution, deviations) = with_prior(
-            &found.triangle,
+        let (solution, deviations) = solve_with_prior(
+            &found.r_factor,
             &found.solution,
-            &found.deviations,
+            &found.uncertainty,
             &[0.0; 3],
             &beliefs,
         )
         .unwrap();
-        let inflation = crate::estimate::prior::inflation(&found.solution, &found.deviations);
+        let inflation = crate::estimate::prior::variance_inflation(&found.solution, &found.uncertainty);
         let variance = found.solution.residual_variance() * inflation;
         let w = DMatrix::from_row_slice(800, 3, &rows.w);
         let y = DVector::from_column_slice(&rows.y);
-        let precision =
-            DMatrix::from_diagonal(&DVector::from_fn(3, |j, _| beliefs[j].std.powi(-2)));
+        let precision = DMatrix::from_diagonal(&DVector::from_fn(3, |j, _| beliefs[j].std.powi(-2)));
         let information = w.transpose() * &w / variance + &precision;
         let right = w.transpose() * y / variance + &precision * DVector::from_element(3, 0.5);
         let expected = information.clone().lu().solve(&right).unwrap();
@@ -402,15 +371,11 @@ mod tests {
                 "{} and {std}",
                 deviations.std[j]
             );
-            assert!(deviations.std[j] <= found.deviations.std[j] * (1.0 + 1e-9));
+            assert!(deviations.std[j] <= found.uncertainty.std[j] * (1.0 + 1e-9));
         }
         // What is believed firmly stays, what is not believed follows the recording.
         assert!((solution.values[0] - 0.5).abs() < 3.0);
         let apart = (solution.values[2] - found.solution.values[2]).abs();
-        assert!(
-            apart
-                < 3.0 * found.deviations.std[2]
-                    + (solution.values[0] - found.solution.values[0]).abs()
-        );
+        assert!(apart < 3.0 * found.uncertainty.std[2] + (solution.values[0] - found.solution.values[0]).abs());
     }
 }

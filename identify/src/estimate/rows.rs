@@ -1,13 +1,13 @@
-//! Rows of a regression as they are shown: what every one that takes them asks of them.
+//! Blocks of rows of a regression, and the checks that all estimators apply to them.
 
 use crate::estimate::error::LeastSquaresError;
 
-/// One showing of a block of whole samples: regressor and measured values, as in
-/// [`LeastSquares::add_rows`](crate::LeastSquares::add_rows), rows interleaved per sample
-/// (`row = sample * channels + channel`).
-pub type Visit<'a> = dyn FnMut(&[f64], &[f64]) -> Result<(), LeastSquaresError> + 'a;
+/// Receives a block of complete samples: regressor and measured values, as in
+/// [`LeastSquares::add_rows`](crate::LeastSquares::add_rows), rows interleaved per sample (`row = sample * channels +
+/// channel`).
+pub type RowVisitor<'a> = dyn FnMut(&[f64], &[f64]) -> Result<(), LeastSquaresError> + 'a;
 
-/// Checks one block of rows; `before` rows came earlier.
+/// Checks the lengths of a block of rows and that all numbers are finite; `before` is the number of earlier rows.
 pub(crate) fn check_rows(
     regressor: &[f64],
     measured: &[f64],
@@ -43,18 +43,20 @@ pub(crate) fn check_rows(
     Ok(())
 }
 
-/// Whether a row was given the weight 0, or says nothing for another reason: its residual is no sample of any noise.
-pub(crate) fn is_left_out(row: &[f64], measured: f64) -> bool {
+/// Whether a row contains no information, for example with weight 0: its residual is no sample of the noise.
+pub(crate) fn is_uninformative(row: &[f64], measured: f64) -> bool {
     measured == 0.0 && row.iter().all(|w| *w == 0.0)
 }
 
-/// Whether all numbers are finite; a sum is not when a summand is not. Independent sums go at the speed of memory.
+/// Whether all numbers are finite. A sum is not finite if one of its terms is not; independent sums reach the speed of
+/// memory.
 pub(crate) fn all_finite(values: &[f64]) -> bool {
     let mut sums = [0.0; 8];
     let eights = values.chunks_exact(8);
     let rest: f64 = eights.remainder().iter().sum();
     for eight in eights {
         for lane in 0..8 {
+            // Zero times infinity or NaN is NaN; zero times a finite number cannot overflow.
             sums[lane] += 0.0 * eight[lane];
         }
     }

@@ -1,68 +1,64 @@
-//! What a regression found: the triangle of the reduced rows goes in; parameters, rank, condition
-//! numbers and classical deviations come out, with what is not determined named.
+//! Solution of a regression. Input: its R factor. Output: parameters, rank, condition numbers and classical standard
+//! deviations, with a list of what is not determined.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::estimate::error::LeastSquaresError;
-use crate::estimate::numeric_rank::without_noise;
-use crate::estimate::undetermined::{Direction, null_directions};
+use crate::estimate::numeric_rank::zero_noise_columns;
+use crate::estimate::thresholds::RANK_TOLERANCE;
+use crate::estimate::undetermined::{NullDirection, null_directions};
 
-/// Singular values of the column-scaled regressor below this fraction of the largest one count
-/// as zero. Rounding leaves about 1e-15; what is larger is information, however weak, and the
-/// standard deviations say how weak.
-pub const RANK_TOLERANCE: f64 = 1e-11;
-
-/// How many rows a regression has seen.
+/// Number of rows of a regression.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct RowCount {
     /// All of them.
     pub(crate) shown: usize,
-    /// Those that are not zero throughout: `0 = 0` is no equation, whatever the parameters.
-    pub(crate) telling: usize,
+    /// Those that are not zero: `0 = 0` is no equation.
+    pub(crate) informative: usize,
 }
 
-/// What a regression found. Lists are in the order of the regressor's columns.
+/// Solution of a regression. Lists are in the order of the regressor's columns.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Solution {
+pub struct RegressionSolution {
     /// Parameters, in the units of measured value per unit of the column.
     pub values: Vec<f64>,
-    /// Standard deviations under the classical assumption of independent residuals of equal
-    /// variance, which recordings hardly ever meet; infinite for what is not determined, NaN when
-    /// there are no more rows than parameters. See [`Deviations`](crate::Deviations) for honest ones.
+    /// Standard deviations for independent residuals of equal variance, which recordings hardly ever have; infinite for
+    /// undetermined parameters, NaN if there are no more rows than parameters. See
+    /// [`ParameterUncertainty`](crate::ParameterUncertainty) for realistic ones.
     pub classical_std: Vec<f64>,
-    /// Ratio of the largest to the smallest singular value of the regressor (2-norm); infinite
-    /// when the rank is deficient.
+    /// Ratio of the largest to the smallest singular value of the regressor (2-norm); infinite if the rank is
+    /// deficient.
     pub condition_number: f64,
-    /// The same after scaling all columns to norm 1, hence free of units.
+    /// The same after scaling all columns to norm 1, which is independent of units.
     pub scaled_condition_number: f64,
     /// `|W p - y|`, 2-norm.
     pub residual_norm: f64,
     /// `|y|`, 2-norm.
     pub measured_norm: f64,
-    /// Rows of the regressor that say something: those of zeros alone, as a weight of 0 leaves them, do not count.
+    /// Number of rows with information; rows of zeros, such as those with weight 0, do not count.
     pub rows: usize,
-    /// All rows that were shown.
+    /// Number of all rows.
     pub shown: usize,
     /// Numeric rank of the column-scaled regressor.
     pub rank: usize,
-    /// Which parameters the rows determine.
+    /// Whether the rows determine each parameter.
     pub determined: Vec<bool>,
     /// Directions along which parameters may change without any effect on the rows;
     /// `n - rank` of them.
-    pub undetermined: Vec<Direction>,
+    pub undetermined: Vec<NullDirection>,
     /// Pseudo-inverse of `R`, so that `(W'W)^+ = r_inverse * r_inverse'`.
     pub(crate) r_inverse: DMatrix<f64>,
 }
 
-impl Solution {
+impl RegressionSolution {
     /// `(W'W)^+`, the classical covariance for residuals of variance 1.
     pub fn unit_covariance(&self) -> DMatrix<f64> {
         &self.r_inverse * self.r_inverse.transpose()
     }
 
-    /// Takes the inverse and the classical deviations of another solution for the same parameters, which says how far
-    /// values follow from gradients.
-    pub(crate) fn take_inverse_of(&mut self, other: Self) {
+    /// Adopts the inverse and the classical standard deviations of another solution for the same parameters, which
+    /// relates values to gradients.
+    pub(crate) fn adopt_inverse(&mut self, other: Self) {
         self.r_inverse = other.r_inverse;
         self.classical_std = other.classical_std;
         for (mine, theirs) in self.determined.iter_mut().zip(other.determined) {
@@ -70,7 +66,7 @@ impl Solution {
         }
     }
 
-    /// Variance of the residuals with the degrees of freedom taken off; NaN without any left.
+    /// Variance of the residuals, corrected for the degrees of freedom; NaN without any.
     pub fn residual_variance(&self) -> f64 {
         match self.rows.saturating_sub(self.rank) {
             0 => f64::NAN,
@@ -97,42 +93,35 @@ impl Solution {
     }
 }
 
-/// Solves the upper triangle `[R, Q'y; 0, +-|residual|]`, row-major, that so many rows left; where
-/// it does not determine the parameters they stay at `nominal`, whose length gives their number.
-pub(crate) fn solve_triangle(
+/// Solves the factor `[R, Q'y; 0, +-|residual|]`, row-major, of a number of rows. Undetermined parameters stay at
+/// `nominal`, whose length is the number of parameters.
+pub(crate) fn solve_r_factor(
     triangle: &[f64],
     rows: RowCount,
     nominal: &[f64],
-) -> Result<Solution, LeastSquaresError> {
+) -> Result<RegressionSolution, LeastSquaresError> {
     let n = nominal.len();
     let width = n + 1;
     let r = DMatrix::from_fn(n, n, |i, j| triangle[i * width + j]);
     let qty = DVector::from_fn(n, |i, _| triangle[i * width + n]);
     let corner = triangle[n * width + n];
     let mut norms: Vec<f64> = r.column_iter().map(|column| column.norm()).collect();
-    without_noise(&mut norms);
-    let scaled = DMatrix::from_fn(n, n, |i, j| {
-        if norms[j] > 0.0 {
-            r[(i, j)] / norms[j]
-        } else {
-            0.0
-        }
-    });
+    zero_noise_columns(&mut norms);
+    let scaled = DMatrix::from_fn(n, n, |i, j| if norms[j] > 0.0 { r[(i, j)] / norms[j] } else { 0.0 });
     for norm in &mut norms {
         if *norm == 0.0 {
             *norm = 1.0;
         }
     }
-    let svd = nalgebra::SVD::try_new(scaled, true, true, f64::EPSILON, 10_000)
-        .ok_or(LeastSquaresError::NoConvergence)?;
+    // The rank follows from the singular values of the scaled columns.
+    let svd =
+        nalgebra::SVD::try_new(scaled, true, true, f64::EPSILON, 10_000).ok_or(LeastSquaresError::NoConvergence)?;
     let (Some(u), Some(vt)) = (&svd.u, &svd.v_t) else {
         return Err(LeastSquaresError::NoConvergence);
     };
     let s = &svd.singular_values;
     let largest = s.max();
-    let kept: Vec<usize> = (0..n)
-        .filter(|&i| s[i] > RANK_TOLERANCE * largest)
-        .collect();
+    let kept: Vec<usize> = (0..n).filter(|&i| s[i] > RANK_TOLERANCE * largest).collect();
     let rank = kept.len();
     let r_inverse = if rank == n {
         // Back substitution keeps the small parameters accurate.
@@ -141,20 +130,17 @@ pub(crate) fn solve_triangle(
             .ok_or(LeastSquaresError::NoConvergence)?
     } else {
         DMatrix::from_fn(n, n, |i, j| {
-            kept.iter()
-                .map(|&k| vt[(k, i)] * u[(j, k)] / s[k])
-                .sum::<f64>()
-                / norms[i]
+            kept.iter().map(|&k| vt[(k, i)] * u[(j, k)] / s[k]).sum::<f64>() / norms[i]
         })
     };
     let dropped: Vec<usize> = (0..n).filter(|i| !kept.contains(i)).collect();
+    // Right singular vectors of the zero singular values are the undetermined directions.
     let null_space = DMatrix::from_fn(dropped.len(), n, |i, j| vt[(dropped[i], j)]);
     let (determined, undetermined) = null_directions(&null_space, &norms);
     let start = DVector::from_column_slice(nominal);
     let misfit = &qty - &r * &start;
     let values: DVector<f64> = if rank == n {
-        r.solve_upper_triangular(&qty)
-            .ok_or(LeastSquaresError::NoConvergence)?
+        r.solve_upper_triangular(&qty).ok_or(LeastSquaresError::NoConvergence)?
     } else {
         start + &r_inverse * &misfit
     };
@@ -171,14 +157,14 @@ pub(crate) fn solve_triangle(
         .clone()
         .try_svd(false, false, f64::EPSILON, 10_000)
         .ok_or(LeastSquaresError::NoConvergence)?;
-    let mut solution = Solution {
+    let mut solution = RegressionSolution {
         values: values.iter().copied().collect(),
         classical_std: Vec::new(),
         condition_number: ratio(&plain.singular_values),
         scaled_condition_number: ratio(s),
         residual_norm,
         measured_norm: qty.norm().hypot(corner),
-        rows: rows.telling,
+        rows: rows.informative,
         shown: rows.shown,
         rank,
         determined,

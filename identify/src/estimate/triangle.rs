@@ -1,33 +1,35 @@
-//! Reduced rows as a value of their own: what a regression is, for all that is computed from it without the samples.
+//! The R factor as a value of its own: the input of all computations that do not need the samples.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::estimate::error::LeastSquaresError;
 use crate::estimate::least_squares::LeastSquares;
-use crate::estimate::solution::{RowCount, Solution, solve_triangle};
+use crate::estimate::solution::{RegressionSolution, RowCount, solve_r_factor};
 
-/// The upper triangle `[R, Q'y; 0, +-|residual|]` of some rows: all that they say about the parameters.
+/// The factor `[R, Q'y; 0, +-|residual|]` of some rows: all their information on the parameters.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Triangle {
+pub struct RFactor {
+    /// Number of parameters.
     n: usize,
+    /// Number of rows that were reduced.
     rows: RowCount,
     /// `(n + 1) x (n + 1)` by rows.
     entries: Vec<f64>,
 }
 
-impl Triangle {
-    /// What a regression has reduced.
+impl RFactor {
+    /// The factor of a regression.
     pub fn new(regression: &LeastSquares) -> Self {
         Self {
             n: regression.n_parameters(),
             rows: regression.row_count(),
-            entries: regression.reduced(),
+            entries: regression.augmented_factor(),
         }
     }
 
-    /// The triangle of `n` parameters whose entries, from [`Triangle::entries`], were kept elsewhere, and from how many rows they
-    /// came, those of zeros left out.
-    /// Fails when there are not `(n + 1)(n + 2) / 2` entries or one is not finite.
+    /// Restores the factor of `n` parameters from stored [`RFactor::entries`] and the number of its rows, those of
+    /// zeros excluded.
+    /// Fails if there are not `(n + 1)(n + 2) / 2` entries or one is not finite.
     pub fn from_entries(n: usize, rows: usize, entries: &[f64]) -> Result<Self, LeastSquaresError> {
         let width = n + 1;
         if entries.len() != width * (width + 1) / 2 {
@@ -38,18 +40,12 @@ impl Triangle {
             });
         }
         if let Some(at) = entries.iter().position(|x| !x.is_finite()) {
-            return Err(LeastSquaresError::NotFinite {
-                row: at,
-                column: None,
-            });
+            return Err(LeastSquaresError::NotFinite { row: at, column: None });
         }
         let mut whole = vec![0.0; width * width];
         let mut next = entries.iter();
         for i in 0..width {
-            for (x, entry) in whole[i * width + i..(i + 1) * width]
-                .iter_mut()
-                .zip(next.by_ref())
-            {
+            for (x, entry) in whole[i * width + i..(i + 1) * width].iter_mut().zip(next.by_ref()) {
                 *x = *entry;
             }
         }
@@ -57,13 +53,13 @@ impl Triangle {
             n,
             rows: RowCount {
                 shown: rows,
-                telling: rows,
+                informative: rows,
             },
             entries: whole,
         })
     }
 
-    /// The entries of the triangle `[R, Q'y; 0, +-|residual|]` by rows, without the zeros below its diagonal.
+    /// The entries of the factor `[R, Q'y; 0, +-|residual|]` by rows, without the zeros below its diagonal.
     pub fn entries(&self) -> Vec<f64> {
         let width = self.n + 1;
         (0..width)
@@ -72,8 +68,8 @@ impl Triangle {
             .collect()
     }
 
-    /// The triangle of the rows of both. Fails when the numbers of parameters differ.
-    pub fn merged(&self, other: &Self) -> Result<Self, LeastSquaresError> {
+    /// The factor of the rows of both. Fails if the numbers of parameters differ.
+    pub fn merge_with(&self, other: &Self) -> Result<Self, LeastSquaresError> {
         if self.n != other.n {
             return Err(LeastSquaresError::NominalLength {
                 have: other.n,
@@ -90,7 +86,7 @@ impl Triangle {
         Ok(Self {
             rows: RowCount {
                 shown: self.rows.shown + other.rows.shown,
-                telling: self.rows.telling + other.rows.telling,
+                informative: self.rows.informative + other.rows.informative,
             },
             ..Self::new(&regression)
         })
@@ -101,13 +97,13 @@ impl Triangle {
         self.n
     }
 
-    /// Rows that were reduced, those of zeros left out.
+    /// Number of rows that were reduced, those of zeros excluded.
     pub fn rows(&self) -> usize {
-        self.rows.telling
+        self.rows.informative
     }
 
-    /// Says from how many rows the reduced ones came.
-    pub(crate) fn count_rows(&mut self, rows: RowCount) {
+    /// Sets the number of rows from which the factor came.
+    pub(crate) fn set_row_count(&mut self, rows: RowCount) {
         self.rows = rows;
     }
 
@@ -117,22 +113,22 @@ impl Triangle {
     }
 
     /// `Q'y`, `n` long.
-    pub fn right(&self) -> DVector<f64> {
+    pub fn right_side(&self) -> DVector<f64> {
         DVector::from_fn(self.n, |i, _| self.entries[i * (self.n + 1) + self.n])
     }
 
-    /// The norm of the residual that no parameters can explain.
-    pub fn corner(&self) -> f64 {
+    /// Norm of the residual that no parameters can explain.
+    pub fn residual_norm(&self) -> f64 {
         self.entries[self.entries.len() - 1].abs()
     }
 
     /// The solution; undetermined directions stay at `nominal`.
-    pub fn solve_near(&self, nominal: &[f64]) -> Result<Solution, LeastSquaresError> {
-        solve_triangle(&self.entries, self.rows, nominal)
+    pub fn solve_near(&self, nominal: &[f64]) -> Result<RegressionSolution, LeastSquaresError> {
+        solve_r_factor(&self.entries, self.rows, nominal)
     }
 
-    /// The same rows for the differences of the parameters from some values.
-    pub(crate) fn from(&self, values: &[f64]) -> Self {
+    /// The same rows for parameters relative to some values.
+    pub(crate) fn relative_to(&self, values: &[f64]) -> Self {
         let mut shifted = self.clone();
         for row in shifted.entries.chunks_exact_mut(self.n + 1) {
             let explained: f64 = row.iter().zip(values).map(|(w, value)| w * value).sum();
@@ -141,9 +137,8 @@ impl Triangle {
         shifted
     }
 
-    /// The regression of some of the columns alone; the parameters of the others are 0.
-    /// Fails when a column is not there.
-    pub fn only(&self, columns: &[usize]) -> Result<Self, LeastSquaresError> {
+    /// The factor of some of the columns alone; the parameters of the others are 0. Fails if a column does not exist.
+    pub fn select_columns(&self, columns: &[usize]) -> Result<Self, LeastSquaresError> {
         let width = self.n + 1;
         let mut regression = LeastSquares::new(columns.len());
         for row in self.entries.chunks_exact(width) {
@@ -156,8 +151,8 @@ impl Triangle {
         })
     }
 
-    /// The same with further rows, `n` numbers and a right-hand side each, which do not count as measured ones.
-    /// Fails when the lengths do not fit.
+    /// The same with additional rows, `n` numbers and a right side each, which do not count as measured ones. Fails if
+    /// the lengths do not match.
     pub fn with_rows(&self, regressor: &[f64], right: &[f64]) -> Result<Self, LeastSquaresError> {
         let width = self.n + 1;
         let mut regression = LeastSquares::new(self.n);
@@ -175,27 +170,25 @@ impl Triangle {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
 
     #[test]
     fn triangles_that_were_kept_add_to_that_of_all_rows() {
-        let mut noise = Noise::new(8);
+        let mut noise = TestNoise::new(8);
         let (n, rows) = (4, 90);
         let w: Vec<f64> = (0..n * rows).map(|_| noise.normal()).collect();
         let y: Vec<f64> = (0..rows).map(|_| noise.normal()).collect();
         let of = |from: usize, to: usize| {
             let mut regression = LeastSquares::new(n);
-            regression
-                .add_rows(&w[from * n..to * n], &y[from..to])
-                .unwrap();
-            let triangle = Triangle::new(&regression);
-            Triangle::from_entries(n, triangle.rows(), &triangle.entries()).unwrap()
+            regression.add_rows(&w[from * n..to * n], &y[from..to]).unwrap();
+            let triangle = RFactor::new(&regression);
+            RFactor::from_entries(n, triangle.rows(), &triangle.entries()).unwrap()
         };
         let [a, b, c] = [of(0, 20), of(20, 50), of(50, rows)];
         let all = of(0, rows).solve_near(&[0.0; 4]).unwrap();
         for merged in [
-            a.merged(&b).unwrap().merged(&c).unwrap(),
-            c.merged(&a).unwrap().merged(&b).unwrap(),
+            a.merge_with(&b).unwrap().merge_with(&c).unwrap(),
+            c.merge_with(&a).unwrap().merge_with(&b).unwrap(),
         ] {
             assert_eq!(merged.rows(), rows);
             let solved = merged.solve_near(&[0.0; 4]).unwrap();
@@ -204,7 +197,7 @@ mod tests {
                 assert!((solved.classical_std[k] - all.classical_std[k]).abs() < 1e-12);
             }
         }
-        assert!(Triangle::from_entries(3, rows, &a.entries()).is_err());
-        assert!(a.merged(&Triangle::new(&LeastSquares::new(3))).is_err());
+        assert!(RFactor::from_entries(3, rows, &a.entries()).is_err());
+        assert!(a.merge_with(&RFactor::new(&LeastSquares::new(3))).is_err());
     }
 }

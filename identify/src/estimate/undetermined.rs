@@ -1,18 +1,19 @@
-//! What a recording does not determine: a null space goes in, readable directions come out.
+//! Undetermined directions. Input: a null space; output: sparse, readable directions.
 
 use nalgebra::DMatrix;
 
+use crate::estimate::thresholds::PARTICIPATION_TOLERANCE;
 use crate::words::with_digits;
 
 /// A change of the parameters that changes no row of the regressor.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Direction {
+pub struct NullDirection {
     /// `(parameter, change)`; the first has change 1, the others are ordered by parameter.
     pub changes: Vec<(usize, f64)>,
 }
 
-impl Direction {
-    /// One sentence with the parameters' names; a parameter beyond the list is called `#index`.
+impl NullDirection {
+    /// One sentence with the parameters' names; a parameter without a name is called `#index`.
     pub fn describe(&self, names: &[String]) -> String {
         let name = |i: usize| names.get(i).cloned().unwrap_or_else(|| format!("#{i}"));
         let list: Vec<String> = self.changes.iter().map(|(i, _)| name(*i)).collect();
@@ -38,20 +39,14 @@ impl Direction {
     }
 }
 
-/// Entries of unit null vectors below this are rounding.
-const PARTICIPATES: f64 = 1e-6;
-
-/// Which parameters take part in no null vector, and a sparse basis of the null space.
+/// Whether each parameter is outside of all null vectors, and a sparse basis of the null space.
 ///
-/// `null_space` holds one unit vector per row, in columns scaled by `norms`; elimination with
-/// complete pivoting makes each direction start with a parameter that no other one contains.
-pub(crate) fn null_directions(
-    null_space: &DMatrix<f64>,
-    norms: &[f64],
-) -> (Vec<bool>, Vec<Direction>) {
+/// `null_space` has one unit vector per row, in columns scaled by `norms`. Elimination with complete pivoting makes
+/// each direction start with a parameter that no other direction contains.
+pub(crate) fn null_directions(null_space: &DMatrix<f64>, norms: &[f64]) -> (Vec<bool>, Vec<NullDirection>) {
     let n = norms.len();
     let determined = (0..n)
-        .map(|j| null_space.column(j).norm() <= PARTICIPATES)
+        .map(|j| null_space.column(j).norm() <= PARTICIPATION_TOLERANCE)
         .collect();
     let mut basis = null_space.clone();
     let mut pivots: Vec<usize> = Vec::new();
@@ -59,16 +54,17 @@ pub(crate) fn null_directions(
         let mut best = (0.0, step, 0);
         for i in step..basis.nrows() {
             for j in 0..n {
-                // Entries that are equal but for rounding must not decide by it: the first wins.
+                // Of entries that are equal up to rounding, the first is the pivot.
                 if basis[(i, j)].abs() > best.0 * (1.0 + 1e-9) {
                     best = (basis[(i, j)].abs(), i, j);
                 }
             }
         }
         let (size, row, column) = best;
-        if size <= PARTICIPATES {
+        if size <= PARTICIPATION_TOLERANCE {
             break;
         }
+        // Scale the pivot row and remove its parameter from all other rows.
         basis.swap_rows(step, row);
         let pivot = basis[(step, column)];
         basis.row_mut(step).unscale_mut(pivot);
@@ -80,14 +76,15 @@ pub(crate) fn null_directions(
         }
         pivots.push(column);
     }
+    // Undo the scaling of the columns.
     let directions = pivots
         .iter()
         .enumerate()
         .map(|(i, &pivot)| {
             let others = (0..n)
-                .filter(|&j| j != pivot && basis[(i, j)].abs() > PARTICIPATES)
+                .filter(|&j| j != pivot && basis[(i, j)].abs() > PARTICIPATION_TOLERANCE)
                 .map(|j| (j, basis[(i, j)] * norms[pivot] / norms[j]));
-            Direction {
+            NullDirection {
                 changes: std::iter::once((pivot, 1.0)).chain(others).collect(),
             }
         })

@@ -1,52 +1,53 @@
-//! Rows times their weights, and the scales of residuals that weights are made from.
+//! Weighted rows, and the scales of residuals from which weights are computed.
 //!
-//! Decision: weights are factors of rows. Variances, standstill, scales of channels and Huber's function multiply
-//! rows of regressor and force alike. A force that was not measured makes its row zero before any filter, so
-//! nothing has to be invented. Rows of zeros are no residuals, while error figures count every sample.
+//! Decision: weights are factors of rows. Variances, standstill, scales of channels and Huber's function multiply rows
+//! of regressor and force equally. A force that was not measured makes its row zero before any filter, so no value has
+//! to be invented. Rows of zeros are no residuals, while error figures count every sample.
 
 use crate::estimate::error::LeastSquaresError;
 use crate::estimate::least_squares::LeastSquares;
-use crate::estimate::magnitudes::Magnitudes;
-use crate::estimate::rows::{Visit, is_left_out};
-use crate::estimate::solution::Solution;
+use crate::estimate::magnitudes::MagnitudeHistogram;
+use crate::estimate::rows::{RowVisitor, is_uninformative};
+use crate::estimate::solution::RegressionSolution;
 
-/// What each row was multiplied by in the end.
+/// Final weights of the rows.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Weighting {
-    /// For each channel the scale of its residuals, in the units of the measured value (as shown).
+pub struct RowWeighting {
+    /// Scale of the residuals of each channel, in the unit of the measured value.
     pub scales: Vec<f64>,
-    /// Whether rows were divided by it.
+    /// Whether rows were divided by this scale.
     pub by_channel: bool,
-    /// Huber's bound in scales.
+    /// Huber's bound in multiples of the scale; `None` for ordinary least squares.
     pub huber: Option<f64>,
-    /// Share of the rows whose residual was beyond the bound.
+    /// Share of the rows whose residual exceeded the bound, 0 to 1.
     pub outliers: f64,
-    /// Solutions that were made.
+    /// Number of solutions.
     pub iterations: usize,
-    /// Whether the last two agreed.
-    pub settled: bool,
+    /// Whether the last two solutions agreed.
+    pub converged: bool,
 }
 
-/// Which rows a reweighting makes.
+/// Kind of rows that a reweighting computes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum WeightedRows {
     /// Regressor and measured value times the root of the weight: their gradient is that of Huber's function.
     Weighted,
-    /// WeightedRows within the bound only, with the residual that Huber's function sees: the second derivatives.
+    /// Rows within the bound only, with the clipped residual of Huber's function: the second derivatives.
     Curvature,
 }
 
-/// The scale of each channel's residuals: standard deviation, or median magnitude for robust estimates.
-pub(crate) fn scales<E: From<LeastSquaresError>>(
-    solution: &Solution,
-    weighting: &Weighting,
-    show: &mut impl FnMut(&mut Visit<'_>) -> Result<(), E>,
+/// Scale of each channel's residuals: the standard deviation, or 1.4826 times the median magnitude for robust
+/// estimates.
+pub(crate) fn residual_scales<E: From<LeastSquaresError>>(
+    solution: &RegressionSolution,
+    weighting: &RowWeighting,
+    show: &mut impl FnMut(&mut RowVisitor<'_>) -> Result<(), E>,
 ) -> Result<Vec<f64>, E> {
     let channels = weighting.scales.len();
     let n = solution.values.len();
     let mut squares = vec![0.0; channels];
-    let mut medians: Vec<Magnitudes> = match weighting.huber {
-        Some(_) => vec![Magnitudes::new(); channels],
+    let mut medians: Vec<MagnitudeHistogram> = match weighting.huber {
+        Some(_) => vec![MagnitudeHistogram::new(); channels],
         None => Vec::new(),
     };
     let mut size = vec![0.0; channels];
@@ -56,7 +57,7 @@ pub(crate) fn scales<E: From<LeastSquaresError>>(
         for (row, y) in regressor.chunks_exact(n).zip(measured) {
             let channel = rows % channels;
             rows += 1;
-            if is_left_out(row, *y) {
+            if is_uninformative(row, *y) {
                 continue;
             }
             counts[channel] += 1;
@@ -75,7 +76,7 @@ pub(crate) fn scales<E: From<LeastSquaresError>>(
             let freedom = (samples - solution.rank as f64 / channels as f64).max(1.0);
             let spread = (squares[channel] / freedom).sqrt();
             let scale = medians.get(channel).map_or(spread, |m| 1.4826 * m.median());
-            // A channel without any residual must not get all the weight there is.
+            // A channel without residual must not get infinite weight.
             let least = 1e-12 * (size[channel] / samples).sqrt();
             if scale > least {
                 scale
@@ -86,13 +87,13 @@ pub(crate) fn scales<E: From<LeastSquaresError>>(
         .collect())
 }
 
-/// The regression of reweighted rows.
-pub(crate) fn reweighted<E: From<LeastSquaresError>>(
+/// Regression of the reweighted rows.
+pub(crate) fn reweight_rows<E: From<LeastSquaresError>>(
     values: &[f64],
     channels: usize,
-    weighting: &Weighting,
+    weighting: &RowWeighting,
     rows: WeightedRows,
-    show: &mut impl FnMut(&mut Visit<'_>) -> Result<(), E>,
+    show: &mut impl FnMut(&mut RowVisitor<'_>) -> Result<(), E>,
 ) -> Result<LeastSquares, E> {
     let mut regression = LeastSquares::with_channels(values.len(), channels);
     show_weighted(values, channels, weighting, rows, show, &mut |w, y| {
@@ -101,12 +102,12 @@ pub(crate) fn reweighted<E: From<LeastSquaresError>>(
     Ok(regression)
 }
 
-/// The share of rows beyond Huber's bound.
-pub(crate) fn outliers<E: From<LeastSquaresError>>(
+/// Share of the rows whose residual exceeds Huber's bound.
+pub(crate) fn outlier_share<E: From<LeastSquaresError>>(
     values: &[f64],
     channels: usize,
-    weighting: &Weighting,
-    show: &mut impl FnMut(&mut Visit<'_>) -> Result<(), E>,
+    weighting: &RowWeighting,
+    show: &mut impl FnMut(&mut RowVisitor<'_>) -> Result<(), E>,
 ) -> Result<f64, E> {
     let bound = weighting.huber.unwrap_or(f64::INFINITY);
     let (mut beyond, mut rows, mut counted) = (0_usize, 0_usize, 0_usize);
@@ -114,7 +115,7 @@ pub(crate) fn outliers<E: From<LeastSquaresError>>(
         for (row, y) in w.chunks_exact(values.len()).zip(y) {
             let scale = weighting.scales[rows % channels];
             rows += 1;
-            counted += usize::from(!is_left_out(row, *y));
+            counted += usize::from(!is_uninformative(row, *y));
             beyond += usize::from((y - dot(row, values)).abs() > bound * scale);
         }
         Ok(())
@@ -122,14 +123,14 @@ pub(crate) fn outliers<E: From<LeastSquaresError>>(
     Ok(beyond as f64 / counted.max(1) as f64)
 }
 
-/// Shows weighted rows for residuals at `values`.
+/// Passes weighted rows to `visit`, with weights from the residuals at `values`.
 pub(crate) fn show_weighted<E: From<LeastSquaresError>>(
     values: &[f64],
     channels: usize,
-    weighting: &Weighting,
+    weighting: &RowWeighting,
     rows: WeightedRows,
-    show: &mut impl FnMut(&mut Visit<'_>) -> Result<(), E>,
-    visit: &mut Visit<'_>,
+    show: &mut impl FnMut(&mut RowVisitor<'_>) -> Result<(), E>,
+    visit: &mut RowVisitor<'_>,
 ) -> Result<(), E> {
     if !weighting.by_channel && weighting.huber.is_none() {
         return show(visit);
@@ -144,31 +145,20 @@ pub(crate) fn show_weighted<E: From<LeastSquaresError>>(
             let scale = weighting.scales[at % channels];
             at += 1;
             let error = y - dot(row, values);
-            let inside = weighting
-                .huber
-                .is_none_or(|bound| error.abs() <= bound * scale);
+            let inside = weighting.huber.is_none_or(|bound| error.abs() <= bound * scale);
+            // Weight min(1, bound / |residual|) beyond the bound; its root multiplies the row.
             let root = match (weighting.huber, rows) {
-                (Some(bound), WeightedRows::Weighted) if !inside => {
-                    (bound * scale / error.abs()).sqrt()
-                }
+                (Some(bound), WeightedRows::Weighted) if !inside => (bound * scale / error.abs()).sqrt(),
                 (Some(_), WeightedRows::Curvature) if !inside => 0.0,
                 _ => 1.0,
             };
-            let factor = if weighting.by_channel {
-                root / scale
-            } else {
-                root
-            };
+            let factor = if weighting.by_channel { root / scale } else { root };
             scaled.extend(row.iter().map(|w| factor * w));
             right.push(match (weighting.huber, rows) {
-                // What Huber's function sees of the residual keeps the variance of its gradient.
+                // The clipped residual keeps the variance of the gradient.
                 (Some(bound), WeightedRows::Curvature) => {
                     let seen = error.clamp(-bound * scale, bound * scale);
-                    let unit = if weighting.by_channel {
-                        seen / scale
-                    } else {
-                        seen
-                    };
+                    let unit = if weighting.by_channel { seen / scale } else { seen };
                     factor * dot(row, values) + unit
                 }
                 _ => factor * y,
@@ -178,6 +168,7 @@ pub(crate) fn show_weighted<E: From<LeastSquaresError>>(
     })
 }
 
+/// Inner product of two rows.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }

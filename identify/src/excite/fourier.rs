@@ -1,5 +1,4 @@
-//! Finite Fourier series, eq. (15) of the paper: coefficients go in; motion, and the extremes that it really has, come
-//! out.
+//! Finite Fourier series, eq. (15) of the paper. Input: coefficients; output: motion and its exact extremes.
 //!
 //! J. Swevers et al., "Optimal robot excitation and identification", IEEE Trans. Robotics and Automation 13 (1997).
 
@@ -9,15 +8,15 @@ use std::f64::consts::PI;
 /// `q(t) = offset + sum over k = 1.. of mu_k/(k omega) sin(k omega t) - nu_k/(k omega) cos(k omega t)`.
 ///
 /// ```
-/// use modelmill_identify::excite::Series;
-/// let series = Series { offset: 1.0, mu: vec![0.0, 4.0], nu: vec![0.0, 0.0], omega: 2.0 };
+/// use modelmill_identify::excite::FourierSeries;
+/// let series = FourierSeries { offset: 1.0, mu: vec![0.0, 4.0], nu: vec![0.0, 0.0], omega: 2.0 };
 /// // 1 + sin(4 t), with rate 4 cos(4 t)
 /// let [low, high] = series.extremes(0);
 /// assert!((low - 0.0).abs() < 1e-8 && (high - 2.0).abs() < 1e-8);
-/// assert_eq!(series.at(0.0), [1.0, 4.0, 0.0]);
+/// assert_eq!(series.at_time(0.0), [1.0, 4.0, 0.0]);
 /// ```
 #[derive(Clone, Debug, PartialEq)]
-pub struct Series {
+pub struct FourierSeries {
     /// Mean value, rad or m.
     pub offset: f64,
     /// `mu_1, mu_2, ...`, rad/s or m/s.
@@ -28,9 +27,9 @@ pub struct Series {
     pub omega: f64,
 }
 
-impl Series {
+impl FourierSeries {
     /// Coordinate, rate and acceleration at a time in s.
-    pub fn at(&self, t: f64) -> [f64; 3] {
+    pub fn at_time(&self, t: f64) -> [f64; 3] {
         let mut motion = [self.offset, 0.0, 0.0];
         for (k, (mu, nu)) in self.mu.iter().zip(&self.nu).enumerate() {
             let w = (k + 1) as f64 * self.omega;
@@ -47,8 +46,8 @@ impl Series {
         2.0 * PI / self.omega
     }
 
-    /// Bounds on all values between which the coordinate (0), its rate (1) or its acceleration (2) moves, at any time:
-    /// never too narrow, and too wide by no more than 1e-9 of the motion's size.
+    /// Bounds of the coordinate (0), its rate (1) or its acceleration (2) at all times: never too narrow, and too wide
+    /// by at most 1e-9 of the motion's size.
     pub fn extremes(&self, derivative: usize) -> [f64; 2] {
         let mean = if derivative == 0 { self.offset } else { 0.0 };
         // Cosine and sine of each harmonic.
@@ -67,12 +66,12 @@ impl Series {
             })
             .collect();
         let negative: Vec<[f64; 2]> = terms.iter().map(|[c, s]| [-c, -s]).collect();
-        [mean - greatest(&negative), mean + greatest(&terms)]
+        [mean - upper_bound(&negative), mean + upper_bound(&terms)]
     }
 
     /// The same motion, larger or smaller around its mean value.
     #[must_use]
-    pub fn scaled(&self, factor: f64) -> Self {
+    pub fn scale_amplitude(&self, factor: f64) -> Self {
         let times = |list: &[f64]| list.iter().map(|x| factor * x).collect();
         Self {
             offset: self.offset,
@@ -83,11 +82,11 @@ impl Series {
     }
 }
 
-/// An upper bound of `sum of c_k cos(k x) + s_k sin(k x)`, at most 1e-9 of the amplitudes' sum too high.
+/// Upper bound of `sum of c_k cos(k x) + s_k sin(k x)`, at most 1e-9 of the sum of the amplitudes too high.
 ///
-/// On an interval of width h the sum exceeds its greater end by at most `h^2/8` times a bound of its second
-/// derivative; intervals that could still matter are halved.
-fn greatest(terms: &[[f64; 2]]) -> f64 {
+/// On an interval of width h the sum exceeds its greater end by at most `h^2/8` times a bound of its second derivative.
+/// Intervals that may contain the maximum are halved.
+fn upper_bound(terms: &[[f64; 2]]) -> f64 {
     let value = |x: f64| -> f64 {
         let harmonics = terms.iter().enumerate();
         harmonics
@@ -112,9 +111,7 @@ fn greatest(terms: &[[f64; 2]]) -> f64 {
     let mut width = 2.0 * PI / pieces as f64;
     let ends: Vec<f64> = (0..=pieces).map(|i| value(i as f64 * width)).collect();
     let mut best = ends.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let mut open: Vec<(f64, f64, f64)> = (0..pieces)
-        .map(|i| (i as f64 * width, ends[i], ends[i + 1]))
-        .collect();
+    let mut open: Vec<(f64, f64, f64)> = (0..pieces).map(|i| (i as f64 * width, ends[i], ends[i + 1])).collect();
     while !open.is_empty() {
         let excess = curvature * width * width / 8.0;
         open.retain(|(_, left, right)| left.max(*right) + excess > best + tolerance);
@@ -134,10 +131,10 @@ fn greatest(terms: &[[f64; 2]]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
 
-    fn random(noise: &mut Noise, n: usize) -> Series {
-        Series {
+    fn random(noise: &mut TestNoise, n: usize) -> FourierSeries {
+        FourierSeries {
             offset: noise.normal(),
             mu: (0..n).map(|_| noise.normal()).collect(),
             nu: (0..n).map(|_| noise.normal()).collect(),
@@ -147,13 +144,13 @@ mod tests {
 
     #[test]
     fn extremes_hold_every_value_and_are_reached() {
-        let mut noise = Noise::new(7);
+        let mut noise = TestNoise::new(7);
         for n in 1..=7 {
             let series = random(&mut noise, n);
             for derivative in 0..3 {
                 let [low, high] = series.extremes(derivative);
                 let values: Vec<f64> = (0..200_000)
-                    .map(|i| series.at(series.period() * f64::from(i) / 200_000.0)[derivative])
+                    .map(|i| series.at_time(series.period() * f64::from(i) / 200_000.0)[derivative])
                     .collect();
                 let least = values.iter().copied().fold(f64::INFINITY, f64::min);
                 let greatest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -166,11 +163,11 @@ mod tests {
 
     #[test]
     fn rates_are_derivatives() {
-        let series = random(&mut Noise::new(3), 5);
+        let series = random(&mut TestNoise::new(3), 5);
         let step = 1e-5;
         for i in 0..20 {
             let t = 0.1 * f64::from(i);
-            let (before, now, after) = (series.at(t - step), series.at(t), series.at(t + step));
+            let (before, now, after) = (series.at_time(t - step), series.at_time(t), series.at_time(t + step));
             for d in 0..2 {
                 let slope = (after[d] - before[d]) / (2.0 * step);
                 assert!((slope - now[d + 1]).abs() < 1e-6);

@@ -1,14 +1,14 @@
-//! Motion that excites a mechanism so that its base parameters are found best: limits go in, a periodic trajectory for
-//! each active coordinate comes out, eq. (14), (15) and (17) of the paper.
+//! Excitation: a motion with which the base parameters are identified best. Input: limits. Output: a periodic
+//! trajectory for each active coordinate, eq. (14), (15) and (17) of the paper.
 //!
-//! 1. `random` - random series within the limits; the best of them are where the search starts.
+//! 1. `random` - random series within the limits; the search starts from the best of them.
 //! 2. `search` - sequential quadratic programming from each start.
-//! 3. `feasible` - what was found, shrunk until no limit is exceeded, between samples either.
+//! 3. `feasible` - shrinks the result until no limit is exceeded, between samples either.
 //!
-//! What is made small is a [`Criterion`]: uncertainty of the base parameters, or, with [`separate`], what two effects have in
-//! common.
+//! The objective is an [`ExcitationCriterion`]: the uncertainty of the base parameters, or, with [`separate`], the
+//! similarity of two effects. It is minimised.
 //!
-//! How a mechanism moves is the business of the caller, who gives a [`Plant`].
+//! The caller provides the mechanism as an [`ExcitationPlant`].
 
 mod feasible;
 mod fourier;
@@ -16,34 +16,36 @@ mod measure;
 mod random;
 mod search;
 pub mod separate;
+mod thresholds;
 
 use std::fmt;
 
+use modelmill_runtime::RandomBits;
 use nalgebra::DMatrix;
 
-pub use fourier::Series;
+pub use fourier::FourierSeries;
 pub use measure::{condition_number, least_singular_value, scaled_condition_number};
 
 /// Motion of all active coordinates, `[coordinate][sample]`.
 #[derive(Clone, Debug, Default)]
-pub struct Motion {
-    /// rad or m
+pub struct ExcitationMotion {
+    /// Positions, rad or m.
     pub q: Vec<Vec<f64>>,
-    /// rad/s or m/s
+    /// Rates, rad/s or m/s.
     pub qd: Vec<Vec<f64>>,
-    /// rad/s^2 or m/s^2
+    /// Accelerations, rad/s^2 or m/s^2.
     pub qdd: Vec<Vec<f64>>,
 }
 
-impl Motion {
-    /// Series sampled at equal steps over one period, without its end, which is its beginning.
-    pub fn sample(series: &[Series], samples: usize) -> Self {
+impl ExcitationMotion {
+    /// Samples series at equal steps over one period; the end, which equals the beginning, is left out.
+    pub fn sample(series: &[FourierSeries], samples: usize) -> Self {
         let mut motion = Self::default();
         for one in series {
             let step = one.period() / samples as f64;
             let mut columns = [0, 1, 2].map(|_| Vec::with_capacity(samples));
             for i in 0..samples {
-                for (column, value) in columns.iter_mut().zip(one.at(i as f64 * step)) {
+                for (column, value) in columns.iter_mut().zip(one.at_time(i as f64 * step)) {
                     column.push(value);
                 }
             }
@@ -56,67 +58,67 @@ impl Motion {
     }
 }
 
-/// The mechanism, as far as excitation must know it.
-pub trait Plant {
-    /// The regressor along a motion: rows of samples and drives, columns of base parameters; `None` where the
-    /// mechanism cannot follow.
-    fn regressor(&self, motion: &Motion) -> Option<DMatrix<f64>>;
+/// What excitation needs of a mechanism.
+pub trait ExcitationPlant {
+    /// The regressor along a motion: rows of samples and drives, columns of base parameters; `None` if the mechanism
+    /// cannot follow the motion.
+    fn regressor(&self, motion: &ExcitationMotion) -> Option<DMatrix<f64>>;
 
-    /// Names of limits beyond those of coordinates, in the order of [`Plant::excess`].
+    /// Names of limits in addition to those of the coordinates, in the order of [`ExcitationPlant::excess`].
     fn limits(&self) -> Vec<String>;
 
-    /// For each of [`Plant::limits`] and each sample, by how much it is exceeded, as a share of half its range:
-    /// negative inside, -1 in the middle; `None` where the mechanism cannot follow.
-    fn excess(&self, motion: &Motion) -> Option<Vec<Vec<f64>>>;
+    /// Excess of each of [`ExcitationPlant::limits`], `[limit][sample]`, as a share of half its range: negative inside,
+    /// -1 in the middle. `None` if the mechanism cannot follow the motion.
+    fn excess(&self, motion: &ExcitationMotion) -> Option<Vec<Vec<f64>>>;
 
-    /// For [`Criterion::Separation`], by how much effects can be told apart along a motion, such as a force in root mean
-    /// squares; `None` where the mechanism cannot follow, and for plants that are not asked to tell any apart.
-    fn apart(&self, _motion: &Motion) -> Option<f64> {
+    /// For [`ExcitationCriterion::Separation`]: how well effects are distinguished along a motion, for example an rms
+    /// force. `None` if the mechanism cannot follow the motion, and for plants without effects to distinguish.
+    fn separation(&self, _motion: &ExcitationMotion) -> Option<f64> {
         None
     }
 }
 
 /// Limits of one active coordinate, `[low, high]`.
 #[derive(Clone, Debug, PartialEq)]
-pub struct CoordinateLimits {
-    /// What messages call it.
+pub struct ExcitationLimits {
+    /// Name of the coordinate in messages.
     pub name: String,
-    /// rad or m
+    /// Limits of the position, rad or m.
     pub position: [f64; 2],
-    /// rad/s or m/s, around 0
+    /// Limits of the rate, rad/s or m/s, around 0; `None` without limits.
     pub rate: Option<[f64; 2]>,
-    /// rad/s^2 or m/s^2, around 0
+    /// Limits of the acceleration, rad/s^2 or m/s^2, around 0; `None` without limits.
     pub acceleration: Option<[f64; 2]>,
 }
 
-/// What is made small.
+/// What is minimised.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum Criterion {
-    /// The condition number of the stacked regressor in its units, eq. (13).
+pub enum ExcitationCriterion {
+    /// Condition number of the stacked regressor in its units, eq. (13).
     #[default]
     Condition,
     /// `-log det(W'W / N)`, which does not depend on units.
     LogDet,
-    /// What effects have in common: made small is `-log` of [`Plant::apart`].
+    /// Similarity of effects: minimises `-log` of [`ExcitationPlant::separation`].
     Separation,
 }
 
-/// How to search.
+/// Options of the search.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
-    /// Harmonics of the series.
+    /// Number of harmonics of the series.
     pub harmonics: usize,
     /// Period, s.
     pub period: f64,
-    /// What is made small.
-    pub criterion: Criterion,
-    /// Random feasible trajectories that are tried first.
+    /// Criterion that is minimised.
+    pub criterion: ExcitationCriterion,
+    /// Number of random feasible trajectories that are tried first.
     pub random: usize,
-    /// How many of them the search starts from.
+    /// Number of them from which the search starts.
     pub starts: usize,
-    /// Steps of the search from each start, at most.
+    /// Largest number of steps of the search from each start.
     pub steps: usize,
-    /// The same seed gives the same trajectory.
+    /// Seed of the random numbers; the same seed gives the same trajectory.
     pub seed: u64,
 }
 
@@ -125,7 +127,7 @@ impl Default for Options {
         Self {
             harmonics: 7,
             period: 7.29,
-            criterion: Criterion::Condition,
+            criterion: ExcitationCriterion::Condition,
             random: 1000,
             starts: 4,
             steps: 150,
@@ -134,37 +136,37 @@ impl Default for Options {
     }
 }
 
-/// A trajectory that was found.
+/// Result of the search.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Excitation {
+pub struct ExcitationTrajectory {
     /// One series for each active coordinate.
-    pub series: Vec<Series>,
-    /// Value of the criterion: the logarithm of the condition number, `-log det`, or `-log` of what is apart.
+    pub series: Vec<FourierSeries>,
+    /// Value of the criterion: the logarithm of the condition number, `-log det`, or `-log` of the separation.
     pub value: f64,
-    /// The same for the best of the random trajectories.
-    pub first: f64,
-    /// Condition number of the regressor, eq. (13), at [`samples`] steps over the period.
+    /// The same for the best random trajectory.
+    pub start_value: f64,
+    /// Condition number of the regressor, eq. (13), at [`samples_per_period`] steps over the period.
     pub condition_number: f64,
-    /// The same for the best of the random trajectories.
-    pub start: f64,
-    /// Random trajectories that kept the limits.
-    pub random: usize,
-    /// Trajectories for which the regressor was evaluated.
+    /// The same for the best random trajectory.
+    pub start_condition_number: f64,
+    /// Number of random trajectories within the limits.
+    pub feasible_starts: usize,
+    /// Number of evaluations of the criterion.
     pub evaluations: usize,
-    /// Value of the criterion where each search ended, the best first.
-    pub ends: Vec<f64>,
-    /// How close the trajectory comes to each limit.
-    pub margins: Vec<Margin>,
+    /// Value of the criterion at the end of each search, best first.
+    pub end_values: Vec<f64>,
+    /// Margin to each limit.
+    pub margins: Vec<LimitMargin>,
 }
 
-/// How close a trajectory comes to a limit.
+/// Margin of a trajectory to one limit.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Margin {
-    /// Which limit.
+pub struct LimitMargin {
+    /// Name of the limit; `_d` and `_dd` mark rates and accelerations.
     pub name: String,
-    /// The largest excess over a period, as a share of half the range: not above 0 where the limit is kept.
+    /// Largest excess over a period, as a share of half the range: not above 0 if the limit is kept.
     pub excess: f64,
-    /// Whether the excess is a proven bound for all times, or one from fine sampling and differences.
+    /// Whether the excess is a proven bound for all times, or comes from fine sampling and differences.
     pub proven: bool,
 }
 
@@ -172,30 +174,30 @@ pub struct Margin {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ExciteError {
-    /// No random trajectory kept the limits.
+    /// No random trajectory was within the limits.
     NoStart {
-        /// How many were tried.
-        tried: usize,
-        /// The limit that was exceeded most often, if it is not that the mechanism could not follow.
-        most: Option<String>,
+        /// Number of trajectories that were tried.
+        attempts: usize,
+        /// The limit that was exceeded most often; `None` if the mechanism could not follow the motions.
+        most_exceeded: Option<String>,
     },
     /// There are no base parameters or no coordinates.
     NothingToExcite,
     /// The regressor has dependent columns along every trajectory that was tried.
     Deficient,
-    /// The effects are the same along every trajectory that was tried.
+    /// The effects are indistinguishable along every trajectory that was tried.
     Inseparable,
 }
 
 impl fmt::Display for ExciteError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NoStart { tried, most } => {
-                write!(f, "none of {tried} random trajectories kept the limits: ")?;
+            Self::NoStart { attempts: tried, most_exceeded: most } => {
+                write!(f, "none of {tried} random trajectories is within the limits: ")?;
                 match most {
-                    Some(name) => write!(f, "`{name}` was exceeded most often; widen it"),
+                    Some(name) => write!(f, "`{name}` was exceeded most often; widen this limit"),
                     None => f.write_str(
-                        "the mechanism could not follow; narrow the positions so that the loops close within them",
+                        "the mechanism cannot reach the positions; narrow their limits so that the loops close everywhere within them",
                     ),
                 }
             }
@@ -203,10 +205,10 @@ impl fmt::Display for ExciteError {
                 "there is nothing to excite: the model has no base parameter that a force depends on",
             ),
             Self::Deficient => f.write_str(
-                "no trajectory within the limits tells all base parameters apart; widen the limits or use more harmonics",
+                "no trajectory within the limits distinguishes all base parameters; widen the limits or use more harmonics",
             ),
             Self::Inseparable => {
-                f.write_str("no trajectory within the limits tells the effects apart")
+                f.write_str("no trajectory within the limits distinguishes the effects")
             }
         }
     }
@@ -214,90 +216,90 @@ impl fmt::Display for ExciteError {
 
 impl std::error::Error for ExciteError {}
 
-/// Samples over a period from which criteria and limits of the plant are computed in the search: 16 for the shortest
-/// wave, but no fewer than 128.
-pub fn samples(options: &Options) -> usize {
+/// Number of samples over a period from which criteria and limits of the plant are computed in the search: 16 for the
+/// shortest wave, but at least 128.
+pub fn samples_per_period(options: &Options) -> usize {
     (16 * options.harmonics).max(128)
 }
 
-/// Whether a search goes on.
-pub type Flow = std::ops::ControlFlow<()>;
+/// Whether a search continues.
+pub type SearchFlow = std::ops::ControlFlow<()>;
 
-/// Finds a trajectory; `progress` is told of each step out of [`steps`] and says whether to go on. A search that is stopped ends
-/// soon, with what it has or an error.
+/// Finds a trajectory. `progress` is called with the number of new steps, out of [`max_progress_steps`], and returns
+/// whether to continue. A search that is stopped ends soon, with its result so far or an error.
 pub fn excite(
-    plant: &dyn Plant,
-    limits: &[CoordinateLimits],
+    plant: &dyn ExcitationPlant,
+    limits: &[ExcitationLimits],
     options: &Options,
-    progress: &dyn Fn(usize) -> Flow,
-) -> Result<Excitation, ExciteError> {
+    progress: &dyn Fn(usize) -> SearchFlow,
+) -> Result<ExcitationTrajectory, ExciteError> {
     if limits.is_empty() {
         return Err(ExciteError::NothingToExcite);
     }
-    let measure = measure::Measure::new(plant, limits, options);
-    let drawn = random::draw(&measure, progress)?;
-    let mut found: Vec<(f64, Vec<Series>)> = Vec::new();
+    let measure = measure::TrajectoryEvaluator::new(plant, limits, options);
+    // Stage 1: random starts; stage 2: a search from each of the best, shrunk to the limits.
+    let drawn = random::draw_starts(&measure, progress)?;
+    let mut found: Vec<(f64, Vec<FourierSeries>)> = Vec::new();
     for start in drawn.best.iter().take(options.starts) {
         let end = search::improve(&measure, &start.1, progress);
-        found.extend(feasible::within(&measure, &end));
+        found.extend(feasible::shrink_to_limits(&measure, &end));
     }
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
     found.truncate(options.starts);
-    let polished = found.len().min(POLISHED);
+    // Stage 3: the best ends are refined with sharper constraints.
+    let polished = found.len().min(POLISHED_ENDS);
     for k in 0..polished {
         let end = search::polish(&measure, &found[k].1, progress);
-        found.extend(feasible::within(&measure, &end));
+        found.extend(feasible::shrink_to_limits(&measure, &end));
     }
-    // The start itself is an answer, should no search do better.
+    // The best start is the result if no search improves it.
     let first = drawn.best[0].clone();
     found.push(first.clone());
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
     let ends = found.iter().map(|(value, _)| *value).collect();
     let (value, series) = found.swap_remove(0);
-    let condition = |series: &[Series]| {
-        let motion = Motion::sample(series, samples(options));
-        plant
-            .regressor(&motion)
-            .map_or(f64::INFINITY, |w| condition_number(&w))
+    let condition = |series: &[FourierSeries]| {
+        let motion = ExcitationMotion::sample(series, samples_per_period(options));
+        plant.regressor(&motion).map_or(f64::INFINITY, |w| condition_number(&w))
     };
-    Ok(Excitation {
+    Ok(ExcitationTrajectory {
         condition_number: condition(&series),
-        start: condition(&first.1),
+        start_condition_number: condition(&first.1),
         value,
-        first: first.0,
-        random: drawn.feasible,
+        start_value: first.0,
+        feasible_starts: drawn.feasible,
         evaluations: measure.evaluations(),
-        ends,
+        end_values: ends,
         margins: feasible::margins(&measure, &series),
         series,
     })
 }
 
-/// Random motions within the limits, as a search would start from.
+/// Random motions within the limits, like those from which a search starts.
 pub fn random_motions(
-    plant: &dyn Plant,
-    limits: &[CoordinateLimits],
+    plant: &dyn ExcitationPlant,
+    limits: &[ExcitationLimits],
     options: &Options,
     wanted: usize,
-) -> Result<Vec<Motion>, ExciteError> {
+) -> Result<Vec<ExcitationMotion>, ExciteError> {
     if limits.is_empty() {
         return Err(ExciteError::NothingToExcite);
     }
-    let measure = measure::Measure::new(plant, limits, options);
+    let measure = measure::TrajectoryEvaluator::new(plant, limits, options);
     let mut motions = Vec::new();
-    let mut draws = random::Draws(options.seed);
-    random::feasible_ones(&measure, &mut draws, wanted, |series| {
-        motions.push(measure.motion(&series));
-        Flow::Continue(())
+    let mut draws = RandomBits::new(options.seed);
+    random::draw_feasible(&measure, &mut draws, wanted, |series| {
+        motions.push(measure.sample_motion(&series));
+        SearchFlow::Continue(())
     })?;
     Ok(motions)
 }
 
-/// Ends of searches that are polished.
-const POLISHED: usize = 2;
+/// Number of search results that are refined.
+const POLISHED_ENDS: usize = 2;
 
-/// Steps that `progress` of [`excite`] is told of, at most.
-pub fn steps(options: &Options) -> usize {
-    let rounds = options.starts + POLISHED * search::POLISHES;
+/// Largest number of steps that `progress` of [`excite`] counts.
+pub fn max_progress_steps(options: &Options) -> usize {
+    let rounds = options.starts + POLISHED_ENDS * search::POLISHES;
     options.random + rounds * options.steps
 }

@@ -1,36 +1,38 @@
-//! Random trajectories that keep the limits, as large as the limits let them be.
+//! Random trajectories within the limits, as large as the limits allow.
 
-use super::feasible::{reach, worst};
-use super::measure::{Measure, half};
-use super::{Criterion, ExciteError, Flow, Series};
+use modelmill_runtime::RandomBits;
 
-/// Trajectories that kept the limits.
-pub(super) struct Drawn {
-    /// The best of them with their values, the best first.
-    pub(super) best: Vec<(f64, Vec<Series>)>,
-    /// How many there were.
+use super::feasible::{max_scale_factor, worst_plant_limit};
+use super::measure::{TrajectoryEvaluator, half_width};
+use super::{ExcitationCriterion, ExciteError, FourierSeries, SearchFlow};
+
+/// Random trajectories within the limits.
+pub(super) struct FeasibleStarts {
+    /// The best of them with the values of the criterion, best first.
+    pub(super) best: Vec<(f64, Vec<FourierSeries>)>,
+    /// Number of trajectories that were within the limits.
     pub(super) feasible: usize,
 }
 
-/// Draws per trajectory that is wanted, before it is given up.
+/// Largest number of draws per requested trajectory.
 const PATIENCE: usize = 20;
-/// How often a trajectory is shrunk to keep the plant's limits before another one is drawn.
+/// Number of times a trajectory is shrunk to the plant's limits before another one is drawn.
 const SHRINKS: usize = 12;
 
-/// Draws as many as the options say.
-pub(super) fn draw(
-    measure: &Measure<'_>,
-    progress: &dyn Fn(usize) -> Flow,
-) -> Result<Drawn, ExciteError> {
+/// Draws as many trajectories as the options request and keeps the best; an error if none is useful.
+pub(super) fn draw_starts(
+    measure: &TrajectoryEvaluator<'_>,
+    progress: &dyn Fn(usize) -> SearchFlow,
+) -> Result<FeasibleStarts, ExciteError> {
     let wanted = measure.options.random.max(1);
-    let mut draws = Draws(measure.options.seed);
-    let mut drawn: Vec<(f64, Vec<Series>)> = Vec::new();
+    let mut draws = RandomBits::new(measure.options.seed);
+    let mut drawn: Vec<(f64, Vec<FourierSeries>)> = Vec::new();
     let mut feasible = 0;
     let mut stopped = false;
-    feasible_ones(measure, &mut draws, wanted, |series| {
+    draw_feasible(measure, &mut draws, wanted, |series| {
         feasible += 1;
         let flow = progress(1);
-        let value = measure.value(&measure.motion(&series));
+        let value = measure.criterion_value(&measure.sample_motion(&series));
         if value.is_finite() {
             drawn.push((value, series));
         }
@@ -38,53 +40,52 @@ pub(super) fn draw(
         flow
     })?;
     if drawn.is_empty() {
-        return Err(nothing(measure));
+        return Err(no_start_error(measure));
     }
     drawn.sort_by(|a, b| a.0.total_cmp(&b.0));
-    // A search polishes each of them; before that, they must hold between samples too.
-    drawn.truncate(if stopped {
-        1
-    } else {
-        4 * measure.options.starts.max(1)
-    });
-    let kept: Vec<(f64, Vec<Series>)> = drawn
+    // The search starts from these, so they must be within the limits between samples too. If the user stops, one is
+    // enough.
+    drawn.truncate(if stopped { 1 } else { 4 * measure.options.starts.max(1) });
+    let kept: Vec<(f64, Vec<FourierSeries>)> = drawn
         .into_iter()
-        .filter_map(|(_, series)| super::feasible::within(measure, &series))
+        .filter_map(|(_, series)| super::feasible::shrink_to_limits(measure, &series))
         .collect();
     let mut best = kept;
     best.sort_by(|a, b| a.0.total_cmp(&b.0));
     if best.is_empty() {
-        return Err(nothing(measure));
+        return Err(no_start_error(measure));
     }
-    Ok(Drawn { best, feasible })
+    Ok(FeasibleStarts { best, feasible })
 }
 
-/// Why no trajectory is worth anything.
-fn nothing(measure: &Measure<'_>) -> ExciteError {
+/// Error for the case that no trajectory has a finite criterion.
+fn no_start_error(measure: &TrajectoryEvaluator<'_>) -> ExciteError {
     match measure.options.criterion {
-        Criterion::Separation => ExciteError::Inseparable,
-        Criterion::Condition | Criterion::LogDet => ExciteError::Deficient,
+        ExcitationCriterion::Separation => ExciteError::Inseparable,
+        ExcitationCriterion::Condition | ExcitationCriterion::LogDet => ExciteError::Deficient,
     }
 }
 
-/// Draws trajectories until as many as are wanted have kept the limits, patience ends, or `take` says that it is enough; an error if none has.
-pub(super) fn feasible_ones(
-    measure: &Measure<'_>,
-    draws: &mut Draws,
+/// Draws trajectories until `wanted` of them are within the limits, the largest number of draws is reached, or `take`
+/// stops. An error if none is within the limits.
+pub(super) fn draw_feasible(
+    measure: &TrajectoryEvaluator<'_>,
+    draws: &mut RandomBits,
     wanted: usize,
-    mut take: impl FnMut(Vec<Series>) -> Flow,
+    mut take: impl FnMut(Vec<FourierSeries>) -> SearchFlow,
 ) -> Result<(), ExciteError> {
     let names = measure.plant.limits();
+    // Counts how often each limit was exceeded, for the error message.
     let mut blame = vec![0_usize; names.len()];
     let (mut tried, mut feasible) = (0, 0);
-    let mut flow = Flow::Continue(());
+    let mut flow = SearchFlow::Continue(());
     while flow.is_continue() && feasible < wanted && tried < PATIENCE * wanted {
         tried += 1;
-        let mut series: Vec<Series> = (0..measure.limits.len())
-            .map(|i| one(measure, i, draws))
+        let mut series: Vec<FourierSeries> = (0..measure.limits.len())
+            .map(|i| draw_series(measure, i, draws))
             .collect();
         for _ in 0..SHRINKS {
-            match worst(measure, &series, super::samples(measure.options)) {
+            match worst_plant_limit(measure, &series, super::samples_per_period(measure.options)) {
                 Some((_, excess)) if excess <= 0.0 => {
                     feasible += 1;
                     flow = take(series);
@@ -93,7 +94,8 @@ pub(super) fn feasible_ones(
                 Some((k, _)) if k < blame.len() => blame[k] += 1,
                 _ => {}
             }
-            series = series.iter().map(|s| s.scaled(0.8)).collect();
+            // Shrink the motion and check the limits again.
+            series = series.iter().map(|s| s.scale_amplitude(0.8)).collect();
         }
     }
     if feasible > 0 {
@@ -101,47 +103,29 @@ pub(super) fn feasible_ones(
     }
     let most = (0..names.len()).max_by_key(|k| blame[*k]);
     Err(ExciteError::NoStart {
-        tried,
-        most: most.filter(|k| blame[*k] > 0).map(|k| names[k].clone()),
+        attempts: tried,
+        most_exceeded: most.filter(|k| blame[*k] > 0).map(|k| names[k].clone()),
     })
 }
 
-/// A series of one coordinate that fills the tightest of its limits, around a mean value that leaves it room.
-fn one(measure: &Measure<'_>, i: usize, draws: &mut Draws) -> Series {
+/// A random series of one coordinate that reaches its tightest limit, around a random mean within the remaining range.
+fn draw_series(measure: &TrajectoryEvaluator<'_>, i: usize, draws: &mut RandomBits) -> FourierSeries {
     let n = measure.options.harmonics;
     let omega = measure.omega();
     let [low, high] = measure.limits[i].position;
-    let shape = Series {
+    let shape = FourierSeries {
         offset: 0.0,
-        mu: (0..n).map(|_| draws.normal()).collect(),
-        nu: (0..n).map(|_| draws.normal()).collect(),
+        mu: (0..n).map(|_| draws.nearly_normal()).collect(),
+        nu: (0..n).map(|_| draws.nearly_normal()).collect(),
         omega,
     };
+    // Scale the random shape to the limits of position, rate and acceleration.
     let [least, greatest] = shape.extremes(0);
-    let by_position = 2.0 * half([low, high]) / (greatest - least);
-    let factor = reach(&measure.limits[i], &shape).min(by_position);
-    let mut series = shape.scaled(factor);
-    let room = (2.0 * half([low, high]) - factor * (greatest - least)).max(0.0);
-    series.offset = low - factor * least + room * draws.uniform();
+    let by_position = 2.0 * half_width([low, high]) / (greatest - least);
+    let factor = max_scale_factor(&measure.limits[i], &shape).min(by_position);
+    let mut series = shape.scale_amplitude(factor);
+    // Remaining range for the mean value.
+    let room = (2.0 * half_width([low, high]) - factor * (greatest - least)).max(0.0);
+    series.offset = low - factor * least + room * draws.below_one();
     series
-}
-
-/// Random numbers that are the same on every machine (Steele et al., `SplitMix`, 2014).
-pub(super) struct Draws(pub(super) u64);
-
-impl Draws {
-    /// Between 0 and 1.
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^= z >> 31;
-        (z >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    /// Nearly normal: the sum of twelve uniform numbers, in which no function of a mathematical library has a part.
-    fn normal(&mut self) -> f64 {
-        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
-    }
 }

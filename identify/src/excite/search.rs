@@ -1,88 +1,92 @@
-//! From a start to a local optimum: sequential quadratic programming (D. Kraft, 1988, the crate `slsqp`) on the
+//! Local optimisation from a start: sequential quadratic programming (D. Kraft, 1988, the crate `slsqp`) on the
 //! coefficients of eq. (17), with limits as smooth constraints.
 //!
-//! The largest excess over a limit is taken as `log(sum of exp(r * excess)) / r`, which is smooth and never below it
-//! (G. Kreisselmeier and R. Steinhauser, 1979); r grows from one round to the next.
+//! The largest excess over a limit is approximated by `log(sum of exp(r * excess)) / r`, which is smooth and never
+//! below it (G. Kreisselmeier and R. Steinhauser, 1979); r grows from one round to the next.
 //!
-//! Decision: gradients are central differences over the some thirty coefficients, because evaluation in blocks
-//! makes each of them cheap. They need smooth functions: the logarithm of the condition number and smooth largest
-//! excesses.
+//! Decision: gradients are central differences over about thirty coefficients, because evaluation in blocks makes each
+//! of them cheap. They need smooth functions: the logarithm of the condition number and smooth largest excesses.
 
 use std::cell::{Cell, RefCell};
 
 use slsqp::{StopTols, minimize};
 
-use super::measure::{Measure, excess, half};
-use super::{Criterion, Flow, Motion, Series};
+use super::measure::{TrajectoryEvaluator, excess, half_width};
+use super::{ExcitationCriterion, ExcitationMotion, FourierSeries, SearchFlow};
 
-/// Sharpness of the smooth largest value, in the first round and in those that polish.
+/// Sharpness r of the smooth maximum, in the first round and in the refining ones.
 const FIRST: f64 = 50.0;
 const POLISH: [f64; 2] = [200.0, 800.0];
-/// Step of the differences, in coefficients that are of size 1.
+/// Step of the differences, for coefficients of size 1.
 const STEP: f64 = 1e-5;
-/// The same where effects are told apart. Many of them jump with the sign of a rate, which moves from one sample to the next
-/// only now and then: a difference over many such steps has the slope of their mean. On the SpiderMill it takes dry from
-/// viscous friction 6 % farther apart than short steps do, and costs nothing where nothing jumps.
-const WIDE: f64 = 1e-2;
-/// The value of a trajectory that the mechanism cannot follow.
-const REFUSED: f64 = 1e3;
+/// The same if effects are to be distinguished. Many of them jump with the sign of a rate, whose zero moves from one
+/// sample to the next only for large steps. A difference over many such steps gives the mean slope. On the SpiderMill
+/// it separates dry from viscous friction 6 % better than short steps, and it costs nothing where nothing jumps.
+const SEPARATION_STEP: f64 = 1e-2;
+/// Value of a trajectory that the mechanism cannot follow.
+const INFEASIBLE_VALUE: f64 = 1e3;
 
 /// Objective and constraints at a point, with their derivatives.
-struct Known {
-    at: Vec<f64>,
+struct ConstraintLinearisation {
+    /// Coefficients of the point.
+    point: Vec<f64>,
+    /// The objective, then the constraints.
     values: Vec<f64>,
+    /// Their gradients, in the same order.
     gradients: Vec<Vec<f64>>,
 }
 
-/// Rounds of polishing.
+/// Number of refining rounds.
 pub(super) const POLISHES: usize = POLISH.len();
 
-/// Improves a trajectory; it may exceed limits a little.
+/// Improves a trajectory; the result may exceed limits slightly.
 pub(super) fn improve(
-    measure: &Measure<'_>,
-    start: &[Series],
-    progress: &dyn Fn(usize) -> Flow,
-) -> Vec<Series> {
-    let scales = Scales::new(measure);
-    let x = round(measure, &scales, &scales.encode(start), FIRST, progress);
+    measure: &TrajectoryEvaluator<'_>,
+    start: &[FourierSeries],
+    progress: &dyn Fn(usize) -> SearchFlow,
+) -> Vec<FourierSeries> {
+    let scales = CoefficientScales::new(measure);
+    let x = optimise_round(measure, &scales, &scales.encode(start), FIRST, progress);
     scales.decode(&x)
 }
 
-/// Improves a trajectory that was improved before: closer to the limits.
+/// Refines an improved trajectory with sharper constraints, closer to the limits.
 pub(super) fn polish(
-    measure: &Measure<'_>,
-    start: &[Series],
-    progress: &dyn Fn(usize) -> Flow,
-) -> Vec<Series> {
-    let scales = Scales::new(measure);
+    measure: &TrajectoryEvaluator<'_>,
+    start: &[FourierSeries],
+    progress: &dyn Fn(usize) -> SearchFlow,
+) -> Vec<FourierSeries> {
+    let scales = CoefficientScales::new(measure);
     let mut x = scales.encode(start);
     for sharpness in POLISH {
-        x = round(measure, &scales, &x, sharpness, progress);
+        x = optimise_round(measure, &scales, &x, sharpness, progress);
     }
     scales.decode(&x)
 }
 
-fn round(
-    measure: &Measure<'_>,
-    scales: &Scales<'_, '_>,
+/// One run of the optimiser with a sharpness of the constraints; returns the coefficients at its end.
+fn optimise_round(
+    measure: &TrajectoryEvaluator<'_>,
+    scales: &CoefficientScales<'_, '_>,
     start: &[f64],
     sharpness: f64,
-    progress: &dyn Fn(usize) -> Flow,
+    progress: &dyn Fn(usize) -> SearchFlow,
 ) -> Vec<f64> {
-    let known: RefCell<Option<Known>> = RefCell::new(None);
-    let flow = Cell::new(Flow::Continue(()));
+    // Objective and constraints are requested one by one; they are computed together and kept for the point.
+    let known: RefCell<Option<ConstraintLinearisation>> = RefCell::new(None);
+    let flow = Cell::new(SearchFlow::Continue(()));
     let entry = |x: &[f64], k: usize, gradient: Option<&mut [f64]>| -> f64 {
         if flow.get().is_break() {
-            // Where nothing changes any more, the search ends by itself.
+            // With zero gradients the optimiser ends by itself.
             if let Some(gradient) = gradient {
                 gradient.fill(0.0);
             }
             return 0.0;
         }
-        let is_known = known.borrow().as_ref().is_some_and(|known| known.at == x);
+        let is_known = known.borrow().as_ref().is_some_and(|known| known.point == x);
         if !is_known {
             flow.set(progress(usize::from(k == 0)));
-            *known.borrow_mut() = Some(look(measure, scales, x, sharpness));
+            *known.borrow_mut() = Some(linearise(measure, scales, x, sharpness));
         }
         let known = known.borrow();
         let known = known.as_ref().expect("just looked");
@@ -91,12 +95,11 @@ fn round(
         }
         known.values[k]
     };
-    let n_constraints = values(measure, scales, start, sharpness).len() - 1;
+    let n_constraints = objective_and_constraints(measure, scales, start, sharpness).len() - 1;
     let entry = &entry;
-    let constraint = |k: usize| {
-        move |x: &[f64], gradient: Option<&mut [f64]>, (): &mut ()| entry(x, k, gradient)
-    };
+    let constraint = |k: usize| move |x: &[f64], gradient: Option<&mut [f64]>, (): &mut ()| entry(x, k, gradient);
     let constraints: Vec<_> = (1..=n_constraints).map(constraint).collect();
+    // Coefficients of size 1 reach a limit; four times that is far beyond.
     let bounds = vec![(-4.0, 4.0); start.len()];
     let tolerances = StopTols {
         ftol_rel: 1e-6,
@@ -121,41 +124,51 @@ fn round(
     }
 }
 
-/// Values and central differences.
-fn look(measure: &Measure<'_>, scales: &Scales<'_, '_>, x: &[f64], sharpness: f64) -> Known {
+/// Objective and constraints at a point, with gradients by central differences.
+fn linearise(
+    measure: &TrajectoryEvaluator<'_>,
+    scales: &CoefficientScales<'_, '_>,
+    x: &[f64],
+    sharpness: f64,
+) -> ConstraintLinearisation {
     let at = x.to_vec();
     let step = match measure.options.criterion {
-        Criterion::Separation => WIDE,
-        Criterion::Condition | Criterion::LogDet => STEP,
+        ExcitationCriterion::Separation => SEPARATION_STEP,
+        ExcitationCriterion::Condition | ExcitationCriterion::LogDet => STEP,
     };
-    let middle = values(measure, scales, x, sharpness);
+    let middle = objective_and_constraints(measure, scales, x, sharpness);
     let mut gradients = vec![vec![0.0; x.len()]; middle.len()];
     let mut moved = at.clone();
     for i in 0..x.len() {
         moved[i] = x[i] + step;
-        let high = values(measure, scales, &moved, sharpness);
+        let high = objective_and_constraints(measure, scales, &moved, sharpness);
         moved[i] = x[i] - step;
-        let low = values(measure, scales, &moved, sharpness);
+        let low = objective_and_constraints(measure, scales, &moved, sharpness);
         moved[i] = x[i];
         for (gradient, (high, low)) in gradients.iter_mut().zip(high.iter().zip(&low)) {
             let slope = (high - low) / (2.0 * step);
             gradient[i] = if slope.is_finite() { slope } else { 0.0 };
         }
     }
-    Known {
-        at,
+    ConstraintLinearisation {
+        point: at,
         values: middle,
         gradients,
     }
 }
 
-/// The objective, then all constraints.
-fn values(measure: &Measure<'_>, scales: &Scales<'_, '_>, x: &[f64], sharpness: f64) -> Vec<f64> {
-    let motion = measure.motion(&scales.decode(x));
-    let value = measure.value(&motion);
-    let mut values = vec![if value.is_finite() { value } else { REFUSED }];
+/// The objective, then all constraints (not above 0 inside the limits), at a point.
+fn objective_and_constraints(
+    measure: &TrajectoryEvaluator<'_>,
+    scales: &CoefficientScales<'_, '_>,
+    x: &[f64],
+    sharpness: f64,
+) -> Vec<f64> {
+    let motion = measure.sample_motion(&scales.decode(x));
+    let value = measure.criterion_value(&motion);
+    let mut values = vec![if value.is_finite() { value } else { INFEASIBLE_VALUE }];
     for (i, derivative, range) in measure.ranges() {
-        let Motion { q, qd, qdd } = &motion;
+        let ExcitationMotion { q, qd, qdd } = &motion;
         let column = [q, qd, qdd][derivative];
         let excesses = column[i].iter().map(|v| excess(*v, range));
         values.push(smooth_largest(excesses, sharpness));
@@ -163,45 +176,43 @@ fn values(measure: &Measure<'_>, scales: &Scales<'_, '_>, x: &[f64], sharpness: 
     let n = measure.plant.limits().len();
     match measure.plant.excess(&motion) {
         Some(all) => {
-            let peaks = all
-                .iter()
-                .map(|one| smooth_largest(one.iter().copied(), sharpness));
+            let peaks = all.iter().map(|one| smooth_largest(one.iter().copied(), sharpness));
             values.extend(peaks);
         }
-        None => values.extend(std::iter::repeat_n(REFUSED, n)),
+        None => values.extend(std::iter::repeat_n(INFEASIBLE_VALUE, n)),
     }
     values
 }
 
-/// Smooth, and never below the largest value.
+/// Smooth maximum, never below the largest value.
 fn smooth_largest(values: impl Iterator<Item = f64> + Clone, sharpness: f64) -> f64 {
     let largest = values.clone().fold(f64::NEG_INFINITY, f64::max);
     if !largest.is_finite() {
-        return REFUSED;
+        return INFEASIBLE_VALUE;
     }
     let sum: f64 = values.map(|v| (sharpness * (v - largest)).exp()).sum();
     largest + sum.ln() / sharpness
 }
 
-/// What makes coefficients of size 1 out of those of a series.
-struct Scales<'m, 'a> {
-    measure: &'m Measure<'a>,
-    /// Amplitude of each harmonic that one limit or another allows, for each coordinate.
+/// Scales between coefficients of size 1 and those of a series.
+struct CoefficientScales<'m, 'a> {
+    /// Limits and options.
+    measure: &'m TrajectoryEvaluator<'a>,
+    /// Largest amplitude of each harmonic within the tightest limit, `[coordinate][harmonic]`, rad or m.
     amplitudes: Vec<Vec<f64>>,
 }
 
-impl<'m, 'a> Scales<'m, 'a> {
-    fn new(measure: &'m Measure<'a>) -> Self {
+impl<'m, 'a> CoefficientScales<'m, 'a> {
+    /// Amplitudes from the limits of position, rate and acceleration.
+    fn new(measure: &'m TrajectoryEvaluator<'a>) -> Self {
         let amplitudes = measure.limits.iter().map(|limits| {
             let harmonics = 1..=measure.options.harmonics;
             harmonics
                 .map(|k| {
                     let w = k as f64 * measure.omega();
-                    let by_rate = limits.rate.map_or(f64::INFINITY, |r| half(r) / w);
-                    let by_acceleration = limits
-                        .acceleration
-                        .map_or(f64::INFINITY, |r| half(r) / (w * w));
-                    half(limits.position).min(by_rate).min(by_acceleration)
+                    let by_rate = limits.rate.map_or(f64::INFINITY, |r| half_width(r) / w);
+                    let by_acceleration = limits.acceleration.map_or(f64::INFINITY, |r| half_width(r) / (w * w));
+                    half_width(limits.position).min(by_rate).min(by_acceleration)
                 })
                 .collect()
         });
@@ -211,11 +222,12 @@ impl<'m, 'a> Scales<'m, 'a> {
         }
     }
 
-    fn encode(&self, series: &[Series]) -> Vec<f64> {
+    /// Coefficients of size 1 for some series: for each coordinate the mean, then sines and cosines.
+    fn encode(&self, series: &[FourierSeries]) -> Vec<f64> {
         let mut x = Vec::new();
         for (i, one) in series.iter().enumerate() {
             let [low, high] = self.measure.limits[i].position;
-            x.push((one.offset - 0.5 * (low + high)) / half([low, high]));
+            x.push((one.offset - 0.5 * (low + high)) / half_width([low, high]));
             for list in [&one.mu, &one.nu] {
                 for (k, coefficient) in list.iter().enumerate() {
                     let w = (k + 1) as f64 * one.omega;
@@ -226,7 +238,8 @@ impl<'m, 'a> Scales<'m, 'a> {
         x
     }
 
-    fn decode(&self, x: &[f64]) -> Vec<Series> {
+    /// The series of some coefficients; the inverse of `encode`.
+    fn decode(&self, x: &[f64]) -> Vec<FourierSeries> {
         let n = self.measure.options.harmonics;
         let omega = self.measure.omega();
         let each = x.chunks_exact(1 + 2 * n).enumerate();
@@ -237,8 +250,8 @@ impl<'m, 'a> Scales<'m, 'a> {
                     .map(|k| x[from + k] * (k + 1) as f64 * omega * self.amplitudes[i][k])
                     .collect()
             };
-            Series {
-                offset: 0.5 * (low + high) + half([low, high]) * x[0],
+            FourierSeries {
+                offset: 0.5 * (low + high) + half_width([low, high]) * x[0],
                 mu: list(1),
                 nu: list(1 + n),
                 omega,

@@ -1,39 +1,38 @@
-//! Measured and model force after the same low-pass: both forces go in, the figures of what is left in the band come out.
+//! Error figures after a low-pass on both forces. Input: measured and model force; output: the error within the band.
 //!
-//! A force is noisier than a motion, and no model explains its noise. Both forces pass the field's filter, Butterworth's of
-//! order 4 run both ways, and the same part of the samples is dropped at both ends, so that neither the decimation nor the
-//! smoothing of a preparation changes what the figures mean.
+//! A force is noisier than a motion, and no model explains its noise. Both forces are filtered by a Butterworth
+//! low-pass of order 4, run forward and backward, and the same share of the samples is dropped at both ends. So neither
+//! the decimation nor the smoothing of a preparation changes the meaning of the figures.
 
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
-use super::{Comparison, Figures};
-use crate::motion::{is_even, mean_rate, on_even_times};
-use crate::signal::{FilterError, LowPass, count};
+use super::thresholds::TRIMMED_PART;
+use super::{ErrorAccumulator, ErrorFigures};
+use crate::motion::{is_even, mean_rate, resample_evenly};
+use crate::signal::{FilterError, LowPass, float_to_count};
 
 /// Order of the low-pass in one direction.
 const ORDER: usize = 4;
-/// The part of the samples that is dropped at each end, where the filter starts and stops.
-pub const TRIMMED_PART: f64 = 0.05;
 
-/// Relative error and its size where both forces passed one low-pass.
+/// Error figures after both forces passed the same low-pass.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FilteredFigures {
     /// Cut-off of the low-pass, Hz.
     pub cutoff_hz: f64,
-    /// Relative error over all channels stacked; absent as that of [`Figures`] is.
+    /// Relative error over all channels stacked; absent in the same cases as that of [`ErrorFigures`].
     pub nrms: Option<f64>,
-    /// Root mean square of the error over all channels; absent where channels have different units.
+    /// Rms error over all channels, N or N m; absent if channels have different units.
     pub rms: Option<f64>,
-    /// Samples that count.
+    /// Number of samples that count.
     pub samples: usize,
     /// The figures of each channel.
-    pub channels: IndexMap<String, InBand>,
+    pub channels: IndexMap<String, FilteredChannelFigures>,
 }
 
 /// The figures of one channel after a low-pass.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct InBand {
+pub struct FilteredChannelFigures {
     /// Relative error; absent when nothing but zero was measured.
     pub nrms: Option<f64>,
     /// Root mean square of the error, in the unit of the force.
@@ -41,10 +40,10 @@ pub struct InBand {
 }
 
 impl FilteredFigures {
-    /// What figures of filtered forces say.
-    pub fn new(cutoff_hz: f64, figures: &Figures) -> Self {
+    /// Extracts the figures of filtered forces.
+    pub fn new(cutoff_hz: f64, figures: &ErrorFigures) -> Self {
         let channels = figures.channels.iter().map(|(name, one)| {
-            let figures = InBand {
+            let figures = FilteredChannelFigures {
                 nrms: one.nrms,
                 rms: one.rms,
             };
@@ -60,12 +59,13 @@ impl FilteredFigures {
     }
 }
 
-/// Adds one recording to a comparison of filtered forces: `measured[channel][sample]` and `model[channel][sample]` at the
-/// times, s, pass Butterworth's filter of order 4 at `cutoff_hz`, both ways, and lose 5 % of their samples at each end.
-/// Uneven samples are taken to even times first, both forces alike.
-/// Fails when there are too few samples, the cut-off is not below half the rate, or a value is not finite.
-pub fn in_band(
-    comparison: &mut Comparison,
+/// Adds one recording to a comparison of filtered forces. `measured[channel][sample]` and `model[channel][sample]` at
+/// the times, s, pass a Butterworth low-pass of order 4 at `cutoff_hz`, forward and backward, and lose 5 % of their
+/// samples at each end.
+/// Uneven samples are first interpolated to even times, both forces equally.
+/// Fails if there are too few samples, the cut-off is not below half the rate, or a value is not finite.
+pub fn add_filtered_forces(
+    comparison: &mut ErrorAccumulator,
     time: &[f64],
     measured: &[Vec<f64>],
     model: &[Vec<f64>],
@@ -77,14 +77,14 @@ pub fn in_band(
             if is_even(time) {
                 filter.zero_phase(column)
             } else {
-                filter.zero_phase(&on_even_times(time, column))
+                filter.zero_phase(&resample_evenly(time, column))
             }
         };
         columns.iter().map(even).collect()
     };
     let (measured, model) = (passed(measured)?, passed(model)?);
     let n = time.len();
-    let trim = count(TRIMMED_PART * n as f64);
+    let trim = float_to_count(TRIMMED_PART * n as f64);
     let interleaved = |columns: &[Vec<f64>]| -> Vec<f64> {
         let samples = trim..n - trim;
         samples
@@ -98,7 +98,7 @@ pub fn in_band(
 /// Why forces cannot be compared after a low-pass.
 #[derive(Debug, Clone, PartialEq)]
 pub enum BandError {
-    /// The filter does not suit the samples.
+    /// The filter cannot be applied to the samples.
     Filter(FilterError),
     /// The values cannot be compared.
     Figures(super::FiguresError),

@@ -1,11 +1,11 @@
-//! What can be wrong with the file of a fit, each with what to do.
+//! Faults of a fit file, each with a remedy.
 
 use std::fmt;
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{CommandName, Message, OptionName, Remedy};
 
-use crate::words::list;
+use crate::words::backquoted_list;
 
 /// Why a fit file cannot be used.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,7 +22,7 @@ pub struct FitFileError {
 pub enum FitFault {
     /// The file cannot be opened or read.
     Unreadable {
-        /// The operating system's words.
+        /// Message of the operating system.
         reason: String,
     },
     /// The text is not the JSON of `identify`.
@@ -34,39 +34,39 @@ pub enum FitFault {
         /// What is wrong there.
         reason: String,
     },
-    /// The text does not begin as JSON does: a recording or a model file, perhaps.
+    /// The text is not JSON: possibly a recording or a model file.
     NoJson,
     /// A parameter of the model is not in the file.
     MissingParameter {
-        /// The parameter.
+        /// Name of the parameter.
         name: String,
         /// The closest name in the file.
         nearest: Option<String>,
         /// The names in the file.
         present: Vec<String>,
     },
-    /// The file holds parameters that the model does not have.
+    /// The file has parameters that the model does not have.
     UnknownParameters {
-        /// Those parameters.
+        /// Names of these parameters.
         names: Vec<String>,
     },
-    /// The file holds a parameter twice.
+    /// The file has a parameter twice.
     DuplicateParameter {
-        /// The parameter.
+        /// Name of the parameter.
         name: String,
     },
-    /// A constant that an expression of the base parameters holds has another value.
-    OtherConstant {
-        /// The constant.
+    /// A constant in an expression of the base parameters has another value.
+    ConstantDiffers {
+        /// Name of the constant.
         name: String,
         /// Its value in the file.
         file: f64,
         /// Its value in the model.
         model: f64,
     },
-    /// A parameter has the same name but stands for another expression.
-    OtherExpression {
-        /// The parameter.
+    /// A parameter has the same name but another expression.
+    ExpressionDiffers {
+        /// Name of the parameter.
         name: String,
         /// The expression in the file.
         file: String,
@@ -82,46 +82,36 @@ impl FitFileError {
         let identify = Remedy::command(CommandName::Identify);
         match &self.fault {
             FitFault::Unreadable { reason } => message!(
-                "{file}: the fit cannot be read: {reason}; make it with {} ({})",
+                "{file}: the fit cannot be read: {reason}; create it with {} ({})",
                 identify,
                 Remedy::option(OptionName::Out).with_value(file)
             ),
-            FitFault::NotAFit {
-                line,
-                column,
-                reason,
-            } => message!(
+            FitFault::NotAFit { line, column, reason } => message!(
                 "{file}, line {line}, column {column}: this is not the JSON that {} writes: \
                  {reason}",
                 identify
             ),
             FitFault::NoJson => message!(
-                "{file} is no fit: the JSON that {} writes is expected; recordings go to {}",
+                "{file} is not a fit: the JSON that {} writes is expected; pass recordings to {}",
                 identify,
                 Remedy::option(OptionName::Data)
             ),
-            FitFault::MissingParameter {
-                name,
-                nearest,
-                present,
-            } => {
-                let nearest = nearest
-                    .as_ref()
-                    .map(|near| format!(" (the closest is `{near}`)"));
+            FitFault::MissingParameter { name, nearest, present } => {
+                let nearest = nearest.as_ref().map(|near| format!(" (the closest is `{near}`)"));
                 message!(
-                    "{file}: the model's parameter `{name}` is not in the fit{}, which holds {}; identify this model again",
+                    "{file}: the model's parameter `{name}` is not in the fit{}, which has {}; identify this model again",
                     nearest.unwrap_or_default(),
-                    list(present)
+                    backquoted_list(present)
                 )
             }
             FitFault::UnknownParameters { names } => message!(
-                "{file}: the fit holds {}, which the model does not have; identify this model again",
-                list(names)
+                "{file}: the fit has {}, which the model does not have; identify this model again",
+                backquoted_list(names)
             ),
             FitFault::DuplicateParameter { name } => {
-                message!("{file}: the fit holds `{name}` twice; remove one")
+                message!("{file}: the fit has `{name}` twice; remove one")
             }
-            FitFault::OtherConstant {
+            FitFault::ConstantDiffers {
                 name,
                 file: theirs,
                 model,
@@ -129,7 +119,7 @@ impl FitFileError {
                 "{file}: the fit was made with {name} = {theirs}, but the model has {name} = {model}, and base parameters \
                  depend on it: identify again"
             ),
-            FitFault::OtherExpression {
+            FitFault::ExpressionDiffers {
                 name,
                 file: theirs,
                 model,

@@ -1,20 +1,19 @@
-//! The result of an identification as a file: what `identify --json` prints, and what
-//! `--parameters FIT.json` reads back.
+//! The result of an identification as a file: what `identify --json` prints and `--parameters FIT.json` reads.
 
 use std::path::Path;
 
 use indexmap::IndexMap;
-use modelmill_boundary::files::{Disk, Files};
+use modelmill_boundary::files::{DiskFiles, FileSource};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-use crate::estimate::{Deviations, Solution};
-use crate::figures::Figures;
+use crate::estimate::{ParameterUncertainty, RegressionSolution};
+use crate::figures::ErrorFigures;
 use crate::figures::fit_error::{FitFault, FitFileError};
-use crate::recording::Note;
-use crate::words::nearest;
+use crate::recording::RecordingNote;
+use crate::words::nearest_name;
 
-/// The most bytes that a fit is read of.
+/// Largest size of a fit file, bytes.
 const LONGEST_FIT: u64 = 64 << 20;
 
 /// A base parameter as the model describes it.
@@ -26,31 +25,29 @@ pub struct ParameterInfo {
     pub expression: String,
     /// Its unit.
     pub unit: String,
-    /// Its value from the model file's nominal values, where all of them are given.
+    /// Its value from the nominal values of the model file; `None` if one of them is missing.
     pub nominal: Option<f64>,
 }
 
-/// How a value of a fit came about.
+/// Origin of a value of a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Status {
-    /// The recordings say it.
+pub enum ParameterStatus {
+    /// The recordings determine it.
     #[default]
     Identified,
-    /// The recordings do not say it: the value is the nearest to the nominal ones that fits.
+    /// The recordings do not determine it: the value is the nearest to the nominal ones that fits.
     Undetermined,
-    /// Kept at its nominal value, or at 0 where there is none, as the recordings do not support another one beside the
-    /// others (`identify --essential`).
+    /// Fixed at its nominal value, or at 0 without one, as the recordings do not support another value in addition to
+    /// the other parameters (`identify --essential`).
     NotEssential,
-    /// A number of the model file, which was taken off the measured forces before the fit.
+    /// A number of the model file, whose force was subtracted from the measured forces before the fit.
     Known,
 }
 
-impl Status {
-    #[allow(
-        clippy::trivially_copy_pass_by_ref,
-        reason = "serde asks with a reference"
-    )]
+impl ParameterStatus {
+    #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+    /// Whether it is the default, which is omitted in JSON.
     fn is_identified(&self) -> bool {
         *self == Self::Identified
     }
@@ -63,24 +60,24 @@ pub struct FitParameter {
     pub name: String,
     /// Its expression in the physical parameters.
     pub expression: String,
-    /// The identified value; the nominal one (or 0) where the recording does not determine it.
+    /// The identified value; the nominal one (or 0) if the recording does not determine it.
     pub value: f64,
-    /// Standard deviation allowing for autocorrelated residuals; `null` where the parameter is not identified, and
-    /// where there are no more equations than parameters.
+    /// Standard deviation allowing for autocorrelated residuals; `null` if the parameter is not identified, or if there
+    /// are no more equations than parameters.
     pub std: Option<f64>,
     /// Standard deviation for independent residuals, for comparison only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub classical_std: Option<f64>,
-    /// How many independent samples would give the same standard deviation.
+    /// Number of independent samples that would give the same standard deviation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub effective_samples: Option<f64>,
     /// Unit of the values.
     pub unit: String,
-    /// The value that the model file's nominal values give.
+    /// The value from the nominal values of the model file.
     pub nominal: Option<f64>,
-    /// Left away for what is identified.
-    #[serde(default, skip_serializing_if = "Status::is_identified")]
-    pub status: Status,
+    /// Origin of the value; omitted for identified parameters.
+    #[serde(default, skip_serializing_if = "ParameterStatus::is_identified")]
+    pub status: ParameterStatus,
 }
 
 /// An identification: the JSON of `identify`.
@@ -88,77 +85,68 @@ pub struct FitParameter {
 pub struct FitFile {
     /// Name of the model.
     pub model: String,
-    /// Samples that the fit was made from, each of all channels.
+    /// Number of samples of the fit, each of all channels.
     pub samples: usize,
-    /// Condition number of the regressor (2-norm); `null` when its rank is deficient.
+    /// Condition number of the regressor (2-norm); `null` if its rank is deficient.
     pub condition_number: Option<f64>,
     /// The same for columns of norm 1.
     #[serde(default)]
     pub scaled_condition_number: Option<f64>,
     /// The base parameters, in the order of the regressor's columns.
     pub parameters: Vec<FitParameter>,
-    /// Covariance of the values, row by row in the order of `parameters`, in the products of their units; left away
-    /// where a deviation is not known.
+    /// Covariance of the values, row by row in the order of `parameters`, in the products of their units; omitted if a
+    /// standard deviation is not known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub covariance: Option<Vec<Vec<f64>>>,
     /// Values of the model's constants, on which the regressor and the expressions depend.
     #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
     pub constants: IndexMap<String, f64>,
-    /// What the recording does not determine, one sentence for each direction.
+    /// Directions that the recording does not determine, one sentence each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub undetermined: Vec<String>,
     /// Error figures on the recordings of the fit.
-    pub fit: Figures,
-    /// Error figures on the recordings of the check, if any.
-    pub check: Option<Figures>,
-    /// Remarks on the data.
-    #[serde(
-        default,
-        skip_serializing_if = "Vec::is_empty",
-        with = "crate::recording::notes"
-    )]
-    pub data: Vec<Note>,
-    /// What the estimator found beside the values, of which only physical parameters are read again.
+    pub fit: ErrorFigures,
+    /// Error figures on the validation runs, if any.
+    pub check: Option<ErrorFigures>,
+    /// Notes on the data.
+    #[serde(default, skip_serializing_if = "Vec::is_empty", with = "crate::recording::notes")]
+    pub data: Vec<RecordingNote>,
+    /// Further results of the estimator, of which only physical parameters are read again.
     #[serde(default, skip_serializing)]
-    pub estimator: Estimator,
+    pub estimator: EstimatorOutput,
 }
 
-/// What the estimator found beside the values of a fit.
+/// Further results of the estimator.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
-pub struct Estimator {
-    /// Physical parameters that bodies can have, where these were asked for.
+pub struct EstimatorOutput {
+    /// Physically possible parameters, if these were requested.
     #[serde(default)]
-    physical: Option<Physical>,
+    physical: Option<FitFilePhysical>,
 }
 
+/// Physical parameters in a fit file.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
-struct Physical {
+struct FitFilePhysical {
+    /// All of them, in the order of the file.
     parameters: Vec<PhysicalValue>,
 }
 
+/// A physical parameter in a fit file.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 struct PhysicalValue {
     name: String,
     value: f64,
 }
 
-/// The parameters of a fit file from the model's description, the solution and its deviations,
-/// all in the order of the regressor's columns (asserted to be of one length).
+/// The parameters of a fit file from the model's description, the solution and its standard deviations, all in the
+/// order of the regressor's columns (asserted to have equal length).
 pub fn fit_parameters(
     infos: &[ParameterInfo],
-    solution: &Solution,
-    deviations: &Deviations,
+    solution: &RegressionSolution,
+    deviations: &ParameterUncertainty,
 ) -> Vec<FitParameter> {
-    assert_eq!(
-        infos.len(),
-        solution.values.len(),
-        "one description per column"
-    );
-    assert_eq!(
-        infos.len(),
-        deviations.std.len(),
-        "one deviation per column"
-    );
+    assert_eq!(infos.len(), solution.values.len(), "one description per column");
+    assert_eq!(infos.len(), deviations.std.len(), "one standard deviation per column");
     let finite = |value: f64| value.is_finite().then_some(value);
     infos
         .iter()
@@ -173,34 +161,27 @@ pub fn fit_parameters(
             unit: info.unit.clone(),
             nominal: info.nominal,
             status: if solution.determined[i] {
-                Status::Identified
+                ParameterStatus::Identified
             } else {
-                Status::Undetermined
+                ParameterStatus::Undetermined
             },
         })
         .collect()
 }
 
 impl FitFile {
-    /// Physical parameters that bodies can have, by their names; none unless they were asked for.
-    pub fn physical(&self) -> Vec<(String, f64)> {
-        let found = self
-            .estimator
-            .physical
-            .iter()
-            .flat_map(|found| &found.parameters);
+    /// Physically possible parameters as (name, value); none unless they were requested.
+    pub fn physical_parameters(&self) -> Vec<(String, f64)> {
+        let found = self.estimator.physical.iter().flat_map(|found| &found.parameters);
         found.map(|one| (one.name.clone(), one.value)).collect()
     }
 
-    /// Covariance of some of the parameters, by their positions: the file's, or else the squares of its standard
-    /// deviations as if the values were independent; `None` where a deviation is missing. The flag says whether the
-    /// file's own was taken.
+    /// Covariance of some of the parameters, by their positions: that of the file, or else the squares of its standard
+    /// deviations as if the values were independent. `None` if a standard deviation is missing. The flag is true for
+    /// the file's covariance.
     pub fn covariance_of(&self, parameters: &[usize]) -> Option<(DMatrix<f64>, bool)> {
         let n = parameters.len();
-        let std: Option<Vec<f64>> = parameters
-            .iter()
-            .map(|k| self.parameters.get(*k)?.std)
-            .collect();
+        let std: Option<Vec<f64>> = parameters.iter().map(|k| self.parameters.get(*k)?.std).collect();
         let std = std?;
         let whole = self.covariance.as_ref().filter(|rows| {
             let m = self.parameters.len();
@@ -219,26 +200,24 @@ impl FitFile {
         })
     }
 
-    /// Reads a fit; fails when the file cannot be read or is something else.
+    /// Reads a fit; fails if the file cannot be read or is something else.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, FitFileError> {
-        Self::read_from(&Disk::default(), path.as_ref())
+        Self::read_from(&DiskFiles::default(), path.as_ref())
     }
 
     /// Reads a fit as [`FitFile::read`] does, from `files`.
-    pub fn read_from(files: &dyn Files, path: &Path) -> Result<Self, FitFileError> {
+    pub fn read_from(files: &dyn FileSource, path: &Path) -> Result<Self, FitFileError> {
         let file = path.display().to_string();
-        let text = files
-            .read_text(path, LONGEST_FIT)
-            .map_err(|error| FitFileError {
-                file: file.clone(),
-                fault: FitFault::Unreadable {
-                    reason: error.fault.to_string(),
-                },
-            })?;
+        let text = files.read_text(path, LONGEST_FIT).map_err(|error| FitFileError {
+            file: file.clone(),
+            fault: FitFault::Unreadable {
+                reason: error.fault.to_string(),
+            },
+        })?;
         Self::parse(&text, &file)
     }
 
-    /// Reads a fit from its text; `file` is what messages call it.
+    /// Reads a fit from its text; `file` is its name in messages.
     pub fn parse(text: &str, file: &str) -> Result<Self, FitFileError> {
         if !text.trim_start().starts_with('{') {
             return Err(FitFileError {
@@ -261,11 +240,11 @@ impl FitFile {
         })
     }
 
-    /// Constants of the model whose values were others when the fit was made: `(name, value then, value now)`.
-    /// `model` holds `(name, value)`; a fit without constants, as earlier versions wrote it, has none that differ.
-    /// Fails when such a constant stands in an expression of the base parameters, which then are others.
-    /// `file` is what messages call the fit.
-    pub fn other_constants(
+    /// Constants of the model that had other values when the fit was computed: `(name, value then, value now)`. `model`
+    /// contains `(name, value)`; a fit without constants, from an earlier version, has none that differ.
+    /// Fails if such a constant is in an expression of the base parameters, which then are different.
+    /// `file` is the name of the fit in messages.
+    pub fn differing_constants(
         &self,
         model: &[(&str, f64)],
         file: &str,
@@ -278,14 +257,10 @@ impl FitFile {
             if (then - now).abs() <= 1e-12 * then.abs().max(now.abs()) {
                 continue;
             }
-            if self
-                .parameters
-                .iter()
-                .any(|p| mentions(&p.expression, name))
-            {
+            if self.parameters.iter().any(|p| contains_name(&p.expression, name)) {
                 return Err(FitFileError {
                     file: file.to_owned(),
-                    fault: FitFault::OtherConstant {
+                    fault: FitFault::ConstantDiffers {
                         name: (*name).to_owned(),
                         file: *then,
                         model: *now,
@@ -298,18 +273,14 @@ impl FitFile {
     }
 
     /// The values for a model's base parameters, `(name, expression)` in the model's order.
-    /// `file` is what messages call the fit.
-    /// Fails when the parameters of the file are not exactly these.
+    /// `file` is the name of the fit in messages. Fails if the parameters of the file are not exactly these.
     pub fn values_for(&self, model: &[(&str, &str)], file: &str) -> Result<Vec<f64>, FitFileError> {
         let fail = |fault| FitFileError {
             file: file.to_owned(),
             fault,
         };
         for (i, parameter) in self.parameters.iter().enumerate() {
-            if self.parameters[..i]
-                .iter()
-                .any(|other| other.name == parameter.name)
-            {
+            if self.parameters[..i].iter().any(|other| other.name == parameter.name) {
                 return Err(fail(FitFault::DuplicateParameter {
                     name: parameter.name.clone(),
                 }));
@@ -317,20 +288,16 @@ impl FitFile {
         }
         let mut values = Vec::with_capacity(model.len());
         for (name, expression) in model {
-            let Some(parameter) = self
-                .parameters
-                .iter()
-                .find(|parameter| parameter.name == *name)
-            else {
+            let Some(parameter) = self.parameters.iter().find(|parameter| parameter.name == *name) else {
                 let present: Vec<String> = self.parameters.iter().map(|p| p.name.clone()).collect();
                 return Err(fail(FitFault::MissingParameter {
                     name: (*name).to_owned(),
-                    nearest: nearest(name, present.iter().map(String::as_str)).map(str::to_owned),
+                    nearest: nearest_name(name, present.iter().map(String::as_str)).map(str::to_owned),
                     present,
                 }));
             };
             if parameter.expression != *expression {
-                return Err(fail(FitFault::OtherExpression {
+                return Err(fail(FitFault::ExpressionDiffers {
                     name: parameter.name.clone(),
                     file: parameter.expression.clone(),
                     model: (*expression).to_owned(),
@@ -353,8 +320,8 @@ impl FitFile {
     }
 }
 
-/// Whether a name stands in an expression.
-fn mentions(expression: &str, name: &str) -> bool {
+/// Whether a name occurs in an expression as a complete word.
+fn contains_name(expression: &str, name: &str) -> bool {
     expression
         .split(|c: char| !(c.is_alphanumeric() || c == '_'))
         .any(|word| word == name)
@@ -375,8 +342,7 @@ mod tests {
     #[test]
     fn a_fit_survives_writing_and_reading() {
         let fit = FitFile::parse(TEXT, "fit.json").unwrap();
-        let again =
-            FitFile::parse(&serde_json::to_string_pretty(&fit).unwrap(), "fit.json").unwrap();
+        let again = FitFile::parse(&serde_json::to_string_pretty(&fit).unwrap(), "fit.json").unwrap();
         assert_eq!(fit, again);
         assert_eq!(
             fit.values_for(&[("p2_min", "fv"), ("p1_min", "m")], "fit.json")
@@ -394,39 +360,29 @@ mod tests {
                 "\"constants\": {\"L\": 0.5, \"g\": 9.81}, \"parameters\"",
             );
         let fit = FitFile::parse(&text, "fit.json").unwrap();
-        let others = |model: &[(&str, f64)]| fit.other_constants(model, "fit.json");
+        let others = |model: &[(&str, f64)]| fit.differing_constants(model, "fit.json");
         assert_eq!(others(&[("L", 0.5), ("g", 9.81), ("new", 1.0)]), Ok(vec![]));
         assert_eq!(
             others(&[("L", 0.5), ("g", 9.80)]),
             Ok(vec![("g".to_owned(), 9.81, 9.80)])
         );
         let says = others(&[("L", 0.6)]).unwrap_err().to_string();
-        assert!(
-            says.contains("L = 0.5") && says.contains("L = 0.6"),
-            "{says}"
-        );
+        assert!(says.contains("L = 0.5") && says.contains("L = 0.6"), "{says}");
         let earlier = FitFile::parse(TEXT, "fit.json").unwrap();
-        assert_eq!(
-            earlier.other_constants(&[("m", 1.0)], "fit.json"),
-            Ok(vec![])
-        );
+        assert_eq!(earlier.differing_constants(&[("m", 1.0)], "fit.json"), Ok(vec![]));
     }
 
     #[test]
     fn a_fit_of_another_model_is_refused_with_the_reason() {
         let fit = FitFile::parse(TEXT, "fit.json").unwrap();
-        let says =
-            |model: &[(&str, &str)]| fit.values_for(model, "fit.json").unwrap_err().to_string();
+        let says = |model: &[(&str, &str)]| fit.values_for(model, "fit.json").unwrap_err().to_string();
         assert_eq!(
             says(&[("p1_min", "m"), ("p3_min", "fc"), ("p2_min", "fv")]),
             "fit.json: the model's parameter `p3_min` is not in the fit (the closest is `p1_min`), \
-             which holds `p1_min`, `p2_min`; identify this model again"
+             which has `p1_min`, `p2_min`; identify this model again"
         );
-        assert!(says(&[("p1_min", "m")]).contains("holds `p2_min`, which the model does not have"));
-        assert!(
-            says(&[("p1_min", "m + d"), ("p2_min", "fv")])
-                .contains("`m` in the fit but `m + d` in the model")
-        );
+        assert!(says(&[("p1_min", "m")]).contains("has `p2_min`, which the model does not have"));
+        assert!(says(&[("p1_min", "m + d"), ("p2_min", "fv")]).contains("`m` in the fit but `m + d` in the model"));
         let broken = FitFile::parse(&TEXT.replace("\"fit\"", "\"fits\""), "fit.json")
             .unwrap_err()
             .to_string();

@@ -1,45 +1,47 @@
-//! Error figures: measured and model forces go in, the numbers of a comparison come out, as
-//! `identify` and `compare` print them.
+//! Error figures. Input: measured and model forces; output: the numbers of a comparison as `identify` and `compare`
+//! print them.
 //!
-//! `nrms` is `|measured - model| / |measured|` in the 2-norm over the samples, all channels
-//! stacked for the total. `mean_relative` is the paper's mean of `|error| / |measured|`, whose
-//! peaks where the measured force passes through zero are the reason to read `nrms` beside it.
+//! `nrms` is `|measured - model| / |measured|` in the 2-norm over the samples, all channels stacked for the total.
+//! `mean_relative` is the paper's mean of `|error| / |measured|`; it has peaks where the measured force passes through
+//! zero, so `nrms` is given too.
 //! `abs_ratio` is `sum |error| / sum |measured|`, as Volkmann et al. (IEEE ICMA 2020) give it.
-//! Figures are of every sample as it was recorded, whatever a fit was made from; beside them stand those after one low-pass
-//! on both forces ([`FilteredFigures`]), which do not count the noise of the force above the motion.
+//! Figures are of every recorded sample, however the fit was computed. In addition there are figures after one low-pass
+//! on both forces ([`FilteredFigures`]), which exclude the noise of the force above the motion.
 
 mod filtered;
 mod fit_error;
 mod fit_file;
 mod locate;
+mod thresholds;
 
 use std::fmt;
 
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
-pub use filtered::{BandError, FilteredFigures, InBand, TRIMMED_PART, in_band};
+pub use filtered::{BandError, FilteredChannelFigures, FilteredFigures, add_filtered_forces};
 pub use fit_error::{FitFault, FitFileError};
-pub use fit_file::{Estimator, FitFile, FitParameter, ParameterInfo, Status, fit_parameters};
-pub use locate::{LocateOptions, Region, TIME_COLUMN, locate};
+pub use fit_file::{EstimatorOutput, FitFile, FitParameter, ParameterInfo, ParameterStatus, fit_parameters};
+pub use locate::{ErrorRegion, LocateOptions, TIME_COLUMN, locate_errors};
+pub use thresholds::TRIMMED_PART;
 
 /// Error figures of a comparison.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Figures {
-    /// Relative error over all channels stacked; absent when nothing but zero was measured, and where channels have different
-    /// units, whose squares have no sum.
+pub struct ErrorFigures {
+    /// Relative error over all channels stacked; absent if all measured values are zero, and if channels have different
+    /// units, whose squares cannot be added.
     pub nrms: Option<f64>,
-    /// Root mean square of the error over all channels, in the unit of the forces; absent where channels have different units.
+    /// Rms error over all channels, in the unit of the forces; absent if channels have different units.
     #[serde(default)]
     pub rms: Option<f64>,
-    /// Samples, each of all channels.
+    /// Number of samples, each of all channels.
     pub samples: usize,
     /// The figures of each channel, in the order of the drives.
     pub channels: IndexMap<String, ChannelFigures>,
-    /// Measured and model force through the same low-pass.
+    /// Figures after the same low-pass on measured and model force.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub band: Option<FilteredFigures>,
-    /// The rows that the fit was made from, where these are not the samples: forces after the parallel filter, fewer of them.
+    /// Figures of the rows of the fit, if these are not the samples: after the parallel filter and decimation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rows: Option<FilteredFigures>,
 }
@@ -47,25 +49,24 @@ pub struct Figures {
 /// Error figures of one channel.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ChannelFigures {
-    /// Relative error; absent when nothing but zero was measured.
+    /// Relative error; absent if all measured values are zero.
     pub nrms: Option<f64>,
-    /// Mean of `|error| / |measured|` over samples with a measured value other than zero;
-    /// absent when there are none.
+    /// Mean of `|error| / |measured|` over samples with a measured value other than zero; absent if there are none.
     pub mean_relative: Option<f64>,
-    /// `sum |error| / sum |measured|`; absent when nothing but zero was measured.
+    /// `sum |error| / sum |measured|`; absent if all measured values are zero.
     #[serde(default)]
     pub abs_ratio: Option<f64>,
     /// Largest `|error|`, in the unit of the force.
     pub max_abs: f64,
-    /// Root mean square of the error, in the unit of the force.
+    /// Rms error, in the unit of the force.
     pub rms: f64,
-    /// The unit of the force; empty where it is not known.
+    /// The unit of the force; empty if it is not known.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub unit: String,
-    /// Samples whose force was not measured, or is told apart as a fault of the sensor; no figure counts them.
+    /// Number of samples whose force was not measured or is a detected sensor fault; no figure includes them.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub not_counted: usize,
-    /// Samples that `mean_relative` leaves out because exactly zero was measured.
+    /// Number of samples that `mean_relative` leaves out because exactly zero was measured.
     pub zero_measured: usize,
 }
 
@@ -73,20 +74,20 @@ pub struct ChannelFigures {
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum FiguresError {
-    /// Measured and model values differ in number, or are no whole samples of the channels.
+    /// Measured and model values differ in number, or are not complete samples of the channels.
     Shape {
-        /// Measured values.
+        /// Number of measured values.
         measured: usize,
-        /// Model values.
+        /// Number of model values.
         model: usize,
-        /// Channels.
+        /// Number of channels.
         channels: usize,
     },
     /// A value is NaN or infinite.
     NotFinite {
-        /// The channel.
+        /// Name of the channel.
         channel: String,
-        /// The sample, from 0.
+        /// Index of the sample, from 0.
         sample: usize,
     },
     /// No samples were given.
@@ -102,12 +103,12 @@ impl fmt::Display for FiguresError {
                 channels,
             } => write!(
                 f,
-                "{measured} measured and {model} model values are no matching samples of {channels} channels"
+                "{measured} measured and {model} model values differ in number, or are not complete samples of {channels} channels"
             ),
             Self::NotFinite { channel, sample } => write!(
                 f,
                 "the measured or the model force of `{channel}` is not finite in sample {sample}; \
-                 is the mechanism out of reach or singular there?"
+                 check whether the mechanism is out of reach or singular there"
             ),
             Self::NoSamples => f.write_str("there are no samples to compare"),
         }
@@ -116,11 +117,11 @@ impl fmt::Display for FiguresError {
 
 impl std::error::Error for FiguresError {}
 
-/// Takes samples block by block; its memory does not depend on their number.
+/// Accumulates errors block by block; its memory does not depend on the number of samples.
 ///
 /// ```
-/// use modelmill_identify::Comparison;
-/// let mut comparison = Comparison::new(["left".to_owned(), "right".to_owned()]);
+/// use modelmill_identify::ErrorAccumulator;
+/// let mut comparison = ErrorAccumulator::new(["left".to_owned(), "right".to_owned()]);
 /// comparison.add(&[3.0, 4.0], &[3.0, 5.0])?;
 /// let figures = comparison.finish()?;
 /// assert_eq!(figures.nrms, Some(0.2));
@@ -128,31 +129,38 @@ impl std::error::Error for FiguresError {}
 /// # Ok::<(), modelmill_identify::FiguresError>(())
 /// ```
 #[derive(Debug, Clone)]
-pub struct Comparison {
-    channels: IndexMap<String, Sums>,
+pub struct ErrorAccumulator {
+    channels: IndexMap<String, ChannelErrorSums>,
     samples: usize,
 }
 
+/// Sums over the samples of one channel.
 #[derive(Debug, Clone, Default)]
-struct Sums {
+struct ChannelErrorSums {
     unit: String,
+    /// Samples that do not count.
     not_counted: usize,
+    /// Sum of squared errors.
     error: f64,
+    /// Sum of squared measured values.
     measured: f64,
+    /// Sum of `|error| / |measured|`.
     relative: f64,
+    /// Sum of `|error|`.
     abs_error: f64,
+    /// Sum of `|measured|`.
     abs_measured: f64,
     max_abs: f64,
     zero_measured: usize,
 }
 
-impl Comparison {
+impl ErrorAccumulator {
     /// A comparison of the named channels, without samples yet.
     pub fn new(channels: impl IntoIterator<Item = String>) -> Self {
         Self {
             channels: channels
                 .into_iter()
-                .map(|name| (name, Sums::default()))
+                .map(|name| (name, ChannelErrorSums::default()))
                 .collect(),
             samples: 0,
         }
@@ -167,13 +175,13 @@ impl Comparison {
         self
     }
 
-    /// Takes whole samples, interleaved `[sample * n_channels + channel]`.
-    /// Fails when the lengths do not fit or a value is not finite.
+    /// Adds complete samples, interleaved `[sample * n_channels + channel]`. Fails if the lengths do not match or a
+    /// value is not finite.
     pub fn add(&mut self, measured: &[f64], model: &[f64]) -> Result<(), FiguresError> {
         self.add_counted(measured, model, |_, _| true)
     }
 
-    /// The same, of which only those values count of which `counts(sample, channel)` says so.
+    /// The same, but only values for which `counts(sample, channel)` is true are included.
     pub fn add_counted(
         &mut self,
         measured: &[f64],
@@ -181,10 +189,7 @@ impl Comparison {
         counts: impl Fn(usize, usize) -> bool,
     ) -> Result<(), FiguresError> {
         let channels = self.channels.len();
-        if channels == 0
-            || measured.len() != model.len()
-            || !measured.len().is_multiple_of(channels)
-        {
+        if channels == 0 || measured.len() != model.len() || !measured.len().is_multiple_of(channels) {
             return Err(FiguresError::Shape {
                 measured: measured.len(),
                 model: model.len(),
@@ -222,20 +227,18 @@ impl Comparison {
         Ok(())
     }
 
-    /// The figures of all samples taken; fails when there were none.
-    pub fn finish(&self) -> Result<Figures, FiguresError> {
+    /// The figures of all added samples; fails if there are none.
+    pub fn finish(&self) -> Result<ErrorFigures, FiguresError> {
         if self.samples == 0 {
             return Err(FiguresError::NoSamples);
         }
         let ratio = |error: f64, measured: f64| (measured > 0.0).then(|| (error / measured).sqrt());
-        let total = |of: fn(&Sums) -> f64| self.channels.values().map(of).sum::<f64>();
+        let total = |of: fn(&ChannelErrorSums) -> f64| self.channels.values().map(of).sum::<f64>();
         let (error, measured) = (total(|sums| sums.error), total(|sums| sums.measured));
-        let counted = |sums: &Sums| self.samples - sums.not_counted;
+        let counted = |sums: &ChannelErrorSums| self.samples - sums.not_counted;
         let all: usize = self.channels.values().map(counted).sum();
         let mut units = self.channels.values().map(|sums| &sums.unit);
-        let is_one_unit = units
-            .next()
-            .is_some_and(|first| units.all(|unit| unit == first));
+        let is_one_unit = units.next().is_some_and(|first| units.all(|unit| unit == first));
         let channels = self.channels.iter().map(|(name, sums)| {
             let samples = counted(sums);
             let counted = samples - sums.zero_measured;
@@ -251,7 +254,7 @@ impl Comparison {
             };
             (name.clone(), figures)
         });
-        Ok(Figures {
+        Ok(ErrorFigures {
             nrms: is_one_unit.then(|| ratio(error, measured)).flatten(),
             rms: is_one_unit.then(|| (error / all.max(1) as f64).sqrt()),
             samples: self.samples,
@@ -262,22 +265,21 @@ impl Comparison {
     }
 }
 
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "as serde asks")]
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde requires it")]
 fn is_zero(count: &usize) -> bool {
     *count == 0
 }
 
-/// Figures of whole columns, `measured[channel][sample]` and `model[channel][sample]`.
-/// Fails when the shapes differ, a value is not finite or there are no samples.
-pub fn compare(
+/// Figures of complete columns, `measured[channel][sample]` and `model[channel][sample]`. Fails if the shapes differ, a
+/// value is not finite or there are no samples.
+pub fn compare_forces(
     channels: &[String],
     measured: &[Vec<f64>],
     model: &[Vec<f64>],
-) -> Result<Figures, FiguresError> {
+) -> Result<ErrorFigures, FiguresError> {
     let samples = measured.first().map_or(0, Vec::len);
-    let fits = |columns: &[Vec<f64>]| {
-        columns.len() == channels.len() && columns.iter().all(|column| column.len() == samples)
-    };
+    let fits =
+        |columns: &[Vec<f64>]| columns.len() == channels.len() && columns.iter().all(|column| column.len() == samples);
     if !fits(measured) || !fits(model) {
         let count = |columns: &[Vec<f64>]| columns.iter().map(Vec::len).sum();
         return Err(FiguresError::Shape {
@@ -286,7 +288,7 @@ pub fn compare(
             channels: channels.len(),
         });
     }
-    let mut comparison = Comparison::new(channels.iter().cloned());
+    let mut comparison = ErrorAccumulator::new(channels.iter().cloned());
     let (mut y, mut m) = (Vec::new(), Vec::new());
     for sample in 0..samples {
         y.clear();
@@ -307,31 +309,25 @@ mod tests {
         let names = ["a".to_owned(), "b".to_owned()];
         let measured = [vec![1.0, -2.0, 0.0, 2.0], vec![4.0, 0.0, 0.0, 0.0]];
         let model = [vec![1.5, -2.0, 1.0, 2.0], vec![4.0, 0.0, 0.0, -1.0]];
-        let figures = compare(&names, &measured, &model).unwrap();
+        let figures = compare_forces(&names, &measured, &model).unwrap();
         let a = &figures.channels["a"];
         assert!((a.nrms.unwrap() - (1.25_f64 / 9.0).sqrt()).abs() < 1e-15);
         assert!((a.mean_relative.unwrap() - 0.5 / 3.0).abs() < 1e-15);
         assert!((a.abs_ratio.unwrap() - 1.5 / 5.0).abs() < 1e-15);
-        assert_eq!(
-            (a.max_abs.to_bits(), a.zero_measured),
-            (1.0_f64.to_bits(), 1)
-        );
+        assert_eq!((a.max_abs.to_bits(), a.zero_measured), (1.0_f64.to_bits(), 1));
         assert!((figures.nrms.unwrap() - (2.25_f64 / 25.0).sqrt()).abs() < 1e-15);
         assert!((figures.rms.unwrap() - (2.25_f64 / 8.0).sqrt()).abs() < 1e-15);
         let json = serde_json::to_value(&figures).unwrap();
         assert!(json["channels"]["b"]["mean_relative"].is_number());
-        assert_eq!(serde_json::from_value::<Figures>(json).unwrap(), figures);
+        assert_eq!(serde_json::from_value::<ErrorFigures>(json).unwrap(), figures);
     }
 
     /// Squares of newtons and of newton metres have no sum.
     #[test]
     fn different_units_have_no_total_and_some_samples_do_not_count() {
         let names = ["a".to_owned(), "b".to_owned()];
-        let mut comparison = Comparison::new(names).with_units(["N".to_owned(), "N m".to_owned()]);
-        let (measured, model) = (
-            [3.0, 1.0, 9e9, 1.0, 4.0, 1.0],
-            [3.0, 1.5, 0.0, 1.0, 5.0, 1.0],
-        );
+        let mut comparison = ErrorAccumulator::new(names).with_units(["N".to_owned(), "N m".to_owned()]);
+        let (measured, model) = ([3.0, 1.0, 9e9, 1.0, 4.0, 1.0], [3.0, 1.5, 0.0, 1.0, 5.0, 1.0]);
         let counts = |sample, channel| (sample, channel) != (1, 0);
         comparison.add_counted(&measured, &model, counts).unwrap();
         let figures = comparison.finish().unwrap();
@@ -344,12 +340,9 @@ mod tests {
     #[test]
     fn nothing_measured_gives_no_ratio_and_bad_values_are_refused() {
         let names = ["a".to_owned()];
-        let silent = compare(&names, &[vec![0.0, 0.0]], &[vec![1.0, 0.0]]).unwrap();
-        assert_eq!(
-            (silent.nrms, silent.channels["a"].mean_relative),
-            (None, None)
-        );
-        let error = compare(&names, &[vec![0.0, 1.0]], &[vec![0.0, f64::NAN]]).unwrap_err();
+        let silent = compare_forces(&names, &[vec![0.0, 0.0]], &[vec![1.0, 0.0]]).unwrap();
+        assert_eq!((silent.nrms, silent.channels["a"].mean_relative), (None, None));
+        let error = compare_forces(&names, &[vec![0.0, 1.0]], &[vec![0.0, f64::NAN]]).unwrap_err();
         assert_eq!(
             error,
             FiguresError::NotFinite {
@@ -358,9 +351,9 @@ mod tests {
             }
         );
         assert_eq!(
-            compare(&names, &[vec![]], &[vec![]]).unwrap_err(),
+            compare_forces(&names, &[vec![]], &[vec![]]).unwrap_err(),
             FiguresError::NoSamples
         );
-        assert!(compare(&names, &[vec![1.0]], &[vec![]]).is_err());
+        assert!(compare_forces(&names, &[vec![1.0]], &[vec![]]).is_err());
     }
 }

@@ -1,17 +1,18 @@
-//! Interpretation as in Table 1 of the paper: identified base parameters go in, and the physical parameters that are
-//! taken as unknown come out, all real solutions of them, with deviations.
+//! Interpretation as in Table 1 of the paper. Input: identified base parameters and the physical parameters that are
+//! taken as unknown. Output: all real solutions for the unknowns, with standard deviations.
 //!
-//! A base parameter is a polynomial in the unknowns once all other parameters are held at their nominal values. What
-//! the polynomials determine is decided by the exact rank of their Jacobian at random points. As many equations as
-//! unknowns are solved exactly (`roots`), so that no real solution is missed; more equations than unknowns by
-//! weighted least squares (`nearest`). Deviations follow from those of the base parameters by the Jacobian.
+//! A base parameter is a polynomial in the unknowns once all other parameters are fixed at their nominal values. The
+//! exact rank of the Jacobian at random points decides what the polynomials determine. As many equations as unknowns
+//! are solved exactly (`roots`), so that no real solution is missed; more equations than unknowns by weighted least
+//! squares (`nearest`). Standard deviations follow from those of the base parameters by the Jacobian.
 //!
-//! Decision: this is exact. Coefficients are the decimals of the files, a Groebner basis states whether there are
-//! finitely many solutions, and Sturm's theorem isolates all real ones. Nothing depends on a start value or a
-//! search range; floating point enters with the standard deviations only.
+//! Decision: this is exact. Coefficients are the decimals of the files, a Groebner basis shows whether there are
+//! finitely many solutions, and Sturm's theorem isolates all real ones. Nothing depends on a start value or a search
+//! range; floating point enters with the standard deviations only.
 
 mod nearest;
 mod roots;
+mod thresholds;
 
 use std::fmt;
 
@@ -19,60 +20,61 @@ use nalgebra::{DMatrix, DVector};
 use num_rational::BigRational;
 use num_traits::Zero;
 
-use crate::estimate::{Direction, null_directions};
+use crate::estimate::{NullDirection, null_directions};
+use thresholds::{FREE_DIRECTION_SINGULAR_VALUE, MULTIPLE_SOLUTION_RATIO};
 
-pub use modelmill_algebra::polynomial::{Polynomial, exact};
+pub use modelmill_algebra::polynomial::{Polynomial, exact_decimal};
 
-/// What is to be solved.
+/// Input of an interpretation.
 #[derive(Clone, Debug)]
-pub struct System {
+pub struct InterpretationProblem {
     /// Each base parameter as a polynomial in the unknowns, all in equally many unknowns.
     pub equations: Vec<Polynomial>,
-    /// Identified values of the base parameters.
+    /// Identified values of the base parameters, one per equation.
     pub values: Vec<f64>,
-    /// Their covariance, in the products of their units; `None` where it is not known.
+    /// Their covariance, in the products of their units; `None` if it is not known.
     pub covariance: Option<DMatrix<f64>>,
-    /// Nominal values of the unknowns.
+    /// Nominal values of the unknowns, in the order of the polynomials.
     pub nominal: Vec<f64>,
 }
 
-/// What base parameters say about the unknowns.
+/// What base parameters determine about the unknowns.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Interpretation {
-    /// As many independent equations as unknowns: all real solutions, maybe none.
+pub enum PhysicalInterpretation {
+    /// As many independent equations as unknowns: all real solutions, possibly none.
     Exact {
         /// The solutions, the one nearest to the nominal values first.
-        solutions: Vec<Physical>,
+        solutions: Vec<PhysicalSolution>,
     },
-    /// More equations than unknowns: what fits best.
+    /// More equations than unknowns: the best fits.
     LeastSquares {
-        /// Local minima of the weighted error, the best first; the only one where the equations are linear.
-        solutions: Vec<Physical>,
+        /// Local minima of the weighted error, best first; a single one if the equations are linear.
+        solutions: Vec<PhysicalSolution>,
         /// Whether the equations are linear in the unknowns, so that there is no other minimum.
         is_linear: bool,
-        /// Points from which minima were looked for.
+        /// Number of starting points of the search for minima.
         starts: usize,
     },
     /// The base parameters do not determine the unknowns.
     Undetermined {
-        /// Changes of the unknowns that change no base parameter, to first order around the nominal values.
-        directions: Vec<Direction>,
-        /// Which unknowns take part in none of them.
+        /// Changes of the unknowns that change no base parameter, to first order at the nominal values.
+        directions: Vec<NullDirection>,
+        /// Whether each unknown takes part in none of them.
         determined: Vec<bool>,
     },
 }
 
-/// A solution.
+/// A solution for the unknowns.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Physical {
+pub struct PhysicalSolution {
     /// Values of the unknowns.
     pub values: Vec<f64>,
-    /// Their standard deviations; `None` where those of the base parameters are not known, or where the solution is a
-    /// multiple one.
+    /// Their standard deviations; `None` if those of the base parameters are not known, or for a multiple solution.
     pub std: Option<Vec<f64>>,
-    /// `base parameter - its value for the solution`, for each equation.
+    /// Base parameter minus its value for the solution, for each equation.
     pub residuals: Vec<f64>,
-    /// Sum of squares of the residuals by their deviations; `None` where these are not known, 0 for exact solutions.
+    /// Sum of squares of the residuals relative to their standard deviations; `None` if these are not known, 0 for
+    /// exact solutions.
     pub chi_squared: Option<f64>,
 }
 
@@ -80,7 +82,7 @@ pub struct Physical {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum InterpretError {
-    /// The equations are of too high degree, or too many, to be solved exactly.
+    /// The degree or the number of the equations is too high for an exact solution.
     TooHard,
 }
 
@@ -88,8 +90,8 @@ impl fmt::Display for InterpretError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::TooHard => f.write_str(
-                "the equations are of too high degree to be solved exactly; take fewer unknowns, such as those that \
-                 the page of equations shows to be coupled least",
+                "the degree of the equations is too high for an exact solution; choose fewer unknowns, for example \
+                 those that are coupled least on the page of equations",
             ),
         }
     }
@@ -97,99 +99,98 @@ impl fmt::Display for InterpretError {
 
 impl std::error::Error for InterpretError {}
 
-/// Solves for the unknowns. Lists of the system must be of matching lengths (asserted), values finite.
+/// Solves for the unknowns. The lists of the system must have matching lengths (asserted) and finite values.
 ///
 /// ```
-/// use modelmill_identify::interpret::{Interpretation, Polynomial, System, exact, interpret};
+/// use modelmill_identify::interpret::{InterpretationProblem, PhysicalInterpretation};
+/// use modelmill_identify::interpret::{Polynomial, exact_decimal, interpret};
 /// // p1 = m c and p2 = m c^2, with m = 2 kg and c = 0.5 m.
 /// let product = |powers: &[(usize, u32)]| {
 ///     let mut p = Polynomial::new(2);
-///     p.add_term(powers, &exact(1.0));
+///     p.add_term(powers, &exact_decimal(1.0));
 ///     p
 /// };
-/// let system = System {
+/// let system = InterpretationProblem {
 ///     equations: vec![product(&[(0, 1), (1, 1)]), product(&[(0, 1), (1, 2)])],
 ///     values: vec![1.0, 0.5],
 ///     covariance: None,
 ///     nominal: vec![1.0, 1.0],
 /// };
-/// let Ok(Interpretation::Exact { solutions }) = interpret(&system) else { panic!() };
+/// let Ok(PhysicalInterpretation::Exact { solutions }) = interpret(&system) else { panic!() };
 /// assert_eq!(solutions[0].values, [2.0, 0.5]);
 /// ```
-pub fn interpret(system: &System) -> Result<Interpretation, InterpretError> {
+pub fn interpret(system: &InterpretationProblem) -> Result<PhysicalInterpretation, InterpretError> {
     let n = system.nominal.len();
-    assert_eq!(
-        system.equations.len(),
-        system.values.len(),
-        "one value per equation"
-    );
+    assert_eq!(system.equations.len(), system.values.len(), "one value per equation");
     assert!(
         system.equations.iter().all(|p| p.n == n),
         "one nominal value per unknown"
     );
+    // Equations without any unknown contain no information.
     let used: Vec<usize> = (0..system.equations.len())
-        .filter(|k| (0..n).any(|i| system.equations[*k].mentions(i)))
+        .filter(|k| (0..n).any(|i| system.equations[*k].has_unknown(i)))
         .collect();
-    let jacobian = |k: &usize| -> Vec<Polynomial> {
-        (0..n).map(|i| system.equations[*k].derivative(i)).collect()
-    };
+    let jacobian = |k: &usize| -> Vec<Polynomial> { (0..n).map(|i| system.equations[*k].derivative(i)).collect() };
     let jacobian: Vec<Vec<Polynomial>> = used.iter().map(jacobian).collect();
+    // The rank of the Jacobian decides between undetermined, exact and least squares.
     let rank = generic_rank(&jacobian, n);
     if rank < n {
-        return Ok(undetermined(system, &jacobian, n - rank));
+        return Ok(find_undetermined(system, &jacobian, n - rank));
     }
     if used.len() > n {
-        return Ok(nearest::nearest(system, &used));
+        return Ok(nearest::solve_least_squares(system, &used));
     }
     let equations: Vec<Polynomial> = used.iter().map(|k| equation(system, *k)).collect();
     let points = match roots::solve(&equations, n).map_err(|_| InterpretError::TooHard)? {
         roots::RealSolutions::Finite(points) => points,
-        // Curves of solutions beside a generic rank that is full: the values are special, and so is what can be said.
-        roots::RealSolutions::Infinite => return Ok(undetermined(system, &jacobian, 0)),
+        // Solutions form a curve although the rank is full almost everywhere: the values are a special case.
+        roots::RealSolutions::Infinite => return Ok(find_undetermined(system, &jacobian, 0)),
     };
-    let mut solutions: Vec<Physical> = points
+    let mut solutions: Vec<PhysicalSolution> = points
         .into_iter()
-        .map(|values| Physical {
-            std: deviations(system, &used, &values),
+        .map(|values| PhysicalSolution {
+            std: standard_deviations(system, &used, &values),
             residuals: residuals(system, &values),
             chi_squared: system.covariance.is_some().then_some(0.0),
             values,
         })
         .collect();
-    let distance = |one: &Physical| -> f64 {
+    // The solution nearest to the nominal values comes first, by relative differences.
+    let distance = |one: &PhysicalSolution| -> f64 {
         let pairs = one.values.iter().zip(&system.nominal);
         pairs
             .map(|(x, x0)| ((x - x0) / (x0.abs() + x.abs()).max(f64::MIN_POSITIVE)).powi(2))
             .sum()
     };
     solutions.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
-    Ok(Interpretation::Exact { solutions })
+    Ok(PhysicalInterpretation::Exact { solutions })
 }
 
-/// `base parameter - value` as a polynomial.
-fn equation(system: &System, k: usize) -> Polynomial {
+/// Base parameter minus its identified value, as a polynomial.
+fn equation(system: &InterpretationProblem, k: usize) -> Polynomial {
     let mut equation = system.equations[k].clone();
-    equation.add_term(&[], &-exact(system.values[k]));
+    equation.add_term(&[], &-exact_decimal(system.values[k]));
     equation
 }
 
-fn residuals(system: &System, at: &[f64]) -> Vec<f64> {
+/// Identified values minus the values of all equations at a point.
+fn residuals(system: &InterpretationProblem, at: &[f64]) -> Vec<f64> {
     let pairs = system.equations.iter().zip(&system.values);
     pairs.map(|(p, value)| value - p.value(at)).collect()
 }
 
 /// The Jacobian of some equations at a point.
-fn jacobian_at(system: &System, equations: &[usize], at: &[f64]) -> DMatrix<f64> {
+fn jacobian_at(system: &InterpretationProblem, equations: &[usize], at: &[f64]) -> DMatrix<f64> {
     DMatrix::from_fn(equations.len(), at.len(), |r, i| {
         system.equations[equations[r]].derivative(i).value(at)
     })
 }
 
 /// Standard deviations of a solution of as many equations as unknowns: `J x' = p'` gives `cov x = J^-1 cov p J^-T`.
-fn deviations(system: &System, used: &[usize], at: &[f64]) -> Option<Vec<f64>> {
+fn standard_deviations(system: &InterpretationProblem, used: &[usize], at: &[f64]) -> Option<Vec<f64>> {
     let covariance = system.covariance.as_ref()?;
     let mut jacobian = jacobian_at(system, used, at);
-    // Units must not decide what counts as singular.
+    // Scale rows and columns, so that units do not decide whether the matrix is singular.
     let scales: Vec<f64> = (0..used.len()).map(|r| jacobian.row(r).norm()).collect();
     for (r, scale) in scales.iter().enumerate() {
         if *scale == 0.0 {
@@ -202,26 +203,24 @@ fn deviations(system: &System, used: &[usize], at: &[f64]) -> Option<Vec<f64>> {
         jacobian.column_mut(i).unscale_mut(*scale);
     }
     let singular = jacobian.clone().singular_values();
-    if singular.min() < 1e-12 * singular.max() {
+    if singular.min() < MULTIPLE_SOLUTION_RATIO * singular.max() {
         return None;
     }
+    // Undo the scaling.
     let inverse = jacobian.try_inverse()?;
-    let inverse = DMatrix::from_fn(at.len(), used.len(), |i, r| {
-        inverse[(i, r)] / (columns[i] * scales[r])
-    });
-    let part = DMatrix::from_fn(used.len(), used.len(), |a, b| {
-        covariance[(used[a], used[b])]
-    });
+    let inverse = DMatrix::from_fn(at.len(), used.len(), |i, r| inverse[(i, r)] / (columns[i] * scales[r]));
+    let part = DMatrix::from_fn(used.len(), used.len(), |a, b| covariance[(used[a], used[b])]);
     let result = &inverse * part * inverse.transpose();
     Some(roots_of_diagonal(&result))
 }
 
+/// Roots of the diagonal of a covariance matrix; rounding below zero counts as zero.
 fn roots_of_diagonal(covariance: &DMatrix<f64>) -> Vec<f64> {
     let diagonal = covariance.diagonal();
     diagonal.iter().map(|v| v.max(0.0).sqrt()).collect()
 }
 
-/// The rank that the Jacobian has almost everywhere: exact, at random points; the highest of a few.
+/// Rank that the Jacobian has almost everywhere: the highest of the exact ranks at three random points.
 fn generic_rank(jacobian: &[Vec<Polynomial>], n: usize) -> usize {
     let mut state = 0x6d69_6c6c_u64;
     let mut draw = || {
@@ -239,15 +238,19 @@ fn generic_rank(jacobian: &[Vec<Polynomial>], n: usize) -> usize {
         .unwrap_or(0)
 }
 
+/// Values of a polynomial Jacobian at a rational point.
 fn exact_jacobian(jacobian: &[Vec<Polynomial>], point: &[BigRational]) -> Vec<Vec<BigRational>> {
+    // Exact values, so that the rank does not depend on a tolerance.
     let row = |row: &Vec<Polynomial>| row.iter().map(|p| p.exact_value(point)).collect();
     jacobian.iter().map(row).collect()
 }
 
+/// Rank of a rational matrix by Gaussian elimination.
 fn exact_rank(mut rows: Vec<Vec<BigRational>>) -> usize {
     let n = rows.first().map_or(0, Vec::len);
     let mut rank = 0;
     for c in 0..n {
+        // Any entry that is not zero is a valid pivot in exact arithmetic.
         let Some(pivot) = (rank..rows.len()).find(|r| !rows[*r][c].is_zero()) else {
             continue;
         };
@@ -268,10 +271,15 @@ fn exact_rank(mut rows: Vec<Vec<BigRational>>) -> usize {
     rank
 }
 
-/// What is not determined, at the nominal values; these are moved a little where they hide something.
-fn undetermined(system: &System, jacobian: &[Vec<Polynomial>], at_least: usize) -> Interpretation {
+/// Directions that are not determined, at the nominal values; unknowns that are nominally zero are moved to 1. There
+/// are at least `at_least` directions.
+fn find_undetermined(
+    system: &InterpretationProblem,
+    jacobian: &[Vec<Polynomial>],
+    at_least: usize,
+) -> PhysicalInterpretation {
     let n = system.nominal.len();
-    // A product of two unknowns, one of them nominally zero, says nothing there.
+    // The derivative of a product vanishes where one factor is nominally zero, which would hide the dependence.
     let point: Vec<f64> = system
         .nominal
         .iter()
@@ -289,30 +297,25 @@ fn undetermined(system: &System, jacobian: &[Vec<Polynomial>], at_least: usize) 
             matrix.row_mut(r).unscale_mut(norm);
         }
     }
+    // The null space from the smallest singular values.
     let svd = matrix.svd(false, true);
-    let v_t = svd.v_t.expect("right singular vectors are asked for");
+    let v_t = svd.v_t.expect("right singular vectors were requested");
     let mut order: Vec<usize> = (0..n).collect();
     order.sort_by(|a, b| svd.singular_values[*a].total_cmp(&svd.singular_values[*b]));
     let n_null = order
         .iter()
-        .filter(|i| svd.singular_values[**i] < 1e-10)
+        .filter(|i| svd.singular_values[**i] < FREE_DIRECTION_SINGULAR_VALUE)
         .count()
         .max(at_least);
     let null_space = DMatrix::from_fn(n_null, n, |r, i| v_t[(order[r], i)]);
     let norms: Vec<f64> = scales.iter().map(|s| 1.0 / s.abs()).collect();
     let (determined, directions) = null_directions(&null_space, &norms);
-    Interpretation::Undetermined {
-        directions,
-        determined,
-    }
+    PhysicalInterpretation::Undetermined { directions, determined }
 }
 
-/// Rows and right-hand side divided by deviations: `L^-1` of the covariance's Cholesky factor.
-fn whitened(
-    covariance: Option<&DMatrix<f64>>,
-    used: &[usize],
-    values: &[f64],
-) -> (DMatrix<f64>, bool) {
+/// Matrix that whitens the equations: `L^-1` of the covariance's Cholesky factor, or one over the values if there is no
+/// usable covariance. The flag states which.
+fn whiten_rows(covariance: Option<&DMatrix<f64>>, used: &[usize], values: &[f64]) -> (DMatrix<f64>, bool) {
     let n = used.len();
     let part = covariance.map(|c| DMatrix::from_fn(n, n, |a, b| c[(used[a], used[b])]));
     let factor = part
@@ -324,7 +327,7 @@ fn whitened(
             let scale = |k: &usize| 1.0 / values[*k].abs().max(f64::MIN_POSITIVE);
             let weights: Vec<f64> = used.iter().map(scale).collect();
             let largest = weights.iter().copied().fold(0.0, f64::max);
-            // A value of zero has no size of its own.
+            // A value of zero has no scale of its own.
             let weights = weights.iter().map(|w| {
                 if *w >= 1.0 / f64::MIN_POSITIVE {
                     1.0_f64.min(largest)
@@ -332,10 +335,7 @@ fn whitened(
                     *w
                 }
             });
-            (
-                DMatrix::from_diagonal(&DVector::from_iterator(n, weights)),
-                false,
-            )
+            (DMatrix::from_diagonal(&DVector::from_iterator(n, weights)), false)
         }
     }
 }

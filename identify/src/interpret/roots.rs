@@ -1,27 +1,27 @@
-//! All real solutions of a system of polynomial equations that has finitely many: a Groebner basis goes in, points in
-//! floating point come out, each the nearest to an exact solution.
+//! All real solutions of a system of polynomial equations with finitely many solutions. Input: polynomials; output:
+//! points in floating point, each the nearest to an exact solution.
 //!
-//! Multiplication by a linear form acts on the quotient ring; where its minimal polynomial has as many roots as the
-//! ring has dimensions, each solution's coordinates are polynomials in the form's value (the shape lemma:
-//! D. Cox, J. Little, D. O'Shea, "Using Algebraic Geometry", 2.4). Multiple solutions are made simple by
-//! A. Seidenberg's lemma (1974) first.
+//! Multiplication by a linear form acts on the quotient ring. If its minimal polynomial has as many roots as the ring
+//! has dimensions, the coordinates of each solution are polynomials in the value of the form (the shape lemma: D. Cox,
+//! J. Little, D. O'Shea, "Using Algebraic Geometry", 2.4). Multiple solutions are made simple first by A. Seidenberg's
+//! lemma (1974).
 
 use num_rational::BigRational;
 use num_traits::{One, Signed, Zero};
 
 use modelmill_algebra::groebner::{
-    TooHard, Work, groebner, is_contradiction, remainder, standard_terms,
+    GroebnerLimitExceeded, GroebnerWork, groebner_basis, has_no_solution, remainder, standard_terms,
 };
-use modelmill_algebra::polynomial::{Polynomial, Powers, float, unknown};
+use modelmill_algebra::polynomial::{Polynomial, TermExponents, nearest_f64, unknown_polynomial};
 use modelmill_algebra::real_roots::{
-    Interval, Univariate, halve, is_squarefree, isolate, squarefree,
+    RationalInterval, UnivariatePolynomial, halve_interval, is_squarefree, isolate_roots, squarefree_part,
 };
 
-/// Most complex solutions of a system.
+/// Largest number of complex solutions of a system.
 const MOST_SOLUTIONS: usize = 64;
-/// Linear forms that are tried before solutions are taken for multiple ones.
+/// Number of linear forms that are tried before solutions are assumed to be multiple.
 const FORMS: i64 = 6;
-/// Halvings of a root's interval: far below what any number in floating point could tell.
+/// Largest number of halvings of a root's interval, far below the resolution of floating point.
 const MOST_HALVINGS: usize = 2000;
 
 /// The solutions of a system.
@@ -33,58 +33,66 @@ pub(crate) enum RealSolutions {
     Infinite,
 }
 
-/// Solves equations `polynomial = 0` in `n` unknowns.
-pub(crate) fn solve(equations: &[Polynomial], n: usize) -> Result<RealSolutions, TooHard> {
-    let mut work = Work::default();
-    let mut basis = groebner(equations, &mut work)?;
+/// Solves equations `polynomial = 0` in `n` unknowns; an error if the computation is too large.
+pub(crate) fn solve(equations: &[Polynomial], n: usize) -> Result<RealSolutions, GroebnerLimitExceeded> {
+    let mut work = GroebnerWork::default();
+    let mut basis = groebner_basis(equations, &mut work)?;
     let mut is_radical = false;
     loop {
-        if is_contradiction(&basis) {
+        if has_no_solution(&basis) {
             return Ok(RealSolutions::Finite(Vec::new()));
         }
+        // Monomials that are a basis of the quotient ring; their number is that of complex solutions.
         let Some(terms) = standard_terms(&basis, n, MOST_SOLUTIONS)? else {
             return Ok(RealSolutions::Infinite);
         };
-        let ring = Quotient {
+        let ring = QuotientRing {
             basis: &basis,
             terms: &terms,
         };
+        // A form that separates all solutions gives the answer.
         for k in 1..=FORMS {
-            if let Some(shape) = ring.shape(k, &mut work)? {
+            if let Some(shape) = ring.solve_shape_lemma(k, &mut work)? {
                 return Ok(RealSolutions::Finite(shape.points()));
             }
         }
         if is_radical {
-            return Err(TooHard);
+            return Err(GroebnerLimitExceeded);
         }
+        // Add the squarefree part of each unknown's minimal polynomial, which makes multiple solutions simple.
         let mut more = basis.clone();
         for i in 0..n {
-            let minimal = ring.minimal(&unknown(n, i), &mut work)?;
+            let minimal = ring.minimal_polynomial(&unknown_polynomial(n, i), &mut work)?;
             let mut equation = Polynomial::new(n);
-            for (exponent, factor) in squarefree(&minimal).iter().enumerate() {
+            for (exponent, factor) in squarefree_part(&minimal).iter().enumerate() {
                 let exponent = u32::try_from(exponent).expect("a small exponent");
                 equation.add_term(&[(i, exponent)], factor);
             }
             more.push(equation);
         }
-        basis = groebner(&more, &mut work)?;
+        basis = groebner_basis(&more, &mut work)?;
         is_radical = true;
     }
 }
 
-/// Polynomials modulo the equations.
-struct Quotient<'a> {
+/// The quotient ring: polynomials modulo the equations.
+struct QuotientRing<'a> {
+    /// Groebner basis of the equations.
     basis: &'a [Polynomial],
-    terms: &'a [Powers],
+    /// Monomials that span the ring.
+    terms: &'a [TermExponents],
 }
 
-/// The solutions as values of polynomials at the roots of one.
-struct Shape {
-    minimal: Univariate,
-    coordinates: Vec<Univariate>,
+/// The solutions: each real root of one polynomial gives the coordinates by further polynomials.
+struct ShapeLemmaSolution {
+    /// Minimal polynomial of the linear form; its roots are the values of the form.
+    minimal: UnivariatePolynomial,
+    /// Each coordinate as a polynomial in the value of the form.
+    coordinates: Vec<UnivariatePolynomial>,
 }
 
-impl Quotient<'_> {
+impl QuotientRing<'_> {
+    /// Coefficients of a reduced polynomial for the monomials of the ring.
     fn vector(&self, polynomial: &Polynomial) -> Vec<BigRational> {
         let factor = |term| polynomial.terms.get(term).cloned();
         let terms = self.terms.iter();
@@ -93,11 +101,15 @@ impl Quotient<'_> {
             .collect()
     }
 
-    /// 1, form, form^2, ... up to one power more than there are dimensions.
-    fn powers(&self, form: &Polynomial, work: &mut Work) -> Result<Vec<Vec<BigRational>>, TooHard> {
+    /// The powers 1, form, form^2, ... as vectors, one more than there are dimensions.
+    fn powers(
+        &self,
+        form: &Polynomial,
+        work: &mut GroebnerWork,
+    ) -> Result<Vec<Vec<BigRational>>, GroebnerLimitExceeded> {
         let n = form.n;
         let mut one = Polynomial::new(n);
-        one.add(Powers::one(n), &BigRational::one());
+        one.add(TermExponents::unit_term(n), &BigRational::one());
         let mut power = remainder(&one, self.basis, work)?;
         let mut vectors = vec![self.vector(&power)];
         for _ in 0..self.terms.len() {
@@ -111,12 +123,17 @@ impl Quotient<'_> {
         Ok(vectors)
     }
 
-    /// The least polynomial that vanishes for the form, modulo the equations.
-    fn minimal(&self, form: &Polynomial, work: &mut Work) -> Result<Univariate, TooHard> {
+    /// Monic polynomial of least degree that is zero for the form, modulo the equations.
+    fn minimal_polynomial(
+        &self,
+        form: &Polynomial,
+        work: &mut GroebnerWork,
+    ) -> Result<UnivariatePolynomial, GroebnerLimitExceeded> {
         let powers = self.powers(form, work)?;
+        // The first power that is a combination of lower ones gives the polynomial.
         for k in 1..powers.len() {
-            if let Some(mut factors) = combination(&powers[..k], &[&powers[k]]) {
-                let mut minimal: Univariate = factors.remove(0).into_iter().map(|f| -f).collect();
+            if let Some(mut factors) = solve_combinations(&powers[..k], &[&powers[k]]) {
+                let mut minimal: UnivariatePolynomial = factors.remove(0).into_iter().map(|f| -f).collect();
                 minimal.push(BigRational::one());
                 return Ok(minimal);
             }
@@ -124,48 +141,53 @@ impl Quotient<'_> {
         unreachable!("more vectors than dimensions are dependent")
     }
 
-    /// The shape of the solutions for a linear form, if the form tells all of them apart.
-    fn shape(&self, k: i64, work: &mut Work) -> Result<Option<Shape>, TooHard> {
+    /// The solutions by the shape lemma for the k-th linear form; `None` if the form does not separate all solutions.
+    fn solve_shape_lemma(
+        &self,
+        k: i64,
+        work: &mut GroebnerWork,
+    ) -> Result<Option<ShapeLemmaSolution>, GroebnerLimitExceeded> {
         let n = self.basis[0].n;
         let mut form = Polynomial::new(n);
+        // Integer weights of the unknowns, different for each k.
         let mut weight = 1_i64;
         for i in 0..n {
-            form.add(
-                Powers::unknown(n, i),
-                &BigRational::from_integer(weight.into()),
-            );
+            form.add(TermExponents::unknown(n, i), &BigRational::from_integer(weight.into()));
             weight = (weight * (k + 1) + k) % 1009;
         }
         let mut powers = self.powers(&form, work)?;
         let last = powers.pop().expect("at least one power");
+        // The highest power and all coordinates as combinations of lower powers.
         let mut targets = vec![last];
         for i in 0..n {
-            let coordinate = remainder(&unknown(n, i), self.basis, work)?;
+            let coordinate = remainder(&unknown_polynomial(n, i), self.basis, work)?;
             targets.push(self.vector(&coordinate));
         }
         let targets: Vec<&Vec<BigRational>> = targets.iter().collect();
-        let Some(mut factors) = combination(&powers, &targets) else {
+        let Some(mut factors) = solve_combinations(&powers, &targets) else {
             return Ok(None);
         };
-        let mut minimal: Univariate = factors.remove(0).into_iter().map(|f| -f).collect();
+        let mut minimal: UnivariatePolynomial = factors.remove(0).into_iter().map(|f| -f).collect();
         minimal.push(BigRational::one());
-        Ok(is_squarefree(&minimal).then_some(Shape {
+        Ok(is_squarefree(&minimal).then_some(ShapeLemmaSolution {
             minimal,
             coordinates: factors,
         }))
     }
 }
 
-impl Shape {
+impl ShapeLemmaSolution {
+    /// All real solutions in floating point.
     fn points(&self) -> Vec<Vec<f64>> {
-        isolate(&self.minimal)
+        isolate_roots(&self.minimal)
             .into_iter()
-            .map(|root| self.point(root))
+            .map(|root| self.refine_point(root))
             .collect()
     }
 
-    /// A solution: the root's interval is halved until every coordinate is known to the last bit.
-    fn point(&self, mut root: Interval) -> Vec<f64> {
+    /// One solution: the interval of the root is halved until every coordinate is known to the last bit.
+    fn refine_point(&self, mut root: RationalInterval) -> Vec<f64> {
+        // Relative accuracy of 2^-60, or absolute 2^-1000 for a coordinate near zero.
         let fine = BigRational::new(1.into(), num_bigint::BigInt::from(1) << 60);
         let tiny = BigRational::new(1.into(), num_bigint::BigInt::from(1) << 1000);
         for _ in 0..MOST_HALVINGS {
@@ -177,21 +199,19 @@ impl Shape {
             if all_known {
                 break;
             }
-            // Some bits more between two looks: looking costs more than halving.
+            // Several halvings between two tests, since a test costs more than a halving.
             for _ in 0..16 {
-                halve(&self.minimal, &mut root);
+                halve_interval(&self.minimal, &mut root);
             }
         }
         let images = self.coordinates.iter().map(|p| root.image(p).middle());
-        images.map(|value| float(&value)).collect()
+        images.map(|value| nearest_f64(&value)).collect()
     }
 }
 
-/// Each target as a combination of vectors; `None` unless the vectors are independent and span all targets.
-fn combination(
-    vectors: &[Vec<BigRational>],
-    targets: &[&Vec<BigRational>],
-) -> Option<Vec<Vec<BigRational>>> {
+/// Each target as a combination of vectors, by Gauss-Jordan elimination. `None` unless the vectors are independent and
+/// span all targets.
+fn solve_combinations(vectors: &[Vec<BigRational>], targets: &[&Vec<BigRational>]) -> Option<Vec<Vec<BigRational>>> {
     let (rows, columns) = (vectors[0].len(), vectors.len());
     let mut matrix: Vec<Vec<BigRational>> = (0..rows)
         .map(|r| {
@@ -217,16 +237,13 @@ fn combination(
             }
         }
     }
+    // Rows below the pivots must vanish, or a target is outside of the span.
     let spans = matrix[columns..]
         .iter()
         .all(|row| row[columns..].iter().all(Zero::is_zero));
     spans.then(|| {
         (0..targets.len())
-            .map(|t| {
-                (0..columns)
-                    .map(|c| matrix[c][columns + t].clone())
-                    .collect()
-            })
+            .map(|t| (0..columns).map(|c| matrix[c][columns + t].clone()).collect())
             .collect()
     })
 }
@@ -234,7 +251,7 @@ fn combination(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::interpret::exact;
+    use crate::interpret::exact_decimal;
 
     type Terms<'a> = &'a [(f64, &'a [(usize, u32)])];
 
@@ -242,7 +259,7 @@ mod tests {
         let one = |terms: &Terms<'_>| {
             let mut p = Polynomial::new(n);
             for (factor, powers) in *terms {
-                p.add_term(powers, &exact(*factor));
+                p.add_term(powers, &exact_decimal(*factor));
             }
             p
         };
@@ -284,20 +301,11 @@ mod tests {
         let found = sorted(solve(&double, 2).unwrap());
         let root = 2.0_f64.sqrt();
         assert_eq!(found, [[2.0, -root], [2.0, root]]);
-        // x^2 + 1 = 0 has no real solution; x = 1 and x = 2 contradict each other; x y = 1 leaves a curve.
+        // x^2 + 1 = 0 has no real solution; x = 1 and x = 2 contradict each other; x y = 1 is a curve.
         let complex = system(1, &[&[(1.0, &[(0, 2)]), (1.0, &[])]]);
         assert_eq!(sorted(solve(&complex, 1).unwrap()), Vec::<Vec<f64>>::new());
-        let contradiction = system(
-            1,
-            &[
-                &[(1.0, &[(0, 1)]), (-1.0, &[])],
-                &[(1.0, &[(0, 1)]), (-2.0, &[])],
-            ],
-        );
-        assert_eq!(
-            sorted(solve(&contradiction, 1).unwrap()),
-            Vec::<Vec<f64>>::new()
-        );
+        let contradiction = system(1, &[&[(1.0, &[(0, 1)]), (-1.0, &[])], &[(1.0, &[(0, 1)]), (-2.0, &[])]]);
+        assert_eq!(sorted(solve(&contradiction, 1).unwrap()), Vec::<Vec<f64>>::new());
         let curve = system(2, &[&[(1.0, &[(0, 1), (1, 1)]), (-1.0, &[])]]);
         assert_eq!(solve(&curve, 2).unwrap(), RealSolutions::Infinite);
     }

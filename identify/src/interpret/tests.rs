@@ -1,18 +1,20 @@
+//! Tests of interpretation with small systems whose solutions are known.
 use super::*;
 
 /// `sum of factor * product of powers` for each equation.
 type Equations<'a> = &'a [&'a [(f64, &'a [(usize, u32)])]];
 
-fn system(n: usize, equations: Equations<'_>, values: &[f64], std: Option<f64>) -> System {
+/// A problem with `n` unknowns, equal standard deviations, and nominal values of 1.
+fn system(n: usize, equations: Equations<'_>, values: &[f64], std: Option<f64>) -> InterpretationProblem {
     let polynomial = |terms: &&[(f64, &[(usize, u32)])]| {
         let mut p = Polynomial::new(n);
         for (factor, powers) in *terms {
-            p.add_term(powers, &exact(*factor));
+            p.add_term(powers, &exact_decimal(*factor));
         }
         p
     };
     let k = values.len();
-    System {
+    InterpretationProblem {
         equations: equations.iter().map(polynomial).collect(),
         values: values.to_vec(),
         covariance: std.map(|s| DMatrix::identity(k, k) * s * s),
@@ -25,15 +27,12 @@ fn both_solutions_of_a_quadratic_are_found_with_their_deviations() {
     // x y = 6, x + y = 5: (2, 3) and (3, 2). J = [y x; 1 1], inverse 1/(y - x) [1 -x; -1 y].
     let found = interpret(&system(
         2,
-        &[
-            &[(1.0, &[(0, 1), (1, 1)])],
-            &[(1.0, &[(0, 1)]), (1.0, &[(1, 1)])],
-        ],
+        &[&[(1.0, &[(0, 1), (1, 1)])], &[(1.0, &[(0, 1)]), (1.0, &[(1, 1)])]],
         &[6.0, 5.0],
         Some(0.1),
     ))
     .unwrap();
-    let Interpretation::Exact { mut solutions } = found else {
+    let PhysicalInterpretation::Exact { mut solutions } = found else {
         panic!("{found:?}")
     };
     solutions.sort_by(|a, b| a.values[0].total_cmp(&b.values[0]));
@@ -54,7 +53,7 @@ fn a_double_solution_has_no_deviation() {
         Some(0.1),
     ))
     .unwrap();
-    let Interpretation::Exact { solutions } = found else {
+    let PhysicalInterpretation::Exact { solutions } = found else {
         panic!("{found:?}")
     };
     assert_eq!(solutions.len(), 1);
@@ -76,11 +75,7 @@ fn what_is_not_determined_is_named() {
         None,
     ))
     .unwrap();
-    let Interpretation::Undetermined {
-        directions,
-        determined,
-    } = found
-    else {
+    let PhysicalInterpretation::Undetermined { directions, determined } = found else {
         panic!("{found:?}")
     };
     assert_eq!(determined, [false, false, true]);
@@ -101,7 +96,7 @@ fn more_equations_than_unknowns_are_weighed() {
         Some(0.5),
     ))
     .unwrap();
-    let Interpretation::LeastSquares {
+    let PhysicalInterpretation::LeastSquares {
         solutions,
         is_linear: true,
         ..
@@ -120,7 +115,7 @@ fn more_equations_than_unknowns_are_weighed() {
         None,
     ))
     .unwrap();
-    let Interpretation::LeastSquares { solutions, .. } = found else {
+    let PhysicalInterpretation::LeastSquares { solutions, .. } = found else {
         panic!("{found:?}")
     };
     let mut values: Vec<f64> = solutions.iter().map(|s| s.values[0]).collect();

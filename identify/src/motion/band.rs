@@ -1,40 +1,35 @@
-//! The band of a motion: positions go in, a frequency comes out below which they are, and above which a force can hardly be
-//! theirs.
+//! The band of a motion: positions go in; the frequency above which forces are hardly caused by the motion comes out.
 
 use crate::motion::derivatives::mean_rate;
-use crate::motion::even::{is_even, on_even_times};
+use crate::motion::even::{is_even, resample_evenly};
+use crate::motion::thresholds::{BAND_FEWEST_PERIODS, BAND_HIGHEST_SHARE, FORCE_BAND_FACTOR, MOTION_POWER_SHARE};
 use crate::signal::hann_power;
 
-/// The part of the power of a position that lies below the highest frequency of its motion. Positions decide, not rates: the
-/// noise of a clock or of an encoder is a large part of these.
-const PART: f64 = 0.999;
-/// Forces hold accelerations, products of rates, and friction that reverses with them: they reach so many times as far.
-const FARTHER: f64 = 20.0;
-
-/// Up to where forces follow a motion, Hz; at most a fifth of the sampling rate. `None` if nothing moves.
-pub(crate) fn of_motion<'a>(
-    time: &[f64],
-    positions: impl IntoIterator<Item = &'a [f64]>,
-) -> Option<f64> {
+/// Highest frequency at which forces follow a motion, Hz; at most a fifth of the sampling rate. `None` if nothing
+/// moves.
+pub(crate) fn motion_band<'a>(time: &[f64], positions: impl IntoIterator<Item = &'a [f64]>) -> Option<f64> {
     let rate = mean_rate(time);
+    // The frequency of each coordinate below which its power lies.
     let reach = positions.into_iter().filter_map(|q| {
         let power = if is_even(time) {
             hann_power(q)
         } else {
-            hann_power(&on_even_times(time, q))
+            hann_power(&resample_evenly(time, q))
         };
         let total: f64 = power.iter().sum();
         let mut sum = 0.0;
         let within = power.iter().position(|one| {
             sum += one;
-            sum > PART * total
+            sum > MOTION_POWER_SHARE * total
         })?;
         (total > 0.0).then(|| 0.5 * rate * within.max(1) as f64 / (power.len() - 1) as f64)
     });
+    // The coordinate with the highest frequency decides; the result has limits from the length and the rate of the
+    // recording.
     let reach = reach.fold(0.0, f64::max);
-    let highest = 0.2 * rate;
-    let lowest = (4.0 * rate / time.len() as f64).min(highest);
-    (reach > 0.0).then(|| (FARTHER * reach).clamp(lowest, highest))
+    let highest = BAND_HIGHEST_SHARE * rate;
+    let lowest = (BAND_FEWEST_PERIODS * rate / time.len() as f64).min(highest);
+    (reach > 0.0).then(|| (FORCE_BAND_FACTOR * reach).clamp(lowest, highest))
 }
 
 #[cfg(test)]
@@ -49,8 +44,8 @@ mod tests {
             time.iter().map(angle).collect()
         };
         let motion = [tone(0.3), tone(2.0)];
-        let band = of_motion(&time, motion.iter().map(Vec::as_slice)).unwrap();
+        let band = motion_band(&time, motion.iter().map(Vec::as_slice)).unwrap();
         assert!((38.0..44.0).contains(&band), "{band}");
-        assert_eq!(of_motion(&time, [vec![1.0; 4000].as_slice()]), None);
+        assert_eq!(motion_band(&time, [vec![1.0; 4000].as_slice()]), None);
     }
 }

@@ -1,82 +1,78 @@
-//! Where motion ends and noise begins: signals that are to be differentiated go in; the cut-off of the low-pass that
-//! promises the smallest error of the accelerations comes out.
+//! The cut-off between motion and noise: signals that are differentiated go in; the cut-off of the low-pass with the
+//! smallest expected error of the accelerations comes out.
 //!
-//! The trade-off is N. Wiener's (signal lost against noise kept, frequency by frequency), restricted to the shape of
-//! Butterworth's filter run both ways and central differences. What counts as signal, how coordinates are weighed, and
-//! the search are our own.
+//! The trade-off is that of N. Wiener (lost signal against remaining noise, frequency by frequency), restricted to
+//! Butterworth's filter run both ways and central differences. The definition of signal, the weights of coordinates
+//! and the search are our own.
 
 use std::f64::consts::{LN_10, PI, TAU};
 
-use crate::signal::{count, hann_power, median};
+use crate::motion::thresholds::{
+    CUTOFF_ERROR_RATIO, CUTOFF_FEWEST_PERIODS, CUTOFF_FEWEST_SAMPLES, CUTOFF_HIGHEST_SHARE, CUTOFF_NEGLIGIBLE_SQUARE,
+    MOTION_NOISE_RATIO, TRIM_ONE_IN, TRIMMED_PERIODS,
+};
+use crate::signal::{float_to_count, hann_power, median};
 
-/// A band of the spectrum holds motion where its power is above so many times the noise.
-/// Within the narrowest bands chance reaches that about once in a thousand.
-const ABOVE_NOISE: f64 = 4.0;
 /// Relative width of a band.
 const BAND: f64 = 0.15;
-/// Periods of the cut-off that are dropped at each end for the transients, which reach 0.1 % there.
-pub(crate) const TRIMMED_PERIODS: f64 = 3.0;
-/// At most one sample in so many is dropped at each end.
-pub(crate) const LONGEST_TRIM: f64 = 6.0;
-/// Cut-offs tried.
+/// Number of cut-offs that are tried.
 const STEPS: u32 = 128;
 
-/// A signal that is differentiated to accelerations.
+/// A signal that is differentiated to get accelerations.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Signal<'a> {
+pub(crate) struct DifferentiatedSignal<'a> {
     /// Its samples, evenly spaced.
     pub(crate) values: &'a [f64],
-    /// How often: twice for positions, once for rates.
-    pub(crate) times: u8,
+    /// Number of differentiations: two for positions, one for rates.
+    pub(crate) derivative_order: u8,
 }
 
-/// The cut-off, Hz, that promises nearly the smallest error of the accelerations of all signals together, each relative
-/// to its size, for signals of one length sampled at `rate_hz`; `None` when none of them holds motion above its noise.
+/// The cut-off, Hz, with nearly the smallest expected error of the accelerations of all signals, each relative to its
+/// size. Signals have the same length and are sampled at `rate_hz`. `None` if none of them has motion above its
+/// noise.
 ///
-/// The spectrum of the differences is signal plus noise. White noise of the measured values has the known shape
-/// `(2 rate sin(pi f/rate))^(2 times)` there; its level is the median of means over the upper quarter of the band, so that
-/// quantisation counts as the noise it is. Motion is what stands above it on the average over bands, for single lines
-/// far up are seldom motion, and their share in the acceleration is huge. A cut-off then costs the signal it takes,
-/// the noise it leaves, and what the transients at the ends of a short recording spoil. The error of a coordinate is bounded by its size, so that one which hardly moves does not decide
-/// for the others.
+/// The spectrum of the differences is signal plus noise. White noise of the measured values has the known shape `(2
+/// rate sin(pi f/rate))^(2 times)` there. Its level is the median of means over the upper quarter of the band, so
+/// that quantisation counts as noise. Motion is what exceeds it on average over bands, because single lines at high
+/// frequencies are seldom motion, but have a large share in the acceleration. The error of a cut-off has three parts:
+/// lost signal, remaining noise, and transients at the ends of a short recording. The error of a coordinate is
+/// limited by its size, so that a coordinate with little motion does not decide for the others.
 ///
-/// A low cut-off loses more samples at the ends, so the highest one is returned whose expected error is within a quarter
-/// of the smallest, or below 0.03 % of the acceleration; never above a fifth of the sampling rate, where central
-/// differences take more than the filter leaves.
-pub(crate) fn choose_cutoff(signals: &[Signal<'_>], rate_hz: f64, order: usize) -> Option<f64> {
+/// A low cut-off loses more samples at the ends. Therefore the highest cut-off is returned whose expected error is
+/// within a quarter of the smallest, or below 0.03 % of the acceleration. It is never above a fifth of the sampling
+/// rate, where central differences attenuate more than the filter.
+pub(crate) fn choose_cutoff(signals: &[DifferentiatedSignal<'_>], rate_hz: f64, order: usize) -> Option<f64> {
     let samples = signals.first()?.values.len();
-    if samples < 32 || !(rate_hz > 0.0 && rate_hz.is_finite()) {
+    if samples < CUTOFF_FEWEST_SAMPLES || !(rate_hz > 0.0 && rate_hz.is_finite()) {
         return None;
     }
-    let spectra: Vec<Spectrum> = signals
+    let spectra: Vec<AccelerationSpectrum> = signals
         .iter()
-        .filter_map(|signal| Spectrum::new(*signal, rate_hz))
+        .filter_map(|signal| AccelerationSpectrum::new(*signal, rate_hz))
         .collect();
     let bins = spectra.first().map_or(0, |one| one.bins);
-    let gains = Gains::new(bins, order);
+    let gains = FilterGains::new(bins, order);
     if spectra.is_empty() {
         return None;
     }
-    let lowest = 4.0 * rate_hz / samples as f64;
-    let highest = 0.2 * rate_hz;
+    // Cut-offs in geometric steps, each with the sum of the squared relative errors of all signals.
+    let lowest = CUTOFF_FEWEST_PERIODS * rate_hz / samples as f64;
+    let highest = CUTOFF_HIGHEST_SHARE * rate_hz;
     let costs: Vec<(f64, f64)> = (0..=STEPS)
         .map(|i| lowest * (highest / lowest).powf(f64::from(i) / f64::from(STEPS)))
         .map(|cutoff| {
-            let transient = transients(cutoff / rate_hz, samples);
-            let passed = gains.passed(cutoff, rate_hz);
-            let noise = [1, 2].map(|times| gains.noise(&passed, times, rate_hz));
+            let transient = transient_error(cutoff / rate_hz, samples);
+            let passed = gains.passed_power(cutoff, rate_hz);
+            let noise = [1, 2].map(|times| gains.noise_power(&passed, times, rate_hz));
             let errors = spectra.iter().map(|spectrum| {
-                let noise = noise[usize::from(spectrum.times == 2)];
+                let noise = noise[usize::from(spectrum.derivative_order == 2)];
                 spectrum.relative_error(&passed, noise, &gains, transient)
             });
             (cutoff, errors.sum())
         })
         .collect();
-    let smallest = costs
-        .iter()
-        .map(|(_, cost)| *cost)
-        .fold(f64::INFINITY, f64::min);
-    let bearable = (1.25_f64.powi(2) * smallest).max(1e-7 * spectra.len() as f64);
+    let smallest = costs.iter().map(|(_, cost)| *cost).fold(f64::INFINITY, f64::min);
+    let bearable = (CUTOFF_ERROR_RATIO.powi(2) * smallest).max(CUTOFF_NEGLIGIBLE_SQUARE * spectra.len() as f64);
     costs
         .into_iter()
         .filter(|(_, cost)| *cost <= bearable)
@@ -84,65 +80,58 @@ pub(crate) fn choose_cutoff(signals: &[Signal<'_>], rate_hz: f64, order: usize) 
         .reduce(f64::max)
 }
 
-/// What transients at both ends leave in the samples that are kept, relative to the square of the acceleration, for a
-/// cut-off in parts of the sampling rate: three periods of it are dropped, or what a short recording can spare, and the
-/// transient falls tenfold in each.
-fn transients(cutoff: f64, samples: usize) -> f64 {
+/// Error of the transients at both ends in the samples that are kept, relative to the square of the acceleration. The
+/// cut-off is given as a share of the sampling rate. Three periods of it are dropped, or fewer in a short recording,
+/// and the transient falls tenfold in each period.
+fn transient_error(cutoff: f64, samples: usize) -> f64 {
     let periods = cutoff * samples as f64;
-    let dropped = (periods / LONGEST_TRIM).min(TRIMMED_PERIODS);
+    let dropped = (periods / TRIM_ONE_IN).min(TRIMMED_PERIODS);
     10.0_f64.powf(-2.0 * dropped) / (LN_10 * (periods - 2.0 * dropped))
 }
 
 /// Power of an acceleration over frequency, split into motion and noise.
-struct Spectrum {
-    times: u8,
-    /// Frequencies that there are.
+struct AccelerationSpectrum {
+    /// As in [`DifferentiatedSignal`].
+    derivative_order: u8,
+    /// Number of frequencies.
     bins: usize,
-    /// Power of the true acceleration at the frequencies at which the noise does not hide it.
+    /// Power of the true acceleration at the frequencies where it exceeds the noise.
     motion: Vec<(usize, f64)>,
-    /// Power of the noise of the measured values, the same at all frequencies.
+    /// Power of the noise of the measured values, equal at all frequencies.
     noise: f64,
 }
 
-impl Spectrum {
-    /// `None` where no motion stands above the noise.
-    fn new(signal: Signal<'_>, rate_hz: f64) -> Option<Self> {
+impl AccelerationSpectrum {
+    /// Splits the spectrum of a signal; `None` if no motion exceeds the noise.
+    fn new(signal: DifferentiatedSignal<'_>, rate_hz: f64) -> Option<Self> {
+        // Differences of neighbouring samples, as a first estimate of the acceleration.
         let mut differences = signal.values.to_vec();
-        for _ in 0..signal.times {
-            differences = differences
-                .windows(2)
-                .map(|w| (w[1] - w[0]) * rate_hz)
-                .collect();
+        for _ in 0..signal.derivative_order {
+            differences = differences.windows(2).map(|w| (w[1] - w[0]) * rate_hz).collect();
         }
         let power = hann_power(&differences);
         let bins = power.len();
         let angle = |k: usize| PI * k as f64 / (bins - 1) as f64;
-        let shape =
-            |k: usize| (2.0 * rate_hz * (0.5 * angle(k)).sin()).powi(2 * i32::from(signal.times));
-        let upper: Vec<f64> = (bins * 3 / 4..bins - 1)
-            .map(|k| power[k] / shape(k))
-            .collect();
-        // The median passes over lines; means below it hold where noise itself is made of lines, as in a run that was
-        // put together from copies.
+        let shape = |k: usize| (2.0 * rate_hz * (0.5 * angle(k)).sin()).powi(2 * i32::from(signal.derivative_order));
+        // The level of the noise in the upper quarter of the band.
+        let upper: Vec<f64> = (bins * 3 / 4..bins - 1).map(|k| power[k] / shape(k)).collect();
+        // The median ignores lines. The means below it are needed if the noise itself consists of lines, as in a run
+        // that was made of copies.
         let means = upper.chunks(upper.len().div_ceil(64).max(16));
-        let noise = median(
-            means
-                .map(|c| c.iter().sum::<f64>() / c.len() as f64)
-                .collect(),
-        );
+        let noise = median(means.map(|c| c.iter().sum::<f64>() / c.len() as f64).collect());
         let mut motion = Vec::new();
-        // A window of von Hann and padding spread one frequency over some bins.
+        // The window and the padding spread one frequency over several bins, so bands have a least width.
         let narrowest = (8 * bins).div_ceil(differences.len());
         let mut start = 1;
         while start < bins {
-            let width = count(BAND * start as f64).max(narrowest);
+            let width = float_to_count(BAND * start as f64).max(narrowest);
             let end = (start + width).min(bins);
             let band: f64 = (start..end).map(|k| power[k] / shape(k)).sum();
-            if band > ABOVE_NOISE * noise * (end - start) as f64 {
+            if band > MOTION_NOISE_RATIO * noise * (end - start) as f64 {
                 for k in start..end {
-                    // What differences of neighbours take of a motion at this frequency.
+                    // The gain of differences of neighbours at this frequency.
                     let half = 0.5 * angle(k);
-                    let taken = (half.sin() / half).powi(2 * i32::from(signal.times));
+                    let taken = (half.sin() / half).powi(2 * i32::from(signal.derivative_order));
                     let above = power[k] - noise * shape(k);
                     if above > 0.0 {
                         motion.push((k, above / taken));
@@ -152,21 +141,21 @@ impl Spectrum {
             start = end;
         }
         (!motion.is_empty()).then_some(Self {
-            times: signal.times,
+            derivative_order: signal.derivative_order,
             bins,
             motion,
             noise,
         })
     }
 
-    /// Expected square error of the filtered acceleration, relative to the square of its size plus that error, where the
-    /// filter passes `passed` of each frequency and noise of power 1 becomes one of power `noise`.
-    fn relative_error(&self, passed: &[f64], noise: f64, gains: &Gains, transient: f64) -> f64 {
-        let times = i32::from(self.times);
+    /// Expected squared error of the filtered acceleration, relative to the square of its size plus that error. The
+    /// filter has the gain `passed` at each frequency, and noise of power 1 becomes noise of power `noise`.
+    fn relative_error(&self, passed: &[f64], noise: f64, gains: &FilterGains, transient: f64) -> f64 {
+        let times = i32::from(self.derivative_order);
         let mut error = self.noise * noise;
         let mut size = 0.0;
         for (k, motion) in &self.motion {
-            // Central differences over two steps.
+            // Central differences extend over two steps.
             let gain = passed[*k] * gains.difference[*k].powi(times);
             error += (1.0 - gain).powi(2) * motion;
             size += motion;
@@ -176,40 +165,40 @@ impl Spectrum {
     }
 }
 
-/// What filter and differences do at each frequency, but for the cut-off: the same for all signals and cut-offs.
-struct Gains {
+/// Gains of filter and differences at each frequency that do not depend on the cut-off; the same for all signals.
+struct FilterGains {
+    /// Exponent of the filter: twice its order.
     power: i32,
-    /// The power of the filter, of the frequency as the bilinear transformation warps it.
+    /// The warped frequency of the bilinear transformation to that exponent.
     warped: Vec<f64>,
-    /// The sine of the angle that a frequency turns in a step, and its ratio to that angle.
+    /// Sine of the angle of a frequency in one step.
     sine: Vec<f64>,
+    /// Ratio of that sine to the angle: the gain of central differences.
     difference: Vec<f64>,
 }
 
-impl Gains {
+impl FilterGains {
+    /// Prepares the gains for spectra of `bins` frequencies.
     fn new(bins: usize, order: usize) -> Self {
         let power = 2 * i32::try_from(order).unwrap_or(i32::MAX / 2);
         let angles = (0..bins).map(|k| 0.5 * TAU * k as f64 / (bins - 1) as f64);
         Self {
             power,
-            warped: angles
-                .clone()
-                .map(|a| (0.5 * a).tan().powi(power))
-                .collect(),
+            warped: angles.clone().map(|a| (0.5 * a).tan().powi(power)).collect(),
             sine: angles.clone().map(f64::sin).collect(),
             difference: angles.map(|a| a.sin() / a).collect(),
         }
     }
 
-    /// What the filter of a cut-off passes of each frequency.
-    fn passed(&self, cutoff_hz: f64, rate_hz: f64) -> Vec<f64> {
+    /// Gain of the filter with this cut-off at each frequency, in both directions.
+    fn passed_power(&self, cutoff_hz: f64, rate_hz: f64) -> Vec<f64> {
         let warped = (PI * cutoff_hz / rate_hz).tan().powi(self.power);
         let passed = |frequency: &f64| 1.0 / (1.0 + frequency / warped);
         self.warped.iter().map(passed).collect()
     }
 
-    /// The power of accelerations from noise of power 1 of what is differentiated so many times.
-    fn noise(&self, passed: &[f64], times: i32, rate_hz: f64) -> f64 {
+    /// Power of the acceleration noise for measured noise of power 1, after `times` differentiations.
+    fn noise_power(&self, passed: &[f64], times: i32, rate_hz: f64) -> f64 {
         let pairs = passed.iter().zip(&self.sine).skip(1);
         pairs
             .map(|(passed, sine)| {
@@ -224,10 +213,13 @@ impl Gains {
 mod tests {
     use super::*;
     use crate::motion::derivatives::filter_and_differentiate;
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
 
-    fn twice(values: &[f64]) -> Signal<'_> {
-        Signal { values, times: 2 }
+    fn twice(values: &[f64]) -> DifferentiatedSignal<'_> {
+        DifferentiatedSignal {
+            values,
+            derivative_order: 2,
+        }
     }
 
     /// The chosen cut-off gives nearly the smallest error that any cut-off could give.
@@ -245,7 +237,7 @@ mod tests {
             })
             .collect();
         for sigma in [1e-3, 4e-6, 1e-8] {
-            let mut noise = Noise::new(5);
+            let mut noise = TestNoise::new(5);
             let truth = |t: f64| -> f64 {
                 harmonics
                     .iter()
@@ -263,19 +255,11 @@ mod tests {
                 })
                 .collect();
             let error = |cutoff: f64| {
-                let qdd = filter_and_differentiate(&time, &positions, cutoff, 4)
-                    .unwrap()
-                    .qdd;
+                let qdd = filter_and_differentiate(&time, &positions, cutoff, 4).unwrap().qdd;
                 let inner = 400..3245;
-                (inner
-                    .clone()
-                    .map(|i| (qdd[i] - truth(time[i])).powi(2))
-                    .sum::<f64>()
-                    / inner.len() as f64)
-                    .sqrt()
+                (inner.clone().map(|i| (qdd[i] - truth(time[i])).powi(2)).sum::<f64>() / inner.len() as f64).sqrt()
             };
-            let size =
-                (time.iter().map(|t| truth(*t).powi(2)).sum::<f64>() / time.len() as f64).sqrt();
+            let size = (time.iter().map(|t| truth(*t).powi(2)).sum::<f64>() / time.len() as f64).sqrt();
             let chosen = choose_cutoff(&[twice(&positions)], rate, 4).unwrap();
             let best = (0..60)
                 .map(|i| error(0.6 * 1.09_f64.powi(i)))
@@ -291,7 +275,7 @@ mod tests {
     #[test]
     fn a_coordinate_at_rest_has_no_cutoff() {
         assert_eq!(choose_cutoff(&[twice(&[1.0; 500])], 250.0, 4), None);
-        let mut noise = Noise::new(2);
+        let mut noise = TestNoise::new(2);
         let still: Vec<f64> = (0..500).map(|_| 1.0 + 1e-6 * noise.normal()).collect();
         // Chance peaks may pass for motion; nothing below may panic on them.
         let _ = choose_cutoff(&[twice(&still)], 250.0, 4);

@@ -1,19 +1,21 @@
-//! Fewer samples of the same motion: the parallel filter of identification, on regressors and forces alike.
+//! Decimation: the parallel filter of identification, which is applied equally to regressor and forces.
+//!
+//! Columns of samples go in, shorter columns of the same motion come out.
 
 use crate::signal::{FilterError, LowPass};
 
-/// Columns that are filtered side by side: as many vectors of numbers as the filter's recursion has time for, or, of few
-/// columns, fewer.
+/// Columns that are filtered at the same time, so that the recursion of the filter uses vector registers.
 const LANES: usize = 16;
+/// The same for a group of few columns.
 const FEW: usize = 4;
 
-/// The parallel filter passes this part of the sampling rate that is left.
-pub const PASSED_BY_DECIMATION: f64 = 0.4;
+/// The parallel filter passes frequencies up to this share of the new sampling rate.
+pub const DECIMATION_PASSBAND: f64 = 0.4;
 
 /// The low-pass that [`decimate`] uses: Chebyshev 1, order 8, 0.05 dB, up to 0.8 of the new
 /// half rate.
 fn anti_alias(factor: usize) -> Result<LowPass, FilterError> {
-    LowPass::chebyshev1(8, 0.05, PASSED_BY_DECIMATION / factor as f64, 1.0)
+    LowPass::chebyshev1(8, 0.05, DECIMATION_PASSBAND / factor as f64, 1.0)
 }
 
 /// Every `factor`-th sample, starting with the first, of the zero-phase low-passed signal
@@ -45,16 +47,14 @@ pub fn decimate_time(time: &[f64], factor: usize) -> Vec<f64> {
     time.iter().copied().step_by(factor.max(1)).collect()
 }
 
-/// [`decimate`] on each of some columns of equal length, several at once.
+/// [`decimate`] on several columns of equal length, some of them at the same time.
 /// Fails as [`decimate`] does.
 pub fn decimate_columns(columns: &[&[f64]], factor: usize) -> Result<Vec<Vec<f64>>, FilterError> {
     if factor < 2 {
-        return columns
-            .iter()
-            .map(|column| decimate(column, factor))
-            .collect();
+        return columns.iter().map(|column| decimate(column, factor)).collect();
     }
     let mut short = Vec::with_capacity(columns.len());
+    // Groups of columns are filtered together; a small group uses fewer lanes.
     for group in columns.chunks(LANES) {
         short.extend(if group.len() <= FEW {
             decimate_group::<FEW>(group, factor)?
@@ -65,12 +65,10 @@ pub fn decimate_columns(columns: &[&[f64]], factor: usize) -> Result<Vec<Vec<f64
     Ok(short)
 }
 
-/// [`decimate_columns`] of at most so many columns.
-fn decimate_group<const N: usize>(
-    group: &[&[f64]],
-    factor: usize,
-) -> Result<Vec<Vec<f64>>, FilterError> {
+/// [`decimate_columns`] of at most `N` columns.
+fn decimate_group<const N: usize>(group: &[&[f64]], factor: usize) -> Result<Vec<Vec<f64>>, FilterError> {
     let samples = group.iter().map(|column| column.len()).min().unwrap_or(0);
+    // Interleave the columns, one lane per column.
     let mut lanes = vec![[0.0; N]; samples];
     for (k, column) in group.iter().enumerate() {
         for (lane, value) in lanes.iter_mut().zip(*column) {
@@ -82,11 +80,8 @@ fn decimate_group<const N: usize>(
     Ok((0..group.len()).map(column).collect())
 }
 
-/// Every `factor`-th sample of columns that stand side by side.
-fn decimate_lanes<const N: usize>(
-    lanes: &[[f64; N]],
-    factor: usize,
-) -> Result<Vec<[f64; N]>, FilterError> {
+/// Every `factor`-th sample of interleaved columns.
+fn decimate_lanes<const N: usize>(lanes: &[[f64; N]], factor: usize) -> Result<Vec<[f64; N]>, FilterError> {
     if factor >= lanes.len() {
         return Err(FilterError::FactorOutOfRange { factor });
     }
@@ -112,7 +107,7 @@ pub fn decimate_table(table: &[f64], width: usize, factor: usize) -> Result<Vec<
     }
     let samples = table.len() / width;
     let mut short = vec![0.0; samples.div_ceil(factor) * width];
-    // A drive knows nothing of bodies that it does not move: their columns are zero, and stay so.
+    // Columns of bodies that a drive does not move are zero, and stay zero.
     let mut is_zero = vec![true; width];
     for row in table.chunks_exact(width) {
         for (is_zero, value) in is_zero.iter_mut().zip(row) {
@@ -121,10 +116,10 @@ pub fn decimate_table(table: &[f64], width: usize, factor: usize) -> Result<Vec<
     }
     let mut columns: Vec<usize> = (0..width).filter(|column| !is_zero[*column]).collect();
     if columns.is_empty() {
-        // The length is looked at in any case.
+        // Without other columns one of zeros is filtered, so that the length is checked.
         columns.push(0);
     }
-    // A few at a time, so that a long table is not held twice.
+    // Few columns at a time keep the memory small.
     for group in columns.chunks(LANES) {
         let lanes: Vec<[f64; LANES]> = (table.chunks_exact(width))
             .map(|row| {

@@ -1,34 +1,35 @@
-//! Forces that are read later than they act: the states of a run are taken that much earlier.
+//! Delayed force signals: the states of a run are taken earlier by the delay.
 //!
-//! The forces keep their samples, noise and jumps included; states are smooth, so that they can be read off between samples
-//! by the cubic through the four nearest (Lagrange). A sample whose states would lie before the first or behind the last
-//! one has no partner and is dropped.
+//! The forces keep their samples with noise and jumps. States are smooth, so that they can be interpolated by the
+//! cubic through the four nearest samples (Lagrange). A sample whose states would lie outside of the recording is
+//! dropped.
 //!
 //! Decision: the states are shifted and not the forces, because states are smooth while forces jump at reversals
 //! and are noisy.
 
-use crate::motion::run::Run;
+use crate::motion::run::PreparedRun;
 
-impl Run {
-    /// Pairs every force with the states `delay` seconds before it was read, and gives how many samples at the start and at
-    /// the end are dropped for lack of states. A negative delay pairs it with later ones.
+impl PreparedRun {
+    /// Pairs every force with the states `delay` seconds before it. Returns how many samples at the start and at the
+    /// end are dropped because states are missing. A negative delay pairs it with later states.
     ///
-    /// `None` leaves the run as it is: fewer than four samples would be left.
-    pub fn pair_with_earlier_states(&mut self, delay: f64) -> Option<(usize, usize)> {
+    /// `None` leaves the run unchanged, because fewer than four samples would remain.
+    pub fn shift_states_by_delay(&mut self, delay: f64) -> Option<(usize, usize)> {
         let n = self.time.len();
         let (Some(&first), Some(&last)) = (self.time.first(), self.time.last()) else {
             return None;
         };
-        // A delay by whole samples must not fail by rounding.
+        // A delay of a multiple of the sampling time must not fail by rounding.
         let slack = 1e-9 * (last - first);
         let start = self.time.partition_point(|t| t - delay < first - slack);
         let end = self.time.partition_point(|t| t - delay <= last + slack);
         if n < 4 || end < start + 4 {
             return None;
         }
+        // Weights for each remaining sample; the same for all coordinates.
         let stencils: Vec<(usize, [f64; 4])> = self.time[start..end]
             .iter()
-            .map(|t| stencil(&self.time, t - delay))
+            .map(|t| cubic_stencil(&self.time, t - delay))
             .collect();
         let states = (self.q.iter_mut()).chain(&mut self.qd).chain(&mut self.qdd);
         for column in states {
@@ -37,6 +38,7 @@ impl Run {
                 .map(|(at, weights)| (0..4).map(|k| weights[k] * column[at + k]).sum())
                 .collect();
         }
+        // Times, forces and lines keep their values, but lose the dropped samples.
         let cut = |column: &mut Vec<f64>| {
             column.truncate(end);
             column.drain(..start);
@@ -53,8 +55,8 @@ impl Run {
     }
 }
 
-/// The first of the four samples around a time, and their weights in the cubic through them.
-fn stencil(time: &[f64], at: f64) -> (usize, [f64; 4]) {
+/// Index of the first of the four samples around a time, and their weights in the cubic through them.
+fn cubic_stencil(time: &[f64], at: f64) -> (usize, [f64; 4]) {
     let above = time.partition_point(|t| *t < at);
     let first = above.saturating_sub(2).min(time.len() - 4);
     let nodes = &time[first..first + 4];
@@ -70,15 +72,13 @@ fn stencil(time: &[f64], at: f64) -> (usize, [f64; 4]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motion::prepared_as::PreparedAs;
+    use crate::motion::prepared_as::PreparationRecord;
 
     /// Uneven samples of cubics, with the time itself as the force.
-    fn run(n: u32) -> Run {
-        let time: Vec<f64> = (0..n)
-            .map(|i| 0.01 * f64::from(i) + 0.003 * f64::from(i % 3))
-            .collect();
+    fn run(n: u32) -> PreparedRun {
+        let time: Vec<f64> = (0..n).map(|i| 0.01 * f64::from(i) + 0.003 * f64::from(i % 3)).collect();
         let column = |of: fn(f64) -> f64| vec![time.iter().map(|t| of(*t)).collect()];
-        Run {
+        PreparedRun {
             file: "run.csv".to_owned(),
             q: column(|t| t * t * t - t),
             qd: column(|t| 3.0 * t * t - 1.0),
@@ -87,8 +87,8 @@ mod tests {
             missing_force: Vec::new(),
             left_out: Vec::new(),
             lines: (2..u64::from(n) + 2).collect(),
-            repeats: None,
-            prepared: PreparedAs::default(),
+            repeatability: None,
+            prepared: PreparationRecord::default(),
             notes: Vec::new(),
             time,
         }
@@ -98,9 +98,7 @@ mod tests {
     fn cubics_are_met_exactly_and_lost_samples_are_counted() {
         for delay in [0.0, 0.0042, -0.0042, 0.013, 0.25] {
             let mut moved = run(60);
-            let lost = moved
-                .pair_with_earlier_states(delay)
-                .expect("samples are left");
+            let lost = moved.shift_states_by_delay(delay).expect("samples are left");
             let n = moved.time.len();
             assert_eq!(n + lost.0 + lost.1, 60);
             assert_eq!(lost.0 > 0, delay > 0.0);
@@ -122,8 +120,8 @@ mod tests {
     #[test]
     fn a_delay_beyond_the_recording_leaves_it() {
         let mut short = run(10);
-        assert_eq!(short.pair_with_earlier_states(5.0), None);
+        assert_eq!(short.shift_states_by_delay(5.0), None);
         assert_eq!(short.time.len(), 10);
-        assert_eq!(run(3).pair_with_earlier_states(0.0), None);
+        assert_eq!(run(3).shift_states_by_delay(0.0), None);
     }
 }

@@ -1,19 +1,17 @@
-//! Rates and accelerations from recorded positions: zero-phase low-pass, then central
-//! differences on the true time base. Positions go in; filtered positions and both derivatives
-//! come out, with the cut-off that was used.
+//! Rates and accelerations from recorded positions: a zero-phase low-pass, then central differences at the recorded
+//! times. Positions go in; filtered positions and both derivatives come out.
 //!
-//! Source: the field's standard procedure, e.g. M. Gautier, "Numerical calculation of the base
-//! inertial parameters of robots", and A. Janot, M. Gautier and M. Brunot, "Data set and
-//! reference models of EMPS" (2019), whose recipe is [`Preparation::emps`].
-//! Which cut-off: [`crate::motion::cutoff`]. Periodic motions have a better way: [`crate::motion::series`].
+//! Source: the standard procedure, for example M. Gautier, "Numerical calculation of the base inertial parameters of
+//! robots", and A. Janot, M. Gautier and M. Brunot, "Data set and reference models of EMPS" (2019), whose settings
+//! are [`crate::StatePreparation::emps`]. The cut-off is chosen by [`crate::motion::cutoff`]. Periodic motions are
+//! better treated by [`crate::motion::series`].
 
 use crate::signal::{FilterError, LowPass};
 
-/// The derivative of `values` at each of the times: that of the parabola through three
-/// neighbours, which is the central difference where steps are even, and second-order exact
-/// where they are not. At both ends the parabola of the first or last three is used.
-/// `values` must be as long as `time` (asserted); fewer than three samples have the slope of
-/// their line, or zero.
+/// The derivative of `values` at each time, from the parabola through three neighbours. This is the central
+/// difference for even steps, and of second order for uneven ones. At both ends the parabola of the first or last
+/// three samples is used. Panics unless `values` is as long as `time`. Two samples have the slope of their line, a
+/// single one has zero.
 pub fn differentiate(time: &[f64], values: &[f64]) -> Vec<f64> {
     assert_eq!(time.len(), values.len(), "one value per time");
     let n = values.len();
@@ -22,7 +20,7 @@ pub fn differentiate(time: &[f64], values: &[f64]) -> Vec<f64> {
         2 => return vec![(values[1] - values[0]) / (time[1] - time[0]); 2],
         _ => {}
     }
-    // Slope at the place `at` of the parabola through the samples around `i`.
+    // Slope at the sample `at` of the parabola through the samples around `i`.
     let slope = |i: usize, at: usize| {
         let before = time[i] - time[i - 1];
         let after = time[i + 1] - time[i];
@@ -38,9 +36,9 @@ pub fn differentiate(time: &[f64], values: &[f64]) -> Vec<f64> {
     derivative
 }
 
-/// One coordinate with its derivatives, as [`filter_and_differentiate`] returns it; all of the same length.
+/// One coordinate with its derivatives; all columns have the same length.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Smoothed {
+pub struct SmoothedCoordinate {
     /// Filtered positions.
     pub q: Vec<f64>,
     /// Rates, central differences of `q`.
@@ -49,22 +47,22 @@ pub struct Smoothed {
     pub qdd: Vec<f64>,
 }
 
-/// Filters positions at `cutoff_hz` (Butterworth of `order`, zero phase) and takes central
-/// differences twice on the true `time`, s.
-/// Fails when the cut-off does not suit the sampling rate or there are too few samples.
+/// Filters positions at `cutoff_hz` (Butterworth of `order`, zero phase) and takes central differences twice at the
+/// recorded times `time`, s. Fails when the cut-off does not fit the sampling rate, or when there are too few
+/// samples.
 pub fn filter_and_differentiate(
     time: &[f64],
     positions: &[f64],
     cutoff_hz: f64,
     order: usize,
-) -> Result<Smoothed, FilterError> {
+) -> Result<SmoothedCoordinate, FilterError> {
     let q = LowPass::butterworth(order, cutoff_hz, mean_rate(time))?.zero_phase(positions)?;
     let qd = differentiate(time, &q);
     let qdd = differentiate(time, &qd);
-    Ok(Smoothed { q, qd, qdd })
+    Ok(SmoothedCoordinate { q, qd, qdd })
 }
 
-/// Samples per second on average; 0 for fewer than two samples.
+/// Mean number of samples per second; 0 for fewer than two samples.
 pub(crate) fn mean_rate(time: &[f64]) -> f64 {
     match time {
         [first, .., last] => (time.len() - 1) as f64 / (last - first),

@@ -1,64 +1,61 @@
-//! Samples at uneven times on even ones, and back: times and values go in; the cubic spline through them, read off anywhere,
-//! comes out.
+//! Interpolation between uneven and even times: times and values go in; values of the cubic spline through them come
+//! out.
 //!
-//! A filter of even steps takes a sample that was read late for motion. The spline through the samples at their true times
-//! moves with them, and its error is of the fourth order of the step, far below what a filter of the motion's band leaves.
-//! Source: C. de Boor, "A Practical Guide to Splines" (1978), chapter IV, with the ends not bent.
+//! A filter for even steps treats an error of a sample's time as motion. The spline through the samples at their true
+//! times has an error of fourth order in the step, far below that of a filter. Source: C. de Boor, "A Practical Guide
+//! to Splines" (1978), chapter IV, with second derivatives of zero at the ends.
 
-/// Stamps that are no further off an even grid than this part of a step are even.
-const OFF_GRID: f64 = 1e-4;
-/// Decimals that stamps may be rounded to.
-const MOST_DECIMALS: i32 = 9;
+use crate::motion::thresholds::{EVEN_TIMES_TOLERANCE, ROUNDED_MOST_DECIMALS, ROUNDED_TIMES_TOLERANCE};
 
-/// How samples stand in time.
+/// How the times of samples are spaced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Steps {
+pub(crate) enum SampleSpacing {
     /// At even times.
     Even,
-    /// At even times, whose stamps are rounded to as many decimals as they have.
+    /// At even times that were rounded to their number of decimals.
     Rounded,
     /// At uneven times.
     Uneven,
 }
 
-/// How samples stand in time, as far as their stamps can tell.
-pub(crate) fn steps(time: &[f64]) -> Steps {
+/// How the times of samples are spaced, as far as they show it.
+pub(crate) fn sample_spacing(time: &[f64]) -> SampleSpacing {
     let n = time.len();
     if n < 3 {
-        return Steps::Even;
+        return SampleSpacing::Even;
     }
     let grid = even_times(time);
     let step = (grid[n - 1] - grid[0]) / (n - 1) as f64;
+    // The largest difference from the even grid decides.
     let off = (time.iter().zip(&grid)).fold(0.0_f64, |most, (t, even)| most.max((t - even).abs()));
-    if off <= OFF_GRID * step {
-        Steps::Even
-    } else if off <= unit_of(time) {
-        Steps::Rounded
+    if off <= EVEN_TIMES_TOLERANCE * step {
+        SampleSpacing::Even
+    } else if off <= timestamp_resolution(time) {
+        SampleSpacing::Rounded
     } else {
-        Steps::Uneven
+        SampleSpacing::Uneven
     }
 }
 
-/// Whether the steps are even but for rounding.
+/// Whether the steps are even, except for rounding.
 pub(crate) fn is_even(time: &[f64]) -> bool {
-    steps(time) != Steps::Uneven
+    sample_spacing(time) != SampleSpacing::Uneven
 }
 
-/// Half of the last decimal that any of the stamps has; 0 where they have more than are written.
-fn unit_of(time: &[f64]) -> f64 {
+/// Half a unit of the last decimal of the times; 0 if they have more than [`ROUNDED_MOST_DECIMALS`].
+fn timestamp_resolution(time: &[f64]) -> f64 {
     let has = |decimals: i32| {
         let scale = 10.0_f64.powi(decimals);
-        let is_whole =
-            |t: &f64| (t * scale - (t * scale).round()).abs() < 1e-9 * (t * scale).abs().max(1.0);
+        let is_whole = |t: &f64| (t * scale - (t * scale).round()).abs() < 1e-9 * (t * scale).abs().max(1.0);
         time.iter().all(is_whole)
     };
-    (0..=MOST_DECIMALS)
+    (0..=ROUNDED_MOST_DECIMALS)
         .find(|decimals| has(*decimals))
-        // The line through rounded stamps is itself a little off.
-        .map_or(0.0, |decimals| 0.55 * 10.0_f64.powi(-decimals))
+        // The line through rounded times has a small error itself.
+        .map_or(0.0, |decimals| ROUNDED_TIMES_TOLERANCE * 10.0_f64.powi(-decimals))
 }
 
-/// As many even times as there are stamps, on the line that comes closest to them.
+/// As many even times as there are samples, on the least squares line through their times.
 pub(crate) fn even_times(time: &[f64]) -> Vec<f64> {
     let n = time.len() as f64;
     let mean = time.iter().sum::<f64>() / n;
@@ -70,33 +67,33 @@ pub(crate) fn even_times(time: &[f64]) -> Vec<f64> {
         size += k * k;
     }
     let step = if size > 0.0 { slope / size } else { 0.0 };
-    (0..time.len())
-        .map(|k| mean + step * (k as f64 - middle))
-        .collect()
+    (0..time.len()).map(|k| mean + step * (k as f64 - middle)).collect()
 }
 
-/// Even times from the first stamp to the last, as many as there are stamps.
+/// As many even times as there are samples, from the first time to the last.
 pub(crate) fn spread_times(time: &[f64]) -> Vec<f64> {
     let n = time.len();
     let step = (time[n - 1] - time[0]) / (n.max(2) - 1) as f64;
     (0..n).map(|k| time[0] + step * k as f64).collect()
 }
 
-/// The values at [`spread_times`].
-pub(crate) fn on_even_times(time: &[f64], values: &[f64]) -> Vec<f64> {
-    Spline::new(time, values).at_all(&spread_times(time))
+/// The values of the spline at [`spread_times`].
+pub(crate) fn resample_evenly(time: &[f64], values: &[f64]) -> Vec<f64> {
+    CubicSpline::new(time, values).evaluate_at(&spread_times(time))
 }
 
-/// The cubic spline through some samples.
-pub(crate) struct Spline<'a> {
+/// The cubic spline through samples.
+pub(crate) struct CubicSpline<'a> {
+    /// Times of the samples, s.
     time: &'a [f64],
+    /// Values of the samples.
     values: &'a [f64],
     /// Second derivatives at the samples.
-    bends: Vec<f64>,
+    second_derivatives: Vec<f64>,
 }
 
-impl<'a> Spline<'a> {
-    /// Times must increase; there must be as many values (asserted).
+impl<'a> CubicSpline<'a> {
+    /// Computes the spline. Times must increase; panics unless there are as many values.
     pub(crate) fn new(time: &'a [f64], values: &'a [f64]) -> Self {
         assert_eq!(time.len(), values.len(), "one value per time");
         let n = time.len();
@@ -106,8 +103,7 @@ impl<'a> Spline<'a> {
             let (mut upper, mut right) = (vec![0.0; n], vec![0.0; n]);
             for i in 1..n - 1 {
                 let [before, after] = [time[i] - time[i - 1], time[i + 1] - time[i]];
-                let slopes =
-                    (values[i + 1] - values[i]) / after - (values[i] - values[i - 1]) / before;
+                let slopes = (values[i + 1] - values[i]) / after - (values[i] - values[i - 1]) / before;
                 let pivot = 2.0 * (before + after) - before * upper[i - 1];
                 upper[i] = after / pivot;
                 right[i] = (6.0 * slopes - before * right[i - 1]) / pivot;
@@ -119,24 +115,25 @@ impl<'a> Spline<'a> {
         Self {
             time,
             values,
-            bends,
+            second_derivatives: bends,
         }
     }
 
-    /// The values at some times, which must not decrease; beyond the ends the end pieces go on.
-    pub(crate) fn at_all(&self, times: &[f64]) -> Vec<f64> {
+    /// Values at times that must not decrease. Outside of the samples the first or last piece is continued.
+    pub(crate) fn evaluate_at(&self, times: &[f64]) -> Vec<f64> {
         let n = self.time.len();
         if n < 2 {
             return vec![self.values.first().copied().unwrap_or(0.0); times.len()];
         }
         let mut i = 0;
+        // Move to the piece that contains the time.
         let at = |t: &f64| {
             while i + 2 < n && self.time[i + 1] <= *t {
                 i += 1;
             }
             let step = self.time[i + 1] - self.time[i];
             let [a, b] = [(self.time[i + 1] - t) / step, (t - self.time[i]) / step];
-            let bend = (a.powi(3) - a) * self.bends[i] + (b.powi(3) - b) * self.bends[i + 1];
+            let bend = (a.powi(3) - a) * self.second_derivatives[i] + (b.powi(3) - b) * self.second_derivatives[i + 1];
             a * self.values[i] + b * self.values[i + 1] + bend * step * step / 6.0
         };
         times.iter().map(at).collect()
@@ -149,14 +146,9 @@ mod tests {
 
     #[test]
     fn rounded_stamps_are_even_and_jitter_is_not() {
-        let stamps = |off: fn(u32) -> f64| -> Vec<f64> {
-            (0..400).map(|k| f64::from(k) / 300.0 + off(k)).collect()
-        };
+        let stamps = |off: fn(u32) -> f64| -> Vec<f64> { (0..400).map(|k| f64::from(k) / 300.0 + off(k)).collect() };
         assert!(is_even(&stamps(|_| 0.0)));
-        let rounded: Vec<f64> = stamps(|_| 0.0)
-            .into_iter()
-            .map(|t| (1e4 * t).round() / 1e4)
-            .collect();
+        let rounded: Vec<f64> = stamps(|_| 0.0).into_iter().map(|t| (1e4 * t).round() / 1e4).collect();
         assert!(is_even(&rounded));
         assert!(!is_even(&stamps(|k| 2e-5 * f64::from(k * k % 7) / 7.0)));
         let mut lost = rounded;
@@ -174,7 +166,7 @@ mod tests {
                 .collect();
             let values: Vec<f64> = time.iter().map(|t| t.sin()).collect();
             let asked: Vec<f64> = (0..500).map(|k| 1.5 + 0.006 * f64::from(k)).collect();
-            let found = Spline::new(&time, &values).at_all(&asked);
+            let found = CubicSpline::new(&time, &values).evaluate_at(&asked);
             let off = asked.iter().zip(found).map(|(t, v)| (v - t.sin()).abs());
             off.fold(0.0, f64::max)
         };

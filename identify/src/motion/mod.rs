@@ -1,5 +1,9 @@
-//! From recorded columns to states: positions go in; smooth positions, rates and accelerations come out, as a [`Run`] with
-//! its forces.
+//! From recorded columns to states: positions go in; smooth positions, rates and accelerations come out, as a
+//! [`PreparedRun`] with its forces.
+//!
+//! `run` reads the columns, `prepare` selects the smoothing, `smooth` applies it, and `remarks` reports what was
+//! found.
+//! Low-pass: `derivatives` with `cutoff`; polynomials: `local_polynomials`; periodic motions: `periods` and `series`.
 
 mod band;
 mod cutoff;
@@ -16,15 +20,14 @@ mod remarks;
 mod run;
 mod series;
 mod smooth;
+mod thresholds;
 
-pub use decimation::{
-    PASSED_BY_DECIMATION, decimate, decimate_columns, decimate_table, decimate_time,
-};
+pub use decimation::{DECIMATION_PASSBAND, decimate, decimate_columns, decimate_table, decimate_time};
 pub(crate) use derivatives::mean_rate;
-pub use derivatives::{Smoothed, differentiate, filter_and_differentiate};
-pub(crate) use even::{is_even, on_even_times};
-pub use options::{DerivativeSource, Preparation, Smoothing};
-pub use periods::Repeats;
-pub use prepare::Open;
-pub use prepared_as::PreparedAs;
-pub use run::Run;
+pub use derivatives::{SmoothedCoordinate, differentiate, filter_and_differentiate};
+pub(crate) use even::{is_even, resample_evenly};
+pub use options::{DerivativeSource, SmoothingMethod, StatePreparation};
+pub use periods::RunRepeatability;
+pub use prepare::PreparationChoices;
+pub use prepared_as::PreparationRecord;
+pub use run::PreparedRun;

@@ -1,69 +1,68 @@
-//! How states are prepared from a recording.
+//! Options for preparing states from a recording.
 
 use serde::{Deserialize, Serialize};
 
-/// Where derivatives come from.
+/// The source of derivatives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DerivativeSource {
-    /// Recorded derivative columns are taken as they are; only missing ones are prepared.
+    /// Recorded derivatives are used unchanged; only missing ones are prepared.
     #[default]
     RecordedFirst,
-    /// Every derivative is prepared from the positions, whatever the file holds.
+    /// All derivatives are prepared from the positions, even if they are recorded.
     Positions,
 }
 
-/// How positions become smooth positions, rates and accelerations.
+/// How smooth positions, rates and accelerations are computed from positions.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Smoothing {
-    /// A Fourier series where the run is periodic and the series leaves nothing but noise, or less of the forces on held-out
-    /// time, unless a cut-off is given; Butterworth's low-pass otherwise.
+pub enum SmoothingMethod {
+    /// A Fourier series if the run is periodic and either the residual is noise only or the error of the forces on
+    /// held-out time is smaller; otherwise Butterworth's low-pass. With a given cut-off always the low-pass.
     #[default]
     Automatic,
-    /// Butterworth's low-pass run both ways, then central differences: the field's standard.
+    /// Butterworth's low-pass run both ways, then central differences: the standard method.
     Butterworth,
-    /// Local polynomials (Savitzky-Golay) of the width that suits the cut-off.
+    /// Local polynomials (Savitzky-Golay) with the window that corresponds to the cut-off.
     SavitzkyGolay,
-    /// A Fourier series up to the cut-off; the period, s, is found from the positions when absent.
+    /// A Fourier series up to the cut-off.
     Fourier {
-        /// The period, s.
+        /// The period, s; `None` to find it from the positions.
         period: Option<f64>,
     },
 }
 
-/// How states are prepared from a recording. [`Preparation::default`] suits a file of positions.
+/// Options for preparing states from a recording. The default fits a file of positions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct Preparation {
-    /// Cut-off of the low-pass on the positions, Hz; chosen from the signal when absent.
+pub struct StatePreparation {
+    /// Cut-off of the low-pass on the positions, Hz; `None` to choose it from the signal.
     pub cutoff_hz: Option<f64>,
     /// Order of the Butterworth filter in one direction.
     pub order: usize,
-    /// Samples dropped at the start and at the end; when absent, three periods of the
-    /// cut-off at both ends if anything was filtered (the transient falls tenfold in each, and
-    /// reaches 0.1 % of the acceleration), at most a sixth of the recording; none otherwise.
+    /// Samples dropped at the start and at the end. `None` drops three periods of the cut-off at both ends if
+    /// anything was filtered, but at most a sixth of the recording. Transients fall tenfold in each period, to 0.1 %
+    /// of the acceleration.
     pub trim: Option<(usize, usize)>,
-    /// Every how many samples one is kept, after the parallel filter on all columns of the
-    /// regressor and on the force; 1 keeps all.
+    /// Every how many samples one is kept, after the parallel filter on the regressor and the forces; 1 keeps all.
     pub decimate: usize,
-    /// Which derivatives are prepared.
+    /// Which derivatives are prepared and which are read.
     pub source: DerivativeSource,
     /// How they are prepared.
-    pub smoothing: Smoothing,
-    /// Up to which frequency forces are compared beside the raw figures, Hz; the cut-off, or what the motion reaches, when
-    /// absent.
+    pub smoothing: SmoothingMethod,
+    /// Highest frequency at which forces are compared in addition to the raw figures, Hz; `None` for the cut-off or
+    /// the band of the motion.
     pub band_hz: Option<f64>,
-    /// Whether cut-off, smoothing and decimation were chosen by what they leave of the forces rather than asked for.
+    /// Whether cut-off, smoothing and decimation were chosen by their error of the forces, instead of given by the
+    /// user.
     #[serde(skip)]
     pub chosen: bool,
-    /// Whether states are prepared without a look at whether the motion repeats itself: for thousands of recordings that are
-    /// prepared alike.
+    /// Whether the search for a period is omitted, as for thousands of recordings that are prepared in the same way.
     #[serde(skip)]
     pub unexamined: bool,
 }
 
-impl Default for Preparation {
+impl Default for StatePreparation {
     fn default() -> Self {
         Self {
             cutoff_hz: None,
@@ -71,7 +70,7 @@ impl Default for Preparation {
             trim: None,
             decimate: 1,
             source: DerivativeSource::RecordedFirst,
-            smoothing: Smoothing::Automatic,
+            smoothing: SmoothingMethod::Automatic,
             band_hz: None,
             chosen: false,
             unexamined: false,
@@ -79,11 +78,10 @@ impl Default for Preparation {
     }
 }
 
-impl Preparation {
-    /// The recipe of the EMPS reference: order 4 at 100 Hz, the first 49 samples dropped,
-    /// decimation by 10. As many are dropped at the end, where differences are one-sided: with
-    /// one or two bad accelerations left there the error rises from 4.04 to 4.3 %, while any
-    /// number from 5 on gives the same.
+impl StatePreparation {
+    /// The settings of the EMPS reference: order 4 at 100 Hz, the first 49 samples dropped, decimation by 10. As many
+    /// samples are dropped at the end, where differences are one-sided. With one or two bad accelerations there the
+    /// error rises from 4.04 to 4.3 %; with 5 or more dropped samples it does not change.
     pub fn emps() -> Self {
         Self {
             cutoff_hz: Some(100.0),

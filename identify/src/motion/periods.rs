@@ -1,4 +1,4 @@
-//! Periodic runs: positions go in; the period, and what the forces repeat themselves by, come out.
+//! Periodic runs: positions go in; the period, and how well the forces repeat, come out.
 //!
 //! Sources: J. Swevers, C. Ganseman, D. B. Tuekel, J. de Schutter, H. Van Brussel, "Optimal robot excitation and
 //! identification", IEEE Trans. Robotics and Automation 13 (1997): the spread over the periods is the noise.
@@ -7,50 +7,50 @@
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
-use crate::signal::{count, median};
+use crate::motion::thresholds::{
+    FORCE_JUMP_INTERIOR, FORCE_JUMP_RATIO, PERIOD_FEWEST_SAMPLES, PERIOD_LEFT_DIFFERENCE, PERIOD_MOST_DIFFERENCE,
+    PERIOD_RETURNED_DIFFERENCE, PHASE_MOST_STEPS,
+};
+use crate::signal::{float_to_count, median};
 
 /// Points of the coarse search for a period.
 const GRID: usize = 2048;
-/// Two motions a period apart may differ by this part of the motion's variance.
-const SAME: f64 = 2e-3;
 
-/// A step of a force so many times the usual one is a jump.
-const JUMP: f64 = 8.0;
-
-/// How well a periodic run repeats itself.
+/// How well a periodic run repeats.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Repeats {
+pub struct RunRepeatability {
     /// The period, s.
     pub period: f64,
-    /// Whole periods in the run.
+    /// Complete periods in the run.
     pub periods: usize,
-    /// Spread of the forces over the periods, relative to their size (2-norms, all drives together): no model can be
-    /// better than that on one period.
+    /// Spread of the forces over the periods, relative to their size (2-norms, all drives together). The error of any
+    /// model on one period is at least this.
     pub noise_floor: f64,
     /// The same for each drive.
     pub channels: IndexMap<String, f64>,
 }
 
-/// The shortest period after which all positions are where they were, s; `None` if there is none of which the run holds
-/// two, the last of which ends a step after the last sample. Positions that do not move say nothing.
+/// The shortest period after which all positions repeat, s; `None` if there is none with two periods in the run. The
+/// last period ends one step after the last sample. Positions that do not move are ignored.
 pub(crate) fn find_period(time: &[f64], positions: &[&[f64]]) -> Option<f64> {
     let moving: Vec<(&[f64], f64)> = positions
         .iter()
         .map(|q| (*q, variance(q)))
         .filter(|(q, variance)| *variance > 0.0 && !is_noise(q, *variance))
         .collect();
-    if moving.is_empty() || time.len() < 16 {
+    if moving.is_empty() || time.len() < PERIOD_FEWEST_SAMPLES {
         return None;
     }
     let (start, end) = (time[0], time[time.len() - 1]);
-    // Half a step more, since the period is not known better yet.
+    // Half a step more, because the period is not known exactly yet.
     let longest = 0.5 * (end - start) * (1.0 + 1.5 / (time.len() - 1) as f64);
-    // Ever longer beginnings of the run, on ever coarser grids, so that many short periods are found as such.
+    // Segments from the start of the run, longer in each pass, with coarser grids. Short periods are then found in a
+    // short segment.
     let mut samples = time.len().min(GRID);
     loop {
         let found = coarse_period(&time[..samples], &moving)
-            .map(|(period, step)| refine(time, &moving, period, step))
-            .filter(|(period, apart)| *apart < SAME && *period <= longest);
+            .map(|(period, step)| refine_period(time, &moving, period, step))
+            .filter(|(period, apart)| *apart < PERIOD_MOST_DIFFERENCE && *period <= longest);
         if let Some((period, _)) = found {
             return Some(period);
         }
@@ -61,28 +61,28 @@ pub(crate) fn find_period(time: &[f64], positions: &[&[f64]]) -> Option<f64> {
     }
 }
 
-/// Whether neighbours are hardly more alike than any two samples, as in a coordinate that is held still (the ratio of
-/// J. von Neumann, 1941, twice as large for noise as the bar here).
+/// Whether neighbouring samples differ about as much as any two samples, as in a coordinate at standstill. The ratio
+/// is that of J. von Neumann (1941), which is twice the limit used here for noise.
 fn is_noise(values: &[f64], variance: f64) -> bool {
     let steps: f64 = values.windows(2).map(|w| (w[1] - w[0]).powi(2)).sum();
     steps > variance * (values.len() - 1) as f64
 }
 
-/// A period by the first return of a motion to itself on an even grid, with the grid's step.
+/// The period at which the motion first returns to itself on an even grid, and the step of the grid.
 fn coarse_period(time: &[f64], moving: &[(&[f64], f64)]) -> Option<(f64, f64)> {
     let (start, end) = (*time.first()?, *time.last()?);
     let m = time.len().min(GRID);
     let step = (end - start) / (m - 1) as f64;
+    // Positions on the grid, scaled so that unrelated motions have the distance 1.
     let grids: Vec<Vec<f64>> = moving
         .iter()
         .map(|(q, variance)| {
             let scale = (2.0 * variance * moving.len() as f64).sqrt();
-            let at =
-                |i: usize| interpolate(time, &q[..time.len()], start + step * i as f64) / scale;
+            let at = |i: usize| interpolate(time, &q[..time.len()], start + step * i as f64) / scale;
             (0..m).map(at).collect()
         })
         .collect();
-    // How far the motion is from itself some steps later, 1 for unrelated motions.
+    // Distance of the motion from itself some steps later, 1 for unrelated motions.
     let apart = |lag: usize| -> f64 {
         let sum: f64 = grids
             .iter()
@@ -93,18 +93,20 @@ fn coarse_period(time: &[f64], moving: &[(&[f64], f64)]) -> Option<(f64, f64)> {
             .sum();
         sum / (m - lag) as f64
     };
-    // Two lags beyond half the run, so that half of it can be told to be the nearest.
+    // Two lags more than half of the run, so that a minimum at half of the run can be recognised.
     let far: Vec<f64> = (0..=m / 2 + 2).map(apart).collect();
-    let left = far.iter().position(|d| *d > 0.3)?;
+    // The motion must leave its start before it can return.
+    let left = far.iter().position(|d| *d > PERIOD_LEFT_DIFFERENCE)?;
     let candidate = (left + 1..far.len() - 1)
-        .find(|i| far[*i] < 0.1 && far[*i] <= far[i - 1] && far[*i] <= far[i + 1])?;
+        .find(|i| far[*i] < PERIOD_RETURNED_DIFFERENCE && far[*i] <= far[i - 1] && far[*i] <= far[i + 1])?;
     Some((step * candidate as f64, step))
 }
 
-/// A period on the true time base of the whole run, to a small part of a step, and how far the motion is from itself
-/// after it.
-fn refine(time: &[f64], moving: &[(&[f64], f64)], period: f64, step: f64) -> (f64, f64) {
+/// The period at the recorded times of the complete run, accurate to a small part of a step, and the distance of the
+/// motion from itself after it.
+fn refine_period(time: &[f64], moving: &[(&[f64], f64)], period: f64, step: f64) -> (f64, f64) {
     let end = time[time.len() - 1];
+    // A long run is thinned out, because a few thousand samples determine the period.
     let stride = (time.len() / (4 * GRID)).max(1);
     let apart = |period: f64| -> f64 {
         let (mut sum, mut n) = (0.0, 0);
@@ -120,42 +122,43 @@ fn refine(time: &[f64], moving: &[(&[f64], f64)], period: f64, step: f64) -> (f6
         }
         sum / f64::from(n.max(1))
     };
-    let period = smallest(apart, period - 1.5 * step, period + 1.5 * step);
+    // One and a half steps on each side contain the minimum.
+    let period = minimise_by_golden_sections(apart, period - 1.5 * step, period + 1.5 * step);
     (period, apart(period))
 }
 
-/// The spread of forces over the periods of a run; `None` where it holds fewer than two, or no force.
-pub(crate) fn repeats(
+/// The spread of forces over the periods of a run; `None` if there are fewer than two periods, or no force.
+pub(crate) fn measure_repeatability(
     time: &[f64],
     period: f64,
     names: &[String],
     forces: &[Vec<f64>],
-) -> Option<Repeats> {
+) -> Option<RunRepeatability> {
     let (start, end) = (*time.first()?, *time.last()?);
     let step = (end - start) / (time.len() - 1) as f64;
-    // The last sample of the last period lies one step before the next one would begin.
-    // The period is known to a part of a step.
-    let periods = count((end + 1.5 * step - start) / period);
-    let phases = count((period / step).round());
+    // The last sample of the last period is one step before the next period. The period is known to a part of a step.
+    let periods = float_to_count((end + 1.5 * step - start) / period);
+    let phases = float_to_count((period / step).round());
     if periods < 2 || phases < 2 {
         return None;
     }
-    // Samples of different periods seldom have the same phase, so forces are interpolated between neighbours; that
-    // lowers their noise, which is allowed for as if it were white. Where neighbours are missing a phase says nothing.
+    // Samples of different periods seldom have the same phase, so forces are interpolated between neighbours. This
+    // reduces white noise by a known factor, which is corrected. Phases without neighbours are ignored.
     let mut places = Vec::with_capacity(phases);
     for phase in 0..phases {
         let all = (0..periods).map(|k| {
             let t = start + period * (k as f64 + phase as f64 / phases as f64);
-            between(time, t, 1.5 * step)
+            bracketing_sample(time, t, PHASE_MOST_STEPS * step)
         });
         places.extend(all.collect::<Option<Vec<_>>>());
     }
+    // For one force: the variance over the periods, corrected for the interpolation, and the mean square.
     let spread = |force: &[f64]| {
         let (mut error, mut noise, mut size) = (0.0, 0.0, 0.0);
-        // Between two samples where friction turns round, a force has no value that could be told.
+        // At a reversal of friction a force between two samples is not known.
         let usual = median(force.windows(2).map(|w| (w[1] - w[0]).abs()).collect());
         let jumps = |(i, part): &(usize, f64)| {
-            (0.02..0.98).contains(part) && (force[i + 1] - force[*i]).abs() > JUMP * usual
+            FORCE_JUMP_INTERIOR.contains(part) && (force[i + 1] - force[*i]).abs() > FORCE_JUMP_RATIO * usual
         };
         let mut values = 0;
         for place in places.iter().filter(|place| !place.iter().any(jumps)) {
@@ -177,7 +180,7 @@ pub(crate) fn repeats(
     let total = sums
         .iter()
         .fold((0.0, 0.0), |(e, s), (error, size)| (e + error, s + size));
-    Some(Repeats {
+    Some(RunRepeatability {
         period,
         periods,
         noise_floor: ratio(total)?,
@@ -190,21 +193,23 @@ pub(crate) fn repeats(
     })
 }
 
+/// Variance of numbers around their mean.
 fn variance(values: &[f64]) -> f64 {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
     values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n
 }
 
-/// The sample before a time and the part of the way to the next one; `None` where these are more than `apart` from each
-/// other. Beyond the ends the first and the last pair go on for half as long.
-fn between(time: &[f64], at: f64, apart: f64) -> Option<(usize, f64)> {
+/// The sample before a time, and the share of the way to the next one. `None` if these two are more than `apart`
+/// apart, s. Outside of the samples the first or last pair is used up to half that distance.
+fn bracketing_sample(time: &[f64], at: f64, apart: f64) -> Option<(usize, f64)> {
     let after = time.partition_point(|t| *t < at).clamp(1, time.len() - 1);
     let (t0, t1) = (time[after - 1], time[after]);
     let is_near = t1 - t0 <= apart && at >= t0 - 0.5 * apart && at <= t1 + 0.5 * apart;
     is_near.then(|| (after - 1, ((at - t0) / (t1 - t0)).clamp(0.0, 1.0)))
 }
 
+/// Linear interpolation; outside of the samples the first or last value.
 fn interpolate(time: &[f64], values: &[f64], at: f64) -> f64 {
     let after = time.partition_point(|t| *t < at).clamp(1, time.len() - 1);
     let (t0, t1) = (time[after - 1], time[after]);
@@ -212,8 +217,8 @@ fn interpolate(time: &[f64], values: &[f64], at: f64) -> f64 {
     values[after - 1] + part * (values[after] - values[after - 1])
 }
 
-/// Where a function with one dip is smallest, by golden sections.
-fn smallest(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
+/// The minimum of a function with a single minimum between `low` and `high`, by golden section search.
+fn minimise_by_golden_sections(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
     for _ in 0..40 {
         let (a, b) = (high - golden * (high - low), low + golden * (high - low));
@@ -231,7 +236,7 @@ mod tests {
     use std::f64::consts::TAU;
 
     use super::*;
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
 
     const PERIOD: f64 = 2.37;
 
@@ -250,11 +255,8 @@ mod tests {
     #[test]
     fn the_period_is_found_on_the_true_time_base() {
         let time = times(2500);
-        let mut noise = Noise::new(4);
-        let q: Vec<f64> = time
-            .iter()
-            .map(|t| motion(*t) + 1e-4 * noise.normal())
-            .collect();
+        let mut noise = TestNoise::new(4);
+        let q: Vec<f64> = time.iter().map(|t| motion(*t) + 1e-4 * noise.normal()).collect();
         let period = find_period(&time, &[&q, &vec![1.0; q.len()]]).expect("a period");
         assert!((period - PERIOD).abs() < 1e-3, "{period}");
         // Less than two periods, or none at all.
@@ -276,7 +278,7 @@ mod tests {
     /// jump with the sign of a rate, and a piece of the run is missing.
     #[test]
     fn the_spread_over_periods_is_the_noise() {
-        let mut noise = Noise::new(9);
+        let mut noise = TestNoise::new(9);
         for (jump, missing) in [(0.0, 0), (20.0, 0), (20.0, 100)] {
             let time: Vec<f64> = (0..5925)
                 .filter(|i| !(1500..1500 + missing).contains(i))
@@ -290,7 +292,7 @@ mod tests {
                 })
                 .collect();
             let size = (force.iter().map(|f| f * f).sum::<f64>() / force.len() as f64).sqrt();
-            let found = repeats(&time, PERIOD, &["a".to_owned()], &[force]).expect("ten periods");
+            let found = measure_repeatability(&time, PERIOD, &["a".to_owned()], &[force]).expect("ten periods");
             assert_eq!(found.periods, 10);
             assert!(
                 (found.noise_floor * size / 0.3 - 1.0).abs() < 0.05,

@@ -1,46 +1,58 @@
-//! Which way of smoothing suits a recording, and states by it: columns go in, positions with both derivatives come out.
+//! Selects the smoothing that fits a recording, and prepares states with it: columns go in, positions with both
+//! derivatives come out.
 
-use crate::motion::cutoff::{LONGEST_TRIM, Signal, TRIMMED_PERIODS, choose_cutoff};
+use crate::motion::cutoff::{DifferentiatedSignal, choose_cutoff};
 use crate::motion::derivatives::mean_rate;
-use crate::motion::even::{is_even, on_even_times};
-use crate::motion::options::{Preparation, Smoothing};
-use crate::motion::prepared_as::PreparedAs;
-use crate::motion::run::Run;
-use crate::motion::series::{self, Periodic};
-use crate::motion::smooth::{Recorded, Way};
+use crate::motion::even::{is_even, resample_evenly};
+use crate::motion::options::{SmoothingMethod, StatePreparation};
+use crate::motion::prepared_as::PreparationRecord;
+use crate::motion::run::PreparedRun;
+use crate::motion::series::{self, PeriodicSeries};
+use crate::motion::smooth::{RecordedCoordinate, SmoothingFilter};
+use crate::motion::thresholds::{
+    CUTOFF_WITHOUT_MOTION_SHARE, PERIOD_LONGEST_DURATIONS, PERIOD_SHORTEST_STEPS, PLANNED_MOST_HARMONICS, TRIM_ONE_IN,
+    TRIMMED_PERIODS,
+};
 use crate::motion::{local_polynomials, periods};
-use crate::recording::{Fault, Note, Recording, RecordingError};
-use crate::signal::{LowPass, count};
-use crate::words::list;
+use crate::recording::{RecordingError, RecordingFault, RecordingNote, SignalRecording};
+use crate::signal::{LowPass, float_to_count};
+use crate::words::backquoted_list;
 
-impl Recording {
-    /// States of all coordinates by the way of smoothing that the preparation asks for, or that suits them; what was
-    /// chosen goes into `prepared` and `notes`.
+impl SignalRecording {
+    /// States of all coordinates with the requested smoothing, or with the one that fits them. What was chosen is
+    /// added to `prepared` and `notes`.
+    ///
+    /// Returns positions, rates and accelerations of each coordinate. Fails when there are too few samples, or when
+    /// the cut-off
+    /// or the period does not fit the recording.
     pub(crate) fn prepare_states(
         &self,
         time: &[f64],
-        columns: &[Recorded<'_>],
-        preparation: &Preparation,
-        prepared: &mut PreparedAs,
-        notes: &mut Vec<Note>,
+        columns: &[RecordedCoordinate<'_>],
+        preparation: &StatePreparation,
+        prepared: &mut PreparationRecord,
+        notes: &mut Vec<RecordingNote>,
     ) -> Result<Vec<[Vec<f64>; 3]>, RecordingError> {
-        let incomplete: Vec<&Recorded<'_>> = columns.iter().filter(|c| !c.is_complete()).collect();
+        // Coordinates with both derivatives need no preparation.
+        let incomplete: Vec<&RecordedCoordinate<'_>> = columns.iter().filter(|c| !c.is_complete()).collect();
         if incomplete.is_empty() {
-            return Ok(columns.iter().filter_map(Recorded::complete).collect());
+            return Ok(columns.iter().filter_map(RecordedCoordinate::recorded_states).collect());
         }
         prepared.coordinates = incomplete.iter().map(|c| c.name.clone()).collect();
         let order = preparation.order;
         let rate = mean_rate(time);
+        // Check the number of samples before anything is designed.
         if time.len() < 3 {
-            return Err(self.fault(Fault::TooFewSamples {
+            return Err(self.fault(RecordingFault::TooFewSamples {
                 have: time.len(),
-                need: Way::Butterworth { order }.need(),
+                need: SmoothingFilter::Butterworth { order }.min_samples(),
                 purpose: "preparing derivatives from positions".into(),
             }));
         }
+        // A filter design, with a fault that names the coordinates.
         let design = |cutoff: f64| {
             LowPass::butterworth(order, cutoff, rate).map_err(|error| {
-                self.fault(Fault::Filter {
+                self.fault(RecordingFault::Filter {
                     column: prepared.coordinates.join(", "),
                     error,
                 })
@@ -48,103 +60,110 @@ impl Recording {
         };
         let need = design(rate / 4.0)?.padding() + 1;
         if time.len() < need {
-            return Err(self.fault(Fault::TooFewSamples {
+            return Err(self.fault(RecordingFault::TooFewSamples {
                 have: time.len(),
                 need,
                 purpose: "preparing derivatives from positions".into(),
             }));
         }
-        let found = series_of(time, columns, preparation);
-        // One cut-off for all coordinates keeps loops consistent.
-        let chosen = || cutoff_of(time, &incomplete, order);
+        let found = find_motion_series(time, columns, preparation);
+        // One cut-off for all coordinates, so that loops stay closed.
+        let chosen = || choose_cutoff_for(time, &incomplete, order);
         let cutoff = match &found {
             Some(found) => found.harmonics as f64 / found.period,
-            None => preparation.cutoff_hz.or_else(chosen).unwrap_or(0.1 * rate),
+            None => preparation
+                .cutoff_hz
+                .or_else(chosen)
+                .unwrap_or(CUTOFF_WITHOUT_MOTION_SHARE * rate),
         };
         design(cutoff)?;
-        // A cut-off whose period is longer than the recording leaves nothing of it but a trend.
+        // With a cut-off period longer than the recording only a trend would remain.
         let lowest = rate / time.len() as f64;
         if cutoff < lowest && found.is_none() {
-            return Err(self.fault(Fault::CutoffTooLow {
+            return Err(self.fault(RecordingFault::CutoffTooLow {
                 cutoff_hz: cutoff,
                 lowest_hz: lowest,
                 duration: time.len() as f64 / rate,
             }));
         }
+        // The smoothing: a series that was found, or the requested one with all of its numbers.
         let way = match (preparation.smoothing, &found) {
-            (_, Some(found)) => Way::Series {
+            (_, Some(found)) => SmoothingFilter::Series {
                 period: found.period,
                 harmonics: found.harmonics,
             },
-            (Smoothing::Automatic | Smoothing::Butterworth, None) => Way::Butterworth { order },
-            (Smoothing::SavitzkyGolay, None) => Way::Polynomials {
+            (SmoothingMethod::Automatic | SmoothingMethod::Butterworth, None) => SmoothingFilter::Butterworth { order },
+            (SmoothingMethod::SavitzkyGolay, None) => SmoothingFilter::Polynomials {
                 half_width: local_polynomials::half_width(cutoff, rate),
             },
-            (Smoothing::Fourier { period }, None) => {
+            // A series was requested: its period is given or must be found.
+            (SmoothingMethod::Fourier { period }, None) => {
                 let positions: Vec<&[f64]> = columns.iter().map(|c| c.q).collect();
                 let period = period.or_else(|| periods::find_period(time, &positions));
-                let period = period.ok_or_else(|| self.fault(Fault::NoPeriod))?;
+                let period = period.ok_or_else(|| self.fault(RecordingFault::NoPeriod))?;
                 let duration = time[time.len() - 1] - time[0];
-                let (shortest, longest) = (4.0 / rate, 1.5 * duration);
+                let (shortest, longest) = (PERIOD_SHORTEST_STEPS / rate, PERIOD_LONGEST_DURATIONS * duration);
                 if !(shortest..longest).contains(&period) {
-                    return Err(self.fault(Fault::Period {
+                    return Err(self.fault(RecordingFault::Period {
                         period,
                         shortest,
                         longest,
                     }));
                 }
-                let harmonics = count(cutoff * period).max(1);
-                Way::Series { period, harmonics }
+                let harmonics = float_to_count(cutoff * period).max(1);
+                SmoothingFilter::Series { period, harmonics }
             }
         };
+        // Record what was chosen.
         prepared.cutoff_hz = Some(cutoff);
         prepared.cutoff_chosen = preparation.cutoff_hz.is_none() || preparation.chosen;
-        // A series has no transients at its ends.
-        if !matches!(way, Way::Series { .. }) {
-            prepared.trimmed = self.transients(rate / cutoff, time.len(), preparation, notes);
+        // A series has no transients at the ends.
+        if !matches!(way, SmoothingFilter::Series { .. }) {
+            prepared.trimmed = self.transient_samples(rate / cutoff, time.len(), preparation, notes);
         }
-        if let Way::Series { period, .. } = way {
+        if let SmoothingFilter::Series { period, .. } = way {
             prepared.period = Some(period);
         }
+        // The user is informed about the choice.
         if let Some(found) = &found {
-            notes.push(Note::info(self.describe_series(found, &incomplete)));
+            notes.push(RecordingNote::info(self.describe_series(found, &incomplete)));
         } else {
-            notes.push(Note::info(format!(
+            notes.push(RecordingNote::info(format!(
                 "Derivatives of {} in {} are prepared: {}.",
-                list(&prepared.coordinates),
+                backquoted_list(&prepared.coordinates),
                 self.file(),
                 way.describe(cutoff, prepared.cutoff_chosen && !preparation.chosen),
             )));
         }
-        let states = self.smoothed(time, columns, cutoff, way)?;
-        // Where forces have chosen a series, they have told that what it leaves is no motion.
-        if found.is_none() && !preparation.chosen && matches!(way, Way::Series { .. }) {
-            self.note_left_over(columns, &states, notes);
+        let states = self.smooth_columns(time, columns, cutoff, way)?;
+        // If forces have chosen the series, they have shown that its residual is not motion.
+        if found.is_none() && !preparation.chosen && matches!(way, SmoothingFilter::Series { .. }) {
+            self.note_series_residual(columns, &states, notes);
         }
         Ok(states)
     }
 
-    /// All columns smoothed and differentiated in one way.
-    fn smoothed(
+    /// All columns smoothed and differentiated with the same filter.
+    fn smooth_columns(
         &self,
         time: &[f64],
-        columns: &[Recorded<'_>],
+        columns: &[RecordedCoordinate<'_>],
         cutoff: f64,
-        way: Way,
+        way: SmoothingFilter,
     ) -> Result<Vec<[Vec<f64>; 3]>, RecordingError> {
         columns
             .iter()
             .map(|column| {
                 let all = column.prepare(time, cutoff, way).map_err(|error| {
-                    self.fault(Fault::Filter {
+                    self.fault(RecordingFault::Filter {
                         column: column.name.clone(),
                         error,
                     })
                 })?;
                 all.ok_or_else(|| {
-                    self.fault(Fault::TooFewSamples {
+                    self.fault(RecordingFault::TooFewSamples {
                         have: time.len(),
-                        need: way.need(),
+                        need: way.min_samples(),
                         purpose: "smoothing at this cut-off".into(),
                     })
                 })
@@ -152,19 +171,21 @@ impl Recording {
             .collect()
     }
 
-    /// Samples that the filter's transients spoil at both ends, `period` being that of the cut-off
-    /// in samples.
-    fn transients(
+    /// Number of samples that transients affect at the start and at the end; `period` is that of the cut-off in
+    /// samples.
+    ///
+    /// A recording that is too short to drop them all is reported.
+    fn transient_samples(
         &self,
         period: f64,
         samples: usize,
-        preparation: &Preparation,
-        notes: &mut Vec<Note>,
+        preparation: &StatePreparation,
+        notes: &mut Vec<RecordingNote>,
     ) -> (usize, usize) {
-        let most = count(samples as f64 / LONGEST_TRIM);
+        let most = float_to_count(samples as f64 / TRIM_ONE_IN);
         let spoilt = (1..most).find(|count| *count as f64 >= TRIMMED_PERIODS * period);
         if spoilt.is_none() && preparation.trim.is_none() {
-            notes.push(Note::warning(format!(
+            notes.push(RecordingNote::warning(format!(
                 "{} is short for its cut-off: the filter's transients reach beyond the samples dropped at the ends; \
                  use a longer recording or a higher cut-off.",
                 self.file()
@@ -175,82 +196,79 @@ impl Recording {
     }
 }
 
-/// The cut-off that suits what is to be differentiated, on even times.
-fn cutoff_of(time: &[f64], columns: &[&Recorded<'_>], order: usize) -> Option<f64> {
+/// The cut-off that fits the columns to be differentiated; uneven samples are interpolated to even times first.
+fn choose_cutoff_for(time: &[f64], columns: &[&RecordedCoordinate<'_>], order: usize) -> Option<f64> {
     let rate = mean_rate(time);
-    let sources: Vec<Signal<'_>> = columns.iter().map(|c| c.source()).collect();
+    let sources: Vec<DifferentiatedSignal<'_>> = columns.iter().map(|c| c.signal_to_differentiate()).collect();
     if is_even(time) {
         return choose_cutoff(&sources, rate, order);
     }
     let even: Vec<Vec<f64>> = sources
         .iter()
-        .map(|signal| on_even_times(time, signal.values))
+        .map(|signal| resample_evenly(time, signal.values))
         .collect();
-    let even: Vec<Signal<'_>> = (sources.iter().zip(&even))
-        .map(|(signal, values)| Signal { values, ..*signal })
+    let even: Vec<DifferentiatedSignal<'_>> = (sources.iter().zip(&even))
+        .map(|(signal, values)| DifferentiatedSignal { values, ..*signal })
         .collect();
     choose_cutoff(&even, rate, order)
 }
 
-/// A series of more harmonics is no plan of a motion, but takes up whatever is there; forces must tell.
-const MANY_HARMONICS: f64 = 25.5;
-
-/// What is open in the preparation of a recording.
+/// The open choices in the preparation of a recording.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Open {
+pub struct PreparationChoices {
     /// Mean sampling rate, Hz.
     pub rate_hz: f64,
-    /// Up to where forces follow the motion, Hz.
+    /// Highest frequency at which forces follow the motion, Hz.
     pub band_hz: f64,
-    /// The cut-off that the spectra of the positions alone propose, Hz.
+    /// The cut-off that follows from the spectra of the positions only, Hz.
     pub cutoff_hz: f64,
-    /// The period after which the motion repeats itself, s, where it does.
+    /// The period of the motion, s, if it is periodic.
     pub period: Option<f64>,
 }
 
-impl Recording {
-    /// What there is to choose where the preparation leaves cut-off, smoothing and decimation open; `None` where it does not,
-    /// where all derivatives are recorded, where a Fourier series leaves nothing but noise, and where nothing moves.
-    /// Fails as [`Recording::runs_with`] does.
-    pub fn open(
+impl SignalRecording {
+    /// The choices that the preparation leaves open: cut-off, smoothing and decimation. `None` if they are given, if
+    /// all derivatives are recorded, if a Fourier series has a residual of noise only, or if nothing moves. Fails as
+    /// [`Self::runs_with`] does.
+    pub fn find_open_choices(
         &self,
         coordinates: &[String],
         drives: &[String],
-        preparation: &Preparation,
-    ) -> Result<Option<Open>, RecordingError> {
-        let usual = Preparation::default();
-        let is_open = preparation.cutoff_hz.is_none()
-            && preparation.smoothing == usual.smoothing
-            && preparation.decimate <= 1;
+        preparation: &StatePreparation,
+    ) -> Result<Option<PreparationChoices>, RecordingError> {
+        let usual = StatePreparation::default();
+        // Any of the three options makes the choice of the user.
+        let is_open =
+            preparation.cutoff_hz.is_none() && preparation.smoothing == usual.smoothing && preparation.decimate <= 1;
         if !is_open {
             return Ok(None);
         }
-        // The band that figures are asked for is none of the motion.
-        let preparation = Preparation {
+        // The requested band for figures is not that of the motion.
+        let preparation = StatePreparation {
             band_hz: None,
             ..preparation.clone()
         };
         let runs = self.runs_with(coordinates, drives, &preparation)?;
+        // The longest segment represents the recording.
         let longest = runs.iter().max_by_key(|run| run.samples());
         let found = longest.and_then(|run| {
             let prepared = &run.prepared;
             let cutoff = prepared.cutoff_hz.filter(|cutoff| {
-                let harmonics = prepared
-                    .period
-                    .map_or(f64::INFINITY, |period| cutoff * period);
-                harmonics > MANY_HARMONICS
+                let harmonics = prepared.period.map_or(f64::INFINITY, |period| cutoff * period);
+                harmonics > PLANNED_MOST_HARMONICS
             });
             Some((mean_rate(&run.time), prepared.band_hz?, cutoff?))
         });
+        // A series is an alternative only if the motion has a period.
         Ok(found.map(|(rate_hz, band_hz, cutoff_hz)| {
-            let as_series = Preparation {
-                smoothing: Smoothing::Fourier { period: None },
+            let as_series = StatePreparation {
+                smoothing: SmoothingMethod::Fourier { period: None },
                 cutoff_hz: Some(cutoff_hz),
                 ..preparation
             };
             let runs = self.runs_with(coordinates, drives, &as_series).ok();
-            let longest = runs.and_then(|runs| runs.into_iter().max_by_key(Run::samples));
-            Open {
+            let longest = runs.and_then(|runs| runs.into_iter().max_by_key(PreparedRun::samples));
+            PreparationChoices {
                 rate_hz,
                 band_hz,
                 cutoff_hz,
@@ -260,20 +278,22 @@ impl Recording {
     }
 }
 
-/// The series of which what is to be differentiated is samples, where the preparation leaves that open.
-pub(crate) fn series_of(
+/// The Fourier series of the motion, if there is one and the preparation leaves the choice open.
+pub(crate) fn find_motion_series(
     time: &[f64],
-    columns: &[Recorded<'_>],
-    preparation: &Preparation,
-) -> Option<Periodic> {
+    columns: &[RecordedCoordinate<'_>],
+    preparation: &StatePreparation,
+) -> Option<PeriodicSeries> {
     let is_open = matches!(
         preparation.smoothing,
-        Smoothing::Automatic | Smoothing::Fourier { period: None }
+        SmoothingMethod::Automatic | SmoothingMethod::Fourier { period: None }
     );
     if !is_open || preparation.cutoff_hz.is_some() {
         return None;
     }
     let incomplete = columns.iter().filter(|column| !column.is_complete());
-    let signals: Vec<&[f64]> = incomplete.map(|column| column.source().values).collect();
+    let signals: Vec<&[f64]> = incomplete
+        .map(|column| column.signal_to_differentiate().values)
+        .collect();
     series::find_series(time, &signals)
 }

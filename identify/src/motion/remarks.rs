@@ -1,4 +1,6 @@
-//! What a prepared run tells of itself: periods and the spread of its forces over them, and standstill.
+//! Notes on a prepared run: its period and the spread of its forces, encoder steps, and standstill.
+//!
+//! Columns and the run go in; notes for the user come out.
 
 use std::f64::consts::TAU;
 
@@ -7,29 +9,28 @@ use modelmill_boundary::text::{Message, OptionName, Remedy};
 
 use crate::motion::derivatives::mean_rate;
 use crate::motion::periods;
-use crate::motion::run::Run;
-use crate::motion::series::Periodic;
-use crate::motion::smooth::Recorded;
-use crate::recording::{Note, Recording};
-use crate::words::{count_of, list, seven_digits, with_digits};
+use crate::motion::run::PreparedRun;
+use crate::motion::series::PeriodicSeries;
+use crate::motion::smooth::RecordedCoordinate;
+use crate::motion::thresholds::{
+    ENCODER_EQUAL_ONE_IN, ENCODER_NOISE_SHARE, ENCODER_ON_GRID_SHARE, ENCODER_STEP_TOLERANCE, MAX_SERIES_RESIDUAL,
+    STANDSTILL_ONE_IN, STANDSTILL_RATE_SHARE,
+};
+use crate::recording::{RecordingNote, SignalRecording};
+use crate::words::{backquoted_list, count_of, seven_digits, with_digits};
 
-/// A series that leaves more of a motion than this part is not its series.
-const LEFT_OVER: f64 = 1e-2;
-
-/// Encoder steps count where they leave more noise of the accelerations than this part.
-const COARSE: f64 = 0.005;
-/// Positions are on a grid if this part of their steps are whole multiples of its step.
-const ON_GRID: f64 = 0.99;
-
-/// The step of an encoder, if neighbouring positions are often the same and all others differ by whole steps.
+/// The step of an encoder. `None` unless neighbouring positions are often equal and all others differ by integer
+/// multiples.
 fn encoder_step(q: &[f64]) -> Option<f64> {
     let steps: Vec<f64> = q.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
     let largest = steps.iter().copied().fold(0.0, f64::max);
     let is_same = |step: &&f64| **step <= 1e-9 * largest;
     let same = steps.iter().filter(is_same).count();
-    if 10 * same < steps.len() {
+    // Without equal neighbours the signal is not quantised visibly.
+    if ENCODER_EQUAL_ONE_IN * same < steps.len() {
         return None;
     }
+    // The smallest difference is the step.
     let step = steps
         .iter()
         .copied()
@@ -37,23 +38,28 @@ fn encoder_step(q: &[f64]) -> Option<f64> {
         .reduce(f64::min)?;
     let is_whole = |size: &&f64| {
         let multiple = **size / step;
-        (multiple - multiple.round()).abs() < 0.02
+        (multiple - multiple.round()).abs() < ENCODER_STEP_TOLERANCE
     };
     let whole = steps.iter().filter(is_whole).count();
-    (whole as f64 >= ON_GRID * steps.len() as f64).then_some(step)
+    (whole as f64 >= ENCODER_ON_GRID_SHARE * steps.len() as f64).then_some(step)
 }
 
-impl Recording {
-    /// Looks for a period, unless that of the motion's series is known; the spread of the forces over it is the noise floor.
-    pub(crate) fn note_repeats(&self, columns: &[Recorded<'_>], drives: &[String], run: &mut Run) {
+impl SignalRecording {
+    /// Looks for a period, unless the series has one, and adds the spread of the forces over the periods to the run.
+    pub(crate) fn note_repeatability(
+        &self,
+        columns: &[RecordedCoordinate<'_>],
+        drives: &[String],
+        run: &mut PreparedRun,
+    ) {
         let positions: Vec<&[f64]> = columns.iter().map(|column| column.q).collect();
         let Some(forces) = &run.force else { return };
         let known = run.prepared.period;
         let period = known.or_else(|| periods::find_period(&run.time, &positions));
         let Some(period) = period else { return };
-        run.repeats = periods::repeats(&run.time, period, drives, forces);
-        if let Some(repeats) = &run.repeats {
-            run.notes.push(Note::info(format!(
+        run.repeatability = periods::measure_repeatability(&run.time, period, drives, forces);
+        if let Some(repeats) = &run.repeatability {
+            run.notes.push(RecordingNote::info(format!(
                 "The motion in {} repeats itself every {} s, {} times in all; over these periods the forces spread \
                  by {:.3} % of their size, the noise floor.",
                 self.file(),
@@ -64,17 +70,18 @@ impl Recording {
         }
     }
 
-    /// Says that the motion is taken for a series, and what that leaves of it.
-    pub(crate) fn describe_series(&self, found: &Periodic, columns: &[&Recorded<'_>]) -> Message {
+    /// The note on a series that was chosen automatically, with its residual for each coordinate.
+    pub(crate) fn describe_series(&self, found: &PeriodicSeries, columns: &[&RecordedCoordinate<'_>]) -> Message {
         let names: Vec<String> = columns.iter().map(|column| column.name.clone()).collect();
+        // Residuals of rates are marked, because these were fitted if they are recorded.
         let left = columns.iter().zip(&found.noise).map(|(column, noise)| {
             let derivative = if column.qd.is_some() { "_d" } else { "" };
             format!("{noise:.2e} of `{}{derivative}`", column.name)
         });
         message!(
-            "Derivatives of {} in {} are those of a Fourier series of period {} s with {}, since it leaves nothing but \
-             white noise: {} (RMS); {} filters instead.",
-            list(&names),
+            "Derivatives of {} in {} are those of a Fourier series of period {} s with {}, because its residual is \
+             white noise: {} (RMS). Use {} to filter instead.",
+            backquoted_list(&names),
             self.file(),
             seven_digits(found.period),
             count_of(found.harmonics, "harmonic", "harmonics"),
@@ -83,21 +90,22 @@ impl Recording {
         )
     }
 
-    /// Says what a series that was asked for leaves of the motion, where that is too much.
-    pub(crate) fn note_left_over(
+    /// Warns if the residual of a requested series is a large part of the motion.
+    pub(crate) fn note_series_residual(
         &self,
-        columns: &[Recorded<'_>],
+        columns: &[RecordedCoordinate<'_>],
         states: &[[Vec<f64>; 3]],
-        notes: &mut Vec<Note>,
+        notes: &mut Vec<RecordingNote>,
     ) {
         for (column, [q, ..]) in columns.iter().zip(states) {
+            // Squares of the motion around its mean, and of the residual.
             let mean = column.q.iter().sum::<f64>() / column.q.len() as f64;
             let size: f64 = column.q.iter().map(|v| (v - mean).powi(2)).sum();
             let left: f64 = column.q.iter().zip(q).map(|(a, b)| (a - b).powi(2)).sum();
-            if left > LEFT_OVER.powi(2) * size {
-                notes.push(Note::warning(format!(
-                    "The Fourier series leaves {:.1} % of the motion of `{}` in {} (RMS): it has another period, or none; \
-                     take another smoothing.",
+            if left > MAX_SERIES_RESIDUAL.powi(2) * size {
+                notes.push(RecordingNote::warning(format!(
+                    "The residual of the Fourier series is {:.1} % of the motion of `{}` in {} (RMS). The motion has another period, \
+                     or none: choose another smoothing.",
                     100.0 * (left / size).sqrt(),
                     column.name,
                     self.file()
@@ -106,12 +114,12 @@ impl Recording {
         }
     }
 
-    /// Says which encoders have steps so coarse that they are a part of the accelerations.
-    pub(crate) fn note_encoder_steps(&self, columns: &[Recorded<'_>], run: &mut Run) {
+    /// Warns of encoders whose steps cause noise in the accelerations.
+    pub(crate) fn note_encoder_steps(&self, columns: &[RecordedCoordinate<'_>], run: &mut PreparedRun) {
         let Some(cutoff) = run.prepared.cutoff_hz else {
             return;
         };
-        // What lies above the band of the forces is filtered off their rows.
+        // Noise above the band of the forces is removed by the filter on their rows.
         let band = run.prepared.band_hz.unwrap_or(cutoff);
         let cutoff = cutoff.min(band);
         let rate = mean_rate(&run.time);
@@ -123,11 +131,10 @@ impl Recording {
             let Some(step) = encoder_step(column.q) else {
                 continue;
             };
-            // White noise of a step's twelfth below the cut-off, differentiated twice.
-            let noise =
-                step / 12.0_f64.sqrt() * (2.0 / rate * TAU.powi(4) * cutoff.powi(5) / 5.0).sqrt();
+            // White noise with variance step^2/12 below the cut-off, differentiated twice.
+            let noise = step / 12.0_f64.sqrt() * (2.0 / rate * TAU.powi(4) * cutoff.powi(5) / 5.0).sqrt();
             let size = (qdd.iter().map(|a| a * a).sum::<f64>() / qdd.len() as f64).sqrt();
-            if noise > COARSE * size && size > 0.0 {
+            if noise > ENCODER_NOISE_SHARE * size && size > 0.0 {
                 found.push(format!(
                     "`{}` of {} ({:.1} %)",
                     column.name,
@@ -137,44 +144,44 @@ impl Recording {
             }
         }
         if !found.is_empty() {
-            run.notes.push(Note::warning(format!(
-                "Positions in {} come in steps of the encoder: {}; in brackets the noise that they leave of the accelerations. \
-                 It makes inertias too small and hides weak effects; a motion that repeats itself, or a finer encoder, helps.",
+            run.notes.push(RecordingNote::warning(format!(
+                "Positions in {} are quantised in steps of the encoder: {}. The number in brackets is their noise as a share of the \
+                 accelerations. It makes inertias too small and hides weak effects; record a periodic motion, or use a finer encoder.",
                 self.file(),
                 found.join(", ")
             )));
         }
     }
 
-    /// Says which coordinates stand still, for how much of the time.
-    pub(crate) fn note_standstill(&self, coordinates: &[String], run: &mut Run) {
+    /// Reports coordinates that do not move, and those with standstill for more than a tenth of the samples.
+    pub(crate) fn note_standstill(&self, coordinates: &[String], run: &mut PreparedRun) {
+        // Coordinates without any motion.
         for (name, q) in coordinates.iter().zip(&run.q) {
             let (low, high) = q
                 .iter()
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
-                    (l.min(*v), h.max(*v))
-                });
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
             if q.len() > 1 && high <= low {
-                run.notes.push(Note::warning(format!(
-                    "`{name}` does not move in {}: what depends on its motion cannot be identified.",
+                run.notes.push(RecordingNote::warning(format!(
+                    "`{name}` does not move in {}: parameters that depend on its motion cannot be identified.",
                     self.file()
                 )));
             }
         }
+        // Coordinates that are slow for a part of the time.
         let mut resting = Vec::new();
         for (name, qd) in coordinates.iter().zip(&run.qd) {
             let fastest = qd.iter().map(|rate| rate.abs()).fold(0.0, f64::max);
             let slow = qd
                 .iter()
-                .filter(|rate| rate.abs() <= 0.01 * fastest)
+                .filter(|rate| rate.abs() <= STANDSTILL_RATE_SHARE * fastest)
                 .count();
-            // A motion that reverses now and then is slow for a per cent or two of its time.
-            if fastest > 0.0 && 10 * slow > qd.len() {
+            // A motion that reverses sometimes is slow for one or two percent of its time.
+            if fastest > 0.0 && STANDSTILL_ONE_IN * slow > qd.len() {
                 resting.push(format!("`{name}` for {} %", 100 * slow / qd.len()));
             }
         }
         if !resting.is_empty() {
-            run.notes.push(Note::info(message!(
+            run.notes.push(RecordingNote::info(message!(
                 "In {} there is standstill, a rate below a hundredth of the fastest: {} of the samples. Friction takes any \
                  value there; {} leaves such equations out of a fit.",
                 self.file(),

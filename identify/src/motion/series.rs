@@ -1,63 +1,67 @@
-//! Periodic motions as finite Fourier series: samples go in; the period, found to a small part of a step, the series
-//! with exact derivatives, and whether it leaves anything but noise come out.
+//! Periodic motions as finite Fourier series: samples go in. The period, accurate to a small part of a step, the
+//! series with exact derivatives, and whether its residual is noise come out.
 //!
 //! Sources: J. Swevers, C. Ganseman, D. B. Tuekel, J. de Schutter, H. Van Brussel, "Optimal robot excitation and
 //! identification", IEEE Trans. Robotics and Automation 13 (1997), for motions as series; G. H. Golub and V. Pereyra,
-//! SIAM J. Numerical Analysis 10 (1973), for the period as the one unknown that is left when the linear ones are
-//! projected out.
+//! SIAM J. Numerical Analysis 10 (1973), for the period as the only nonlinear unknown after projection.
 //!
-//! Decision: the series is tried first and judged by its residual. Where positions are a Fourier series plus white
+//! Decision: the series is tried first and judged by its residual. If positions are a Fourier series plus white
 //! noise, differences and filters only lose information.
 
 use std::f64::consts::{LN_2, TAU};
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use crate::motion::derivatives::Smoothed;
+use crate::motion::derivatives::SmoothedCoordinate;
 use crate::motion::periods::find_period;
-use crate::signal::{count, hann_power};
+use crate::motion::thresholds::{
+    MIN_LINE_POWER_RATIO, SERIES_CLOSED_STEPS, SERIES_FEWEST_SAMPLES, SERIES_HIGHEST_SHARE, SERIES_MOST_HARMONICS,
+    SERIES_SAMPLES_PER_COLUMN, WHITE_MEAN_SIGMAS,
+};
+use crate::signal::{float_to_count, hann_power};
 
-/// Harmonics that a motion is searched for at most.
-const MOST_HARMONICS: usize = 100;
-/// Runs of more samples are not tried as a single period: it would take long, and nobody moves so slowly.
+/// Longer runs are not tried as a single period, because that takes long and such slow motions do not occur.
 const LONGEST_ALONE: usize = 1 << 18;
-/// Samples of a long run in which harmonics are counted first.
+/// Number of samples at the start of a long run in which harmonics are counted first.
 const BEGINNING: usize = 1 << 16;
-/// Samples that are looked at side by side.
+/// Samples that are processed at the same time.
 const LANES: usize = 8;
-/// Changes of a period below this part of a step say nothing.
-const SETTLED: f64 = 1e-7;
-/// A line stands out when its power is so many times what noise has on the average: chance lifts one in three million.
-const STANDS_OUT: f64 = 15.0;
+/// The iteration of the period ends when it changes by less than this part of a step.
+const CONVERGENCE_TOLERANCE: f64 = 1e-7;
 
-/// A motion that repeats itself, and what else is in its samples.
+/// A periodic motion and the noise in its samples.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Periodic {
+pub(crate) struct PeriodicSeries {
     /// The period, s.
     pub(crate) period: f64,
-    /// Harmonics that stand above the noise.
+    /// Number of harmonics above the noise.
     pub(crate) harmonics: usize,
-    /// Standard deviation of what the series leaves of each signal, in its unit.
+    /// Standard deviation of the residual of each signal, in its unit.
     pub(crate) noise: Vec<f64>,
 }
 
-/// The least squares projection of signals on a Fourier series of one period: what depends on the times alone.
-struct Basis<'a> {
+/// The least squares projection on a Fourier series of one period: the part that depends on the times only.
+struct FourierBasis<'a> {
+    /// Times of the samples, s.
     time: &'a [f64],
+    /// The period, s.
     period: f64,
+    /// Number of harmonics.
     harmonics: usize,
+    /// Cholesky factor of the normal equations.
     normal: Cholesky<f64, Dyn>,
 }
 
-impl<'a> Basis<'a> {
-    /// `None` if there are too few samples for so many harmonics, or their times do not tell them apart.
+impl<'a> FourierBasis<'a> {
+    /// Prepares the projection. `None` if there are too few samples for the harmonics, or if their times do not
+    /// distinguish them.
     fn new(time: &'a [f64], period: f64, harmonics: usize) -> Option<Self> {
         let columns = 2 * harmonics + 1;
-        if time.len() < 2 * columns || !(period > 0.0 && period.is_finite()) {
+        if time.len() < SERIES_SAMPLES_PER_COLUMN * columns || !(period > 0.0 && period.is_finite()) {
             return None;
         }
-        // Products of sines and cosines are sums of those of twice as many harmonics, so that all products of columns
-        // follow from as many sums as there are columns.
+        // Products of sines and cosines are sums of those of up to twice as many harmonics. So all entries of the
+        // normal equations follow from one sum per column.
         let (mut cosines, mut sines) = (vec![0.0; columns], vec![0.0; columns]);
         for chunk in time.chunks(LANES) {
             let angles = lanes(chunk, |t| TAU * (t - time[0]) / period);
@@ -70,6 +74,7 @@ impl<'a> Basis<'a> {
         let mut normal = DMatrix::zeros(columns, columns);
         normal[(0, 0)] = time.len() as f64;
         cosines[0] = time.len() as f64;
+        // Entries for pairs of harmonics, by the product formulas of sine and cosine.
         for j in 1..=harmonics {
             let (cos_j, sin_j) = (2 * j - 1, 2 * j);
             normal[(cos_j, 0)] = cosines[j];
@@ -79,14 +84,15 @@ impl<'a> Basis<'a> {
                 normal[(cos_j, cos_k)] = half(cosines[j - k], cosines[j + k]);
                 normal[(sin_j, sin_k)] = half(cosines[j - k], -cosines[j + k]);
                 normal[(sin_j, cos_k)] = half(sines[j + k], sines[j - k]);
-                // The lower triangle is all that is read.
+                // Only the lower triangle is read.
                 if k < j {
                     normal[(cos_j, sin_k)] = half(sines[j + k], -sines[j - k]);
                 }
             }
         }
         let normal = normal.cholesky()?;
-        // Normal equations are as good as the columns are near to orthogonal, as they are over whole periods.
+        // Over complete periods the columns are nearly orthogonal. If they are not, normal equations are too
+        // inaccurate.
         let diagonal = normal.l_dirty().diagonal();
         let is_sound = diagonal.min() > 1e-3 * diagonal.max();
         is_sound.then_some(Self {
@@ -97,12 +103,12 @@ impl<'a> Basis<'a> {
         })
     }
 
-    /// Coefficients: the constant, then cosine and sine of each harmonic.
-    fn series(&self, values: &[f64]) -> DVector<f64> {
+    /// Coefficients of the series: the constant, then cosine and sine of each harmonic.
+    fn fit_coefficients(&self, values: &[f64]) -> DVector<f64> {
         let mut sums = vec![[0.0; LANES]; 2 * self.harmonics + 1];
         for (chunk, values) in self.time.chunks(LANES).zip(values.chunks(LANES)) {
             let angles = lanes(chunk, |t| self.angle(*t));
-            // Beyond the last sample there is nothing to count.
+            // Lanes behind the last sample have the value zero, so they do not contribute.
             let values = lanes(values, |value| *value);
             for (sum, value) in sums[0].iter_mut().zip(&values) {
                 *sum += value;
@@ -115,16 +121,16 @@ impl<'a> Basis<'a> {
             });
         }
         let right = sums.iter().map(|sum| sum.iter().sum());
-        self.normal
-            .solve(&DVector::from_iterator(sums.len(), right))
+        self.normal.solve(&DVector::from_iterator(sums.len(), right))
     }
 
+    /// Angle of the first harmonic at a time, rad.
     fn angle(&self, t: f64) -> f64 {
         TAU * (t - self.time[0]) / self.period
     }
 
-    /// Values and both derivatives at all times.
-    fn along(&self, series: &DVector<f64>) -> [Vec<f64>; 3] {
+    /// Values, rates and accelerations of the series at all times.
+    fn evaluate_series(&self, series: &DVector<f64>) -> [Vec<f64>; 3] {
         let w = TAU / self.period;
         let mut along = [(); 3].map(|()| Vec::with_capacity(self.time.len()));
         for chunk in self.time.chunks(LANES) {
@@ -147,28 +153,29 @@ impl<'a> Basis<'a> {
         along
     }
 
-    /// What a series leaves of the values, and the rates of the series.
+    /// The residual of the values, and the rates of the series.
     fn residual(&self, series: &DVector<f64>, values: &[f64]) -> (Vec<f64>, Vec<f64>) {
-        let [along, rates, _] = self.along(series);
+        let [along, rates, _] = self.evaluate_series(series);
         let pairs = values.iter().zip(along);
         (pairs.map(|(value, said)| value - said).collect(), rates)
     }
 
-    /// One step of Gauss and Newton towards the period that leaves least of all signals, s; each signal counts by its
-    /// residual, so that units do not matter.
-    fn step(&self, signals: &[&[f64]]) -> Option<f64> {
+    /// One Gauss-Newton step towards the period with the smallest residual of all signals, s. Each signal is weighted
+    /// by its residual, so that units do not matter.
+    fn period_step(&self, signals: &[&[f64]]) -> Option<f64> {
         let (mut slope, mut curvature) = (0.0, 0.0);
         for values in signals {
-            let series = self.series(values);
+            let series = self.fit_coefficients(values);
             let (residual, rates) = self.residual(&series, values);
             let size: f64 = residual.iter().map(|r| r * r).sum();
             if size == 0.0 {
                 continue;
             }
-            // A longer period slows the motion down about its start; the series itself takes part of that up.
+            // A longer period slows the motion down relative to its start. The part of this change that the
+            // coefficients can compensate is removed.
             let slower = |(t, rate): (&f64, f64)| -(t - self.time[0]) / self.period * rate;
             let changes: Vec<f64> = self.time.iter().zip(rates).map(slower).collect();
-            let (changes, _) = self.residual(&self.series(&changes), &changes);
+            let (changes, _) = self.residual(&self.fit_coefficients(&changes), &changes);
             let pairs = changes.iter().zip(&residual);
             slope += pairs.map(|(c, r)| c * r).sum::<f64>() / size;
             curvature += changes.iter().map(|c| c * c).sum::<f64>() / size;
@@ -178,7 +185,7 @@ impl<'a> Basis<'a> {
     }
 }
 
-/// Some numbers side by side; zero where there are fewer.
+/// The values of a function of up to [`LANES`] numbers; zero in the remaining lanes.
 fn lanes(some: &[f64], of: impl Fn(&f64) -> f64) -> [f64; LANES] {
     let mut lanes = [0.0; LANES];
     for (lane, x) in lanes.iter_mut().zip(some) {
@@ -187,7 +194,7 @@ fn lanes(some: &[f64], of: impl Fn(&f64) -> f64) -> [f64; LANES] {
     lanes
 }
 
-/// Calls `visit` with `k`, `cos(k angle)` and `sin(k angle)` of some angles for all `k` from 1 on, by turning step by step.
+/// Calls `visit` with `k`, `cos(k angle)` and `sin(k angle)` for `k` from 1 to `harmonics`, by repeated rotation.
 fn for_each_harmonic(
     angles: &[f64; LANES],
     harmonics: usize,
@@ -206,99 +213,104 @@ fn for_each_harmonic(
     }
 }
 
-/// The least squares projection of positions on a Fourier series of `harmonics` of the period, and its exact
-/// derivatives; `None` if there are too few samples for so many harmonics, or the run is far shorter than the period.
-pub(crate) fn project(
+/// The least squares projection of positions on a Fourier series of `harmonics` harmonics, with exact derivatives.
+/// `None` if there are too few samples for the harmonics, or if the run is much shorter than the period.
+pub(crate) fn project_on_series(
     time: &[f64],
     positions: &[f64],
     period: f64,
     harmonics: usize,
-) -> Option<Smoothed> {
-    let basis = Basis::new(time, period, harmonics)?;
-    let series = basis.series(positions);
-    let [q, qd, qdd] = basis.along(&series);
-    Some(Smoothed { q, qd, qdd })
+) -> Option<SmoothedCoordinate> {
+    let basis = FourierBasis::new(time, period, harmonics)?;
+    let series = basis.fit_coefficients(positions);
+    let [q, qd, qdd] = basis.evaluate_series(&series);
+    Some(SmoothedCoordinate { q, qd, qdd })
 }
 
-/// The series of which the signals are samples with nothing but white noise beside; `None` if there is none.
+/// The series of which the signals are samples with white noise only; `None` if there is none.
 ///
-/// The period is the shortest after which the run returns to itself, as [`find_period`] sees it, or else the length of
-/// the run, with or without the first sample repeated at its end; then it is what leaves least.
-/// Harmonics count up to the last that stands above the noise. What is left is noise if its spectrum is flat: where
-/// the harmonics are no line may stand out, and the mean must be that of the upper half of the band.
-pub(crate) fn find_series(time: &[f64], signals: &[&[f64]]) -> Option<Periodic> {
+/// The period is the shortest one after which the run repeats, from [`find_period`]. Otherwise it is the length of
+/// the run, with or without a repetition of the first sample at the end. It is then refined for the smallest
+/// residual. Harmonics count up to the last one above the noise. The residual is noise if its spectrum is flat: no
+/// line may exceed the noise at the harmonics, and the mean must be that of the upper half of the band.
+pub(crate) fn find_series(time: &[f64], signals: &[&[f64]]) -> Option<PeriodicSeries> {
+    // Constant signals have no period.
     let moving: Vec<&[f64]> = signals
         .iter()
         .copied()
         .filter(|values| values.iter().any(|v| v.total_cmp(&values[0]).is_ne()))
         .collect();
-    if moving.is_empty() || time.len() < 64 {
+    if moving.is_empty() || time.len() < SERIES_FEWEST_SAMPLES {
         return None;
     }
     let duration = time[time.len() - 1] - time[0];
     let step = duration / (time.len() - 1) as f64;
+    // Candidates for the period: one that repeats in the run, otherwise the run as one period.
     let found = find_period(time, &moving);
     let whole = [duration + step, duration]
         .into_iter()
         .filter(|_| found.is_none() && time.len() <= LONGEST_ALONE)
-        .filter(|_| moving.iter().all(|values| closes(values)));
+        .filter(|_| moving.iter().all(|values| is_closed(values)));
     let (period, harmonics) = found
         .into_iter()
         .chain(whole)
-        .find_map(|period| settle(time, &moving, period, duration + 1.5 * step))?;
-    let basis = Basis::new(time, period, harmonics)?;
+        .find_map(|period| refine_series(time, &moving, period, duration + 1.5 * step))?;
+    // The noise of each signal is the residual of its series.
+    let basis = FourierBasis::new(time, period, harmonics)?;
     let noise = signals
         .iter()
         .map(|values| {
-            let (residual, _) = basis.residual(&basis.series(values), values);
+            let (residual, _) = basis.residual(&basis.fit_coefficients(values), values);
             let left = (time.len() - 2 * harmonics - 1) as f64;
             (residual.iter().map(|r| r * r).sum::<f64>() / left).sqrt()
         })
         .collect();
-    Some(Periodic {
+    Some(PeriodicSeries {
         period,
         harmonics,
         noise,
     })
 }
 
-/// Whether a signal might go on at its end with its beginning: the gap between is no larger than a few of its steps.
-fn closes(values: &[f64]) -> bool {
-    let largest = values
-        .windows(2)
-        .map(|w| (w[1] - w[0]).abs())
-        .fold(0.0, f64::max);
-    (values[values.len() - 1] - values[0]).abs() <= 3.0 * largest
+/// Whether a signal could continue at its end with its start: the difference is at most a few of its steps.
+fn is_closed(values: &[f64]) -> bool {
+    let largest = values.windows(2).map(|w| (w[1] - w[0]).abs()).fold(0.0, f64::max);
+    (values[values.len() - 1] - values[0]).abs() <= SERIES_CLOSED_STEPS * largest
 }
 
-/// The period near the one given, and as many harmonics as stand out, if they leave nothing but noise.
-fn settle(time: &[f64], signals: &[&[f64]], mut period: f64, longest: f64) -> Option<(f64, usize)> {
+/// The period near the given one, and the number of significant harmonics; `None` if their residual is not noise.
+///
+/// `longest` is the upper limit of the period, s.
+fn refine_series(time: &[f64], signals: &[&[f64]], mut period: f64, longest: f64) -> Option<(f64, usize)> {
     let n = time.len();
     let step = (time[n - 1] - time[0]) / (n - 1) as f64;
-    let most = count(0.2 * period / step).min(MOST_HARMONICS);
+    let most = float_to_count(SERIES_HIGHEST_SHARE * period / step).min(SERIES_MOST_HARMONICS);
     if most == 0 {
         return None;
     }
+    // Up to four Gauss-Newton steps on the first `samples` samples.
     let refined = |period: f64, samples: usize, harmonics: usize| {
         let signals: Vec<&[f64]> = signals.iter().map(|values| &values[..samples]).collect();
         let mut period = period;
         for _ in 0..4 {
-            let change = Basis::new(&time[..samples], period, harmonics)?.step(&signals)?;
+            let change = FourierBasis::new(&time[..samples], period, harmonics)?.period_step(&signals)?;
             period = (period + change.clamp(-step, step)).clamp(2.0 * step, longest);
-            if change.abs() < SETTLED * step {
+            if change.abs() < CONVERGENCE_TOLERANCE * step {
                 break;
             }
         }
         Some(period)
     };
+    // The number of significant harmonics in the first `samples` samples.
     let harmonics_in = |samples: usize, period: f64, most: usize| {
         let signals: Vec<&[f64]> = signals.iter().map(|values| &values[..samples]).collect();
-        standing_out(&time[..samples], &signals, period, most)
+        last_significant_harmonic(&time[..samples], &signals, period, most)
     };
-    // A long run tells its harmonics in its beginning; all of it would take minutes for a hundred of them.
-    let mut samples = count(3.0 * period / step).max(BEGINNING).min(n);
-    // Fewer harmonics first: their phases bear an error of the period that would turn high ones round after many periods.
-    // Fewer last: what they leave free makes the period vague, and a wrong period adds harmonics.
+    // The start of a long run shows its harmonics; using all of it would take minutes for a hundred harmonics.
+    let mut samples = float_to_count(3.0 * period / step).max(BEGINNING).min(n);
+    // Few harmonics come first, because an error of the period shifts the phase of high harmonics after many periods.
+    // Only significant ones are used at the end, because others make the period uncertain, and a wrong period adds
+    // harmonics.
     period = refined(period, samples, most.min(20))?;
     period = refined(period, samples, most)?;
     let few = harmonics_in(samples, period, most)?;
@@ -310,46 +322,46 @@ fn settle(time: &[f64], signals: &[&[f64]], mut period: f64, longest: f64) -> Op
         samples = (4 * samples).min(n);
         period = refined(period, samples, few)?;
     }
-    // A longer run has a lower noise floor, above which some more may stand.
+    // A longer run has less noise per line, so a few more harmonics may be significant.
     Some((period, harmonics_in(n, period, most.min(2 * few + 8))?))
 }
 
-/// The last harmonic that stands above the noise in any signal; `None` if what all harmonics leave is no white noise, or
-/// none stands out.
-fn standing_out(time: &[f64], signals: &[&[f64]], period: f64, most: usize) -> Option<usize> {
+/// The last harmonic above the noise in any signal. `None` if the residual of all harmonics is not white noise, or if
+/// none is significant.
+fn last_significant_harmonic(time: &[f64], signals: &[&[f64]], period: f64, most: usize) -> Option<usize> {
     let step = (time[time.len() - 1] - time[0]) / (time.len() - 1) as f64;
-    let basis = Basis::new(time, period, most)?;
+    let basis = FourierBasis::new(time, period, most)?;
     let mut harmonics = 0;
     for values in signals {
-        let series = basis.series(values);
+        let series = basis.fit_coefficients(values);
         let (residual, _) = basis.residual(&series, values);
         let variance = white_variance(&residual, step, 2.0 * most as f64 / period)?;
-        // The series took its share of the noise.
+        // The series has fitted a part of the noise as well.
         let variance = variance * time.len() as f64 / (time.len() - 2 * most - 1) as f64;
-        // The square of a line's amplitude that white noise gives on the average.
+        // Mean square of the amplitude of a line that white noise causes.
         let average = 4.0 * variance / time.len() as f64;
-        let stands_out =
-            |k: &usize| series[2 * k - 1].powi(2) + series[2 * k].powi(2) > STANDS_OUT * average;
+        let stands_out = |k: &usize| series[2 * k - 1].powi(2) + series[2 * k].powi(2) > MIN_LINE_POWER_RATIO * average;
         harmonics = harmonics.max((1..=most).rev().find(stands_out).unwrap_or(0));
     }
     (harmonics > 0).then_some(harmonics)
 }
 
-/// The variance of a residual if it is white; `None` if it is not. Lines and the mean are looked at up to `up_to`, Hz,
-/// where motion is.
+/// The variance of a residual if it is white; `None` if not. Lines and the mean are checked up to `up_to`, Hz, where
+/// motion can be.
 fn white_variance(residual: &[f64], step: f64, up_to: f64) -> Option<f64> {
     let power = hann_power(residual);
     let bins = power.len();
+    // The level of the noise from the median of the upper half of the band.
     let mut upper = power[bins / 2..].to_vec();
     upper.sort_by(f64::total_cmp);
     let level = upper[upper.len() / 2] / LN_2;
-    let low = count((2.0 * step * up_to * (bins - 1) as f64).ceil()).clamp(8, bins / 2);
+    let low = float_to_count((2.0 * step * up_to * (bins - 1) as f64).ceil()).clamp(8, bins / 2);
     let lower = &power[1..low];
     let mean = lower.iter().sum::<f64>() / lower.len() as f64;
-    // Padding and the window make neighbours alike, which leaves about so many independent ones.
+    // Padding and window correlate neighbouring bins; this is the number of independent ones.
     let independent = lower.len() as f64 * residual.len() as f64 / (3 * bins) as f64;
-    let is_flat = mean <= level * (1.0 + 5.0 / independent.sqrt().max(1.0));
-    let stands_out = lower.iter().any(|p| *p > STANDS_OUT * level);
+    let is_flat = mean <= level * (1.0 + WHITE_MEAN_SIGMAS / independent.sqrt().max(1.0));
+    let stands_out = lower.iter().any(|p| *p > MIN_LINE_POWER_RATIO * level);
     let variance = residual.iter().map(|r| r * r).sum::<f64>() / residual.len() as f64;
     (is_flat && !stands_out && variance > 0.0).then_some(variance)
 }
@@ -357,7 +369,7 @@ fn white_variance(residual: &[f64], step: f64, up_to: f64) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
 
     const PERIOD: f64 = 2.37;
 
@@ -383,7 +395,7 @@ mod tests {
     }
 
     fn noisy(time: &[f64], sigma: f64, truth: impl Fn(f64) -> f64) -> Vec<f64> {
-        let mut noise = Noise::new(11);
+        let mut noise = TestNoise::new(11);
         let sample = |t: &f64| truth(*t) + sigma * noise.normal();
         time.iter().map(sample).collect()
     }
@@ -392,28 +404,24 @@ mod tests {
     fn a_series_gives_exact_derivatives() {
         let time = times(2500);
         let q: Vec<f64> = time.iter().map(|t| motion(*t)[0]).collect();
-        let prepared = project(&time, &q, PERIOD, 5).expect("enough samples");
+        let prepared = project_on_series(&time, &q, PERIOD, 5).expect("enough samples");
         for (i, t) in time.iter().enumerate() {
             let truth = motion(*t);
             assert!((prepared.q[i] - truth[0]).abs() < 1e-9);
             assert!((prepared.qd[i] - truth[1]).abs() < 1e-8);
             assert!((prepared.qdd[i] - truth[2]).abs() < 1e-7);
         }
-        assert_eq!(project(&time[..10], &q[..10], PERIOD, 5), None);
+        assert_eq!(project_on_series(&time[..10], &q[..10], PERIOD, 5), None);
     }
 
     /// Over part of a period the columns are far from orthogonal; the shortcut for their products stays right.
     #[test]
     fn products_of_columns_are_those_of_the_columns() {
         let time = times(400);
-        let basis = Basis::new(&time, PERIOD, 3).expect("two thirds of a period");
+        let basis = FourierBasis::new(&time, PERIOD, 3).expect("two thirds of a period");
         let rows = DMatrix::from_fn(time.len(), 7, |i, j| {
             let angle = TAU * j.div_ceil(2) as f64 * (time[i] - time[0]) / PERIOD;
-            if j % 2 == 0 && j > 0 {
-                angle.sin()
-            } else {
-                angle.cos()
-            }
+            if j % 2 == 0 && j > 0 { angle.sin() } else { angle.cos() }
         });
         let factor = basis.normal.l();
         let difference = &factor * factor.transpose() - rows.transpose() * &rows;

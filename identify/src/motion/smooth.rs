@@ -1,71 +1,82 @@
-//! From what a file holds of a coordinate to its position, rate and acceleration, by one of the ways of smoothing.
+//! From the recorded columns of a coordinate to its position, rate and acceleration, with one of the smoothing
+//! filters.
 
-use crate::motion::cutoff::Signal;
-use crate::motion::derivatives::{Smoothed, filter_and_differentiate};
-use crate::motion::even::{Spline, Steps, even_times, spread_times, steps};
+use crate::motion::cutoff::DifferentiatedSignal;
+use crate::motion::derivatives::{SmoothedCoordinate, filter_and_differentiate};
+use crate::motion::even::{CubicSpline, SampleSpacing, even_times, sample_spacing, spread_times};
+use crate::motion::thresholds::SERIES_SAMPLES_PER_COLUMN;
 use crate::motion::{local_polynomials, series};
 use crate::words::{count_of, seven_digits};
 
-/// What the file holds of a coordinate.
-pub(crate) struct Recorded<'a> {
+/// The recorded columns of a coordinate.
+pub(crate) struct RecordedCoordinate<'a> {
+    /// Name of the coordinate.
     pub(crate) name: String,
+    /// Positions, rad or m.
     pub(crate) q: &'a [f64],
+    /// Rates, rad/s or m/s, if they are recorded and used.
     pub(crate) qd: Option<&'a [f64]>,
+    /// Accelerations, rad/s^2 or m/s^2, if they are recorded and used.
     pub(crate) qdd: Option<&'a [f64]>,
 }
 
-impl Recorded<'_> {
+impl RecordedCoordinate<'_> {
+    /// Whether both derivatives are recorded, so that nothing must be prepared.
     pub(crate) fn is_complete(&self) -> bool {
         self.qd.is_some() && self.qdd.is_some()
     }
 
-    pub(crate) fn complete(&self) -> Option<[Vec<f64>; 3]> {
+    /// Positions, rates and accelerations as recorded; `None` if any is missing.
+    pub(crate) fn recorded_states(&self) -> Option<[Vec<f64>; 3]> {
         Some([self.q.to_vec(), self.qd?.to_vec(), self.qdd?.to_vec()])
     }
 
-    /// What is differentiated where something is missing: the rates if they are recorded, else the positions.
-    pub(crate) fn source(&self) -> Signal<'_> {
+    /// The signal that is differentiated if something is missing: the rates if they are recorded, otherwise the
+    /// positions.
+    pub(crate) fn signal_to_differentiate(&self) -> DifferentiatedSignal<'_> {
         match self.qd {
-            Some(values) => Signal { values, times: 1 },
-            None => Signal {
+            Some(values) => DifferentiatedSignal {
+                values,
+                derivative_order: 1,
+            },
+            None => DifferentiatedSignal {
                 values: self.q,
-                times: 2,
+                derivative_order: 2,
             },
         }
     }
 
-    /// What is missing is derived from the nearest that is there; positions and rates pass the same filter then, so that all
-    /// states are those of one motion. A recorded acceleration is kept.
-    /// `None` if there are too few samples.
+    /// Prepares missing derivatives from the highest one that is recorded. Positions and rates then pass the same
+    /// filter, so that all states belong to one motion. A recorded acceleration is kept. `None` if there are
+    /// too few samples.
+    ///
+    /// Fails when the filter does not fit the sampling rate.
     pub(crate) fn prepare(
         &self,
         time: &[f64],
         cutoff: f64,
-        way: Way,
+        way: SmoothingFilter,
     ) -> Result<Option<[Vec<f64>; 3]>, crate::FilterError> {
-        if let Some(complete) = self.complete() {
+        if let Some(complete) = self.recorded_states() {
             return Ok(Some(complete));
         }
-        // What stands still has no rate; filters would leave rounding, whose sign is friction.
-        if is_still(self.q) && self.qd.is_none_or(is_still) {
+        // A constant coordinate has rates of zero. Filters would leave rounding errors, whose sign would be friction.
+        if is_constant(self.q) && self.qd.is_none_or(is_constant) {
             let zero = vec![0.0; time.len()];
-            let recorded =
-                |values: Option<&[f64]>| values.map_or_else(|| zero.clone(), <[f64]>::to_vec);
-            return Ok(Some([
-                self.q.to_vec(),
-                recorded(self.qd),
-                recorded(self.qdd),
-            ]));
+            let recorded = |values: Option<&[f64]>| values.map_or_else(|| zero.clone(), <[f64]>::to_vec);
+            return Ok(Some([self.q.to_vec(), recorded(self.qd), recorded(self.qdd)]));
         }
+        // The selected filter on one column.
         let smooth = |values: &[f64]| match way {
-            Way::Butterworth { order } => on_true_times(time, values, cutoff, order).map(Some),
-            Way::Polynomials { half_width } => {
-                Ok(local_polynomials::smooth(time, values, half_width))
+            SmoothingFilter::Butterworth { order } => smooth_at_true_times(time, values, cutoff, order).map(Some),
+            SmoothingFilter::Polynomials { half_width } => {
+                Ok(local_polynomials::smooth_by_polynomials(time, values, half_width))
             }
-            Way::Series { period, harmonics } => {
-                Ok(series::project(time, values, period, harmonics))
+            SmoothingFilter::Series { period, harmonics } => {
+                Ok(series::project_on_series(time, values, period, harmonics))
             }
         };
+        // Recorded rates are smoothed, too, and give the accelerations.
         if let Some(qd) = self.qd {
             let (Some(q), Some(rate)) = (smooth(self.q)?, smooth(qd)?) else {
                 return Ok(None);
@@ -77,58 +88,59 @@ impl Recorded<'_> {
     }
 }
 
-/// [`filter_and_differentiate`] of samples at any times: what is uneven is put on even times first, by the spline through
-/// the samples, and what comes out is read off at the true times again.
-fn on_true_times(
+/// [`filter_and_differentiate`] for samples at any times. Uneven samples are interpolated to even times by a spline,
+/// and the results are interpolated back to the recorded times.
+fn smooth_at_true_times(
     time: &[f64],
     values: &[f64],
     cutoff: f64,
     order: usize,
-) -> Result<Smoothed, crate::FilterError> {
-    match steps(time) {
-        Steps::Even => return filter_and_differentiate(time, values, cutoff, order),
-        Steps::Rounded => {
+) -> Result<SmoothedCoordinate, crate::FilterError> {
+    match sample_spacing(time) {
+        SampleSpacing::Even => return filter_and_differentiate(time, values, cutoff, order),
+        // Rounded times are replaced by the even ones that they were rounded from.
+        SampleSpacing::Rounded => {
             return filter_and_differentiate(&even_times(time), values, cutoff, order);
         }
-        Steps::Uneven => {}
+        SampleSpacing::Uneven => {}
     }
     let even = spread_times(time);
-    let values = Spline::new(time, values).at_all(&even);
+    let values = CubicSpline::new(time, values).evaluate_at(&even);
     let smooth = filter_and_differentiate(&even, &values, cutoff, order)?;
-    let back = |values: &[f64]| Spline::new(&even, values).at_all(time);
-    Ok(Smoothed {
+    let back = |values: &[f64]| CubicSpline::new(&even, values).evaluate_at(time);
+    Ok(SmoothedCoordinate {
         q: back(&smooth.q),
         qd: back(&smooth.qd),
         qdd: back(&smooth.qdd),
     })
 }
 
-/// Whether all values are the same.
-fn is_still(values: &[f64]) -> bool {
+/// Whether all values are equal.
+fn is_constant(values: &[f64]) -> bool {
     values.iter().all(|v| v.total_cmp(&values[0]).is_eq())
 }
 
-/// How positions are smoothed, with all that was left open settled.
+/// A smoothing filter with all of its numbers.
 #[derive(Clone, Copy)]
-pub(crate) enum Way {
+pub(crate) enum SmoothingFilter {
+    /// Butterworth's low-pass of this order, zero phase.
     Butterworth { order: usize },
+    /// Local polynomials over `2 half_width + 1` samples.
     Polynomials { half_width: usize },
+    /// A Fourier series with this period, s, and number of harmonics.
     Series { period: f64, harmonics: usize },
 }
 
-impl Way {
+impl SmoothingFilter {
+    /// Description for notes; `is_chosen` states whether the cut-off was chosen from the signal.
     pub(crate) fn describe(self, cutoff: f64, is_chosen: bool) -> String {
-        let chosen = if is_chosen {
-            " (chosen from the signal)"
-        } else {
-            ""
-        };
+        let chosen = if is_chosen { " (chosen from the signal)" } else { "" };
         match self {
-            Self::Butterworth { order } => format!(
-                "Butterworth of order {order} at {cutoff:.4} Hz{chosen}, zero phase, then central differences"
-            ),
+            Self::Butterworth { order } => {
+                format!("Butterworth of order {order} at {cutoff:.4} Hz{chosen}, zero phase, then central differences")
+            }
             Self::Polynomials { half_width } => format!(
-                "polynomials of degree {} over {} samples each (Savitzky-Golay), which suits a cut-off of \
+                "polynomials of degree {} over {} samples each (Savitzky-Golay), which corresponds to a cut-off of \
                  {cutoff:.4} Hz{chosen}",
                 local_polynomials::DEGREE,
                 2 * half_width + 1
@@ -141,12 +153,12 @@ impl Way {
         }
     }
 
-    /// Samples that it needs.
-    pub(crate) fn need(self) -> usize {
+    /// Least number of samples for the filter.
+    pub(crate) fn min_samples(self) -> usize {
         match self {
             Self::Butterworth { order } => 3 * (order + 1) + 1,
             Self::Polynomials { half_width } => 2 * half_width + 1,
-            Self::Series { harmonics, .. } => 2 * (2 * harmonics + 1),
+            Self::Series { harmonics, .. } => SERIES_SAMPLES_PER_COLUMN * (2 * harmonics + 1),
         }
     }
 }

@@ -1,23 +1,27 @@
-//! One column of a recording: its numbers, and what is wrong with the fields that are none.
+//! One column of a recording: its numbers, and the defects of fields that are not numbers.
+//!
+//! Readers of all formats push fields; a column with defects is refused only when it is used.
 
-use crate::recording::error::Fault;
-use crate::words::nearest;
+use crate::recording::error::RecordingFault;
+use crate::recording::thresholds::LARGEST_NUMBER;
+use crate::words::nearest_name;
 
-/// No quantity that is measured in SI units comes near this, and squares of smaller numbers do not overflow.
-pub(crate) const LARGEST: f64 = 1e100;
-
-/// One field of a sample.
+/// One field of a sample, whatever the format of the file.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Field {
+pub(crate) enum SampleField {
+    /// A finite number of at most [`LARGEST_NUMBER`].
     Number(f64),
+    /// NaN, infinite, empty or too large.
     NotFinite,
+    /// Text that cannot be parsed as a number.
     Text,
 }
 
-impl Field {
-    /// A number, unless it is none that can be computed with.
+impl SampleField {
+    /// A number, unless it is NaN, infinite or too large.
     pub(crate) fn finite(value: f64) -> Self {
-        if value.abs() <= LARGEST {
+        // The comparison is false for NaN.
+        if value.abs() <= LARGEST_NUMBER {
             Self::Number(value)
         } else {
             Self::NotFinite
@@ -25,40 +29,47 @@ impl Field {
     }
 }
 
-/// The numbers of a column, NaN where there are none, and what is wrong with it.
+/// The numbers of a column, NaN where a field has none, and its defects.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(crate) struct Column {
+pub(crate) struct SignalColumn {
+    /// One value per sample, in the unit of the file.
     pub(crate) values: Vec<f64>,
-    pub(crate) text: Option<Defect>,
-    pub(crate) not_finite: Option<Defect>,
-    /// Samples where the value joins its neighbours because none was measured or a sensor failed; empty if there are none.
-    pub(crate) lost: Vec<bool>,
-    /// Values and lost samples before faults of the sensor were taken out, where there were any.
+    /// Fields with text that is not a number.
+    pub(crate) text: Option<ColumnDefect>,
+    /// Fields that are NaN, infinite or empty.
+    pub(crate) not_finite: Option<ColumnDefect>,
+    /// Samples with interpolated values, because none was measured or a sensor failed; empty if there are none.
+    pub(crate) interpolated: Vec<bool>,
+    /// Values and interpolated samples before sensor faults were repaired; `None` if there were none.
     pub(crate) as_recorded: Option<(Vec<f64>, Vec<bool>)>,
 }
 
-/// Fields of a column that cannot be used: the first of them and how many there are.
+/// Fields of a column that cannot be used: the first of them and their number.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Defect {
+pub(crate) struct ColumnDefect {
+    /// Line or row of the first one in the file, from 1.
     pub(crate) line: u64,
+    /// The first one as it stands in the file.
     pub(crate) text: String,
+    /// Number of such fields.
     pub(crate) count: usize,
 }
 
-impl Column {
-    /// Takes the next field; `text` gives it as it stands in the file.
-    pub(crate) fn push(&mut self, field: Field, line: u64, text: &dyn Fn() -> String) {
+impl SignalColumn {
+    /// Appends a field; `text` returns the field as it stands in the file and is called for the first defect only.
+    pub(crate) fn push(&mut self, field: SampleField, line: u64, text: &dyn Fn() -> String) {
         let defect = match field {
-            Field::Number(number) => {
+            SampleField::Number(number) => {
                 self.values.push(number);
                 return;
             }
-            Field::NotFinite => &mut self.not_finite,
-            Field::Text => &mut self.text,
+            SampleField::NotFinite => &mut self.not_finite,
+            SampleField::Text => &mut self.text,
         };
+        // A defect keeps its sample, so that all columns have the same length.
         self.values.push(f64::NAN);
         defect
-            .get_or_insert_with(|| Defect {
+            .get_or_insert_with(|| ColumnDefect {
                 line,
                 text: text(),
                 count: 0,
@@ -67,16 +78,18 @@ impl Column {
     }
 }
 
-/// The fault of a column that is not there.
-pub(crate) fn missing<'a>(
+/// The fault of a column that does not exist, with the nearest name that does.
+///
+/// `by_renaming` is true if the name comes from a renaming of the user.
+pub(crate) fn missing_column_fault<'a>(
     name: &str,
     present: impl Iterator<Item = &'a str>,
     by_renaming: bool,
-) -> Fault {
+) -> RecordingFault {
     let present: Vec<String> = present.map(str::to_owned).collect();
-    Fault::MissingColumn {
+    RecordingFault::MissingColumn {
         name: name.to_owned(),
-        nearest: nearest(name, present.iter().map(String::as_str)).map(str::to_owned),
+        nearest: nearest_name(name, present.iter().map(String::as_str)).map(str::to_owned),
         present,
         by_renaming,
     }

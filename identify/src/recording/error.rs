@@ -1,50 +1,52 @@
-//! What can be wrong with a recording, each with the place, what was expected and what to do.
+//! Faults of a recording, each with its place, what was expected, and what to do.
+//!
+//! A fault is a value; its message has typed remedies, which each front end spells in its own words.
 
 use std::fmt;
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{Message, OptionName, OptionSetting, Remedy};
 
-use crate::recording::read::place_word;
+use crate::recording::read::sample_place_word;
 use crate::signal::FilterError;
-use crate::words::{count_of, list};
+use crate::words::{backquoted_list, count_of};
 
-/// A fault of a recording. Its `Display` names the file, the line and the column where they are
-/// known, and ends with what to do.
+/// A fault of a recording. Its `Display` names the file, the line and the column if they are known, and ends with
+/// advice.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordingError {
-    /// The file as the user named it, or a word for a stream.
+    /// The file as the user named it, or a name for a stream.
     pub file: String,
     /// What is wrong.
-    pub fault: Fault,
+    pub fault: RecordingFault,
 }
 
-/// The kinds of faults of a recording. Lines count from 1 with the header.
+/// The kinds of faults of a recording. Lines count from 1, including the header.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
-pub enum Fault {
+pub enum RecordingFault {
     /// The file cannot be opened or read.
     Unreadable {
-        /// The operating system's words.
+        /// The message of the operating system.
         reason: String,
     },
     /// The file has no bytes, or only white space.
     Empty,
     /// A header, but no sample.
     NoSamples,
-    /// The file is not CSV text: another known format or other bytes.
+    /// The file is not CSV text, but another format or other bytes.
     NotCsv {
-        /// What it looks like.
+        /// The format that the bytes look like.
         looks_like: &'static str,
     },
-    /// The file is of a format that is read, but not in this form.
+    /// The format of the file is supported, but not this form of it.
     Format {
-        /// What it is.
+        /// The format, with its article.
         format: &'static str,
         /// What is wrong, and what to do.
-        says: String,
+        message: String,
     },
-    /// The recording holds more numbers than may be kept in memory.
+    /// The recording has more numbers than may be kept in memory.
     TooLarge {
         /// The line at which reading ended.
         line: u64,
@@ -52,55 +54,55 @@ pub enum Fault {
         samples: usize,
         /// Columns that are needed.
         columns: usize,
-        /// First and last time of those samples, s, where they are known.
+        /// First and last time of those samples, s, if they are known.
         until: Option<(f64, f64)>,
     },
-    /// No sample lies in the time that was asked for.
-    NoneBetween {
-        /// From, s.
+    /// No sample lies in the requested time interval.
+    NoSamplesInInterval {
+        /// Start of the interval, s.
         from: f64,
-        /// To, s.
+        /// End of the interval, s.
         to: f64,
     },
     /// Topics or files that are needed together were not recorded at the same time.
-    NothingInCommon {
-        /// What messages call them.
+    NoCommonTime {
+        /// Their names in messages.
         parts: Vec<String>,
     },
-    /// Two files of one run have a column that is needed.
-    InBoth {
+    /// A needed column is in two files of one run.
+    ColumnInTwoFiles {
         /// Its name.
         name: String,
         /// The other file.
         other: String,
     },
-    /// A sum of columns takes them from several files.
-    AcrossFiles {
-        /// The column that it makes.
+    /// A computed column has terms in several files.
+    SumAcrossFiles {
+        /// The name of the computed column.
         name: String,
     },
-    /// The first line holds numbers where column names are expected.
+    /// The first line contains numbers where column names are expected.
     NoHeader,
-    /// The separator cannot be told from the first line.
+    /// The separator cannot be determined from the first line.
     UnclearSeparator {
         /// The first line, shortened.
         header: String,
     },
     /// A column has no name.
     UnnamedColumn {
-        /// Its place, from 1.
+        /// Its position, from 1.
         place: usize,
     },
     /// Two columns have the same name.
     DuplicateColumn {
         /// The name.
         name: String,
-        /// Places of the first two that have it, from 1.
+        /// Positions of the first two that have it, from 1.
         places: [usize; 2],
-        /// Whether a renaming brought this about.
+        /// Whether a renaming caused this.
         by_renaming: bool,
     },
-    /// A renaming is given twice for the same name.
+    /// Two renamings have the same name.
     DuplicateRenaming {
         /// The name in question.
         name: String,
@@ -114,25 +116,25 @@ pub enum Fault {
         /// Fields of the header.
         expected: usize,
     },
-    /// A column that is needed is not there.
+    /// A needed column does not exist.
     MissingColumn {
-        /// The name that was looked for.
+        /// The name that was requested.
         name: String,
-        /// The closest name that is there.
+        /// The nearest name that exists.
         nearest: Option<String>,
-        /// All names that are there.
+        /// All names that exist.
         present: Vec<String>,
-        /// Whether the name comes from a renaming (`theirs`).
+        /// Whether the name comes from a renaming of the user.
         by_renaming: bool,
     },
-    /// Several columns that are needed are not there.
+    /// Several needed columns do not exist.
     MissingColumns {
-        /// The names that were looked for, each with the closest name that is there.
+        /// The names that were requested, each with the nearest name that exists.
         missing: Vec<(String, Option<String>)>,
-        /// All names that are there.
+        /// All names that exist.
         present: Vec<String>,
     },
-    /// A needed column holds text that is no number.
+    /// A needed column contains text that is not a number.
     NotANumber {
         /// The column.
         column: String,
@@ -140,10 +142,10 @@ pub enum Fault {
         line: u64,
         /// The text there.
         text: String,
-        /// How many fields of the column are concerned.
+        /// How many fields of the column are affected.
         count: usize,
     },
-    /// A needed column holds NaN, infinite or empty fields.
+    /// A needed column contains NaN, infinite or empty fields.
     NotFinite {
         /// The column.
         column: String,
@@ -151,10 +153,10 @@ pub enum Fault {
         line: u64,
         /// The text there.
         text: String,
-        /// How many fields of the column are concerned.
+        /// How many fields of the column are affected.
         count: usize,
     },
-    /// The measured force of a drive is needed and not there.
+    /// The measured force of a drive is needed, but has no column.
     MissingForce {
         /// The drives without a column.
         drives: Vec<String>,
@@ -168,56 +170,56 @@ pub enum Fault {
         /// Time there, s.
         here: f64,
     },
-    /// A quote opens a field that does not end in its line.
+    /// A quoted field does not end in its line.
     OpenQuote {
         /// The line in which it opens.
         line: u64,
     },
-    /// Too few samples for what is asked.
+    /// There are too few samples for an operation.
     TooFewSamples {
-        /// Samples there are.
+        /// Number of samples.
         have: usize,
-        /// Samples there must be.
+        /// Least number of samples.
         need: usize,
-        /// What they are needed for.
+        /// The operation.
         purpose: Message,
     },
-    /// A Fourier series was asked for, but the motion has no period that could be found.
+    /// A Fourier series was requested, but no period of the motion was found.
     NoPeriod,
-    /// The period asked for is too short for the samples, or too long for the recording.
+    /// The requested period is too short for the sampling, or too long for the recording.
     Period {
         /// The period, s.
         period: f64,
-        /// The shortest that samples can show, s.
+        /// The shortest period that the samples can resolve, s.
         shortest: f64,
-        /// The longest that the recording can show, s.
+        /// The longest period that the recording can resolve, s.
         longest: f64,
     },
     /// The cut-off's period is longer than the recording.
     CutoffTooLow {
         /// The cut-off, Hz.
         cutoff_hz: f64,
-        /// The lowest that leaves something, Hz.
+        /// The lowest cut-off that keeps some motion, Hz.
         lowest_hz: f64,
         /// Length of the recording, s.
         duration: f64,
     },
-    /// The filter that was asked for does not suit the recording.
+    /// The requested filter does not fit the recording.
     Filter {
-        /// The coordinate that was being prepared.
+        /// The coordinate that was being filtered.
         column: String,
-        /// The filter's complaint.
+        /// The fault of the filter.
         error: FilterError,
     },
 }
 
 impl RecordingError {
-    /// Where and what is wrong, and what to do.
+    /// The message: place, fault and advice.
     pub fn message(&self) -> Message {
         let file = &self.file;
         let says = self.fault.message();
         match self.fault.line() {
-            Some(line) => message!("{file}, {} {line}: {}", place_word(file), says),
+            Some(line) => message!("{file}, {} {line}: {}", sample_place_word(file), says),
             None => message!("{file}: {}", says),
         }
     }
@@ -231,8 +233,8 @@ impl fmt::Display for RecordingError {
 
 impl std::error::Error for RecordingError {}
 
-impl Fault {
-    /// The line concerned, where there is one.
+impl RecordingFault {
+    /// The line of the fault, if it has one.
     pub fn line(&self) -> Option<u64> {
         match self {
             Self::RaggedLine { line, .. }
@@ -240,6 +242,7 @@ impl Fault {
             | Self::NotFinite { line, .. }
             | Self::OpenQuote { line }
             | Self::TimeNotIncreasing { line, .. }
+            // The header is always the first line.
             | Self::TooLarge { line, .. } => Some(*line),
             Self::NoHeader | Self::UnclearSeparator { .. } => Some(1),
             _ => None,
@@ -247,33 +250,29 @@ impl Fault {
     }
 }
 
-impl Fault {
-    /// What is wrong, and what to do.
+impl RecordingFault {
+    /// What is wrong, and what to do, without the place.
     #[allow(clippy::too_many_lines, reason = "one arm per fault, each a sentence")]
     pub fn message(&self) -> Message {
-        let map = |ours: &str, theirs: &str| {
-            OptionSetting::new(OptionName::Columns, format!("{ours}={theirs}"))
-        };
+        // The option that maps a name of the model to a column of the file.
+        let map = |ours: &str, theirs: &str| OptionSetting::new(OptionName::Columns, format!("{ours}={theirs}"));
         match self {
-            Self::Unreadable { reason } => message!(
-                "the recording cannot be read: {reason}; check the path and the permissions"
-            ),
-            Self::Empty => {
-                "the recording is empty; a header line and one line per sample are expected".into()
+            Self::Unreadable { reason } => {
+                message!("the recording cannot be read: {reason}; check the path and the permissions")
             }
-            Self::NoSamples => {
-                "there is a header but no sample; one line of numbers per sample is expected".into()
-            }
+            Self::Empty => "the recording is empty; a header line and one line per sample are expected".into(),
+            Self::NoSamples => "there is a header but no sample; one line of numbers per sample is expected".into(),
             Self::NotCsv { looks_like } => message!(
                 "this looks like {looks_like}, not like a recording; save it as CSV (UTF-8, with a header), Parquet, HDF5, MCAP or a MATLAB file"
             ),
-            Self::Format { format, says } => message!("this is {format}: {says}"),
+            Self::Format { format, message: says } => message!("this is {format}: {says}"),
             Self::TooLarge {
                 samples,
                 columns,
                 until,
                 ..
             } => {
+                // The advice is a concrete part of the recording, if its times are known.
                 let part = Remedy::option(OptionName::Between);
                 let part = match until {
                     Some((from, to)) => message!(
@@ -285,45 +284,47 @@ impl Fault {
                 let comma = if until.is_some() { "," } else { "" };
                 message!(
                     "the recording is too large to be kept in memory: up to here {samples} samples of {columns} columns are \
-                     {:.1} GB; take a part of it{comma} {}",
+                     {:.1} GB; read a part of it{comma} {}",
+                    // The size is 8 bytes per number; the line of each sample counts as one number.
                     8e-9 * (*samples as f64) * (*columns as f64 + 1.0),
                     part
                 )
             }
-            Self::NoneBetween { from, to } => message!(
-                "no sample lies between t = {from} s and {to} s, as {} asks; give times that the recording has",
+            Self::NoSamplesInInterval { from, to } => message!(
+                "no sample lies between t = {from} s and {to} s, as {} requests; give times within the recording",
                 Remedy::option(OptionName::Between)
             ),
-            Self::NothingInCommon { parts } => message!(
+            Self::NoCommonTime { parts } => message!(
                 "{} have no samples at the same time, so they cannot be joined; are their clocks the same?",
-                list(parts)
+                backquoted_list(parts)
             ),
-            Self::InBoth { name, other } => message!(
+            Self::ColumnInTwoFiles { name, other } => message!(
                 "the column `{name}` is in {other} too; rename it in one of the two files, or leave one of them out"
             ),
-            Self::AcrossFiles { name } => message!(
-                "`{name}` is a sum of columns of several files, which is read from one file only; add them up in a file before"
+            Self::SumAcrossFiles { name } => message!(
+                "`{name}` is a sum of columns of several files, but a sum is read from one file only; compute it in one file first"
             ),
-            Self::NoHeader => "the first line holds numbers, but column names are expected there; \
+            Self::NoHeader => "the first line contains numbers, but column names are expected there; \
                  put a line such as `t,theta1,spindle_left` on top"
                 .into(),
             Self::UnclearSeparator { header } if header.starts_with('#') => message!(
                 "the first line must name the columns, but it is `{header}`; comment lines are not read, delete them"
             ),
             Self::UnclearSeparator { header } => message!(
-                "it cannot be told what separates the columns of `{header}`; \
+                "the separator of the columns is not clear in `{header}`; \
                  use a comma (or `;` or a tab) throughout and a point for decimals"
             ),
-            Self::UnnamedColumn { place } => message!(
-                "column {place} has no name; name it, or remove a separator at the end of the lines"
-            ),
+            Self::UnnamedColumn { place } => {
+                message!("column {place} has no name; name it, or remove a separator at the end of the lines")
+            }
             Self::DuplicateColumn {
                 name,
                 places: [a, b],
                 by_renaming,
             } => {
+                // The advice depends on whether the file or a renaming has the duplicate.
                 let what = if *by_renaming {
-                    "a renaming brings this about: leave it out, or rename the other column too"
+                    "a renaming causes this: remove it, or rename the other column too"
                 } else {
                     "give every column a name of its own"
                 };
@@ -343,26 +344,21 @@ impl Fault {
                 present,
                 by_renaming,
             } => {
+                // First what is missing, then the nearest name, all names, and how to map one.
                 let missing = if *by_renaming {
-                    format!("a renaming asks for the column `{name}`, which is not there")
+                    format!("a renaming refers to the column `{name}`, which is not there")
                 } else {
                     format!("there is no column `{name}`")
                 };
                 let meant = match nearest {
-                    Some(nearest) => format!("; is `{nearest}` meant?"),
+                    Some(nearest) => format!("; did you mean `{nearest}`?"),
                     None => ".".to_owned(),
                 };
                 let how = if *by_renaming {
-                    message!(
-                        "Renamings read {}.",
-                        Remedy::options([map("ours", "theirs")])
-                    )
+                    message!("Renamings read {}.", Remedy::options([map("ours", "theirs")]))
                 } else {
                     let theirs = nearest.as_deref().unwrap_or("THEIRS");
-                    message!(
-                        "Map one onto it with {}.",
-                        Remedy::options([map(name, theirs)])
-                    )
+                    message!("Map one onto it with {}.", Remedy::options([map(name, theirs)]))
                 };
                 message!("{missing}{meant}{} {}", columns_there(present), how)
             }
@@ -370,7 +366,7 @@ impl Fault {
                 let all: Vec<String> = missing
                     .iter()
                     .map(|(name, nearest)| match nearest {
-                        Some(nearest) => format!("`{name}` (is `{nearest}` meant?)"),
+                        Some(nearest) => format!("`{name}` (did you mean `{nearest}`?)"),
                         None => format!("`{name}`"),
                     })
                     .collect();
@@ -385,27 +381,21 @@ impl Fault {
                 )
             }
             Self::NotANumber {
-                column,
-                text,
-                count,
-                ..
+                column, text, count, ..
             } => {
-                let others = others(*count, "fields of the column are no numbers");
+                let write_other_count = write_other_count(*count, "fields of the column are not numbers");
+                // A comma between two integers is most likely a decimal comma.
                 let what = if looks_like_decimal_comma(text) {
                     "write decimals with a point"
                 } else {
                     "correct or remove it"
                 };
-                message!(
-                    "column `{column}` holds `{text}` where a number is expected{others}; {what}"
-                )
+                message!("column `{column}` contains `{text}` where a number is expected{write_other_count}; {what}")
             }
             Self::NotFinite {
-                column,
-                text,
-                count,
-                ..
+                column, text, count, ..
             } => {
+                // Finite numbers get here only if they are too large to be measurements.
                 let holds = if text.is_empty() {
                     format!("column `{column}` is empty where a number is expected")
                 } else {
@@ -413,32 +403,25 @@ impl Fault {
                         Ok(value) if value.is_finite() => "a number that was measured",
                         _ => "a finite number",
                     };
-                    format!("column `{column}` holds `{text}` where {expected} is expected")
+                    format!("column `{column}` contains `{text}` where {expected} is expected")
                 };
                 message!(
                     "{holds}{}; repair the recording, or leave such samples out with {} (they are counted)",
-                    others(*count, "fields of the column are not finite or empty"),
+                    write_other_count(*count, "fields of the column are not finite or empty"),
                     Remedy::option(OptionName::SkipBadSamples)
                 )
             }
             Self::MissingForce { drives } => message!(
                 "the measured force of {} is needed, but there is no such column; \
                  map one onto it with {}",
-                list(drives),
-                Remedy::options([map(
-                    drives.first().map_or("DRIVE", String::as_str),
-                    "THEIRS"
-                )])
+                backquoted_list(drives),
+                Remedy::options([map(drives.first().map_or("DRIVE", String::as_str), "THEIRS")])
             ),
             Self::TimeNotIncreasing { previous, here, .. } => message!(
                 "time goes from {previous} s to {here} s, but must increase from sample to sample; \
                  remove repeated samples, or split the file where the clock was reset"
             ),
-            Self::TooFewSamples {
-                have,
-                need,
-                purpose,
-            } => message!(
+            Self::TooFewSamples { have, need, purpose } => message!(
                 "{} too few for {}, which takes at least {need}; use a longer recording",
                 match have {
                     1 => "1 sample is".to_owned(),
@@ -461,7 +444,7 @@ impl Fault {
                 shortest,
                 longest,
             } => message!(
-                "a period of {period} s was asked for, but this recording can show periods from {shortest:.6} s to \
+                "a period of {period} s was requested, but this recording can show periods from {shortest:.6} s to \
                  {longest:.6} s only; choose one of them, or another smoothing"
             ),
             Self::CutoffTooLow {
@@ -469,8 +452,8 @@ impl Fault {
                 lowest_hz,
                 duration,
             } => message!(
-                "a cut-off of {cutoff_hz} Hz is too low for a recording of {duration:.4} s, of which no motion would be \
-                 left; choose one above {lowest_hz:.4} Hz, or leave {} away and have it chosen from the signal",
+                "a cut-off of {cutoff_hz} Hz is too low for a recording of {duration:.4} s, because it would remove all \
+                 motion; choose one above {lowest_hz:.4} Hz, or omit {} so that it is chosen from the signal",
                 Remedy::option(OptionName::CutoffHz)
             ),
             Self::Filter { column, error } => {
@@ -480,25 +463,23 @@ impl Fault {
     }
 }
 
-impl fmt::Display for Fault {
+impl fmt::Display for RecordingFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.message().in_library_words())
     }
 }
 
-/// Names the columns that are there.
+/// A sentence that lists the existing columns, with a hint if the header looks like a comment.
 fn columns_there(present: &[String]) -> String {
-    let mut says = format!(" The columns are: {}.", list(present));
+    let mut says = format!(" The columns are: {}.", backquoted_list(present));
     if present.first().is_some_and(|first| first.starts_with('#')) {
-        says.push_str(
-            " The first line must name the columns: comment lines are not read, delete them.",
-        );
+        says.push_str(" The first line must name the columns: comment lines are not read, delete them.");
     }
     says
 }
 
-/// Says how many other fields share the fault.
-fn others(count: usize, what: &str) -> String {
+/// The number of affected fields in parentheses; empty if there is only one.
+fn write_other_count(count: usize, what: &str) -> String {
     if count > 1 {
         format!(" ({count} {what})")
     } else {
@@ -506,6 +487,7 @@ fn others(count: usize, what: &str) -> String {
     }
 }
 
+/// Whether a text becomes a number if its only comma is replaced by a point.
 fn looks_like_decimal_comma(text: &str) -> bool {
     text.matches(',').count() == 1 && text.replace(',', ".").parse::<f64>().is_ok()
 }

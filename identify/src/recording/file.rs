@@ -1,115 +1,120 @@
-//! The file of a recording, opened once: an ordinary file is read from its place, so that it may be longer than memory;
-//! what came through a pipe, files that are in memory anyway, and tables are read from there.
+//! A recording that is opened once and read as often as needed. An ordinary file is read from disk each time, so that
+//! it may be larger than memory. The contents of pipes, files in memory and tables are kept in memory.
 
 use std::fs::File;
 use std::io::{Read, Seek};
 use std::path::Path;
 use std::sync::Arc;
 
-use modelmill_boundary::files::{Files, Opened};
+use modelmill_boundary::files::{FileSource, OpenFile};
 
-use crate::recording::error::{Fault, RecordingError};
-use crate::recording::formats::{Format, Input, LONGEST_STREAM, TELLING_BYTES, format_of};
-use crate::recording::table::{self, Table};
-use crate::recording::{ReadOptions, Recording, TableInfo, name_of_bytes};
+use crate::recording::error::{RecordingError, RecordingFault};
+use crate::recording::formats::{LONGEST_STREAM, RecordingFormat, RecordingInput, SIGNATURE_BYTES, format_of};
+use crate::recording::table::{self, MemoryTable};
+use crate::recording::{ReadOptions, SignalRecording, TableInfo, display_name_of_bytes};
 
-/// A recording that is open, to be read as often as needed.
+/// An open recording.
 pub struct RecordingFile {
+    /// Its name in messages.
     name: String,
-    source: Source,
+    /// Where its bytes are.
+    source: RecordingSource,
 }
 
-enum Source {
-    File(&'static dyn Format, File),
-    Memory(&'static dyn Format, Arc<Vec<u8>>),
-    Table(Table),
+/// Where the samples come from.
+enum RecordingSource {
+    /// A file on disk with its format.
+    File(&'static dyn RecordingFormat, File),
+    /// A complete file in memory with its format.
+    Memory(&'static dyn RecordingFormat, Arc<Vec<u8>>),
+    /// Columns in memory.
+    Table(MemoryTable),
 }
 
 impl RecordingFile {
-    /// Opens a recording; fails when it cannot be read, or is a pipe that does not end.
-    pub fn open(files: &dyn Files, path: &Path) -> Result<Self, RecordingError> {
+    /// Opens a recording. Fails when it cannot be read, or when a pipe has more bytes than `LONGEST_STREAM`.
+    pub fn open(files: &dyn FileSource, path: &Path) -> Result<Self, RecordingError> {
         let name = path.display().to_string();
         let fail = |reason: String| RecordingError {
             file: path.display().to_string(),
-            fault: Fault::Unreadable { reason },
+            fault: RecordingFault::Unreadable { reason },
         };
         let opened = files.open(path, LONGEST_STREAM);
         match opened.map_err(|error| fail(error.fault.to_string()))? {
-            Opened::File(mut file) => {
+            OpenFile::File(mut file) => {
+                // The first bytes decide the format.
                 let mut first = Vec::new();
                 (&mut file)
-                    .take(TELLING_BYTES as u64)
+                    .take(SIGNATURE_BYTES as u64)
                     .read_to_end(&mut first)
                     .map_err(|error| fail(error.to_string()))?;
                 Ok(Self {
                     name,
-                    source: Source::File(format_of(&first), file),
+                    source: RecordingSource::File(format_of(&first), file),
                 })
             }
-            Opened::Memory(bytes) => Ok(Self {
-                name: name_of_bytes(&name, &bytes),
-                source: Source::Memory(format_of(&bytes), bytes),
+            OpenFile::Memory(bytes) => Ok(Self {
+                name: display_name_of_bytes(&name, &bytes),
+                source: RecordingSource::Memory(format_of(&bytes), bytes),
             }),
         }
     }
 
-    /// A table of columns in memory; `name` is what messages call it. Fails when columns differ in length.
-    pub fn of_table(name: &str, columns: Vec<(String, Vec<f64>)>) -> Result<Self, RecordingError> {
+    /// Makes a recording of columns in memory; `name` is its name in messages. Fails when columns differ in length.
+    pub fn from_table(name: &str, columns: Vec<(String, Vec<f64>)>) -> Result<Self, RecordingError> {
         let name = format!("{name}{}", table::SUFFIX);
-        match Table::new(columns) {
+        match MemoryTable::new(columns) {
             Ok(table) => Ok(Self {
                 name,
-                source: Source::Table(table),
+                source: RecordingSource::Table(table),
             }),
             Err(fault) => Err(RecordingError { file: name, fault }),
         }
     }
 
-    /// What messages call it.
+    /// Its name in messages.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// The names of its columns as the file has them; fails when it cannot be read.
+    /// The names of its columns as in the file. Fails when the file cannot be read.
     pub fn names(&self) -> Result<Vec<String>, RecordingError> {
-        self.asked(
-            |format, input| format.names(input),
-            |table| Ok(table.names()),
-        )
+        self.dispatch_to_source(|format, input| format.names(input), |table| Ok(table.names()))
     }
 
-    /// What it holds, table by table or topic by topic; fails when it cannot be read.
+    /// Its tables or topics with their columns. Fails when the file cannot be read.
     pub fn tables(&self) -> Result<Vec<TableInfo>, RecordingError> {
-        self.asked(
+        self.dispatch_to_source(
             |format, input| format.tables(input),
-            |table| Ok(vec![table.info()]),
+            |table| Ok(vec![table.table_info()]),
         )
     }
 
-    /// Reads it; fails as [`Recording::read`] does.
-    pub fn read(&self, options: &ReadOptions) -> Result<Recording, RecordingError> {
-        self.asked(
+    /// Reads it with the given options. Fails as [`SignalRecording::read`] does.
+    pub fn read(&self, options: &ReadOptions) -> Result<SignalRecording, RecordingError> {
+        self.dispatch_to_source(
             |format, input| format.read(input, &self.name, options),
             |table| table.read(&self.name, options),
         )
     }
 
-    /// What its format says of all of it, from its beginning.
-    fn asked<T>(
+    /// Calls the function for its kind of source, with input that starts at the first byte; adds the name to faults.
+    fn dispatch_to_source<T>(
         &self,
-        of_format: impl FnOnce(&dyn Format, Input<'_>) -> Result<T, Fault>,
-        of_table: impl FnOnce(&Table) -> Result<T, Fault>,
+        of_format: impl FnOnce(&dyn RecordingFormat, RecordingInput<'_>) -> Result<T, RecordingFault>,
+        of_table: impl FnOnce(&MemoryTable) -> Result<T, RecordingFault>,
     ) -> Result<T, RecordingError> {
         let answer = match &self.source {
-            Source::Table(table) => of_table(table),
-            Source::Memory(format, bytes) => of_format(*format, Input::Bytes(bytes)),
-            Source::File(format, file) => {
+            RecordingSource::Table(table) => of_table(table),
+            RecordingSource::Memory(format, bytes) => of_format(*format, RecordingInput::Bytes(bytes)),
+            // The handle is shared, so the position must be reset before each read.
+            RecordingSource::File(format, file) => {
                 let rewound = file.try_clone().and_then(|mut file| {
                     file.rewind()?;
-                    Ok(Input::File(file))
+                    Ok(RecordingInput::File(file))
                 });
                 rewound
-                    .map_err(|error| Fault::Unreadable {
+                    .map_err(|error| RecordingFault::Unreadable {
                         reason: error.to_string(),
                     })
                     .and_then(|input| of_format(*format, input))
@@ -118,7 +123,8 @@ impl RecordingFile {
         answer.map_err(|fault| self.fault(fault))
     }
 
-    pub(crate) fn fault(&self, fault: Fault) -> RecordingError {
+    /// A fault of this recording.
+    pub(crate) fn fault(&self, fault: RecordingFault) -> RecordingError {
         RecordingError {
             file: self.name.clone(),
             fault,

@@ -1,52 +1,64 @@
-//! Samples of a recording on their way into memory, whatever the format of the file: names are checked and
-//! changed, columns that nobody needs are passed over, and fields that are no numbers are noted with their place.
+//! Takes the samples of a recording into memory, whatever the format of the file. Names are checked and renamed,
+//! columns that are not needed are skipped, and fields that are not numbers are recorded with their place.
+//!
+//! A reader creates a [`SampleIntake`], passes each sample to it, and gets the recording from `finish`.
 
 use indexmap::IndexMap;
 
-use crate::recording::Recording;
-use crate::recording::column::{Column, Defect, Field, missing};
-use crate::recording::error::Fault;
-use crate::recording::notes::Note;
-use crate::recording::options::{Computed, NotFinite, ReadOptions};
+use crate::recording::SignalRecording;
+use crate::recording::column::{ColumnDefect, SampleField, SignalColumn, missing_column_fault};
+use crate::recording::error::RecordingFault;
+use crate::recording::notes::RecordingNote;
+use crate::recording::options::{ComputedColumn, NonFinitePolicy, ReadOptions};
 use crate::words::count_of;
 
-/// Whether more samples are wanted.
+/// Whether the reader should continue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Flow {
+pub(crate) enum IntakeFlow {
+    /// Continue with the next sample.
     Go,
+    /// No later sample is needed.
     Stop,
 }
 
-/// Takes samples one by one.
-pub(crate) struct Intake<'a> {
+/// Takes samples one by one and collects the columns that are needed.
+pub(crate) struct SampleIntake<'a> {
+    /// What the caller wants to read.
     options: &'a ReadOptions,
+    /// Names of the columns in the file.
     theirs: Vec<String>,
+    /// Names after renaming, in the order of the file.
     names: Vec<String>,
-    /// Places of the columns that are kept.
+    /// Whether each column is kept.
     kept: Vec<bool>,
-    /// Places of columns that only those need of which single values may be missing.
+    /// Whether single values of each column may be missing.
     may_lack: Vec<bool>,
-    columns: Vec<Column>,
+    /// The columns by their position in the file; empty if they are not kept.
+    columns: Vec<SignalColumn>,
+    /// Line or row of each sample that was taken.
     lines: Vec<u64>,
-    /// The first sample that was left out, and how many were.
+    /// Line of the first sample that was left out for a bad field, and the number of such samples.
     left_out: Option<(u64, usize)>,
-    /// How the time of a sample follows from its fields, where samples are chosen by it.
+    /// The time as a sum of fields, by position and factor, and a constant; only if samples are selected by time.
     time: Option<(Vec<(usize, f64)>, f64)>,
+    /// Number of samples before the time interval.
     before: usize,
-    /// The line from which on nothing was read.
+    /// The line at which reading stopped, because the time interval had ended.
     stopped: Option<u64>,
-    notes: Vec<Note>,
+    /// Notes for the user.
+    notes: Vec<RecordingNote>,
 }
 
-impl<'a> Intake<'a> {
-    /// Ready for samples of columns that the file calls `theirs`.
-    /// Fails when names are missing or double, or a renaming or computed column asks for one that is not there.
-    pub(crate) fn new(theirs: Vec<String>, options: &'a ReadOptions) -> Result<Self, Fault> {
+impl<'a> SampleIntake<'a> {
+    /// Prepares for samples of columns that the file calls `theirs`. Fails when names are missing or duplicate, or
+    /// when a renaming or computed column refers to a column that does not exist.
+    pub(crate) fn new(theirs: Vec<String>, options: &'a ReadOptions) -> Result<Self, RecordingFault> {
         check_names(&theirs)?;
         let place = |name: &String| {
             let place = theirs.iter().position(|other| other == name);
-            place.ok_or_else(|| missing(name, theirs.iter().map(String::as_str), true))
+            place.ok_or_else(|| missing_column_fault(name, theirs.iter().map(String::as_str), true))
         };
+        // Columns that computed ones are made of are read even if they are not wanted.
         let mut sources = Vec::new();
         for computed in &options.computed {
             for (name, _) in &computed.terms {
@@ -54,7 +66,7 @@ impl<'a> Intake<'a> {
             }
         }
         let mut names = rename(&theirs, &options.renames)?;
-        // A computed column takes the place of one that the file calls so.
+        // A computed column replaces a column of the same name in the file, which gets another name.
         for computed in &options.computed {
             for (name, of_theirs) in names.iter_mut().zip(&theirs) {
                 if *name == computed.name {
@@ -63,17 +75,20 @@ impl<'a> Intake<'a> {
             }
         }
         find_duplicate(&names, true)?;
+        // Without a list of wanted columns all of them are wanted.
         let is_wanted = |name: &String| {
             let wanted = options.wanted.as_ref();
             wanted.is_none_or(|wanted| wanted.contains(name))
         };
+        // Wanted columns are kept; columns that may lack values do not cause a sample to be left out.
         let mut kept: Vec<bool> = names.iter().map(is_wanted).collect();
-        let is_optional = |name: &String| options.may_lack.contains(name);
+        let is_optional = |name: &String| options.may_be_missing.contains(name);
         let mut may_lack: Vec<bool> = names.iter().map(is_optional).collect();
         for (name, may_lack) in names.iter().zip(&mut may_lack) {
-            // A column that nobody wants by itself is a source of computed ones.
+            // An unwanted column is only a source of computed ones, which decide below whether it may lack values.
             *may_lack |= !is_wanted(name);
         }
+        // A source must be complete if any computed column that needs it must be.
         for computed in &options.computed {
             for (name, _) in &computed.terms {
                 may_lack[place(name)?] &= is_optional(&computed.name);
@@ -82,26 +97,25 @@ impl<'a> Intake<'a> {
         for place in sources {
             kept[place] = true;
         }
-        let time = match options.between {
+        // The time is needed to select samples; it may be computed itself.
+        let time = match options.time_interval {
             None => None,
             Some(_) => match options.computed.iter().find(|one| one.name == "t") {
-                Some(Computed { terms, offset, .. }) => {
-                    let terms = terms
-                        .iter()
-                        .map(|(name, factor)| Ok((place(name)?, *factor)));
-                    Some((terms.collect::<Result<Vec<_>, Fault>>()?, *offset))
+                Some(ComputedColumn { terms, offset, .. }) => {
+                    let terms = terms.iter().map(|(name, factor)| Ok((place(name)?, *factor)));
+                    Some((terms.collect::<Result<Vec<_>, RecordingFault>>()?, *offset))
                 }
                 None => match names.iter().position(|name| name == "t") {
                     Some(place) => Some((vec![(place, 1.0)], 0.0)),
                     None => {
-                        return Err(missing("t", names.iter().map(String::as_str), false));
+                        return Err(missing_column_fault("t", names.iter().map(String::as_str), false));
                     }
                 },
             },
         };
         Ok(Self {
             options,
-            columns: vec![Column::default(); names.len()],
+            columns: vec![SignalColumn::default(); names.len()],
             theirs,
             names,
             kept,
@@ -115,50 +129,52 @@ impl<'a> Intake<'a> {
         })
     }
 
-    /// Fields of a sample.
+    /// Number of fields of a sample.
     pub(crate) fn width(&self) -> usize {
         self.names.len()
     }
 
-    /// Whether the fields at this place are looked at.
-    pub(crate) fn reads(&self, place: usize) -> bool {
-        self.kept[place] || place_in(self.time.as_ref(), place)
+    /// Whether the field at this position is used; readers may skip all others.
+    pub(crate) fn is_place_needed(&self, place: usize) -> bool {
+        self.kept[place] || is_time_place(self.time.as_ref(), place)
     }
 
-    /// A remark on the file.
-    pub(crate) fn note(&mut self, note: Note) {
+    /// Adds a note about the file.
+    pub(crate) fn note(&mut self, note: RecordingNote) {
         self.notes.push(note);
     }
 
-    /// Takes a sample; `text` gives a field as it stands in the file, for messages.
-    /// Fails when more numbers would be kept than allowed.
-    pub(crate) fn take(
+    /// Takes a sample from a line; `text` returns a field as it stands in the file, for messages. Fails when more
+    /// numbers would be kept than allowed.
+    pub(crate) fn take_sample(
         &mut self,
         line: u64,
-        sample: &[Field],
+        sample: &[SampleField],
         text: &dyn Fn(usize) -> String,
-    ) -> Result<Flow, Fault> {
-        if let (Some((from, to)), Some(time)) = (self.options.between, self.time_of(sample)) {
+    ) -> Result<IntakeFlow, RecordingFault> {
+        // First the time interval: times increase, so the first time behind it ends the reading.
+        if let (Some((from, to)), Some(time)) = (self.options.time_interval, self.time_of(sample)) {
             if time < from {
                 self.before += 1;
-                return Ok(Flow::Go);
+                return Ok(IntakeFlow::Go);
             }
             if time > to {
                 self.stopped = Some(line);
-                return Ok(Flow::Stop);
+                return Ok(IntakeFlow::Stop);
             }
         }
+        // Then bad fields: a sample is left out if a field that must be present is bad.
         let is_read = |place: usize| self.kept[place] && !self.may_lack[place];
-        if self.options.not_finite == NotFinite::LeaveOut
-            && (0..sample.len()).any(|i| is_read(i) && sample[i] == Field::NotFinite)
+        if self.options.not_finite == NonFinitePolicy::LeaveOut
+            && (0..sample.len()).any(|i| is_read(i) && sample[i] == SampleField::NotFinite)
         {
             self.left_out.get_or_insert((line, 0)).1 += 1;
-            return Ok(Flow::Go);
+            return Ok(IntakeFlow::Go);
         }
         let n_kept = self.kept.iter().filter(|kept| **kept).count() + self.options.computed.len();
-        // The line of each sample is kept with its numbers.
-        if (self.lines.len() + 1) * (n_kept + 1) > self.options.most_numbers {
-            return Err(Fault::TooLarge {
+        // The line of each sample is kept with its numbers, so it counts, too.
+        if (self.lines.len() + 1) * (n_kept + 1) > self.options.max_numbers {
+            return Err(RecordingFault::TooLarge {
                 line,
                 samples: self.lines.len(),
                 columns: n_kept,
@@ -171,64 +187,65 @@ impl<'a> Intake<'a> {
                 self.columns[place].push(sample[place], line, &|| text(place));
             }
         }
-        Ok(Flow::Go)
+        Ok(IntakeFlow::Go)
     }
 
-    fn time_of(&self, sample: &[Field]) -> Option<f64> {
+    /// The time of a sample; `None` if a field of it is not a number.
+    fn time_of(&self, sample: &[SampleField]) -> Option<f64> {
         let (terms, offset) = self.time.as_ref()?;
         let mut time = *offset;
         for (place, factor) in terms {
             match sample[*place] {
-                Field::Number(value) => time += factor * value,
-                // What has no time is kept: the check of time will name it.
-                Field::NotFinite | Field::Text => return None,
+                SampleField::Number(value) => time += factor * value,
+                // A sample without a time is kept; the check of the time column reports it.
+                SampleField::NotFinite | SampleField::Text => return None,
             }
         }
         Some(time)
     }
 
-    /// First and last time that were taken, where they are known.
+    /// First and last time that were taken, if the file has a column `t`.
     fn last_time(&self) -> Option<(f64, f64)> {
         let place = self.names.iter().position(|name| name == "t")?;
         let column = &self.columns[place].values;
         Some((*column.first()?, *column.last()?))
     }
 
-    /// The recording; fails when there are no samples.
-    pub(crate) fn finish(self, file: &str) -> Result<Recording, Fault> {
+    /// Completes the recording, which messages call `file`. Fails when there are no samples.
+    pub(crate) fn finish(self, file: &str) -> Result<SignalRecording, RecordingFault> {
+        // An empty result has another cause if a time interval was requested.
         if self.lines.is_empty() {
-            if let (Some((from, to)), true) = (
-                self.options.between,
-                self.before > 0 || self.stopped.is_some(),
-            ) {
-                return Err(Fault::NoneBetween { from, to });
+            if let (Some((from, to)), true) = (self.options.time_interval, self.before > 0 || self.stopped.is_some()) {
+                return Err(RecordingFault::NoSamplesInInterval { from, to });
             }
-            return Err(Fault::NoSamples);
+            return Err(RecordingFault::NoSamples);
         }
+        // Notes on samples that were skipped or left out.
         let mut notes = self.notes;
-        if let Some((from, to)) = self.options.between {
+        if let Some((from, to)) = self.options.time_interval {
             let rest = match self.stopped {
-                Some(line) => format!(", and nothing from line {line} on"),
+                Some(line) => format!(", and all from line {line} on"),
                 None => String::new(),
             };
-            notes.push(Note::info(format!(
-                "Of {file} the {} from t = {from} s to {to} s are read; {} before{rest} {} not.",
+            notes.push(RecordingNote::info(format!(
+                "Of {file} only the {} from t = {from} s to {to} s are read; {} before{rest} {} skipped.",
                 count_of(self.lines.len(), "sample", "samples"),
                 count_of(self.before, "sample", "samples"),
                 if self.before == 1 { "is" } else { "are" },
             )));
         }
         if let Some((first, n)) = self.left_out {
-            notes.push(Note::warning(format!(
+            notes.push(RecordingNote::warning(format!(
                 "{n} of {} samples of {file} {} NaN, infinite or empty fields and {} left out, the first in line {first}.",
                 n + self.lines.len(),
-                if n == 1 { "holds" } else { "hold" },
+                if n == 1 { "contains" } else { "contain" },
                 if n == 1 { "is" } else { "are" },
             )));
         }
+        // Computed columns come from the kept columns, before these are sorted by whether they are wanted.
         let mut computed = IndexMap::new();
         for one in &self.options.computed {
-            computed.insert(one.name.clone(), compute(one, &self.theirs, &self.columns));
+            computed.insert(one.name.clone(), compute_column(one, &self.theirs, &self.columns));
         }
         let wanted = self.options.wanted.as_ref();
         let mut columns = IndexMap::new();
@@ -241,20 +258,21 @@ impl<'a> Intake<'a> {
             }
         }
         columns.extend(computed);
+        // Columns with defects are reported now, and refused when they are used.
         for (name, column) in &columns {
             for (defect, what) in [
-                (&column.text, "text that is no number"),
+                (&column.text, "text that is not a number"),
                 (&column.not_finite, "NaN, infinite or empty fields"),
             ] {
-                if let Some(Defect { line, count, .. }) = defect {
-                    notes.push(Note::warning(format!(
-                        "Column `{name}` of {file} holds {what} ({}, the first in line {line}) and cannot be used.",
+                if let Some(ColumnDefect { line, count, .. }) = defect {
+                    notes.push(RecordingNote::warning(format!(
+                        "Column `{name}` of {file} contains {what} ({}, the first in line {line}) and cannot be used.",
                         count_of(*count, "field", "fields")
                     )));
                 }
             }
         }
-        Ok(Recording {
+        Ok(SignalRecording {
             file: file.to_owned(),
             columns,
             others,
@@ -264,13 +282,14 @@ impl<'a> Intake<'a> {
     }
 }
 
-fn place_in(time: Option<&(Vec<(usize, f64)>, f64)>, place: usize) -> bool {
+/// Whether the time is computed from the field at this position.
+fn is_time_place(time: Option<&(Vec<(usize, f64)>, f64)>, place: usize) -> bool {
     time.is_some_and(|(terms, _)| terms.iter().any(|(other, _)| *other == place))
 }
 
-/// The sum of columns; what is wrong with any of them is wrong with the sum.
-fn compute(computed: &Computed, theirs: &[String], columns: &[Column]) -> Column {
-    let mut sum = Column::default();
+/// A computed column: `offset + sum of factor * column`. Defects of any term are defects of the sum.
+fn compute_column(computed: &ComputedColumn, theirs: &[String], columns: &[SignalColumn]) -> SignalColumn {
+    let mut sum = SignalColumn::default();
     for (name, factor) in &computed.terms {
         let Some(place) = theirs.iter().position(|other| other == name) else {
             continue;
@@ -288,20 +307,22 @@ fn compute(computed: &Computed, theirs: &[String], columns: &[Column]) -> Column
     sum
 }
 
-fn check_names(names: &[String]) -> Result<(), Fault> {
+/// Fails when a column has no name, or two have the same.
+fn check_names(names: &[String]) -> Result<(), RecordingFault> {
     for (i, name) in names.iter().enumerate() {
         if name.is_empty() {
-            return Err(Fault::UnnamedColumn { place: i + 1 });
+            return Err(RecordingFault::UnnamedColumn { place: i + 1 });
         }
     }
     find_duplicate(names, false)
 }
 
-fn find_duplicate(names: &[String], by_renaming: bool) -> Result<(), Fault> {
+/// Fails when two names are equal; positions in the fault count from 1.
+fn find_duplicate(names: &[String], by_renaming: bool) -> Result<(), RecordingFault> {
     let mut seen = std::collections::BTreeMap::new();
     for (i, name) in names.iter().enumerate() {
         if let Some(first) = seen.insert(name, i) {
-            return Err(Fault::DuplicateColumn {
+            return Err(RecordingFault::DuplicateColumn {
                 name: name.clone(),
                 places: [first + 1, i + 1],
                 by_renaming,
@@ -311,18 +332,22 @@ fn find_duplicate(names: &[String], by_renaming: bool) -> Result<(), Fault> {
     Ok(())
 }
 
-fn rename(names: &[String], renames: &[(String, String)]) -> Result<Vec<String>, Fault> {
+/// Applies renamings `(ours, theirs)`. Fails when a name occurs twice in them, or a column does not exist.
+fn rename(names: &[String], renames: &[(String, String)]) -> Result<Vec<String>, RecordingFault> {
     let mut renamed = names.to_vec();
     for (i, (ours, theirs)) in renames.iter().enumerate() {
+        // Each column and each new name may occur once.
         if renames[..i].iter().any(|(o, t)| o == ours || t == theirs) {
             let twice_ours = renames[..i].iter().any(|(o, _)| o == ours);
-            return Err(Fault::DuplicateRenaming {
+            return Err(RecordingFault::DuplicateRenaming {
                 name: if twice_ours { ours } else { theirs }.clone(),
             });
         }
         match names.iter().position(|name| name == theirs) {
             Some(place) => renamed[place].clone_from(ours),
-            None => return Err(missing(theirs, names.iter().map(String::as_str), true)),
+            None => {
+                return Err(missing_column_fault(theirs, names.iter().map(String::as_str), true));
+            }
         }
     }
     Ok(renamed)

@@ -1,45 +1,48 @@
-//! Columns that were sampled at different times, such as topics of a log or files of one run: each with its times go in,
-//! rows with a value of every column come out.
+//! Joins columns that were sampled at different times, such as topics of a log or files of one run. Columns with
+//! their times go in, rows with a value of every column come out.
 //!
-//! The slowest part gives the times, so that no samples are invented; the others are interpolated linearly between the two
-//! samples around. Rows for which a part has no samples nearby are left out.
+//! The slowest part gives the sample times, so that no samples are invented. The other parts are interpolated
+//! linearly between their two neighbouring samples. Rows without neighbouring samples in some part are left out.
 //!
-//! Decision: interpolation to the fastest rate would count samples that nobody took, and standard deviations would
-//! be too small.
+//! Decision: interpolation to the fastest rate would count samples that were never measured, and standard deviations
+//! would be too small.
 
-use crate::recording::error::Fault;
-use crate::recording::gaps::GAP;
-use crate::recording::notes::Note;
+use crate::recording::error::RecordingFault;
+use crate::recording::notes::RecordingNote;
+use crate::recording::thresholds::{EQUALLY_SLOW_SHARE, GAP_LEAST_STEPS};
 use crate::signal::median;
-use crate::words::{count_of, list};
+use crate::words::{backquoted_list, count_of};
 
 /// Columns with the same times.
 #[derive(Debug)]
-pub(crate) struct Part {
-    /// What messages call it.
+pub(crate) struct JoinPart {
+    /// Its name in messages.
     pub(crate) name: String,
     /// Times of the samples, s.
     pub(crate) time: Vec<f64>,
-    /// Values by the place where they go.
+    /// Values, each with the position of its column in the result.
     pub(crate) columns: Vec<(usize, Vec<f64>)>,
 }
 
-/// Columns that have all the same times.
+/// Columns with common times.
 #[derive(Debug)]
-pub(crate) struct Joined {
+pub(crate) struct JoinedColumns {
+    /// Times of the rows, s.
     pub(crate) time: Vec<f64>,
+    /// Values, each with the position of its column in the result.
     pub(crate) columns: Vec<(usize, Vec<f64>)>,
 }
 
-/// Joins parts; `None` if there are none. `tell` hears what was done.
+/// Joins parts; `None` if there are none. `tell` receives notes about what was done.
 ///
 /// Fails when the times of a part do not increase, or parts have no time in common.
-pub(crate) fn joined(
-    mut parts: Vec<Part>,
-    tell: &mut dyn FnMut(Note),
-) -> Result<Option<Joined>, Fault> {
+pub(crate) fn join_parts(
+    mut parts: Vec<JoinPart>,
+    tell: &mut dyn FnMut(RecordingNote),
+) -> Result<Option<JoinedColumns>, RecordingFault> {
+    // A single part needs no interpolation.
     if parts.len() < 2 {
-        return Ok(parts.pop().map(|part| Joined {
+        return Ok(parts.pop().map(|part| JoinedColumns {
             time: part.time,
             columns: part.columns,
         }));
@@ -49,28 +52,27 @@ pub(crate) fn joined(
     }
     let steps: Vec<f64> = parts.iter().map(usual_step).collect();
     let slowest = steps.iter().copied().fold(0.0, f64::max);
-    // Of those that are equally slow the one with the most columns, and of these the first.
+    // Among equally slow parts the one with the most columns is the base; among these the first.
     let base = (0..parts.len())
-        .filter(|i| steps[*i] >= 0.99 * slowest)
+        .filter(|i| steps[*i] >= EQUALLY_SLOW_SHARE * slowest)
         .rev()
         .max_by_key(|i| parts[*i].columns.len())
         .unwrap_or(0);
     let base_step = steps[base];
-    let others_steps: Vec<f64> = (0..steps.len())
-        .filter(|i| *i != base)
-        .map(|i| steps[i])
-        .collect();
+    let others_steps: Vec<f64> = (0..steps.len()).filter(|i| *i != base).map(|i| steps[i]).collect();
     let names: Vec<String> = parts.iter().map(|part| part.name.clone()).collect();
     let base = parts.remove(base);
     let n = base.time.len();
     let mut is_covered = vec![true; n];
     let mut others = Vec::new();
     let mut columns = base.columns;
+    // Interpolate every other part to the times of the base.
     for (part, step) in parts.into_iter().zip(others_steps) {
+        // The neighbouring samples of each row; none in a gap of this part.
         let around: Vec<Option<(usize, f64)>> = base
             .time
             .iter()
-            .map(|t| place_of(*t, &part.time, GAP * step.max(base_step)))
+            .map(|t| find_sample(*t, &part.time, GAP_LEAST_STEPS * step.max(base_step)))
             .collect();
         for (covered, around) in is_covered.iter_mut().zip(&around) {
             *covered &= around.is_some();
@@ -79,45 +81,42 @@ pub(crate) fn joined(
             others.push(part.name);
         }
         for (place, values) in part.columns {
+            // The first sample of the pair, plus the share of the way to the second one.
             let value = |around: &Option<(usize, f64)>| match around {
-                Some((k, share)) if *share != 0.0 => {
-                    values[*k] + share * (values[k + 1] - values[*k])
-                }
+                Some((k, share)) if *share != 0.0 => values[*k] + share * (values[k + 1] - values[*k]),
                 Some((k, _)) => values[*k],
                 None => f64::NAN,
             };
             columns.push((place, around.iter().map(value).collect()));
         }
     }
+    // A row is kept only if all parts have neighbouring samples.
     let covered = is_covered.iter().filter(|covered| **covered).count();
     if covered == 0 {
-        return Err(Fault::NothingInCommon { parts: names });
+        return Err(RecordingFault::NoCommonTime { parts: names });
     }
     if !others.is_empty() {
-        tell(Note::info(format!(
-            "Samples are those of `{}`, {base_step:.3e} s apart; {} {} taken at their times, between samples by straight \
-             lines.",
+        tell(RecordingNote::info(format!(
+            "The sample times are those of `{}`, {base_step:.3e} s apart; {} {} interpolated linearly to them.",
             base.name,
-            list(&others),
+            backquoted_list(&others),
             if others.len() == 1 { "is" } else { "are" },
         )));
     }
     if covered < n {
-        tell(Note::warning(format!(
-            "{} of `{}` {} not between samples of all others and left out.",
+        tell(RecordingNote::warning(format!(
+            "{} of `{}` {} left out, because another part has no samples around that time.",
             count_of(n - covered, "sample", "samples"),
             base.name,
             if n - covered == 1 { "is" } else { "are" },
         )));
     }
+    // Remove the rows that are left out from all columns.
     let kept = |values: Vec<f64>| -> Vec<f64> {
         let pairs = values.into_iter().zip(&is_covered);
-        pairs
-            .filter(|(_, covered)| **covered)
-            .map(|(value, _)| value)
-            .collect()
+        pairs.filter(|(_, covered)| **covered).map(|(value, _)| value).collect()
     };
-    Ok(Some(Joined {
+    Ok(Some(JoinedColumns {
         time: kept(base.time),
         columns: columns
             .into_iter()
@@ -126,10 +125,12 @@ pub(crate) fn joined(
     }))
 }
 
-fn check_increasing(part: &Part) -> Result<(), Fault> {
+/// Fails when the times of a part do not increase; lines count from 1 with the header.
+fn check_increasing(part: &JoinPart) -> Result<(), RecordingFault> {
     for (k, pair) in part.time.windows(2).enumerate() {
+        // A comparison with NaN fails as well.
         if pair[1].partial_cmp(&pair[0]) != Some(std::cmp::Ordering::Greater) {
-            return Err(Fault::TimeNotIncreasing {
+            return Err(RecordingFault::TimeNotIncreasing {
                 line: k as u64 + 2,
                 previous: pair[0],
                 here: pair[1],
@@ -139,12 +140,14 @@ fn check_increasing(part: &Part) -> Result<(), Fault> {
     Ok(())
 }
 
-fn usual_step(part: &Part) -> f64 {
+/// Median step of time of a part, s.
+fn usual_step(part: &JoinPart) -> f64 {
     median(part.time.windows(2).map(|pair| pair[1] - pair[0]).collect())
 }
 
-/// The sample at or before `t` with the share of the way to the next one; `None` outside, and in gaps longer than `gap`.
-fn place_of(t: f64, times: &[f64], gap: f64) -> Option<(usize, f64)> {
+/// The sample at or before `t`, and the share of the way to the next one. `None` outside of the times, and in gaps
+/// longer than `gap`, s.
+fn find_sample(t: f64, times: &[f64], gap: f64) -> Option<(usize, f64)> {
     let after = times.partition_point(|other| *other <= t);
     let k = after.checked_sub(1)?;
     if times[k].total_cmp(&t).is_eq() {

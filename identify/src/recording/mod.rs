@@ -1,8 +1,8 @@
 //! Recordings: a file of any format of the list in `formats` goes in, named columns of numbers come out.
 //!
-//! A column that holds something else than numbers harms only those who ask for it: it is named in
-//! the notes, and [`Recording::column`] refuses it with the line at fault.
-//! [`Recording::states`](crate::recording::Recording::states) makes a [`Run`](crate::Run) of it.
+//! A column with anything else than numbers is a fault only for callers that use it. The notes name it, and
+//! [`SignalRecording::column`] refuses it with the line of the first bad field. `SignalRecording::states` makes a
+//! [`PreparedRun`](crate::PreparedRun) of a recording.
 
 mod column;
 mod error;
@@ -11,41 +11,46 @@ mod formats;
 mod gaps;
 mod intake;
 mod join;
+mod joined_files;
 pub(crate) mod notes;
 mod options;
 mod read;
 mod repair;
 mod table;
 mod tables;
-mod together;
+mod thresholds;
 
 use indexmap::IndexMap;
 
-use crate::words::nearest;
-pub use error::{Fault, RecordingError};
+use crate::words::nearest_name;
+pub use error::{RecordingError, RecordingFault};
 pub use file::RecordingFile;
-pub use notes::{Note, Severity};
-pub use options::{Computed, NotFinite, ReadOptions};
-pub use read::{has_ending_of_a_recording, name_of_bytes, place_word};
+pub use joined_files::RecordingFiles;
+pub use notes::{NoteSeverity, RecordingNote};
+pub use options::{ComputedColumn, NonFinitePolicy, ReadOptions};
+pub use read::{display_name_of_bytes, has_recording_extension, sample_place_word};
 pub use tables::{ColumnInfo, TableInfo};
-pub use together::RecordingFiles;
 
-use column::{Column, Defect, missing};
-pub(crate) use gaps::GAP;
+use column::{ColumnDefect, SignalColumn, missing_column_fault};
+pub(crate) use thresholds::GAP_LEAST_STEPS;
 
-/// A recording in memory: columns of equal length by name, in the file's order.
+/// A recording in memory: columns of equal length by name, in the order of the file.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Recording {
+pub struct SignalRecording {
+    /// Name of the file in messages.
     pub(crate) file: String,
-    pub(crate) columns: IndexMap<String, Column>,
+    /// Columns by their names after renaming; computed ones at the end.
+    pub(crate) columns: IndexMap<String, SignalColumn>,
     /// Names of the columns of the file that were not needed.
     pub(crate) others: Vec<String>,
+    /// Line or row of each sample in the file, from 1.
     pub(crate) lines: Vec<u64>,
-    pub(crate) notes: Vec<Note>,
+    /// Notes on the file and on what was done with it.
+    pub(crate) notes: Vec<RecordingNote>,
 }
 
-impl Recording {
-    /// What messages call the recording.
+impl SignalRecording {
+    /// Name of the recording in messages.
     pub fn file(&self) -> &str {
         &self.file
     }
@@ -55,20 +60,21 @@ impl Recording {
         self.lines.len()
     }
 
-    /// Names of all columns after renaming, those that were not needed at the end.
+    /// Names of all columns after renaming; those that were not needed come last.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         let others = self.others.iter().map(String::as_str);
         self.columns.keys().map(String::as_str).chain(others)
     }
 
     /// Whether there is a column of that name.
-    pub fn has(&self, name: &str) -> bool {
+    pub fn has_column(&self, name: &str) -> bool {
         self.columns.contains_key(name)
     }
 
-    /// Samples whose value of a column joins its neighbours, since none was measured or a sensor failed; `None` if there are none.
-    pub(crate) fn lost(&self, name: &str) -> Option<&[bool]> {
-        let lost = &self.columns.get(name)?.lost;
+    /// Samples of a column with interpolated values, because none was measured or a sensor failed; `None` if there
+    /// are none.
+    pub(crate) fn lost_samples(&self, name: &str) -> Option<&[bool]> {
+        let lost = &self.columns.get(name)?.interpolated;
         lost.contains(&true).then_some(lost.as_slice())
     }
 
@@ -77,27 +83,28 @@ impl Recording {
         self.lines.get(sample).copied()
     }
 
-    /// What the user should know about the file.
-    pub fn notes(&self) -> &[Note] {
+    /// Notes on the file for the user.
+    pub fn notes(&self) -> &[RecordingNote] {
         &self.notes
     }
 
-    /// The numbers of a column, one per sample.
-    /// Fails when it is not there or holds fields that are no finite numbers.
+    /// The numbers of a column, one per sample. Fails when the column does not exist, or has fields that are not
+    /// finite numbers.
     pub fn column(&self, name: &str) -> Result<&[f64], RecordingError> {
         let Some(column) = self.columns.get(name) else {
-            return Err(self.fault(missing(name, self.names(), false)));
+            return Err(self.fault(missing_column_fault(name, self.names(), false)));
         };
-        if let Some(Defect { line, text, count }) = column.text.clone() {
-            return Err(self.fault(Fault::NotANumber {
+        // Text is reported before missing values, because it is the more serious defect.
+        if let Some(ColumnDefect { line, text, count }) = column.text.clone() {
+            return Err(self.fault(RecordingFault::NotANumber {
                 column: name.to_owned(),
                 line,
                 text,
                 count,
             }));
         }
-        if let Some(Defect { line, text, count }) = column.not_finite.clone() {
-            return Err(self.fault(Fault::NotFinite {
+        if let Some(ColumnDefect { line, text, count }) = column.not_finite.clone() {
+            return Err(self.fault(RecordingFault::NotFinite {
                 column: name.to_owned(),
                 line,
                 text,
@@ -107,65 +114,55 @@ impl Recording {
         Ok(&column.values)
     }
 
-    /// The numbers of a column, as [`Recording::column`]; columns of the names `wanted` are not proposed for it.
-    pub(crate) fn column_beside(
-        &self,
-        name: &str,
-        wanted: &[String],
-    ) -> Result<&[f64], RecordingError> {
-        if self.has(name) {
+    /// The numbers of a column, as [`Self::column`]. Columns named in `wanted` are not suggested for a missing one.
+    pub(crate) fn column_without_suggesting(&self, name: &str, wanted: &[String]) -> Result<&[f64], RecordingError> {
+        if self.has_column(name) {
             return self.column(name);
         }
-        let others = self
-            .names()
-            .filter(|name| !wanted.iter().any(|w| w == name));
-        let proposed = nearest(name, others).map(str::to_owned);
-        let mut fault = missing(name, self.names(), false);
-        if let Fault::MissingColumn { nearest, .. } = &mut fault {
+        let others = self.names().filter(|name| !wanted.iter().any(|w| w == name));
+        let proposed = nearest_name(name, others).map(str::to_owned);
+        let mut fault = missing_column_fault(name, self.names(), false);
+        if let RecordingFault::MissingColumn { nearest, .. } = &mut fault {
             *nearest = proposed;
         }
         Err(self.fault(fault))
     }
 
-    /// Fails when more than one of the names `needed` is no column, and says all of them at once; columns of the names `wanted`
-    /// are not proposed, and none twice.
-    pub(crate) fn check_columns(
-        &self,
-        needed: &[String],
-        wanted: &[String],
-    ) -> Result<(), RecordingError> {
-        let missing: Vec<&String> = needed.iter().filter(|name| !self.has(name)).collect();
+    /// Fails when more than one of the columns `needed` does not exist, and reports all of them at once. Columns
+    /// named in `wanted` are not suggested, and no column is suggested twice.
+    pub(crate) fn check_columns(&self, needed: &[String], wanted: &[String]) -> Result<(), RecordingError> {
+        let missing: Vec<&String> = needed.iter().filter(|name| !self.has_column(name)).collect();
+        // A single missing column has its own fault.
         if missing.len() < 2 {
             return Ok(());
         }
-        let mut others: Vec<&str> = self
-            .names()
-            .filter(|name| !wanted.iter().any(|w| w == name))
-            .collect();
+        let mut others: Vec<&str> = self.names().filter(|name| !wanted.iter().any(|w| w == name)).collect();
         let missing = missing.into_iter().map(|name| {
-            let found = nearest(name, others.iter().copied()).map(str::to_owned);
+            let found = nearest_name(name, others.iter().copied()).map(str::to_owned);
             others.retain(|other| Some(*other) != found.as_deref());
             (name.clone(), found)
         });
-        Err(self.fault(Fault::MissingColumns {
+        Err(self.fault(RecordingFault::MissingColumns {
             missing: missing.collect(),
             present: self.names().map(str::to_owned).collect(),
         }))
     }
 
-    /// Puts numbers in the place of a column, or adds one; one for each sample (asserted).
-    pub fn put(&mut self, name: &str, values: Vec<f64>) {
+    /// Replaces the numbers of a column, or adds a column.
+    ///
+    /// Panics unless there is one number for each sample.
+    pub fn set_column(&mut self, name: &str, values: Vec<f64>) {
         assert_eq!(values.len(), self.samples(), "one number for each sample");
         let column = self.columns.entry(name.to_owned()).or_default();
         column.values = values;
     }
 
-    /// The samples from `start` to before `end` as a recording of its own, without the notes.
-    pub(crate) fn stretch(&self, file: String, start: usize, end: usize) -> Self {
+    /// The samples from `start` up to, but not including `end` as a recording of its own, without notes.
+    pub(crate) fn extract_segment(&self, file: String, start: usize, end: usize) -> Self {
         let columns = self.columns.iter().map(|(name, column)| {
-            let column = Column {
+            let column = SignalColumn {
                 values: column.values[start..end].to_vec(),
-                lost: column.lost.get(start..end).unwrap_or(&[]).to_vec(),
+                interpolated: column.interpolated.get(start..end).unwrap_or(&[]).to_vec(),
                 text: column.text.clone(),
                 not_finite: column.not_finite.clone(),
                 as_recorded: None,
@@ -181,7 +178,8 @@ impl Recording {
         }
     }
 
-    pub(crate) fn fault(&self, fault: Fault) -> RecordingError {
+    /// A fault of this recording.
+    pub(crate) fn fault(&self, fault: RecordingFault) -> RecordingError {
         RecordingError {
             file: self.file.clone(),
             fault,

@@ -1,72 +1,72 @@
-//! What a user should know about the data although it is no error: notes that go to the
-//! terminal and into the JSON (`"data": [{"severity", "says"}]`).
+//! Notes: facts about the data that a user should know although they are not errors. They go to the terminal and into
+//! the JSON (`"data": [{"severity", "says"}]`).
 
 use modelmill_boundary::text::{Message, RemedySpelling};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// How much a [`Note`] matters.
+/// How much a [`RecordingNote`] matters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Severity {
-    /// Said for the record: a choice that was made, a column that was prepared.
+pub enum NoteSeverity {
+    /// For information: a choice that was made, a column that was prepared.
     Info,
-    /// Likely to harm the result; worth a look before trusting it.
+    /// Likely to affect the result; check it before using the result.
     Warning,
 }
 
-/// One remark about a recording or its preparation.
+/// One note about a recording or its preparation.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Note {
+pub struct RecordingNote {
     /// How much it matters.
-    pub severity: Severity,
-    /// One or two full sentences.
+    pub severity: NoteSeverity,
+    /// One or two complete sentences.
     pub says: Message,
 }
 
-/// A remark as it stands in JSON, in the words of whoever reads it.
+/// A note in JSON, with remedies already spelled.
 #[derive(Serialize, Deserialize)]
 struct SpelledNote {
-    severity: Severity,
+    /// As in [`RecordingNote`].
+    severity: NoteSeverity,
+    /// The text.
     says: String,
 }
 
-impl Note {
-    /// A remark for the record.
+impl RecordingNote {
+    /// A note for information.
     pub fn info(says: impl Into<Message>) -> Self {
         Self {
-            severity: Severity::Info,
+            severity: NoteSeverity::Info,
             says: says.into(),
         }
     }
 
-    /// A remark that asks for attention.
+    /// A note that the user should check.
     pub fn warning(says: impl Into<Message>) -> Self {
         Self {
-            severity: Severity::Warning,
+            severity: NoteSeverity::Warning,
             says: says.into(),
         }
     }
 
-    /// The remark as JSON, in the words of whoever reads it.
+    /// The note as JSON, with remedies spelled for the reader's front end.
     pub fn json(&self, spelling: &dyn RemedySpelling) -> serde_json::Value {
         serde_json::json!({ "severity": self.severity, "says": self.says.spell(spelling) })
     }
 }
 
-/// Writes remarks in the words of the library, which is how a fit keeps them that no front end has printed.
-pub(crate) fn serialize<S: Serializer>(notes: &[Note], serializer: S) -> Result<S::Ok, S::Error> {
+/// Writes notes with remedies spelled for the library. A fit that no front end has printed keeps them in this form.
+pub(crate) fn serialize<S: Serializer>(notes: &[RecordingNote], serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_seq(notes.iter().map(|note| SpelledNote {
         severity: note.severity,
         says: note.says.in_library_words(),
     }))
 }
 
-/// Reads remarks, whose words are plain text then.
-pub(crate) fn deserialize<'de, D: Deserializer<'de>>(
-    deserializer: D,
-) -> Result<Vec<Note>, D::Error> {
+/// Reads notes, whose texts are plain then.
+pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<RecordingNote>, D::Error> {
     let notes = Vec::<SpelledNote>::deserialize(deserializer)?.into_iter();
-    let note = |one: SpelledNote| Note {
+    let note = |one: SpelledNote| RecordingNote {
         severity: one.severity,
         says: one.says.into(),
     };

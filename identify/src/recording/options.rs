@@ -1,63 +1,64 @@
-//! How a recording is read: names, computed columns, bad samples, the time that is looked at.
+//! Options for reading a recording: names, computed columns, bad samples, and the time interval.
 
-/// What becomes of samples with NaN, infinite or empty fields.
+/// How samples with NaN, infinite or empty fields are treated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum NotFinite {
-    /// A column that holds such fields is refused when it is asked for.
+pub enum NonFinitePolicy {
+    /// A column with such fields is refused when it is used.
     #[default]
     Refuse,
-    /// Samples where any column holds such a field are left out, counted and said in the notes; those that lack only values
-    /// of [`ReadOptions::may_lack`] stay.
+    /// Samples with such a field in any column are left out and counted in the notes. Samples that lack only values
+    /// of [`ReadOptions::may_be_missing`] are kept.
     LeaveOut,
 }
 
-/// A column of ours that is an affine sum of the file's: `offset + sum of factor * column`.
+/// A computed column, an affine sum of columns of the file: `offset + sum of factor * column`.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Computed {
-    /// Our name.
+pub struct ComputedColumn {
+    /// Its name in the model.
     pub name: String,
-    /// The file's columns with their factors.
+    /// Columns of the file with their factors.
     pub terms: Vec<(String, f64)>,
-    /// What is added.
+    /// The constant term, in SI units.
     pub offset: f64,
 }
 
-/// How a recording is read.
+/// Options for reading a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReadOptions {
-    /// `(ours, theirs)`: the column that the file calls `theirs` is known as `ours`.
+    /// Pairs `(ours, theirs)`: the column `theirs` of the file gets the name `ours`.
     pub renames: Vec<(String, String)>,
-    /// Columns that are computed from the file's; each replaces one of its name.
-    pub computed: Vec<Computed>,
-    /// What becomes of NaN, infinite and empty fields.
-    pub not_finite: NotFinite,
-    /// Our names of the columns that are needed; the others are neither looked at nor kept.
-    /// All are kept if there is no such list.
+    /// Computed columns; each replaces a column of the same name.
+    pub computed: Vec<ComputedColumn>,
+    /// How NaN, infinite and empty fields are treated.
+    pub not_finite: NonFinitePolicy,
+    /// Names, after renaming, of the columns that are needed. Others are neither read nor kept. `None` keeps all
+    /// columns.
     pub wanted: Option<Vec<String>>,
-    /// Our names of columns of which single values may be missing where [`NotFinite::LeaveOut`] is asked for: forces, whose
-    /// samples still hold positions.
-    pub may_lack: Vec<String>,
-    /// Only samples whose time `t` lies between these two, s; the others are passed over, counted and said.
-    pub between: Option<(f64, f64)>,
-    /// Most numbers that are kept, the line of each sample among them; a recording that holds more is refused before memory runs out.
-    pub most_numbers: usize,
+    /// Names, after renaming, of columns that may lack single values with [`NonFinitePolicy::LeaveOut`]. These are
+    /// forces: a sample without a force still has positions.
+    pub may_be_missing: Vec<String>,
+    /// Only samples with a time `t` in this interval are read, s; the others are counted in a note.
+    pub time_interval: Option<(f64, f64)>,
+    /// Most numbers that are kept, including the line of each sample. A larger recording is refused before memory is
+    /// exhausted.
+    pub max_numbers: usize,
 }
 
 impl ReadOptions {
-    /// A single column under the name that the file gives it.
-    pub(crate) fn only(name: &str) -> Self {
+    /// Options that read a single column under its name in the file.
+    pub(crate) fn single_column(name: &str) -> Self {
         Self {
             wanted: Some(vec![name.to_owned()]),
             ..Self::default()
         }
     }
 
-    /// Whether a column that the file calls `theirs` is needed.
-    pub(crate) fn needs(&self, theirs: &str) -> bool {
+    /// Whether the column that the file calls `theirs` is needed, as itself or for a computed column.
+    pub(crate) fn is_column_needed(&self, theirs: &str) -> bool {
         let Some(wanted) = &self.wanted else {
             return true;
         };
-        let is_term = |one: &Computed| one.terms.iter().any(|(name, _)| name == theirs);
+        let is_term = |one: &ComputedColumn| one.terms.iter().any(|(name, _)| name == theirs);
         let renamed = self.renames.iter().find(|(_, other)| other == theirs);
         let ours = renamed.map_or(theirs, |(ours, _)| ours);
         self.computed.iter().any(is_term) || wanted.iter().any(|name| name == ours)
@@ -69,11 +70,11 @@ impl Default for ReadOptions {
         Self {
             renames: Vec::new(),
             computed: Vec::new(),
-            not_finite: NotFinite::default(),
+            not_finite: NonFinitePolicy::default(),
             wanted: None,
-            may_lack: Vec::new(),
-            between: None,
-            most_numbers: 1 << 26,
+            may_be_missing: Vec::new(),
+            time_interval: None,
+            max_numbers: 1 << 26,
         }
     }
 }

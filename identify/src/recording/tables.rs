@@ -1,35 +1,35 @@
-//! What a file holds, before anything is made of it: tables, or topics, with their columns.
+//! The contents of a file before it is used: tables or topics, with their columns.
 
-use crate::recording::Recording;
+use crate::recording::SignalRecording;
 
-/// A table of a file, or a topic of a robot's log.
+/// A table of a file, or a topic of a log.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TableInfo {
-    /// Its name; empty where a file is a single table.
+    /// Its name; empty if the file is a single table.
     pub name: String,
-    /// Type of its messages; empty where there are none.
+    /// Type of its messages; empty for a table.
     pub kind: String,
-    /// Its columns, of as many samples each; none where it cannot be read.
+    /// Its columns, all with the same number of samples; none if the table cannot be read.
     pub columns: Vec<ColumnInfo>,
-    /// How many samples, or messages.
+    /// Number of samples or messages.
     pub samples: usize,
-    /// Time of the first and the last sample, s, where a column or the messages tell it.
+    /// Time of the first and the last sample, s, if a column or the messages have it.
     pub time: Option<(f64, f64)>,
-    /// What should be known of it, such as why it cannot be read, or which time is taken.
+    /// A remark, such as why it cannot be read, or which time is used.
     pub remark: Option<String>,
 }
 
 /// A column of a table.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ColumnInfo {
-    /// Its name, as mappings take it.
+    /// Its name, as mappings use it.
     pub name: String,
-    /// Type of its values, such as `float64`, as the file says it.
+    /// Type of its values as in the file, such as `float64`.
     pub kind: String,
 }
 
 impl TableInfo {
-    /// Samples per second on average; `None` where no time is known or there is one sample only.
+    /// Mean number of samples per second; `None` without a time, or with one sample only.
     pub fn rate(&self) -> Option<f64> {
         let (start, end) = self.time?;
         let rate = (self.samples.saturating_sub(1)) as f64 / (end - start);
@@ -37,35 +37,26 @@ impl TableInfo {
     }
 }
 
-/// Names that time usually has, in small letters.
-const OF_TIME: [&str; 8] = [
-    "t",
-    "time",
-    "t_s",
-    "time_s",
-    "timestamp",
-    "stamp",
-    "seconds",
-    "sec",
-];
+/// Usual names of the time, in lower case, the most likely first.
+const TIME_NAMES: [&str; 8] = ["t", "time", "t_s", "time_s", "timestamp", "stamp", "seconds", "sec"];
 
-/// The column that is likely to be the time.
-pub(crate) fn likely_time(names: &[String]) -> Option<&String> {
+/// The column that is most likely the time, by its name behind the last point.
+pub(crate) fn likely_time_column(names: &[String]) -> Option<&String> {
     let is_called = |name: &String, time: &str| {
         let last = name.rsplit('.').next().unwrap_or(name);
         last.eq_ignore_ascii_case(time)
     };
-    OF_TIME
+    TIME_NAMES
         .iter()
         .find_map(|time| names.iter().find(|name| is_called(name, time)))
 }
 
-/// First and last time of a table that has a column for it; `read` gives the recording of that column.
-pub(crate) fn found_time(
+/// First and last time of a table, s; `read` reads the recording of a single column.
+pub(crate) fn find_time_range(
     names: &[String],
-    read: impl FnOnce(&str) -> Option<Recording>,
+    read: impl FnOnce(&str) -> Option<SignalRecording>,
 ) -> Option<(f64, f64)> {
-    let name = likely_time(names)?;
+    let name = likely_time_column(names)?;
     let recording = read(name)?;
     let time = recording.column(name).ok()?;
     Some((*time.first()?, *time.last()?))

@@ -1,4 +1,4 @@
-//! What is done with the numbers of one signal, whatever they mean: filters, spectra, statistics.
+//! Operations on the numbers of one signal, independent of their meaning: filters, spectra, statistics.
 
 mod filters;
 mod spectrum;
@@ -7,4 +7,4 @@ mod statistics;
 pub use filters::{FilterError, LowPass, MAX_FILTER_ORDER};
 pub(crate) use spectrum::hann_power;
 pub use statistics::white_noise;
-pub(crate) use statistics::{count, median};
+pub(crate) use statistics::{float_to_count, median};

@@ -4,9 +4,11 @@
 use std::f64::consts::TAU;
 
 use modelmill_identify::diagnose::{
-    Candidate, Choice, Column, Diagnosis, Effect, EffectParameter, Layout, Nature, NoSupply,
-    Problem, Sign, Source, Stretch, Verdict, diagnose, white_noise,
+    CandidateEffect, CandidateNature, ColumnChoice, ColumnSource, DiagnosisProblem, DiagnosisVerdict, EffectParameter,
+    ForceColumn, LocatedEffect, ModelDiagnosis, NoColumnProvider, SampleLayout, SampleSegment, SignConstraint,
+    diagnose, white_noise,
 };
+use modelmill_runtime::RandomBits;
 
 /// Samples of the fit, and as many of the check.
 const SAMPLES: usize = 1500;
@@ -14,22 +16,17 @@ const STEP: f64 = 0.004;
 /// Deviation of the force's noise; columns have a size near 1.
 const NOISE: f64 = 0.1;
 
-/// `SplitMix64` with Box and Muller's transform on top.
-struct Random(u64);
+/// Random numbers with Box and Muller's transform on top.
+struct Random(RandomBits);
 
 impl Random {
     fn new(seed: u64) -> Self {
-        Self(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15))
+        Self(RandomBits::new(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15)))
     }
 
     /// Uniform in `(0, 1]`.
     fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^= z >> 31;
-        ((z >> 11) as f64 + 1.0) / (1_u64 << 53) as f64
+        self.0.above_zero()
     }
 
     fn normal(&mut self) -> f64 {
@@ -70,29 +67,29 @@ impl Random {
 }
 
 /// A column of the one channel.
-fn column(values: &[f64]) -> Column {
-    Column(vec![Some(values.to_vec())])
+fn column(values: &[f64]) -> ForceColumn {
+    ForceColumn(vec![Some(values.to_vec())])
 }
 
 /// A candidate with some columns, whose parameters all have the same sign.
-fn candidate(kind: &str, columns: &[&[f64]], sign: Sign) -> Candidate {
+fn candidate(kind: &str, columns: &[&[f64]], sign: SignConstraint) -> CandidateEffect {
     let parameter = |k: usize| EffectParameter {
         symbol: format!("p{k}"),
         unit: "N".into(),
         sign,
     };
-    Candidate {
-        effect: Effect {
+    CandidateEffect {
+        effect: LocatedEffect {
             kind: kind.into(),
             at: vec!["drive".into()],
         },
         parameters: (0..columns.len()).map(parameter).collect(),
-        searched: 0,
+        searched_constants: 0,
         is_part_of_load: false,
         refines: None,
-        nature: Nature::Effect,
+        nature: CandidateNature::Effect,
         is_per_run: false,
-        source: Source::Columns(vec![Choice {
+        source: ColumnSource::Columns(vec![ColumnChoice {
             constants: Vec::new(),
             columns: columns.iter().map(|values| column(values)).collect(),
         }]),
@@ -100,16 +97,16 @@ fn candidate(kind: &str, columns: &[&[f64]], sign: Sign) -> Candidate {
 }
 
 /// Smooth functions and the candidates `c0`, `c1`, ... made of them.
-fn crowd(random: &mut Random, count: usize) -> (Vec<Vec<f64>>, Vec<Candidate>) {
+fn crowd(random: &mut Random, count: usize) -> (Vec<Vec<f64>>, Vec<CandidateEffect>) {
     let columns: Vec<Vec<f64>> = (0..count).map(|_| random.smooth()).collect();
     let made = columns.iter().enumerate();
-    let candidates = made.map(|(k, values)| candidate(&format!("c{k}"), &[values], Sign::Any));
+    let candidates = made.map(|(k, values)| candidate(&format!("c{k}"), &[values], SignConstraint::Any));
     let candidates = candidates.collect();
     (columns, candidates)
 }
 
 /// A model of three columns, a recording for the fit and one for the check, of which `hidden` is what the model lacks.
-fn problem(random: &mut Random, hidden: &[f64], candidates: Vec<Candidate>) -> Problem {
+fn problem(random: &mut Random, hidden: &[f64], candidates: Vec<CandidateEffect>) -> DiagnosisProblem {
     let base: Vec<Vec<f64>> = (0..3).map(|_| random.smooth()).collect();
     let mut measured = hidden.to_vec();
     for (values, factor) in base.iter().zip([3.0, -2.0, 1.5]) {
@@ -117,31 +114,28 @@ fn problem(random: &mut Random, hidden: &[f64], candidates: Vec<Candidate>) -> P
             *sum += factor * x;
         }
     }
-    let stretch = |name: &str, is_check: bool| Stretch {
+    let segment = |name: &str, is_check: bool| SampleSegment {
         name: name.into(),
         samples: SAMPLES,
         step: STEP,
-        sampled: STEP,
+        recorded_step: STEP,
         is_check,
     };
-    Problem {
-        layout: Layout {
+    DiagnosisProblem {
+        layout: SampleLayout {
             channels: vec!["drive".into()],
-            stretches: vec![stretch("fit", false), stretch("check", true)],
+            segments: vec![segment("fit", false), segment("check", true)],
             left_out: Vec::new(),
         },
         noise: vec![white_noise(&measured)],
         measured: column(&measured),
-        held: None,
+        fixed_forces: None,
         base: base.iter().map(|values| column(values)).collect(),
         base_is_part_of_load: vec![true; 3],
         friction: Vec::new(),
         candidates,
-        variables: vec![
-            ("q".into(), random.smooth()),
-            ("q_d".into(), random.smooth()),
-        ],
-        ..Problem::default()
+        variables: vec![("q".into(), random.smooth()), ("q_d".into(), random.smooth())],
+        ..DiagnosisProblem::default()
     }
 }
 
@@ -154,26 +148,24 @@ fn deviation(values: &[f64]) -> f64 {
     (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt()
 }
 
-fn answer(problem: &Problem) -> Diagnosis {
-    diagnose(&mut problem.clone(), &NoSupply)
+fn answer(problem: &DiagnosisProblem) -> ModelDiagnosis {
+    diagnose(&mut problem.clone(), &NoColumnProvider)
 }
 
 /// Kinds that were found, in the order of their names.
-fn found(diagnosis: &Diagnosis) -> Vec<&str> {
-    let mut kinds: Vec<&str> = (diagnosis.effects.iter())
-        .map(|e| e.effect.kind.as_str())
-        .collect();
+fn found(diagnosis: &ModelDiagnosis) -> Vec<&str> {
+    let mut kinds: Vec<&str> = (diagnosis.effects.iter()).map(|e| e.effect.kind.as_str()).collect();
     kinds.sort_unstable();
     kinds
 }
 
 /// What became of a candidate.
-fn refused<'a>(diagnosis: &'a Diagnosis, kind: &str) -> Option<&'a str> {
+fn refused<'a>(diagnosis: &'a ModelDiagnosis, kind: &str) -> Option<&'a str> {
     let mut all = diagnosis.candidates.iter();
     let considered = all.find(|c| c.effect.kind == kind);
     considered
         .expect("every candidate is listed")
-        .refused
+        .rejection_reason
         .as_deref()
 }
 
@@ -186,19 +178,16 @@ fn one_hidden_column_is_found_among_twenty() {
         let problem = problem(&mut random, &hidden, candidates);
         let diagnosis = answer(&problem);
         assert_eq!(found(&diagnosis), ["c7"], "seed {seed}");
-        assert_eq!(diagnosis.verdict, Verdict::MissingEffect, "seed {seed}");
+        assert_eq!(diagnosis.verdict, DiagnosisVerdict::MissingEffect, "seed {seed}");
         let estimate = diagnosis.effects[0].estimates[0];
         // Three deviations of a factor are 3 * 0.1 / sqrt(1500 * 1) with a column of size 1; some are smaller.
         assert!((estimate - 0.5).abs() < 0.03, "seed {seed}: {estimate}");
-        let [first, last] = diagnosis.ladder.as_slice() else {
-            panic!("seed {seed}: one step, not {:?}", diagnosis.ladder);
+        let [first, last] = diagnosis.steps.as_slice() else {
+            panic!("seed {seed}: one step, not {:?}", diagnosis.steps);
         };
         assert!(last.check < 0.6 * first.check, "seed {seed}");
-        let left = deviation(&diagnosis.rest[0]) / NOISE;
-        assert!(
-            (0.95..1.05).contains(&left),
-            "seed {seed}: {left} of the noise"
-        );
+        let left = deviation(&diagnosis.residual[0]) / NOISE;
+        assert!((0.95..1.05).contains(&left), "seed {seed}: {left} of the noise");
         assert_eq!(refused(&diagnosis, "c7"), None);
         assert!(refused(&diagnosis, "c3").is_some());
     }
@@ -218,11 +207,7 @@ fn two_hidden_columns_are_found_together() {
         let diagnosis = answer(&problem(&mut random, &hidden, candidates));
         assert_eq!(found(&diagnosis), ["c11", "c2"], "seed {seed}");
         for effect in &diagnosis.effects {
-            let truth = if effect.effect.kind == "c2" {
-                0.4
-            } else {
-                -0.3
-            };
+            let truth = if effect.effect.kind == "c2" { 0.4 } else { -0.3 };
             let estimate = effect.estimates[0];
             assert!((estimate - truth).abs() < 0.03, "seed {seed}: {estimate}");
         }
@@ -238,8 +223,8 @@ fn nothing_is_found_in_white_noise() {
         let problem = problem(&mut random, &hidden, candidates);
         let diagnosis = answer(&problem);
         assert_eq!(found(&diagnosis), [""; 0], "seed {seed}");
-        assert_eq!(diagnosis.verdict, Verdict::Adequate, "seed {seed}");
-        assert_eq!(diagnosis.ladder.len(), 1);
+        assert_eq!(diagnosis.verdict, DiagnosisVerdict::Adequate, "seed {seed}");
+        assert_eq!(diagnosis.steps.len(), 1);
         let noise = problem.noise[0] / NOISE;
         assert!((0.9..1.1).contains(&noise), "seed {seed}: {noise}");
     }
@@ -267,7 +252,7 @@ fn proportional_columns_are_named_as_such() {
     let mut random = Random::new(400);
     let (columns, mut candidates) = crowd(&mut random, 20);
     let twin = sum(&[(-2.5, &columns[5])]);
-    candidates.push(candidate("twin", &[&twin], Sign::Any));
+    candidates.push(candidate("twin", &[&twin], SignConstraint::Any));
     let hidden = sum(&[(0.5, &columns[5]), (1.0, &random.white())]);
     let diagnosis = answer(&problem(&mut random, &hidden, candidates));
     let [effect] = diagnosis.effects.as_slice() else {
@@ -294,7 +279,7 @@ fn different_columns_are_told_apart() {
 
 #[test]
 fn an_impossible_sign_is_refused() {
-    for (sign, factor) in [(Sign::Positive, -0.5), (Sign::Negative, 0.5)] {
+    for (sign, factor) in [(SignConstraint::Positive, -0.5), (SignConstraint::Negative, 0.5)] {
         let mut random = Random::new(500);
         let law = random.smooth();
         let hidden = sum(&[(factor, &law), (1.0, &random.white())]);
@@ -303,7 +288,7 @@ fn an_impossible_sign_is_refused() {
         let diagnosis = answer(&problem);
         assert_eq!(found(&diagnosis), [""; 0]);
         assert_eq!(refused(&diagnosis, "law"), Some("sign"));
-        problem.candidates = vec![candidate("law", &[&law], Sign::Any)];
+        problem.candidates = vec![candidate("law", &[&law], SignConstraint::Any)];
         let diagnosis = answer(&problem);
         assert_eq!(found(&diagnosis), ["law"]);
         assert!(diagnosis.effects[0].estimates[0] * factor > 0.0);
@@ -318,8 +303,8 @@ fn the_simpler_of_two_nested_laws_is_taken() {
             let mut random = Random::new(600 + seed);
             let (_, mut candidates) = crowd(&mut random, 10);
             let (one, two) = (random.smooth(), random.smooth());
-            candidates.push(candidate("wide", &[&one, &two], Sign::Any));
-            candidates.push(candidate("narrow", &[&one], Sign::Any));
+            candidates.push(candidate("wide", &[&one, &two], SignConstraint::Any));
+            candidates.push(candidate("narrow", &[&one], SignConstraint::Any));
             let hidden = sum(&[(0.5, &one), (more, &two), (1.0, &random.white())]);
             let diagnosis = answer(&problem(&mut random, &hidden, candidates));
             let expected = if more == 0.0 { "narrow" } else { "wide" };
@@ -345,9 +330,9 @@ fn what_no_candidate_has_is_unexplained() {
         let law: Vec<f64> = q.iter().zip(rate).map(|(q, v)| 0.4 * q * v * v).collect();
         problem.measured.add(1.0, &column(&law));
         let diagnosis = answer(&problem);
-        assert_eq!(diagnosis.verdict, Verdict::Unexplained, "seed {seed}");
+        assert_eq!(diagnosis.verdict, DiagnosisVerdict::Unexplained, "seed {seed}");
         assert_eq!(diagnosis.unexplained, [0], "seed {seed}");
-        again.push(diagnosis.reproducible[0]);
+        again.push(diagnosis.repeatable_share[0]);
         if !diagnosis.effects.is_empty() {
             wrong.push((seed, found(&diagnosis).join(", ")));
         }

@@ -6,10 +6,10 @@
 
 use std::path::PathBuf;
 
-use modelmill_identify::estimate::autocorrelated_deviations;
+use modelmill_identify::estimate::uncertainty_with_autocorrelation;
 use modelmill_identify::{
-    LeastSquares, LeastSquaresError, LocateOptions, Preparation, Recording, Run, compare,
-    decimate_table, decimate_time, locate,
+    LeastSquares, LeastSquaresError, LocateOptions, PreparedRun, SignalRecording, StatePreparation, compare_forces,
+    decimate_table, decimate_time, locate_errors,
 };
 
 fn data() -> Option<PathBuf> {
@@ -17,9 +17,7 @@ fn data() -> Option<PathBuf> {
     if folder.join("emps_train.csv").is_file() {
         return Some(folder);
     }
-    println!(
-        "EMPS is not tested: there are no recordings in ../shared/data/emps beside the workspace."
-    );
+    println!("EMPS is not tested: there are no recordings in ../shared/data/emps beside the workspace.");
     None
 }
 
@@ -30,29 +28,18 @@ struct Regression {
     rate: Vec<f64>,
 }
 
-fn read(path: PathBuf) -> Run {
-    let recording = Recording::read(
-        path,
-        &[("t", "t_s"), ("x", "q_meas_m"), ("axis", "force_N")],
-    )
-    .expect("a readable file");
+fn read(path: PathBuf) -> PreparedRun {
+    let recording =
+        SignalRecording::read(path, &[("t", "t_s"), ("x", "q_meas_m"), ("axis", "force_N")]).expect("a readable file");
     recording
-        .states_with(
-            &["x".to_owned()],
-            &["axis".to_owned()],
-            &Preparation::emps(),
-        )
+        .states_with(&["x".to_owned()], &["axis".to_owned()], &StatePreparation::emps())
         .expect("states")
 }
 
 /// Columns qdd, qd, sign(qd), 1, decimated in parallel with the force.
-fn regression(run: &Run) -> Regression {
+fn regression(run: &PreparedRun) -> Regression {
     let (qd, qdd) = (&run.qd[0], &run.qdd[0]);
-    let full: Vec<f64> = qd
-        .iter()
-        .zip(qdd)
-        .flat_map(|(v, a)| [*a, *v, sign(*v), 1.0])
-        .collect();
+    let full: Vec<f64> = qd.iter().zip(qdd).flat_map(|(v, a)| [*a, *v, sign(*v), 1.0]).collect();
     let factor = run.prepared.decimate;
     let force = run.measured_interleaved().expect("a force");
     Regression {
@@ -75,16 +62,12 @@ fn model(data: &Regression, values: &[f64]) -> Vec<f64> {
 }
 
 fn relative_error(data: &Regression, values: &[f64]) -> f64 {
-    let figures = compare(
+    let figures = compare_forces(
         &["axis".to_owned()],
         std::slice::from_ref(&data.force),
         std::slice::from_ref(&model(data, values)),
     );
-    100.0
-        * figures
-            .expect("figures")
-            .nrms
-            .expect("a force was measured")
+    100.0 * figures.expect("figures").nrms.expect("a force was measured")
 }
 
 #[test]
@@ -95,21 +78,15 @@ fn the_published_parameters_come_out() {
     assert_eq!(train.force.len(), 2475);
     assert_eq!(train.time.len(), 2475);
     let mut fit = LeastSquares::new(4);
-    fit.add_rows(&train.regressor, &train.force)
-        .expect("finite rows");
+    fit.add_rows(&train.regressor, &train.force).expect("finite rows");
     let solution = fit.solve().expect("a solution");
-    let deviations = autocorrelated_deviations(&solution, 1, |visit| {
+    let deviations = uncertainty_with_autocorrelation(&solution, 1, |visit| {
         visit(&train.regressor, &train.force)?;
         Ok::<(), LeastSquaresError>(())
     })
     .expect("deviations");
 
-    let published = [
-        ("M", 95.1089),
-        ("Fv", 203.5034),
-        ("Fc", 20.3935),
-        ("offset", -3.1648),
-    ];
+    let published = [("M", 95.1089), ("Fv", 203.5034), ("Fc", 20.3935), ("offset", -3.1648)];
     for (j, (name, expected)) in published.iter().enumerate() {
         let value = solution.values[j];
         println!(
@@ -130,17 +107,12 @@ fn the_published_parameters_come_out() {
     let on_train = relative_error(&train, &solution.values);
     let pulses = regression(&read(folder.join("emps_pulses.csv")));
     let on_pulses = relative_error(&pulses, &solution.values);
-    println!(
-        "relative error: train {on_train:.3} % (published 4.083), pulses {on_pulses:.3} % (published 5.982)"
-    );
+    println!("relative error: train {on_train:.3} % (published 4.083), pulses {on_pulses:.3} % (published 5.982)");
     assert!((on_train - 4.083).abs() < 0.15);
     assert!((on_pulses - 5.982).abs() < 0.15);
 
     // The residual is strongly autocorrelated, and the deviations must say so.
-    println!(
-        "lag-1 correlation of the residual {:.3}",
-        deviations.residual_lag1[0]
-    );
+    println!("lag-1 correlation of the residual {:.3}", deviations.residual_lag1[0]);
     assert!((deviations.residual_lag1[0] - 0.66).abs() < 0.05);
     for j in 0..4 {
         assert!(deviations.std[j] > 1.5 * solution.classical_std[j]);
@@ -152,7 +124,7 @@ fn the_published_parameters_come_out() {
         .zip(model(&train, &solution.values))
         .map(|(y, m)| y - m)
         .collect();
-    let regions = locate(
+    let regions = locate_errors(
         &[("axis", &error)],
         &[("t", &train.time), ("x_d", &train.rate)],
         &LocateOptions::default(),
@@ -172,8 +144,7 @@ fn friction_by_direction_explains_what_was_published() {
         .iter()
         .zip(qdd)
         .flat_map(|(v, a)| {
-            let (forward, backward) =
-                (f64::from(u8::from(*v > 0.0)), f64::from(u8::from(*v < 0.0)));
+            let (forward, backward) = (f64::from(u8::from(*v > 0.0)), f64::from(u8::from(*v < 0.0)));
             [*a, v * forward, forward, v * backward, -backward]
         })
         .collect();
@@ -184,11 +155,7 @@ fn friction_by_direction_explains_what_was_published() {
     let solution = fit.solve().expect("a solution");
     let error = 100.0 * solution.residual_norm / solution.measured_norm;
     println!("{:?}, {error:.3} %", solution.values);
-    for (value, published) in solution
-        .values
-        .iter()
-        .zip([95.154, 166.706, 20.144, 240.424, 20.628])
-    {
+    for (value, published) in solution.values.iter().zip([95.154, 166.706, 20.144, 240.424, 20.628]) {
         assert!(
             (value / published - 1.0).abs() < 0.025,
             "{value} instead of {published}"

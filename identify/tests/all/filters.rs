@@ -10,8 +10,7 @@ fn signal() -> Vec<f64> {
     (0..120_u32)
         .map(|i| {
             let k = f64::from(i);
-            (0.11 * k).sin() + 0.3 * (1.7 * k + 0.4).cos() + 0.01 * k
-                - if i % 7 == 3 { 0.2 } else { 0.0 }
+            (0.11 * k).sin() + 0.3 * (1.7 * k + 0.4).cos() + 0.01 * k - if i % 7 == 3 { 0.2 } else { 0.0 }
         })
         .collect()
 }
@@ -46,11 +45,7 @@ fn zero_phase_butterworth_agrees_with_scipy() {
 
 #[test]
 fn decimation_agrees_with_scipy() {
-    check(
-        &decimate(&signal(), 10).unwrap(),
-        &tables::DECIMATED_10,
-        1e-9,
-    );
+    check(&decimate(&signal(), 10).unwrap(), &tables::DECIMATED_10, 1e-9);
     check(&decimate(&signal(), 3).unwrap(), &tables::DECIMATED_3, 1e-9);
 }
 

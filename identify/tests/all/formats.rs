@@ -4,7 +4,9 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use modelmill_identify::{Computed, Fault, NotFinite, ReadOptions, Recording, name_of_bytes};
+use modelmill_identify::{
+    ComputedColumn, NonFinitePolicy, ReadOptions, RecordingFault, SignalRecording, display_name_of_bytes,
+};
 use parquet::basic::Compression;
 use parquet::data_type::{DoubleType, FloatType, Int64Type};
 use parquet::file::properties::WriterProperties;
@@ -16,9 +18,7 @@ fn scratch(name: &str) -> PathBuf {
 }
 
 fn fixture(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("tests/fixtures")
-        .join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures").join(name)
 }
 
 const SAMPLES: usize = 20_000;
@@ -34,12 +34,9 @@ fn write_parquet(path: &Path, compression: Compression) {
          optional double motor; required double spare; }",
     )
     .expect("a schema");
-    let properties = WriterProperties::builder()
-        .set_compression(compression)
-        .build();
+    let properties = WriterProperties::builder().set_compression(compression).build();
     let file = File::create(path).expect("a writable folder");
-    let mut writer =
-        SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties)).expect("a writer");
+    let mut writer = SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties)).expect("a writer");
     for group in 0..2 {
         let rows = group * SAMPLES / 2..(group + 1) * SAMPLES / 2;
         let mut columns = writer.next_row_group().expect("a row group");
@@ -53,10 +50,7 @@ fn write_parquet(path: &Path, compression: Compression) {
             .write_batch(&stamps, None, None)
             .expect("written");
         column.close().expect("closed");
-        #[expect(
-            clippy::cast_possible_truncation,
-            reason = "the column is of that type"
-        )]
+        #[expect(clippy::cast_possible_truncation, reason = "the column is of that type")]
         let q: Vec<f32> = rows.clone().map(|k| time(k).sin() as f32).collect();
         let mut column = columns.next_column().expect("no fault").expect("a column");
         column
@@ -64,11 +58,7 @@ fn write_parquet(path: &Path, compression: Compression) {
             .write_batch(&q, None, None)
             .expect("written");
         column.close().expect("closed");
-        let force: Vec<f64> = rows
-            .clone()
-            .filter(|k| *k != 7)
-            .map(|k| 3.0 * time(k))
-            .collect();
+        let force: Vec<f64> = rows.clone().filter(|k| *k != 7).map(|k| 3.0 * time(k)).collect();
         let levels: Vec<i16> = rows.clone().map(|k| i16::from(k != 7)).collect();
         let mut column = columns.next_column().expect("no fault").expect("a column");
         column
@@ -106,10 +96,10 @@ fn parquet_gives_numbers_times_and_nulls() {
         let path = scratch(&format!("{name}.parquet"));
         write_parquet(&path, compression);
         assert_eq!(
-            Recording::names_in(&path).unwrap(),
+            SignalRecording::names_in(&path).unwrap(),
             ["stamp", "q", "motor", "spare"]
         );
-        let recording = Recording::read_with(&path, &options()).unwrap();
+        let recording = SignalRecording::read_with(&path, &options()).unwrap();
         assert_eq!(recording.samples(), SAMPLES);
         for k in [0, 1, 9_999, 10_000, 19_999] {
             assert!((recording.column("t").unwrap()[k] - time(k)).abs() < 1e-12);
@@ -117,13 +107,13 @@ fn parquet_gives_numbers_times_and_nulls() {
         }
         let missing = recording.column("motor").unwrap_err().to_string();
         assert!(
-            missing.contains(", row 8: column `motor` holds `null or NaN`"),
+            missing.contains(", row 8: column `motor` contains `null or NaN`"),
             "{missing}"
         );
-        let kept = Recording::read_with(
+        let kept = SignalRecording::read_with(
             &path,
             &ReadOptions {
-                not_finite: NotFinite::LeaveOut,
+                not_finite: NonFinitePolicy::LeaveOut,
                 ..options()
             },
         )
@@ -141,25 +131,20 @@ fn every_format_is_read_from_memory_too() {
     write_parquet(&parquet, Compression::SNAPPY);
     let csv = scratch("memory.csv");
     std::fs::write(&csv, "t,q\n0,1.5\n0.1,1.6\n").unwrap();
-    for path in [
-        &parquet,
-        &csv,
-        &fixture("run-v7.mat"),
-        &fixture("run-v6.mat"),
-    ] {
+    for path in [&parquet, &csv, &fixture("run-v7.mat"), &fixture("run-v6.mat")] {
         let bytes = std::fs::read(path).unwrap();
         let file = path.display().to_string();
         assert_eq!(
-            Recording::names_in_bytes(&bytes, &file).unwrap(),
-            Recording::names_in(path).unwrap()
+            SignalRecording::names_in_bytes(&bytes, &file).unwrap(),
+            SignalRecording::names_in(path).unwrap()
         );
         let options = if *path == parquet {
             options()
         } else {
             ReadOptions::default()
         };
-        let from_bytes = Recording::from_bytes(&bytes, &file, &options).unwrap();
-        let from_file = Recording::read_with(path, &options).unwrap();
+        let from_bytes = SignalRecording::from_bytes(&bytes, &file, &options).unwrap();
+        let from_file = SignalRecording::read_with(path, &options).unwrap();
         assert_eq!(from_bytes.samples(), from_file.samples());
         let column = from_file.column("t").unwrap();
         assert_eq!(from_bytes.column("t").unwrap(), column);
@@ -167,21 +152,19 @@ fn every_format_is_read_from_memory_too() {
     }
     // A pipe has no ending that tells what it carries; what is in the bytes does.
     let bytes = std::fs::read(&parquet).unwrap();
-    let name = name_of_bytes("/dev/stdin", &bytes);
-    let missing = Recording::from_bytes(&bytes, &name, &options()).unwrap();
+    let name = display_name_of_bytes("/dev/stdin", &bytes);
+    let missing = SignalRecording::from_bytes(&bytes, &name, &options()).unwrap();
     let missing = missing.column("motor").unwrap_err().to_string();
     assert!(
         missing.contains("/dev/stdin (Parquet), row 8: column `motor`"),
         "{missing}"
     );
-    assert_eq!(name_of_bytes("/dev/stdin", b"t,q\n"), "/dev/stdin");
+    assert_eq!(display_name_of_bytes("/dev/stdin", b"t,q\n"), "/dev/stdin");
     let broken = bytes;
     let broken = &broken[..broken.len() / 2];
     for says in [
-        Recording::names_in_bytes(broken, "-")
-            .unwrap_err()
-            .to_string(),
-        Recording::from_bytes(b"MATLAB 7.3 MAT-file, Platform", "-", &options())
+        SignalRecording::names_in_bytes(broken, "-").unwrap_err().to_string(),
+        SignalRecording::from_bytes(b"MATLAB 7.3 MAT-file, Platform", "-", &options())
             .unwrap_err()
             .to_string(),
     ] {
@@ -194,23 +177,18 @@ fn only_the_time_that_is_asked_for_is_read() {
     let path = scratch("between.parquet");
     write_parquet(&path, Compression::SNAPPY);
     let part = |between| {
-        Recording::read_with(
+        SignalRecording::read_with(
             &path,
             &ReadOptions {
-                between: Some(between),
-                most_numbers: 40_004,
+                time_interval: Some(between),
+                max_numbers: 40_004,
                 ..options()
             },
         )
     };
     let recording = part((2.0, 12.0)).unwrap();
     assert!((9_999..=10_001).contains(&recording.samples()));
-    assert!(
-        recording.notes()[0]
-            .says
-            .in_library_words()
-            .contains("time stamps")
-    );
+    assert!(recording.notes()[0].says.in_library_words().contains("time stamps"));
     assert!(
         recording.notes()[1]
             .says
@@ -219,15 +197,11 @@ fn only_the_time_that_is_asked_for_is_read() {
     );
     assert_eq!(
         part((30.0, 40.0)).unwrap_err().fault,
-        Fault::NoneBetween {
-            from: 30.0,
-            to: 40.0
-        }
+        RecordingFault::NoSamplesInInterval { from: 30.0, to: 40.0 }
     );
     let says = part((0.0, 20.0)).unwrap_err().to_string();
     assert!(
-        says.contains("too large to be kept in memory")
-            && says.contains("option `between` = `0,10`"),
+        says.contains("too large to be kept in memory") && says.contains("option `between` = `0,10`"),
         "{says}"
     );
 }
@@ -239,23 +213,18 @@ fn broken_files_get_an_answer() {
     let bytes = std::fs::read(&path).unwrap();
     for length in [4, 100, bytes.len() / 2, bytes.len() - 1] {
         std::fs::write(&path, &bytes[..length]).unwrap();
-        let says = Recording::read_with(&path, &options())
-            .unwrap_err()
-            .to_string();
-        assert!(
-            says.contains("this is a Parquet file: it cannot be read"),
-            "{says}"
-        );
+        let says = SignalRecording::read_with(&path, &options()).unwrap_err().to_string();
+        assert!(says.contains("this is a Parquet file: it cannot be read"), "{says}");
     }
     let path = scratch("broken.mat");
     let bytes = std::fs::read(fixture("run-v7.mat")).unwrap();
     for length in [40, 130, bytes.len() / 2] {
         std::fs::write(&path, &bytes[..length]).unwrap();
-        let says = Recording::read(&path, &[]).unwrap_err().to_string();
+        let says = SignalRecording::read(&path, &[]).unwrap_err().to_string();
         assert!(says.contains("this is a MATLAB file"), "{says}");
     }
     std::fs::write(&path, b"MATLAB 7.3 MAT-file, Platform: GLNXA64").unwrap();
-    let says = Recording::read(&path, &[]).unwrap_err().to_string();
+    let says = SignalRecording::read(&path, &[]).unwrap_err().to_string();
     assert!(says.contains("is it complete"), "{says}");
 }
 
@@ -263,7 +232,7 @@ fn broken_files_get_an_answer() {
 #[test]
 fn matlab_files_give_vectors_and_columns_of_matrices() {
     for name in ["run-v7.mat", "run-v6.mat"] {
-        let recording = Recording::read(fixture(name), &[("q1", "q_1"), ("motor", "F")]).unwrap();
+        let recording = SignalRecording::read(fixture(name), &[("q1", "q_1"), ("motor", "F")]).unwrap();
         assert_eq!(recording.samples(), 50, "{name}");
         for k in [0, 1, 49] {
             let t = k as f64 * 0.01;
@@ -274,22 +243,16 @@ fn matlab_files_give_vectors_and_columns_of_matrices() {
                 ("motor", 3.0 * k as f64),
             ] {
                 let value = recording.column(column).unwrap()[k];
-                assert!(
-                    (value - expected).abs() < 1e-12,
-                    "{name}: {column} is {value}"
-                );
+                assert!((value - expected).abs() < 1e-12, "{name}: {column} is {value}");
             }
         }
     }
-    let recording = Recording::read(fixture("run-v7.mat"), &[]).unwrap();
+    let recording = SignalRecording::read(fixture("run-v7.mat"), &[]).unwrap();
     let says = recording.notes()[0].says.in_library_words();
     assert!(says.contains("`gain`") && !says.contains("`z`"), "{says}");
     // Complex numbers are refused as such, not read by their real parts.
     let says = recording.column("z").unwrap_err().to_string();
-    assert!(
-        says.contains("`z`") && says.contains("a complex number"),
-        "{says}"
-    );
+    assert!(says.contains("`z`") && says.contains("a complex number"), "{says}");
 }
 
 #[test]
@@ -297,25 +260,22 @@ fn sums_of_columns_are_computed_and_keep_their_faults() {
     let text = "t,a,b\n0,1,10\n1,2,NaN\n2,3,30\n";
     let read = |terms: &[(&str, f64)], not_finite| {
         let options = ReadOptions {
-            computed: vec![Computed {
+            computed: vec![ComputedColumn {
                 name: "a".to_owned(),
-                terms: terms
-                    .iter()
-                    .map(|(name, f)| ((*name).to_owned(), *f))
-                    .collect(),
+                terms: terms.iter().map(|(name, f)| ((*name).to_owned(), *f)).collect(),
                 offset: 0.5,
             }],
             not_finite,
             wanted: Some(vec!["t".to_owned(), "a".to_owned()]),
             ..ReadOptions::default()
         };
-        Recording::from_reader(text.as_bytes(), "run.csv", &options)
+        SignalRecording::from_reader(text.as_bytes(), "run.csv", &options)
     };
-    let own = read(&[("a", 2.0)], NotFinite::Refuse).unwrap();
+    let own = read(&[("a", 2.0)], NonFinitePolicy::Refuse).unwrap();
     assert_eq!(own.column("a").unwrap(), [2.5, 4.5, 6.5]);
-    let sum = read(&[("a", 2.0), ("b", -1.0)], NotFinite::Refuse).unwrap();
+    let sum = read(&[("a", 2.0), ("b", -1.0)], NonFinitePolicy::Refuse).unwrap();
     assert!(sum.column("a").unwrap_err().to_string().contains("line 3"));
-    let left = read(&[("a", 2.0), ("b", -1.0)], NotFinite::LeaveOut).unwrap();
+    let left = read(&[("a", 2.0), ("b", -1.0)], NonFinitePolicy::LeaveOut).unwrap();
     assert_eq!(left.column("a").unwrap(), [-7.5, -23.5]);
-    assert!(read(&[("c", 1.0)], NotFinite::Refuse).is_err());
+    assert!(read(&[("c", 1.0)], NonFinitePolicy::Refuse).is_err());
 }

@@ -4,8 +4,8 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use modelmill_boundary::files::Disk;
-use modelmill_identify::{ReadOptions, Recording, RecordingFile, TableInfo};
+use modelmill_boundary::files::DiskFiles;
+use modelmill_identify::{ReadOptions, RecordingFile, SignalRecording, TableInfo};
 
 fn fixtures() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures")
@@ -64,34 +64,26 @@ fn options(theirs: &[String; 7]) -> ReadOptions {
 }
 
 fn tables(path: &Path) -> Vec<TableInfo> {
-    let file = RecordingFile::open(&Disk::default(), path).unwrap();
+    let file = RecordingFile::open(&DiskFiles::default(), path).unwrap();
     file.tables().unwrap()
 }
 
 /// Holds all files of a folder against its CSV.
 fn same_in(folder: &Path) {
-    let csv = Recording::read(folder.join("run.csv"), &[]).unwrap();
+    let csv = SignalRecording::read(folder.join("run.csv"), &[]).unwrap();
     for (file, theirs) in forms() {
         let path = folder.join(file);
-        let recording = Recording::read_with(&path, &options(&theirs)).unwrap();
+        let recording = SignalRecording::read_with(&path, &options(&theirs)).unwrap();
         assert_eq!(recording.samples(), csv.samples(), "{file}");
         for name in OURS {
             let (found, expected) = (recording.column(name).unwrap(), csv.column(name).unwrap());
             for (k, (found, expected)) in found.iter().zip(expected).enumerate() {
-                assert_eq!(
-                    found.to_bits(),
-                    expected.to_bits(),
-                    "{file}: {name}, sample {k}"
-                );
+                assert_eq!(found.to_bits(), expected.to_bits(), "{file}: {name}, sample {k}");
             }
         }
         let bytes = std::fs::read(&path).unwrap();
-        let piped = Recording::from_bytes(&bytes, "a pipe", &options(&theirs)).unwrap();
-        assert_eq!(
-            piped.column("tau_2").unwrap(),
-            csv.column("tau_2").unwrap(),
-            "{file}"
-        );
+        let piped = SignalRecording::from_bytes(&bytes, "a pipe", &options(&theirs)).unwrap();
+        assert_eq!(piped.column("tau_2").unwrap(), csv.column("tau_2").unwrap(), "{file}");
         let with_columns = tables(&path).into_iter().find(|table| {
             let mut columns = table.columns.iter();
             columns.any(|column| column.name == theirs[1])
@@ -101,7 +93,7 @@ fn same_in(folder: &Path) {
         let rate = table.rate().unwrap();
         assert!((rate - 250.0).abs() < 1e-6, "{file}: {rate}");
         // A file that lost its end is no recording.
-        let cut = Recording::from_bytes(&bytes[..bytes.len() * 2 / 3], file, &options(&theirs));
+        let cut = SignalRecording::from_bytes(&bytes[..bytes.len() * 2 / 3], file, &options(&theirs));
         assert!(cut.is_err(), "{file}");
     }
 }
@@ -118,9 +110,7 @@ fn files_that_are_made_now_give_the_same_numbers() {
     let packages = "import h5py, pyarrow, mcap_ros2, rosbags, zstandard";
     let has = Command::new(&python).args(["-c", packages]).output();
     if !has.is_ok_and(|output| output.status.success()) {
-        println!(
-            "left out: `{python}` lacks packages ({packages}); MODELMILL_PYTHON names another one"
-        );
+        println!("left out: `{python}` lacks packages ({packages}); MODELMILL_PYTHON names another one");
         return;
     }
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("logs");
@@ -132,18 +122,14 @@ fn files_that_are_made_now_give_the_same_numbers() {
         .arg("3001")
         .output()
         .unwrap();
-    assert!(
-        made.status.success(),
-        "{}",
-        String::from_utf8_lossy(&made.stderr)
-    );
+    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
     same_in(&folder);
 }
 
 #[test]
 fn whole_numbers_of_all_types_are_read_right() {
     for file in ["run-zstd-v1.parquet", "run-brotli-v2.parquet"] {
-        let recording = Recording::read(fixtures().join(file), &[]).unwrap();
+        let recording = SignalRecording::read(fixtures().join(file), &[]).unwrap();
         let kinds = tables(&fixtures().join(file)).remove(0).columns;
         for k in [0, 1, 59] {
             let x = k as f64;
@@ -151,11 +137,7 @@ fn whole_numbers_of_all_types_are_read_right() {
                 ("u8", "uint32", (200.0 + x) % 256.0),
                 ("u16", "uint32", 65535.0 - x),
                 ("u32", "uint32", 4_294_967_295.0 - x),
-                (
-                    "u64",
-                    "uint64",
-                    18_446_744_073_709_551_616.0 - 4096.0 * (x + 1.0),
-                ),
+                ("u64", "uint64", 18_446_744_073_709_551_616.0 - 4096.0 * (x + 1.0)),
                 ("i8", "int32", x - 128.0),
                 ("i16", "int32", -x),
                 ("i32", "int32", x - 2_147_483_648.0),
@@ -173,7 +155,7 @@ fn whole_numbers_of_all_types_are_read_right() {
 #[test]
 fn datasets_of_all_types_are_read_right() {
     for file in ["run-earliest.h5", "run-latest.h5"] {
-        let recording = Recording::read(fixtures().join(file), &[]).unwrap();
+        let recording = SignalRecording::read(fixtures().join(file), &[]).unwrap();
         for k in [0, 1, 59] {
             let q = recording.column("run.q_1").unwrap()[k];
             for (name, expected) in [
@@ -184,18 +166,15 @@ fn datasets_of_all_types_are_read_right() {
                 ("more.group11.x", q + 11.0),
             ] {
                 let value = recording.column(name).unwrap()[k];
-                assert!(
-                    (value - expected).abs() < 1e-12,
-                    "{file}: {name} is {value}"
-                );
+                assert!((value - expected).abs() < 1e-12, "{file}: {name} is {value}");
             }
         }
         let notes = recording.notes();
         assert!(
-            notes.iter().any(
-                |note| note.says.in_library_words().contains("`calibration`")
-                    && note.says.in_library_words().contains("`operator`")
-            ),
+            notes
+                .iter()
+                .any(|note| note.says.in_library_words().contains("`calibration`")
+                    && note.says.in_library_words().contains("`operator`")),
             "{notes:?}"
         );
     }
@@ -205,10 +184,7 @@ fn datasets_of_all_types_are_read_right() {
 fn messages_of_any_type_become_columns() {
     let path = fixtures().join("run-zstd.mcap");
     let topics = tables(&path);
-    let status: Vec<_> = topics
-        .iter()
-        .filter(|topic| topic.name == "status")
-        .collect();
+    let status: Vec<_> = topics.iter().filter(|topic| topic.name == "status").collect();
     assert_eq!(status.len(), 1);
     assert_eq!(
         (status[0].kind.as_str(), status[0].samples),
@@ -242,23 +218,14 @@ fn messages_of_any_type_become_columns() {
             wanted: Some(vec!["t".to_owned(), name.to_owned()]),
             ..ReadOptions::default()
         };
-        Recording::read_with(&path, &options).unwrap()
+        SignalRecording::read_with(&path, &options).unwrap()
     };
     let current = one("status.drives.right.current");
     let expected: Vec<f64> = (0..12).map(|i| -5.0 * f64::from(i)).collect();
-    assert_eq!(
-        current.column("status.drives.right.current").unwrap(),
-        expected
-    );
+    assert_eq!(current.column("status.drives.right.current").unwrap(), expected);
     assert!(
-        current.notes()[0]
-            .says
-            .in_library_words()
-            .contains("`status`")
-            && current.notes()[0]
-                .says
-                .in_library_words()
-                .contains("arrival"),
+        current.notes()[0].says.in_library_words().contains("`status`")
+            && current.notes()[0].says.in_library_words().contains("arrival"),
         "{:?}",
         current.notes()
     );
@@ -283,7 +250,7 @@ fn topics_are_joined_on_time() {
         ),
         ..ReadOptions::default()
     };
-    let recording = Recording::read_with(&path, &options).unwrap();
+    let recording = SignalRecording::read_with(&path, &options).unwrap();
     let command = recording.column("command.data").unwrap();
     // The first command comes 1 us after the first state, which has none before it.
     assert_eq!(recording.samples(), 59);
@@ -297,13 +264,12 @@ fn topics_are_joined_on_time() {
         .map(|note| note.says.in_library_words())
         .collect();
     assert!(
-        says.iter()
-            .any(|says| says.contains("1 sample of `joint_states`")),
+        says.iter().any(|says| says.contains("1 sample of `joint_states`")),
         "{says:?}"
     );
     assert!(
         says.iter()
-            .any(|says| says.contains("`command` is taken at their times")),
+            .any(|says| says.contains("`command` is interpolated linearly to them")),
         "{says:?}"
     );
 }

@@ -3,27 +3,19 @@
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 
-use modelmill_identify::{Preparation, ReadOptions, Recording, Run, Smoothing};
+use modelmill_identify::{PreparedRun, ReadOptions, SignalRecording, SmoothingMethod, StatePreparation};
+use modelmill_runtime::RandomBits;
 
 const RATE: f64 = 250.0;
 const PERIOD: f64 = 7.29;
 
-/// Seeded numbers, evenly spread over `[0, 1)` (S. Steele, D. Lea and C. Flood's `SplitMix64`).
-fn uniform(state: &mut u64) -> f64 {
-    *state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
-    let mut z = *state;
-    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-}
-
 /// Position, rate and acceleration of a motion of seven harmonics that the seed chooses.
 fn motion(seed: u64, t: f64) -> [f64; 3] {
-    let mut state = seed;
+    let mut random = RandomBits::new(seed);
     let mut sum = [1.7, 0.0, 0.0];
     for k in 1..=7 {
         let w = TAU * f64::from(k) / PERIOD;
-        let (a, phase) = (0.12 * uniform(&mut state), TAU * uniform(&mut state));
+        let (a, phase) = (0.12 * random.below_one(), TAU * random.below_one());
         let (sin, cos) = (w * t + phase).sin_cos();
         sum[0] += a * sin;
         sum[1] += a * w * cos;
@@ -33,37 +25,33 @@ fn motion(seed: u64, t: f64) -> [f64; 3] {
 }
 
 /// What an encoder of 20 bits with noise reads, prepared.
-fn prepared(seed: u64, samples: u32, smoothing: Smoothing) -> Run {
-    let mut state = seed.wrapping_mul(77);
+fn prepared(seed: u64, samples: u32, smoothing: SmoothingMethod) -> PreparedRun {
+    let mut random = RandomBits::new(seed.wrapping_mul(77));
     let step = TAU / f64::from(1 << 20);
     let mut text = "t,q\n".to_owned();
     for i in 0..samples {
         let t = f64::from(i) / RATE;
-        // Twelve uniform numbers add up to a normal one, nearly.
-        let noise = 4e-6 * ((0..12).map(|_| uniform(&mut state)).sum::<f64>() - 6.0);
+        let noise = 4e-6 * random.nearly_normal();
         let read = ((motion(seed, t)[0] + noise) / step).round() * step;
         writeln!(text, "{t},{read:.9}").unwrap();
     }
-    let recording =
-        Recording::from_reader(text.as_bytes(), "run.csv", &ReadOptions::default()).unwrap();
-    let preparation = Preparation {
+    let recording = SignalRecording::from_reader(text.as_bytes(), "run.csv", &ReadOptions::default()).unwrap();
+    let preparation = StatePreparation {
         smoothing,
-        ..Preparation::default()
+        ..StatePreparation::default()
     };
-    recording
-        .states_with(&["q".to_owned()], &[], &preparation)
-        .unwrap()
+    recording.states_with(&["q".to_owned()], &[], &preparation).unwrap()
 }
 
 /// RMS error of the acceleration.
-fn acceleration_error(seed: u64, run: &Run) -> f64 {
+fn acceleration_error(seed: u64, run: &PreparedRun) -> f64 {
     let pairs = run.time.iter().zip(&run.qdd[0]);
     let sum: f64 = pairs.map(|(t, a)| (a - motion(seed, *t)[2]).powi(2)).sum();
     (sum / run.samples() as f64).sqrt()
 }
 
 /// The signs of friction come from the rates: they must be right but for the sample beside a reversal.
-fn check_signs(seed: u64, run: &Run) {
+fn check_signs(seed: u64, run: &PreparedRun) {
     for (t, rate) in run.time.iter().zip(&run.qd[0]) {
         let around = [-1.0, 0.0, 1.0].map(|i| motion(seed, t + i / RATE)[1]);
         let reverses = around.iter().any(|r| r.signum() != around[1].signum());
@@ -79,10 +67,10 @@ fn check_signs(seed: u64, run: &Run) {
 fn two_periods_or_one_are_projected_on_their_series() {
     for seed in 1..=8 {
         for samples in [3645, 1823] {
-            let run = prepared(seed, samples, Smoothing::default());
+            let run = prepared(seed, samples, SmoothingMethod::default());
             let note = run.notes[0].says.in_library_words();
             assert!(
-                note.contains("with 7 harmonics, since it leaves nothing but white noise"),
+                note.contains("with 7 harmonics, because its residual is white noise"),
                 "seed {seed}, {samples} samples: {note}"
             );
             assert_eq!(run.samples(), samples as usize);
@@ -98,7 +86,7 @@ fn two_periods_or_one_are_projected_on_their_series() {
 fn part_of_a_period_is_filtered_where_motion_ends() {
     for seed in 1..=8 {
         for samples in [1325, 1000, 2200] {
-            let run = prepared(seed, samples, Smoothing::default());
+            let run = prepared(seed, samples, SmoothingMethod::default());
             let cutoff = run.prepared.cutoff_hz.unwrap();
             assert!(
                 (3.0..15.0).contains(&cutoff),
@@ -113,8 +101,8 @@ fn part_of_a_period_is_filtered_where_motion_ends() {
 
 #[test]
 fn a_series_beats_the_low_pass_by_far() {
-    let series = acceleration_error(3, &prepared(3, 3645, Smoothing::Automatic));
-    let filtered = acceleration_error(3, &prepared(3, 3645, Smoothing::Butterworth));
+    let series = acceleration_error(3, &prepared(3, 3645, SmoothingMethod::Automatic));
+    let filtered = acceleration_error(3, &prepared(3, 3645, SmoothingMethod::Butterworth));
     println!("error of the acceleration: {series:.2e} by the series, {filtered:.2e} by the filter");
     assert!(series < 0.1 * filtered);
 }

@@ -4,12 +4,12 @@
 use std::fmt::Write as _;
 
 use modelmill_identify::{
-    DerivativeSource, Fault, NotFinite, Preparation, ReadOptions, Recording, RecordingError,
-    Severity,
+    DerivativeSource, NonFinitePolicy, NoteSeverity, ReadOptions, RecordingError, RecordingFault, SignalRecording,
+    StatePreparation,
 };
 
-fn read(text: &str) -> Result<Recording, RecordingError> {
-    Recording::from_reader(text.as_bytes(), "run.csv", &ReadOptions::default())
+fn read(text: &str) -> Result<SignalRecording, RecordingError> {
+    SignalRecording::from_reader(text.as_bytes(), "run.csv", &ReadOptions::default())
 }
 
 fn names(list: &[&str]) -> Vec<String> {
@@ -18,10 +18,7 @@ fn names(list: &[&str]) -> Vec<String> {
 
 #[track_caller]
 fn check_refused(text: &str, expected: &str) {
-    assert_eq!(
-        read(text).expect_err("the recording is faulty").to_string(),
-        expected
-    );
+    assert_eq!(read(text).expect_err("the recording is faulty").to_string(), expected);
 }
 
 #[test]
@@ -40,12 +37,12 @@ fn files_that_are_no_recordings() {
     );
     check_refused(
         "0.0,1.5\n0.1,1.6\n",
-        "run.csv, line 1: the first line holds numbers, but column names are expected there; \
+        "run.csv, line 1: the first line contains numbers, but column names are expected there; \
          put a line such as `t,theta1,spindle_left` on top",
     );
     check_refused(
         "t q force\n0 1 2\n",
-        "run.csv, line 1: it cannot be told what separates the columns of `t q force`; \
+        "run.csv, line 1: the separator of the columns is not clear in `t q force`; \
          use a comma (or `;` or a tab) throughout and a point for decimals",
     );
     check_refused(
@@ -56,33 +53,21 @@ fn files_that_are_no_recordings() {
         .chain("t,q\n0,1\n".encode_utf16())
         .flat_map(u16::to_le_bytes)
         .collect();
-    let error =
-        Recording::from_reader(utf16.as_slice(), "run.csv", &ReadOptions::default()).unwrap_err();
+    let error = SignalRecording::from_reader(utf16.as_slice(), "run.csv", &ReadOptions::default()).unwrap_err();
     assert_eq!(
         error.fault,
-        Fault::NotCsv {
+        RecordingFault::NotCsv {
             looks_like: "UTF-16 text"
         }
     );
-    let error = Recording::from_reader(
-        [b't', b',', 0xE9, b'\n'].as_slice(),
-        "run.csv",
-        &ReadOptions::default(),
-    );
-    assert!(
-        error
-            .unwrap_err()
-            .to_string()
-            .contains("another encoding than UTF-8")
-    );
-    let missing = Recording::read("no/such/run.csv", &[])
-        .unwrap_err()
-        .to_string();
+    let error = SignalRecording::from_reader([b't', b',', 0xE9, b'\n'].as_slice(), "run.csv", &ReadOptions::default());
+    assert!(error.unwrap_err().to_string().contains("another encoding than UTF-8"));
+    let missing = SignalRecording::read("no/such/run.csv", &[]).unwrap_err().to_string();
     assert!(
         missing.starts_with("no/such/run.csv: the recording cannot be read:"),
         "{missing}"
     );
-    let folder = Recording::read(env!("CARGO_MANIFEST_DIR"), &[])
+    let folder = SignalRecording::read(env!("CARGO_MANIFEST_DIR"), &[])
         .unwrap_err()
         .to_string();
     assert!(folder.contains("a folder, not a file"), "{folder}");
@@ -112,7 +97,7 @@ fn faults_of_header_and_lines() {
 fn a_quote_left_open_is_named_where_it_opens() {
     let check = |text: &str, line: u64| {
         let error = read(text).expect_err("the recording is faulty");
-        assert_eq!(error.fault, Fault::OpenQuote { line }, "{text:?}: {error}");
+        assert_eq!(error.fault, RecordingFault::OpenQuote { line }, "{text:?}: {error}");
         assert!(
             error.to_string().starts_with(&format!(
                 "run.csv, line {line}: a quote opens here, but the field that it begins does not end in the same line;"
@@ -138,24 +123,23 @@ fn a_quote_left_open_is_named_where_it_opens() {
         wanted: Some(names(&["t", "q"])),
         ..ReadOptions::default()
     };
-    let recording = Recording::from_reader(text.as_bytes(), "run.csv", &options).unwrap();
+    let recording = SignalRecording::from_reader(text.as_bytes(), "run.csv", &options).unwrap();
     assert_eq!(recording.column("q").unwrap(), [1.0, 2.0]);
     assert_eq!(recording.line(1), Some(4));
 }
 
 #[test]
 fn a_column_with_other_things_than_numbers_is_refused_when_it_is_used() {
-    let recording =
-        read("t,q,f,remark\n0,1,NaN,start\n0.1,abc,2,\n0.2,x,inf,end\n0.3,4,,\n").unwrap();
+    let recording = read("t,q,f,remark\n0,1,NaN,start\n0.1,abc,2,\n0.2,x,inf,end\n0.3,4,,\n").unwrap();
     assert_eq!(recording.column("t").unwrap(), [0.0, 0.1, 0.2, 0.3]);
     assert_eq!(
         recording.column("q").unwrap_err().to_string(),
-        "run.csv, line 3: column `q` holds `abc` where a number is expected \
-         (2 fields of the column are no numbers); correct or remove it"
+        "run.csv, line 3: column `q` contains `abc` where a number is expected \
+         (2 fields of the column are not numbers); correct or remove it"
     );
     assert_eq!(
         recording.column("f").unwrap_err().to_string(),
-        "run.csv, line 2: column `f` holds `NaN` where a finite number is expected \
+        "run.csv, line 2: column `f` contains `NaN` where a finite number is expected \
          (3 fields of the column are not finite or empty); \
          repair the recording, or leave such samples out with option `skip_bad_samples` (they are counted)"
     );
@@ -165,9 +149,8 @@ fn a_column_with_other_things_than_numbers_is_refused_when_it_is_used() {
         .map(|note| note.says.in_library_words())
         .collect();
     assert!(
-        says.iter().any(
-            |s| s.contains("Column `remark` of run.csv holds text that is no number (2 fields")
-        )
+        says.iter()
+            .any(|s| { s.contains("Column `remark` of run.csv contains text that is not a number (2 fields") })
     );
     let decimal_comma = read("t;q\n0;1,5\n1;1,6\n").unwrap();
     assert!(
@@ -182,16 +165,16 @@ fn a_column_with_other_things_than_numbers_is_refused_when_it_is_used() {
 #[test]
 fn samples_left_out_are_counted() {
     let options = ReadOptions {
-        not_finite: NotFinite::LeaveOut,
+        not_finite: NonFinitePolicy::LeaveOut,
         ..ReadOptions::default()
     };
     let text = "t,q\n0,1\n0.1,NaN\n0.2,2\n0.3,\n0.4,5\n";
-    let recording = Recording::from_reader(text.as_bytes(), "run.csv", &options).unwrap();
+    let recording = SignalRecording::from_reader(text.as_bytes(), "run.csv", &options).unwrap();
     assert_eq!(recording.column("q").unwrap(), [1.0, 2.0, 5.0]);
     assert_eq!(recording.line(1), Some(4));
     assert_eq!(
         recording.notes()[0].says.in_library_words(),
-        "2 of 5 samples of run.csv hold NaN, infinite or empty fields and are left out, the first in line 3."
+        "2 of 5 samples of run.csv contain NaN, infinite or empty fields and are left out, the first in line 3."
     );
 }
 
@@ -203,7 +186,7 @@ fn renamings_and_missing_columns() {
             .map(|(ours, theirs)| ((*ours).to_owned(), (*theirs).to_owned()))
             .collect();
         let text = "t_s,theta1,F_left\n0,1,2\n0.1,2,3\n";
-        Recording::from_reader(
+        SignalRecording::from_reader(
             text.as_bytes(),
             "run.csv",
             &ReadOptions {
@@ -213,33 +196,30 @@ fn renamings_and_missing_columns() {
         )
     };
     let recording = read(&[("t", "t_s"), ("spindle_left", "F_left")]).unwrap();
-    assert_eq!(
-        recording.names().collect::<Vec<_>>(),
-        ["t", "theta1", "spindle_left"]
-    );
+    assert_eq!(recording.names().collect::<Vec<_>>(), ["t", "theta1", "spindle_left"]);
     assert_eq!(
         read(&[]).unwrap().column("t").unwrap_err().to_string(),
-        "run.csv: there is no column `t`; is `t_s` meant? The columns are: `t_s`, `theta1`, `F_left`. \
+        "run.csv: there is no column `t`; did you mean `t_s`? The columns are: `t_s`, `theta1`, `F_left`. \
          Map one onto it with option `columns` = `t=t_s`."
     );
     assert_eq!(
         read(&[("spindle_left", "F_lefd")]).unwrap_err().to_string(),
-        "run.csv: a renaming asks for the column `F_lefd`, which is not there; is `F_left` meant? \
+        "run.csv: a renaming refers to the column `F_lefd`, which is not there; did you mean `F_left`? \
          The columns are: `t_s`, `theta1`, `F_left`. Renamings read option `columns` = `ours=theirs`."
     );
     assert!(
         read(&[("theta1", "F_left")])
             .unwrap_err()
             .to_string()
-            .contains("a renaming brings this about")
+            .contains("a renaming causes this")
     );
     assert!(matches!(
         read(&[("a", "t_s"), ("a", "F_left")]).unwrap_err().fault,
-        Fault::DuplicateRenaming { .. }
+        RecordingFault::DuplicateRenaming { .. }
     ));
     assert!(matches!(
         read(&[("a", "t_s"), ("b", "t_s")]).unwrap_err().fault,
-        Fault::DuplicateRenaming { .. }
+        RecordingFault::DuplicateRenaming { .. }
     ));
 }
 
@@ -252,11 +232,7 @@ fn marks_line_ends_and_separators_of_other_programs() {
         "\"t\",\"q\"\n 0 , 1 \n+1e-1, 2.0\n\n",
     ] {
         let recording = read(text).unwrap();
-        assert_eq!(
-            recording.names().collect::<Vec<_>>(),
-            ["t", "q"],
-            "{text:?}"
-        );
+        assert_eq!(recording.names().collect::<Vec<_>>(), ["t", "q"], "{text:?}");
         assert_eq!(recording.column("q").unwrap(), [1.0, 2.0], "{text:?}");
     }
 }
@@ -264,15 +240,9 @@ fn marks_line_ends_and_separators_of_other_programs() {
 #[test]
 fn recorded_derivatives_are_taken_as_they_are() {
     let text = "t,q,q_d,q_dd,drive\n0,1,10,100,5\n0.1,2,20,200,6\n0.2,3,30,300,7\n";
-    let run = read(text)
-        .unwrap()
-        .states(&names(&["q"]), &names(&["drive"]))
-        .unwrap();
+    let run = read(text).unwrap().states(&names(&["q"]), &names(&["drive"])).unwrap();
     assert_eq!((run.samples(), run.prepared.cutoff_hz), (3, None));
-    assert_eq!(
-        (run.q[0][1], run.qd[0][1], run.qdd[0][1]),
-        (2.0, 20.0, 200.0)
-    );
+    assert_eq!((run.q[0][1], run.qd[0][1], run.qdd[0][1]), (2.0, 20.0, 200.0));
     assert_eq!(run.measured_interleaved().unwrap(), [5.0, 6.0, 7.0]);
     assert!(run.notes.is_empty());
 }
@@ -286,7 +256,7 @@ fn a_force_may_be_missing_until_it_is_needed() {
         .unwrap();
     assert!(run.force.is_none());
     assert_eq!(
-        run.measured().unwrap_err().to_string(),
+        run.measured_forces().unwrap_err().to_string(),
         "run.csv: the measured force of `right` is needed, but there is no such column; \
          map one onto it with option `columns` = `right=THEIRS`"
     );
@@ -302,20 +272,17 @@ fn time_must_increase_and_gaps_are_said() {
     );
     let gap = read("t,q,q_d,q_dd\n0,1,1,1\n0.1,2,1,1\n0.2,3,1,1\n0.5,4,1,1\n0.6,5,1,1\n").unwrap();
     let run = gap.states(&names(&["q"]), &[]).unwrap();
-    assert_eq!(run.notes[0].severity, Severity::Warning);
+    assert_eq!(run.notes[0].severity, NoteSeverity::Warning);
     assert!(
         run.notes[0].says.in_library_words().contains("1 gap ")
-            && run.notes[0]
-                .says
-                .in_library_words()
-                .contains("after line 4"),
+            && run.notes[0].says.in_library_words().contains("after line 4"),
         "{}",
         run.notes[0].says.in_library_words()
     );
 }
 
 /// `sin` at 200 Hz in 400 samples, with the columns asked for.
-fn sine(columns: &[&str]) -> Recording {
+fn sine(columns: &[&str]) -> SignalRecording {
     let mut text = format!("t,{}\n", columns.join(","));
     for i in 0..400 {
         let t = 0.005 * f64::from(i);
@@ -336,19 +303,16 @@ fn sine(columns: &[&str]) -> Recording {
 
 #[test]
 fn missing_derivatives_are_prepared_and_said() {
-    let truth = sine(&["q", "q_d", "q_dd"])
-        .states(&names(&["q"]), &[])
-        .unwrap();
+    let truth = sine(&["q", "q_d", "q_dd"]).states(&names(&["q"]), &[]).unwrap();
     for columns in [&["q", "drive"][..], &["q", "q_d"], &["q", "q_dd"]] {
         let run = sine(columns).states(&names(&["q"]), &[]).unwrap();
         let (start, end) = run.prepared.trimmed;
         assert!(start > 0 && run.samples() == 400 - start - end);
         assert!(run.prepared.cutoff_chosen);
         assert!(
-            run.notes.iter().any(|note| note
-                .says
-                .in_library_words()
-                .contains("chosen from the signal")),
+            run.notes
+                .iter()
+                .any(|note| note.says.in_library_words().contains("chosen from the signal")),
             "{:?}",
             run.notes
         );
@@ -371,27 +335,23 @@ fn missing_derivatives_are_prepared_and_said() {
 
 #[test]
 fn a_preparation_of_ones_own_is_kept_to() {
-    let preparation = Preparation {
+    let preparation = StatePreparation {
         cutoff_hz: Some(30.0),
         trim: Some((7, 3)),
         decimate: 5,
         source: DerivativeSource::Positions,
-        ..Preparation::default()
+        ..StatePreparation::default()
     };
     let run = sine(&["q", "q_d", "q_dd"])
         .states_with(&names(&["q"]), &[], &preparation)
         .unwrap();
     assert_eq!(
-        (
-            run.prepared.cutoff_hz,
-            run.prepared.trimmed,
-            run.prepared.decimate
-        ),
+        (run.prepared.cutoff_hz, run.prepared.trimmed, run.prepared.decimate),
         (Some(30.0), (7, 3), 5)
     );
     assert_eq!(run.samples(), 390);
     assert!((run.time[0] - 0.035).abs() < 1e-12);
-    let bad = Preparation {
+    let bad = StatePreparation {
         cutoff_hz: Some(150.0),
         ..preparation.clone()
     };
@@ -399,11 +359,8 @@ fn a_preparation_of_ones_own_is_kept_to() {
         .states_with(&names(&["q"]), &[], &bad)
         .unwrap_err()
         .to_string();
-    assert!(
-        error.contains("150 Hz") && error.contains("below 100"),
-        "{error}"
-    );
-    let bad = Preparation {
+    assert!(error.contains("150 Hz") && error.contains("below 100"), "{error}");
+    let bad = StatePreparation {
         trim: Some((usize::MAX, 1)),
         ..preparation
     };
@@ -414,7 +371,7 @@ fn a_preparation_of_ones_own_is_kept_to() {
             .to_string()
             .contains("option `trim`")
     );
-    let bad = Preparation {
+    let bad = StatePreparation {
         cutoff_hz: Some(1e-9),
         ..bad
     };
@@ -436,18 +393,13 @@ fn short_and_still_recordings_get_an_answer() {
         "run.csv: 2 samples are too few for preparing derivatives from positions, which takes at least 16; \
          use a longer recording"
     );
-    assert!(
-        read("t,q\n0,1\n")
-            .unwrap()
-            .states(&names(&["q"]), &[])
-            .is_err()
-    );
+    assert!(read("t,q\n0,1\n").unwrap().states(&names(&["q"]), &[]).is_err());
     let still = sine(&["still"]).states(&names(&["still"]), &[]).unwrap();
     assert!(
-        still.notes.iter().any(|note| note
-            .says
-            .in_library_words()
-            .contains("`still` does not move")),
+        still
+            .notes
+            .iter()
+            .any(|note| note.says.in_library_words().contains("`still` does not move")),
         "{:?}",
         still.notes
     );
@@ -457,8 +409,7 @@ fn short_and_still_recordings_get_an_answer() {
 /// Ten thousand mutilated recordings: an answer each, no panic.
 #[test]
 fn mutilated_recordings_get_an_answer() {
-    let sound = b"\xEF\xBB\xBFt,q,drive\r\n0,1,2\r\n0.1,1.5,2e3\r\n0.2,-1,\"3\"\r\n0.3,NaN,inf\r\n"
-        .to_vec();
+    let sound = b"\xEF\xBB\xBFt,q,drive\r\n0,1,2\r\n0.1,1.5,2e3\r\n0.2,-1,\"3\"\r\n0.3,NaN,inf\r\n".to_vec();
     let pieces: [&[u8]; 12] = [
         b",", b";", b"\t", b"\r", b"\n", b"\"", b"NaN", b"1e400", b"-", b"\0", b"\xFF", b"t",
     ];
@@ -484,16 +435,16 @@ fn mutilated_recordings_get_an_answer() {
             }
         }
         let not_finite = if draw(2) == 0 {
-            NotFinite::Refuse
+            NonFinitePolicy::Refuse
         } else {
-            NotFinite::LeaveOut
+            NonFinitePolicy::LeaveOut
         };
         let options = ReadOptions {
             renames: Vec::new(),
             not_finite,
             ..ReadOptions::default()
         };
-        match Recording::from_reader(bytes.as_slice(), "run.csv", &options) {
+        match SignalRecording::from_reader(bytes.as_slice(), "run.csv", &options) {
             Ok(recording) => {
                 read_well += 1;
                 let _ = recording

@@ -3,9 +3,9 @@
 use std::f64::consts::PI;
 use std::ops::ControlFlow;
 
-use modelmill_identify::excite::separate::{Question, separation};
+use modelmill_identify::excite::separate::{SeparationProblem, measure_separation};
 use modelmill_identify::excite::{
-    CoordinateLimits, Criterion, ExciteError, Motion, Options, Plant, excite,
+    ExcitationCriterion, ExcitationLimits, ExcitationMotion, ExcitationPlant, ExciteError, Options, excite,
 };
 use nalgebra::DMatrix;
 
@@ -19,8 +19,8 @@ struct Axis {
     rival: Law,
 }
 
-impl Plant for Axis {
-    fn regressor(&self, _: &Motion) -> Option<DMatrix<f64>> {
+impl ExcitationPlant for Axis {
+    fn regressor(&self, _: &ExcitationMotion) -> Option<DMatrix<f64>> {
         None
     }
 
@@ -28,29 +28,27 @@ impl Plant for Axis {
         Vec::new()
     }
 
-    fn excess(&self, _: &Motion) -> Option<Vec<Vec<f64>>> {
+    fn excess(&self, _: &ExcitationMotion) -> Option<Vec<Vec<f64>>> {
         Some(Vec::new())
     }
 
-    fn apart(&self, motion: &Motion) -> Option<f64> {
+    fn separation(&self, motion: &ExcitationMotion) -> Option<f64> {
         let [q, qd, qdd] = [&motion.q[0], &motion.qd[0], &motion.qdd[0]];
-        let columns = |laws: &[Law]| {
-            DMatrix::from_fn(q.len(), laws.len(), |i, k| laws[k]([q[i], qd[i], qdd[i]]))
-        };
+        let columns = |laws: &[Law]| DMatrix::from_fn(q.len(), laws.len(), |i, k| laws[k]([q[i], qd[i], qdd[i]]));
         let effect = columns(&[self.effect]);
-        let question = Question {
+        let question = SeparationProblem {
             base: columns(&self.base),
             fitted: vec![effect.clone()],
             effect,
             rivals: vec![columns(&[self.rival])],
         };
-        let found = separation(&question)?;
-        (!found.is_mimicked()).then(|| found.left.min(found.reverse))
+        let found = measure_separation(&question)?;
+        (!found.is_mimicked()).then(|| found.residual.min(found.reverse_residual))
     }
 }
 
 fn found(axis: &Axis, harmonics: usize) -> Result<f64, ExciteError> {
-    let limits = [CoordinateLimits {
+    let limits = [ExcitationLimits {
         name: "q".to_owned(),
         position: [-1.0, 1.0],
         rate: None,
@@ -59,17 +57,17 @@ fn found(axis: &Axis, harmonics: usize) -> Result<f64, ExciteError> {
     let options = Options {
         harmonics,
         period: 2.0 * PI,
-        criterion: Criterion::Separation,
+        criterion: ExcitationCriterion::Separation,
         random: 200,
         ..Options::default()
     };
     let found = excite(axis, &limits, &options, &|_| ControlFlow::Continue(()))?;
     assert!(found.margins.iter().all(|margin| margin.excess <= 0.0));
-    assert!(found.value <= found.first);
+    assert!(found.value <= found.start_value);
     println!(
         "{:.6} apart, {:.6} in the best random motion",
         (-found.value).exp(),
-        (-found.first).exp()
+        (-found.start_value).exp()
     );
     Ok((-found.value).exp())
 }
@@ -112,9 +110,6 @@ fn a_spring_beside_a_mass_takes_two_harmonics() {
     }
     let apart = found(&axis, 2).unwrap();
     println!("{best:.6} is the best of all");
-    assert!(
-        (apart / best - 1.0).abs() < 2e-3,
-        "{apart} where {best} is known"
-    );
+    assert!((apart / best - 1.0).abs() < 2e-3, "{apart} where {best} is known");
     assert_eq!(found(&axis, 1), Err(ExciteError::Inseparable));
 }

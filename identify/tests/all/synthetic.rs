@@ -7,10 +7,10 @@
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 
-use modelmill_identify::estimate::autocorrelated_deviations;
+use modelmill_identify::estimate::uncertainty_with_autocorrelation;
 use modelmill_identify::{
-    Comparison, FitFile, LeastSquares, LeastSquaresError, ParameterInfo, Preparation, ReadOptions,
-    Recording, Run, fit_parameters,
+    ErrorAccumulator, FitFile, LeastSquares, LeastSquaresError, ParameterInfo, PreparedRun, ReadOptions,
+    SignalRecording, StatePreparation, fit_parameters,
 };
 
 const GRAVITY: f64 = 9.81;
@@ -30,13 +30,7 @@ fn rows(q: [f64; 2], qd: [f64; 2], qdd: [f64; 2]) -> [[f64; 5]; 2] {
             first,
             both,
         ],
-        [
-            0.0,
-            cos * qdd[0] + sin * qd[0] * qd[0],
-            qdd[0] + qdd[1],
-            0.0,
-            both,
-        ],
+        [0.0, cos * qdd[0] + sin * qd[0] * qd[0], qdd[0] + qdd[1], 0.0, both],
     ]
 }
 
@@ -45,10 +39,7 @@ fn motion(axis: usize, t: f64) -> [f64; 3] {
     let base = 2.0 * PI / 7.29;
     let mut state = [1.4 + 0.3 * axis as f64, 0.0, 0.0];
     for h in 1..=7 {
-        let (w, phase) = (
-            base * f64::from(h),
-            1.7 * f64::from(h * h) + 2.3 * axis as f64,
-        );
+        let (w, phase) = (base * f64::from(h), 1.7 * f64::from(h * h) + 2.3 * axis as f64);
         let (sin, cos) = (w * t + phase).sin_cos();
         let amplitude = 0.35 / f64::from(h);
         state[0] += amplitude * sin;
@@ -77,7 +68,7 @@ impl Noise {
 }
 
 /// A recording of 14.58 s at 250 Hz; `bias` is a force on the right drive that the model lacks.
-fn recording(seed: u64, bias: f64) -> Recording {
+fn recording(seed: u64, bias: f64) -> SignalRecording {
     let mut noise = Noise(seed);
     let mut text = "t,theta1,theta2,left,right\n".to_owned();
     let step = 2.0 * PI / f64::from(1 << 20);
@@ -91,22 +82,16 @@ fn recording(seed: u64, bias: f64) -> Recording {
             force[0] + noise.normal(),
             force[1] + bias * b[1].signum() + noise.normal(),
         );
-        writeln!(
-            text,
-            "{t:.3},{:.9},{:.9},{left:.6},{right:.6}",
-            angles[0], angles[1]
-        )
-        .expect("a string takes text");
+        writeln!(text, "{t:.3},{:.9},{:.9},{left:.6},{right:.6}", angles[0], angles[1]).expect("a string takes text");
     }
-    Recording::from_reader(text.as_bytes(), "synthetic.csv", &ReadOptions::default())
-        .expect("a sound recording")
+    SignalRecording::from_reader(text.as_bytes(), "synthetic.csv", &ReadOptions::default()).expect("a sound recording")
 }
 
 fn dot(row: &[f64], p: &[f64]) -> f64 {
     row.iter().zip(p).map(|(w, p)| w * p).sum()
 }
 
-fn regressor(run: &Run) -> Vec<f64> {
+fn regressor(run: &PreparedRun) -> Vec<f64> {
     (0..run.samples())
         .flat_map(|i| {
             let pick = |columns: &[Vec<f64>]| [columns[0][i], columns[1][i]];
@@ -115,12 +100,12 @@ fn regressor(run: &Run) -> Vec<f64> {
         .collect()
 }
 
-fn run(seed: u64, bias: f64) -> Run {
+fn run(seed: u64, bias: f64) -> PreparedRun {
     recording(seed, bias)
         .states_with(
             &NAMES.map(str::to_owned),
             &DRIVES.map(str::to_owned),
-            &Preparation::default(),
+            &StatePreparation::default(),
         )
         .expect("states")
 }
@@ -139,7 +124,7 @@ fn positions_alone_give_the_parameters_within_a_fifth_of_a_percent() {
         regression.add_rows(w, y).expect("finite rows");
     }
     let solution = regression.solve().expect("a solution");
-    let deviations = autocorrelated_deviations(&solution, 2, |visit| {
+    let deviations = uncertainty_with_autocorrelation(&solution, 2, |visit| {
         for (w, y) in w.chunks(300 * 10).zip(y.chunks(300 * 2)) {
             visit(w, y)?;
         }
@@ -164,11 +149,8 @@ fn positions_alone_give_the_parameters_within_a_fifth_of_a_percent() {
     let rms = solution.residual_norm / (solution.rows as f64).sqrt();
     assert!((rms - 1.0).abs() < 0.05, "{rms}");
 
-    let model: Vec<f64> = w
-        .chunks_exact(5)
-        .map(|row| dot(row, &solution.values))
-        .collect();
-    let mut comparison = Comparison::new(DRIVES.map(str::to_owned));
+    let model: Vec<f64> = w.chunks_exact(5).map(|row| dot(row, &solution.values)).collect();
+    let mut comparison = ErrorAccumulator::new(DRIVES.map(str::to_owned));
     comparison.add(&y, &model).expect("finite values");
     let infos: Vec<ParameterInfo> = (0..5)
         .map(|j| ParameterInfo {
@@ -190,17 +172,11 @@ fn positions_alone_give_the_parameters_within_a_fifth_of_a_percent() {
         fit: comparison.finish().expect("figures"),
         check: None,
         data: run.notes.clone(),
-        estimator: modelmill_identify::Estimator::default(),
+        estimator: modelmill_identify::EstimatorOutput::default(),
     };
-    let again =
-        FitFile::parse(&serde_json::to_string(&fit).expect("JSON"), "fit.json").expect("a fit");
-    let names: Vec<(&str, &str)> = infos
-        .iter()
-        .map(|i| (i.name.as_str(), i.expression.as_str()))
-        .collect();
-    let values = again
-        .values_for(&names, "fit.json")
-        .expect("the same parameters");
+    let again = FitFile::parse(&serde_json::to_string(&fit).expect("JSON"), "fit.json").expect("a fit");
+    let names: Vec<(&str, &str)> = infos.iter().map(|i| (i.name.as_str(), i.expression.as_str())).collect();
+    let values = again.values_for(&names, "fit.json").expect("the same parameters");
     for (a, b) in values.iter().zip(&solution.values) {
         assert!((a / b - 1.0).abs() < 1e-15);
     }
@@ -214,8 +190,7 @@ fn a_missing_effect_widens_the_deviations() {
     let mut regression = LeastSquares::new(5);
     regression.add_rows(&w, &y).expect("finite rows");
     let solution = regression.solve().expect("a solution");
-    let deviations =
-        autocorrelated_deviations(&solution, 2, |visit| visit(&w, &y)).expect("deviations");
+    let deviations = uncertainty_with_autocorrelation(&solution, 2, |visit| visit(&w, &y)).expect("deviations");
     println!(
         "lag 1: {:?}, effective samples {:?}",
         deviations.residual_lag1, deviations.effective_samples

@@ -1,50 +1,49 @@
 //! Loops, drives and the columns of recordings.
 //!
-//! Decision: a freedom that nothing drives becomes a drive that is not driven. It is a row of the equation of
-//! motion, named after its coordinate, whose force is zero unless it was recorded. So there are as many drives as
-//! freedoms, the drives' Jacobian has a row of the unit matrix there, and no stage needs a second kind of rows.
+//! The tables `loop`, `drive` and `recording` of a file go in. Out come the loops, the rows of the equation of
+//! motion,
+//! and the names and factors of recorded columns.
+//!
+//! Decision: a degree of freedom without a drive becomes a row of the equation of motion with a drive that is not
+//! driven. It is named after its coordinate, and its force is zero unless it was recorded. So there are as many
+//! drives as degrees of freedom, the drives' Jacobian has a row of the unit matrix there, and no stage needs a second
+//! kind of rows.
 
 use std::collections::BTreeMap;
 
-use crate::build::Places;
+use crate::build::MechanismSpans;
 use crate::build::bodies::check_unique;
-use crate::build::frames::{Points, Tree, twice};
+use crate::build::frames::{FrameTree, PointTable, duplicate_name};
 use crate::build::free;
-use crate::build::symbols::Symbols;
+use crate::build::symbols::SymbolTable;
 use crate::column;
-use crate::diagnostic::{Diagnostic, Log, Span};
-use crate::exact::{CoordinateIdx, Exact, Symbol};
-use crate::mechanism::{Drive, DriveKind, Loop};
+use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
+use crate::exact::{CoordinateIdx, ExactExpression, ModelSymbol};
+use crate::mechanism::{DriveKind, KinematicLoop, ModelDrive};
 use crate::schema::ModelEntry;
-use crate::scope::Sort;
+use crate::scope::SymbolSort;
 use crate::suggest;
-use crate::values::Name;
+use crate::values::SpannedName;
 
 /// Most loops of a mechanism.
 const MOST_LOOPS: usize = 60;
 
-/// Reads the loops.
+/// Reads the loops: pairs of points on different frames that coincide.
+///
+/// Their places are appended to `places.loops`. A faulty loop is reported and left out.
 pub(super) fn loops(
     model: &ModelEntry,
-    points: &Points,
-    places: &mut Places,
-    log: &mut Log,
-) -> Vec<Loop> {
-    let entries = model
-        .loops
-        .as_ref()
-        .map_or(&[][..], |list| list.entries.as_slice());
-    check_unique(
-        "loop",
-        entries.iter().filter_map(|entry| entry.name.as_ref()),
-        log,
-    );
+    points: &PointTable,
+    places: &mut MechanismSpans,
+    log: &mut DiagnosticLog,
+) -> Vec<KinematicLoop> {
+    // Loops may have names; those must be unique.
+    let entries = model.loops.as_ref().map_or(&[][..], |list| list.entries.as_slice());
+    check_unique("loop", entries.iter().filter_map(|entry| entry.name.as_ref()), log);
     if let Some(entry) = entries.get(MOST_LOOPS) {
-        log.push(
-            Diagnostic::error(entry.span, "there are too many loops")
-                .label(format!("at most {MOST_LOOPS}")),
-        );
+        log.push(Diagnostic::error(entry.span, "there are too many loops").label(format!("at most {MOST_LOOPS}")));
     }
+    // Loops beyond the limit are not looked at.
     let mut loops = Vec::new();
     for entry in entries.iter().take(MOST_LOOPS) {
         let Some(joins) = &entry.joins else { continue };
@@ -59,9 +58,11 @@ pub(super) fn loops(
             );
             continue;
         };
+        // Both names are looked up, so that both are reported if both are unknown.
         let (Some(one), Some(other)) = (points.find(first, log), points.find(second, log)) else {
             continue;
         };
+        // Two points on one frame can never move relative to each other.
         if points.points[one.0].frame == points.points[other.0].frame {
             log.push(
                 Diagnostic::error(joins.span, "these two points are fixed to the same frame")
@@ -70,54 +71,59 @@ pub(super) fn loops(
             continue;
         }
         places.loops.push(joins.span);
-        loops.push(Loop {
-            name: entry.name.as_ref().map_or_else(
-                || format!("{}_{}", first.text, second.text),
-                |name| name.text.clone(),
-            ),
+        // Without a name a loop is called after its two points.
+        loops.push(KinematicLoop {
+            name: entry
+                .name
+                .as_ref()
+                .map_or_else(|| format!("{}_{}", first.text, second.text), |name| name.text.clone()),
             joins: [one, other],
         });
     }
     loops
 }
 
-/// Rows of the equation of motion, and drives that have none of their own because there are more of them.
-pub(super) struct Drives {
-    pub(super) rows: Vec<Drive>,
-    pub(super) shared: Vec<Drive>,
+/// Rows of the equation of motion, and the drives that share them where there are more drives than rows.
+pub(super) struct DriveRows {
+    /// One row per degree of freedom, with the drive that acts on it.
+    pub(super) rows: Vec<ModelDrive>,
+    /// Drives without rows of their own; empty unless a tree has more drives than degrees of freedom.
+    pub(super) shared: Vec<ModelDrive>,
 }
 
-/// Reads the drives; there must be one per degree of freedom that is driven, or more than there are freedoms in a tree. What is not has a row of its own, called after
-/// its coordinate: those of free bodies come first, those of joints last.
+/// Reads the drives. There must be one per driven degree of freedom, or, in a tree, more than there are degrees of
+/// freedom.
+///
+/// Each degree of freedom without a drive has a row of its own, named after its coordinate. Rows of free bodies come
+/// first,
+/// those of undriven joints last.
 pub(super) fn drives(
     model: &ModelEntry,
-    symbols: &Symbols,
-    tree: &Tree,
-    points: &Points,
-    places: &mut Places,
-    log: &mut Log,
-) -> Drives {
-    let entries = model
-        .drive
-        .as_ref()
-        .map_or(&[][..], |list| list.entries.as_slice());
+    symbols: &SymbolTable,
+    tree: &FrameTree,
+    points: &PointTable,
+    places: &mut MechanismSpans,
+    log: &mut DiagnosticLog,
+) -> DriveRows {
+    let entries = model.drive.as_ref().map_or(&[][..], |list| list.entries.as_slice());
     let before = log.n_errors();
-    let mut drives: Vec<Drive> = Vec::new();
-    // Which drives act where their entry says; the others only stand in the list.
+    // Each entry is read with its kind; drives with faults keep their names.
+    let mut drives: Vec<ModelDrive> = Vec::new();
+    // Whether each drive acts where its entry states; faulty ones stay in the list only to keep their names known.
     let mut known = Vec::new();
     for entry in entries {
+        // Exactly one of `joint` and `linear` states how a drive acts.
         let kind = match (&entry.joint, &entry.linear) {
             (Some(joint), None) => coordinate(joint, symbols, log).map(DriveKind::Joint),
             (None, Some(linear)) => {
                 let from = linear.from.as_ref().and_then(|name| points.find(name, log));
                 let to = linear.to.as_ref().and_then(|name| points.find(name, log));
-                from.zip(to)
-                    .map(|(from, to)| DriveKind::Linear { from, to })
+                from.zip(to).map(|(from, to)| DriveKind::Linear { from, to })
             }
             _ if log.syntax_broken || entry.faulty => None,
             _ => {
                 log.push(
-                    Diagnostic::error(entry.span, "this drive does not say what it drives")
+                    Diagnostic::error(entry.span, "this drive does not specify what it drives")
                         .label("expected either `joint` or `linear`")
                         .help("for example `joint = \"q1\"`, or `linear = { from = \"B\", to = \"A\" }`"),
                 );
@@ -126,17 +132,19 @@ pub(super) fn drives(
         };
         let Some(name) = &entry.name else { continue };
         if name.text == "t" {
-            // Its force would be read from the column that holds the time.
+            // Its force would be read from the column of the time.
             log.push(
                 Diagnostic::error(name.span, "a drive cannot be called `t`")
-                    .label("recordings hold the time in the column `t`")
+                    .label("recordings have the time in the column `t`")
                     .help("choose another name, such as `motor`"),
             );
         }
+        // A second drive with the same name is left out.
         if let Some(first) = drives.iter().position(|drive| drive.name == name.text) {
-            log.push(twice("drive", name, places.drives[first]));
+            log.push(duplicate_name("drive", name, places.drives[first]));
             continue;
         }
+        // Two drives on one coordinate would have equal columns.
         if let Some(DriveKind::Joint(joint)) = kind
             && let Some(first) = drives
                 .iter()
@@ -154,41 +162,45 @@ pub(super) fn drives(
         }
         places.drives.push(name.span);
         known.push(kind.is_some());
-        drives.push(Drive {
+        // The replaced kind of a faulty drive is never used, because the fault stops the build.
+        drives.push(ModelDrive {
             name: name.text.clone(),
             kind: kind.unwrap_or(DriveKind::Joint(CoordinateIdx(0))),
             is_driven: true,
         });
     }
-    let shared = free::take_shared(model, symbols, &mut drives);
-    free::check_apart(tree, &shared, points, &places.drives, log);
+    // A tree with more drives than degrees of freedom: the drives share rows, which are added below.
+    let shared = free::split_shared_drives(model, symbols, &mut drives);
+    free::check_linear_drives(tree, &shared, points, &places.drives, log);
+    // The places of drives now belong to the rows.
     if !shared.is_empty() {
         places.drives.clear();
     }
-    let mut drives = Drives {
-        rows: drives,
-        shared,
-    };
+    let mut drives = DriveRows { rows: drives, shared };
     free::add_rows(model, symbols, tree, points, places, &mut drives, log);
+    // Counts are compared only without earlier faults, which may be the reason for a difference.
     if log.n_errors() == before && !log.syntax_broken {
-        free::check_apart(tree, &drives.rows, points, &places.drives, log);
-        check_number(model, symbols, &drives.rows, places, log);
+        free::check_linear_drives(tree, &drives.rows, points, &places.drives, log);
+        check_drive_count(model, symbols, &drives.rows, places, log);
     }
     drives
 }
 
-fn check_number(
+/// Reports a number of drives that differs from the number of degrees of freedom, with advice for each case.
+fn check_drive_count(
     model: &ModelEntry,
-    symbols: &Symbols,
-    drives: &[Drive],
-    places: &Places,
-    log: &mut Log,
+    symbols: &SymbolTable,
+    drives: &[ModelDrive],
+    places: &MechanismSpans,
+    log: &mut DiagnosticLog,
 ) {
+    // Active coordinates with a rate are the degrees of freedom.
     let n_active = symbols
         .coordinates
         .iter()
         .filter(|coordinate| !coordinate.passive && coordinate.motion.has_rate())
         .count();
+    // Coordinates that could not be declared would make the count wrong.
     let n_declared = model
         .coordinates
         .as_ref()
@@ -197,10 +209,11 @@ fn check_number(
     if drives.len() == n_active || faulty || n_declared != symbols.coordinates.len() {
         return;
     }
+    // The mark is on the first drive that is too many, or on a coordinate without a drive.
     let span = if drives.len() > n_active {
         places.drives.get(n_active).copied()
     } else {
-        // The first coordinate that no drive holds directly is as good a place as any.
+        // Linear drives belong to no coordinate, so any coordinate without a drive of its own is a good mark.
         symbols
             .coordinates
             .iter()
@@ -214,6 +227,7 @@ fn check_number(
             })
             .and_then(|(i, _)| places.coordinates.get(i).copied())
     };
+    // The counts in the message, with the right plural.
     let degrees = |n: usize| format!("{n} degree{} of freedom", if n == 1 { "" } else { "s" });
     let count = |n: usize| format!("{n} drive{}", if n == 1 { "" } else { "s" });
     log.push(
@@ -224,33 +238,38 @@ fn check_number(
         .label(if drives.len() > n_active {
             "this drive is one too many"
         } else {
-            "no drive is left for this coordinate"
+            "there is no drive for this coordinate"
         })
         .help("each coordinate that is not `passive` is a degree of freedom and needs one drive, or `driven = false`")
         .help(if n_active == 0 {
-            "every coordinate is `passive`, so that nothing is driven: take `passive = true` off the one that the drive moves; if \
-             the loops tie too many coordinates then, a joint is missing or a loop is too many"
+            "every coordinate is `passive`, so that nothing is driven: remove `passive = true` from the one that the drive moves; if \
+             the loops then constrain too many coordinates, a joint is missing or there is a loop too many"
         } else if drives.len() > n_active {
             "delete a drive, or make another coordinate active; more drives than degrees of freedom are possible without loops only"
         } else {
-            "add a `[[drive]]`; if the loops settle this coordinate, mark it `passive = true`, and if it moves freely, `driven = false`"
+            "add a `[[drive]]`; if the loops determine this coordinate, mark it `passive = true`, and if it moves freely, `driven = false`"
         }),
     );
 }
 
-fn coordinate(name: &Name, symbols: &Symbols, log: &mut Log) -> Option<CoordinateIdx> {
+/// The coordinate of a name; other sorts of names are reported.
+fn coordinate(name: &SpannedName, symbols: &SymbolTable, log: &mut DiagnosticLog) -> Option<CoordinateIdx> {
+    // The scope reports unknown names and marks the coordinate as used.
     let meaning = symbols
         .scope
-        .look_up(&name.text, name.span, &[Sort::Coordinate], log)?;
+        .look_up(&name.text, name.span, &[SymbolSort::Coordinate], log)?;
     match meaning.exact {
-        Exact::Symbol(Symbol::Coordinate(idx)) => Some(idx),
+        ExactExpression::Symbol(ModelSymbol::Coordinate(idx)) => Some(idx),
         _ => None,
     }
 }
 
-/// Drives, coordinates and points are places of effects and columns of recordings: their names must differ.
-pub(super) fn check_place_names(model: &ModelEntry, log: &mut Log) {
-    let mut seen: BTreeMap<&str, (&str, Span)> = BTreeMap::new();
+/// Reports equal names of drives, coordinates and points, which are places of effects and columns of recordings.
+///
+/// Names that end like a derivative of a coordinate (`_d`, `_dd`) are reported as well.
+pub(super) fn check_place_names(model: &ModelEntry, log: &mut DiagnosticLog) {
+    // The first use of each name, with the sort of thing and its place.
+    let mut seen: BTreeMap<&str, (&str, SourceSpan)> = BTreeMap::new();
     let coordinates = model
         .coordinates
         .iter()
@@ -268,14 +287,15 @@ pub(super) fn check_place_names(model: &ModelEntry, log: &mut Log) {
         .flat_map(|list| &list.entries)
         .filter_map(|entry| entry.name.as_ref())
         .map(|name| ("point", name.text.as_str(), name.span));
-    let all: Vec<(&str, &str, Span)> = coordinates.chain(drives).chain(points).collect();
+    let all: Vec<(&str, &str, SourceSpan)> = coordinates.chain(drives).chain(points).collect();
+    // Equal names of one kind are reported where that kind is read.
     for &(what, name, span) in &all {
         match seen.get(name) {
             Some(&(first, first_span)) if first != what => log.push(
                 Diagnostic::error(span, format!("`{name}` names a {first} and a {what}"))
                     .label(format!("the {what}"))
                     .related(first_span, format!("the {first}"))
-                    .help("effects and recordings tell them apart by name; rename one of the two"),
+                    .help("effects and recordings distinguish them by name; rename one of the two"),
             ),
             Some(_) => {}
             None => {
@@ -283,6 +303,7 @@ pub(super) fn check_place_names(model: &ModelEntry, log: &mut Log) {
             }
         }
     }
+    // The column `q_d` would be read as the rate of `q`.
     for &(what, name, span) in all.iter().filter(|(what, ..)| *what != "point") {
         let stem = name.strip_suffix("_dd").or_else(|| name.strip_suffix("_d"));
         if let Some(stem) = stem
@@ -290,21 +311,22 @@ pub(super) fn check_place_names(model: &ModelEntry, log: &mut Log) {
             && *first == "coordinate"
         {
             log.push(
-                Diagnostic::error(
-                    span,
-                    format!("the {what} `{name}` reads like a derivative of `{stem}`"),
-                )
-                .label("recordings name derivatives with `_d` and `_dd`")
-                .related(*first_span, "this coordinate")
-                .help("choose another name"),
+                Diagnostic::error(span, format!("the {what} `{name}` reads like a derivative of `{stem}`"))
+                    .label("recordings name derivatives with `_d` and `_dd`")
+                    .related(*first_span, "this coordinate")
+                    .help("choose another name"),
             );
         }
     }
 }
 
-/// Reads what columns of drives measure: by what they are multiplied to be what acts at the joint.
-pub(super) fn torque(model: &ModelEntry, drives: &Drives, log: &mut Log) -> Vec<(String, f64)> {
-    let drives: Vec<&Drive> = drives.rows.iter().chain(&drives.shared).collect();
+/// Reads what the columns of drives measure: for each drive, the factor that converts its column to the load at the
+/// joint.
+///
+/// The factor is the product of the ratio and the torque constant.
+pub(super) fn torque(model: &ModelEntry, drives: &DriveRows, log: &mut DiagnosticLog) -> Vec<(String, f64)> {
+    // Drives that share rows have columns as well.
+    let drives: Vec<&ModelDrive> = drives.rows.iter().chain(&drives.shared).collect();
     let recording = model.recording.as_ref();
     let torque = recording.and_then(|entry| entry.torque.as_ref());
     let mut factors = Vec::new();
@@ -318,20 +340,19 @@ pub(super) fn torque(model: &ModelEntry, drives: &Drives, log: &mut Log) -> Vec<
             );
             continue;
         }
+        // An entry without any factor has no effect.
         let given = [&entry.ratio, &entry.constant];
         if given.iter().all(|number| number.is_none()) && !entry.faulty {
             log.push(
-                Diagnostic::error(key.span, format!("this says nothing of `{}`", key.name))
+                Diagnostic::error(key.span, format!("this entry of `{}` is empty", key.name))
                     .label("expected `ratio`, `constant` (N m/A), or both"),
             );
         }
+        // The factor is the product of the given numbers.
         let mut factor = 1.0;
         for number in given.into_iter().flatten() {
             if number.value == 0.0 {
-                log.push(
-                    Diagnostic::error(number.span, "this is zero")
-                        .label("expected what the column is multiplied by"),
-                );
+                log.push(Diagnostic::error(number.span, "this is zero").label("expected a factor other than zero"));
             }
             factor *= number.value;
         }
@@ -340,20 +361,17 @@ pub(super) fn torque(model: &ModelEntry, drives: &Drives, log: &mut Log) -> Vec<
     factors
 }
 
-/// Reads how recordings name their columns.
+/// Reads how recordings name the columns of this model: pairs of the model's name and a description of the column.
 pub(super) fn recording(
     model: &ModelEntry,
-    symbols: &Symbols,
-    drives: &Drives,
-    log: &mut Log,
+    symbols: &SymbolTable,
+    drives: &DriveRows,
+    log: &mut DiagnosticLog,
 ) -> Vec<(String, String)> {
-    let Some(columns) = model
-        .recording
-        .as_ref()
-        .and_then(|entry| entry.columns.as_ref())
-    else {
+    let Some(columns) = model.recording.as_ref().and_then(|entry| entry.columns.as_ref()) else {
         return Vec::new();
     };
+    // All names that the model has for columns; quaternions have no derivatives.
     let mut known = vec!["t".to_owned()];
     for coordinate in &symbols.coordinates {
         let name = &coordinate.name;
@@ -363,10 +381,12 @@ pub(super) fn recording(
         }
         known.extend([name.clone(), format!("{name}_d"), format!("{name}_dd")]);
     }
+    // Drives have a column for the force and one for its variance.
     for drive in drives.rows.iter().chain(&drives.shared) {
         known.extend([drive.name.clone(), format!("{}_var", drive.name)]);
     }
     let mut pairs: Vec<(String, String)> = Vec::new();
+    // Unknown names of the model are left out, so that nothing is mapped to them.
     for (key, theirs) in &columns.entries {
         if !known.contains(&key.name) {
             if !log.is_full() {
@@ -388,6 +408,7 @@ pub(super) fn recording(
                     .label("expected the column's name in the recordings"),
             );
         }
+        // Faults that no recording could resolve are reported here, not when the first recording is read.
         if let Some(says) = column::fault_without_recording(&theirs.text) {
             log.push(
                 Diagnostic::error(theirs.span, format!("this describes no column: {says}"))

@@ -1,24 +1,27 @@
 //! Coordinates that follow others: gears, belts, screws, differentials.
+//!
+//! The entry `follows` of a coordinate goes in; an affine function of other coordinates comes out.
 
 use std::collections::BTreeMap;
 
-use crate::build::Places;
-use crate::build::symbols::Symbols;
-use crate::diagnostic::{Diagnostic, Log, Span};
-use crate::exact::{CoordinateIdx, Exact, Symbol};
-use crate::formula::Formula;
-use crate::mechanism::Coupling;
+use crate::build::MechanismSpans;
+use crate::build::symbols::SymbolTable;
+use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
+use crate::exact::{CoordinateIdx, ExactExpression, ModelSymbol};
+use crate::formula::SourceFormula;
+use crate::mechanism::CoordinateCoupling;
 use crate::schema::{CoordinateEntry, ModelEntry};
-use crate::scope::{Sort, Wanted};
+use crate::scope::{FormulaRequirement, SymbolSort};
 
-/// Reads the couplings and gives what follows its nominal value.
+/// Reads the couplings and sets the nominal value of each coordinate that follows others.
 pub(super) fn couplings(
     model: &ModelEntry,
-    symbols: &mut Symbols,
-    places: &Places,
-    log: &mut Log,
-) -> Vec<Coupling> {
-    let mut found: Vec<(Coupling, Span)> = Vec::new();
+    symbols: &mut SymbolTable,
+    places: &MechanismSpans,
+    log: &mut DiagnosticLog,
+) -> Vec<CoordinateCoupling> {
+    let mut found: Vec<(CoordinateCoupling, SourceSpan)> = Vec::new();
+    // Coordinates that could not be declared are reported already.
     for (key, entry) in model.coordinates.iter().flat_map(|table| &table.entries) {
         let Some(follows) = &entry.follows else {
             continue;
@@ -26,19 +29,21 @@ pub(super) fn couplings(
         let Some(i) = symbols.coordinates.iter().position(|c| c.name == key.name) else {
             continue;
         };
-        reject_unused(entry, key.span, log);
+        // The value and the drive of such a coordinate cannot be chosen.
+        reject_unused_fields(entry, key.span, log);
         if let Some(coupling) = coupling(follows, CoordinateIdx(i), symbols, log) {
             found.push((coupling, follows.ast.span));
         }
     }
+    // Nominal values are computed only if all couplings are valid.
     if log.n_errors() == 0 {
         set_nominal(&found, symbols, places, log);
     }
     found.into_iter().map(|(coupling, _)| coupling).collect()
 }
 
-/// Says what else is given that follows already.
-fn reject_unused(entry: &CoordinateEntry, span: Span, log: &mut Log) {
+/// Reports entries of a coordinate that `follows` determines already.
+fn reject_unused_fields(entry: &CoordinateEntry, span: SourceSpan, log: &mut DiagnosticLog) {
     let given = [
         (entry.nominal.is_some(), "nominal"),
         (entry.passive.is_some(), "passive"),
@@ -49,7 +54,7 @@ fn reject_unused(entry: &CoordinateEntry, span: Span, log: &mut Log) {
             log.push(
                 Diagnostic::error(
                     span,
-                    format!("`{name}` says nothing of a coordinate that follows others"),
+                    format!("`{name}` has no effect on a coordinate that follows others"),
                 )
                 .label(format!("delete `{name}`")),
             );
@@ -57,37 +62,42 @@ fn reject_unused(entry: &CoordinateEntry, span: Span, log: &mut Log) {
     }
 }
 
+/// The coupling of one coordinate; reports an expression that is not affine in others or contains a quaternion.
+/// The dimension of the expression must be that of the coordinate: an angle or a length.
 fn coupling(
-    follows: &Formula,
+    follows: &SourceFormula,
     coordinate: CoordinateIdx,
-    symbols: &Symbols,
-    log: &mut Log,
-) -> Option<Coupling> {
+    symbols: &SymbolTable,
+    log: &mut DiagnosticLog,
+) -> Option<CoordinateCoupling> {
     let own = &symbols.coordinates[coordinate.0];
-    let wanted = Wanted {
-        sorts: &[Sort::Constant, Sort::Coordinate],
+    let wanted = FormulaRequirement {
+        sorts: &[SymbolSort::Constant, SymbolSort::Coordinate],
         dimension: own.motion.dimension(),
         what: "what this coordinate follows",
     };
+    // The scope reports unknown names and wrong units; the shape is checked below.
     let exact = symbols.scope.resolve(follows, wanted, log)?;
     let span = follows.ast.span;
-    let Some(Linear { terms, offset }) = linear(&exact) else {
+    let Some(CoordinateSum { terms, offset }) = coordinate_sum(&exact) else {
         log.push(
-            Diagnostic::error(span, "a coordinate follows others in proportion")
+            Diagnostic::error(span, "a coordinate can only be an affine function of others")
                 .label("expected a sum of coordinates, each times constants, and of constants")
                 .help("for example `\"n*q1\"`, `\"h*q1 + s0\"` or `\"(q1 + q2)/2\"`"),
         );
         return None;
     };
-    let terms: Vec<(CoordinateIdx, Exact)> = terms.into_iter().collect();
+    let terms: Vec<(CoordinateIdx, ExactExpression)> = terms.into_iter().collect();
+    // An expression without coordinates would fix the coordinate.
     if terms.is_empty() {
         log.push(
             Diagnostic::error(span, "this follows no coordinate")
                 .label("expected the name of a coordinate in it")
-                .help("what stands still needs no coordinate: write the constant into the frame"),
+                .help("a constant needs no coordinate: write it into the frame"),
         );
         return None;
     }
+    // Components of a unit quaternion are not independent of each other.
     let all = terms.iter().map(|(i, _)| *i).chain([coordinate]);
     if let Some(i) = all
         .into_iter()
@@ -100,18 +110,26 @@ fn coupling(
         );
         return None;
     }
-    Some(Coupling {
+    Some(CoordinateCoupling {
         coordinate,
         terms,
         offset,
     })
 }
 
-/// Puts what follows at its nominal value; what follows itself is reported.
-fn set_nominal(found: &[(Coupling, Span)], symbols: &mut Symbols, places: &Places, log: &mut Log) {
-    let mut left: Vec<&(Coupling, Span)> = found.iter().collect();
+/// Computes nominal values in the order of dependence; a coordinate that follows itself is reported.
+/// `found` has the couplings with their places.
+fn set_nominal(
+    found: &[(CoordinateCoupling, SourceSpan)],
+    symbols: &mut SymbolTable,
+    places: &MechanismSpans,
+    log: &mut DiagnosticLog,
+) {
+    // Each pass takes one coupling whose coordinates all have their values; if there is none, there is a cycle.
+    let mut left: Vec<&(CoordinateCoupling, SourceSpan)> = found.iter().collect();
     while !left.is_empty() {
-        let waits = |coupling: &Coupling| {
+        // A coupling waits while one of its coordinates has no value yet.
+        let waits = |coupling: &CoordinateCoupling| {
             let mut terms = coupling.terms.iter();
             terms.any(|(i, _)| left.iter().any(|(other, _)| other.coordinate == *i))
         };
@@ -120,43 +138,45 @@ fn set_nominal(found: &[(Coupling, Span)], symbols: &mut Symbols, places: &Place
             log.push(
                 Diagnostic::error(
                     places.coordinates[coupling.coordinate.0],
-                    format!(
-                        "`{}` follows itself",
-                        symbols.coordinates[coupling.coordinate.0].name
-                    ),
+                    format!("`{}` follows itself", symbols.coordinates[coupling.coordinate.0].name),
                 )
-                .label("by way of what it follows")
+                .label("through the coordinates that it follows")
                 .related(*span, "it follows this")
-                .help("one of the coordinates has to move by itself"),
+                .help("one of these coordinates must be independent"),
             );
             return;
         };
+        // All coordinates of this coupling have their values now.
         let (coupling, _) = left.remove(next);
-        let value = |symbol: Symbol| match symbol {
-            Symbol::Coordinate(i) => symbols.coordinates[i.0].nominal,
-            Symbol::Constant(i) => symbols.constants[i.0].value,
-            Symbol::Parameter(_) | Symbol::Place(_) => f64::NAN,
+        let value = |symbol: ModelSymbol| match symbol {
+            ModelSymbol::Coordinate(i) => symbols.coordinates[i.0].nominal,
+            ModelSymbol::Constant(i) => symbols.constants[i.0].value,
+            ModelSymbol::Parameter(_) | ModelSymbol::Place(_) => f64::NAN,
         };
         symbols.coordinates[coupling.coordinate.0].nominal = coupling.value(&value);
     }
 }
 
-/// An expression as a sum of multiples of coordinates, and what is left.
-struct Linear {
-    terms: BTreeMap<CoordinateIdx, Exact>,
-    offset: Exact,
+/// An expression as a sum of multiples of coordinates, and a term without coordinates.
+struct CoordinateSum {
+    /// Factor of each coordinate.
+    terms: BTreeMap<CoordinateIdx, ExactExpression>,
+    /// The term without coordinates.
+    offset: ExactExpression,
 }
 
-impl Linear {
-    fn fixed(offset: Exact) -> Self {
+impl CoordinateSum {
+    /// A value that contains no coordinate.
+    fn without_coordinates(offset: ExactExpression) -> Self {
         Self {
             terms: BTreeMap::new(),
             offset,
         }
     }
 
-    /// Does the same to every factor and to the rest.
-    fn map(self, f: impl Fn(Exact) -> Exact) -> Self {
+    /// Applies a linear function to every factor and to the offset; an offset of zero stays zero.
+    /// `f` must map zero to zero.
+    fn map(self, f: impl Fn(ExactExpression) -> ExactExpression) -> Self {
         let terms = self.terms.into_iter();
         Self {
             terms: terms.map(|(i, factor)| (i, f(factor))).collect(),
@@ -169,54 +189,64 @@ impl Linear {
     }
 }
 
-/// `None` where a coordinate stands otherwise than in proportion.
-fn linear(exact: &Exact) -> Option<Linear> {
+/// Splits an expression into multiples of coordinates; `None` if it is not affine in them.
+fn coordinate_sum(exact: &ExactExpression) -> Option<CoordinateSum> {
+    // Subexpressions without coordinates are kept as they are.
     let mut moves = false;
-    exact.for_each_symbol(&mut |symbol| moves |= matches!(symbol, Symbol::Coordinate(_)));
+    exact.for_each_symbol(&mut |symbol| moves |= matches!(symbol, ModelSymbol::Coordinate(_)));
     if !moves {
-        return Some(Linear::fixed(exact.clone()));
+        return Some(CoordinateSum::without_coordinates(exact.clone()));
     }
+    // The rules of an affine function: linear in each term, and products with at most one moving factor.
     match exact {
-        Exact::Symbol(Symbol::Coordinate(i)) => Some(Linear {
-            terms: BTreeMap::from([(*i, Exact::one())]),
-            offset: Exact::zero(),
+        ExactExpression::Symbol(ModelSymbol::Coordinate(i)) => Some(CoordinateSum {
+            terms: BTreeMap::from([(*i, ExactExpression::unity())]),
+            offset: ExactExpression::zero(),
         }),
-        Exact::Negative(inner) => Some(linear(inner)?.map(|x| Exact::Negative(Box::new(x)))),
-        Exact::Quotient(above, below) => {
-            let fixed = linear(below).filter(|below| below.terms.is_empty())?;
-            let divided = |x| Exact::Quotient(Box::new(x), Box::new(fixed.offset.clone()));
-            Some(linear(above)?.map(divided))
+        // A sign applies to all factors and to the offset.
+        ExactExpression::Negative(inner) => {
+            Some(coordinate_sum(inner)?.map(|x| ExactExpression::Negative(Box::new(x))))
         }
-        Exact::Product(factors) => {
-            let mut moving: Option<Linear> = None;
+        ExactExpression::Quotient(above, below) => {
+            // A divisor must be free of coordinates.
+            let fixed = coordinate_sum(below).filter(|below| below.terms.is_empty())?;
+            let divided = |x| ExactExpression::Quotient(Box::new(x), Box::new(fixed.offset.clone()));
+            Some(coordinate_sum(above)?.map(divided))
+        }
+        ExactExpression::Product(factors) => {
+            // At most one factor may contain coordinates; all others multiply its terms.
+            let mut moving: Option<CoordinateSum> = None;
             let mut others = Vec::new();
             for factor in factors {
-                let found = linear(factor)?;
+                let found = coordinate_sum(factor)?;
                 if found.terms.is_empty() {
                     others.push(found.offset);
                 } else if moving.replace(found).is_some() {
                     return None;
                 }
             }
-            let times = |x: Exact| {
-                let one = (x != Exact::one()).then_some(x);
-                let mut all: Vec<Exact> = others.iter().cloned().chain(one).collect();
+            let times = |x: ExactExpression| {
+                // Factors of one are dropped to keep the expression short.
+                let one = (x != ExactExpression::unity()).then_some(x);
+                let mut all: Vec<ExactExpression> = others.iter().cloned().chain(one).collect();
                 match all.len() {
-                    0 => Exact::one(),
+                    0 => ExactExpression::unity(),
                     1 => all.remove(0),
-                    _ => Exact::Product(all),
+                    _ => ExactExpression::Product(all),
                 }
             };
             Some(moving?.map(times))
         }
-        Exact::Sum(terms) => {
-            let mut sum = Linear::fixed(Exact::zero());
+        // Terms without coordinates are collected into the offset.
+        ExactExpression::Sum(terms) => {
+            let mut sum = CoordinateSum::without_coordinates(ExactExpression::zero());
             let mut fixed = Vec::new();
             for term in terms {
-                let found = linear(term)?;
+                let found = coordinate_sum(term)?;
                 for (i, factor) in found.terms {
+                    // Factors of the same coordinate are added.
                     let all = match sum.terms.remove(&i) {
-                        Some(before) => Exact::Sum(vec![before, factor]),
+                        Some(before) => ExactExpression::Sum(vec![before, factor]),
                         None => factor,
                     };
                     sum.terms.insert(i, all);
@@ -225,10 +255,11 @@ fn linear(exact: &Exact) -> Option<Linear> {
                     fixed.push(found.offset);
                 }
             }
+            // The offset is a sum only if it has at least two terms.
             sum.offset = match fixed.len() {
-                0 => Exact::zero(),
+                0 => ExactExpression::zero(),
                 1 => fixed.remove(0),
-                _ => Exact::Sum(fixed),
+                _ => ExactExpression::Sum(fixed),
             };
             Some(sum)
         }

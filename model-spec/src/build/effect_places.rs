@@ -1,43 +1,53 @@
-//! The places of an effect: what their names mean, and what they carry.
+//! The places of an effect: what their names refer to, and the load of each.
+//!
+//! Names go in; an [`EffectPlace`] each and the common [`PlaceLoad`] come out. Faults are reported.
 
-use crate::build::frames::Points;
-use crate::build::symbols::Symbols;
-use crate::diagnostic::{Diagnostic, Log};
+use crate::build::frames::PointTable;
+use crate::build::symbols::SymbolTable;
+use crate::diagnostic::{Diagnostic, DiagnosticLog};
 use crate::exact::CoordinateIdx;
-use crate::kind_terms::lacking_units;
-use crate::kinds::{ActsOn, Carries, OtherMotion, n_places};
-use crate::mechanism::{Drive, DriveIdx, DriveKind, LumpedMass, Part, PartIdx, Place};
+use crate::kind_terms::symbols_without_unit;
+use crate::kinds::{ActsOn, OtherMotion, PlaceLoad, n_places};
+use crate::mechanism::{DriveIdx, DriveKind, EffectPlace, LumpedMass, ModelDrive, ModelPart, PartIdx};
 use crate::record::OneOrMany;
 use crate::schema::EffectKindEntry;
 use crate::suggest;
-use crate::values::Name;
+use crate::values::SpannedName;
 
-/// What an effect may act on, beside the coordinates.
-pub(crate) struct Scene<'a> {
-    pub(crate) drives: &'a [Drive],
-    pub(crate) points: &'a Points,
-    pub(crate) parts: &'a [Part],
+/// Everything that an effect may act on, in addition to the coordinates.
+pub(crate) struct EffectTargets<'a> {
+    /// Drives with rows of the equation of motion.
+    pub(crate) drives: &'a [ModelDrive],
+    /// Named points.
+    pub(crate) points: &'a PointTable,
+    /// Rigid bodies.
+    pub(crate) parts: &'a [ModelPart],
+    /// Lumped masses, without names that an effect could use.
     pub(crate) lumped_masses: &'a [LumpedMass],
 }
 
-/// Finds a place by its name; where several things bear it, the one that the kind may act on.
-pub(super) fn place(
-    name: &Name,
+/// Finds a place by its name. If several things have that name, the kind of effect decides which one is used.
+/// `allowed` are the sorts of places of the kind; `scene` has the parts of the mechanism. An unknown name is
+/// reported.
+pub(super) fn find_place(
+    name: &SpannedName,
     allowed: &[ActsOn],
-    symbols: &Symbols,
-    scene: &Scene<'_>,
-    log: &mut Log,
-) -> Option<Place> {
+    symbols: &SymbolTable,
+    scene: &EffectTargets<'_>,
+    log: &mut DiagnosticLog,
+) -> Option<EffectPlace> {
+    // Parts are looked up lazily, because most effects act on drives.
     let part = || {
         let at = scene.parts.iter().position(|part| part.name == name.text)?;
-        Some(Place::Part(PartIdx(at)))
+        Some(EffectPlace::Part(PartIdx(at)))
     };
+    // The reserved names for the complete base and for the measured forces.
     let whole = match name.text.as_str() {
-        "base" => Some((ActsOn::Base, Place::Base)),
-        "force" => Some((ActsOn::Force, Place::Force)),
+        "base" => Some((ActsOn::Base, EffectPlace::Base)),
+        "force" => Some((ActsOn::Force, EffectPlace::Force)),
         _ => None,
     };
-    // Parts and the whole have names of their own, which a drive or a point may bear as well: the kind tells.
+    // Parts, the base and the forces have names of their own, which a drive or a point may have as well.
     if let Some((_, place)) = whole.filter(|(sort, _)| allowed.contains(sort)) {
         return Some(place);
     }
@@ -46,26 +56,26 @@ pub(super) fn place(
     {
         return Some(place);
     }
-    if let Some(idx) = scene
-        .drives
-        .iter()
-        .position(|drive| drive.name == name.text)
-    {
-        return Some(Place::Drive(DriveIdx(idx)));
+    // Names of drives, coordinates and points differ from each other, so their order does not matter.
+    if let Some(idx) = scene.drives.iter().position(|drive| drive.name == name.text) {
+        return Some(EffectPlace::Drive(DriveIdx(idx)));
     }
+    // Next come coordinates, then points, and at the end parts for kinds that do not act on them.
     let coordinate = symbols
         .coordinates
         .iter()
         .position(|coordinate| coordinate.name == name.text);
     if let Some(idx) = coordinate {
-        return Some(Place::Coordinate(CoordinateIdx(idx)));
+        return Some(EffectPlace::Coordinate(CoordinateIdx(idx)));
     }
     if let Some(idx) = scene.points.get(&name.text) {
-        return Some(Place::Point(idx));
+        return Some(EffectPlace::Point(idx));
     }
+    // A place of the wrong sort is returned, too: `common_load` reports it with a better message.
     if let Some(place) = part().or(whole.map(|(_, place)| place)) {
         return Some(place);
     }
+    // Unknown: the advice lists only names on which this kind may act.
     let mut known: Vec<&str> = Vec::new();
     let expected = match allowed {
         [ActsOn::Part] => {
@@ -87,37 +97,41 @@ pub(super) fn place(
             "the name of a drive, a coordinate or a point"
         }
     };
+    // A place that a variant removes is reported with the place of the removal.
     if !log.is_full() {
         let removal = log.removal(&["drive", "coordinates", "point", "part"], &name.text);
         log.push(
             Diagnostic::error(name.span, format!("unknown place `{}`", name.text))
                 .label(format!("expected {expected}"))
-                .removed_or(removal, || {
-                    suggest::advice(&name.text, "places", known.iter().copied())
-                }),
+                .with_removal_or(removal, || suggest::advice(&name.text, "places", known.iter().copied())),
         );
     }
     None
 }
 
-/// What the places of an effect carry; they must all carry the same, and the kind must be allowed there.
+/// The load of the places of an effect. All places must have the same load, and the kind must be allowed there.
+///
+/// `None` after any fault, each of which is reported.
+/// `places` belong to the names `at`, in the same order.
 pub(super) fn common_load(
     kind: &EffectKindEntry,
-    at: &OneOrMany<Name>,
-    places: &[Place],
-    symbols: &Symbols,
-    drives: &[Drive],
-    log: &mut Log,
-) -> Option<Carries> {
-    let carried = |kind: DriveKind| kind.carries(&symbols.coordinates);
+    at: &OneOrMany<SpannedName>,
+    places: &[EffectPlace],
+    symbols: &SymbolTable,
+    drives: &[ModelDrive],
+    log: &mut DiagnosticLog,
+) -> Option<PlaceLoad> {
+    let carried = |kind: DriveKind| kind.place_load(&symbols.coordinates);
     let names = &at.entries;
     let kind_name = kind.name.as_ref().map_or("", |name| name.text.as_str());
-    let mut common: Option<Carries> = None;
+    // The load of the first place, which all others must share.
+    let mut common: Option<PlaceLoad> = None;
     let mut fine = true;
+    // A kind with `other` acts at its first place only; the second one gives its motion.
     let n_acting = if kind.other.is_some() { 1 } else { names.len() };
-    if let (Some(motion), [first, other, ..], Some(place)) = (kind.other, &names[..], places.get(1))
-    {
-        fine = moves(motion, other, *place, &carried, drives, log);
+    if let (Some(motion), [first, other, ..], Some(place)) = (kind.other, &names[..], places.get(1)) {
+        // The second place gives its motion only, so it is checked for its motion and for being another place.
+        fine = has_motion(motion, other, *place, &carried, drives, log);
         if first.text == other.text {
             log.push(
                 Diagnostic::error(other.span, format!("`{}` is listed twice", other.text))
@@ -126,47 +140,48 @@ pub(super) fn common_load(
             fine = false;
         }
     }
+    // Each place on which the kind acts: its sort, its units, duplicates, and equal loads.
     for (i, (name, place)) in names.iter().zip(places).enumerate().take(n_acting) {
         let (sort, carries) = match place {
-            Place::Drive(idx) => (ActsOn::Drive, carried(drives[idx.0].kind)),
-            Place::Coordinate(idx) => (ActsOn::Coordinate, carried(DriveKind::Joint(*idx))),
-            Place::Point(_) => (ActsOn::Point, Carries::Mass),
-            Place::Part(_) => (ActsOn::Part, Carries::Elsewhere),
-            Place::Base => (ActsOn::Base, Carries::Elsewhere),
-            Place::Force => (ActsOn::Force, Carries::Elsewhere),
+            EffectPlace::Drive(idx) => (ActsOn::Drive, carried(drives[idx.0].kind)),
+            EffectPlace::Coordinate(idx) => (ActsOn::Coordinate, carried(DriveKind::Joint(*idx))),
+            EffectPlace::Point(_) => (ActsOn::Point, PlaceLoad::Mass),
+            EffectPlace::Part(_) => (ActsOn::Part, PlaceLoad::Elsewhere),
+            EffectPlace::Base => (ActsOn::Base, PlaceLoad::Elsewhere),
+            EffectPlace::Force => (ActsOn::Force, PlaceLoad::Elsewhere),
         };
         let allowed: Vec<ActsOn> = kind.on.iter().flat_map(|on| on.entries.clone()).collect();
         if !allowed.contains(&sort) {
-            let list: Vec<&str> = allowed.iter().map(|sort| sort.words()).collect();
+            let list: Vec<&str> = allowed.iter().map(|sort| sort.description()).collect();
             log.push(
                 Diagnostic::error(name.span, format!("`{kind_name}` cannot act here"))
-                    .label(format!("this is {}", sort.words()))
+                    .label(format!("this is {}", sort.description()))
                     .help(format!("`{kind_name}` acts on {}", list.join(" or "))),
             );
             fine = false;
             continue;
         }
-        // What mechanics need of their places is checked with them.
-        if kind.mechanics.is_none() && !lacking_units(kind, carries).is_empty() {
+        // Places of mechanics are checked with the mechanics.
+        // The kind must have units for the load of this place.
+        if kind.mechanics.is_none() && !symbols_without_unit(kind, carries).is_empty() {
             log.push(
                 Diagnostic::error(name.span, format!("`{kind_name}` cannot act here"))
                     .label(match carries {
-                        Carries::Force => "this place carries a force, for which the kind has no units",
-                        Carries::Torque => "this place carries a torque, for which the kind has no units",
-                        Carries::Mass | Carries::Elsewhere => "the kind has no units for this place",
+                        PlaceLoad::Force => "this place carries a force, for which the kind has no units",
+                        PlaceLoad::Torque => "this place carries a torque, for which the kind has no units",
+                        PlaceLoad::Mass | PlaceLoad::Elsewhere => "the kind has no units for this place",
                     })
                     .help("give the kind's parameters and constants units for both, `{ force = ..., torque = ... }`"),
             );
             fine = false;
             continue;
         }
+        // The same place twice would double the effect.
         if names[..i].iter().any(|other| other.text == name.text) {
-            log.push(
-                Diagnostic::error(name.span, format!("`{}` is listed twice", name.text))
-                    .label("each place once"),
-            );
+            log.push(Diagnostic::error(name.span, format!("`{}` is listed twice", name.text)).label("each place once"));
             fine = false;
         }
+        // One parameter cannot be both a force and a torque.
         match common {
             Some(first) if first != carries => {
                 log.push(
@@ -182,16 +197,13 @@ pub(super) fn common_load(
             _ => common = Some(carries),
         }
     }
+    // Kinds that couple two places, and some mechanics, need an exact number of them.
     if let Some(n) = n_places(kind).filter(|n| *n != names.len()) {
+        // The reason in the advice depends on how the kind uses its places.
         let (word, why) = match n {
             1 => ("one place", "it acts on one place at a time"),
-            _ if kind.mechanics.is_some() => {
-                ("two places", "it acts along the line between two points")
-            }
-            _ if kind.other.is_some() => (
-                "two places",
-                "it acts on the first with the motion of the second",
-            ),
+            _ if kind.mechanics.is_some() => ("two places", "it acts along the line between two points"),
+            _ if kind.other.is_some() => ("two places", "it acts on the first with the motion of the second"),
             _ => (
                 "two places",
                 "at each of two places it acts with the motion of the other",
@@ -207,31 +219,33 @@ pub(super) fn common_load(
     common.filter(|_| fine)
 }
 
-/// Whether a place moves as a kind asks of its other one.
-fn moves(
+/// Whether the second place of an effect moves as its kind requires; reports it otherwise.
+/// `carried` gives the load of a drive: a torque for revolute motion, a force for prismatic motion.
+fn has_motion(
     motion: OtherMotion,
-    name: &Name,
-    place: Place,
-    carried: &dyn Fn(DriveKind) -> Carries,
-    drives: &[Drive],
-    log: &mut Log,
+    name: &SpannedName,
+    place: EffectPlace,
+    carried: &dyn Fn(DriveKind) -> PlaceLoad,
+    drives: &[ModelDrive],
+    log: &mut DiagnosticLog,
 ) -> bool {
+    // Only drives and coordinates move.
     let carries = match place {
-        Place::Drive(idx) => Some(carried(drives[idx.0].kind)),
-        Place::Coordinate(idx) => Some(carried(DriveKind::Joint(idx))),
-        Place::Point(_) | Place::Part(_) | Place::Base | Place::Force => None,
+        EffectPlace::Drive(idx) => Some(carried(drives[idx.0].kind)),
+        EffectPlace::Coordinate(idx) => Some(carried(DriveKind::Joint(idx))),
+        EffectPlace::Point(_) | EffectPlace::Part(_) | EffectPlace::Base | EffectPlace::Force => None,
     };
-    if carries == Some(motion.carries()) {
+    if carries == Some(motion.place_load()) {
         return true;
     }
-    let expected = format!("expected a drive or coordinate that {}", motion.words());
+    let expected = format!("expected a drive or coordinate that {}", motion.description());
     log.push(
         Diagnostic::error(
             name.span,
-            format!("`{}` does not move as this kind asks", name.text),
+            format!("`{}` does not move as this kind requires", name.text),
         )
         .label(expected)
-        .help("the kind says in `other` whether its other place is an `angle` or a `length`"),
+        .help("the kind states in `other` whether its other place is an `angle` or a `length`"),
     );
     false
 }

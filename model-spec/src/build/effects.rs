@@ -1,52 +1,52 @@
-//! Effects of a file, by the kinds of the library and its own.
+//! Effects of a file, of kinds from the library and from the file itself.
+//!
+//! The table `effect` goes in; effects with their places, terms, constants and bodies come out. Parameters that they
+//! introduce are added to those of the file.
 
 use std::collections::BTreeMap;
 
 use crate::build::bodies::check_unique;
-use crate::build::effect_places::{Scene, common_load, place};
-use crate::build::frames::twice;
-use crate::build::symbols::{Shared, Symbols};
-use crate::diagnostic::{Diagnostic, Log, Span};
-use crate::document::Key;
-use crate::exact::{Exact, ParameterIdx};
-use crate::finite::{self, Why};
-use crate::formula::AstKind;
+use crate::build::effect_places::{EffectTargets, common_load, find_place};
+use crate::build::frames::duplicate_name;
+use crate::build::symbols::{ParameterLookup, SymbolTable};
+use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
+use crate::document::TomlKey;
+use crate::exact::{ExactExpression, ParameterIdx};
+use crate::finite::{self, ValueFaultCause};
+use crate::formula::FormulaAstKind;
 use crate::kind_terms::{factors, unit_at};
-use crate::kinds::{ActsOn, Carries, Sign, check, library_entries, n_places};
+use crate::kinds::{ActsOn, PlaceLoad, Sign, check_kind, library_entries, n_places};
 use crate::mechanics::Mechanics;
-use crate::mechanism::{Bodies, Effect, EffectTerm, Parameter, Place};
+use crate::mechanism::{DynamicParameter, EffectBodies, EffectPlace, EffectTerm, ModelEffect};
 use crate::schema::{EffectEntry, EffectKindEntry, KindParameterEntry, ModelEntry};
-use crate::scope::{Sort, Wanted};
+use crate::scope::{FormulaRequirement, SymbolSort};
 use crate::suggest;
-use crate::unit::{Dimension, Unit};
-use crate::values::Name;
+use crate::unit::{ModelUnit, UnitDimension};
+use crate::values::SpannedName;
 
-/// Reads the effects; their parameters join those of the file.
+/// Reads the effects and adds their parameters to those of the file.
+/// `own_kinds` are kinds of the model file and of its libraries; those of the program are added here.
 pub(super) fn effects(
     model: &ModelEntry,
     own_kinds: &[&EffectKindEntry],
-    symbols: &mut Symbols,
-    scene: &Scene<'_>,
-    log: &mut Log,
-) -> Vec<Effect> {
+    symbols: &mut SymbolTable,
+    scene: &EffectTargets<'_>,
+    log: &mut DiagnosticLog,
+) -> Vec<ModelEffect> {
+    // All kinds are checked once, before any effect uses them.
     let kinds = kinds(own_kinds, log);
     let entries = model.effect.iter().flat_map(|list| &list.entries);
-    check_unique(
-        "effect",
-        entries.clone().filter_map(|entry| entry.name.as_ref()),
-        log,
-    );
-    // What couples two places may couple each with a third.
+    check_unique("effect", entries.clone().filter_map(|entry| entry.name.as_ref()), log);
+    // Effects that couple two places may share one of them with another effect.
+    // For kinds with exactly two places: whether they act on both. `None` for all other kinds.
     let couples = |entry: &EffectEntry| {
-        let kind = entry
-            .kind
-            .as_ref()
-            .and_then(|kind| kinds.get(kind.text.as_str()));
+        let kind = entry.kind.as_ref().and_then(|kind| kinds.get(kind.text.as_str()));
         kind.and_then(|(kind, _)| {
             let both_ways = kind.other.is_none();
             (n_places(kind) == Some(2)).then_some(both_ways)
         })
     };
+    // Checks that compare effects with each other come first.
     warn_of_twins(entries.clone(), &couples, log);
     check_single(entries.clone(), &kinds, log);
     entries
@@ -54,19 +54,14 @@ pub(super) fn effects(
         .collect()
 }
 
-/// Reports what is one property of the whole, such as a tilt, and acts twice.
-fn check_single<'a>(
-    entries: impl Iterator<Item = &'a EffectEntry>,
-    kinds: &Kinds<'_>,
-    log: &mut Log,
-) {
-    let mut seen: Vec<(Mechanics, Span)> = Vec::new();
+/// Reports kinds that describe one property of the complete mechanism, such as a tilt of gravity, if they occur
+/// twice.
+fn check_single<'a>(entries: impl Iterator<Item = &'a EffectEntry>, kinds: &KindTable<'_>, log: &mut DiagnosticLog) {
+    // Kinds are compared by their mechanics, so that own kinds with other names count as equal.
+    let mut seen: Vec<(Mechanics, SourceSpan)> = Vec::new();
     for name in entries.filter_map(|entry| entry.kind.as_ref()) {
         let kind = kinds.get(name.text.as_str());
-        let Some(way) = kind
-            .and_then(|(kind, _)| kind.mechanics)
-            .filter(|way| way.is_of_the_whole())
-        else {
+        let Some(way) = kind.and_then(|(kind, _)| kind.mechanics).filter(|way| way.is_global()) else {
             continue;
         };
         match seen.iter().find(|(known, _)| *known == way) {
@@ -81,25 +76,29 @@ fn check_single<'a>(
     }
 }
 
-/// Warns of a kind that acts twice at one place with the same constants: the columns are equal, and a variant that means
-/// to override an effect without a name brings this about. What couples places is a twin if it couples the same ones;
-/// `couples` says whether it does so both ways.
+/// Warns of a kind that acts twice at one place with the same constants. Its columns are then equal. A common cause
+/// is a variant that is meant to override an effect without a name. Effects that couple two places are compared by
+/// both places; `couples` states whether the order of the places matters (`Some(false)`) or not (`Some(true)`).
 fn warn_of_twins<'a>(
     entries: impl Iterator<Item = &'a EffectEntry>,
     couples: &dyn Fn(&EffectEntry) -> Option<bool>,
-    log: &mut Log,
+    log: &mut DiagnosticLog,
 ) {
-    let mut seen: BTreeMap<(&str, Vec<&str>), (&EffectEntry, &Name)> = BTreeMap::new();
+    // Each kind at each place, with the first effect that has it.
+    let mut seen: BTreeMap<(&str, Vec<&str>), (&EffectEntry, &SpannedName)> = BTreeMap::new();
+    // With own constants the columns differ, so that both effects can be meant.
     for entry in entries.filter(|entry| entry.constants.is_none()) {
         let Some(kind) = &entry.kind else { continue };
         let mut all: Vec<&str> = (entry.at.iter().flat_map(|at| &at.entries))
             .map(|place| place.text.as_str())
             .collect();
         let together = couples(entry);
+        // Places of a symmetric coupling are sorted, so that both orders compare equal.
         if together != Some(false) {
             all.sort_unstable();
         }
         let n_keys = if together.is_some() { 1 } else { all.len() };
+        // A coupling has one key, other effects have one for each place.
         for place in entry.at.iter().flat_map(|at| &at.entries).take(n_keys) {
             let key = if together.is_some() {
                 all.clone()
@@ -108,112 +107,111 @@ fn warn_of_twins<'a>(
             };
             let known = *seen.entry((&kind.text, key)).or_insert((entry, place));
             let (first, first_place) = known;
+            // The places of one effect are checked elsewhere.
             if std::ptr::eq(first, entry) {
                 continue;
             }
+            // An unnamed effect of another file was probably meant to be overridden.
             let remedy = if first.name.is_none() && first_place.span.file != place.span.file {
-                "to override the effect of the extended file, give it a `name` there and here the same one"
+                "to override the effect of the extended file, give both effects the same `name`"
             } else {
                 "delete one of them"
             };
             log.push(
-                Diagnostic::warning(
-                    place.span,
-                    format!("`{}` acts twice at `{}`", kind.text, place.text),
-                )
-                .label("the effects add up")
-                .related(first_place.span, "it acts there already")
-                .help(remedy),
+                Diagnostic::warning(place.span, format!("`{}` acts twice at `{}`", kind.text, place.text))
+                    .label("the effects add up")
+                    .related(first_place.span, "it acts there already")
+                    .help(remedy),
             );
         }
     }
 }
 
-/// A kind and whether it is sound.
-type Kinds<'a> = BTreeMap<&'a str, (&'a EffectKindEntry, bool)>;
+/// Kinds by name, each with whether it has no faults.
+/// The flag is false for kinds whose own entries have errors.
+type KindTable<'a> = BTreeMap<&'a str, (&'a EffectKindEntry, bool)>;
 
-fn kinds<'a>(own: &[&'a EffectKindEntry], log: &mut Log) -> Kinds<'a> {
-    let mut kinds: Kinds<'a> = BTreeMap::new();
+/// The kinds of the library and of the file, each checked; faults and name clashes are reported.
+fn kinds<'a>(own: &[&'a EffectKindEntry], log: &mut DiagnosticLog) -> KindTable<'a> {
+    // Kinds of the program are valid.
+    let mut kinds: KindTable<'a> = BTreeMap::new();
     for entry in library_entries() {
         if let Some(name) = &entry.name {
             kinds.insert(&name.text, (entry, true));
         }
     }
+    // Own kinds follow; a name that exists already is refused.
     for entry in own {
         let before = log.n_errors();
         let Some(name) = &entry.name else { continue };
         if let Some((first, _)) = kinds.get(name.text.as_str()) {
             let first_span = first.name.as_ref().map_or(name.span, |name| name.span);
+            // Kinds of the library have no place in the user's files.
             if first_span.file == usize::MAX {
                 log.push(
-                    Diagnostic::error(
-                        name.span,
-                        format!("the library has a kind `{}` already", name.text),
-                    )
-                    .label("expected a new name"),
+                    Diagnostic::error(name.span, format!("the library has a kind `{}` already", name.text))
+                        .label("expected a new name"),
                 );
             } else {
-                log.push(twice("kind of effect", name, first_span));
+                log.push(duplicate_name("kind of effect", name, first_span));
             }
             continue;
         }
-        check(entry, log);
-        let complete = (entry.mechanics.is_some()
-            || entry.parameters.is_some() && entry.expression.is_some())
+        // Check the kind without a model; missing entries were reported by the reader.
+        check_kind(entry, log);
+        // Faulty kinds stay in the table, so that their effects are not reported as unknown.
+        let complete = (entry.mechanics.is_some() || entry.parameters.is_some() && entry.expression.is_some())
             && entry.on.is_some();
         kinds.insert(&name.text, (entry, complete && log.n_errors() == before));
     }
+    // A kind may refine one that is declared after it, so references are checked at the end.
     for refined in own.iter().filter_map(|entry| entry.refines.as_ref()) {
         if !kinds.contains_key(refined.text.as_str()) {
             log.push(
-                Diagnostic::error(
-                    refined.span,
-                    format!("unknown kind of effect `{}`", refined.text),
-                )
-                .label("expected the simpler kind that this one holds as a special case")
-                .help(suggest::advice(
-                    &refined.text,
-                    "kinds",
-                    kinds.keys().copied(),
-                )),
+                Diagnostic::error(refined.span, format!("unknown kind of effect `{}`", refined.text))
+                    .label("expected the simpler kind that is a special case of this one")
+                    .help(suggest::advice(&refined.text, "kinds", kinds.keys().copied())),
             );
         }
     }
     kinds
 }
 
-fn unknown(kind: &Name, kinds: &Kinds<'_>) -> Diagnostic {
+/// The diagnostic of an unknown kind of effect.
+fn unknown_kind(kind: &SpannedName, kinds: &KindTable<'_>) -> Diagnostic {
     let message = format!("unknown kind of effect `{}`", kind.text);
     Diagnostic::error(kind.span, message)
         .label("expected a kind of the library or of this file")
         .help(suggest::advice(&kind.text, "kinds", kinds.keys().copied()))
 }
 
+/// Reads one effect; `None` after a fault, which is reported.
+/// The kind decides which places are allowed, which parameters exist, and what multiplies each of them.
 fn effect(
     entry: &EffectEntry,
-    kinds: &Kinds<'_>,
-    symbols: &mut Symbols,
-    scene: &Scene<'_>,
-    log: &mut Log,
-) -> Option<Effect> {
+    kinds: &KindTable<'_>,
+    symbols: &mut SymbolTable,
+    scene: &EffectTargets<'_>,
+    log: &mut DiagnosticLog,
+) -> Option<ModelEffect> {
     let at = entry.at.as_ref();
-    let known = entry
-        .kind
-        .as_ref()
-        .and_then(|name| kinds.get(name.text.as_str()));
+    let known = entry.kind.as_ref().and_then(|name| kinds.get(name.text.as_str()));
     let allowed: &[ActsOn] = known
         .and_then(|(kind, _)| kind.on.as_ref())
         .map_or(&[], |on| on.entries.as_slice());
-    let mut places: Vec<Place> = at
+    // Places are looked up before the kind, so that unknown names are reported even for an unknown kind.
+    let mut places: Vec<EffectPlace> = at
         .iter()
         .flat_map(|at| &at.entries)
-        .filter_map(|name| place(name, allowed, symbols, scene, log))
+        .filter_map(|name| find_place(name, allowed, symbols, scene, log))
         .collect();
+    // Without a kind nothing else can be checked.
     let kind_name = entry.kind.as_ref()?;
     let Some(&(kind, is_sound)) = known else {
-        log.push(unknown(kind_name, kinds));
+        log.push(unknown_kind(kind_name, kinds));
         return None;
     };
+    // Names of parameters are compared with the symbols of the kind.
     check_parameter_names(entry, kind, log);
     let at = at?;
     if at.entries.is_empty() {
@@ -223,13 +221,16 @@ fn effect(
         );
         return None;
     }
+    // Faulty kinds and unknown places are reported already.
     if !is_sound || places.len() != at.entries.len() {
         return None;
     }
     let carries = common_load(kind, at, &places, symbols, scene.drives, log)?;
+    // The kind and its places fit; now its constants, and the factor or the bodies of each parameter.
     let before = log.n_errors();
     let mut constants = constants(entry, kind, kind_name, symbols, carries, log);
     check_values(entry, kind, kind_name, symbols, log);
+    // Expressions give one factor per parameter; mechanics check their places and give bodies.
     let shapes = match kind.mechanics {
         None => factors(kind, carries, &constants, log)?,
         Some(way) => {
@@ -246,18 +247,21 @@ fn effect(
             Vec::new()
         }
     };
+    // Default names of parameters end with the names of all places.
     let places_name = at
         .entries
         .iter()
         .map(|name| name.text.as_str())
         .collect::<Vec<_>>()
         .join("_");
+    // Mechanics may allow only some of their parameters at a place, such as those of a planar part.
     let own = kind.mechanics.zip(places.first());
-    let own =
-        own.and_then(|(way, place)| Some((way, way.entry().parameters_at(*place, scene.parts)?)));
+    let own = own.and_then(|(way, place)| Some((way, way.entry().parameters_at(*place, scene.parts)?)));
+    // One term per parameter of the kind, in the kind's order.
     let mut terms = Vec::new();
     let parameters = kind.parameters.iter().flat_map(|table| &table.entries);
     for (i, (key, parameter)) in parameters.enumerate() {
+        // Parameters that do not exist at this place are skipped, or refused if the file names them.
         if let Some((way, those)) = &own
             && !those.contains(&key.name.as_str())
         {
@@ -268,21 +272,24 @@ fn effect(
         terms.push(EffectTerm {
             symbol: key.name.clone(),
             parameter: term_parameter(entry, key, parameter, unit, &places_name, symbols, log)?,
-            expression: shapes.get(i).cloned().unwrap_or_else(Exact::one),
+            // Terms of mechanics have the factor one.
+            expression: shapes.get(i).cloned().unwrap_or_else(ExactExpression::unity),
         });
     }
-    let mut bodies = Bodies::default();
+    let mut bodies = EffectBodies::default();
     if let Some(way) = kind.mechanics.map(Mechanics::entry) {
-        // A file of one's own may list them in another order.
+        // A kind of the user's file may list the parameters in another order.
         let listed = way.parameters().iter().map(|(symbol, _)| *symbol);
         terms.sort_by_key(|term| listed.clone().position(|symbol| symbol == term.symbol));
         bodies = way.bodies(&terms, &places, scene);
     }
+    // The second place of a kind with `other` is no place of action.
     let other = kind.other.and(places.get(1).copied());
     if other.is_some() {
         places.truncate(1);
     }
-    (log.n_errors() == before).then(|| Effect {
+    // A fault in any constant or term drops the effect.
+    (log.n_errors() == before).then(|| ModelEffect {
         kind: kind_name.text.clone(),
         places,
         other,
@@ -293,38 +300,41 @@ fn effect(
     })
 }
 
-/// The parameter of one term of an effect: one that the file knows, or a new one.
+/// The parameter of one term of an effect: a parameter that the file declares, or a new one.
+/// `unit` is that of the parameter at these places, and `places_name` the end of its default name.
 fn term_parameter(
     entry: &EffectEntry,
-    key: &Key,
+    key: &TomlKey,
     parameter: &KindParameterEntry,
-    unit: &Unit,
+    unit: &ModelUnit,
     places_name: &str,
-    symbols: &mut Symbols,
-    log: &mut Log,
+    symbols: &mut SymbolTable,
+    log: &mut DiagnosticLog,
 ) -> Option<ParameterIdx> {
+    // The entry of the file for this parameter, if there is one.
     let said = entry
         .parameters
         .iter()
         .flat_map(|table| &table.entries)
         .find(|(name, _)| name.name == key.name)
         .map(|(_, said)| said);
+    // Without a name in the file the parameter is called after its symbol and its places.
     let named = said.and_then(|said| said.name.as_ref());
-    let name = named.map_or_else(
-        || format!("{}_{places_name}", key.name),
-        |name| name.text.clone(),
-    );
+    let name = named.map_or_else(|| format!("{}_{places_name}", key.name), |name| name.text.clone());
+    // Messages point to the name of the parameter, or to the kind if the file gives none.
     let kind_span = entry.kind.as_ref().map_or(entry.span, |kind| kind.span);
     let span = named.map_or(kind_span, |name| name.span);
     let nominal = said.and_then(|said| said.nominal);
+    // A name that is declared already shares that parameter; its unit must be the same.
     let shared = symbols.share_parameter(&name, Some(unit.dimension), span, nominal, log);
     let idx = match shared {
-        Shared::Known(idx) => idx,
-        Shared::Faulty => return None,
-        Shared::New => {
+        ParameterLookup::Known(idx) => idx,
+        ParameterLookup::Faulty => return None,
+        ParameterLookup::New => {
+            // A new parameter starts with its nominal value, zero without one.
             let idx = ParameterIdx(symbols.parameters.len());
             let fine = symbols.declare_parameter(
-                Parameter {
+                DynamicParameter {
                     name,
                     nominal: nominal.map_or(0.0, |number| number.value),
                     unit: unit.text.clone(),
@@ -341,21 +351,20 @@ fn term_parameter(
             idx
         }
     };
+    // The sign is checked for shared parameters as well.
     let nominal_span = nominal.map_or(span, |number| number.span);
-    warn_of_sign(
-        &symbols.parameters[idx.0],
-        parameter.sign,
-        nominal_span,
-        log,
-    );
+    warn_of_sign(&symbols.parameters[idx.0], parameter.sign, nominal_span, log);
+    // An effect is a use of the parameter.
     if let Some(meaning) = symbols.scope.get(&symbols.parameters[idx.0].name) {
         meaning.used.set(true);
     }
     Some(idx)
 }
 
-/// Warns of a nominal value whose sign makes no physical sense.
-fn warn_of_sign(parameter: &Parameter, sign: Option<Sign>, span: Span, log: &mut Log) {
+/// Warns of a nominal value whose sign contradicts the physics of the kind.
+/// `sign` is the one that the kind requires; without it nothing is reported.
+fn warn_of_sign(parameter: &DynamicParameter, sign: Option<Sign>, span: SourceSpan, log: &mut DiagnosticLog) {
+    // Zero is allowed for both signs: it means that no value is known.
     let value = parameter.nominal;
     let expected = match sign {
         Some(Sign::Positive) if value < 0.0 => "positive",
@@ -371,19 +380,22 @@ fn warn_of_sign(parameter: &Parameter, sign: Option<Sign>, span: Span, log: &mut
             ),
         )
         .label(format!("expected a {expected} value"))
-        .help("check its sign, and whether the kind is the one that is meant"),
+        .help("check its sign, and whether this kind is intended"),
     );
 }
 
-/// The values of the kind's constants in this effect.
+/// The values of the kind's constants in this effect: its own values, else the defaults of the kind.
+///
+/// Unknown and missing constants are reported.
 fn constants(
     entry: &EffectEntry,
     kind: &EffectKindEntry,
-    kind_name: &Name,
-    symbols: &Symbols,
-    carries: Carries,
-    log: &mut Log,
-) -> Vec<(String, Exact)> {
+    kind_name: &SpannedName,
+    symbols: &SymbolTable,
+    carries: PlaceLoad,
+    log: &mut DiagnosticLog,
+) -> Vec<(String, ExactExpression)> {
+    // Unknown names first, then a value for each constant of the kind.
     let known = || kind.constants.iter().flat_map(|table| &table.entries);
     for (key, _) in entry.constants.iter().flat_map(|table| &table.entries) {
         if !known().any(|(name, _)| name.name == key.name) {
@@ -391,11 +403,7 @@ fn constants(
             log.push(
                 Diagnostic::error(key.span, format!("unknown constant `{}`", key.name))
                     .label(format!("`{}` has no such constant", kind_name.text))
-                    .help(suggest::advice(
-                        &key.name,
-                        "constants",
-                        names.iter().copied(),
-                    )),
+                    .help(suggest::advice(&key.name, "constants", names.iter().copied())),
             );
         }
     }
@@ -407,6 +415,7 @@ fn constants(
             .flat_map(|table| &table.entries)
             .find(|(name, _)| name.name == key.name)
             .map(|(_, formula)| formula);
+        // A constant without any value is reported with its note as the label.
         let Some(formula) = given.or(constant.value.as_ref()) else {
             log.push(
                 Diagnostic::error(
@@ -423,11 +432,11 @@ fn constants(
             );
             continue;
         };
-        let dimension =
-            unit_at(constant.unit.as_ref(), carries).map_or(Dimension::ONE, |unit| unit.dimension);
+        // The unit of a constant depends on the load of the place.
+        let dimension = unit_at(constant.unit.as_ref(), carries).map_or(UnitDimension::ONE, |unit| unit.dimension);
         let what = format!("`{}`", key.name);
-        let wanted = Wanted {
-            sorts: &[Sort::Constant],
+        let wanted = FormulaRequirement {
+            sorts: &[SymbolSort::Constant],
             dimension,
             what: &what,
         };
@@ -438,14 +447,16 @@ fn constants(
     values
 }
 
-/// Reports values of the constants at which the kind's expression has no finite value, such as a Stribeck speed of 0.
+/// Reports values of constants at which the kind's expression is not finite, such as a Stribeck speed of 0.
+/// Kinds without an expression have nothing to evaluate.
 fn check_values(
     entry: &EffectEntry,
     kind: &EffectKindEntry,
-    kind_name: &Name,
-    symbols: &Symbols,
-    log: &mut Log,
+    kind_name: &SpannedName,
+    symbols: &SymbolTable,
+    log: &mut DiagnosticLog,
 ) {
+    // The value of the effect, else the default of the kind.
     let given = |name: &str| {
         let own = entry
             .constants
@@ -461,7 +472,7 @@ fn check_values(
                 .and_then(|(_, constant)| constant.value.as_ref())
         })
     };
-    // Values that are no numbers themselves are reported where they stand.
+    // A constant without a finite value of its own is reported at that constant.
     let value = |name: &str| {
         finite::value(&given(name)?.ast, &|inner| symbols.scope.value(inner))
             .ok()
@@ -470,9 +481,11 @@ fn check_values(
     let Some(expression) = kind.expression.as_ref() else {
         return;
     };
+    // The innermost part of the expression that has no value.
     let Err(fault) = finite::value(&expression.ast, &value) else {
         return;
     };
+    // The mark is on the constant that causes the fault, unless its value is a default of the library.
     let named = kind
         .constants
         .iter()
@@ -484,23 +497,21 @@ fn check_values(
         .map(|formula| formula.ast.span)
         .filter(|span| span.file != usize::MAX)
         .unwrap_or(kind_name.span);
-    let what = named.map_or_else(
-        || format!("`{}`", kind_name.text),
-        |name| format!("`{name}`"),
-    );
-    let is_name = matches!(&fault.piece.kind, AstKind::Name(_));
-    let message = match fault.why {
-        Why::Divides if is_name => format!("{what} must not be zero"),
-        Why::Root if is_name => format!("{what} must not be negative"),
+    let what = named.map_or_else(|| format!("`{}`", kind_name.text), |name| format!("`{name}`"));
+    // The message names the constant if the faulty part is exactly that constant.
+    let is_name = matches!(&fault.piece.kind, FormulaAstKind::Name(_));
+    let message = match fault.cause {
+        ValueFaultCause::Divides if is_name => format!("{what} must not be zero"),
+        ValueFaultCause::Root if is_name => format!("{what} must not be negative"),
         _ => format!(
             "with this value of {what} the effect `{}` has no finite value",
             kind_name.text
         ),
     };
-    let label = match fault.why {
-        Why::Divides => format!("`{}` divides by it", kind_name.text),
-        Why::Root => format!("`{}` takes its root", kind_name.text),
-        Why::TooLarge => "too large".to_owned(),
+    let label = match fault.cause {
+        ValueFaultCause::Divides => format!("`{}` divides by it", kind_name.text),
+        ValueFaultCause::Root => format!("`{}` takes its root", kind_name.text),
+        ValueFaultCause::TooLarge => "too large".to_owned(),
     };
     log.push(
         Diagnostic::error(span, message)
@@ -509,7 +520,9 @@ fn check_values(
     );
 }
 
-fn check_parameter_names(entry: &EffectEntry, kind: &EffectKindEntry, log: &mut Log) {
+/// Reports entries of `parameters` whose names the kind does not have.
+fn check_parameter_names(entry: &EffectEntry, kind: &EffectKindEntry, log: &mut DiagnosticLog) {
+    // All symbols of the kind, for the comparison and for the advice.
     let names: Vec<&str> = kind
         .parameters
         .iter()
@@ -521,11 +534,7 @@ fn check_parameter_names(entry: &EffectEntry, kind: &EffectKindEntry, log: &mut 
             log.push(
                 Diagnostic::error(key.span, format!("unknown parameter `{}`", key.name))
                     .label("this kind of effect has no such parameter")
-                    .help(suggest::advice(
-                        &key.name,
-                        "parameters",
-                        names.iter().copied(),
-                    )),
+                    .help(suggest::advice(&key.name, "parameters", names.iter().copied())),
             );
         }
     }

@@ -1,43 +1,42 @@
-//! What moves without a drive: free bodies and undriven joints. They get their rows of the equation of motion here, and what
-//! would need more than that is refused.
+//! Free bodies and undriven joints: motion without a drive. They get their rows of the equation of motion here.
+//! Configurations that need more than such rows are refused.
 
 use std::collections::BTreeMap;
 
-use crate::build::Places;
-use crate::build::actuation::Drives;
-use crate::build::frames::{Points, Tree};
-use crate::build::symbols::Symbols;
-use crate::diagnostic::{Diagnostic, Log, Span};
-use crate::exact::{CoordinateIdx, Symbol};
-use crate::mechanism::{Drive, DriveKind, FrameIdx, FreeBody, Loop, PointIdx, Step};
+use crate::build::MechanismSpans;
+use crate::build::actuation::DriveRows;
+use crate::build::frames::{FrameTree, PointTable};
+use crate::build::symbols::SymbolTable;
+use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
+use crate::exact::{CoordinateIdx, ModelSymbol};
+use crate::mechanism::{DriveKind, FrameIdx, FrameStep, FreeBody, KinematicLoop, ModelDrive, PointIdx};
 use crate::schema::ModelEntry;
 
-/// The free bodies with the frames that they carry.
-fn free_bodies(tree: &Tree) -> impl Iterator<Item = (usize, &FreeBody)> {
+/// The free bodies, each with the index of the frame that it moves.
+fn free_bodies(tree: &FrameTree) -> impl Iterator<Item = (usize, &FreeBody)> {
+    // Indices of frames are kept, because checks need the place of the frame in the file.
     let steps = tree.frames.iter().enumerate();
     steps.flat_map(|(i, frame)| {
         let of_frame = frame.steps.iter();
         of_frame.filter_map(move |step| match step {
-            Step::Free(body) => Some((i, body)),
+            FrameStep::Free(body) => Some((i, body)),
             _ => None,
         })
     })
 }
 
-/// Takes the drives out of a tree that has more of them than degrees of freedom: they share its rows.
-pub(super) fn take_shared(
+/// Removes the drives from a tree that has more of them than degrees of freedom. They are returned and share its
+/// rows.
+pub(super) fn split_shared_drives(
     model: &ModelEntry,
-    symbols: &Symbols,
-    drives: &mut Vec<Drive>,
-) -> Vec<Drive> {
+    symbols: &SymbolTable,
+    drives: &mut Vec<ModelDrive>,
+) -> Vec<ModelDrive> {
+    // Degrees of freedom: active coordinates with a rate.
     let coordinates = symbols.coordinates.iter();
-    let freedoms = coordinates
-        .filter(|c| !c.passive && c.motion.has_rate())
-        .count();
-    let has_loops = model
-        .loops
-        .as_ref()
-        .is_some_and(|list| !list.entries.is_empty());
+    let freedoms = coordinates.filter(|c| !c.passive && c.motion.has_rate()).count();
+    let has_loops = model.loops.as_ref().is_some_and(|list| !list.entries.is_empty());
+    // With loops or passive coordinates a surplus drive is an error instead.
     let has_passive = symbols.coordinates.iter().any(|c| c.passive);
     if drives.len() <= freedoms || freedoms == 0 || has_loops || has_passive {
         return Vec::new();
@@ -45,34 +44,38 @@ pub(super) fn take_shared(
     std::mem::take(drives)
 }
 
-/// Adds a row for every degree of freedom that nothing drives, or that drives share.
+/// Adds a row for every degree of freedom without a drive, or for all of them if drives share the rows.
+///
+/// Rows are inserted into the drives of `drives`, and their places into `places.drives`.
 pub(super) fn add_rows(
     model: &ModelEntry,
-    symbols: &Symbols,
-    tree: &Tree,
-    points: &Points,
-    places: &mut Places,
-    drives: &mut Drives,
-    log: &mut Log,
+    symbols: &SymbolTable,
+    tree: &FrameTree,
+    points: &PointTable,
+    places: &mut MechanismSpans,
+    drives: &mut DriveRows,
+    log: &mut DiagnosticLog,
 ) {
-    let Drives {
-        rows: drives,
-        shared,
-    } = drives;
+    let DriveRows { rows: drives, shared } = drives;
+    // Rows of a free body: its position, then the vector part of its quaternion as rates of rotation.
     let mut of_bodies = Vec::new();
     for (frame, body) in free_bodies(tree) {
-        check_body(symbols, tree, frame, body, places, log);
+        // A free body is checked before its rows are made.
+        check_free_body(symbols, tree, frame, body, places, log);
         let [_, qx, qy, qz] = body.quaternion;
         of_bodies.extend(body.position);
         of_bodies.extend([qx, qy, qz]);
     }
-    let mut undriven = undriven(model, symbols, places, drives, log);
+    // Undriven joints, or all joints if drives share the rows.
+    let mut undriven = undriven_coordinates(model, symbols, places, drives, log);
+    // Shared drives act on all joints, so every joint gets a row without a drive.
     if !shared.is_empty() {
         let all = (0..symbols.coordinates.len()).map(CoordinateIdx);
         undriven = all
             .filter(|i| symbols.coordinates[i.0].motion.has_rate() && !of_bodies.contains(i))
             .collect();
     }
+    // A row is not needed where a drive acts directly on the coordinate.
     let driven: Vec<CoordinateIdx> = drives
         .iter()
         .filter_map(|drive| match drive.kind {
@@ -80,19 +83,18 @@ pub(super) fn add_rows(
             DriveKind::Linear { .. } => None,
         })
         .collect();
-    let row = |i: CoordinateIdx| Drive {
+    // The force of such a row is called `on_` and the coordinate.
+    let row = |i: CoordinateIdx| ModelDrive {
         name: format!("on_{}", symbols.coordinates[i.0].name),
         kind: DriveKind::Joint(i),
         is_driven: false,
     };
     let span = |i: &CoordinateIdx| places.coordinates[i.0];
     of_bodies.retain(|i| !driven.contains(i));
+    // The name of a row must not collide with any other column of recordings.
     for (i, row) in of_bodies.iter().chain(&undriven).map(|i| (i, row(*i))) {
         let is_taken = symbols.coordinates.iter().any(|c| c.name == row.name)
-            || drives
-                .iter()
-                .chain(&*shared)
-                .any(|drive| drive.name == row.name)
+            || drives.iter().chain(&*shared).any(|drive| drive.name == row.name)
             || points.get(&row.name).is_some();
         if is_taken {
             log.push(
@@ -108,6 +110,7 @@ pub(super) fn add_rows(
             );
         }
     }
+    // Rows of free bodies come first, those of undriven joints last.
     let spans: Vec<_> = of_bodies.iter().map(span).collect();
     let last: Vec<_> = undriven.iter().map(span).collect();
     drives.splice(0..0, of_bodies.into_iter().map(row));
@@ -116,15 +119,18 @@ pub(super) fn add_rows(
     places.drives.extend(last);
 }
 
-/// Coordinates of joints that the file says nothing drives.
-fn undriven(
+/// Coordinates of joints with `driven = false`; contradictions to `passive` and to drives are reported.
+///
+/// Components of quaternions are skipped, because their joint states how the body moves.
+fn undriven_coordinates(
     model: &ModelEntry,
-    symbols: &Symbols,
-    places: &Places,
-    drives: &[Drive],
-    log: &mut Log,
+    symbols: &SymbolTable,
+    places: &MechanismSpans,
+    drives: &[ModelDrive],
+    log: &mut DiagnosticLog,
 ) -> Vec<CoordinateIdx> {
     let mut found = Vec::new();
+    // Only coordinates with `driven = false` count.
     for (key, entry) in model.coordinates.iter().flat_map(|table| &table.entries) {
         if entry.driven.is_none_or(|flag| flag.0) {
             continue;
@@ -134,31 +140,27 @@ fn undriven(
         };
         let coordinate = &symbols.coordinates[i];
         if coordinate.motion.is_quaternion() {
-            continue; // Said of the whole body by its joint.
+            continue; // The joint decides for all coordinates of the body.
         }
+        // Passive coordinates have no row of their own.
         if coordinate.passive {
             log.push(
                 Diagnostic::error(
                     key.span,
-                    format!(
-                        "`{}` is `passive`, so that no drive could act on it",
-                        key.name
-                    ),
+                    format!("`{}` is `passive`, so that no drive could act on it", key.name),
                 )
-                .label("delete `driven = false`: the loops settle this coordinate"),
+                .label("delete `driven = false`: the loops determine this coordinate"),
             );
             continue;
         }
+        // A drive on the coordinate contradicts the entry.
         let kind = DriveKind::Joint(CoordinateIdx(i));
         if let Some(at) = drives.iter().position(|drive| drive.kind == kind) {
             log.push(
-                Diagnostic::error(
-                    key.span,
-                    format!("nothing drives `{}`, and a drive does", key.name),
-                )
-                .label("`driven = false` here")
-                .related(places.drives[at], "this drive acts on it")
-                .help("delete one of the two"),
+                Diagnostic::error(key.span, format!("`{}` has `driven = false` and a drive", key.name))
+                    .label("`driven = false` here")
+                    .related(places.drives[at], "this drive acts on it")
+                    .help("delete one of the two"),
             );
             continue;
         }
@@ -167,29 +169,33 @@ fn undriven(
     found
 }
 
-/// Reports what a free body cannot be.
-fn check_body(
-    symbols: &Symbols,
-    tree: &Tree,
+/// Reports a free body that is not on the base, has passive coordinates, or shares its coordinates.
+///
+/// `frame` is the frame that the body moves.
+fn check_free_body(
+    symbols: &SymbolTable,
+    tree: &FrameTree,
     frame: usize,
     body: &FreeBody,
-    places: &Places,
-    log: &mut Log,
+    places: &MechanismSpans,
+    log: &mut DiagnosticLog,
 ) {
     let here = &tree.frames[frame];
     let Some(span) = places.frames.get(frame).copied().flatten() else {
         return;
     };
+    // The coordinates are the pose in the base frame, so no other step may come before or after.
     if here.parent != FrameIdx(0) || here.steps.len() != 1 {
         log.push(
             Diagnostic::error(
                 span,
-                "a free body with a quaternion hangs on `base`, and on nothing between",
+                "a free body with a quaternion must be on `base` without a transform",
             )
             .label("its coordinates are its pose in the base frame")
-            .help("write `on = \"base\"` and leave `transform` away; a frame on it may have one"),
+            .help("write `on = \"base\"` and omit `transform`; a frame on the body may have one"),
         );
     }
+    // None of the seven coordinates may be passive.
     let all = body.position.iter().chain(&body.quaternion);
     for i in all.clone() {
         if symbols.coordinates[i.0].passive {
@@ -198,11 +204,12 @@ fn check_body(
                     places.coordinates[i.0],
                     "a coordinate of a free body with a quaternion cannot be `passive`",
                 )
-                .label("no loop settles it")
-                .help("a platform whose loops settle its pose has `free` with six coordinates"),
+                .label("no loop determines it")
+                .help("a platform whose pose the loops determine has `free` with six coordinates"),
             );
         }
     }
+    // A zero quaternion cannot be normalised to an orientation.
     let size: f64 = body
         .quaternion
         .iter()
@@ -212,18 +219,19 @@ fn check_body(
         log.push(
             Diagnostic::error(
                 places.coordinates[body.quaternion[0].0],
-                "the nominal quaternion has no length",
+                "the nominal quaternion is zero",
             )
-            .label("so it stands for no orientation")
-            .help("leave its values away, or give it a length of one"),
+            .label("it is not an orientation")
+            .help("omit its values, or give it a length of one"),
         );
     }
+    // A coordinate of a free body must move that body only.
     for i in all {
         let uses = tree
             .frames
             .iter()
             .flat_map(|frame| &frame.steps)
-            .filter(|step| uses(step, *i));
+            .filter(|step| is_moved_by(step, *i));
         if uses.count() > 1 {
             log.push(
                 Diagnostic::error(
@@ -237,57 +245,61 @@ fn check_body(
     }
 }
 
-fn uses(step: &Step, coordinate: CoordinateIdx) -> bool {
+/// Whether a step of a frame depends on a coordinate.
+/// A rotation depends on it by a term, a translation by a factor, a free body by its coordinates.
+fn is_moved_by(step: &FrameStep, coordinate: CoordinateIdx) -> bool {
     match step {
-        Step::Rotate(_, angle) => angle
+        FrameStep::Rotate(_, angle) => angle
             .terms
             .iter()
-            .any(|(s, _)| *s == Symbol::Coordinate(coordinate)),
-        Step::Translate(_, length) => length.coordinates.iter().any(|(i, _)| *i == coordinate),
-        Step::Free(body) => body
-            .position
-            .iter()
-            .chain(&body.quaternion)
-            .any(|i| *i == coordinate),
+            .any(|(s, _)| *s == ModelSymbol::Coordinate(coordinate)),
+        FrameStep::Translate(_, length) => length.coordinates.iter().any(|(i, _)| *i == coordinate),
+        FrameStep::Free(body) => body.position.iter().chain(&body.quaternion).any(|i| *i == coordinate),
     }
 }
 
-/// Reports linear drives that reach from one free body to another, or to what stands on the base.
-pub(super) fn check_apart(
-    tree: &Tree,
-    drives: &[Drive],
-    points: &Points,
-    spans: &[Span],
-    log: &mut Log,
+/// Reports linear drives between two free bodies, or between a free body and the base.
+///
+/// `spans` are the places of the drives, in their order.
+pub(super) fn check_linear_drives(
+    tree: &FrameTree,
+    drives: &[ModelDrive],
+    points: &PointTable,
+    spans: &[SourceSpan],
+    log: &mut DiagnosticLog,
 ) {
-    let root = roots(tree);
+    // Both ends must move with the same free body, or with none.
+    let root = free_body_finder(tree);
     for (drive, span) in drives.iter().zip(spans) {
         if let DriveKind::Linear { from, to } = drive.kind
             && root(points, from) != root(points, to)
         {
-            log.push(across(*span, "a drive"));
+            log.push(free_body_crossing(*span, "a drive"));
         }
     }
 }
 
-/// The same for loops.
+/// Reports loops between two free bodies, or between a free body and the base.
 pub(super) fn check_loops(
-    tree: &Tree,
-    loops: &[Loop],
-    points: &Points,
-    places: &Places,
-    log: &mut Log,
+    tree: &FrameTree,
+    loops: &[KinematicLoop],
+    points: &PointTable,
+    places: &MechanismSpans,
+    log: &mut DiagnosticLog,
 ) {
-    let root = roots(tree);
+    let root = free_body_finder(tree);
     for (closed, span) in loops.iter().zip(&places.loops) {
         let [one, other] = closed.joins;
         if root(points, one) != root(points, other) {
-            log.push(across(*span, "a loop"));
+            log.push(free_body_crossing(*span, "a loop"));
         }
     }
 }
 
-fn across(span: Span, what: &str) -> Diagnostic {
+/// The diagnostic of a drive or loop with ends on different sides of a free body.
+///
+/// `what` is the sort of thing, with its article.
+fn free_body_crossing(span: SourceSpan, what: &str) -> Diagnostic {
     Diagnostic::error(
         span,
         format!("{what} cannot reach across a free body with a quaternion"),
@@ -296,11 +308,13 @@ fn across(span: Span, what: &str) -> Diagnostic {
     .help("give that body `free` with six coordinates, its position and three angles")
 }
 
-/// On which free body, if any, a point moves.
-fn roots(tree: &Tree) -> impl Fn(&Points, PointIdx) -> Option<usize> {
+/// Returns a function that gives the frame of the free body on which a point moves, if any.
+fn free_body_finder(tree: &FrameTree) -> impl Fn(&PointTable, PointIdx) -> Option<usize> {
+    // Parents come before their children, so one pass is enough.
     let mut of_frame: BTreeMap<usize, usize> = BTreeMap::new();
     for (i, frame) in tree.frames.iter().enumerate() {
-        let is_free = frame.steps.iter().any(|step| matches!(step, Step::Free(_)));
+        // A frame belongs to the free body of its parent, unless it is one itself.
+        let is_free = frame.steps.iter().any(|step| matches!(step, FrameStep::Free(_)));
         let root = if is_free {
             Some(i)
         } else {

@@ -1,20 +1,19 @@
-//! What was identified: values that take the place of nominal ones.
+//! Identified values, which replace nominal ones.
 //!
-//! Decision: a fit stands beside the nominal values that it replaces. The table `[identified]` holds base
-//! parameters by their expressions, or parameters by their names. Nothing else of the file is rewritten, and
-//! deleting the table removes the fit. Code that needs nominal base values gets them from one place, the
-//! derivation.
+//! Decision: a fit is stored in addition to the nominal values that it replaces. The table `[identified]` contains
+//! base parameters by their expressions, or parameters by their names. Nothing else of the file is rewritten, and
+//! deleting the table removes the fit. Code that needs nominal base values gets them from one place, the derivation.
 
-use crate::build::symbols::Symbols;
-use crate::diagnostic::{Diagnostic, Log};
+use crate::build::symbols::SymbolTable;
+use crate::diagnostic::{Diagnostic, DiagnosticLog};
 use crate::schema::ModelEntry;
 use crate::suggest;
 
-/// Gives parameters their identified values; what comes back are those of base parameters, by their expressions.
-pub(super) fn identified(
+/// Sets parameters to their identified values, and returns those of base parameters with their expressions.
+pub(super) fn read_identified(
     model: &ModelEntry,
-    symbols: &mut Symbols,
-    log: &mut Log,
+    symbols: &mut SymbolTable,
+    log: &mut DiagnosticLog,
 ) -> Vec<(String, f64)> {
     let Some(entry) = &model.identified else {
         return Vec::new();
@@ -32,6 +31,7 @@ pub(super) fn identified(
                 .help(suggest::advice(&key.name, "parameters", known)),
         );
     }
+    // Expressions are compared with those of the derivation later, when the base parameters are known.
     let base = entry.base.iter().flat_map(|list| &list.entries);
     let values = base.filter_map(|one| {
         let (expression, value) = (one.expression.as_ref()?, one.value.as_ref()?);

@@ -1,7 +1,7 @@
-//! From the tables of a file to the mechanism that they mean.
+//! From the tables of a file to the mechanism that they describe.
 //!
-//! Every stage reports all faults that it finds and goes on with what is sound; a name whose definition is faulty
-//! counts as known, so that one fault is reported once.
+//! Every stage reports all faults that it finds and continues with the parts that have none. A name with a faulty
+//! definition counts as known, so that one fault is reported once.
 
 mod actuation;
 mod bodies;
@@ -16,41 +16,51 @@ mod limits;
 mod retain;
 pub(crate) mod symbols;
 
-use crate::build::effect_places::Scene;
-use crate::diagnostic::{Log, Span};
+use crate::build::effect_places::EffectTargets;
+use crate::diagnostic::{DiagnosticLog, SourceSpan};
 use crate::kinds::{EffectKind, describe, library_entries};
 use crate::mechanics;
-use crate::mechanism::{Mechanism, Recording};
+use crate::mechanism::{Mechanism, RecordingColumns};
 use crate::pose;
 use crate::schema::{EffectKindEntry, ModelEntry};
 
-/// The places of what a mechanism holds, by index, for findings about its pose.
+/// The places in the file of the parts of a mechanism, by index, for findings about its pose.
 #[derive(Debug, Default)]
-pub(crate) struct Places {
-    pub(crate) whole: Option<Span>,
-    pub(crate) frames: Vec<Option<Span>>,
-    pub(crate) points: Vec<Span>,
-    pub(crate) loops: Vec<Span>,
-    pub(crate) drives: Vec<Span>,
-    pub(crate) coordinates: Vec<Span>,
+pub(crate) struct MechanismSpans {
+    /// The complete file.
+    pub(crate) whole: Option<SourceSpan>,
+    /// Frames; `None` for the base.
+    pub(crate) frames: Vec<Option<SourceSpan>>,
+    /// Names of points.
+    pub(crate) points: Vec<SourceSpan>,
+    /// The pairs of points of loops.
+    pub(crate) loops: Vec<SourceSpan>,
+    /// Drives, or the coordinates of rows without a drive.
+    pub(crate) drives: Vec<SourceSpan>,
+    /// Names of coordinates.
+    pub(crate) coordinates: Vec<SourceSpan>,
 }
 
 /// Builds the mechanism, if there are no errors, and the kinds of effects that its file may use.
 ///
-/// `libraries` are kinds of libraries of its own.
+/// `libraries` are kinds of effects from libraries of the user.
+///
+/// The mechanism is `None` after any error, each of which is in the log.
 pub(crate) fn build(
     model: &ModelEntry,
     libraries: &[EffectKindEntry],
-    log: &mut Log,
+    log: &mut DiagnosticLog,
 ) -> (Option<Mechanism>, Vec<EffectKind>) {
-    let mut places = Places {
+    let mut places = MechanismSpans {
         whole: Some(model.span),
-        ..Places::default()
+        ..MechanismSpans::default()
     };
+    // Names first: all later stages resolve expressions with them.
     let mut symbols = symbols::declare(model, &mut places, log);
     let gravity = symbols::gravity(model, &symbols.scope, log);
     let n_errors = log.n_errors();
     let tree = frames::frames(model, &symbols, &mut places, log);
+    // A faulty frame may be the one that would use a coordinate.
     if log.n_errors() == n_errors {
         symbols::check_coordinates_move(model, &symbols, &places, log);
     }
@@ -61,28 +71,25 @@ pub(crate) fn build(
     let loops = actuation::loops(model, &points, &mut places, log);
     free::check_loops(&tree, &loops, &points, &places, log);
     let drives = actuation::drives(model, &symbols, &tree, &points, &mut places, log);
+    // Effects come after drives, points and parts, on which they act.
     let own_kinds = model.effect_kind.iter().flat_map(|list| &list.entries);
     let own_kinds: Vec<&EffectKindEntry> = libraries.iter().chain(own_kinds).collect();
-    let scene = Scene {
+    let scene = EffectTargets {
         drives: &drives.rows,
         points: &points,
         parts: &parts,
         lumped_masses: &lumped_masses,
     };
     let effects = effects::effects(model, &own_kinds, &mut symbols, &scene, log);
-    let (gravity, force_delay) = mechanics::whole(&effects, gravity, &symbols.constants);
+    // Effects may tilt gravity or delay the measured forces.
+    let (gravity, force_delay) = mechanics::gravity_and_delay(&effects, gravity, &symbols.constants);
     let retain = retain::retain(model, &symbols, log);
-    let limits = limits::limits(
-        model,
-        &symbols.coordinates,
-        &drives.rows,
-        &points.points,
-        log,
-    );
-    let identified_base = identified::identified(model, &mut symbols, log);
+    let limits = limits::limits(model, &symbols.coordinates, &drives.rows, &points.points, log);
+    let identified_base = identified::read_identified(model, &mut symbols, log);
     let columns = actuation::recording(model, &symbols, &drives, log);
     let torque = actuation::torque(model, &drives, log);
     actuation::check_place_names(model, log);
+    // With errors, unused names are often a consequence.
     if log.n_errors() == 0 {
         symbols::warn_of_unused(&symbols, log);
     }
@@ -114,10 +121,11 @@ pub(crate) fn build(
         identified_base,
         retain,
         limits,
-        recording: Recording { columns, torque },
+        recording: RecordingColumns { columns, torque },
         is_at_values: false,
     };
+    // These checks need the complete mechanism at its nominal values.
     bodies::warn_of_negative(model, &mechanism, log);
-    pose::check(&mut mechanism, &places, log);
+    pose::check_pose(&mut mechanism, &places, log);
     ((log.n_errors() == 0).then_some(mechanism), kinds)
 }

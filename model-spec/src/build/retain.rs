@@ -1,19 +1,23 @@
 //! The products of parameters that should stay in the base parameters.
+//!
+//! The list `retain` goes in; powers of parameters come out, one list per product.
 
 use std::collections::BTreeMap;
 
-use crate::build::symbols::Symbols;
-use crate::diagnostic::{Diagnostic, Log};
-use crate::exact::{Exact, ParameterIdx, Symbol};
-use crate::formula::{Ast, AstKind};
+use crate::build::symbols::SymbolTable;
+use crate::diagnostic::{Diagnostic, DiagnosticLog};
+use crate::exact::{ExactExpression, ModelSymbol, ParameterIdx};
+use crate::formula::{FormulaAst, FormulaAstKind};
 use crate::schema::ModelEntry;
-use crate::scope::Sort;
+use crate::scope::SymbolSort;
 
-/// Reads the products of parameters to retain.
+/// Reads the products to retain: for each, its parameters with positive exponents, in the order of the file.
+///
+/// Their order is that of preference: the most wanted product comes first.
 pub(super) fn retain(
     model: &ModelEntry,
-    symbols: &Symbols,
-    log: &mut Log,
+    symbols: &SymbolTable,
+    log: &mut DiagnosticLog,
 ) -> Vec<Vec<(ParameterIdx, u32)>> {
     let mut products = Vec::new();
     for formula in model.retain.iter().flat_map(|list| &list.entries) {
@@ -25,40 +29,40 @@ pub(super) fn retain(
     products
 }
 
+/// Adds the powers of a product to `powers`, all multiplied by `exponent`; false after a fault.
+///
+/// Only names of parameters, products of them, and positive powers are allowed.
 fn product(
-    ast: &Ast,
+    ast: &FormulaAst,
     exponent: u32,
-    symbols: &Symbols,
+    symbols: &SymbolTable,
     powers: &mut BTreeMap<ParameterIdx, u32>,
-    log: &mut Log,
+    log: &mut DiagnosticLog,
 ) -> bool {
     match &ast.kind {
-        AstKind::Name(name) => {
-            // Naming a parameter here uses nothing: it only orders what the mechanism holds.
-            let was_used = symbols
-                .scope
-                .get(name)
-                .is_some_and(|meaning| meaning.used.get());
-            let Some(meaning) = symbols
-                .scope
-                .look_up(name, ast.span, &[Sort::Parameter], log)
-            else {
+        // A name must be that of a parameter.
+        FormulaAstKind::Name(name) => {
+            // An entry of `retain` does not count as a use of the parameter, so the mark is restored.
+            let was_used = symbols.scope.get(name).is_some_and(|meaning| meaning.used.get());
+            let Some(meaning) = symbols.scope.look_up(name, ast.span, &[SymbolSort::Parameter], log) else {
                 return false;
             };
             meaning.used.set(was_used);
-            if let Exact::Symbol(Symbol::Parameter(idx)) = meaning.exact {
+            if let ExactExpression::Symbol(ModelSymbol::Parameter(idx)) = meaning.exact {
                 *powers.entry(idx).or_default() += exponent;
             }
             true
         }
-        AstKind::Product(factors) => {
+        // All factors are read, so that each fault is reported.
+        FormulaAstKind::Product(factors) => {
             let mut fine = true;
             for factor in factors {
                 fine &= product(factor, exponent, symbols, powers, log);
             }
             fine
         }
-        AstKind::Power(base, power) if *power > 0 => product(
+        // Nested powers multiply their exponents.
+        FormulaAstKind::Power(base, power) if *power > 0 => product(
             base,
             exponent.saturating_mul(power.unsigned_abs()),
             symbols,

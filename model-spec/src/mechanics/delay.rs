@@ -1,35 +1,40 @@
-//! Forces that are read later than they act.
+//! A delay of the recorded forces relative to the motion.
+//!
+//! Equations and generated code do not contain it; it is applied where recordings are prepared.
 
-use crate::exact::Symbol;
+use crate::exact::ModelSymbol;
 use crate::kinds::ActsOn;
-use crate::mechanics::{Entry, Symbols};
-use crate::mechanism::{Constant, Effect};
-use crate::unit::Dimension;
+use crate::mechanics::{MechanicsEntry, MechanicsSymbols};
+use crate::mechanism::{ModelConstant, ModelEffect};
+use crate::unit::UnitDimension;
 
-pub(crate) struct Delay;
+/// The entry of [`crate::Mechanics::Delay`]: it has one constant, the time `T`, and no parameters.
+pub(crate) struct DelayMechanics;
 
-impl Entry for Delay {
-    fn words(&self) -> &'static str {
-        "forces of recordings are those of T before"
+impl MechanicsEntry for DelayMechanics {
+    fn description(&self) -> &'static str {
+        "recorded forces are those of the time T before"
     }
 
-    fn lead(&self) -> &'static str {
-        "lets forces be read later than they act, s: "
+    fn introduction(&self) -> &'static str {
+        "delays recorded forces, s: "
     }
 
-    fn on(&self) -> ActsOn {
+    fn acts_on(&self) -> ActsOn {
         ActsOn::Force
     }
 
-    fn constants(&self) -> Symbols {
-        &[("T", Dimension::TIME)]
+    fn constants(&self) -> MechanicsSymbols {
+        &[("T", UnitDimension::TIME)]
     }
 
-    fn force_delay(&self, effect: &Effect, constants: &[Constant]) -> f64 {
+    // Constants of effects are expressions over constants of the model; other symbols cannot occur.
+    fn force_delay(&self, effect: &ModelEffect, constants: &[ModelConstant]) -> f64 {
         let value = |symbol| match symbol {
-            Symbol::Constant(idx) => constants[idx.0].value,
+            ModelSymbol::Constant(idx) => constants[idx.0].value,
             _ => f64::NAN,
         };
+        // Without a value the delay is zero.
         let time = effect.constants.iter().find(|(name, _)| name == "T");
         time.map_or(0.0, |(_, time)| time.evaluate(&value))
     }

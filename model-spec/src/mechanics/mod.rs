@@ -1,7 +1,7 @@
-//! What effects do that no expression at their place can say: one enum, and one file for each of its variants.
+//! Effects that no expression at their place can state: one enum, and one file for each of its variants.
 //!
-//! Whatever model files, pages and the diagnosis ask of one is answered by its [`Entry`]. The generalised forces of those
-//! that have some are in `regressor/mechanics` of `modelmill-codegen`.
+//! Model files, pages and the diagnosis use them through [`MechanicsEntry`]. Generalised forces of those that have
+//! some are in `regressor/mechanics` of `modelmill-codegen`.
 //!
 //! Decision: an effect is an expression at a place wherever an expression can state it. Only effects that act on
 //! bodies, on gravity or on the force signal have `mechanics`. Bodies of effects join the others as polynomials of
@@ -15,85 +15,88 @@ mod rod;
 mod strut;
 mod tilt;
 
-use crate::build::effect_places::Scene;
-use crate::build::symbols::Symbols as Names;
-use crate::diagnostic::Log;
-use crate::exact::Exact;
+use crate::build::effect_places::EffectTargets;
+use crate::build::symbols::SymbolTable as Names;
+use crate::diagnostic::DiagnosticLog;
+use crate::exact::ExactExpression;
 use crate::kinds::ActsOn;
-use crate::mechanism::{Bodies, Constant, Effect, EffectTerm, Mechanism, Part, Place, PointIdx};
+use crate::mechanism::{
+    EffectBodies, EffectPlace, EffectTerm, Mechanism, ModelConstant, ModelEffect, ModelPart, PointIdx,
+};
 use crate::schema::EffectEntry;
-use crate::unit::Dimension;
-use crate::values::Name;
+use crate::unit::UnitDimension;
+use crate::values::SpannedName;
 use crate::words::words;
 
 words! {
-    /// What a kind does that no expression at its place can say.
+    /// An effect that no expression at its place can state.
     #[derive(PartialOrd, Ord, Hash)]
     pub Mechanics as "MechanicsName": "mechanics",
-    /// A slender rod along each of the linear drives that turns about the drive's first point and slides through its
-    /// second. The terms are moments of its mass along itself about the first point: of second order (kg m^2), of
+    /// A slender rod along each of the linear drives. It rotates about the drive's first point and slides through its
+    /// second one. The terms are moments of its mass along itself about the first point: of second order (kg m^2), of
     /// first order (kg m), and the mass (kg). With `a` the first point and `u` the unit vector along the drive, the
     /// generalised force is `du'(Jr u'' + Sr (a'' - g)) + da'(Sr u'' + mr (a'' - g))` (d'Alembert).
     "rod" => Rod,
-    /// A passive element along the line between two points. The terms are a constant pull (N), one by the distance `l` of
-    /// the points (N/m) and one by its rate (N s/m): the generalised force is `(F0 + k l + Fv l') dl/dq`.
+    /// A passive element along the line between two points. The terms are a constant pull (N), a pull proportional to
+    /// the distance `l` of the points (N/m), and one proportional to its rate (N s/m).
+    /// The generalised force is `(F0 + k l + Fv l') dl/dq`.
     "strut" => Strut,
-    /// The moments of lumped masses are taken where their forces are.
+    /// Corrects lumped masses: their moments are taken at the point of their forces.
     "placement" => Placement,
-    /// Differences of one part from what the model file says of it.
+    /// Differences of one part from its entry in the model file.
     "part" => Part,
-    /// A turn of the base against gravity; [`Mechanism::gravity`] holds the result.
+    /// A rotation of the base relative to gravity; [`Mechanism::gravity`] contains the result.
     "tilt" => Tilt,
-    /// A delay of the measured forces; [`Mechanism::force_delay`] holds the time.
+    /// A delay of the recorded forces; [`Mechanism::force_delay`] contains the time.
     "delay" => Delay,
 }
 
 impl Mechanics {
-    /// What the variant is and does.
-    pub(crate) fn entry(self) -> &'static dyn Entry {
+    /// The properties of the variant.
+    pub(crate) fn entry(self) -> &'static dyn MechanicsEntry {
         match self {
-            Self::Rod => &rod::Rod,
-            Self::Strut => &strut::Strut,
-            Self::Placement => &placement::Placement,
-            Self::Part => &part::Difference,
-            Self::Tilt => &tilt::Tilt,
-            Self::Delay => &delay::Delay,
+            Self::Rod => &rod::RodMechanics,
+            Self::Strut => &strut::StrutMechanics,
+            Self::Placement => &placement::PlacementMechanics,
+            Self::Part => &part::PartMechanics,
+            Self::Tilt => &tilt::TiltMechanics,
+            Self::Delay => &delay::DelayMechanics,
         }
     }
 
-    /// What it does, for people, where other kinds have an expression.
-    pub fn words(self) -> &'static str {
-        self.entry().words()
+    /// What it does, for places where other kinds print an expression.
+    pub fn description(self) -> &'static str {
+        self.entry().description()
     }
 
-    /// What it does in a model, for people: what stands before its parameters, or before its constants if it has no
+    /// What it does in a model: the text before the list of its parameters, or of its constants if it has no
     /// parameters.
-    pub fn lead(self) -> &'static str {
-        self.entry().lead()
+    pub fn introduction(self) -> &'static str {
+        self.entry().introduction()
     }
 
-    /// What stands before the value of a constant where constants are listed; empty where there is only one.
+    /// The text before the value of a constant in a list of constants; empty if there is only one.
     pub fn constant_label(self, symbol: &str) -> &'static str {
         self.entry().constant_label(symbol)
     }
 
-    /// Whether its forces are part of what the drives carry, as those of masses are.
+    /// Whether its forces are part of the load of the drives, as those of masses are.
     pub fn is_part_of_load(self) -> bool {
         self.entry().is_part_of_load()
     }
 
-    /// Whether it could say anything at a place of a model that the model does not say by itself.
-    pub fn has_effect_at(self, mechanism: &Mechanism, place: Place) -> bool {
+    /// Whether it can change the forces of a model at a place. If not, the diagnosis does not try it there.
+    pub fn has_effect_at(self, mechanism: &Mechanism, place: EffectPlace) -> bool {
         self.entry().has_effect_at(mechanism, place)
     }
 
-    /// The symbols of the parameters that it has at a place, if these depend on the place.
-    pub fn parameters_at(self, mechanism: &Mechanism, place: Place) -> Option<Vec<&'static str>> {
+    /// The symbols of its parameters at a place, if these depend on the place.
+    pub fn parameters_at(self, mechanism: &Mechanism, place: EffectPlace) -> Option<Vec<&'static str>> {
         self.entry().parameters_at(place, &mechanism.parts)
     }
 
-    /// Which of some places it acts on as one, by their positions in the list; `None` if on each by itself.
-    pub fn groups(self, mechanism: &Mechanism, places: &[Place]) -> Option<Vec<Vec<usize>>> {
+    /// Groups of places on which it acts jointly, by positions in the list; `None` if it acts on each place alone.
+    pub fn groups(self, mechanism: &Mechanism, places: &[EffectPlace]) -> Option<Vec<Vec<usize>>> {
         self.entry().groups(mechanism, places)
     }
 
@@ -102,92 +105,98 @@ impl Mechanics {
         self.entry().pairs(mechanism)
     }
 
-    /// Whether it is one property of the whole mechanism, which it can have only once.
-    pub(crate) fn is_of_the_whole(self) -> bool {
-        matches!(self.entry().on(), ActsOn::Base | ActsOn::Force)
+    /// Whether it is a property of the complete mechanism, which can occur only once.
+    pub(crate) fn is_global(self) -> bool {
+        matches!(self.entry().acts_on(), ActsOn::Base | ActsOn::Force)
     }
 }
 
 /// Symbols with their dimensions.
-pub(crate) type Symbols = &'static [(&'static str, Dimension)];
+pub(crate) type MechanicsSymbols = &'static [(&'static str, UnitDimension)];
 
-/// What one of the [`Mechanics`] is and does.
-pub(crate) trait Entry: Sync {
-    /// See [`Mechanics::words`].
-    fn words(&self) -> &'static str;
+/// The properties of one of the [`Mechanics`]. Defaults are those of an effect on a single place without parameters.
+pub(crate) trait MechanicsEntry: Sync {
+    /// See [`Mechanics::description`].
+    fn description(&self) -> &'static str;
 
-    /// See [`Mechanics::lead`].
-    fn lead(&self) -> &'static str;
+    /// See [`Mechanics::introduction`].
+    fn introduction(&self) -> &'static str;
 
     /// See [`Mechanics::constant_label`].
     fn constant_label(&self, _symbol: &str) -> &'static str {
         ""
     }
 
-    /// The one sort of place on which it acts.
-    fn on(&self) -> ActsOn;
+    /// The only sort of place on which it acts.
+    fn acts_on(&self) -> ActsOn;
 
-    /// Its parameters, in the order of an effect's terms.
-    fn parameters(&self) -> Symbols {
+    /// Its parameters with their dimensions, in the order of an effect's terms.
+    fn parameters(&self) -> MechanicsSymbols {
         &[]
     }
 
-    /// Its constants.
-    fn constants(&self) -> Symbols {
+    /// Its constants with their dimensions.
+    fn constants(&self) -> MechanicsSymbols {
         &[]
     }
 
-    /// How many places an effect must have; any number if `None`.
+    /// How many places an effect must have; `None` for any number.
     fn n_places(&self) -> Option<usize> {
         Some(1)
     }
 
-    /// Reports a place of an effect where there is nothing to act on.
-    fn check_place(&self, _name: &Name, _place: Place, _scene: &Scene<'_>, _log: &mut Log) {}
-
-    /// Reports places of an effect that do not go together.
-    fn check_places(&self, _names: &[Name], _places: &[Place], _scene: &Scene<'_>, _log: &mut Log) {
-    }
-
-    /// See [`Mechanics::parameters_at`].
-    fn parameters_at(&self, _place: Place, _parts: &[Part]) -> Option<Vec<&'static str>> {
-        None
-    }
-
-    /// Reports a parameter that an effect names though it does not have it at its place, where it has `those`.
-    fn refuse_parameter(
+    /// Reports a place on which it cannot act.
+    fn check_place(
         &self,
-        _entry: &EffectEntry,
-        _symbol: &str,
-        _those: &[&str],
-        _log: &mut Log,
+        _name: &SpannedName,
+        _place: EffectPlace,
+        _scene: &EffectTargets<'_>,
+        _log: &mut DiagnosticLog,
     ) {
     }
 
-    /// The values of an effect's constants, where they are to be constants of the model with names of their own; `None`
-    /// if that fails, which is reported.
+    /// Reports places that cannot be combined in one effect.
+    fn check_places(
+        &self,
+        _names: &[SpannedName],
+        _places: &[EffectPlace],
+        _scene: &EffectTargets<'_>,
+        _log: &mut DiagnosticLog,
+    ) {
+    }
+
+    /// See [`Mechanics::parameters_at`].
+    fn parameters_at(&self, _place: EffectPlace, _parts: &[ModelPart]) -> Option<Vec<&'static str>> {
+        None
+    }
+
+    /// Reports a parameter that an effect names but that does not exist at its place; `those` are the ones that do.
+    fn refuse_parameter(&self, _entry: &EffectEntry, _symbol: &str, _those: &[&str], _log: &mut DiagnosticLog) {}
+
+    /// The values of an effect's constants, some of which become named constants of the model. `None` after a fault,
+    /// which is reported.
     fn named_constants(
         &self,
-        values: Vec<(String, Exact)>,
-        _kind: &Name,
+        values: Vec<(String, ExactExpression)>,
+        _kind: &SpannedName,
         _names: &mut Names,
-        _log: &mut Log,
-    ) -> Option<Vec<(String, Exact)>> {
+        _log: &mut DiagnosticLog,
+    ) -> Option<Vec<(String, ExactExpression)>> {
         Some(values)
     }
 
-    /// Bodies of an effect.
-    fn bodies(&self, _terms: &[EffectTerm], _places: &[Place], _scene: &Scene<'_>) -> Bodies {
-        Bodies::default()
+    /// Bodies that an effect adds to the mechanism.
+    fn bodies(&self, _terms: &[EffectTerm], _places: &[EffectPlace], _scene: &EffectTargets<'_>) -> EffectBodies {
+        EffectBodies::default()
     }
 
-    /// Gravity of the mechanism with an effect, for that without it.
-    fn gravity(&self, _effect: &Effect, gravity: [Exact; 3]) -> [Exact; 3] {
+    /// Gravity of the mechanism with the effect; `gravity` is that without it, m/s^2.
+    fn gravity(&self, _effect: &ModelEffect, gravity: [ExactExpression; 3]) -> [ExactExpression; 3] {
         gravity
     }
 
-    /// How much later than they act an effect lets forces be read, s.
-    fn force_delay(&self, _effect: &Effect, _constants: &[Constant]) -> f64 {
+    /// Delay of the recorded forces that an effect defines, s.
+    fn force_delay(&self, _effect: &ModelEffect, _constants: &[ModelConstant]) -> f64 {
         0.0
     }
 
@@ -197,7 +206,7 @@ pub(crate) trait Entry: Sync {
     }
 
     /// See [`Mechanics::has_effect_at`].
-    fn has_effect_at(&self, _mechanism: &Mechanism, _place: Place) -> bool {
+    fn has_effect_at(&self, _mechanism: &Mechanism, _place: EffectPlace) -> bool {
         true
     }
 
@@ -207,17 +216,17 @@ pub(crate) trait Entry: Sync {
     }
 
     /// See [`Mechanics::groups`].
-    fn groups(&self, _mechanism: &Mechanism, _places: &[Place]) -> Option<Vec<Vec<usize>>> {
+    fn groups(&self, _mechanism: &Mechanism, _places: &[EffectPlace]) -> Option<Vec<Vec<usize>>> {
         None
     }
 }
 
-/// Gravity of the mechanism with its effects, and how much later than they act its forces are read.
-pub(crate) fn whole(
-    effects: &[Effect],
-    mut gravity: [Exact; 3],
-    constants: &[Constant],
-) -> ([Exact; 3], f64) {
+/// Gravity of the mechanism with its effects, m/s^2, and the sum of their delays of the recorded forces, s.
+pub(crate) fn gravity_and_delay(
+    effects: &[ModelEffect],
+    mut gravity: [ExactExpression; 3],
+    constants: &[ModelConstant],
+) -> ([ExactExpression; 3], f64) {
     let mut delay = 0.0;
     for effect in effects {
         if let Some(mechanics) = effect.mechanics {

@@ -1,58 +1,63 @@
-//! The moments of lumped masses, taken where their forces are.
+//! A correction of lumped masses: their moments are taken at the point of their forces.
 
-use crate::build::effect_places::Scene;
-use crate::diagnostic::{Diagnostic, Log};
-use crate::exact::{Exact, Symbol};
+use crate::build::effect_places::EffectTargets;
+use crate::diagnostic::{Diagnostic, DiagnosticLog};
+use crate::exact::{ExactExpression, ModelSymbol};
 use crate::kinds::ActsOn;
-use crate::mechanics::{Entry, Symbols};
-use crate::mechanism::{Bodies, EffectTerm, LumpedMass, Mechanism, Place, Point};
-use crate::unit::Dimension;
-use crate::values::Name;
+use crate::mechanics::{MechanicsEntry, MechanicsSymbols};
+use crate::mechanism::{EffectBodies, EffectPlace, EffectTerm, FramePoint, LumpedMass, Mechanism};
+use crate::unit::UnitDimension;
+use crate::values::SpannedName;
 
-pub(crate) struct Placement;
+/// The entry of [`crate::Mechanics::Placement`].
+pub(crate) struct PlacementMechanics;
 
-impl Entry for Placement {
-    fn words(&self) -> &'static str {
+impl MechanicsEntry for PlacementMechanics {
+    fn description(&self) -> &'static str {
         "m times the moments at the point, less those at `moment_at`"
     }
 
-    fn lead(&self) -> &'static str {
+    fn introduction(&self) -> &'static str {
         "the moments of lumped masses at the point where their forces act; the mass: "
     }
 
-    fn on(&self) -> ActsOn {
+    fn acts_on(&self) -> ActsOn {
         ActsOn::Point
     }
 
-    fn parameters(&self) -> Symbols {
-        &[("m", Dimension::MASS)]
+    fn parameters(&self) -> MechanicsSymbols {
+        &[("m", UnitDimension::MASS)]
     }
 
     fn n_places(&self) -> Option<usize> {
         None
     }
 
-    fn check_place(&self, name: &Name, place: Place, scene: &Scene<'_>, log: &mut Log) {
-        if displaced(place, &scene.points.points, scene.lumped_masses).is_empty() {
+    fn check_place(&self, name: &SpannedName, place: EffectPlace, scene: &EffectTargets<'_>, log: &mut DiagnosticLog) {
+        // The effect corrects only masses with two different places.
+        if displaced_masses(place, &scene.points.points, scene.lumped_masses).is_empty() {
             log.push(
                 Diagnostic::error(
                     name.span,
                     "no lumped mass here has different places for forces and for moments",
                 )
                 .label("expected the point at which the forces of such a mass are taken")
-                .help("this effect corrects a `[[lumped_mass]]` whose `moment_at` differs from its `force_at`; for a mass that the model lacks, take `point_mass`"),
+                .help("this effect corrects a `[[lumped_mass]]` whose `moment_at` differs from its `force_at`; for a mass that the model lacks, use `point_mass`"),
             );
         }
     }
 
-    /// Masses where forces are taken, less such whose moments are taken elsewhere: what is left are moments.
-    fn bodies(&self, terms: &[EffectTerm], places: &[Place], scene: &Scene<'_>) -> Bodies {
-        let mut bodies = Bodies::default();
+    /// Masses at the point of the forces, minus masses whose moments are at `moment_at`. Forces cancel, and a moment
+    /// remains.
+    fn bodies(&self, terms: &[EffectTerm], places: &[EffectPlace], scene: &EffectTargets<'_>) -> EffectBodies {
+        let mut bodies = EffectBodies::default();
         for term in terms {
-            let mass = Exact::Symbol(Symbol::Parameter(term.parameter));
+            let mass = ExactExpression::Symbol(ModelSymbol::Parameter(term.parameter));
+            // All lumped masses at all places of the effect share the parameter.
             let all = places
                 .iter()
-                .flat_map(|place| displaced(*place, &scene.points.points, scene.lumped_masses));
+                .flat_map(|place| displaced_masses(*place, &scene.points.points, scene.lumped_masses));
+            // The first mass has both places at the point; the second one, negative, keeps the places of the file.
             for lump in all {
                 bodies.lumped_masses.push(LumpedMass {
                     mass: mass.clone(),
@@ -69,16 +74,18 @@ impl Entry for Placement {
         bodies
     }
 
-    fn has_effect_at(&self, mechanism: &Mechanism, place: Place) -> bool {
-        !displaced(place, &mechanism.points, &mechanism.lumped_masses).is_empty()
+    fn has_effect_at(&self, mechanism: &Mechanism, place: EffectPlace) -> bool {
+        !displaced_masses(place, &mechanism.points, &mechanism.lumped_masses).is_empty()
     }
 
-    /// Shares of one mass are misplaced together.
-    fn groups(&self, mechanism: &Mechanism, places: &[Place]) -> Option<Vec<Vec<usize>>> {
-        let mut groups: Vec<(Vec<&Exact>, Vec<usize>)> = Vec::new();
+    /// Places with the same masses belong together, because these are shares of one mass.
+    fn groups(&self, mechanism: &Mechanism, places: &[EffectPlace]) -> Option<Vec<Vec<usize>>> {
+        // Groups by the list of masses at each place.
+        let mut groups: Vec<(Vec<&ExactExpression>, Vec<usize>)> = Vec::new();
         for (i, place) in places.iter().enumerate() {
-            let lumps = displaced(*place, &mechanism.points, &mechanism.lumped_masses);
-            let masses: Vec<&Exact> = lumps.into_iter().map(|lump| &lump.mass).collect();
+            // The masses whose moments are misplaced at this point.
+            let lumps = displaced_masses(*place, &mechanism.points, &mechanism.lumped_masses);
+            let masses: Vec<&ExactExpression> = lumps.into_iter().map(|lump| &lump.mass).collect();
             match groups.iter_mut().find(|(known, _)| *known == masses) {
                 Some((_, group)) => group.push(i),
                 None => groups.push((masses, vec![i])),
@@ -88,9 +95,10 @@ impl Entry for Placement {
     }
 }
 
-/// Lumped masses whose forces are taken at a point, but whose moments elsewhere.
-fn displaced<'a>(place: Place, points: &[Point], all: &'a [LumpedMass]) -> Vec<&'a LumpedMass> {
-    let Place::Point(point) = place else {
+/// Lumped masses whose forces are taken at a point, and whose moments are taken at another one.
+/// Such a mass is on the frame of the point, and its forces act exactly there.
+fn displaced_masses<'a>(place: EffectPlace, points: &[FramePoint], all: &'a [LumpedMass]) -> Vec<&'a LumpedMass> {
+    let EffectPlace::Point(point) = place else {
         return Vec::new();
     };
     let point = &points[point.0];

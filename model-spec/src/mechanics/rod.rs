@@ -1,35 +1,38 @@
 //! A slender rod along a linear drive, such as its screw.
+//!
+//! Its generalised force is derived in `regressor/mechanics` of `modelmill-codegen`.
 
-use crate::build::effect_places::Scene;
-use crate::diagnostic::{Diagnostic, Log};
+use crate::build::effect_places::EffectTargets;
+use crate::diagnostic::{Diagnostic, DiagnosticLog};
 use crate::kinds::ActsOn;
-use crate::mechanics::{Entry, Symbols};
-use crate::mechanism::{Drive, DriveKind, Mechanism, Place};
-use crate::unit::Dimension;
-use crate::values::Name;
+use crate::mechanics::{MechanicsEntry, MechanicsSymbols};
+use crate::mechanism::{DriveKind, EffectPlace, Mechanism, ModelDrive};
+use crate::unit::UnitDimension;
+use crate::values::SpannedName;
 
-pub(crate) struct Rod;
+/// The entry of [`crate::Mechanics::Rod`].
+pub(crate) struct RodMechanics;
 
-impl Entry for Rod {
-    fn words(&self) -> &'static str {
+impl MechanicsEntry for RodMechanics {
+    fn description(&self) -> &'static str {
         "a rod along the drive, about its first point"
     }
 
-    fn lead(&self) -> &'static str {
-        "a rod that turns about the first point and slides through the second; its second and first moment about the \
+    fn introduction(&self) -> &'static str {
+        "a rod that rotates about the first point and slides through the second; its second and first moment about the \
          first point, and its mass: "
     }
 
-    fn on(&self) -> ActsOn {
+    fn acts_on(&self) -> ActsOn {
         ActsOn::Drive
     }
 
-    /// Moments of its mass along itself, of second, first and no order.
-    fn parameters(&self) -> Symbols {
+    /// Moments of its mass along itself, of order two, one and zero.
+    fn parameters(&self) -> MechanicsSymbols {
         &[
-            ("Jr", Dimension::INERTIA),
-            ("Sr", Dimension::FIRST_MOMENT),
-            ("mr", Dimension::MASS),
+            ("Jr", UnitDimension::INERTIA),
+            ("Sr", UnitDimension::FIRST_MOMENT),
+            ("mr", UnitDimension::MASS),
         ]
     }
 
@@ -37,23 +40,26 @@ impl Entry for Rod {
         None
     }
 
-    fn check_place(&self, name: &Name, place: Place, scene: &Scene<'_>, log: &mut Log) {
+    fn check_place(&self, name: &SpannedName, place: EffectPlace, scene: &EffectTargets<'_>, log: &mut DiagnosticLog) {
+        // A rod needs the line between the two points of a drive.
         if !is_line(scene.drives, place) {
             log.push(
                 Diagnostic::error(name.span, "a rod cannot act here")
-                    .label("this drive is no line between two points")
+                    .label("this drive is not a line between two points")
                     .help("a rod lies along a drive with `linear = { from = ..., to = ... }`"),
             );
         }
     }
 
-    fn has_effect_at(&self, mechanism: &Mechanism, place: Place) -> bool {
+    fn has_effect_at(&self, mechanism: &Mechanism, place: EffectPlace) -> bool {
         is_line(&mechanism.drives, place)
     }
 }
 
-fn is_line(drives: &[Drive], place: Place) -> bool {
-    let Place::Drive(drive) = place else {
+/// Whether a place is a linear drive, which has two points.
+/// Only a linear drive has a line.
+fn is_line(drives: &[ModelDrive], place: EffectPlace) -> bool {
+    let EffectPlace::Drive(drive) = place else {
         return false;
     };
     matches!(drives[drive.0].kind, DriveKind::Linear { .. })

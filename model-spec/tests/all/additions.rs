@@ -2,17 +2,17 @@
 
 use std::path::Path;
 
-use modelmill_boundary::files::Disk;
-use modelmill_spec::{AddedEffect, Constant, ConstantValue, Loaded, load, load_file};
+use modelmill_boundary::files::DiskFiles;
+use modelmill_spec::{AddedEffect, ConstantValue, LoadedModel, ModelConstant, load, load_file};
 
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/models");
 
-fn paper() -> Loaded {
+fn paper() -> LoadedModel {
     load_file(&Path::new(FOLDER).join("spidermill-paper.toml")).unwrap()
 }
 
-fn constant(name: &str, value: f64, unit: &str) -> Constant {
-    Constant {
+fn constant(name: &str, value: f64, unit: &str) -> ModelConstant {
+    ModelConstant {
         name: name.to_owned(),
         value,
         unit: unit.to_owned(),
@@ -61,15 +61,8 @@ fn text(effect: &AddedEffect) -> String {
 #[test]
 fn mean_what_a_file_means() {
     let named = |name: &str| ConstantValue::Named(name.to_owned());
-    let constants = [
-        constant("slow", 0.02, "m/s"),
-        constant("tipped", 0.03, "rad"),
-    ];
-    let mut stribeck = effect(
-        "stribeck_friction",
-        &["spindle_left"],
-        &[("vs", named("slow"))],
-    );
+    let constants = [constant("slow", 0.02, "m/s"), constant("tipped", 0.03, "rad")];
+    let mut stribeck = effect("stribeck_friction", &["spindle_left"], &[("vs", named("slow"))]);
     stribeck.parameters = vec![("Fs".to_owned(), "mine".to_owned())];
     let effects = [
         stribeck,
@@ -81,18 +74,13 @@ fn mean_what_a_file_means() {
             &["base"],
             &[("tz", named("tipped")), ("tx", ConstantValue::Number(-0.1))],
         ),
-        effect(
-            "time_delay",
-            &["force"],
-            &[("T", ConstantValue::Number(2.5e-7))],
-        ),
+        effect("time_delay", &["force"], &[("T", ConstantValue::Number(2.5e-7))]),
     ];
-    let mut variant =
-        "schema = 1\nname = \"spidermill_paper\"\nextends = \"spidermill-paper.toml\"\n".to_owned();
+    let mut variant = "schema = 1\nname = \"spidermill_paper\"\nextends = \"spidermill-paper.toml\"\n".to_owned();
     variant.extend(effects.iter().map(text));
     variant.push_str("[constants]\n");
     variant.extend(constants.iter().map(|one| {
-        let Constant {
+        let ModelConstant {
             name,
             value,
             unit,
@@ -104,25 +92,17 @@ fn mean_what_a_file_means() {
             note.as_deref().unwrap_or_default()
         )
     }));
-    let written = load(
-        &format!("{FOLDER}/variant.toml"),
-        &variant,
-        &Disk::default(),
-    )
-    .unwrap();
-    let mut joined = paper().with(&constants, &effects).unwrap();
-    assert_eq!(
-        joined.effects.len(),
-        paper().mechanism.effects.len() + effects.len()
-    );
+    let written = load(&format!("{FOLDER}/variant.toml"), &variant, &DiskFiles::default()).unwrap();
+    let mut joined = paper().with_additions(&constants, &effects).unwrap();
+    assert_eq!(joined.effects.len(), paper().mechanism.effects.len() + effects.len());
     joined.name.clone_from(&written.mechanism.name);
     assert_eq!(format!("{joined:#?}"), format!("{:#?}", written.mechanism));
 }
 
 #[test]
 fn what_cannot_be_is_said() {
-    let refused = |constants: &[Constant], effect: AddedEffect| {
-        let failure = paper().with(constants, &[effect]).unwrap_err();
+    let refused = |constants: &[ModelConstant], effect: AddedEffect| {
+        let failure = paper().with_additions(constants, &[effect]).unwrap_err();
         failure.render(false)
     };
     let friction = || effect("coulomb_friction", &["spindle_left"], &[]);
@@ -134,11 +114,7 @@ fn what_cannot_be_is_said() {
             effect("coulomb_friction", &["nowhere"], &[]),
             "unknown place `nowhere`",
         ),
-        (
-            vec![],
-            effect("no_friction", &["spindle_left"], &[]),
-            "unknown kind",
-        ),
+        (vec![], effect("no_friction", &["spindle_left"], &[]), "unknown kind"),
         (vec![constant("d1", 1.0, "m")], friction(), "`d1`"),
         (vec![constant("further", 1.0, "mm")], friction(), "`mm`"),
         (vec![], shared, "`d1`"),

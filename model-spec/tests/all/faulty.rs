@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use modelmill_boundary::files::{Disk, Files, Memory};
-use modelmill_spec::{Failure, Severity, load};
+use modelmill_boundary::files::{DiskFiles, FileSource, MemoryFiles};
+use modelmill_spec::{DiagnosticSeverity, LoadFailure, load};
 
 /// Reads a fixture under the path that messages should show.
 fn render(name: &str) -> String {
@@ -18,17 +18,17 @@ fn render(name: &str) -> String {
 }
 
 /// The fixtures under their names alone.
-fn beside(folder: &Path) -> Memory {
-    let paths = Disk::default().list(folder).unwrap();
+fn beside(folder: &Path) -> MemoryFiles {
+    let paths = DiskFiles::default().list(folder).unwrap();
     let files = paths.iter().filter(|path| path.is_file());
-    files.fold(Memory::default(), |files, path| {
-        files.with(path.file_name().unwrap(), std::fs::read(path).unwrap())
+    files.fold(MemoryFiles::default(), |files, path| {
+        files.with_file(path.file_name().unwrap(), std::fs::read(path).unwrap())
     })
 }
 
-fn failure(text: &str) -> Failure {
+fn failure(text: &str) -> LoadFailure {
     let start = Instant::now();
-    let result = load("model.toml", text, &Memory::default());
+    let result = load("model.toml", text, &MemoryFiles::default());
     let took = start.elapsed();
     assert!(took < Duration::from_secs(5), "took {took:?}");
     result.map(|_| ()).expect_err("the file is faulty")
@@ -59,15 +59,13 @@ fn a_file_that_is_no_text_in_utf_8() {
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("latin.toml");
     std::fs::write(&path, b"schema = 1\nname = \"arm\" # m\xFCde\n").unwrap();
     let found = modelmill_spec::load_file(&path).unwrap_err();
-    let says = found
-        .render(false)
-        .replace(&*path.to_string_lossy(), "latin.toml");
+    let says = found.render(false).replace(&*path.to_string_lossy(), "latin.toml");
     insta::assert_snapshot!(says, @r#"
-    error: this file is no text in UTF-8
+    error: this file is not UTF-8 text
      --> latin.toml:2:17
       |
     2 | name = "arm" # m�de
-      |                 ^ the first byte that is not
+      |                 ^ the first invalid byte
       |
       = help: save it as UTF-8; `modelmill` reads model files as text (TOML)
     "#);
@@ -118,15 +116,12 @@ fn what_cannot_move_is_told_where_to_look() {
     );
     let says = failure(&braced).render(false);
     assert!(
-        says.contains("this mechanism cannot move: its loops tie all 4 coordinates")
+        says.contains("this mechanism cannot move: its loops constrain all 4 coordinates")
             && says.contains("a joint that is missing")
             && !says.contains("mark 1 coordinate more"),
         "{says}"
     );
-    let idle = failure(&text.replace(
-        "crank = { nominal = 1.1 }",
-        "crank = { nominal = 1.1, passive = true }",
-    ));
+    let idle = failure(&text.replace("crank = { nominal = 1.1 }", "crank = { nominal = 1.1, passive = true }"));
     let says = idle.render(false);
     assert!(says.contains("every coordinate is `passive`"), "{says}");
 }
@@ -136,7 +131,7 @@ fn what_cannot_move_is_told_where_to_look() {
 fn what_cannot_move_is_no_model_without_drives_either() {
     let says = failure(TRIANGLE).render(false);
     assert!(
-        says.contains("this mechanism cannot move: its loops tie all 2 coordinates"),
+        says.contains("this mechanism cannot move: its loops constrain all 2 coordinates"),
         "{says}"
     );
 }
@@ -190,11 +185,7 @@ fn color_marks_the_same_text() {
 #[test]
 fn a_thousand_nested_brackets() {
     for (open, close) in [("[", "]"), ("{ a = ", " }")] {
-        let text = format!(
-            "schema = 1\nx = {}1{}\n",
-            open.repeat(1000),
-            close.repeat(1000)
-        );
+        let text = format!("schema = 1\nx = {}1{}\n", open.repeat(1000), close.repeat(1000));
         let found = failure(&text);
         assert!(
             found.render(false).contains("at most 80 deep"),
@@ -206,16 +197,8 @@ fn a_thousand_nested_brackets() {
     }
     let dotted = format!("x{} = 1\n[y{}]\n", ".x".repeat(1000), ".y".repeat(1000));
     failure(&dotted);
-    let parentheses = format!(
-        "gravity = [\"{}1{}\", 0, 0]",
-        "(".repeat(1000),
-        ")".repeat(1000)
-    );
-    assert!(
-        failure(&parentheses)
-            .render(false)
-            .contains("nested too deeply")
-    );
+    let parentheses = format!("gravity = [\"{}1{}\", 0, 0]", "(".repeat(1000), ")".repeat(1000));
+    assert!(failure(&parentheses).render(false).contains("nested too deeply"));
     let minus = format!(
         "gravity = [\"{}1\", \"1{}\", \"1{}\"]",
         "-".repeat(3000),
@@ -259,12 +242,10 @@ fn a_file_of_megabytes() {
 
 #[test]
 fn every_error_says_where() {
-    let found = failure(
-        "schema = 1\nname = \"x\"\ngravity = [\"q\", 0, 0]\nframe = 1\ncoordinates = { q = 1 }\n",
-    );
+    let found = failure("schema = 1\nname = \"x\"\ngravity = [\"q\", 0, 0]\nframe = 1\ncoordinates = { q = 1 }\n");
     let mut places = Vec::new();
     for diagnostic in &found.diagnostics {
-        assert_eq!(diagnostic.severity, Severity::Error);
+        assert_eq!(diagnostic.severity, DiagnosticSeverity::Error);
         let span = diagnostic.span.expect("a place");
         places.push(found.sources.line_and_column(span));
     }
@@ -274,18 +255,14 @@ fn every_error_says_where() {
 #[test]
 fn a_file_that_cannot_be_read() {
     let failure = modelmill_spec::load_file(Path::new("no/such/model.toml")).unwrap_err();
-    assert!(
-        failure
-            .render(false)
-            .contains("cannot read `no/such/model.toml`")
-    );
+    assert!(failure.render(false).contains("cannot read `no/such/model.toml`"));
 }
 
 #[test]
 fn line_ends_and_marks_of_other_systems() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/two_link.toml");
     let text = std::fs::read_to_string(path).unwrap().replace('\n', "\r\n");
-    let none = Memory::default();
+    let none = MemoryFiles::default();
     assert!(load("model.toml", &text, &none).is_ok());
     assert!(load("model.toml", &format!("\u{feff}{text}"), &none).is_ok());
 }

@@ -7,8 +7,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use modelmill_boundary::files::Memory;
-use modelmill_spec::{Severity, load};
+use modelmill_boundary::files::MemoryFiles;
+use modelmill_spec::{DiagnosticSeverity, load};
 
 /// Cases without `MODELMILL_FUZZ_SECONDS`.
 const CASES: u64 = 2000;
@@ -129,7 +129,7 @@ fn corpus() -> Vec<(String, String)> {
 }
 
 /// A stretch of a text between character boundaries.
-fn stretch(text: &str, random: &mut Random) -> (usize, usize) {
+fn segment(text: &str, random: &mut Random) -> (usize, usize) {
     let mut start = random.below(text.len() + 1);
     let mut end = (start + random.below(60)).min(text.len());
     while !text.is_char_boundary(start) {
@@ -143,7 +143,7 @@ fn stretch(text: &str, random: &mut Random) -> (usize, usize) {
 
 /// A stretch that holds whole words or numbers, where there are any.
 fn word(text: &str, random: &mut Random) -> (usize, usize) {
-    let (start, _) = stretch(text, random);
+    let (start, _) = segment(text, random);
     let is_word = |found: char| found.is_alphanumeric() || found == '_' || found == '.';
     let start = start + text[start..].find(is_word).unwrap_or(0);
     let end = text[start..]
@@ -153,7 +153,7 @@ fn word(text: &str, random: &mut Random) -> (usize, usize) {
 }
 
 fn mutate(text: &mut String, others: &[(String, String)], random: &mut Random) {
-    let (start, end) = stretch(text, random);
+    let (start, end) = segment(text, random);
     match random.below(11) {
         0 => text.replace_range(start..end, ""),
         1 => {
@@ -163,10 +163,7 @@ fn mutate(text: &mut String, others: &[(String, String)], random: &mut Random) {
         2 | 3 => text.insert_str(start, PIECES[random.below(PIECES.len())]),
         4 | 5 => {
             let (start, end) = word(text, random);
-            text.replace_range(
-                start..end,
-                PIECES[random.below(PIECES.len())].trim_matches('"'),
-            );
+            text.replace_range(start..end, PIECES[random.below(PIECES.len())].trim_matches('"'));
         }
         6 => {
             // A word of the file in the place of another: names that exist, in the wrong place.
@@ -177,7 +174,7 @@ fn mutate(text: &mut String, others: &[(String, String)], random: &mut Random) {
         }
         7 => {
             let other = &others[random.below(others.len())].1;
-            let (from, _) = stretch(other, random);
+            let (from, _) = segment(other, random);
             let mut to = (from + random.below(400)).min(other.len());
             while !other.is_char_boundary(to) {
                 to += 1;
@@ -215,7 +212,7 @@ fn mutate(text: &mut String, others: &[(String, String)], random: &mut Random) {
 }
 
 /// What must hold for any text.
-fn check(name: &str, text: &str, others: &Memory) -> bool {
+fn check(name: &str, text: &str, others: &MemoryFiles) -> bool {
     match load(name, text, others) {
         Ok(loaded) => {
             let _ = loaded.render(true);
@@ -223,22 +220,14 @@ fn check(name: &str, text: &str, others: &Memory) -> bool {
                 loaded
                     .warnings
                     .iter()
-                    .all(|found| found.severity == Severity::Warning)
+                    .all(|found| found.severity == DiagnosticSeverity::Warning)
             );
             let mechanism = &loaded.mechanism;
-            assert!(
-                mechanism
-                    .coordinates
-                    .iter()
-                    .all(|one| one.nominal.is_finite())
-            );
+            assert!(mechanism.coordinates.iter().all(|one| one.nominal.is_finite()));
             for point in &mechanism.points {
                 for at in &point.at {
                     assert!(!mechanism.text_of(at).is_empty());
-                    assert!(
-                        at.evaluate(&|symbol| mechanism.symbol_nominal(symbol))
-                            .is_finite()
-                    );
+                    assert!(at.evaluate(&|symbol| mechanism.symbol_nominal(symbol)).is_finite());
                 }
             }
             for (i, frame) in mechanism.frames.iter().enumerate() {
@@ -251,7 +240,7 @@ fn check(name: &str, text: &str, others: &Memory) -> bool {
                 failure
                     .diagnostics
                     .iter()
-                    .any(|found| found.severity == Severity::Error)
+                    .any(|found| found.severity == DiagnosticSeverity::Error)
             );
             assert!(failure.render(false).contains("error"));
             let _ = failure.render(true);
@@ -270,11 +259,9 @@ fn no_text_makes_it_panic_or_hang() {
         .and_then(|text| text.parse::<u64>().ok());
     let mut random = Random(seed.unwrap_or(1).wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
     let others = corpus();
-    let files = others
-        .iter()
-        .fold(Memory::default(), |files, (name, text)| {
-            files.with(name, text.as_str())
-        });
+    let files = others.iter().fold(MemoryFiles::default(), |files, (name, text)| {
+        files.with_file(name, text.as_str())
+    });
     let start = Instant::now();
     let (mut cases, mut sound, mut slowest) = (0_u64, 0_u64, Duration::ZERO);
     while seconds.map_or(cases < CASES, |limit| start.elapsed().as_secs() < limit) {
@@ -305,8 +292,5 @@ fn no_text_makes_it_panic_or_hang() {
         }
     }
     println!("{cases} cases, {sound} of them sound models, slowest {slowest:?}");
-    assert!(
-        sound > 0,
-        "the mutations are so coarse that nothing survives them"
-    );
+    assert!(sound > 0, "the mutations are so coarse that nothing survives them");
 }

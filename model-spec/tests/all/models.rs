@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use modelmill_spec::{Loaded, load_file};
+use modelmill_spec::{LoadedModel, load_file};
 
 fn folder(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
@@ -18,7 +18,7 @@ fn files(path: &str) -> Vec<PathBuf> {
     files
 }
 
-fn model(name: &str) -> Loaded {
+fn model(name: &str) -> LoadedModel {
     load_file(&folder("models").join(name)).unwrap_or_else(|failure| panic!("{failure}"))
 }
 
@@ -40,20 +40,9 @@ fn every_model_is_sound() {
 #[test]
 fn names_of_the_spidermill() {
     let mechanism = model("spidermill-paper.toml").mechanism;
-    let parameters: Vec<&str> = mechanism
-        .parameters
-        .iter()
-        .map(|one| one.name.as_str())
-        .collect();
-    assert_eq!(
-        parameters,
-        ["m1", "m2", "m3", "m4", "dc1", "dc3", "Ic12", "Ic32"]
-    );
-    let frames: Vec<&str> = mechanism
-        .frames
-        .iter()
-        .map(|one| one.name.as_str())
-        .collect();
+    let parameters: Vec<&str> = mechanism.parameters.iter().map(|one| one.name.as_str()).collect();
+    assert_eq!(parameters, ["m1", "m2", "m3", "m4", "dc1", "dc3", "Ic12", "Ic32"]);
+    let frames: Vec<&str> = mechanism.frames.iter().map(|one| one.name.as_str()).collect();
     assert_eq!(frames, ["base", "S1", "S3", "S7", "S5"]);
     assert_eq!(mechanism.retain.len(), 5);
     let platform = &mechanism.lumped_masses[2];
@@ -73,11 +62,7 @@ fn loops_are_closed_at_the_nominal_pose() {
 #[test]
 fn parameters_of_an_arm_come_link_by_link() {
     let mechanism = model("puma560.toml").mechanism;
-    let names: Vec<&str> = mechanism
-        .parameters
-        .iter()
-        .map(|one| one.name.as_str())
-        .collect();
+    let names: Vec<&str> = mechanism.parameters.iter().map(|one| one.name.as_str()).collect();
     assert_eq!(names.len(), 60);
     assert_eq!(
         names[..11],

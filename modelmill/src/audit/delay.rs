@@ -1,126 +1,123 @@
-//! Forces that were read later than they act, or earlier: all drives together where their clock is another, some of them where
-//! theirs is.
+//! Delay of the force signals relative to the motion, positive or negative: of all drives if their clock differs, of
+//! some drives if the clocks of these differ. A segment goes in, a note with the delay comes out.
 
-use modelmill_identify::{Delay, DelayAudit, Delays, Note};
+use modelmill_identify::{DelayAudit, DelayEstimate, ForceDelays, RecordingNote};
 
-use super::rows::Rows;
+use super::rows::AuditRows;
+use super::thresholds::{
+    COMMON_DELAY_FEWEST_DRIVES, DELAY_LEAST_GAIN, DELAY_LEAST_HALF_WIDTHS, DELAY_LEAST_STEPS,
+    DELAY_REVERSAL_RATE_SHARE, DELAY_WARNING_GAIN, LONGEST_DELAY_S, LONGEST_DELAY_SHARE, LONGEST_DELAY_STEPS,
+    PROMPT_DRIVE_MOST_HALF_WIDTH, SAME_DELAY_TOLERANCE_STEPS, SINGLE_DELAY_LEAST_GAIN, SINGLE_DELAY_LEAST_HALF_WIDTHS,
+    SINGLE_DELAY_LEAST_STEPS,
+};
 use crate::model::Model;
-use crate::stretch::Stretch;
+use crate::segment::RecordingSegment;
 use crate::text::table::{percent, significant};
 
-/// Samples of all drives that are looked at, spread over the recording, and the fewest of each.
+/// Largest number of samples over all drives, spread over the recording.
 const LOOKED_AT: usize = 9000;
+/// Smallest number of samples for each drive.
 const FEWEST: usize = 1200;
-/// Longest delay that is looked for, s, or in samples where these are few, and in parts of the recording.
-const LONGEST: f64 = 0.25;
-const LONGEST_SAMPLES: f64 = 64.0;
-const LONGEST_PART: f64 = 0.1;
-/// Part of a drive's fastest rate below which its friction may be about to reverse, which has its own way of coming late.
-const SLOW: f64 = 0.1;
 
-/// How many times the half width of its interval a delay must be to be told, as what a model lacks is not quite at random.
-const CLEAR: f64 = 1.5;
-/// The same of a drive that alone is late: laws that the model lacks are often at one drive.
-const CLEAR_ALONE: f64 = 3.0;
-/// The shortest delay that is told, in samples: of all drives, and of some.
-const LEAST: f64 = 0.2;
-const LEAST_ALONE: f64 = 0.3;
-/// Delays that differ by less than this part of a sample are alike.
-const ALIKE: f64 = 0.1;
-/// Parts by which what is left must fall: of all drives, of the drive that alone is late, and for a warning.
-const GAIN: f64 = 0.003;
-const GAIN_ALONE: f64 = 0.03;
-const GRAVE: f64 = 0.1;
-
-/// What the forces come later or earlier than the motion by.
-pub(super) struct Late {
-    delays: Delays,
+/// Delays of the force signals of a segment.
+pub(super) struct ForceDelayAudit {
+    /// Delays of all drives together and of each drive, with residuals.
+    delays: ForceDelays,
+    /// Time between samples, s.
     step: f64,
 }
 
-impl Late {
-    pub(super) fn of(model: &Model, data: &Stretch) -> Option<Self> {
+impl ForceDelayAudit {
+    /// Estimates the delays; `None` if forces are missing, the segment is too short, or a pose has no
+    /// solution.
+    pub(super) fn from_segment(model: &Model, data: &RecordingSegment) -> Option<Self> {
         let run = &data.run;
         let forces = run.force.as_deref()?;
         let n = run.time.len();
         let duration = run.time.last()? - run.time.first()?;
         let step = duration / (n - 1) as f64;
-        let longest = LONGEST
-            .max(LONGEST_SAMPLES * step)
-            .min(LONGEST_PART * duration);
+        let longest = LONGEST_DELAY_S
+            .max(LONGEST_DELAY_STEPS * step)
+            .min(LONGEST_DELAY_SHARE * duration);
+        // Both ends are excluded by the longest delay, so that every shifted sample exists.
         let from = run.time.partition_point(|t| *t < run.time[0] + longest);
-        let to = run
-            .time
-            .partition_point(|t| *t <= run.time[n - 1] - longest);
+        let to = run.time.partition_point(|t| *t <= run.time[n - 1] - longest);
         let most = (LOOKED_AT / forces.len().max(1)).max(FEWEST);
         let every = ((to - from) / most).max(1);
         let samples: Vec<usize> = (from..to).step_by(every).collect();
-        let rows = Rows::new(model, data, &samples)?;
+        let rows = AuditRows::new(model, data, &samples)?;
         let drives = forces.len();
+        // Samples near reversals of a drive are not used.
         let mut counts = vec![false; samples.len() * drives];
         for (d, rates) in rows.motion[1].iter().enumerate() {
             let fastest = rates.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
             for (i, rate) in rates.iter().enumerate() {
-                counts[i * drives + d] = rate.abs() > SLOW * fastest;
+                counts[i * drives + d] = rate.abs() > DELAY_REVERSAL_RATE_SHARE * fastest;
             }
         }
-        let delays = Delays::of(&DelayAudit {
+        let delays = ForceDelays::from_audit(&DelayAudit {
             regressor: rows.regressor,
-            slope: Rows::slope(model, data, &samples)?,
+            slope: AuditRows::slope(model, data, &samples)?,
             time: rows.time,
-            counts,
-            recorded: &run.time,
+            used_rows: counts,
+            recording_time: &run.time,
             forces,
-            left_out: &run.left_out,
-            longest,
+            excluded_forces: &run.left_out,
+            max_delay: longest,
         })?;
         Some(Self { delays, step })
     }
 
-    /// What is left with what is found to be late taken into account, relative to what is left without; the geometric mean over
-    /// the drives.
+    /// Relative decrease of the residual with the delay, as a geometric mean over the drives. `with` is 1 for the
+    /// common delay and 2 for delays of single drives.
     fn gain(&self, with: usize) -> f64 {
-        let [before, after] = [0, with].map(|which| mean(&self.delays.left[which]));
+        let [before, after] = [0, with].map(|which| geometric_mean(&self.delays.residuals[which]));
         1.0 - after / before.max(f64::MIN_POSITIVE)
     }
 
-    /// The delay that all drives have, if that is how it is.
-    fn together(&self) -> Option<Delay> {
-        let all = self.delays.together;
-        let alone = &self.delays.alone;
-        // A clock delays all forces alike; where drives differ, it is a law that the model lacks.
-        let differ = |one: &Delay, other: &Delay| {
+    /// The delay that all drives share; `None` if they differ, or if it is not clear.
+    fn common_delay(&self) -> Option<DelayEstimate> {
+        let all = self.delays.common;
+        let alone = &self.delays.by_channel;
+        // A clock delays all forces alike; if drives differ, the model lacks a law.
+        let differ = |one: &DelayEstimate, other: &DelayEstimate| {
             let apart = (one.seconds - other.seconds).abs();
-            apart > CLEAR * one.half_width.hypot(other.half_width) + ALIKE * self.step
+            apart
+                > DELAY_LEAST_HALF_WIDTHS * one.half_width.hypot(other.half_width)
+                    + SAME_DELAY_TOLERANCE_STEPS * self.step
         };
-        let agree = (alone.iter().enumerate())
-            .all(|(d, one)| !alone[..d].iter().any(|other| differ(one, other)));
-        // Two drives at least must tell of themselves.
-        let telling =
-            |one: &&Delay| one.seconds.abs() > one.half_width && one.seconds * all.seconds > 0.0;
-        let agree = agree && alone.iter().filter(telling).count() >= alone.len().min(2);
-        let is_there = self.is_clear(all, CLEAR, LEAST) && self.gain(1) > GAIN;
+        let agree = (alone.iter().enumerate()).all(|(d, one)| !alone[..d].iter().any(|other| differ(one, other)));
+        // At least two drives must show the delay on their own.
+        let telling = |one: &&DelayEstimate| one.seconds.abs() > one.half_width && one.seconds * all.seconds > 0.0;
+        let agree = agree && alone.iter().filter(telling).count() >= alone.len().min(COMMON_DELAY_FEWEST_DRIVES);
+        let is_there =
+            self.is_clear(all, DELAY_LEAST_HALF_WIDTHS, DELAY_LEAST_STEPS) && self.gain(1) > DELAY_LEAST_GAIN;
         (agree && is_there).then_some(all)
     }
 
-    /// Drives whose forces are late where others tell that they are not.
-    fn alone(&self) -> Vec<usize> {
-        let Delays { alone, left, .. } = &self.delays;
+    /// Drives whose force signals are delayed while those of the other drives are clearly not.
+    fn delayed_drives(&self) -> Vec<usize> {
+        let ForceDelays {
+            by_channel: alone,
+            residuals: left,
+            ..
+        } = &self.delays;
+        // A delayed drive must be clear and must reduce its own residual.
         let late: Vec<usize> = (0..alone.len())
-            .filter(|d| self.is_clear(alone[*d], CLEAR_ALONE, LEAST_ALONE))
-            .filter(|d| left[2][*d] < (1.0 - GAIN_ALONE) * left[0][*d])
+            .filter(|d| self.is_clear(alone[*d], SINGLE_DELAY_LEAST_HALF_WIDTHS, SINGLE_DELAY_LEAST_STEPS))
+            .filter(|d| left[2][*d] < (1.0 - SINGLE_DELAY_LEAST_GAIN) * left[0][*d])
             .collect();
-        let Some(least) = (late.iter().map(|d| alone[*d].seconds.abs())).min_by(f64::total_cmp)
-        else {
+        let Some(least) = (late.iter().map(|d| alone[*d].seconds.abs())).min_by(f64::total_cmp) else {
             return Vec::new();
         };
         let is_late = |d: usize| late.contains(&d);
+        // The other drives must show that the common clock is correct.
         let others = || (0..alone.len()).filter(|d| !is_late(*d)).map(|d| alone[d]);
-        let in_time =
-            others().all(|one| one.seconds.abs() < CLEAR * one.half_width + ALIKE * self.step);
-        let known = others().any(|one| one.half_width < 0.5 * least);
-        let same_side = late.iter().all(|d| alone[*d].seconds > 0.0)
-            || late.iter().all(|d| alone[*d].seconds < 0.0);
+        let in_time = others().all(|one| {
+            one.seconds.abs() < DELAY_LEAST_HALF_WIDTHS * one.half_width + SAME_DELAY_TOLERANCE_STEPS * self.step
+        });
+        let known = others().any(|one| one.half_width < PROMPT_DRIVE_MOST_HALF_WIDTH * least);
+        let same_side = late.iter().all(|d| alone[*d].seconds > 0.0) || late.iter().all(|d| alone[*d].seconds < 0.0);
         if in_time && known && same_side {
             late
         } else {
@@ -128,129 +125,132 @@ impl Late {
         }
     }
 
-    fn is_clear(&self, delay: Delay, clear: f64, least: f64) -> bool {
+    /// Whether a delay exceeds its uncertainty by the factor `clear`, and `least` samples.
+    fn is_clear(&self, delay: DelayEstimate, clear: f64, least: f64) -> bool {
         delay.seconds.abs() > (clear * delay.half_width).max(least * self.step)
     }
 
-    /// What is left with the delay, as the geometric mean over the drives of their relative errors, where one is told.
-    pub(super) fn left(&self) -> Option<f64> {
-        if self.together().is_some() {
-            Some(mean(&self.delays.left[1]))
+    /// The residual with the delay, as the geometric mean of relative errors over the drives; `None` without a delay.
+    pub(super) fn residual_with_delay(&self) -> Option<f64> {
+        if self.common_delay().is_some() {
+            Some(geometric_mean(&self.delays.residuals[1]))
         } else {
-            (!self.alone().is_empty()).then(|| mean(&self.delays.left[2]))
+            (!self.delayed_drives().is_empty()).then(|| geometric_mean(&self.delays.residuals[2]))
         }
     }
 
-    /// What is to be said.
-    pub(super) fn note(&self, model: &Model, file: &str) -> Option<Note> {
+    /// The note on the delay; `None` without one. `file` is the name of the recording.
+    pub(super) fn delay_note(&self, model: &Model, file: &str) -> Option<RecordingNote> {
         let names = model.drives();
-        if let Some(all) = self.together() {
-            return Some(self.together_note(all, &names, file));
+        if let Some(all) = self.common_delay() {
+            return Some(self.common_delay_note(all, &names, file));
         }
-        let late = self.alone();
+        let late = self.delayed_drives();
         if late.is_empty() {
             return None;
         }
         let each: Vec<String> = late
             .iter()
             .map(|d| {
-                let one = self.delays.alone[*d];
+                let one = self.delays.by_channel[*d];
                 format!(
-                    "The force of `{}` comes {} than the motion that the model explains it by: {}.",
+                    "The force of `{}` comes {} than the motion that causes it in the model: {}.",
                     names[*d],
-                    side(one),
-                    self.amount(one)
+                    direction_word(one),
+                    self.delay_text(one)
                 )
             })
             .collect();
         let says = format!(
-            "{} That is so in {file}; forces of the other drives are in time.{} Look at how its samples are stamped, and shift \
+            "{} This holds for {file}; the forces of the other drives are not delayed.{} Check its time stamps, and shift \
              its column.",
             each.join(" "),
-            self.worth(2)
+            self.gain_text(2)
         );
-        Some(self.graded(2, says))
+        Some(self.graded_note(2, says))
     }
 
-    /// The note of a delay that all drives have.
-    fn together_note(&self, all: Delay, names: &[String], file: &str) -> Note {
-        let amount = self.amount(all);
+    /// The note on a delay that all drives share.
+    fn common_delay_note(&self, all: DelayEstimate, names: &[String], file: &str) -> RecordingNote {
+        let amount = self.delay_text(all);
+        // The delays of single drives show how well they agree.
         let mut each = String::new();
         if names.len() > 1 {
-            let of = names.iter().zip(&self.delays.alone).map(|(name, one)| {
+            let of = names.iter().zip(&self.delays.by_channel).map(|(name, one)| {
                 format!(
                     "`{name}` {} +- {}",
-                    rounded(one.seconds / self.step),
+                    rounded_text(one.seconds / self.step),
                     significant(one.half_width / self.step, 2)
                 )
             });
             let of: Vec<String> = of.collect();
-            each = format!(" Each drive by itself, in samples: {}.", of.join(", "));
+            each = format!(" Delay of each drive, in samples: {}.", of.join(", "));
         }
-        let worth = self.worth(1);
+        let worth = self.gain_text(1);
+        // A lead of up to one sample is normal for controllers, and only noted.
         if all.seconds < 0.0 && -all.seconds < self.step + all.half_width {
-            return Note::info(format!(
-                "The forces in {file} lead the motion by {amount}, as where a controller sets them after it has read the \
+            return RecordingNote::info(format!(
+                "The forces in {file} lead the motion by {amount}, which is normal if a controller sets them after reading the \
                  positions.{each}{worth}"
             ));
         }
+        // Only a delay can be modelled by `time_delay`.
         let mend = if all.seconds > 0.0 {
             format!(
-                " An effect `time_delay` at `force` with T = {} s in the model file takes it out.",
+                " An effect `time_delay` at `force` with T = {} s in the model file compensates for it.",
                 significant(all.seconds, 3)
             )
         } else {
             String::new()
         };
         let says = format!(
-            "The forces in {file} come {} than the motion that the model explains them by: {amount}.{each}{worth}{mend}",
-            side(all)
+            "The forces in {file} come {} than the motion that causes them in the model: {amount}.{each}{worth}{mend}",
+            direction_word(all)
         );
-        self.graded(1, says)
+        self.graded_note(1, says)
     }
 
-    fn amount(&self, delay: Delay) -> String {
+    /// The size of a delay in samples and ms with its interval.
+    fn delay_text(&self, delay: DelayEstimate) -> String {
         format!(
             "{} samples or {} ms (+- {} ms, 99 %)",
-            rounded(delay.seconds.abs() / self.step),
-            rounded(1e3 * delay.seconds.abs()),
+            rounded_text(delay.seconds.abs() / self.step),
+            rounded_text(1e3 * delay.seconds.abs()),
             significant(1e3 * delay.half_width, 2)
         )
     }
 
-    /// What taking a delay out gains.
-    fn worth(&self, with: usize) -> String {
-        let [before, after] = [0, with].map(|which| percent(Some(mean(&self.delays.left[which]))));
+    /// The residuals with and without the delay, as a sentence.
+    fn gain_text(&self, with: usize) -> String {
+        let [before, after] = [0, with].map(|which| percent(Some(geometric_mean(&self.delays.residuals[which]))));
         format!(
-            " With that the best fit is off by {after} rather than {before} (geometric mean over the drives, away from reversals)."
+            " With the delay the best fit has an error of {after} instead of {before} (geometric mean over the drives, away from reversals)."
         )
     }
 
-    fn graded(&self, with: usize, says: String) -> Note {
-        if self.gain(with) > GRAVE {
-            Note::warning(says)
+    /// The note as a warning if the delay causes a large part of the residual.
+    fn graded_note(&self, with: usize, says: String) -> RecordingNote {
+        if self.gain(with) > DELAY_WARNING_GAIN {
+            RecordingNote::warning(says)
         } else {
-            Note::info(says)
+            RecordingNote::info(says)
         }
     }
 }
 
-fn side(delay: Delay) -> &'static str {
-    if delay.seconds > 0.0 {
-        "later"
-    } else {
-        "earlier"
-    }
+/// The sign of a delay as a word.
+fn direction_word(delay: DelayEstimate) -> &'static str {
+    if delay.seconds > 0.0 { "later" } else { "earlier" }
 }
 
-/// The geometric mean.
-fn mean(parts: &[f64]) -> f64 {
+/// The geometric mean of positive numbers.
+fn geometric_mean(parts: &[f64]) -> f64 {
     let logarithms = parts.iter().map(|part| part.max(f64::MIN_POSITIVE).ln());
     (logarithms.sum::<f64>() / parts.len().max(1) as f64).exp()
 }
 
-/// Two decimals where they say something.
-fn rounded(value: f64) -> String {
+/// A number with two decimals, or one from 10 on.
+fn rounded_text(value: f64) -> String {
     if value.abs() < 10.0 {
         format!("{value:.2}")
     } else {

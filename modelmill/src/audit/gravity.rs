@@ -1,6 +1,7 @@
-//! Gravity that pulls the other way: a machine that hangs where its model stands, or the sign of `gravity` in the model file.
+//! Detects gravity of the wrong sign: a machine mounted upside down relative to its model, or a wrong sign of
+//! `gravity` in the model file.
 //!
-//! Decision: no second derivation is needed. The columns at standstill are those of gravity, and they change their
+//! Decision: no second derivation is needed. The columns at standstill are those of gravity, which change their
 //! sign.
 
 use modelmill_boundary::message;
@@ -8,42 +9,41 @@ use modelmill_boundary::text::Remedy;
 use modelmill_identify::ForceAudit;
 use nalgebra::DVector;
 
-use super::rows::Rows;
-use super::{BETTER, Finding, GRAVITY};
+use super::rows::AuditRows;
+use super::thresholds::{CORRECTION_MOST_RATIO, GRAVITY_LEAST_ERROR};
+use super::{AuditFinding, GRAVITY};
 use crate::model::Model;
-use crate::stretch::Stretch;
+use crate::segment::RecordingSegment;
 use crate::text::table::percent;
 
-/// Relative errors, friction and offsets of the drives taken off, below which nothing is wrong with gravity.
-const BEARABLE: f64 = 0.01;
-
-/// Says so where gravity the other way explains the forces far better.
-pub(super) fn upside_down(
+/// A finding if reversed gravity explains the forces far better. `measured` are the forces at the samples, interleaved.
+pub(super) fn reversed_gravity_finding(
     model: &Model,
-    data: &Stretch,
+    data: &RecordingSegment,
     samples: &[usize],
     measured: &DVector<f64>,
-) -> Option<Finding> {
+) -> Option<AuditFinding> {
     if model.gravity().iter().all(|g| *g == 0.0) {
         return None;
     }
     let error = |regressor| ForceAudit::new(regressor)?.error(measured);
-    let before = error(Rows::new(model, data, samples)?.regressor)?;
-    if before < BEARABLE {
+    // Both fits include friction, inertia and offsets of the drives.
+    let before = error(AuditRows::new(model, data, samples)?.regressor)?;
+    if before < GRAVITY_LEAST_ERROR {
         return None;
     }
-    let after = error(Rows::upside_down(model, data, samples)?)?;
-    (after < BETTER * before).then(|| {
-        let says = "gravity seems to pull the other way".to_owned();
+    let after = error(AuditRows::with_reversed_gravity(model, data, samples)?)?;
+    (after < CORRECTION_MOST_RATIO * before).then(|| {
+        let says = "gravity seems to point in the opposite direction".to_owned();
         let file = &data.run.file;
         let note = message!(
-            "In {file} {says}: the best fit of the model with friction and offsets of its drives is off by {} as it is, and \
-             would be off by {} then. Check {}, and which way up the machine is mounted; something \
-             that more than balances its weight looks alike.",
+            "In {file} {says}. The best fit of the model with friction and offsets of its drives has an error of {} as it is, and \
+             {} with reversed gravity. Check {}, and how the machine is mounted; a device \
+             that more than balances its weight looks the same.",
             percent(Some(before)),
             percent(Some(after)),
             Remedy::edit("gravity")
         );
-        Finding::suspicion(GRAVITY, vec!["base".to_owned()], says, file, note)
+        AuditFinding::suspicion(GRAVITY, vec!["base".to_owned()], says, file, note)
     })
 }

@@ -1,45 +1,48 @@
-//! Lengths and angles of the model that may be wrong: what the forces of its base parameters change by with each of its constants,
-//! by central differences. While base parameters are held they hide what a constant does to them, and nothing is asked.
+//! Candidates for a wrong length or angle of the model: first and second derivatives of the base columns by
+//! each constant, by central differences. There are none if all base parameters are fixed, since these depend
+//! on the constants too.
 
-use modelmill_codegen::Evaluator;
+use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
-    Candidate, Column, Constant, Effect, EffectParameter, Nature, Sensitivity, Sign, Source,
+    CandidateEffect, CandidateNature, ColumnSource, ConstantCorrection, EffectParameter, ForceColumn, ForceSensitivity,
+    LocatedEffect, SignConstraint,
 };
 
 use crate::model::Model;
-use crate::regressors::{Runs, regressor};
+use crate::regressors::{SegmentList, regressor};
 
 use super::payloads::reach;
+use super::thresholds::CONSTANT_LEAST_EFFECT;
 
 /// Steps of the differences: this part of the machine's size, or of a radian.
 const STEP: f64 = 1e-3;
 
-/// An error of every constant that is a length or an angle; `is_held` says which base parameters are known.
-pub(crate) fn constants(
-    model: &Model,
-    all: &Runs<'_>,
-    is_held: &dyn Fn(usize) -> bool,
-) -> Vec<Candidate> {
+/// A candidate for the error of each length and angle; `is_held` is true for base parameters that are fixed.
+pub(crate) fn constants(model: &Model, all: &SegmentList<'_>, is_held: &dyn Fn(usize) -> bool) -> Vec<CandidateEffect> {
     let derivation = &model.derivation;
     let mechanism = &derivation.mechanism;
+    // Fixed base parameters were computed with the nominal lengths.
     if (0..model.base.len()).all(is_held) {
         return Vec::new();
     }
+    // The columns for a constant that differs by a step.
     let usual: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
     let along = |k: usize, step: f64| {
         let mut moved = usual.clone();
         moved[k] += step;
-        regressor(all, &Evaluator::with_constants(derivation, moved), model)
+        regressor(all, &ModelEvaluator::with_constants(derivation, moved), model)
     };
+    // The columns at the nominal constants are the same for all of them.
     let mut middle = None;
     let mut candidates = Vec::new();
     for (k, constant) in mechanism.constants.iter().enumerate() {
+        // Other units, such as those of counts, are no geometry.
         let step = match constant.unit.as_str() {
             "m" => STEP * reach(mechanism),
             "rad" => STEP,
             _ => continue,
         };
-        // With another length the mechanism may not close along the recordings.
+        // With another length the loops may not close along the recordings.
         let (Ok(back), Ok(ahead)) = (along(k, -step), along(k, step)) else {
             continue;
         };
@@ -47,65 +50,67 @@ pub(crate) fn constants(
             middle = along(k, 0.0).ok();
         }
         let Some(middle) = &middle else { continue };
-        let [mut slope, mut bend] = [(); 2].map(|()| Sensitivity {
+        // First and second derivative; fixed base parameters are summed with their nominal values.
+        let [mut slope, mut bend] = [(); 2].map(|()| ForceSensitivity {
             base: Vec::new(),
-            held: Column(vec![None; model.drives().len()]),
+            fixed: ForceColumn(vec![None; model.drives().len()]),
         });
         for (p, middle) in middle.iter().enumerate() {
-            let sum = |parts: [(f64, &Column); 3]| {
-                let mut sum = Column(vec![None; model.drives().len()]);
+            let sum = |parts: [(f64, &ForceColumn); 3]| {
+                let mut sum = ForceColumn(vec![None; model.drives().len()]);
                 for (factor, part) in parts.into_iter().filter(|(factor, _)| *factor != 0.0) {
                     sum.add(factor, part);
                 }
                 without_rounding(sum)
             };
+            // The central first difference.
             let first = 0.5 / step;
+            // The central second difference.
             let second = 1.0 / (step * step);
             let first = sum([(first, &ahead[p]), (0.0, middle), (-first, &back[p])]);
-            let second = sum([
-                (second, &ahead[p]),
-                (-2.0 * second, middle),
-                (second, &back[p]),
-            ]);
+            let second = sum([(second, &ahead[p]), (-2.0 * second, middle), (second, &back[p])]);
+            // Estimated base parameters get columns, fixed ones a force.
             for (part, change) in [(&mut slope, first), (&mut bend, second)] {
                 if is_held(p) {
-                    part.held.add(model.nominal[p], &change);
+                    part.fixed.add(model.nominal[p], &change);
                 } else {
                     part.base.push(change);
                 }
             }
         }
-        if slope.held.is_zero() && slope.base.iter().all(Column::is_zero) {
+        // A constant without effect on any force is no candidate.
+        if slope.fixed.is_zero() && slope.base.iter().all(ForceColumn::is_zero) {
             continue;
         }
-        candidates.push(Candidate {
-            effect: Effect {
+        candidates.push(CandidateEffect {
+            effect: LocatedEffect {
                 kind: "constant_error".to_owned(),
                 at: vec![constant.name.clone()],
             },
             parameters: vec![EffectParameter {
                 symbol: "error".to_owned(),
                 unit: constant.unit.clone(),
-                sign: Sign::Any,
+                sign: SignConstraint::Any,
             }],
-            searched: 0,
+            searched_constants: 0,
             is_part_of_load: true,
             refines: None,
-            nature: Nature::Effect,
+            nature: CandidateNature::Effect,
             is_per_run: false,
-            source: Source::Constant(Constant { slope, bend }),
+            source: ColumnSource::Constant(ConstantCorrection {
+                first_derivative: slope,
+                second_derivative: bend,
+            }),
         });
     }
     candidates
 }
 
-/// Differences below this are rounding.
-const ROUNDING: f64 = 1e-7;
-
-fn without_rounding(mut column: Column) -> Column {
+/// The column without channels that are rounding only.
+fn without_rounding(mut column: ForceColumn) -> ForceColumn {
     for slot in &mut column.0 {
         let most = slot.iter().flatten().fold(0.0_f64, |m, x| m.max(x.abs()));
-        if most < ROUNDING {
+        if most < CONSTANT_LEAST_EFFECT {
             *slot = None;
         }
     }

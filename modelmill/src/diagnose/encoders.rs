@@ -1,56 +1,50 @@
-//! Encoders that err: by a zero that is not the model's, or as they turn, since an eccentric disc reads the position too large
-//! and too small once or several times a turn; and the model takes that for motion. What forces change by with each reading, its
-//! rate and its acceleration is had by central differences of the fitted model, so that any error along the motion is a sum of
-//! three products.
+//! Candidates for errors of encoders: a wrong zero, or an eccentric disc whose error repeats once or several
+//! times per turn. The derivatives of the forces by position, rate and acceleration come from central
+//! differences of the fitted model. The force of any small error of the motion is then a sum of three products.
 
-use modelmill_identify::changes::Moments;
+use modelmill_identify::changes::NormalEquations;
 use modelmill_identify::diagnose::{
-    Candidate, Choice, Column, Effect, EffectParameter, Nature, Problem, Sign, Source,
+    CandidateEffect, CandidateNature, ColumnChoice, ColumnSource, DiagnosisProblem, EffectParameter, ForceColumn,
+    LocatedEffect, SignConstraint,
 };
 
 use crate::along;
 use crate::model::Model;
-use crate::stretch::Stretch;
+use crate::segment::RecordingSegment;
 
 use super::numbers::stack;
 use super::places::is_free;
-use super::problem::Held;
-use crate::regressors::Runs;
+use super::problem::FixedParameters;
+use super::thresholds::{ENCODER_WAVE_SAMPLES, SLOPE_JUMP_MEDIANS};
+use crate::regressors::SegmentList;
 
-/// How often an error may come again in a turn, or along the travel of a coordinate that slides.
+/// How often an error may repeat per turn, or along the travel of a prismatic coordinate.
 const TIMES: [u32; 16] = [1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 30, 36, 48, 60];
 /// Steps of the differences, as parts of the largest value.
 const STEP: f64 = 1e-5;
-/// Samples that an error must take at least for each of its waves.
-const SAMPLES_PER_WAVE: f64 = 12.0;
-/// Beyond so many times its middle size a difference has met a sign that jumped.
-const JUMPED: f64 = 100.0;
 
-/// What forces change by with position, rate and acceleration of every active coordinate, for base parameters.
-pub(crate) fn sensitivities(
-    model: &Model,
-    all: &Runs<'_>,
-    values: &[f64],
-) -> Vec<Option<[Column; 3]>> {
-    let coordinates = 0..model.motions().len();
-    coordinates
-        .map(|i| sensitivity(model, all, values, i))
-        .collect()
+/// Derivatives of the forces by position, rate and acceleration of every active coordinate, for given base
+/// parameters; `None` if the forces cannot be evaluated next to the recorded motion.
+pub(crate) fn sensitivities(model: &Model, all: &SegmentList<'_>, values: &[f64]) -> Vec<Option<[ForceColumn; 3]>> {
+    // One coordinate at a time; a failure of one does not affect the others.
+    let coordinates = 0..model.active_coordinate_types().len();
+    coordinates.map(|i| sensitivity(model, all, values, i)).collect()
 }
 
-/// What the positions of each encoder read too much throughout; a free body has none.
-pub(crate) fn zeros(model: &Model, slopes: &[Option<[Column; 3]>]) -> Vec<Candidate> {
+/// Candidates for a constant offset of each encoder; a free body has no encoder.
+pub(crate) fn zeros(model: &Model, slopes: &[Option<[ForceColumn; 3]>]) -> Vec<CandidateEffect> {
     let (active, _) = model.derivation.coordinates();
     let has_encoder = |i: &usize| !is_free(&model.derivation.mechanism, *i);
-    let each = model.motions().into_iter().zip(slopes).zip(active);
+    // A free body is measured by other means than an encoder.
+    let each = model.active_coordinate_types().into_iter().zip(slopes).zip(active);
     let each = each.filter_map(|(one, i)| has_encoder(&i).then_some(one));
-    let candidate = |((name, is_angle), slopes): ((String, bool), &Option<[Column; 3]>)| {
+    let candidate = |((name, is_angle), slopes): ((String, bool), &Option<[ForceColumn; 3]>)| {
         let [by_position, ..] = slopes.as_ref()?;
-        let mut column = Column(vec![None; model.drives().len()]);
+        let mut column = ForceColumn(vec![None; model.drives().len()]);
         // Forces are those of the true motion.
         column.add(-1.0, by_position);
-        Some(Candidate {
-            source: Source::Columns(vec![Choice {
+        Some(CandidateEffect {
+            source: ColumnSource::Columns(vec![ColumnChoice {
                 constants: Vec::new(),
                 columns: vec![column],
             }]),
@@ -61,37 +55,40 @@ pub(crate) fn zeros(model: &Model, slopes: &[Option<[Column; 3]>]) -> Vec<Candid
 }
 
 /// A fault of a coordinate's encoder with parameters in its unit.
-fn disturbance(kind: &str, name: String, symbols: &[&str], is_angle: bool) -> Candidate {
+fn disturbance(kind: &str, name: String, symbols: &[&str], is_angle: bool) -> CandidateEffect {
+    // Errors of an encoder have the unit of its coordinate.
     let parameter = |symbol: &&str| EffectParameter {
         symbol: (*symbol).to_owned(),
         unit: if is_angle { "rad" } else { "m" }.to_owned(),
-        sign: Sign::Any,
+        sign: SignConstraint::Any,
     };
-    Candidate {
-        effect: Effect {
+    CandidateEffect {
+        effect: LocatedEffect {
             kind: kind.to_owned(),
             at: vec![name],
         },
         parameters: symbols.iter().map(parameter).collect(),
-        searched: 0,
+        searched_constants: 0,
         is_part_of_load: false,
         refines: None,
-        nature: Nature::Disturbance,
+        nature: CandidateNature::Disturbance,
         is_per_run: false,
-        source: Source::Columns(Vec::new()),
+        source: ColumnSource::Columns(Vec::new()),
     }
 }
 
-/// An error of each encoder with sine and cosine of its angle, for each number of waves that may be.
+/// Candidates for an error of each encoder with sine and cosine of its angle, for each possible number of waves
+/// per turn.
 pub(crate) fn encoders(
     model: &Model,
-    all: &Runs<'_>,
-    problem: &Problem,
-    slopes: &[Option<[Column; 3]>],
-) -> Vec<Candidate> {
-    let motions = model.motions();
+    all: &SegmentList<'_>,
+    problem: &DiagnosisProblem,
+    slopes: &[Option<[ForceColumn; 3]>],
+) -> Vec<CandidateEffect> {
+    let active = model.active_coordinate_types();
     let mut candidates = Vec::new();
-    for (i, (name, is_angle)) in motions.iter().enumerate() {
+    for (i, (name, is_angle)) in active.iter().enumerate() {
+        // Position, rate or acceleration.
         let of = |order: usize| -> Vec<f64> {
             let mut all_values = Vec::new();
             for (one, _) in all {
@@ -101,6 +98,7 @@ pub(crate) fn encoders(
             }
             all_values
         };
+        // Motion of the coordinate at the decimated samples of all recordings.
         let [q, qd, qdd] = [0, 1, 2].map(of);
         let low = q.iter().copied().fold(f64::INFINITY, f64::min);
         let travel = q.iter().copied().fold(f64::NEG_INFINITY, f64::max) - low;
@@ -111,25 +109,25 @@ pub(crate) fn encoders(
         let Some(slopes) = &slopes[i] else {
             continue;
         };
-        let step = problem.layout.stretches.iter().map(|s| s.step);
+        // The largest step between samples decides which waves can be seen.
+        let step = problem.layout.segments.iter().map(|s| s.step);
         let step = step.fold(f64::MIN_POSITIVE, f64::max);
-        let turn = if *is_angle {
-            std::f64::consts::TAU
-        } else {
-            travel
-        };
+        // A prismatic coordinate has no turn: its error repeats along the travel.
+        let turn = if *is_angle { std::f64::consts::TAU } else { travel };
         let choice = |times: u32| {
             let k = std::f64::consts::TAU * f64::from(times) / turn;
-            if k * fastest * step > std::f64::consts::TAU / SAMPLES_PER_WAVE {
+            // At the largest rate a wave must have enough samples, or the low-pass would remove it.
+            if k * fastest * step > std::f64::consts::TAU / ENCODER_WAVE_SAMPLES {
                 return None;
             }
             let wave = |phase: f64| {
                 let error = |j: usize| {
                     let (sin, cos) = (k * q[j] + phase).sin_cos();
+                    // Error of the position, and its first and second derivative in time.
                     let rate = k * cos * qd[j];
                     [sin, rate, k * cos * qdd[j] - k * k * sin * qd[j] * qd[j]]
                 };
-                let mut column = Column(vec![None; model.drives().len()]);
+                let mut column = ForceColumn(vec![None; model.drives().len()]);
                 for (order, slope) in slopes.iter().enumerate() {
                     let mut part = slope.clone();
                     for values in part.0.iter_mut().flatten() {
@@ -142,47 +140,48 @@ pub(crate) fn encoders(
                 }
                 column
             };
-            Some(Choice {
+            Some(ColumnChoice {
                 constants: vec![("times_per_turn".to_owned(), f64::from(times))],
+                // Sine and cosine, so that the phase is estimated linearly.
                 columns: vec![wave(0.0), wave(0.5 * std::f64::consts::PI)],
             })
         };
-        let choices: Vec<Choice> = TIMES.into_iter().filter_map(choice).collect();
+        // Waves that are too short at the largest rate are skipped.
+        let choices: Vec<ColumnChoice> = TIMES.into_iter().filter_map(choice).collect();
         if choices.is_empty() {
             continue;
         }
-        candidates.push(Candidate {
-            searched: 1,
-            source: Source::Columns(choices),
-            ..disturbance(
-                "encoder_eccentricity",
-                name.clone(),
-                &["sine", "cosine"],
-                *is_angle,
-            )
+        candidates.push(CandidateEffect {
+            searched_constants: 1,
+            source: ColumnSource::Columns(choices),
+            ..disturbance("encoder_eccentricity", name.clone(), &["sine", "cosine"], *is_angle)
         });
     }
     candidates
 }
 
-/// Base parameters by least squares, drives weighed alike; those that are held keep their nominal values.
-pub(crate) fn values(model: &Model, problem: &Problem, held: Held) -> Vec<f64> {
-    let mut all = Moments::new(problem.base.len());
+/// Base parameters by least squares, with each drive weighted by its squared force; fixed ones keep their
+/// nominal values.
+pub(crate) fn values(model: &Model, problem: &DiagnosisProblem, held: FixedParameters) -> Vec<f64> {
+    let mut all = NormalEquations::new(problem.base.len());
     for (d, measured) in problem.measured.0.iter().enumerate() {
+        // A drive without force has no equations.
         let Some(measured) = measured else { continue };
-        let mut one = Moments::new(problem.base.len());
+        let mut one = NormalEquations::new(problem.base.len());
         let columns: Vec<Option<&[f64]>> = problem.base.iter().map(|c| c.0[d].as_deref()).collect();
         one.add_rows(&columns, measured);
+        // Each drive counts alike, whatever its force.
         let weight = one.total.max(f64::MIN_POSITIVE).recip();
         one.gram *= weight;
         one.rhs *= weight;
         all.merge(&one);
     }
+    // The normal equations have one solution for all drives.
     let solved = all.solve().values;
     let mut next = solved.iter();
     (0..model.base.len())
         .map(|k| {
-            if held == Held::All || model.is_known(k) {
+            if held == FixedParameters::All || model.is_known(k) {
                 model.nominal[k]
             } else {
                 next.next().copied().unwrap_or(0.0)
@@ -191,19 +190,16 @@ pub(crate) fn values(model: &Model, problem: &Problem, held: Held) -> Vec<f64> {
         .collect()
 }
 
-/// What forces change by with a position, its rate and its acceleration, decimated; `None` where the model does not hold
-/// beside the recording.
-fn sensitivity(
-    model: &Model,
-    all: &Runs<'_>,
-    values: &[f64],
-    coordinate: usize,
-) -> Option<[Column; 3]> {
+/// Derivatives of the forces by a position, its rate and its acceleration, decimated; `None` if the forces
+/// cannot be evaluated next to the recorded motion.
+fn sensitivity(model: &Model, all: &SegmentList<'_>, values: &[f64], coordinate: usize) -> Option<[ForceColumn; 3]> {
     let mut slopes = Vec::new();
     for order in 0..3 {
+        // The forces with one derivative of the motion changed by a step of either sign.
         let along = |sign: f64| {
             stack(all, |one| {
-                let mut turned: Stretch = one.clone();
+                // A copy of the recording with one column changed.
+                let mut turned: RecordingSegment = one.clone();
                 let run = &mut turned.run;
                 let column = &mut [&mut run.q, &mut run.qd, &mut run.qdd][order][coordinate];
                 let largest = column.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
@@ -224,15 +220,16 @@ fn sensitivity(
         let pairs = ahead.into_iter().zip(back);
         let slope = pairs.map(|(ahead, back)| {
             let mut slope: Vec<f64> = ahead.iter().zip(&back).map(|(a, b)| a - b).collect();
+            // The median, since jumps of signs are rare but large.
             let mut sizes: Vec<f64> = slope.iter().map(|x| x.abs()).collect();
             sizes.sort_by(f64::total_cmp);
-            let bound = JUMPED * sizes.get(sizes.len() / 2).copied().unwrap_or(0.0);
+            let bound = SLOPE_JUMP_MEDIANS * sizes.get(sizes.len() / 2).copied().unwrap_or(0.0);
             for x in slope.iter_mut().filter(|x| x.abs() > bound) {
                 *x = 0.0;
             }
             slope
         });
-        slopes.push(Column::new(slope.collect()));
+        slopes.push(ForceColumn::new(slope.collect()));
     }
-    <[Column; 3]>::try_from(slopes).ok()
+    <[ForceColumn; 3]>::try_from(slopes).ok()
 }

@@ -1,282 +1,296 @@
-//! What a diagnosis found, as values: the verdict, what is missing with estimates and doubles, the model with what was
-//! found beside the model as it is, and where errors live. Text, JSON and the page print them.
+//! Findings of a diagnosis as values: verdict, missing effects with estimates and alternatives, the model without and
+//! with the effects found, and regions where the error is largest. Text, JSON and the page print them.
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{CommandName, Message, OptionName, Remedy};
-use modelmill_identify::diagnose::{Diagnosis, Effect, EffectParameter, FoundEffect, Verdict};
-use modelmill_identify::{FitParameter, Note, Region, Status};
+use modelmill_identify::diagnose::{
+    DiagnosisVerdict, EffectParameter, IdentifiedEffect, LocatedEffect, ModelDiagnosis,
+};
+use modelmill_identify::{ErrorRegion, FitParameter, ParameterStatus, RecordingNote};
 use modelmill_spec::Mechanics;
 use modelmill_spec::edit::NewEffect;
 
 use crate::along;
-use crate::compare::{self, Places};
+use crate::compare::{self, ErrorLocations};
 use crate::error::{Error, Outcome};
 use crate::model::Model;
-use crate::recording::{Recording, stretches};
-use crate::runs::Difference;
-use crate::stretch::Stretch;
+use crate::recording::{PreparedRecording, segments};
+use crate::runs::RecordingDifference;
+use crate::segment::RecordingSegment;
 use crate::text::table::percent;
 
-use super::added::{self, Added};
-use super::chosen::Named;
+use super::added_effects::{self, CompletedModelFile};
 use super::faults;
-use super::laws::{self, Hypothesis};
-use super::long;
-use super::off_nominal::{OffNominal, off_nominal, turned};
-use super::problem::{self, Answer, Asked, Held};
-use super::versions::Version;
-use super::words::{self, Judged};
+use super::laws::{self, LawHypothesis};
+use super::long_recordings;
+use super::model_versions::ModelVersion;
+use super::off_nominal::{OffNominalParameter, off_nominal_parameters, reversed_sign_note};
+use super::problem::{self, DiagnosisQuery, DiagnosisSolution, FixedParameters};
+use super::requested_effects::NamedEffect;
+use super::thresholds::{DIFFERENCE_LEAST_GAIN, MOST_VALIDATION_ERROR};
+use super::words::{self, ValidationMethod};
 
-/// Fails where what is fitted to the recordings misses the forces of others by more than these are: nothing that is found in the
-/// fit holds then.
-fn foretells(answer: &Answer, judged: Judged) -> Outcome {
+/// Fails if the fitted model predicts validation data worse than a model without any force: findings of the fit
+/// are worthless then.
+fn check_prediction(answer: &DiagnosisSolution, judged: ValidationMethod) -> Outcome {
     let diagnosis = &answer.diagnosis;
-    let last = diagnosis.ladder.last();
-    let Some(last) = last.filter(|last| last.check > 1.0) else {
+    let last = diagnosis.steps.last();
+    let Some(last) = last.filter(|last| last.check > MOST_VALIDATION_ERROR) else {
         return Ok(());
     };
-    if words::is_to_be_cleared_up(diagnosis) {
+    if words::has_suspicion(diagnosis) {
         return Ok(());
     }
     Err(Error::input(message!(
-        "what is fitted to these recordings ({} of the forces is left there) misses the forces {} by {}, more than a model without \
-         any force would: nothing can be said of what is missing. Record longer to fit to, with all drives moving far and fast \
-         ({}), or hold the parameters of an earlier run ({})",
-        percent(Some(last.fit)),
-        judged.words(),
+        "the error {} is {} of the force ({} on the fitted data), more than that of a model without any force. So the fit is \
+         useless, and no effect can be found. Fit a longer recording in which all drives move far and fast ({}), or fix the \
+         parameters at those of an earlier fit ({})",
+        judged.phrase(),
         percent(Some(last.check)),
+        percent(Some(last.fit)),
         Remedy::command(CommandName::Excite),
         Remedy::option(OptionName::Parameters)
     )))
 }
 
-/// Recordings that differ leave so many times as much where that is not said.
-const NO_WORSE: f64 = 1.5;
-
-/// What is asked of a diagnosis; [`Question::default`] identifies what the model file leaves open.
+/// Options of a diagnosis. [`DiagnosisOptions::default`] estimates all base parameters whose values are not known, see
+/// [`Model::is_known`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Question {
-    /// Which parameters keep their nominal values.
-    pub held: Held,
-    /// Where base parameters come out off their nominal values, ask once more with all of them held: they may hide what is
-    /// missing.
-    pub again_with_nominal: bool,
+pub struct DiagnosisOptions {
+    /// Which base parameters are fixed at their nominal values; the others are estimated.
+    pub fixed: FixedParameters,
+    /// Whether to repeat the diagnosis with all base parameters fixed if some estimates differ from their nominal
+    /// values. Such estimates may hide a missing effect.
+    pub repeat_with_nominal: bool,
 }
 
-impl Default for Question {
+impl Default for DiagnosisOptions {
     fn default() -> Self {
         Self {
-            held: Held::Known,
-            again_with_nominal: true,
+            fixed: FixedParameters::Known,
+            repeat_with_nominal: true,
         }
     }
 }
 
-/// What a diagnosis found.
-pub struct Findings {
-    /// Verdict, ladder, candidates with the reason of their refusal, and what is left unexplained.
-    pub diagnosis: Diagnosis,
-    /// What is missing, with what is known of it.
-    pub missing: Vec<Missing>,
-    /// Laws that no library holds and that would explain what nobody explains: hypotheses.
-    pub laws: Vec<Hypothesis>,
-    /// What the recordings leave open.
-    pub untold: Vec<Untold>,
-    /// Base parameters of the bodies that are not what the file says, the farthest first.
-    pub off_nominal: Vec<OffNominal>,
-    /// The same question with all parameters held at their nominal values, where some are off and it was asked for.
-    pub with_nominal: Option<WithNominal>,
-    /// Where the error sits that matters: what is left unexplained, or that of the model as it is.
-    pub regions: Vec<Region>,
-    /// The model as it is, along all recordings.
-    pub before: Version,
-    /// The model with what was found, or why there is none; the reason is empty where nothing was found.
-    pub after: Result<Version, Message>,
-    /// What was found, as entries of a model file.
+/// The findings of a diagnosis, which [`Model::diagnose`] returns.
+pub struct DiagnosisFindings {
+    /// Verdict, error after each step of the search, all candidates with the reasons why they were rejected, and the
+    /// residual.
+    pub diagnosis: ModelDiagnosis,
+    /// The effects found: those that the model lacks.
+    pub missing: Vec<MissingEffect>,
+    /// Hypotheses: force laws that are in no library and would explain the residual.
+    pub laws: Vec<LawHypothesis>,
+    /// Effects that the recordings can neither show nor exclude.
+    pub undecided: Vec<UndecidedEffect>,
+    /// Base parameters of the bodies whose estimates differ from the file, sorted by the difference between
+    /// estimate and nominal value in standard deviations of the estimate, largest first.
+    pub off_nominal: Vec<OffNominalParameter>,
+    /// The second diagnosis, with all base parameters fixed at their nominal values. `None` if it was not requested,
+    /// was not needed because no estimate differs, or the first one has fixed them all already.
+    pub with_nominal: Option<NominalDiagnosis>,
+    /// Ranges of a coordinate, rate, load or time for the report. If the verdict is [`DiagnosisVerdict::Unexplained`],
+    /// those of the residual of the unexplained drives; otherwise those of `places`.
+    pub regions: Vec<ErrorRegion>,
+    /// The given model, without added effects, along all recordings.
+    pub before: ModelVersion,
+    /// The model with the effects found, or the reason why there is none. The reason is empty if there is no effect to
+    /// add.
+    pub after: Result<ModelVersion, Message>,
+    /// The effects found, as entries of a model file. Effects that a model file cannot contain have no entry.
     pub entries: Vec<NewEffect>,
-    /// The model file with them.
-    pub edited: Option<Added>,
-    /// Where the error of the model as it is lives.
-    pub places: Places,
-    /// Where what is left in the end lives.
-    pub left: Option<Places>,
-    /// Where errors are judged.
-    pub judged: Judged,
-    /// Remarks on the recordings.
-    pub notes: Vec<Note>,
-    /// What was asked and with which columns.
-    pub(crate) answer: Answer,
-    /// Variables on which errors may depend, along the recordings that are judged.
+    /// The model file with these entries; `None` if there are none or they cannot be added.
+    pub edited: Option<CompletedModelFile>,
+    /// Ranges of a variable that contain more than their share of the squared error of the given model.
+    pub places: ErrorLocations,
+    /// The same for the model with the effects found; `None` if there is no such model.
+    pub residual_locations: Option<ErrorLocations>,
+    /// The data on which errors are evaluated: validation runs, or cross-validation.
+    pub validation: ValidationMethod,
+    /// Notes on the model, on the recordings, and on estimates with an impossible sign.
+    pub notes: Vec<RecordingNote>,
+    /// The search problem and its solution, without the columns.
+    pub(crate) answer: DiagnosisSolution,
+    /// Variables on which errors may depend, along the recordings on which errors are evaluated.
     pub(crate) variables: Vec<(String, Vec<f64>)>,
 }
 
-/// An effect that is missing.
+/// An effect that the model lacks.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Missing {
-    /// Its kind and places.
-    pub effect: Effect,
-    /// Its parameters and constants.
-    pub estimates: Vec<Estimate>,
-    /// How likely it is that it is there, between 0 and 1.
+pub struct MissingEffect {
+    /// Its kind, and the elements of the mechanism (such as drives, coordinates and points) on which it acts.
+    pub effect: LocatedEffect,
+    /// Estimates of its parameters and constants.
+    pub estimates: Vec<EffectEstimate>,
+    /// Probability that the effect is present, between 0 and 1.
     pub probability: f64,
-    /// What the recordings cannot tell it from.
-    pub indistinguishable_from: Vec<Effect>,
-    /// Which experiment tells it from these, as the library says.
-    pub separate_by: Option<String>,
-    /// The motion that would tell it from these, if one can be sought.
-    pub separation: Option<Separation>,
+    /// Its alternatives: effects that explain the recordings equally well.
+    pub indistinguishable_from: Vec<LocatedEffect>,
+    /// Experiment that distinguishes it from these, as described in the effect library. `None` if there are no
+    /// alternatives, or the library describes no experiment.
+    pub separating_experiment: Option<String>,
+    /// Request for a motion that distinguishes it from these, for [`Model::excite`]. `None` if there are no
+    /// alternatives, or no motion can be planned.
+    pub separation: Option<SeparationProposal>,
 }
 
-/// An effect that the recordings leave open.
+/// An effect that the recordings can neither show nor exclude.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Untold {
-    /// Its kind and places.
-    pub effect: Effect,
-    /// Why they do.
-    pub says: String,
-    /// Which experiment would tell.
-    pub separate_by: String,
+pub struct UndecidedEffect {
+    /// Its kind, and the elements of the mechanism (such as drives, coordinates and points) on which it acts.
+    pub effect: LocatedEffect,
+    /// The reason, as a sentence without capital letter and full stop.
+    pub reason: String,
+    /// Experiment that would show whether the effect is present.
+    pub separating_experiment: String,
 }
 
-/// Effects between which a motion is to decide.
+/// Request for a motion that distinguishes an effect from its alternatives.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Separation {
-    /// The effect that was found, with its values.
-    pub effect: Named,
-    /// What it may be taken for.
-    pub rivals: Vec<Effect>,
-    /// What is there in either case, with its constants.
-    pub beside: Vec<Named>,
-    /// Noise of the forces, if it is known.
+pub struct SeparationProposal {
+    /// The effect found, with the values of its parameters and constants.
+    pub effect: NamedEffect,
+    /// Its alternatives: effects that explain the recordings equally well.
+    pub rivals: Vec<LocatedEffect>,
+    /// The other effects found, which are assumed to be present whether this effect or one of its rivals is the true
+    /// one, with their constants.
+    pub common_effects: Vec<NamedEffect>,
+    /// Noise of the forces, rms over the drives, N or N m; `None` if it is zero or unknown.
     pub noise: Option<f64>,
 }
 
-/// An estimate of a found effect.
+/// The estimate of a parameter or constant of an effect.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Estimate {
+pub struct EffectEstimate {
     /// Symbol of the parameter or constant.
     pub name: String,
     /// Its value.
     pub value: f64,
-    /// Standard deviation, where identification has the parameter by itself.
+    /// Standard deviation. `None` for a constant, and for a parameter that is identifiable only in combination with
+    /// others, not individually.
     pub std: Option<f64>,
-    /// Unit of the value.
+    /// SI unit of the value.
     pub unit: String,
 }
 
-/// A diagnosis with all parameters held at their nominal values.
-pub struct WithNominal {
-    /// Verdict, ladder and candidates.
-    pub diagnosis: Diagnosis,
-    /// What is missing then.
-    pub missing: Vec<(Effect, Vec<Estimate>)>,
+/// A diagnosis with all base parameters fixed at their nominal values.
+pub struct NominalDiagnosis {
+    /// Verdict, error after each step of the search, all candidates, and the residual.
+    pub diagnosis: ModelDiagnosis,
+    /// The effects found, with their estimates.
+    pub missing: Vec<(LocatedEffect, Vec<EffectEstimate>)>,
 }
 
-impl Findings {
-    /// The entries that are worth adding: none while the recording or the model is in doubt.
-    pub fn to_add(&self) -> &[NewEffect] {
-        if words::is_to_be_cleared_up(&self.diagnosis) {
+impl DiagnosisFindings {
+    /// The entries that should be added: none if a suspected fault (exchanged columns, wrong sign, wrong units, wrong
+    /// direction of gravity) could be the cause of the findings.
+    pub fn entries_to_add(&self) -> &[NewEffect] {
+        if words::has_suspicion(&self.diagnosis) {
             &[]
         } else {
             &self.entries
         }
     }
 
-    /// What is to be done where nothing, or not all, is to be added to the model file.
-    pub(crate) fn beside_the_file(&self) -> Option<&'static str> {
+    /// Advice if not all effects can be added to the model file: because of a suspected fault, or of a delayed force
+    /// signal.
+    pub(crate) fn further_action(&self) -> Option<&'static str> {
         if self.missing.is_empty() {
             return None;
         }
-        if words::is_to_be_cleared_up(&self.diagnosis) {
-            return Some(
-                "First clear up what the verdict begins with: effects may only make up for it.",
-            );
+        if words::has_suspicion(&self.diagnosis) {
+            return Some("First check the fault that the verdict starts with: the effects may only compensate it.");
         }
-        let is_late = |found: &Missing| {
+        let is_late = |found: &MissingEffect| {
             let is_its = |entry: &NewEffect| entry.kind == found.effect.kind;
-            ["time_delay", "force_lag"].contains(&found.effect.kind.as_str())
-                && !self.entries.iter().any(is_its)
+            ["time_delay", "force_lag"].contains(&found.effect.kind.as_str()) && !self.entries.iter().any(is_its)
         };
-        self.missing.iter().any(is_late).then_some(
-            "A force that is read late is mended where it is read: a model file has nothing for it.",
-        )
+        self.missing
+            .iter()
+            .any(is_late)
+            .then_some("Correct the delayed force signal where it is recorded: a model file has no entry for it.")
     }
 }
 
 impl Model {
-    /// Finds which physical effect the model lacks: `fit` is what parameters are fitted to, errors are judged on `check`, or
-    /// by cross-validation if there is none.
+    /// Finds the physical effects that the model lacks. Parameters are fitted to the recordings `fit`. Errors are
+    /// evaluated on the validation runs `check`, or by cross-validation if there are none. `question` are the options.
     ///
-    /// Fails when a recording is too short, holds no force, or leads where the mechanism cannot stand.
+    /// Fails if a recording is too short, has no forces, or contains positions at which the loops of the mechanism
+    /// cannot close, and if the fitted model predicts the forces worse than a model without any force.
     pub fn diagnose(
         &self,
-        fit: &[&Recording],
-        check: &[&Recording],
-        question: &Question,
-    ) -> Outcome<Findings> {
-        let fewer = |all: &[&Recording]| -> Outcome<Vec<Recording>> {
+        fit: &[&PreparedRecording],
+        check: &[&PreparedRecording],
+        question: &DiagnosisOptions,
+    ) -> Outcome<DiagnosisFindings> {
+        // Long recordings are decimated first, to save memory and time.
+        let fewer = |all: &[&PreparedRecording]| -> Outcome<Vec<PreparedRecording>> {
             all.iter().map(|one| one.for_diagnosis(self)).collect()
         };
         let [fewer_fit, fewer_check] = [fewer(fit)?, fewer(check)?];
-        let [of_fit, of_check] =
-            [&fewer_fit, &fewer_check].map(|all| all.iter().collect::<Vec<&Recording>>());
-        let data = stretches(self, &of_fit, &of_check);
-        let held = question.held;
-        let recordings: Vec<&Recording> = of_fit.into_iter().chain(of_check).collect();
-        let between =
-            (self.host()).watched("holding the recordings against each other", 0, |_| {
-                faults::between_runs(self, &recordings)
-            })?;
-        let find = |between: &[Difference]| {
-            let asked = Asked {
-                held,
+        let [of_fit, of_check] = [&fewer_fit, &fewer_check].map(|all| all.iter().collect::<Vec<&PreparedRecording>>());
+        let data = segments(self, &of_fit, &of_check);
+        let held = question.fixed;
+        let recordings: Vec<&PreparedRecording> = of_fit.into_iter().chain(of_check).collect();
+        // Differences between recordings are found first, since they would look like effects.
+        let between = (self.host()).run_job("comparing the recordings with each other", 0, |_| {
+            faults::run_differences(self, &recordings)
+        })?;
+        let find = |between: &[RecordingDifference]| {
+            let asked = DiagnosisQuery {
+                fixed: held,
                 in_full: true,
-                between,
+                run_differences: between,
             };
-            problem::find(self, &data[0], &data[1], asked)
+            problem::find_missing_effects(self, &data[0], &data[1], asked)
         };
+        // The search with differences between recordings; it is repeated without them if there are any.
         let mut answer = find(&between)?;
         let mut between = between;
         if !between.is_empty() {
-            // What the model lacks may look as if the recordings differed.
+            // A missing effect may look like a difference between recordings.
             let without = find(&[])?;
-            if without.left() < NO_WORSE * answer.left() {
+            if without.mean_square_residual() < DIFFERENCE_LEAST_GAIN * answer.mean_square_residual() {
                 answer = without;
                 between.clear();
             }
         }
         let judged = if data[1].is_empty() {
-            Judged::CrossValidation
+            ValidationMethod::CrossValidation
         } else {
-            Judged::Check
+            ValidationMethod::Check
         };
-        if held == Held::Known {
-            foretells(&answer, judged)?;
+        if held == FixedParameters::Known {
+            check_prediction(&answer, judged)?;
         }
-        let notes = data.iter().flatten().flat_map(Stretch::notes);
+        let notes = data.iter().flatten().flat_map(RecordingSegment::notes);
         let notes = self.caution().into_iter().chain(notes.cloned()).collect();
-        let entries = added::entries(self, &answer);
+        // The model file with the effects, and that model identified from the same recordings.
+        let entries = added_effects::entries(self, &answer);
         let (edited, after) = if entries.is_empty() {
             (None, Err(Message::new()))
         } else {
-            match added::add(self, &entries) {
+            match added_effects::add_entries(self, &entries) {
                 Ok(edited) => {
-                    let after = with_effects(self, &edited, [fit, check], &data, held);
+                    let after = version_with_effects(self, &edited, [fit, check], &data, held);
                     (Some(edited), after.map_err(|error| error.message()))
                 }
                 Err(error) => (None, Err(error.message())),
             }
         };
         let [fit_data, check_data] = data;
-        let before = Version::new(self.clone(), fit_data, check_data, held)?;
-        let places = places(&before)?;
-        let left = after.as_ref().ok().map(self::places).transpose()?;
+        // The given model, for comparison.
+        let before = ModelVersion::new(self.clone(), fit_data, check_data, held)?;
+        let places = judged_error_locations(&before)?;
+        let left = after.as_ref().ok().map(self::judged_error_locations).transpose()?;
         let variables = variables(&before)?;
-        let mut findings = Findings {
+        let mut findings = DiagnosisFindings {
             diagnosis: answer.diagnosis.clone(),
             missing: Vec::new(),
             laws: Vec::new(),
-            untold: Vec::new(),
+            undecided: Vec::new(),
             off_nominal: Vec::new(),
             with_nominal: None,
             regions: Vec::new(),
@@ -285,59 +299,78 @@ impl Model {
             entries,
             edited,
             places,
-            left,
-            judged,
+            residual_locations: left,
+            validation: judged,
             notes,
             answer,
             variables,
         };
-        findings.missing = missing(&findings);
+        // The parts of the findings that depend on others are filled in order.
+        findings.missing = missing_effects(&findings);
         findings.laws = laws::hypotheses(&findings.before.model, &findings.diagnosis);
-        findings.untold = untold(&findings);
-        findings.off_nominal = off_nominal(findings.last());
-        if let Some(note) = turned(findings.last(), &findings.off_nominal) {
+        findings.undecided = undecided_effects(&findings);
+        findings.off_nominal = off_nominal_parameters(findings.final_version());
+        if let Some(note) = reversed_sign_note(findings.final_version(), &findings.off_nominal) {
             self.host().note(&note);
             findings.notes.push(note);
         }
         findings.regions = regions(&findings);
-        if question.again_with_nominal && held != Held::All && !findings.off_nominal.is_empty() {
-            findings.with_nominal = Some(with_nominal(&findings, &between)?);
+        if question.repeat_with_nominal && held != FixedParameters::All && !findings.off_nominal.is_empty() {
+            findings.with_nominal = Some(nominal_diagnosis(&findings, &between)?);
         }
         Ok(findings)
     }
 }
 
-impl Findings {
-    /// The model with what was found, or as it is.
-    pub fn last(&self) -> &Version {
+impl DiagnosisFindings {
+    /// The model with the effects found, or the given model if there is none.
+    pub fn final_version(&self) -> &ModelVersion {
         self.after.as_ref().unwrap_or(&self.before)
     }
 
-    /// Names of the drives, in the order of the channels.
+    /// The experiment that decides whether effects of a kind are present at some places: the text of the
+    /// library, and the motion to record.
+    pub(crate) fn deciding_experiment(&self, kind: &str, places: &str) -> String {
+        let mut kinds = self.answer.candidates.kinds.iter();
+        let known = kinds.find(|one| one.name == kind);
+        // The text of the library comes first, if it has one.
+        let known = known.map_or("", |one| one.doubles.as_str());
+        let motion = format!(
+            "To decide, record a motion over more of the travel of {places}, at other speeds and with another load."
+        );
+        format!("{known} {motion}").trim().to_owned()
+    }
+
+    /// Names of the drives, in the order of the indices used in `diagnosis`. A channel is the force of one drive.
     pub fn channels(&self) -> &[String] {
         &self.answer.problem.layout.channels
     }
 }
 
-fn with_effects(
+/// The model with the effects, identified. If a delay changed, recordings are prepared again, since forces then
+/// belong to earlier states.
+///
+/// Fails when the derivation of the model with the effects fails, or when it is cancelled.
+fn version_with_effects(
     model: &Model,
-    edited: &Added,
-    recordings: [&[&Recording]; 2],
-    before: &[Vec<Stretch>; 2],
-    held: Held,
-) -> Outcome<Version> {
+    edited: &CompletedModelFile,
+    recordings: [&[&PreparedRecording]; 2],
+    before: &[Vec<RecordingSegment>; 2],
+    held: FixedParameters,
+) -> Outcome<ModelVersion> {
     let delay = model.derivation.mechanism.force_delay;
     let model = (model.host())
         .derive(&model.path, edited.loaded.clone())?
         .with_values_of(model);
+    // Without a new delay the prepared segments are used again.
     let is_later = model.derivation.mechanism.force_delay.to_bits() != delay.to_bits();
     let [fit, check] = if is_later {
         // With a delay forces belong to earlier states.
-        let again = |recordings: &[&Recording]| -> Outcome<Vec<Stretch>> {
+        let again = |recordings: &[&PreparedRecording]| -> Outcome<Vec<RecordingSegment>> {
             let mut all = Vec::new();
             for one in recordings {
-                for stretch in one.prepared_for(&model)? {
-                    all.push(long::thinned(&model, &stretch)?);
+                for stretch in one.prepare_for(&model)? {
+                    all.push(long_recordings::thin_out(&model, &stretch)?);
                 }
             }
             Ok(all)
@@ -347,71 +380,68 @@ fn with_effects(
         before.clone()
     };
     let host = model.host().clone();
-    host.watched("identifying with what was found", 0, |_| {
-        Version::new(model, fit, check, held)
+    host.run_job("identifying with the effects found", 0, |_| {
+        ModelVersion::new(model, fit, check, held)
     })?
 }
 
-/// The same question with all parameters held at their nominal values.
-fn with_nominal(findings: &Findings, between: &[Difference]) -> Outcome<WithNominal> {
+/// The diagnosis with all parameters fixed at their nominal values.
+///
+/// Fails when it is cancelled.
+fn nominal_diagnosis(findings: &DiagnosisFindings, between: &[RecordingDifference]) -> Outcome<NominalDiagnosis> {
     let version = &findings.before;
-    let of = |is_check: bool| -> Vec<Stretch> {
+    // The diagnosis uses the same split into fitted and validation runs.
+    let of = |is_check: bool| -> Vec<RecordingSegment> {
         let runs = version.data.iter().zip(&version.runs);
         let wanted = runs.filter(|(_, run)| run.is_check == is_check);
         wanted.map(|(data, _)| data.clone()).collect()
     };
-    let asked = Asked {
-        held: Held::All,
+    let asked = DiagnosisQuery {
+        fixed: FixedParameters::All,
         in_full: false,
-        between,
+        run_differences: between,
     };
-    let answer = problem::find(&version.model, &of(false), &of(true), asked)?;
+    let answer = problem::find_missing_effects(&version.model, &of(false), &of(true), asked)?;
     let missing = answer.diagnosis.effects.iter().map(|found| {
         let parameters = &answer.problem.candidates[found.candidate].parameters;
-        (found.effect.clone(), of_search(parameters, found))
+        (found.effect.clone(), search_estimates(parameters, found))
     });
-    Ok(WithNominal {
+    Ok(NominalDiagnosis {
         missing: missing.collect(),
         diagnosis: answer.diagnosis,
     })
 }
 
-fn missing(findings: &Findings) -> Vec<Missing> {
+/// Missing effects with estimates, alternatives and the experiment that separates them.
+fn missing_effects(findings: &DiagnosisFindings) -> Vec<MissingEffect> {
     let found = findings.diagnosis.effects.iter();
     found
-        .map(|found| Missing {
+        .map(|found| MissingEffect {
             effect: found.effect.clone(),
             estimates: estimates(findings, found),
             probability: found.probability,
             indistinguishable_from: found.indistinguishable_from.clone(),
-            separate_by: separate_by(findings, found),
+            separating_experiment: separating_experiment(findings, found),
             separation: separation(findings, found),
         })
         .collect()
 }
 
-fn untold(findings: &Findings) -> Vec<Untold> {
-    let of = |effect: &Effect| {
-        let mut kinds = findings.answer.candidates.kinds.iter();
-        let kind = kinds.find(|kind| kind.name == effect.kind);
-        let place = effect.at.join(" and ");
-        let known = kind.map_or("", |kind| kind.doubles.as_str());
-        let more = format!(
-            "A motion over more of the travel of {place}, at other speeds and with another load, tells it from what the model has."
-        );
-        Untold {
-            effect: effect.clone(),
-            says: "along these motions its force is all but a combination of forces that the model has, so that even one as large \
-                   as the drive's own is neither seen nor excluded"
+/// Effects that the recordings can neither show nor exclude, with the reason and the experiment that would decide.
+fn undecided_effects(findings: &DiagnosisFindings) -> Vec<UndecidedEffect> {
+    let of = |effect: &LocatedEffect| UndecidedEffect {
+        effect: effect.clone(),
+        reason:
+            "along these motions its force is almost a combination of forces that the model has, so even an effect as \
+                   large as the force of the drive can be neither shown nor excluded"
                 .to_owned(),
-            separate_by: format!("{known} {more}").trim().to_owned(),
-        }
+        separating_experiment: findings.deciding_experiment(&effect.kind, &effect.at.join(" and ")),
     };
-    findings.diagnosis.untold.iter().map(of).collect()
+    findings.diagnosis.undetermined_effects.iter().map(of).collect()
 }
 
 /// Unit of a constant of a found effect at its places.
-fn unit_of_constant(findings: &Findings, found: &FoundEffect, name: &str) -> String {
+fn unit_of_constant(findings: &DiagnosisFindings, found: &IdentifiedEffect, name: &str) -> String {
     let candidates = &findings.answer.candidates;
     let kind = (candidates.kinds.iter()).find(|kind| kind.name == found.effect.kind);
     let constant = kind.and_then(|kind| kind.constants.iter().find(|one| one.symbol == name));
@@ -424,10 +454,10 @@ fn unit_of_constant(findings: &Findings, found: &FoundEffect, name: &str) -> Str
     units.map_or_else(String::new, |(_, unit)| unit.clone())
 }
 
-/// Estimates as the search has them.
-fn of_search(parameters: &[EffectParameter], found: &FoundEffect) -> Vec<Estimate> {
-    let values = found.estimates.iter().zip(&found.deviations);
-    let of = |(p, (value, std)): (&EffectParameter, (&f64, &Option<f64>))| Estimate {
+/// Estimates of the search.
+fn search_estimates(parameters: &[EffectParameter], found: &IdentifiedEffect) -> Vec<EffectEstimate> {
+    let values = found.estimates.iter().zip(&found.standard_deviations);
+    let of = |(p, (value, std)): (&EffectParameter, (&f64, &Option<f64>))| EffectEstimate {
         name: p.symbol.clone(),
         value: *value,
         std: *std,
@@ -436,34 +466,31 @@ fn of_search(parameters: &[EffectParameter], found: &FoundEffect) -> Vec<Estimat
     parameters.iter().zip(values).map(of).collect()
 }
 
-/// Estimates of an effect with their deviations, from identification with everything that was found; where the model with
-/// the effects cannot say them apart, those of the search.
-fn estimates(findings: &Findings, found: &FoundEffect) -> Vec<Estimate> {
+/// Estimates of an effect with standard deviations, from identification with all effects found. If the model
+/// with the effects cannot separate them, those of the search.
+fn estimates(findings: &DiagnosisFindings, found: &IdentifiedEffect) -> Vec<EffectEstimate> {
     let parameters = &findings.answer.problem.candidates[found.candidate].parameters;
-    let mut all = of_search(parameters, found);
-    all.extend(found.constants.iter().map(|(name, value)| Estimate {
+    let mut all = search_estimates(parameters, found);
+    // Constants have no standard deviation, since they were found by a search.
+    all.extend(found.constants.iter().map(|(name, value)| EffectEstimate {
         name: name.clone(),
         value: *value,
         std: None,
         unit: unit_of_constant(findings, found, name),
     }));
-    let is_its =
-        |entry: &&NewEffect| entry.kind == found.effect.kind && entry.at == found.effect.at;
+    let is_its = |entry: &&NewEffect| entry.kind == found.effect.kind && entry.at == found.effect.at;
     if let Some(entry) = findings.entries.iter().find(is_its) {
         for estimate in &mut all {
-            // What is held at zero, since its sign would make no sense, stays there.
+            // A value that was fixed at zero, since it would have the wrong sign, stays zero.
             if estimate.value == 0.0 {
                 continue;
             }
-            if let Some(p) = identified(findings, entry, &estimate.name) {
+            if let Some(p) = identified_parameter(findings, entry, &estimate.name) {
                 estimate.value = p.value;
                 estimate.std = p.std;
             } else if let Some((_, constant)) = estimate.name.clone().split_once('*') {
-                // A product of a parameter and a constant is told as the constant.
-                let known = entry
-                    .constants
-                    .iter()
-                    .find(|(symbol, _)| symbol == constant);
+                // A product of a parameter and a constant is reported as the constant.
+                let known = entry.constants.iter().find(|(symbol, _)| symbol == constant);
                 if let Some((_, value)) = known {
                     estimate.value = *value;
                     constant.clone_into(&mut estimate.name);
@@ -475,8 +502,8 @@ fn estimates(findings: &Findings, found: &FoundEffect) -> Vec<Estimate> {
 }
 
 /// The identified parameter of an added effect, if the model with the effects has it by itself.
-fn identified<'a>(
-    findings: &'a Findings,
+fn identified_parameter<'a>(
+    findings: &'a DiagnosisFindings,
     entry: &NewEffect,
     symbol: &str,
 ) -> Option<&'a FitParameter> {
@@ -485,25 +512,23 @@ fn identified<'a>(
     let derivation = &after.model.derivation;
     let mechanism = &derivation.mechanism;
     let place = findings.entries.iter().position(|one| one == entry)?;
-    let first = mechanism
-        .effects
-        .len()
-        .checked_sub(findings.entries.len())?;
+    // Added effects are the last ones of the edited model.
+    let first = mechanism.effects.len().checked_sub(findings.entries.len())?;
     let effect = mechanism.effects.get(first + place)?;
-    let term = (effect.kind == entry.kind)
-        .then(|| effect.terms.iter().find(|term| term.symbol == symbol))??;
+    let term = (effect.kind == entry.kind).then(|| effect.terms.iter().find(|term| term.symbol == symbol))??;
     let reduction = &derivation.reduction;
+    // A parameter is determined by itself if its product is retained alone.
     let k = reduction
         .retained
         .iter()
         .position(|k| reduction.products[*k].0 == [(term.parameter.0, 1)])?;
     fit.parameters
         .get(k)
-        .filter(|p| p.status == Status::Identified)
+        .filter(|p| p.status == ParameterStatus::Identified)
 }
 
-/// Which experiment tells an effect from its doubles, as the library says.
-fn separate_by(findings: &Findings, found: &FoundEffect) -> Option<String> {
+/// Experiment that distinguishes an effect from its alternatives, by the text of the library.
+fn separating_experiment(findings: &DiagnosisFindings, found: &IdentifiedEffect) -> Option<String> {
     if found.indistinguishable_from.is_empty() {
         return None;
     }
@@ -512,17 +537,18 @@ fn separate_by(findings: &Findings, found: &FoundEffect) -> Option<String> {
     (!kind.doubles.is_empty()).then(|| kind.doubles.clone())
 }
 
-/// What a motion would have to decide. What only moves forces in time has no force of its own to be made large.
-fn separation(findings: &Findings, found: &FoundEffect) -> Option<Separation> {
-    let is_force = |effect: &&Effect| {
+/// The request for a motion that distinguishes an effect from its alternatives; `None` for a delay, which adds
+/// no force that a motion could make larger.
+fn separation(findings: &DiagnosisFindings, found: &IdentifiedEffect) -> Option<SeparationProposal> {
+    let is_force = |effect: &&LocatedEffect| {
         let kinds = findings.answer.candidates.kinds.iter();
         let mut kind = kinds.filter(|kind| kind.name == effect.kind);
-        // What no library holds has no columns along another motion.
-        kind.next()
-            .is_some_and(|kind| kind.mechanics != Some(Mechanics::Delay))
+        // A kind that is in no library has no columns along another motion.
+        kind.next().is_some_and(|kind| kind.mechanics != Some(Mechanics::Delay))
     };
+    // Alternatives without columns along other motions cannot be separated by planning.
     let rivals = found.indistinguishable_from.iter().filter(is_force);
-    let rivals: Vec<Effect> = rivals.cloned().collect();
+    let rivals: Vec<LocatedEffect> = rivals.cloned().collect();
     if rivals.is_empty() || !is_force(&&found.effect) {
         return None;
     }
@@ -531,16 +557,17 @@ fn separation(findings: &Findings, found: &FoundEffect) -> Option<Separation> {
     let others = findings.diagnosis.effects.iter();
     let others = others.filter(|other| other.effect != found.effect && is_force(&&other.effect));
     let noise = &findings.answer.problem.noise;
+    // One figure for all drives, since the planned motion has no noise of its own.
     let squares: f64 = noise.iter().map(|n| n * n).sum();
     let noise = (squares / noise.len().max(1) as f64).sqrt();
-    Some(Separation {
-        effect: Named {
+    Some(SeparationProposal {
+        effect: NamedEffect {
             effect: found.effect.clone(),
             values: values.map(|e| (e.name, e.value)).collect(),
         },
         rivals,
-        beside: others
-            .map(|other| Named {
+        common_effects: others
+            .map(|other| NamedEffect {
                 effect: other.effect.clone(),
                 values: other.constants.clone(),
             })
@@ -549,39 +576,41 @@ fn separation(findings: &Findings, found: &FoundEffect) -> Option<Separation> {
     })
 }
 
-/// Where the error sits that matters: what is left unexplained, or that of the model as it is.
-fn regions(findings: &Findings) -> Vec<Region> {
+/// Regions of the residual of the unexplained drives if the verdict is that it is unexplained, otherwise of the error
+/// of the given model.
+fn regions(findings: &DiagnosisFindings) -> Vec<ErrorRegion> {
     let diagnosis = &findings.answer.diagnosis;
-    if diagnosis.verdict != Verdict::Unexplained {
+    if diagnosis.verdict != DiagnosisVerdict::Unexplained {
         return findings.places.regions.clone();
     }
     let channels = &findings.answer.problem.layout.channels;
-    let left = findings.left.as_ref().unwrap_or(&findings.places);
+    let left = findings.residual_locations.as_ref().unwrap_or(&findings.places);
     let mut regions = Vec::new();
+    // Each unexplained drive has at least one region.
     for d in &diagnosis.unexplained {
         let of_channel = left.regions.iter().filter(|r| r.channel == channels[*d]);
         let before = regions.len();
         regions.extend(of_channel.cloned());
         if regions.len() == before {
-            regions.push(everywhere(findings, *d));
+            regions.push(overall_region(findings, *d));
         }
     }
     regions
 }
 
-/// A channel whose error sits nowhere in particular.
-fn everywhere(findings: &Findings, channel: usize) -> Region {
+/// The whole time as a region, for a drive whose residual is largest nowhere in particular.
+fn overall_region(findings: &DiagnosisFindings, channel: usize) -> ErrorRegion {
     let name = findings.answer.problem.layout.channels[channel].clone();
-    let version = findings.last();
-    let judged = version.judged();
+    let version = findings.final_version();
+    let judged = version.validation_runs();
     let times = judged.iter().flat_map(|k| &version.runs[*k].time);
     let range = times.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], t| {
         [low.min(*t), high.max(*t)]
     });
-    let again = 100.0 * findings.answer.diagnosis.reproducible[channel];
-    Region {
+    let again = 100.0 * findings.answer.diagnosis.repeatable_share[channel];
+    ErrorRegion {
         says: format!(
-            "what is left of {name} is spread over all of the time, and {again:.0} % of its square comes again with the state"
+            "the residual of {name} is spread over the whole time, and {again:.0} % of its square is repeatable"
         ),
         channel: name,
         variable: modelmill_identify::TIME_COLUMN.to_owned(),
@@ -591,28 +620,24 @@ fn everywhere(findings: &Findings, channel: usize) -> Region {
     }
 }
 
-/// Where the error of a model lives on the recordings that are judged.
-fn places(version: &Version) -> Outcome<Places> {
-    let judged = version.judged();
-    let (first, last) = (
-        judged.first().copied().unwrap_or(0),
-        judged.last().map_or(0, |k| k + 1),
-    );
+/// Regions of the error of a model, on the recordings on which errors are evaluated.
+fn judged_error_locations(version: &ModelVersion) -> Outcome<ErrorLocations> {
+    let judged = version.validation_runs();
+    let (first, last) = (judged.first().copied().unwrap_or(0), judged.last().map_or(0, |k| k + 1));
+    // Validation runs are contiguous, since fitted recordings come first.
     let runs = &version.runs[first..last];
     let measured: Vec<_> = runs.iter().map(|run| run.measured.clone()).collect();
     let forces: Vec<_> = runs.iter().map(|run| run.forces.clone()).collect();
-    compare::places(
-        &version.model,
-        &version.data[first..last],
-        &measured,
-        &forces,
-    )
+    compare::error_locations(&version.model, &version.data[first..last], &measured, &forces)
 }
 
-/// Variables along the recordings that are judged, one after the other.
-fn variables(version: &Version) -> Outcome<Vec<(String, Vec<f64>)>> {
+/// Variables along the recordings on which errors are evaluated, one after the other.
+///
+/// Fails when a pose has no solution.
+fn variables(version: &ModelVersion) -> Outcome<Vec<(String, Vec<f64>)>> {
     let mut joined: Vec<(String, Vec<f64>)> = Vec::new();
-    for k in version.judged() {
+    // All runs have the same variables.
+    for k in version.validation_runs() {
         let variables = along::variables(&version.model, &version.data[k])?;
         if joined.is_empty() {
             joined = variables;

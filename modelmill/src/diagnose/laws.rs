@@ -1,55 +1,62 @@
-//! Laws that no library holds, by the names of a model: where they may act, what they say as formulas over its coordinates, drives
-//! and loads, and the entry of a library by which `add` takes them.
+//! Laws for the residual that are in no library, with the names of a model: the places where they may act,
+//! their formulas over coordinates, drives and loads, and the entry of a library with which `add` can add them.
 
 use std::fmt::Write as _;
 
-use modelmill_codegen::Evaluator;
+use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
-    Column, Diagnosis, Effect, Factor, Law as Proposed, Product, Proposal, Shape, Site, Term,
-    Variable,
+    ForceColumn, LawFactor, LawProduct, LawProposal, LawShape, LawSite, LawTerm, LawVariable, LocatedEffect,
+    ModelDiagnosis, SiteLaw as Proposed,
 };
 use modelmill_spec::edit::{NewEffect, NewParameter};
-use modelmill_spec::{ActsOn, Carries, DriveKind, Place};
+use modelmill_spec::{ActsOn, DriveKind, EffectPlace, PlaceLoad};
 
 use crate::along;
 use crate::error::Outcome;
 use crate::model::Model;
-use crate::regressors::Runs;
-use crate::stretch::Stretch;
+use crate::regressors::SegmentList;
+use crate::segment::RecordingSegment;
 
-use super::added::rounded;
-use super::candidates::Candidates;
+use super::added_effects::round_significant;
+use super::candidates::DerivedCandidates;
 use super::columns::unit_forces;
-use super::findings::Estimate;
-use super::places::{Spot, spots};
+use super::findings::EffectEstimate;
+use super::places::{CandidatePlace, candidate_places};
 
 /// Places on which laws may act, along all recordings: drives, and joints without a drive of their own.
-pub(crate) fn sites(candidates: &Candidates, model: &Model, all: &Runs<'_>) -> Outcome<Vec<Site>> {
+///
+/// Fails when a pose has no solution.
+pub(crate) fn sites(candidates: &DerivedCandidates, model: &Model, all: &SegmentList<'_>) -> Outcome<Vec<LawSite>> {
+    // The file's mechanism, since places have its names.
     let mechanism = &model.loaded.mechanism;
     let forces = unit_forces(candidates, model, all)?;
-    let mut sites: Vec<Site> = Vec::new();
+    let mut sites: Vec<LawSite> = Vec::new();
     let mut places = Vec::new();
-    for spot in spots(mechanism) {
+    for spot in candidate_places(mechanism) {
         if !matches!(spot.sort, ActsOn::Drive | ActsOn::Coordinate) {
             continue;
         }
+        // A place without a drive acts on the drives through the mechanism; its column comes from the derivation.
+        // A drive acts on itself alone.
         let (force, channel) = match (spot.place, forces.iter().find(|(at, _)| *at == spot)) {
-            (Place::Drive(d), _) => (on_drive(model, all, d.0), Some(d.0)),
+            (EffectPlace::Drive(d), _) => (drive_column(model, all, d.0), Some(d.0)),
             (_, Some((_, force))) => (force.clone(), None),
             (_, None) => continue,
         };
+        // A place without effect on any drive cannot be seen.
         if force.is_zero() {
             continue;
         }
-        sites.push(Site {
+        sites.push(LawSite {
             name: spot.name.clone(),
-            is_angle: spot.carries == Carries::Torque,
+            is_angle: spot.carries == PlaceLoad::Torque,
             channel,
-            force,
-            ..Site::default()
+            drive_forces: force,
+            ..LawSite::default()
         });
         places.push(spot);
     }
+    // Positions, rates and accelerations of the places, recording by recording.
     for (one, _) in all {
         let motions = motions(model, one, &places)?;
         for (site, [position, rate, acceleration]) in sites.iter_mut().zip(motions) {
@@ -62,38 +69,45 @@ pub(crate) fn sites(candidates: &Candidates, model: &Model, all: &Runs<'_>) -> O
 }
 
 /// A force of one along a drive.
-fn on_drive(model: &Model, all: &Runs<'_>, drive: usize) -> Column {
+fn drive_column(model: &Model, all: &SegmentList<'_>, drive: usize) -> ForceColumn {
+    // Samples after decimation, over all recordings.
     let samples = all.iter().map(|(one, _)| one.time().len()).sum();
-    let mut column = Column(vec![None; model.drives().len()]);
+    let mut column = ForceColumn(vec![None; model.drives().len()]);
     column.0[drive] = Some(vec![1.0; samples]);
     column
 }
 
 /// Position, rate and acceleration of places along a recording, of the samples that are kept.
-fn motions(model: &Model, one: &Stretch, places: &[Spot]) -> Outcome<Vec<[Vec<f64>; 3]>> {
-    let evaluator = Evaluator::new(&model.derivation);
+///
+/// Fails when a pose has no solution.
+fn motions(model: &Model, one: &RecordingSegment, places: &[CandidatePlace]) -> Outcome<Vec<[Vec<f64>; 3]>> {
+    let evaluator = ModelEvaluator::new(&model.derivation);
     let mechanism = &model.derivation.mechanism;
     let (active, passive) = model.derivation.coordinates();
-    let drives = along::columns(model, one, |states| evaluator.drives(states))?;
+    // Positions and rates of the drives, for linear ones.
+    let drives = along::columns(model, one, |states| evaluator.drive_motion(states))?;
     let of_passive = if passive.is_empty() {
         Vec::new()
     } else {
-        along::columns(model, one, |states| evaluator.passive(states))?
+        along::columns(model, one, |states| evaluator.passive_motion(states))?
     };
+    // Active coordinates are recorded, passive ones are computed.
     let of_coordinate = |i: usize| -> Option<[Vec<f64>; 3]> {
         let run = &one.run;
         if let Some(k) = active.iter().position(|a| *a == i) {
             return Some([run.q[k].clone(), run.qd[k].clone(), run.qdd[k].clone()]);
         }
         let k = passive.iter().position(|p| *p == i)?;
+        // Positions come first, then rates and accelerations.
         let n = passive.len();
         Some([k, n + k, 2 * n + k].map(|at| of_passive[at].clone()))
     };
     let kept = |values: Vec<f64>| values.into_iter().step_by(one.decimation()).collect();
-    let motion = |spot: &Spot| {
+    // The acceleration of a linear drive is the derivative of its rate.
+    let motion = |spot: &CandidatePlace| {
         let found = match spot.place {
-            Place::Coordinate(i) => of_coordinate(i.0),
-            Place::Drive(d) => match mechanism.drives[d.0].kind {
+            EffectPlace::Coordinate(i) => of_coordinate(i.0),
+            EffectPlace::Drive(d) => match mechanism.drives[d.0].kind {
                 DriveKind::Joint(i) => of_coordinate(i.0),
                 DriveKind::Linear { .. } => {
                     let rate = drives[mechanism.drives.len() + d.0].clone();
@@ -110,6 +124,7 @@ fn motions(model: &Model, one: &Stretch, places: &[Spot]) -> Outcome<Vec<[Vec<f6
 
 /// Central differences.
 fn slopes(values: &[f64], time: &[f64]) -> Vec<f64> {
+    // One-sided at both ends.
     let last = values.len().saturating_sub(1);
     let at = |i: usize| {
         let (a, b) = (i.saturating_sub(1), (i + 1).min(last));
@@ -123,73 +138,76 @@ fn slopes(values: &[f64], time: &[f64]) -> Vec<f64> {
     (0..values.len()).map(at).collect()
 }
 
-/// A law that would explain what nobody explains; a hypothesis.
+/// A law that would explain the residual; a hypothesis.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Law {
-    /// What it adds to the force of its place, over coordinates, rates (`_d`), lengths of drives (`_length`) and what drives carry
-    /// (by their names).
+pub struct ProposedLaw {
+    /// The force that it adds at its place, as a formula over coordinates, rates (`_d`), lengths of drives
+    /// (`_length`) and loads of drives (by the names of the drives).
     pub expression: String,
     /// The drive or coordinate on which it acts.
     pub at: String,
     /// Its parameters.
-    pub parameters: Vec<Estimate>,
-    /// Share of the squared error on the drives that feel it that it takes off where it was not fitted.
+    pub parameters: Vec<EffectEstimate>,
+    /// Share of the squared residual that it explains on data that were not fitted, on the drives on which it
+    /// has an effect.
     pub gain: f64,
-    /// Effects that were found and that it makes needless.
-    pub instead_of: Vec<Effect>,
-    /// How a model file takes it; `None` where the law remembers the way, which no formula says.
+    /// Effects found that become unnecessary with it.
+    pub instead_of: Vec<LocatedEffect>,
+    /// Its entry; `None` if the law depends on the earlier motion, which no formula can express.
     pub entry: Option<LawEntry>,
 }
 
-/// A law as a kind of effect of a library.
+/// A law as a kind of effect for a library.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LawEntry {
-    /// The table of the library.
+    /// The table of the library, as TOML.
     pub text: String,
-    /// The effect by which a model has it.
+    /// The effect that adds it to a model.
     pub effect: NewEffect,
 }
 
-/// A law with those that do as well.
+/// A law with others that explain the recordings equally well.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Hypothesis {
+pub struct LawHypothesis {
     /// The simplest.
-    pub law: Law,
+    pub law: ProposedLaw,
     /// Others, the best first.
-    pub near_ties: Vec<Law>,
+    pub near_ties: Vec<ProposedLaw>,
 }
 
-impl Law {
+impl ProposedLaw {
     /// The formula with its place.
-    pub fn says(&self) -> String {
+    pub fn label(&self) -> String {
         format!("{} at {}", self.expression, self.at)
     }
 }
 
 /// Laws that a diagnosis proposes, by the names of the model.
-pub(crate) fn hypotheses(model: &Model, diagnosis: &Diagnosis) -> Vec<Hypothesis> {
+pub(crate) fn hypotheses(model: &Model, diagnosis: &ModelDiagnosis) -> Vec<LawHypothesis> {
     let sites = &diagnosis.sites;
-    let one = |proposal: &Proposal| Hypothesis {
+    // Alternatives are named in the same way.
+    let one = |proposal: &LawProposal| LawHypothesis {
         law: law(model, sites, &proposal.law),
-        near_ties: (proposal.near_ties.iter())
-            .map(|tie| law(model, sites, tie))
-            .collect(),
+        near_ties: (proposal.near_ties.iter()).map(|tie| law(model, sites, tie)).collect(),
     };
     diagnosis.laws.iter().map(one).collect()
 }
 
-fn law(model: &Model, sites: &[Site], law: &Proposed) -> Law {
+/// A law of the search with the names of the model.
+fn law(model: &Model, sites: &[LawSite], law: &Proposed) -> ProposedLaw {
     let site = &sites[law.site];
-    let mut named = Formula::new(law);
+    // Parameters are numbered in the order of the terms.
+    let mut named = LawFormula::new(law);
     let expression = named.text(law, &|variable, other| {
-        name(model, &sites[other.unwrap_or(law.site)], variable)
+        variable_name(model, &sites[other.unwrap_or(law.site)], variable)
     });
     let mut parameters = Vec::new();
     let mut symbols = named.parameters.iter();
+    // One value for each parameter of the term.
     for term in &law.terms {
-        let values = term.values.iter().zip(&term.deviations);
+        let values = term.values.iter().zip(&term.standard_deviations);
         for ((value, deviation), symbol) in values.zip(symbols.by_ref()) {
-            parameters.push(Estimate {
+            parameters.push(EffectEstimate {
                 name: symbol.clone(),
                 value: *value,
                 std: deviation.is_finite().then_some(*deviation),
@@ -197,65 +215,68 @@ fn law(model: &Model, sites: &[Site], law: &Proposed) -> Law {
             });
         }
     }
-    Law {
+    // The entry uses rounded values, the hypothesis the exact ones.
+    ProposedLaw {
         expression,
         at: site.name.clone(),
-        entry: entry(sites, law, &parameters),
+        entry: library_entry(sites, law, &parameters),
         parameters,
         gain: law.gain,
-        instead_of: law.instead_of.clone(),
+        instead_of: law.replaced_effects.clone(),
     }
 }
 
 /// The name of a place's variable, as errors and recordings have it.
-fn name(model: &Model, site: &Site, variable: Variable) -> String {
-    let drive = site
-        .channel
-        .map(|d| &model.derivation.mechanism.drives[d].kind);
+fn variable_name(model: &Model, site: &LawSite, variable: LawVariable) -> String {
+    // A drive on a joint uses the name of the coordinate, a linear drive its own.
+    let drive = site.channel.map(|d| &model.derivation.mechanism.drives[d].kind);
+    // Other places use their own name.
     let base = match drive {
         Some(DriveKind::Joint(i)) => &model.derivation.mechanism.coordinates[i.0].name,
         _ => &site.name,
     };
     let is_linear = matches!(drive, Some(DriveKind::Linear { .. }));
     match variable {
-        Variable::Position | Variable::OtherPosition if is_linear => format!("{base}_length"),
-        Variable::Position | Variable::OtherPosition => base.clone(),
-        Variable::Rate | Variable::OtherRate => format!("{base}_d"),
-        Variable::Acceleration => format!("{base}_dd"),
-        Variable::Load => site.name.clone(),
+        LawVariable::Position | LawVariable::OtherPosition if is_linear => format!("{base}_length"),
+        LawVariable::Position | LawVariable::OtherPosition => base.clone(),
+        LawVariable::Rate | LawVariable::OtherRate => format!("{base}_d"),
+        LawVariable::Acceleration => format!("{base}_dd"),
+        LawVariable::Load => site.name.clone(),
     }
 }
 
 /// The words of a kind's expression.
-fn word(variable: Variable) -> &'static str {
+fn variable_word(variable: LawVariable) -> &'static str {
     match variable {
-        Variable::Position => "coordinate",
-        Variable::Rate => "rate",
-        Variable::Acceleration => "acceleration",
-        Variable::Load => "load",
-        Variable::OtherPosition => "other_coordinate",
-        Variable::OtherRate => "other_rate",
+        LawVariable::Position => "coordinate",
+        LawVariable::Rate => "rate",
+        LawVariable::Acceleration => "acceleration",
+        LawVariable::Load => "load",
+        LawVariable::OtherPosition => "other_coordinate",
+        LawVariable::OtherRate => "other_rate",
     }
 }
 
-/// The table of a library, and the effect that a model has by it.
-fn entry(sites: &[Site], law: &Proposed, parameters: &[Estimate]) -> Option<LawEntry> {
+/// The table of a library for a law, and the effect that adds it to a model; `None` for a law that depends on
+/// the earlier motion.
+fn library_entry(sites: &[LawSite], law: &Proposed, parameters: &[EffectEstimate]) -> Option<LawEntry> {
     let mut products = law.terms.iter().map(|term| &term.product);
-    if products.any(Product::remembers) {
+    // A law that depends on the earlier motion has no formula over the state.
+    if products.any(LawProduct::has_memory) {
         return None;
     }
+    // The kind is written as TOML, with the words of the library instead of names of the model.
     let site = &sites[law.site];
+    // A second place gives the words `other_coordinate` and `other_rate`.
     let other = law.terms.iter().find_map(|term| term.product.other);
     let other = other.map(|other| &sites[other]);
-    let mut formula = Formula::new(law);
+    let mut formula = LawFormula::new(law);
     formula.with_symbols = true;
-    let expression = formula.text(law, &|variable, _| word(variable).to_owned());
+    let expression = formula.text(law, &|variable, _| variable_word(variable).to_owned());
+    // The kind is named after its place, so that several laws can be in one library.
     let kind = format!("law_of_{}", site.name);
-    let on = if site.channel.is_some() {
-        "drive"
-    } else {
-        "coordinate"
-    };
+    let on = if site.channel.is_some() { "drive" } else { "coordinate" };
+    // Places on angles have torques.
     let carries = if site.is_angle { "torque" } else { "force" };
     let mut text = format!("[[effect_kind]]\nname = \"{kind}\"\non = \"{on}\"\n");
     if let Some(other) = other {
@@ -264,8 +285,9 @@ fn entry(sites: &[Site], law: &Proposed, parameters: &[Estimate]) -> Option<LawE
     }
     let _ = writeln!(
         text,
-        "expression = \"{expression}\"\nsays = \"A hypothesis that recordings suggest: no law of a machine until it is understood.\""
+        "expression = \"{expression}\"\nsays = \"A hypothesis that recordings suggest. It is no law of the machine until its cause is understood.\""
     );
+    // Units are those of the place: of a force or of a torque.
     text.push_str("[effect_kind.parameters]\n");
     for parameter in parameters {
         let _ = writeln!(
@@ -282,14 +304,16 @@ fn entry(sites: &[Site], law: &Proposed, parameters: &[Estimate]) -> Option<LawE
         let _ = writeln!(
             text,
             "{symbol} = {{ unit = {{ {carries} = \"{unit}\" }}, value = {} }}",
-            rounded(*value)
+            round_significant(*value)
         );
     }
-    let nominal = |p: &Estimate| NewParameter {
+    // Estimates become nominal values.
+    let nominal = |p: &EffectEstimate| NewParameter {
         symbol: p.name.clone(),
-        nominal: Some(rounded(p.value)),
+        nominal: Some(round_significant(p.value)),
         ..NewParameter::default()
     };
+    // The effect acts at the first place; the second one is an argument.
     let at = std::iter::once(site).chain(other);
     Some(LawEntry {
         text,
@@ -303,22 +327,23 @@ fn entry(sites: &[Site], law: &Proposed, parameters: &[Estimate]) -> Option<LawE
 }
 
 /// A law as a formula, with the symbols of its parameters and constants.
-struct Formula {
+struct LawFormula {
+    /// Symbols of the parameters.
     parameters: Vec<String>,
-    constants: Vec<(String, f64, Factor)>,
+    /// Symbols of the constants with their values and the factors in which they stand.
+    constants: Vec<(String, f64, LawFactor)>,
     /// Whether constants stand as symbols rather than as numbers.
     with_symbols: bool,
 }
 
-impl Formula {
+impl LawFormula {
+    /// Symbols of the parameters: `k` for a term, `ks` and `kc` for sine and cosine, numbered if there are
+    /// several terms.
     fn new(law: &Proposed) -> Self {
+        // A single term needs no number.
         let several = law.terms.len() > 1;
-        let of_term = |(k, term): (usize, &Term)| {
-            let number = if several {
-                (k + 1).to_string()
-            } else {
-                String::new()
-            };
+        let of_term = |(k, term): (usize, &LawTerm)| {
+            let number = if several { (k + 1).to_string() } else { String::new() };
             let symbols: &[&str] = match term.values.len() {
                 1 => &["k"],
                 _ => &["ks", "kc"],
@@ -333,33 +358,34 @@ impl Formula {
         }
     }
 
-    fn text(&mut self, law: &Proposed, name: &dyn Fn(Variable, Option<usize>) -> String) -> String {
+    /// The formula of a law; `name` gives the name of each variable. Constants are collected on the way if they
+    /// have symbols.
+    fn text(&mut self, law: &Proposed, name: &dyn Fn(LawVariable, Option<usize>) -> String) -> String {
         let mut symbols = self.parameters.clone().into_iter();
         let mut terms = Vec::new();
         for term in &law.terms {
             let factors: Vec<Vec<String>> = (term.product.factors.iter())
                 .map(|factor| {
-                    let is_other = matches!(
-                        factor.variable,
-                        Variable::OtherPosition | Variable::OtherRate
-                    );
+                    // Variables of the second place have its name.
+                    let is_other = matches!(factor.variable, LawVariable::OtherPosition | LawVariable::OtherRate);
                     let other = term.product.other.filter(|_| is_other);
                     self.factor(*factor, &name(factor.variable, other))
                 })
                 .collect();
+            // Sine and cosine have two parameters, all other factors one.
             let wave = factors.iter().find(|texts| texts.len() > 1);
             let mut product = Vec::new();
             if let Some(wave) = wave {
                 let parts = wave.iter().zip(symbols.by_ref());
-                let parts: Vec<String> = parts
-                    .map(|(text, symbol)| format!("{symbol}*{text}"))
-                    .collect();
+                let parts: Vec<String> = parts.map(|(text, symbol)| format!("{symbol}*{text}")).collect();
+                // A sum needs parentheses only next to other factors or terms.
                 let is_alone = factors.len() == 1 && law.terms.len() == 1;
                 let sum = parts.join(" + ");
                 product.push(if is_alone { sum } else { format!("({sum})") });
             } else {
                 product.extend(symbols.next());
             }
+            // The remaining factors follow the parameter.
             let others = factors.iter().filter(|texts| texts.len() == 1);
             product.extend(others.map(|texts| texts[0].clone()));
             terms.push(product.join("*"));
@@ -368,12 +394,12 @@ impl Formula {
     }
 
     /// A constant as a number, or by a symbol of its own.
-    fn constant(&mut self, symbol: &str, value: f64, factor: Factor) -> String {
+    fn constant(&mut self, symbol: &str, value: f64, factor: LawFactor) -> String {
         if !self.with_symbols {
-            return rounded(value).to_string();
+            return round_significant(value).to_string();
         }
-        let of_name =
-            |one: &&(String, f64, Factor)| one.0.trim_end_matches(char::is_numeric) == symbol;
+        let of_name = |one: &&(String, f64, LawFactor)| one.0.trim_end_matches(char::is_numeric) == symbol;
+        // Several constants of one name are numbered from the second on.
         let symbol = match self.constants.iter().filter(of_name).count() {
             0 => symbol.to_owned(),
             n => format!("{symbol}{}", n + 1),
@@ -383,39 +409,35 @@ impl Formula {
     }
 
     /// A shape of a variable: one text, or those of sine and cosine.
-    fn factor(&mut self, factor: Factor, z: &str) -> Vec<String> {
+    fn factor(&mut self, factor: LawFactor, z: &str) -> Vec<String> {
         let text = match factor.shape {
-            Shape::Power {
-                halves,
-                is_odd,
-                scale,
-            } => {
+            // Powers of half integers need a scale, so that the unit is independent of the power.
+            LawShape::Power { halves, is_odd, scale } => {
                 if halves % 2 == 0 {
-                    whole_power(z, halves / 2, is_odd)
+                    integer_power(z, halves / 2, is_odd)
                 } else {
+                    // An odd multiple of one half: whole powers times a root.
                     let share = format!("abs({z})/{}", self.constant("scale", scale, factor));
                     let whole = match halves / 2 {
                         0 => String::new(),
                         1 => format!("{share}*"),
                         n => format!("({share})^{n}*"),
                     };
-                    let sign = if is_odd {
-                        format!("sign({z})*")
-                    } else {
-                        String::new()
-                    };
+                    let sign = if is_odd { format!("sign({z})*") } else { String::new() };
                     format!("{sign}{whole}sqrt({share})")
                 }
             }
-            Shape::Shifted { centre, power } => {
+            // A power about a centre other than zero.
+            LawShape::Shifted { centre, power } => {
                 let centre = self.constant("centre", centre, factor);
-                format!("({})^{power}", less(z, &centre))
+                format!("({})^{power}", difference_text(z, &centre))
             }
-            Shape::Beyond { from, side, power } => {
+            // A hinge is zero on one side of its start.
+            LawShape::Hinge { from, side, power } => {
                 let over = if from == 0.0 {
                     z.to_owned()
                 } else {
-                    less(z, &self.constant("from", from, factor))
+                    difference_text(z, &self.constant("from", from, factor))
                 };
                 let way = if side > 0.0 { "+" } else { "-" };
                 let ramp = format!("(abs({over}) {way} ({over}))/2");
@@ -424,23 +446,25 @@ impl Formula {
                     n => format!("({ramp})^{n}"),
                 }
             }
-            Shape::Wave { pitch } => {
+            // Both phases, since the phase is estimated linearly.
+            LawShape::Wave { pitch } => {
                 let pitch = self.constant("pitch", pitch, factor);
-                return ["sin", "cos"]
-                    .map(|f| format!("{f}(2*pi*{z}/{pitch})"))
-                    .to_vec();
+                return ["sin", "cos"].map(|f| format!("{f}(2*pi*{z}/{pitch})")).to_vec();
             }
-            Shape::Bump { centre, width } => {
-                format!("exp(-({})^2)", self.near(z, centre, width, factor))
+            // A smooth bump at one position.
+            LawShape::Bump { centre, width } => {
+                format!("exp(-({})^2)", self.scaled_distance(z, centre, width, factor))
             }
-            Shape::Detent { centre, width } => {
-                let near = self.near(z, centre, width, factor);
+            LawShape::Detent { centre, width } => {
+                let near = self.scaled_distance(z, centre, width, factor);
                 format!("{near}*exp(-({near})^2)")
             }
-            Shape::Step { centre, width } => {
-                format!("tanh({})", self.near(z, centre, width, factor))
+            // A smooth step between two levels.
+            LawShape::Step { centre, width } => {
+                format!("tanh({})", self.scaled_distance(z, centre, width, factor))
             }
-            Shape::Fading { scale, halves } => {
+            // A force that decays away from zero and changes sign there, as Stribeck friction does over the rate.
+            LawShape::Fading { scale, halves } => {
                 let scale = self.constant("scale", scale, factor);
                 let power = match halves {
                     1 => format!("sqrt(abs({z})/{scale})"),
@@ -449,11 +473,12 @@ impl Formula {
                 };
                 format!("sign({z})*exp(-{power})")
             }
-            Shape::Memory { length, curve } => {
+            // Friction that builds up over a distance; its name is that of the friction model.
+            LawShape::Memory { length, curve } => {
                 let state = if curve == 1 { "dahl" } else { "bouc_wen" };
                 format!("{state}({z}, {})", self.constant("length", length, factor))
             }
-            Shape::Slip { width } => {
+            LawShape::Slip { width } => {
                 format!("slip({z}, {})", self.constant("width", width, factor))
             }
         };
@@ -461,18 +486,20 @@ impl Formula {
     }
 
     /// `(z - centre)/width`
-    fn near(&mut self, z: &str, centre: f64, width: f64, factor: Factor) -> String {
+    fn scaled_distance(&mut self, z: &str, centre: f64, width: f64, factor: LawFactor) -> String {
+        // A centre at zero is left out.
         let from = if centre == 0.0 {
             z.to_owned()
         } else {
             let centre = self.constant("centre", centre, factor);
-            format!("({})", less(z, &centre))
+            format!("({})", difference_text(z, &centre))
         };
         format!("{from}/{}", self.constant("width", width, factor))
     }
 }
 
-fn whole_power(z: &str, power: i32, is_odd: bool) -> String {
+/// `z` to a whole power, with the sign of `z` if `is_odd`.
+fn integer_power(z: &str, power: i32, is_odd: bool) -> String {
     match (power, is_odd) {
         (0, _) => format!("sign({z})"),
         (1, true) => z.to_owned(),
@@ -485,7 +512,7 @@ fn whole_power(z: &str, power: i32, is_odd: bool) -> String {
 }
 
 /// `z - centre`, where the centre may be a number below zero.
-fn less(z: &str, centre: &str) -> String {
+fn difference_text(z: &str, centre: &str) -> String {
     match centre.strip_prefix('-') {
         Some(positive) => format!("{z} + {positive}"),
         None => format!("{z} - {centre}"),
@@ -496,51 +523,48 @@ fn less(z: &str, centre: &str) -> String {
 mod tests {
     use super::*;
 
-    fn formula(factors: &[(Variable, Shape)], with_symbols: bool) -> String {
-        let factor = |(variable, shape): &(Variable, Shape)| Factor {
+    fn formula(factors: &[(LawVariable, LawShape)], with_symbols: bool) -> String {
+        let factor = |(variable, shape): &(LawVariable, LawShape)| LawFactor {
             variable: *variable,
             shape: *shape,
         };
-        let product = Product {
+        let product = LawProduct {
             other: None,
             factors: factors.iter().map(factor).collect(),
         };
-        let parameters = if factors.iter().any(|f| matches!(f.1, Shape::Wave { .. })) {
+        let parameters = if factors.iter().any(|f| matches!(f.1, LawShape::Wave { .. })) {
             2
         } else {
             1
         };
         let law = Proposed {
             site: 0,
-            terms: vec![Term {
+            terms: vec![LawTerm {
                 product,
                 values: vec![1.0; parameters],
-                deviations: vec![0.0; parameters],
+                standard_deviations: vec![0.0; parameters],
             }],
             gain: 1.0,
-            instead_of: Vec::new(),
+            replaced_effects: Vec::new(),
         };
-        let mut formula = Formula::new(&law);
+        let mut formula = LawFormula::new(&law);
         formula.with_symbols = with_symbols;
-        formula.text(&law, &|variable, _| word(variable).to_owned())
+        formula.text(&law, &|variable, _| variable_word(variable).to_owned())
     }
 
     #[test]
     fn laws_are_formulas() {
-        use Variable::{Load, OtherPosition, Position, Rate};
-        let wave = Shape::Wave { pitch: 0.02 };
+        use LawVariable::{Load, OtherPosition, Position, Rate};
+        let wave = LawShape::Wave { pitch: 0.02 };
         assert_eq!(
-            formula(
-                &[(OtherPosition, Shape::LINEAR), (Rate, Shape::LINEAR)],
-                false
-            ),
+            formula(&[(OtherPosition, LawShape::LINEAR), (Rate, LawShape::LINEAR)], false),
             "k*other_coordinate*rate"
         );
         assert_eq!(
-            formula(&[(Position, wave), (Rate, Shape::LINEAR)], true),
+            formula(&[(Position, wave), (Rate, LawShape::LINEAR)], true),
             "(ks*sin(2*pi*coordinate/pitch) + kc*cos(2*pi*coordinate/pitch))*rate"
         );
-        let beyond = Shape::Beyond {
+        let beyond = LawShape::Hinge {
             from: -0.25,
             side: 1.0,
             power: 1,
@@ -549,13 +573,13 @@ mod tests {
             formula(&[(Position, beyond)], false),
             "k*(abs(coordinate + 0.25) + (coordinate + 0.25))/2"
         );
-        let power = Shape::Power {
+        let power = LawShape::Power {
             halves: 3,
             is_odd: false,
             scale: 200.0,
         };
         assert_eq!(
-            formula(&[(Load, power), (Rate, Shape::SIGN)], false),
+            formula(&[(Load, power), (Rate, LawShape::SIGN)], false),
             "k*abs(load)/200*sqrt(abs(load)/200)*sign(rate)"
         );
     }

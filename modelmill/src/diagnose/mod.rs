@@ -1,16 +1,30 @@
-//! `diagnose`: which physical effect a model lacks. Candidates come from the effect library, their columns from the model's
-//! own derivation, and a search over sets of them decides.
+//! `diagnose`: which physical effects a model lacks. Inputs are a model and recordings; the output is
+//! [`DiagnosisFindings`].
 //!
-//! `places` -> `candidates` (what `add` would add) -> `columns` (numbers along the recordings) -> `problem` (posed and solved)
-//! with `long` (recordings in fewer samples), `faults` (of recordings, taken off), and candidates that no entry of a model
-//! file says: `encoders`, `gears`, `memory`, `payloads`, `constants`
-//! -> `added` (the model file with what was found) -> `versions` (both models identified, along all recordings) -> `off_nominal`
-//! (what base parameters say against the file) -> `findings`.
-//! `chosen` does the same for effects that the user names; `words` puts verdicts into sentences.
+//! Candidate effects come from the effect library; their regressor columns come from the derivation of the model. A
+//! search over sets of candidates selects those that are missing.
+//!
+//! The modules, in the order of the data flow:
+//!
+//! 1. `long_recordings`: decimates long recordings.
+//! 2. `places`: lists the places of the mechanism on which effects may act.
+//! 3. `candidates`: derives the effects that `add` could add to the model file.
+//! 4. `columns`, `numbers`: evaluate the forces of these effects along the recordings.
+//! 5. `faults`: finds faults of recordings, which are subtracted or left out before the search.
+//! 6. `encoders`, `gears`, `memory`, `payloads`, `constants`, `tilt`, `held_friction`: add candidates that a model file
+//!    cannot contain.
+//! 7. `problem`: formulates the search with all of these, and solves it.
+//! 8. `added_effects`: adds the effects found to the model file, in memory.
+//! 9. `model_versions`: identifies the models without and with the effects, and evaluates them along all recordings.
+//! 10. `off_nominal`: lists base parameters whose estimates differ from the nominal values.
+//! 11. `laws`: lists force laws that are in no library and would explain the residual.
+//! 12. `findings`: collects the results.
+//!
+//! In addition, `requested_effects` derives and evaluates effects that the user names, `words` writes sentences, and
+//! `thresholds` contains the numbers that decide.
 
-pub(crate) mod added;
+pub(crate) mod added_effects;
 mod candidates;
-mod chosen;
 mod columns;
 mod constants;
 mod encoders;
@@ -19,25 +33,30 @@ mod findings;
 mod gears;
 mod held_friction;
 mod laws;
-mod long;
+mod long_recordings;
 mod memory;
+mod model_versions;
 pub(crate) mod numbers;
 mod off_nominal;
 mod payloads;
 mod places;
 mod problem;
+mod requested_effects;
+mod thresholds;
 mod tilt;
-mod versions;
 pub mod words;
 
 pub(crate) use candidates::sign;
-pub use chosen::Named;
-pub(crate) use chosen::{Chosen, Constants, base, choose};
-pub use findings::{Estimate, Findings, Missing, Question, Separation, Untold, WithNominal};
-pub use laws::{Hypothesis, Law, LawEntry};
-pub use modelmill_identify::diagnose::{
-    Budget, Diagnosis, Disturbance, Effect, Quantity, Rung, Verdict,
+pub use findings::{
+    DiagnosisFindings, DiagnosisOptions, EffectEstimate, MissingEffect, NominalDiagnosis, SeparationProposal,
+    UndecidedEffect,
 };
-pub use off_nominal::OffNominal;
-pub use problem::Held;
-pub use versions::{Along, Version};
+pub use laws::{LawEntry, LawHypothesis, ProposedLaw};
+pub use model_versions::{ForceComparison, ModelVersion};
+pub use modelmill_identify::diagnose::{
+    DiagnosisVerdict, Disturbance, EstimatedQuantity, LocatedEffect, ModelDiagnosis, ResidualBudget, SelectionStep,
+};
+pub use off_nominal::OffNominalParameter;
+pub use problem::FixedParameters;
+pub use requested_effects::NamedEffect;
+pub(crate) use requested_effects::{ChosenEffect, ConstantPolicy, base_columns, derive_effect};

@@ -1,46 +1,42 @@
-//! Base parameters that come out off what the file says, and what that means where no body could have them.
+//! Base parameters whose estimates differ from the nominal values, and a warning if no physical body could have
+//! their sign.
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{CommandName, OptionName, Remedy};
-use modelmill_identify::{FitParameter, Note, Status};
+use modelmill_identify::{FitParameter, ParameterStatus, RecordingNote};
 use modelmill_runtime::Random;
 use modelmill_spec::Sign;
 
-use super::versions::Version;
+use super::model_versions::ModelVersion;
+use super::thresholds::{BODY_PARAMETER_FACTOR, OFF_NOMINAL_PART, OFF_NOMINAL_SIGMAS, SIGN_TRIALS};
 
-/// A base parameter is off its nominal value from this many of its deviations on, and from this share of it on.
-const SIGMAS: f64 = 5.0;
-const OFF: f64 = 0.01;
-/// Every parameter of a body may be off by this factor before the sign of a base parameter is called impossible.
-const FACTOR: f64 = 3.0;
-/// How many bodies with such parameters are tried.
-const TRIED: usize = 200;
-
-/// A base parameter that is not what the file says.
+/// A base parameter whose estimate differs from its nominal value.
 #[derive(Clone, Debug, PartialEq)]
-pub struct OffNominal {
+pub struct OffNominalParameter {
     /// The parameter as it was identified.
     pub parameter: FitParameter,
     /// Its nominal value.
     pub nominal: f64,
-    /// How many of its standard deviations lie between.
+    /// Magnitude of the difference, in standard deviations of the estimate.
     pub sigmas: f64,
 }
 
-/// Base parameters of the bodies that are not what the file says, with the nominal value and the distance in deviations.
-pub(super) fn off_nominal(version: &Version) -> Vec<OffNominal> {
+/// Base parameters of the bodies whose estimates differ from the file, the one with the most standard deviations first.
+pub(super) fn off_nominal_parameters(version: &ModelVersion) -> Vec<OffNominalParameter> {
     let Some(identified) = &version.identified else {
         return Vec::new();
     };
     let parameters = identified.fit.parameters.iter().enumerate();
-    let mut off: Vec<OffNominal> = parameters
-        .filter(|(k, p)| p.status == Status::Identified && !version.model.is_effect(*k))
+    let mut off: Vec<OffNominalParameter> = parameters
+        .filter(|(k, p)| p.status == ParameterStatus::Identified && !version.model.is_effect(*k))
         .filter_map(|(_, p)| {
             let (nominal, std) = (p.nominal?, p.std?);
             let sigmas = (p.value - nominal).abs() / std;
-            let is_off =
-                std > 0.0 && sigmas > SIGMAS && (p.value - nominal).abs() > OFF * nominal.abs();
-            is_off.then(|| OffNominal {
+            // Both bounds: a precise fit would report tiny differences, a poor one large but uncertain ones.
+            let is_off = std > 0.0
+                && sigmas > OFF_NOMINAL_SIGMAS
+                && (p.value - nominal).abs() > OFF_NOMINAL_PART * nominal.abs();
+            is_off.then(|| OffNominalParameter {
                 parameter: p.clone(),
                 nominal,
                 sigmas,
@@ -51,26 +47,27 @@ pub(super) fn off_nominal(version: &Version) -> Vec<OffNominal> {
     off
 }
 
-/// What base parameters say whose sign no bodies near those of the file have: not the bodies are wrong, but what turns their
-/// forces.
-pub(super) fn turned(version: &Version, off: &[OffNominal]) -> Option<Note> {
+/// A warning about base parameters whose sign no bodies near those of the file can have. Then not the bodies
+/// are wrong, but a direction: of gravity, a length, a drive or a column.
+pub(super) fn reversed_sign_note(version: &ModelVersion, off: &[OffNominalParameter]) -> Option<RecordingNote> {
     let model = &version.model;
-    let has_turned = |off: &&OffNominal| {
+    // A sign counts only if the estimate is clear and about as large as the nominal value.
+    let has_turned = |off: &&OffNominalParameter| {
         let p = &off.parameter;
         let is_other = p.value * off.nominal < 0.0
-            && p.std.is_some_and(|std| p.value.abs() > SIGMAS * std)
-            && FACTOR * p.value.abs() > off.nominal.abs();
+            && p.std.is_some_and(|std| p.value.abs() > OFF_NOMINAL_SIGMAS * std)
+            && BODY_PARAMETER_FACTOR * p.value.abs() > off.nominal.abs();
         let k = model.base.iter().position(|one| one.name == p.name);
         is_other && k.is_some_and(|k| has_one_sign(version, k))
     };
-    let turned: Vec<&OffNominal> = off.iter().filter(has_turned).collect();
+    let turned: Vec<&OffNominalParameter> = off.iter().filter(has_turned).collect();
     let first = turned.first()?;
     let names: Vec<&str> = turned.iter().map(|o| o.parameter.name.as_str()).collect();
     let unit = &first.parameter.unit;
-    Some(Note::warning(message!(
-        "{} with a sign that no bodies near those of the file have (`{}` is {:.4} {unit}; the file's values give {:.4} {unit}). Look \
-         first at the direction of gravity, the signs of lengths and angles, and which way drives and columns of the recording \
-         count ({} draws the mechanism with {}): what is said to be missing may only make up for that.",
+    Some(RecordingNote::warning(message!(
+        "{} with a sign that no bodies near those of the file can have (`{}` is {:.4} {unit}; the file's values give {:.4} \
+         {unit}). The effects found may only compensate a wrong direction. Check the direction of gravity, the signs of lengths \
+         and angles, and the positive directions of drives and recorded columns ({} draws the mechanism with {}).",
         if names.len() == 1 {
             format!("{} comes out", names[0])
         } else {
@@ -84,17 +81,18 @@ pub(super) fn turned(version: &Version, off: &[OffNominal]) -> Option<Note> {
     )))
 }
 
-/// Whether a base parameter keeps its sign whatever the parameters of the bodies are, within a factor of those of the file. First
-/// moments and products of inertia may have either sign: they turn with a small change of where a body's mass is.
-fn has_one_sign(version: &Version, k: usize) -> bool {
+/// Whether a base parameter has the same sign for all bodies whose parameters are within a factor of those of
+/// the file. First moments and products of inertia may have either sign, since a small shift of the centre of
+/// mass can change it.
+fn has_one_sign(version: &ModelVersion, k: usize) -> bool {
     let derivation = &version.model.derivation;
     let mechanism = &derivation.mechanism;
     let constants: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
     let nominal = version.model.nominal[k];
+    // A fixed seed: the same recording always gives the same warning.
     let mut random = Random::new(1);
-    let may_turn =
-        |i: usize| version.model.sign_of(i) == Sign::Any && mechanism.parameters[i].unit != "m";
-    // Where the file has none, one as large as others of its unit.
+    let may_turn = |i: usize| version.model.sign_of(i) == Sign::Any && mechanism.parameters[i].unit != "m";
+    // A value that is zero in the file may be as large as the largest one of its unit.
     let size = |i: usize| {
         let own = &mechanism.parameters[i];
         if own.nominal != 0.0 || !may_turn(i) {
@@ -104,15 +102,16 @@ fn has_one_sign(version: &Version, k: usize) -> bool {
         alike.map(|p| p.nominal.abs()).fold(0.0, f64::max)
     };
     let mut factor = |i: usize| {
-        let turned = if may_turn(i) && random.between(0.0, 1.0) < 0.5 {
+        let turned = if may_turn(i) && random.uniform(0.0, 1.0) < 0.5 {
             -1.0
         } else {
             1.0
         };
-        // Extremes count most: a sum changes its sign there first.
-        turned * FACTOR.powf(random.between(-2.0, 2.0).clamp(-1.0, 1.0))
+        // Extreme values are drawn most often: a sum changes its sign there first.
+        turned * BODY_PARAMETER_FACTOR.powf(random.uniform(-2.0, 2.0).clamp(-1.0, 1.0))
     };
-    (0..TRIED).all(|_| {
+    (0..SIGN_TRIALS).all(|_| {
+        // All parameters vary at once; one trial with the other sign is enough.
         let parameters = (0..mechanism.parameters.len()).map(|i| size(i) * factor(i));
         let parameters: Vec<f64> = parameters.collect();
         derivation.base_values(&parameters, &constants)[k] * nominal > 0.0

@@ -1,60 +1,69 @@
-//! A further body on every body of the model: a tool, a workpiece, a forgotten cover. Beside free base parameters it is no
-//! effect, since these take it up; where they are held, as from an unloaded run, its columns are known.
+//! Candidates for a payload on every body of the model: a tool, a workpiece, a forgotten cover. They are tried
+//! only if base parameters are fixed, as from an unloaded run; estimated base parameters would absorb a
+//! payload.
 
-use modelmill_codegen::Evaluator;
+use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
-    Body, Candidate, Column, Effect, EffectParameter, Nature, Sign, Source,
+    AttachedBody, CandidateEffect, CandidateNature, ColumnSource, EffectParameter, ForceColumn, LocatedEffect,
+    SignConstraint,
 };
 use modelmill_spec::{Kinematics, Mechanism};
 
 use crate::error::Outcome;
 use crate::model::Model;
-use crate::regressors::{Runs, regressor};
-use crate::runs::payload::{Payloads, TEN};
+use crate::regressors::{SegmentList, regressor};
+use crate::runs::payload::{PayloadColumns, TEN};
+
+use super::thresholds::PAYLOAD_LEAST_EFFECT;
 
 /// Symbols of the parameters, their units, and the sign that is possible.
-const PARAMETERS: [(&str, &str, Sign); 7] = [
-    ("mass", "kg", Sign::Positive),
-    ("mx", "kg m", Sign::Any),
-    ("my", "kg m", Sign::Any),
-    ("mz", "kg m", Sign::Any),
-    ("sxx", "kg m^2", Sign::Positive),
-    ("syy", "kg m^2", Sign::Positive),
-    ("szz", "kg m^2", Sign::Positive),
+const PARAMETERS: [(&str, &str, SignConstraint); 7] = [
+    ("mass", "kg", SignConstraint::Positive),
+    ("mx", "kg m", SignConstraint::Any),
+    ("my", "kg m", SignConstraint::Any),
+    ("mz", "kg m", SignConstraint::Any),
+    ("sxx", "kg m^2", SignConstraint::Positive),
+    ("syy", "kg m^2", SignConstraint::Positive),
+    ("szz", "kg m^2", SignConstraint::Positive),
 ];
-/// Those of a mass at a place; the others say how it spreads.
-const OF_A_MASS: usize = 4;
-/// A column whose largest value is below this part of the largest of all says nothing.
-const NOTHING: f64 = 1e-9;
+/// The first of them belong to a point mass; the others are second moments.
+const POINT_MASS_PARAMETERS: usize = 4;
 
-/// A mass at a place of every body, and the same with what it spreads about that place.
-pub(crate) fn payloads(model: &Model, all: &Runs<'_>) -> Outcome<Vec<Candidate>> {
-    let payloads = Payloads::new(model)?;
-    let columns = regressor(all, &Evaluator::new(&payloads.derivation), model)?;
+/// For every body a point mass, and the same with second moments.
+///
+/// Fails when the derivation of the columns fails, or when a pose has no solution.
+pub(crate) fn payloads(model: &Model, all: &SegmentList<'_>) -> Outcome<Vec<CandidateEffect>> {
+    let payloads = PayloadColumns::new(model)?;
+    let columns = regressor(all, &ModelEvaluator::new(&payloads.derivation), model)?;
+    // The size of the machine bounds the distance of the payload.
     let reach = reach(&model.derivation.mechanism);
     let largest = columns.iter().map(size).fold(0.0, f64::max);
     let mut candidates = Vec::new();
-    // The farthest body first: of two that carry alike it is the one that tools are put on.
+    // The last body first: of two with the same effect it is the one that carries tools.
     for (frame, which) in payloads.frames.iter().zip(&payloads.columns).rev() {
-        let of = |k: &Option<usize>| -> Column {
+        // Columns at the level of rounding are zero.
+        let of = |k: &Option<usize>| -> ForceColumn {
             let column = k.map(|k| &columns[k]);
-            let column = column.filter(|column| size(column) > NOTHING * largest);
-            column.map_or_else(|| Column(vec![None; model.drives().len()]), Clone::clone)
+            let column = column.filter(|column| size(column) > PAYLOAD_LEAST_EFFECT * largest);
+            column.map_or_else(|| ForceColumn(vec![None; model.drives().len()]), Clone::clone)
         };
-        let ten: [Column; TEN] = which.each_ref().map(of);
-        let is_felt = |k: &usize| match *k {
-            k @ 0..OF_A_MASS => !ten[k].is_zero(),
+        let ten: [ForceColumn; TEN] = which.each_ref().map(of);
+        let has_effect = |k: &usize| match *k {
+            k @ 0..POINT_MASS_PARAMETERS => !ten[k].is_zero(),
             k => {
-                let across = [[7, 9], [4, 9], [4, 7]][k - OF_A_MASS];
+                // A second moment acts through the two inertias about the other axes.
+                let across = [[7, 9], [4, 9], [4, 7]][k - POINT_MASS_PARAMETERS];
                 across.iter().any(|entry| !ten[*entry].is_zero())
             }
         };
-        // Without weight or leverage it is another inertia of the drive.
-        if !(0..OF_A_MASS).any(|k| is_felt(&k)) {
+        // Without weight and leverage it is the same as an inertia of the drive.
+        if !(0..POINT_MASS_PARAMETERS).any(|k| has_effect(&k)) {
             continue;
         }
-        for (most, refines) in [(OF_A_MASS, "point_mass"), (PARAMETERS.len(), "payload")] {
-            let free: Vec<usize> = (0..most).filter(is_felt).collect();
+        // A point mass has four parameters, a general payload seven.
+        for (most, refines) in [(POINT_MASS_PARAMETERS, "point_mass"), (PARAMETERS.len(), "payload")] {
+            // Parameters without effect are not estimated.
+            let free: Vec<usize> = (0..most).filter(has_effect).collect();
             let parameter = |k: &usize| {
                 let (symbol, unit, sign) = PARAMETERS[*k];
                 EffectParameter {
@@ -63,21 +72,21 @@ pub(crate) fn payloads(model: &Model, all: &Runs<'_>) -> Outcome<Vec<Candidate>>
                     sign,
                 }
             };
-            candidates.push(Candidate {
-                effect: Effect {
+            candidates.push(CandidateEffect {
+                effect: LocatedEffect {
                     kind: "payload".to_owned(),
                     at: vec![frame.clone()],
                 },
                 parameters: free.iter().map(parameter).collect(),
-                searched: 0,
+                searched_constants: 0,
                 is_part_of_load: true,
                 refines: Some(refines.to_owned()),
-                nature: Nature::Effect,
+                nature: CandidateNature::Effect,
                 is_per_run: false,
-                source: Source::Body(Body {
-                    ten: ten.clone(),
-                    free,
-                    reach,
+                source: ColumnSource::Body(AttachedBody {
+                    inertial_columns: ten.clone(),
+                    estimated: free,
+                    max_distance: reach,
                 }),
             });
         }
@@ -85,22 +94,22 @@ pub(crate) fn payloads(model: &Model, all: &Runs<'_>) -> Outcome<Vec<Candidate>>
     Ok(candidates)
 }
 
-fn size(column: &Column) -> f64 {
+/// Largest magnitude of a column.
+fn size(column: &ForceColumn) -> f64 {
     let values = column.0.iter().flatten().flatten();
     values.fold(0.0_f64, |most, x| most.max(x.abs()))
 }
 
-/// The largest distance between two frames in the nominal pose, m: nothing that a machine carries is farther away.
+/// Largest distance between two frames in the nominal pose, m; it bounds the distance of a payload from its frame.
 pub(crate) fn reach(mechanism: &Mechanism) -> f64 {
     let nominal: Vec<f64> = mechanism.coordinates.iter().map(|c| c.nominal).collect();
+    // Free joints are at their nominal values.
     let poses = Kinematics::new(mechanism).poses(&nominal);
     let origins: Vec<[f64; 3]> = poses.frames().iter().map(|pose| pose.origin).collect();
     let distance = |a: &[f64; 3], b: &[f64; 3]| -> f64 {
         let squares = a.iter().zip(b).map(|(a, b)| (a - b).powi(2));
         squares.sum::<f64>().sqrt()
     };
-    let pairs = origins
-        .iter()
-        .flat_map(|a| origins.iter().map(move |b| (a, b)));
+    let pairs = origins.iter().flat_map(|a| origins.iter().map(move |b| (a, b)));
     pairs.map(|(a, b)| distance(a, b)).fold(0.0, f64::max)
 }

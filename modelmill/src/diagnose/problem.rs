@@ -1,55 +1,58 @@
-//! A diagnosis from a model and its recordings: the problem is posed in numbers, and solved.
+//! States the search for missing effects in numbers and solves it. Input are a model and recordings, output is a
+//! [`DiagnosisSolution`] with the problem, the diagnosis and the candidates.
 
-use modelmill_codegen::Evaluator;
+use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
-    Carried, Choice, Column, Considered, Diagnosis, Disturbance, Problem, ROUNDING, Site, Source,
-    Supply, diagnose, drifts, readings, white_noise,
+    CandidateOutcome, ColumnChoice, ColumnProvider, ColumnSource, DiagnosisProblem, Disturbance, FORCE_ROUNDING,
+    ForceColumn, LawSite, LoadDependentQuery, ModelDiagnosis, diagnose, drift_candidates, reading_fault_candidates,
+    white_noise,
 };
 
 use crate::along::drive_rates;
 use crate::error::{Error, Outcome};
-use crate::identify::regression::nothing_measured;
+use crate::identify::regression::zero_force_message;
 use crate::model::Model;
-use crate::runs::Difference;
-use crate::stretch::Stretch;
+use crate::runs::RecordingDifference;
+use crate::segment::RecordingSegment;
 use crate::text::table::count;
 
-use super::candidates::{Candidates, candidates};
-use super::columns::{self, Origin, carried, finer};
+use super::candidates::{DerivedCandidates, candidates};
+use super::columns::{self, CandidateOrigin, load_dependent_columns, refined_columns};
 use super::constants::constants;
 use super::encoders::{self, encoders};
-use super::faults::take_off;
+use super::faults::subtract_known;
 use super::gears::gears;
 use super::held_friction;
 use super::laws::sites;
-use super::memory::memories;
+use super::memory::dahl_candidates;
 use super::numbers::{layout, stack, variables};
 use super::payloads::payloads;
+use super::thresholds::FEWEST_SAMPLES;
 use super::words;
-use crate::regressors::{Runs, regressor};
+use crate::regressors::{SegmentList, regressor};
 
-/// Which parameters keep their nominal values.
+/// Which base parameters are fixed at their nominal values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Held {
-    /// Those that are numbers of the file.
+pub enum FixedParameters {
+    /// Only those that are known: they contain no dynamic parameter, see [`Model::is_known`].
     Known,
-    /// All.
+    /// All base parameters. Values of a fit with a covariance are a prior instead, see [`Model::with_fit`].
     All,
 }
 
-/// Samples that each recording must have.
-const FEWEST: usize = 60;
-
-/// What was asked and what was found.
-pub(crate) struct Answer {
-    pub problem: Problem,
-    pub diagnosis: Diagnosis,
-    pub candidates: Candidates,
+/// The problem, its solution and the candidates.
+pub(crate) struct DiagnosisSolution {
+    /// The problem in numbers, without columns.
+    pub problem: DiagnosisProblem,
+    /// Its solution.
+    pub diagnosis: ModelDiagnosis,
+    /// Candidates that `add` could add, with their derivation.
+    pub candidates: DerivedCandidates,
 }
 
-impl Answer {
-    /// What is left of all forces in the mean square, each drive relative to its own.
-    pub(crate) fn left(&self) -> f64 {
+impl DiagnosisSolution {
+    /// Sum of the squared residuals of all drives, each relative to the squared force of the drive (1).
+    pub(crate) fn mean_square_residual(&self) -> f64 {
         let parts = self.diagnosis.budgets.iter().map(|budget| {
             let squares = budget.noise.powi(2) + budget.model.powi(2);
             squares / budget.force.powi(2).max(f64::MIN_POSITIVE)
@@ -58,66 +61,73 @@ impl Answer {
     }
 }
 
-/// What is asked.
+/// Options of the search.
 #[derive(Clone, Copy)]
-pub(crate) struct Asked<'a> {
+pub(crate) struct DiagnosisQuery<'a> {
     /// Which parameters keep their nominal values.
-    pub held: Held,
-    /// Whether all is looked for that may explain something: not while a model file's own values are only held against those that
-    /// were found, where every wrong value of a body would be a further body, and nobody is told of laws and doubles.
+    pub fixed: FixedParameters,
+    /// Whether to search for payloads, laws and alternatives too. Not in the second diagnosis with nominal
+    /// values: there every wrong value of a body would look like a payload.
     pub in_full: bool,
-    /// What the recordings do not share.
-    pub between: &'a [Difference],
+    /// Differences between the recordings.
+    pub run_differences: &'a [RecordingDifference],
 }
 
-/// Finds what a model lacks.
-pub(crate) fn find(
+/// Finds the effects that a model lacks; `fit` are the fitted recordings, `check` the validation runs.
+///
+/// Fails when all forces are zero, when samples are too few, when a pose has no solution, and when a job is
+/// cancelled.
+pub(crate) fn find_missing_effects(
     model: &Model,
-    fit: &[Stretch],
-    check: &[Stretch],
-    asked: Asked<'_>,
-) -> Outcome<Answer> {
-    let held = asked.held;
+    fit: &[RecordingSegment],
+    check: &[RecordingSegment],
+    asked: DiagnosisQuery<'_>,
+) -> Outcome<DiagnosisSolution> {
+    let held = asked.fixed;
+    // Stage 1: derive all candidates and evaluate their columns.
     let candidates = model
         .host()
-        .watched("writing down what may be missing", 0, |_| candidates(model))??;
-    let all: Vec<(&Stretch, bool)> = (fit.iter().map(|one| (one, false)))
+        .run_job("deriving all candidates", 0, |_| candidates(model))??;
+    let all: Vec<(&RecordingSegment, bool)> = (fit.iter().map(|one| (one, false)))
         .chain(check.iter().map(|one| (one, true)))
         .collect();
-    let (mut problem, made) =
-        model
-            .host()
-            .watched("computing what each would add", 0, |_| {
-                problem(&candidates, model, &all)
-            })??;
+    let (mut problem, made) = model
+        .host()
+        .run_job("computing the forces of all candidates", 0, |_| {
+            problem(&candidates, model, &all)
+        })??;
     let mut origins = made.origins;
+    // Stage 2: fixed parameters and known faults are subtracted from the forces.
     let other_friction = match held {
-        Held::All => held_friction::changes(model, &problem.base),
-        Held::Known => Vec::new(),
+        FixedParameters::All => held_friction::changes(model, &problem.base),
+        FixedParameters::Known => Vec::new(),
     };
-    hold(&mut problem, model, held);
+    fix_parameters(&mut problem, model, held);
     problem.effects_only = !asked.in_full;
-    take_off(&mut problem, model, &all, asked.between)?;
+    subtract_known(&mut problem, model, &all, asked.run_differences)?;
     let units: Vec<String> = (0..model.drives().len())
         .map(|d| model.force_unit(d).to_owned())
         .collect();
-    let mut further = readings(&problem);
-    further.extend(drifts(&problem, &units));
-    further.extend(memories(model, &all)?);
+    // Candidates that a model file cannot contain: faults of signals, of encoders, of gears and of lengths.
+    let mut further = reading_fault_candidates(&problem);
+    further.extend(drift_candidates(&problem, &units));
+    further.extend(dahl_candidates(model, &all)?);
+    // Stage 3: candidates that need the derivatives of the forces by the motion.
     let values = encoders::values(model, &problem, held);
     let slopes = encoders::sensitivities(model, &all, &values);
     further.extend(encoders::zeros(model, &slopes));
     further.extend(encoders(model, &all, &problem, &slopes));
     further.extend(gears(model, &all, &values, &slopes)?);
-    further.extend(constants(model, &all, &|k| is_held(model, held, k)));
+    further.extend(constants(model, &all, &|k| is_fixed(model, held, k)));
     further.extend(other_friction);
-    if asked.in_full && (held == Held::All || problem.base.is_empty()) {
+    if asked.in_full && (held == FixedParameters::All || problem.base.is_empty()) {
         further.extend(payloads(model, &all)?);
     }
     problem.candidates.extend(further);
-    // None of these is an entry of a model file.
+    // None of these can be an entry of a model file.
     origins.resize(problem.candidates.len(), None);
-    let supply = Made {
+    // Stage 4: the search, which requests further columns while it runs.
+    let supply = ColumnSupply {
         candidates: &candidates,
         origins: &origins,
         grids: &made.grids,
@@ -126,29 +136,29 @@ pub(crate) fn find(
     };
     let mut diagnosis = model
         .host()
-        .watched("looking for what is missing", 0, |_| {
-            diagnose(&mut problem, &supply)
-        })?;
+        .run_job("searching for missing effects", 0, |_| diagnose(&mut problem, &supply))?;
+    // Stage 5: texts, and candidates that could not be evaluated.
     for one in &mut diagnosis.disturbances {
-        tell(one, model);
+        describe_disturbance(one, model);
     }
     diagnosis
         .candidates
-        .extend(made.undefined.into_iter().map(|effect| Considered {
+        .extend(made.undefined.into_iter().map(|effect| CandidateOutcome {
             effect,
             explained: 0.0,
             gain: 0.0,
-            refused: Some("no finite value somewhere along the recordings".to_owned()),
+            rejection_reason: Some("no finite value somewhere along the recordings".to_owned()),
         }));
-    Ok(Answer {
+    Ok(DiagnosisSolution {
         problem: problem.without_columns(),
         diagnosis,
         candidates,
     })
 }
 
-/// Gives a disturbance the units of its place, and words.
-fn tell(one: &mut Disturbance, model: &Model) {
+/// Completes a disturbance: the units of its place, and a sentence.
+fn describe_disturbance(one: &mut Disturbance, model: &Model) {
+    // A disturbance of a drive has the unit of its force.
     let drives = model.drives();
     let place = one.at.first();
     let drive = drives.iter().position(|drive| Some(drive) == place);
@@ -157,39 +167,45 @@ fn tell(one: &mut Disturbance, model: &Model) {
             model.force_unit(d).clone_into(&mut value.unit);
         }
     }
-    if one.says.is_none() {
-        one.says = Some(words::disturbance(one));
+    if one.description.is_none() {
+        one.description = Some(words::disturbance(one));
     }
 }
 
-/// Columns that are made while the search goes on.
-struct Made<'a> {
-    candidates: &'a Candidates,
-    origins: &'a [Origin],
+/// Computes columns that the search requests while it runs.
+struct ColumnSupply<'a> {
+    /// Candidates that `add` could add.
+    candidates: &'a DerivedCandidates,
+    /// The entry that each candidate of the problem comes from.
+    origins: &'a [CandidateOrigin],
     /// Values that are tried for the constant of each single candidate.
     grids: &'a [Vec<f64>],
+    /// The model without the effects.
     model: &'a Model,
-    all: &'a Runs<'a>,
+    /// Fitted recordings, then validation runs.
+    all: &'a SegmentList<'a>,
 }
 
-impl Supply for Made<'_> {
-    fn finer(&self, candidate: usize, constant: f64) -> Option<Vec<Column>> {
+impl ColumnProvider for ColumnSupply<'_> {
+    fn columns_for_constant(&self, candidate: usize, constant: f64) -> Option<Vec<ForceColumn>> {
+        // Candidates without an entry have no searched constant.
         let (k, felt) = self.origins[candidate].as_ref()?;
         let entry = &self.candidates.entries[*k];
-        let columns = finer(self.candidates, self.model, self.all, entry, constant)?;
+        let columns = refined_columns(self.candidates, self.model, self.all, entry, constant)?;
         let kept = columns.into_iter().zip(felt).filter(|(_, felt)| **felt);
         Some(kept.map(|(column, _)| column).collect())
     }
 
-    fn sites(&self) -> Vec<Site> {
+    fn sites(&self) -> Vec<LawSite> {
         // Poses without answer were reported when the recordings were evaluated for the first time.
         sites(self.candidates, self.model, self.all).unwrap_or_default()
     }
 
-    fn carried(&self, load: &Column, which: Carried) -> Vec<(usize, Choice)> {
+    fn load_dependent_columns(&self, load: &ForceColumn, which: LoadDependentQuery) -> Vec<(usize, ColumnChoice)> {
+        // Either all candidates or one of them, with a given value of its constant.
         let only = match which {
-            Carried::All => None,
-            Carried::One(candidate, _) => {
+            LoadDependentQuery::All => None,
+            LoadDependentQuery::One(candidate, _) => {
                 let Some((entry, _)) = &self.origins[candidate] else {
                     return Vec::new();
                 };
@@ -197,14 +213,15 @@ impl Supply for Made<'_> {
             }
         };
         let tried = |single: usize| match which {
-            Carried::One(_, Some(value)) => vec![value],
-            Carried::All | Carried::One(_, None) => middle(&self.grids[single]),
+            LoadDependentQuery::One(_, Some(value)) => vec![value],
+            LoadDependentQuery::All | LoadDependentQuery::One(_, None) => grid_middle(&self.grids[single]),
         };
         // Poses without answer were reported when the recordings were evaluated for the first time.
-        let made = carried(self.candidates, self.model, self.all, load, only, &tried);
+        let made = load_dependent_columns(self.candidates, self.model, self.all, load, only, &tried);
         let made = made.unwrap_or_default();
+        // From entries back to candidates of the problem.
         let place = |entry: usize| {
-            let is_its = |origin: &Origin| origin.as_ref().is_some_and(|(k, _)| *k == entry);
+            let is_its = |origin: &CandidateOrigin| origin.as_ref().is_some_and(|(k, _)| *k == entry);
             self.origins.iter().position(is_its)
         };
         made.into_iter()
@@ -213,77 +230,76 @@ impl Supply for Made<'_> {
     }
 }
 
-/// The middle of a grid: near enough to see whether anything is there, and no more columns to make than without a constant.
-fn middle(grid: &[f64]) -> Vec<f64> {
+/// The middle of a grid: close enough to detect an effect, at the cost of one value.
+fn grid_middle(grid: &[f64]) -> Vec<f64> {
     grid.get(grid.len() / 2).copied().into_iter().collect()
 }
 
 /// The problem in numbers, with all columns of the base.
+///
+/// Fails when all forces are zero, when samples are too few, or when a pose has no solution.
 fn problem(
-    candidates: &Candidates,
+    candidates: &DerivedCandidates,
     model: &Model,
-    all: &Runs<'_>,
-) -> Outcome<(Problem, columns::Made)> {
-    let measured = stack(all, |one| Ok(one.run.measured()?.to_vec()))?;
+    all: &SegmentList<'_>,
+) -> Outcome<(DiagnosisProblem, columns::CandidateColumns)> {
+    let measured = stack(all, |one| Ok(one.run.measured_forces()?.to_vec()))?;
+    // Forces that are all zero come from a recording without them.
     if measured.iter().flatten().all(|force| *force == 0.0) {
         let file = all.first().map(|(one, _)| one.run.file.as_str());
-        return Err(Error::input(nothing_measured(
-            file.unwrap_or("the recording"),
-        )));
+        return Err(Error::input(zero_force_message(file.unwrap_or("the recording"))));
     }
     for (one, _) in all {
         let samples = one.time().len();
-        if samples < FEWEST {
+        if samples < FEWEST_SAMPLES {
             return Err(Error::input(format!(
-                "{}: {} to be looked at, too few to tell effects from chance; give a longer recording or decimate less, \
-                 so that at least {FEWEST} are left",
+                "{}: {} after decimation, too few to distinguish effects from chance. Give a longer recording or decimate less: \
+                 at least {FEWEST_SAMPLES} are needed",
                 one.run.file,
                 count(samples, "sample is left", "samples are left"),
             )));
         }
     }
-    let mut made = columns::columns(candidates, model, all)?;
-    let undriven = model
-        .derivation
-        .mechanism
-        .drives
-        .iter()
-        .map(|drive| !drive.is_driven);
+    // The noise and the layout come from the recordings, the columns from the model.
+    let mut made = columns::candidate_columns(candidates, model, all)?;
+    // A row without drive whose force is zero has no noise and no friction.
+    let undriven = model.derivation.mechanism.drives.iter().map(|drive| !drive.is_driven);
     let idle = undriven
         .zip(&measured)
         .map(|(undriven, force)| undriven && force.iter().all(|f| *f == 0.0));
-    let problem = Problem {
+    let problem = DiagnosisProblem {
         layout: layout(model, all),
-        noise: noises(&measured, all)?,
+        noise: noise_levels(&measured, all)?,
         idle: idle.collect(),
-        measured: Column::new(measured),
-        base: regressor(all, &Evaluator::new(&model.derivation), model)?,
+        measured: ForceColumn::new(measured),
+        base: regressor(all, &ModelEvaluator::new(&model.derivation), model)?,
         candidates: std::mem::take(&mut made.candidates),
         base_is_part_of_load: (0..model.base.len()).map(|k| !model.is_effect(k)).collect(),
         friction: friction(model, all)?,
         variables: variables(model, all),
-        held: None,
-        ..Problem::default()
+        fixed_forces: None,
+        ..DiagnosisProblem::default()
     };
     Ok((problem, made))
 }
 
 /// Whether a base parameter keeps its nominal value.
-fn is_held(model: &Model, held: Held, k: usize) -> bool {
-    held == Held::All || model.is_known(k)
+fn is_fixed(model: &Model, held: FixedParameters, k: usize) -> bool {
+    held == FixedParameters::All || model.is_known(k)
 }
 
-/// Takes what is not free off the measured forces. What a fit knows to its own deviations stays in the base, and is expected
-/// to be off by no more than these.
-fn hold(problem: &mut Problem, model: &Model, held: Held) {
-    let is_held = |k: usize| is_held(model, held, k);
+/// Subtracts the forces of fixed parameters from the measured ones. Parameters of an earlier fit stay in the
+/// base, with their standard deviations as prior.
+fn fix_parameters(problem: &mut DiagnosisProblem, model: &Model, held: FixedParameters) {
+    let is_held = |k: usize| is_fixed(model, held, k);
     let fitted: Vec<usize> = (0..model.base.len())
-        .filter(|k| held == Held::All && !model.is_known(*k))
+        .filter(|k| held == FixedParameters::All && !model.is_known(*k))
         .collect();
     problem.prior = model.information(&fitted);
     let has_prior = problem.prior.is_some();
     let is_fitted = |k: usize| has_prior && fitted.contains(&k);
-    let mut known = Column(vec![None; model.drives().len()]);
+    // The force of fixed parameters is summed; columns of the others stay.
+    let mut known = ForceColumn(vec![None; model.drives().len()]);
     let (mut free, mut is_part_of_load) = (Vec::new(), Vec::new());
     for (k, column) in std::mem::take(&mut problem.base).into_iter().enumerate() {
         if is_held(k) {
@@ -294,13 +310,14 @@ fn hold(problem: &mut Problem, model: &Model, held: Held) {
             is_part_of_load.push(problem.base_is_part_of_load[k]);
         }
     }
+    // The columns of a tilt change with the base, and are split in the same way.
     for candidate in &mut problem.candidates {
-        if let Source::Tilt(tilt) = &mut candidate.source {
+        if let ColumnSource::Tilt(tilt) = &mut candidate.source {
             for change in &mut tilt.components {
                 let mut free = Vec::new();
                 for (k, column) in std::mem::take(&mut change.base).into_iter().enumerate() {
                     if is_held(k) {
-                        change.held.add(model.nominal[k], &column);
+                        change.fixed.add(model.nominal[k], &column);
                     } else {
                         free.push(column);
                     }
@@ -313,19 +330,22 @@ fn hold(problem: &mut Problem, model: &Model, held: Held) {
     problem.base_is_part_of_load = is_part_of_load;
     if !known.is_zero() {
         problem.measured.add(-1.0, &known);
-        problem.held = Some(known);
+        problem.fixed_forces = Some(known);
     }
 }
 
-/// Viscous and dry friction and an offset of every drive by itself.
-fn friction(model: &Model, all: &Runs<'_>) -> Outcome<Vec<Column>> {
+/// Columns of viscous friction, dry friction and an offset of every drive, in this order.
+///
+/// Fails when a pose has no solution.
+fn friction(model: &Model, all: &SegmentList<'_>) -> Outcome<Vec<ForceColumn>> {
     let rates = stack(all, |one| drive_rates(model, one))?;
     let mut friction = Vec::new();
     for (d, rate) in rates.iter().enumerate() {
+        // At exact standstill dry friction has no direction.
         let sign = |v: &f64| if *v == 0.0 { 0.0 } else { v.signum() };
         let signs = rate.iter().map(sign).collect();
         for values in [rate.clone(), signs, vec![1.0; rate.len()]] {
-            let mut column = Column(vec![None; rates.len()]);
+            let mut column = ForceColumn(vec![None; rates.len()]);
             column.0[d] = Some(values);
             friction.push(column);
         }
@@ -333,22 +353,25 @@ fn friction(model: &Model, all: &Runs<'_>) -> Outcome<Vec<Column>> {
     Ok(friction)
 }
 
-/// White noise of each force. Where few samples are kept motion passes for noise: it is no more than that of the recorded ones.
-fn noises(measured: &[Vec<f64>], all: &Runs<'_>) -> Outcome<Vec<f64>> {
+/// White noise of each force, N or N m. After decimation motion may look like noise, so the noise of all
+/// recorded samples bounds it.
+///
+/// Fails when a recording has no forces.
+fn noise_levels(measured: &[Vec<f64>], all: &SegmentList<'_>) -> Outcome<Vec<f64>> {
     let mut noises = Vec::with_capacity(measured.len());
     for (d, kept) in measured.iter().enumerate() {
         let mut recorded = Vec::new();
         for (one, _) in all {
-            recorded.extend_from_slice(&one.run.measured()?[d]);
+            recorded.extend_from_slice(&one.run.measured_forces()?[d]);
         }
         noises.push(noise(kept).min(noise(&recorded)));
     }
     Ok(noises)
 }
 
-/// White noise of a force, but not less than what rounding leaves of it.
+/// White noise of a force, at least the rounding of its numbers.
 fn noise(force: &[f64]) -> f64 {
     let squares = force.iter().map(|f| f * f).sum::<f64>();
     let size = (squares / force.len().max(1) as f64).sqrt();
-    white_noise(force).max(ROUNDING * size)
+    white_noise(force).max(FORCE_ROUNDING * size)
 }

@@ -1,34 +1,41 @@
-//! What forces change by with gravity along each axis of the base, for a base that may be tilted.
+//! Change of the forces with gravity along each axis of the base, for a base that may be tilted.
 
-use modelmill_codegen::{Derivation, Evaluator};
-use modelmill_identify::diagnose::{Column, Sensitivity, Tilt};
+use modelmill_codegen::{Derivation, ModelEvaluator};
+use modelmill_identify::diagnose::{ForceColumn, ForceSensitivity, TiltCandidate};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use crate::error::Outcome;
 use crate::model::Model;
 
-use crate::regressors::{Runs, regressor};
+use super::thresholds::TILT_LEAST_EFFECT;
+use crate::regressors::{SegmentList, regressor};
 
 /// Constants of a tilt, about x, y and z.
 pub(crate) const TILTS: [&str; 3] = ["tx", "ty", "tz"];
 
-/// What each base column changes by with gravity along each axis of the base, those of known parameters included, and the
-/// axes about which a tilt is felt. Gravity is turned into each axis, both ways: forces are linear in it.
-pub(crate) fn tilt(derivation: &Derivation, model: &Model, all: &Runs<'_>) -> Outcome<Tilt> {
+/// Derivative of each base column by gravity along each axis of the base (per m/s^2), and the axes about which
+/// a tilt has an effect. Forces are linear in gravity, so two evaluations for each axis, with gravity in both
+/// directions, are exact.
+///
+/// Fails when a pose has no solution.
+pub(crate) fn tilt(derivation: &Derivation, model: &Model, all: &SegmentList<'_>) -> Outcome<TiltCandidate> {
     let mechanism = &derivation.mechanism;
     let usual: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
     let gravity = model.gravity();
     let size = gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
-    let mut tilt = Tilt {
+    let mut tilt = TiltCandidate {
         gravity,
         axes: Vec::new(),
-        components: std::array::from_fn(|_| Sensitivity::default()),
+        components: std::array::from_fn(|_| ForceSensitivity::default()),
     };
+    // Without gravity a tilt has no effect.
     if size == 0.0 {
         return Ok(tilt);
     }
+    // The reduction of the model without tilt decides which columns are needed.
     let own = &model.derivation.reduction;
     for (axis, component) in tilt.components.iter_mut().enumerate() {
+        // The base is turned so that gravity points along the axis, in either direction.
         let along = |sign: f64| {
             let mut constants = usual.clone();
             let angles = angles_to(gravity.map(|g| sign * g / size), axis);
@@ -38,14 +45,11 @@ pub(crate) fn tilt(derivation: &Derivation, model: &Model, all: &Runs<'_>) -> Ou
                     constants[at] = angle;
                 }
             }
-            regressor(
-                all,
-                &Evaluator::with_constants(derivation, constants),
-                model,
-            )
+            regressor(all, &ModelEvaluator::with_constants(derivation, constants), model)
         };
+        // Half the difference of both directions is the part that changes with gravity.
         let [before, after] = [along(-1.0)?, along(1.0)?];
-        component.held = Column(vec![None; model.drives().len()]);
+        component.fixed = ForceColumn(vec![None; model.drives().len()]);
         // The base columns in the order of the model.
         for retained in &own.retained {
             let product = &own.products[*retained];
@@ -54,28 +58,30 @@ pub(crate) fn tilt(derivation: &Derivation, model: &Model, all: &Runs<'_>) -> Ou
                 .retained
                 .iter()
                 .position(|p| reduction.products[*p] == *product);
-            let mut change = Column(vec![None; model.drives().len()]);
+            let mut change = ForceColumn(vec![None; model.drives().len()]);
             if let Some(place) = place {
+                // The difference of both directions, per unit of gravity.
                 change.add(0.5 / size, &after[place]);
                 change.add(-0.5 / size, &before[place]);
             }
             component.base.push(change);
         }
     }
-    let every = Tilt {
+    // Only axes about which a tilt changes the forces are tried.
+    let every = TiltCandidate {
         axes: vec![0, 1, 2],
         ..tilt.clone()
     };
     for (axis, direction) in every.directions(&[0.0; 3]).into_iter().enumerate() {
-        let is_felt = (0..own.retained.len()).any(|k| {
-            let mut change = Column(vec![None; model.drives().len()]);
+        let has_effect = (0..own.retained.len()).any(|k| {
+            let mut change = ForceColumn(vec![None; model.drives().len()]);
             for (share, component) in direction.iter().zip(&tilt.components) {
                 change.add(*share, &component.base[k]);
             }
             let values = change.0.iter().flatten().flatten();
-            values.fold(0.0_f64, |m, x| m.max(x.abs())) > 1e-6
+            values.fold(0.0_f64, |m, x| m.max(x.abs())) > TILT_LEAST_EFFECT
         });
-        if is_felt {
+        if has_effect {
             tilt.axes.push(axis);
         }
     }
@@ -88,6 +94,7 @@ fn angles_to(direction: [f64; 3], axis: usize) -> [f64; 3] {
     // Any vector that is not along it completes the frame.
     let other = Vector3::ith(along.iamin(), 1.0);
     let next = along.cross(&other).normalize();
+    // The three vectors are the columns of a rotation.
     let mut turn = Matrix3::zeros();
     turn.set_column(axis, &along);
     turn.set_column((axis + 1) % 3, &next);

@@ -1,54 +1,56 @@
-//! What was found, in sentences.
+//! Sentences for people: verdict, effects with their places, disturbances, and reasons of rejection. Input are
+//! values of a diagnosis, output is English text without line breaks.
 
-use modelmill_identify::diagnose::{Diagnosis, Disturbance, Effect, Rung, Verdict};
+use modelmill_identify::diagnose::{
+    DiagnosisVerdict, Disturbance, FORCE_ROUNDING, LocatedEffect, ModelDiagnosis, SelectionStep,
+};
 
 use crate::audit::SUSPICIONS;
 use crate::text::table::{number, percent, significant};
-use modelmill_identify::diagnose::ROUNDING;
 
-/// Where more than this part of the error stays, figures of all drives say little.
-const HARDLY: f64 = 0.99;
+use super::thresholds::{HARDLY_LOWER, NOISE_FREE_ROUNDINGS};
 
-/// Where errors are judged.
+/// The data on which errors are evaluated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Judged {
-    /// On recordings that were kept for it.
+pub enum ValidationMethod {
+    /// Validation runs: recordings that were not fitted.
     Check,
-    /// On blocks of the fit that take turns.
+    /// Cross-validation: blocks of the fitted recordings, each left out of the fit in turn.
     CrossValidation,
 }
 
-impl Judged {
+impl ValidationMethod {
     /// For a sentence: `on ...`.
-    pub fn words(self) -> &'static str {
+    pub fn phrase(self) -> &'static str {
         match self {
-            Self::Check => "on the check run",
+            Self::Check => "on the validation run",
             Self::CrossValidation => "in cross-validation",
         }
     }
 
-    /// For a column.
-    pub fn short(self) -> &'static str {
+    /// The same as the head of a column.
+    pub fn label(self) -> &'static str {
         match self {
-            Self::Check => "check",
-            Self::CrossValidation => "cross",
+            Self::Check => "validation",
+            Self::CrossValidation => "cross-validation",
         }
     }
 }
 
-/// The name of a kind in words.
+/// The name of a kind in words: `coulomb friction` for `coulomb_friction`.
 pub fn kind(name: &str) -> String {
     name.replace('_', " ")
 }
 
-/// A kind with its places.
-pub fn effect(effect: &Effect) -> String {
+/// A kind with its places: `coulomb friction (a, b)`.
+pub fn effect(effect: &LocatedEffect) -> String {
     format!("{} ({})", kind(&effect.kind), effect.at.join(", "))
 }
 
-/// Effects in a row.
-pub fn effects(effects: &[Effect]) -> String {
+/// Effects as a list for a sentence: `x, y and z`.
+pub fn effects(effects: &[LocatedEffect]) -> String {
     let all: Vec<String> = effects.iter().map(effect).collect();
+    // The last effect is joined by `and`.
     match all.as_slice() {
         [] => "nothing".to_owned(),
         [one] => one.clone(),
@@ -56,54 +58,98 @@ pub fn effects(effects: &[Effect]) -> String {
     }
 }
 
-/// What a step of the ladder did.
-pub fn rung(rung: &Rung) -> String {
+/// The effects that a step of the selection added and dropped.
+pub fn rung(rung: &SelectionStep) -> String {
+    // The first step is the model of the file.
     if rung.added.is_empty() && rung.dropped.is_empty() {
-        return "the model as it is".to_owned();
+        return "the given model".to_owned();
     }
+    // Signs show what was added and what became unnecessary.
     let mut says = Vec::new();
     says.extend(rung.added.iter().map(|one| format!("+ {}", effect(one))));
     says.extend(rung.dropped.iter().map(|one| format!("− {}", effect(one))));
     says.join(" ")
 }
 
-/// What the errors are held against: the noise in the forces, or rounding where there is none.
-pub fn floor(diagnosis: &Diagnosis) -> String {
+/// Whether a noise floor, relative to the force, is no more than the rounding of the recorded numbers.
+fn is_rounding(noise_floor: f64) -> bool {
+    noise_floor <= NOISE_FREE_ROUNDINGS * FORCE_ROUNDING
+}
+
+/// The noise floor as a sentence; errors are compared with it.
+pub fn noise_floor_text(diagnosis: &ModelDiagnosis) -> String {
+    // Errors are compared with this figure.
     let floor = percent(Some(diagnosis.noise_floor));
-    if diagnosis.noise_floor <= 2.0 * ROUNDING {
-        format!("there is no noise in the forces, and what is below {floor} is rounding")
+    if is_rounding(diagnosis.noise_floor) {
+        format!("The forces are noise-free: errors below {floor} are rounding.")
     } else {
-        format!("the noise in the forces is {floor}")
+        format!("The noise is {floor} of the force.")
     }
 }
 
-/// The verdict with figures, what may be wrong with the input first of all, then success first: what was found, what is left and of which kind, what the recordings have besides.
-pub fn verdict(diagnosis: &Diagnosis, channels: &[String], judged: Judged) -> String {
-    let ladder = &diagnosis.ladder;
+/// The noise floor as a label: `noise in the forces`, or `rounding` if the forces are noise-free. `noise_floor`
+/// is relative to the force.
+pub fn floor_label(noise_floor: f64) -> &'static str {
+    if is_rounding(noise_floor) {
+        "rounding"
+    } else {
+        "noise in the forces"
+    }
+}
+
+/// Why a candidate was rejected, as a sentence for people; `reason` is the word of the search, and
+/// `has_effects` says whether the diagnosis found any effect. A reason without a sentence of its own is
+/// returned unchanged.
+pub fn refusal(reason: &str, has_effects: bool) -> &str {
+    match reason {
+        // Words of the search at the left, sentences at the right.
+        "sign" => "a parameter would have an impossible sign",
+        "explains nothing that is left" if has_effects => {
+            "redundant: it explains almost nothing in addition to the effects found"
+        }
+        "explains nothing that is left" => "explains almost none of the error",
+        "another explains more" => "another candidate explains more",
+        "what is left is rounding" => "only noise is left to explain",
+        "not supported by the check" => "not confirmed on the validation run",
+        "not supported by cross-validation" => "not confirmed by cross-validation",
+        "not worth its parameters" => "the gain is too small for its number of parameters",
+        "the model says it already" => "linearly dependent on the columns of the model",
+        "no finite value somewhere along the recordings" => "its formula has no finite value at some samples",
+        other => other,
+    }
+}
+
+/// The verdict with figures. The order of the sentences: what may be wrong with the recording or the model,
+/// which effects were found and how the error falls, which part of the residual stays unexplained, disturbances
+/// in the recordings.
+///
+/// `channels` are the names of the drives.
+pub fn verdict(diagnosis: &ModelDiagnosis, channels: &[String], judged: ValidationMethod) -> String {
+    let ladder = &diagnosis.steps;
+    // Without steps there is no verdict.
     let (Some(first), Some(last)) = (ladder.first(), ladder.last()) else {
         return String::new();
     };
-    let noise = floor(diagnosis);
-    let found: Vec<Effect> = diagnosis.effects.iter().map(|f| f.effect.clone()).collect();
-    let falls = falls(first, last, channels, judged);
+    let noise = noise_floor_text(diagnosis);
+    let found: Vec<LocatedEffect> = diagnosis.effects.iter().map(|f| f.effect.clone()).collect();
+    // The first step is the model as it is, the last one has all effects.
+    let falls = error_reduction_text(first, last, channels, judged);
     let them = if found.len() == 1 { "it" } else { "them" };
+    // Each verdict states the error and compares it with the noise.
     let says = match diagnosis.verdict {
-        Verdict::Adequate => format!(
-            "The model is adequate: it misses the forces by {} {}; {noise}. No effect of the library would lower that where it \
-             was not fitted.",
-            percent(Some(last.check)),
-            judged.words()
+        DiagnosisVerdict::Adequate => format!(
+            "The model is adequate: its error {} is {} of the force. {noise} No effect of the library lowers this error.",
+            judged.phrase(),
+            percent(Some(last.check))
         ),
-        Verdict::MissingEffect => format!(
-            "The model lacks {}. With {them} {falls}; {noise}.",
-            effects(&found)
-        ),
-        Verdict::Unexplained => {
-            let of = |d: &usize| 100.0 * diagnosis.reproducible[*d];
+        DiagnosisVerdict::MissingEffect => format!("The model lacks {}. With {them} {falls}. {noise}", effects(&found)),
+        DiagnosisVerdict::Unexplained => {
+            let of = |d: &usize| 100.0 * diagnosis.repeatable_share[*d];
+            // Drives with a residual that a model could explain.
             let sits: Vec<String> = (diagnosis.unexplained.iter())
                 .map(|d| {
                     format!(
-                        "{} ({:.0} % of what is left there comes again with the state)",
+                        "{} ({:.0} % of the squared residual is repeatable)",
                         channels[*d],
                         of(d)
                     )
@@ -112,68 +158,80 @@ pub fn verdict(diagnosis: &Diagnosis, channels: &[String], judged: Judged) -> St
             let sits = sits.join(" and ");
             if found.is_empty() {
                 format!(
-                    "Something is missing that no effect of the library explains, in {sits}. The model misses the forces by {} \
-                     {}; {noise}.",
-                    percent(Some(last.check)),
-                    judged.words()
+                    "The model lacks something that no effect of the library explains, on {sits}. The error {} is {} of the \
+                     force. {noise}",
+                    judged.phrase(),
+                    percent(Some(last.check))
                 )
             } else {
                 format!(
-                    "The model lacks {}: with {them} {falls}; {noise}. Something is left that no effect of the library \
-                     explains, in {sits}.",
+                    "The model lacks {}. With {them} {falls}. {noise} A part of the residual is not explained by any effect of \
+                     the library, on {sits}.",
                     effects(&found)
                 )
             }
         }
     };
-    let all = [first_of_all(diagnosis), Some(says), besides(diagnosis)];
+    // Suspicions come first, since they may make the verdict wrong.
+    let all = [first_checks(diagnosis), Some(says), disturbances(diagnosis)];
     all.into_iter().flatten().collect::<Vec<_>>().join(" ")
 }
 
-/// How the error falls: of all drives, or where that hardly does, of the drive whose error falls most, since the others hide it.
-fn falls(first: &Rung, last: &Rung, channels: &[String], judged: Judged) -> String {
+/// How the error falls: of all drives, or, if that hardly changes, of the drive whose error falls most. A small
+/// drive would otherwise be hidden by the others.
+fn error_reduction_text(
+    first: &SelectionStep,
+    last: &SelectionStep,
+    channels: &[String],
+    judged: ValidationMethod,
+) -> String {
     let pairs = first.check_by_channel.iter().zip(&last.check_by_channel);
+    // The drive whose error falls most, relative to its error before.
     let most = (channels.iter().zip(pairs)).min_by(|(_, a), (_, b)| {
         let share = |(before, after): &(&f64, &f64)| **after / before.max(f64::MIN_POSITIVE);
         share(a).total_cmp(&share(b))
     });
+    // The total is used unless it hides the drive.
     let (of, before, after) = match most {
-        Some((channel, (before, after))) if last.check > HARDLY * first.check && after < before => {
+        Some((channel, (before, after))) if last.check > HARDLY_LOWER * first.check && after < before => {
             (format!(" of {channel}"), *before, *after)
         }
         _ => (String::new(), first.check, last.check),
     };
     format!(
         "the error{of} {} falls from {} to {}",
-        judged.words(),
+        judged.phrase(),
         percent(Some(before)),
         percent(Some(after))
     )
 }
 
-/// What is to be cleared up before anything else is believed.
-fn first_of_all(diagnosis: &Diagnosis) -> Option<String> {
+/// Suspicions about the recording or the model, which must be checked before any effect is believed; `None`
+/// without any.
+fn first_checks(diagnosis: &ModelDiagnosis) -> Option<String> {
     let suspicions = (diagnosis.disturbances.iter()).filter(|one| is_suspicion(one));
-    let says: Vec<&str> = suspicions.filter_map(|one| one.says.as_deref()).collect();
+    let says: Vec<&str> = suspicions.filter_map(|one| one.description.as_deref()).collect();
     (!says.is_empty()).then(|| {
         format!(
-            "Look first at what may be wrong with the recording or the model: {}.",
+            "Check the recording and the model first: {}.",
             says.join("; ").replace('`', "")
         )
     })
 }
 
-/// Whether something is: until then no effect is worth adding.
-pub(crate) fn is_to_be_cleared_up(diagnosis: &Diagnosis) -> bool {
+/// Whether the recording or the model is in doubt. Until that is checked, no effect is worth adding.
+pub(crate) fn has_suspicion(diagnosis: &ModelDiagnosis) -> bool {
     diagnosis.disturbances.iter().any(is_suspicion)
 }
 
+/// Whether a disturbance is a fault that would make all findings invalid, such as exchanged columns.
 fn is_suspicion(one: &Disturbance) -> bool {
     SUSPICIONS.contains(&one.kind.as_str())
 }
 
-/// What the recordings have besides, by name.
-fn besides(diagnosis: &Diagnosis) -> Option<String> {
+/// Disturbances of the recordings by name, each kind once with all its places; `None` without any.
+fn disturbances(diagnosis: &ModelDiagnosis) -> Option<String> {
+    // Kinds in the order of their first disturbance.
     let mut kinds: Vec<(&str, Vec<&str>)> = Vec::new();
     for one in diagnosis.disturbances.iter().filter(|d| !is_suspicion(d)) {
         let places = one.at.iter().map(String::as_str);
@@ -185,7 +243,9 @@ fn besides(diagnosis: &Diagnosis) -> Option<String> {
     let named: Vec<String> = kinds
         .into_iter()
         .map(|(name, mut at)| {
+            // Places keep their order.
             let mut seen = std::collections::HashSet::new();
+            // A drive may have the same disturbance in several recordings.
             at.retain(|place| seen.insert(*place));
             match at.as_slice() {
                 [] => kind(name),
@@ -196,82 +256,80 @@ fn besides(diagnosis: &Diagnosis) -> Option<String> {
     let is_none = named.is_empty();
     (!is_none).then(|| {
         format!(
-            "The recordings have besides, and the model does not lack: {}.",
+            "Disturbances found in the recordings: {}. They are not model errors.",
             named.join(", ")
         )
     })
 }
 
-/// What a disturbance is, in a sentence.
+/// A disturbance as a sentence without the last full stop; sizes have units.
 pub fn disturbance(one: &Disturbance) -> String {
     let at = one.at.join(", ");
+    // The value of an estimate with its unit, rounded for a sentence.
     let value = |name: &str| {
         let found = one.estimates.iter().find(|value| value.name == name);
         found.map_or_else(String::new, |q| {
-            format!("{} {}", significant(q.value, 3), q.unit)
-                .trim_end()
-                .to_owned()
+            format!("{} {}", significant(q.value, 3), q.unit).trim_end().to_owned()
         })
     };
+    // All estimates with standard deviations, for kinds without a sentence of their own.
     let all: Vec<String> = (one.estimates.iter())
         .map(|q| {
-            let deviation = q.deviation;
-            let deviation =
-                deviation.map_or_else(String::new, |std| format!(" ± {}", significant(std, 2)));
+            let deviation = q.standard_deviation;
+            let deviation = deviation.map_or_else(String::new, |std| format!(" ± {}", significant(std, 2)));
             let said = format!("{} {}{deviation} {}", q.name, number(q.value), q.unit);
             said.trim_end().to_owned()
         })
         .collect();
     let all = all.join(", ");
     match one.kind.as_str() {
+        // Each kind says what it is and what follows for the model.
         "coloured_noise" => format!(
-            "the noise of {at} is {} and coloured, mostly below about {}; it does not come again with the state",
+            "{at} has slow noise of {}, mostly below about {}. It does not repeat when the machine passes the same state, so no model \
+             can explain it",
             value("noise"),
             value("corner")
         ),
-        "quantised_force" => format!("the force of {at} is read in steps of {}", value("step")),
+        "quantised_force" => format!("the measured force of {at} is quantised in steps of {}", value("step")),
         "outliers" => {
+            // The share of the samples has no unit.
             let share = one.estimates.iter().find(|value| value.name == "share");
             format!(
-                "outliers in {at}: {} of the samples, off by {} in the mean square; they count no more",
+                "{at} has outliers: {} of the samples, {} rms. The fit ignores them",
                 percent(share.map(|share| share.value)),
                 value("size")
             )
         }
         "periodic_in_time" => {
-            let frequencies = one
-                .estimates
-                .iter()
-                .filter(|value| value.name == "frequency");
+            // A hum may have several frequencies.
+            let frequencies = one.estimates.iter().filter(|value| value.name == "frequency");
             let frequencies: Vec<String> = frequencies
                 .map(|value| format!("{} Hz", significant(value.value, 4)))
                 .collect();
             format!(
-                "a hum of {} on {at} at {}: periodic in time, not in the state",
+                "{at} has hum of {} at {}: it is periodic in time and not a function of the state",
                 value("amplitude"),
                 frequencies.join(" and ")
             )
         }
-        "offset_drift" => format!("the zero of the force of {at} drifts in time: {all}"),
+        "offset_drift" => format!("the zero of the measured force of {at} drifts with time: {all}"),
         "friction_drift" => {
-            format!(
-                "the friction of {at} changes in the course of a recording, as it does in time when it warms up: {all}"
-            )
+            format!("the friction of {at} changes during a recording, as it does when a joint warms up: {all}")
         }
         "encoder_eccentricity" => format!(
-            "the encoder of {at} errs as an eccentric one does, {} times per turn: {all}",
+            "the encoder of {at} has the error of an eccentric disc, {} times per turn: {all}",
             value("times_per_turn")
         ),
         "different_runs" => {
-            format!("the friction of {at} differs from that of the values that are held: {all}")
+            format!("the friction of {at} differs from the fixed values of the model: {all}")
         }
-        "encoder_zero" => format!(
-            "the encoder of {at} reads too much throughout, as one with another zero than the model does: {all}"
-        ),
+        "encoder_zero" => {
+            format!("the encoder of {at} has a constant offset, since its zero differs from that of the model: {all}")
+        }
         "contact_event" => {
             let [from, to] = one.interval.unwrap_or_default();
             format!(
-                "a contact or push from {} to {} s of {}, on {at}: {all}; this time is left out",
+                "a contact or push from {} to {} s of {}, on {at}: {all}. The fit ignores this time",
                 significant(from, 4),
                 significant(to, 4),
                 one.recordings.join(", ")
@@ -281,10 +339,11 @@ pub fn disturbance(one: &Disturbance) -> String {
     }
 }
 
-/// Text in lines of some letters at most, broken between words.
+/// Text in lines of at most `letters` letters, broken between words; a longer word has a line of its own.
 pub fn lines(text: &str, letters: usize) -> Vec<String> {
     let mut lines: Vec<String> = vec![String::new()];
     for word in text.split_whitespace() {
+        // Words are appended to the last line as long as they fit.
         let line = lines.len() - 1;
         let line = &mut lines[line];
         if !line.is_empty() && line.chars().count() + 1 + word.chars().count() > letters {
@@ -299,14 +358,12 @@ pub fn lines(text: &str, letters: usize) -> Vec<String> {
     lines
 }
 
-/// What a kind of effect does that no library holds, in a sentence.
+/// The meaning of a kind of effect that is in no library, as a sentence; `None` for other kinds.
 pub(crate) fn meaning(kind: &str) -> Option<&'static str> {
     Some(match kind {
-        "drive_gain" => "The force is read 1 + gain times as large as it is.",
-        "force_lag" => {
-            "The force is read through a low-pass of first order with the time constant tau."
-        }
-        "dahl_friction" => "Dry friction that grows to its size over a length after each reversal.",
+        "drive_gain" => "The measured force is 1 + gain times the true force.",
+        "force_lag" => "The measured force is the true one after a first-order low-pass with time constant tau.",
+        "dahl_friction" => "Dry friction that builds up over a distance after each reversal.",
         _ => return None,
     })
 }

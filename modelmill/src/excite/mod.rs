@@ -1,5 +1,5 @@
-//! `excite`: the periodic trajectory that tells the base parameters apart best, eq. (14), (15) and (17), or that tells an
-//! effect from what it may be taken for.
+//! `excite`: the periodic trajectory that determines the base parameters best, eq. (14), (15) and (17), or that
+//! distinguishes an effect best from its alternatives.
 
 pub mod limits;
 pub mod plant;
@@ -8,39 +8,39 @@ mod separated;
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
-use modelmill_identify::Note;
+use modelmill_identify::RecordingNote;
 use modelmill_identify::excite::{
-    Excitation, Motion, Plant, excite, scaled_condition_number, steps,
+    ExcitationMotion, ExcitationPlant, ExcitationTrajectory, excite, max_progress_steps, scaled_condition_number,
 };
 
-use crate::diagnose::Named;
+use crate::diagnose::NamedEffect;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
-use crate::recording::Recording;
+use crate::recording::PreparedRecording;
 use crate::recording::free::free_bodies;
 use crate::text::csv::csv;
-use crate::text::svg::Figure;
+use crate::text::svg::SvgFigure;
 use crate::text::table::significant;
 
-pub use limits::Limit;
-pub use modelmill_identify::excite::{Criterion, Options};
+pub use limits::TrajectoryLimit;
+pub use modelmill_identify::excite::{ExcitationCriterion, Options};
 use plant::ModelPlant;
-pub use separated::Separated;
+pub use separated::SeparationResult;
 
-/// What is asked of an excitation; [`Request::default`] is the paper's, with samples at 500 Hz.
+/// A request for an excitation. [`ExcitationRequest::default`] has the settings of the paper, with samples at 500 Hz.
 #[derive(Clone, Debug)]
-pub struct Request {
-    /// The search: harmonics, period, criterion, how many trajectories are tried, seed.
+pub struct ExcitationRequest {
+    /// The search: harmonics, period, criterion, number of trajectories, seed.
     pub options: Options,
-    /// Samples per second of the trajectory, Hz.
+    /// Sampling rate of the trajectory, Hz.
     pub rate: f64,
-    /// Limits beside those of the model file, or in their place.
-    pub limits: Vec<Limit>,
-    /// Instead of exciting the base parameters, tell effects apart.
-    pub separate: Option<Separate>,
+    /// Limits in addition to those of the model file, or in their place.
+    pub limits: Vec<TrajectoryLimit>,
+    /// Effects to distinguish; if given, they are the goal of the search instead of the base parameters.
+    pub separate: Option<SeparationRequest>,
 }
 
-impl Default for Request {
+impl Default for ExcitationRequest {
     fn default() -> Self {
         Self {
             options: Options::default(),
@@ -51,63 +51,68 @@ impl Default for Request {
     }
 }
 
-/// Effects that are to be told apart.
+/// Effects that the motion must distinguish.
 #[derive(Clone, Debug)]
-pub struct Separate {
-    /// The effect that is to differ most, with values of its parameters and constants, SI units.
-    pub effect: Named,
-    /// What it may be taken for. Constants without a value are fitted like parameters.
-    pub from: Vec<Named>,
-    /// What is there in either case and the model file lacks.
-    pub beside: Vec<Named>,
-    /// Standard deviation of the noise in the forces, N or N m, against which the difference is held.
+pub struct SeparationRequest {
+    /// The effect whose force must differ most, with values of its parameters and constants, SI units.
+    pub effect: NamedEffect,
+    /// Its alternatives: effects with which it may be confused. Constants without a value are fitted like parameters.
+    pub from: Vec<NamedEffect>,
+    /// Effects that are present in both cases and missing in the model file.
+    pub common_effects: Vec<NamedEffect>,
+    /// Standard deviation of the noise in the forces, N or N m, as the scale of the difference.
     pub noise: Option<f64>,
 }
 
-/// A trajectory that was found.
-pub struct Excited {
-    /// What the JSON calls the model.
+/// The result of a search.
+pub struct ExcitationResult {
+    /// Name of the model in the JSON.
     pub model: String,
-    /// Coefficients, condition numbers, and how close the trajectory comes to its limits.
-    pub found: Excitation,
-    /// How it was searched for.
+    /// The trajectory: coefficients, condition numbers, and its distance from the limits.
+    pub found: ExcitationTrajectory,
+    /// The options of the search.
     pub options: Options,
-    /// By how much effects differ along it, where that was asked for.
-    pub separated: Option<Separated>,
-    /// Condition number with columns of equal norm.
+    /// The difference of the effects along it, if effects were to be distinguished.
+    pub separated: Option<SeparationResult>,
+    /// Condition number of the regressor with columns of equal norm; `None` if there is none.
     pub scaled: Option<f64>,
     /// Times of one period, s.
     pub time: Vec<f64>,
     /// Positions, rates and accelerations of the active coordinates at these times.
-    pub motion: Motion,
+    pub motion: ExcitationMotion,
     /// Names of the active coordinates, in their order.
     pub coordinates: Vec<String>,
     /// A picture of the trajectory (SVG).
     pub picture: String,
-    /// Remarks.
-    pub notes: Vec<Note>,
+    /// Notes on limits and effects.
+    pub notes: Vec<RecordingNote>,
 }
 
 impl Model {
-    /// Searches for the periodic trajectory within limits that tells the base parameters apart best, or effects; `recordings`
-    /// are compared with when effects are told apart, and give their size and the noise where these are not given.
+    /// Searches for the periodic trajectory within limits that determines the base parameters, or distinguishes
+    /// effects, best. `recordings` provide ranges of motion, and the size of the effect and the noise if these are
+    /// not given; the result is compared with them.
     ///
-    /// Fails when a coordinate has no limits, when no trajectory keeps them, or when no motion tells the effects apart.
-    pub fn excite(&self, request: &Request, recordings: &[&Recording]) -> Outcome<Excited> {
+    /// Fails when a coordinate has no limits, when no trajectory keeps them, or when no motion distinguishes the
+    /// effects.
+    pub fn excite(&self, request: &ExcitationRequest, recordings: &[&PreparedRecording]) -> Outcome<ExcitationResult> {
         if free_bodies(&self.derivation.mechanism).next().is_some() {
             return Err(Error::input(format!(
-                "{}: motion is planned for joints, and this model has a body that hangs on nothing; plan with the body held, \
-                 its frame fixed to the base",
+                "{}: motion is planned for joints, but this model has a free body; fix the body to the base and plan \
+                 the motion of the joints",
                 self.path
             )));
         }
+        // Options replace limits of the model file; recordings fill in what both leave open.
         let (all_limits, as_recorded) =
-            limits::with_recorded(self, limits::limits(self, &request.limits)?, recordings);
-        let coordinates = limits::of_active(self, &all_limits)?;
+            limits::with_recorded_ranges(self, limits::merged_limits(self, &request.limits)?, recordings);
+        let coordinates = limits::active_limits(self, &all_limits)?;
+        // The criterion of the options is replaced if effects are the goal.
         let mut options = request.options.clone();
         let plant = ModelPlant::new(self, &all_limits);
+        // Effects that no motion can distinguish are refused before the search.
         let asked = match &request.separate {
-            Some(asked) => Some(separated::ask(
+            Some(asked) => Some(separated::prepare_separation(
                 self,
                 &plant,
                 &coordinates,
@@ -120,64 +125,70 @@ impl Model {
         let of_asked = asked.iter().flat_map(|asked| asked.notes.clone());
         let notes = as_recorded.into_iter().chain(of_asked).collect();
         let separating = asked.as_ref().map(|asked| asked.plant(&plant, self));
+        // The goal of the search: effects, or else the unknown base parameters.
         if separating.is_some() {
-            options.criterion = Criterion::Separation;
+            options.criterion = ExcitationCriterion::Separation;
         } else if !plant.has_unknowns() {
             return Err(Error::input(format!(
                 "{}: no base parameter is unknown, so there is nothing to excite",
                 self.path
             )));
         }
-        let searched: &dyn Plant = match &separating {
+        let searched: &dyn ExcitationPlant = match &separating {
             Some(separating) => separating,
             None => &plant,
         };
+        // The search reports progress for each trajectory.
         let found = self
             .host()
-            .watched("searching for a trajectory", steps(&options), |job| {
+            .run_job("searching for a trajectory", max_progress_steps(&options), |job| {
                 excite(searched, &coordinates, &options, &|more| job.flow(more))
             })?
             .map_err(|error| Error::input(format!("{}: {error}", self.path)))?;
-        let samples = samples(request.rate, options.period);
-        let motion = Motion::sample(&found.series, samples);
+        let samples = samples_per_period(request.rate, options.period);
+        let motion = ExcitationMotion::sample(&found.series, samples);
         let time: Vec<f64> = (0..samples)
             // Picoseconds are enough, and 7.288 reads better than 7.287999999999999.
             .map(|i| (1e12 * i as f64 * options.period / samples as f64).round() / 1e12)
             .collect();
+        // The samples of the file decide how far the effects differ, not those of the search.
         let apart = match &separating {
             Some(separating) => {
-                let apart = separating.along(&motion, &separating.which);
+                let apart = separating.distance_along(&motion, &separating.which);
                 Some(apart.ok_or_else(|| too_slow(self, request.rate))?)
             }
             None => None,
         };
         drop(separating);
+        // The result keeps the task, for its texts.
         let separated = match (asked, apart) {
-            (Some(asked), Some(apart)) => Some(Separated {
-                apart,
-                random: (-found.first).exp(),
-                before: asked.before(self)?,
-                unit: separated::unit(self),
+            (Some(asked), Some(apart)) => Some(SeparationResult {
+                distance: apart,
+                random: (-found.start_value).exp(),
+                before: asked.distance_along_recordings(self)?,
+                unit: separated::common_force_unit(self),
                 drives: self.drives().len(),
                 samples,
-                asked,
+                task: asked,
             }),
             _ => None,
         };
+        // The title of the picture names the goal.
         let title = match &separated {
-            Some(separated) => format!("{}: tells {}", self.name, separated.asked.words()),
+            Some(separated) => format!("{}: separates {}", self.name, separated.task.description()),
             None => format!(
                 "{}: excitation with condition number {}",
                 self.name,
                 significant(found.condition_number, 4)
             ),
         };
+        // The scaled condition number is computed along the samples of the file.
         let scaled = plant
             .regressor(&motion)
             .filter(|w| w.ncols() > 0)
             .map(|w| scaled_condition_number(&w))
             .filter(|c| c.is_finite());
-        Ok(Excited {
+        Ok(ExcitationResult {
             model: self.name.clone(),
             picture: picture(self, &plant, &found, &title, &time, &motion),
             found,
@@ -186,23 +197,23 @@ impl Model {
             scaled,
             time,
             motion,
-            coordinates: self.active(),
+            coordinates: self.active_coordinates(),
             notes,
         })
     }
 }
 
-/// Why a rate of so many samples per second does not do.
+/// The error of a sampling rate that is too low to show the difference.
 fn too_slow(model: &Model, rate: f64) -> Error {
     Error::input(message!(
-        "{}: nothing is left of the difference at {rate} samples per second; give a higher rate ({})",
+        "{}: the difference of the effects is lost at {rate} samples per second; give a higher rate ({})",
         model.path,
         Remedy::option(OptionName::Rate)
     ))
 }
 
-/// Samples over one period.
-fn samples(rate: f64, period: f64) -> usize {
+/// Number of samples of one period, at least 1.
+fn samples_per_period(rate: f64, period: f64) -> usize {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -212,14 +223,10 @@ fn samples(rate: f64, period: f64) -> usize {
     samples.max(1)
 }
 
-impl Excited {
-    /// The trajectory as a recording without forces (CSV): `t`, positions, rates and accelerations.
+impl ExcitationResult {
+    /// The trajectory as a recording without forces (CSV): `t`, positions, rates and accelerations, SI units.
     pub fn csv(&self) -> String {
-        let motion = [
-            ("", &self.motion.q),
-            ("_d", &self.motion.qd),
-            ("_dd", &self.motion.qdd),
-        ];
+        let motion = [("", &self.motion.q), ("_d", &self.motion.qd), ("_dd", &self.motion.qdd)];
         let named: Vec<(String, &[f64])> = motion
             .iter()
             .flat_map(|(suffix, columns)| {
@@ -233,17 +240,19 @@ impl Excited {
     }
 }
 
-/// Positions around their means, rates, accelerations and the nominal model's forces.
+/// The picture of a trajectory (SVG): positions around their means, rates, accelerations and the nominal model's
+/// forces.
 fn picture(
     model: &Model,
     plant: &ModelPlant<'_>,
-    found: &Excitation,
+    found: &ExcitationTrajectory,
     title: &str,
     time: &[f64],
-    motion: &Motion,
+    motion: &ExcitationMotion,
 ) -> String {
-    let names = model.active();
-    let mut figure = Figure::new(title, time);
+    let names = model.active_coordinates();
+    let mut figure = SvgFigure::new(title, time);
+    // Positions are drawn around their means, which the title states.
     let around: Vec<Vec<f64>> = motion
         .q
         .iter()
@@ -255,6 +264,7 @@ fn picture(
         .zip(&found.series)
         .map(|(name, series)| format!("{name} {}", significant(series.offset, 4)))
         .collect();
+    // One panel for each kind of quantity, with one curve for each coordinate.
     let mut panel = |title: &str, columns: &[Vec<f64>], names: &[String]| {
         let curves: Vec<(&str, &[f64])> = names
             .iter()
@@ -263,30 +273,24 @@ fn picture(
             .collect();
         figure.panel(title, &curves);
     };
-    let motions = model.motions();
-    let unit = match motions.iter().filter(|(_, is_angle)| *is_angle).count() {
+    let active = model.active_coordinate_types();
+    let unit = match active.iter().filter(|(_, is_angle)| *is_angle).count() {
         0 => "m",
-        angles if angles == motions.len() => "rad",
+        angles if angles == active.len() => "rad",
         _ => "rad or m",
     };
     let title = format!("position around the mean ({}), {unit}", means.join(", "));
     panel(&title, &around, &names);
+    // Units of derivatives, also if coordinates have different units.
     let per = |seconds: &str| {
         unit.replace("rad", &format!("rad/{seconds}"))
             .replace('m', &format!("m/{seconds}"))
     };
     panel(&format!("rate, {}", per("s")), &motion.qd, &names);
-    panel(
-        &format!("acceleration, {}", per("s^2")),
-        &motion.qdd,
-        &names,
-    );
+    panel(&format!("acceleration, {}", per("s^2")), &motion.qdd, &names);
+    // Forces of the nominal model show whether the drives can follow.
     if let Some(forces) = plant.forces(motion) {
-        panel(
-            "force of the nominal model, N or N m",
-            &forces,
-            &model.drives(),
-        );
+        panel("force of the nominal model, N or N m", &forces, &model.drives());
     }
     figure.finish()
 }

@@ -1,80 +1,91 @@
-//! A model whose motion is to tell effects apart: an effect, what it may be taken for, and what is fitted in any case go
-//! in; along a motion or a recording comes out by how much they differ.
+//! Difference of effects along a motion. An effect, its alternatives, and the effects of both cases go in; their
+//! distance along a motion or a recording comes out.
 //!
-//! Columns come from where the diagnosis has them, so that kinds of one's own are told apart like all others.
+//! Columns are computed as the diagnosis computes them, so that kinds from the user's libraries are treated like all
+//! others.
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
-use modelmill_identify::diagnose::{Candidate, Choice, Column, Effect, Sign, white_noise};
-use modelmill_identify::excite::separate::{Question, Separation, fit, separation};
-use modelmill_identify::excite::{Motion, Plant};
-use modelmill_identify::{PreparedAs, Run};
+use modelmill_identify::diagnose::{
+    CandidateEffect, ColumnChoice, ForceColumn, LocatedEffect, SignConstraint, white_noise,
+};
+use modelmill_identify::excite::separate::{
+    SeparationMeasure, SeparationProblem, fit_coefficients, measure_separation,
+};
+use modelmill_identify::excite::{ExcitationMotion, ExcitationPlant};
+use modelmill_identify::{PreparationRecord, PreparedRun};
 use nalgebra::DMatrix;
 
 use crate::diagnose::words;
-use crate::diagnose::{Chosen, Constants, Named, base, choose};
+use crate::diagnose::{ChosenEffect, ConstantPolicy, NamedEffect, base_columns, derive_effect};
 use crate::error::{Error, Outcome};
 use crate::excite::plant::ModelPlant;
 use crate::model::Model;
-use crate::stretch::Stretch;
-use modelmill_identify::diagnose::ROUNDING;
+use crate::segment::RecordingSegment;
+use modelmill_identify::diagnose::FORCE_ROUNDING;
 
-/// What is to be told apart, derived.
-pub(crate) struct Pair {
-    /// The effect with its constants.
-    truth: Chosen,
-    /// The effect as it would be fitted, where constants of it are searched for.
-    fitted: Option<Chosen>,
-    /// What it may be taken for.
-    pub rivals: Vec<Rival>,
-    /// What is there in either case.
-    beside: Vec<Chosen>,
-    /// Values of the effect's parameters by symbol; of either sign if none is given.
+/// The effects to be distinguished, derived.
+pub(crate) struct SeparationSetup {
+    /// The effect with fixed constants.
+    truth: ChosenEffect,
+    /// The effect as it would be fitted, if constants of it are searched for.
+    fitted: Option<ChosenEffect>,
+    /// Its alternatives.
+    pub rivals: Vec<RivalEffect>,
+    /// Effects that are present in both cases.
+    common_effects: Vec<ChosenEffect>,
+    /// Values of the effect's parameters by symbol; without any, each parameter is 1 and may have either sign.
     sizes: Vec<(String, f64)>,
-    /// Noise of each drive's force; all alike if it is not known.
+    /// Noise of each drive's force, N or N m; `None` if unknown, which means equal.
     noise: Option<Vec<f64>>,
 }
 
-/// What an effect may be taken for.
-pub(crate) struct Rival {
-    chosen: Chosen,
-    /// Whether the effect holds it as a special case, so that nothing tells when the rival is true.
-    pub is_held: bool,
+/// An alternative of the effect.
+pub(crate) struct RivalEffect {
+    /// The alternative with its constants.
+    chosen: ChosenEffect,
+    /// Whether the alternative is a special case of the effect, so that forces cannot show that the alternative is
+    /// true.
+    pub is_special_case: bool,
 }
 
-impl Rival {
-    pub(crate) fn effect(&self) -> &Effect {
+impl RivalEffect {
+    /// Kind and places.
+    pub(crate) fn effect(&self) -> &LocatedEffect {
         &self.chosen.named.effect
     }
 }
 
-/// How far effects are apart along a motion.
+/// The distance of effects along a motion.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Apart {
-    pub figures: Separation,
-    /// The rival that is nearest, by its position, and its constants.
+pub struct EffectDistance {
+    /// Force of the effect and of its residuals, rms over all drives.
+    pub figures: SeparationMeasure,
+    /// Index of the nearest alternative.
     pub rival: usize,
+    /// Constants of the nearest alternative.
     pub constants: Vec<(String, f64)>,
-    /// The smaller of both directions that can be told at all.
+    /// The distance, rms over all drives, N or N m: the smaller of both directions, as far as these can be determined.
     pub force: f64,
 }
 
-impl Pair {
-    /// Derives what the command line names.
+impl SeparationSetup {
+    /// Derives the effects: the one to be distinguished, its alternatives `from`, and those that are present in both
+    /// cases.
+    ///
+    /// Fails when an effect is unknown or named twice.
     pub(crate) fn new(
         model: &Model,
-        separate: &Named,
-        from: &[Named],
-        beside: &[Named],
+        separate: &NamedEffect,
+        from: &[NamedEffect],
+        beside: &[NamedEffect],
     ) -> Outcome<Self> {
-        let all: Vec<&Named> = std::iter::once(separate)
-            .chain(from)
-            .chain(beside)
-            .collect();
+        // Each effect may be named once only.
+        let all: Vec<&NamedEffect> = std::iter::once(separate).chain(from).chain(beside).collect();
         for (k, one) in all.iter().enumerate() {
-            if all[..k].iter().any(|known| is_same(known, one)) {
+            if all[..k].iter().any(|known| is_same_effect(known, one)) {
                 return Err(Error::input(message!(
-                    "{} is named twice; {}, {} and {} take different effects",
+                    "{} is named twice; {}, {} and {} need different effects",
                     words::effect(&one.effect),
                     Remedy::option(OptionName::Separate),
                     Remedy::option(OptionName::From),
@@ -82,8 +93,10 @@ impl Pair {
                 )));
             }
         }
-        let choose = |named: &Named, constants: Constants| choose(model, named, constants);
-        let truth = choose(separate, Constants::Usual)?;
+        // Constants of alternatives are searched, those of other effects are fixed.
+        let choose = |named: &NamedEffect, constants: ConstantPolicy| derive_effect(model, named, constants);
+        let truth = choose(separate, ConstantPolicy::Usual)?;
+        // A tilt of the base has sizes for its angles, which are constants of its kind.
         let parameters = &truth.kind.parameters;
         let is_size = |symbol: &str| {
             truth.kind.mechanics == Some(modelmill_spec::Mechanics::Tilt)
@@ -92,10 +105,10 @@ impl Pair {
         let constants = &truth.kind.constants;
         let is_linear = |symbol: &str| {
             let mut of = constants.iter().filter(|c| c.symbol == symbol);
-            of.any(|c| c.search == Some(modelmill_spec::Search::Linear))
+            of.any(|c| c.search == Some(modelmill_spec::ConstantSearch::Linear))
         };
         let mut sizes: Vec<(String, f64)> = separate.values.clone();
-        // A constant beside which the effect is linear is found as a product with its parameter.
+        // A constant in which the effect is linear is estimated as a product with its parameter.
         for (symbol, value) in &separate.values {
             for (parameter, size) in &separate.values {
                 if is_linear(symbol) && is_size(parameter) {
@@ -104,82 +117,87 @@ impl Pair {
             }
         }
         sizes.retain(|(symbol, _)| is_size(symbol) || symbol.contains('*'));
-        let is_searched = |c: &modelmill_spec::KindConstant| {
-            matches!(c.search, Some(modelmill_spec::Search::Range { .. }))
-        };
-        let free = Named {
+        // An effect with searched constants is fitted over their ranges.
+        let is_searched =
+            |c: &modelmill_spec::KindConstant| matches!(c.search, Some(modelmill_spec::ConstantSearch::Range { .. }));
+        let free = NamedEffect {
             effect: separate.effect.clone(),
             values: Vec::new(),
         };
+        // A tilt has no searched constants.
         let is_tilt = truth.kind.mechanics == Some(modelmill_spec::Mechanics::Tilt);
         let fitted = (!is_tilt && truth.kind.constants.iter().any(is_searched))
-            .then(|| choose(&free, Constants::Searched))
+            .then(|| choose(&free, ConstantPolicy::Searched))
             .transpose()?;
+        // Whether an alternative is a special case is found later, along random motions.
         let rivals = from
             .iter()
             .map(|named| {
-                Ok(Rival {
-                    chosen: choose(named, Constants::Searched)?,
-                    is_held: false,
+                Ok(RivalEffect {
+                    chosen: choose(named, ConstantPolicy::Searched)?,
+                    is_special_case: false,
                 })
             })
-            .collect::<Outcome<Vec<Rival>>>()?;
+            .collect::<Outcome<Vec<RivalEffect>>>()?;
         let beside = beside
             .iter()
-            .map(|named| choose(named, Constants::Usual))
-            .collect::<Outcome<Vec<Chosen>>>()?;
+            .map(|named| choose(named, ConstantPolicy::Usual))
+            .collect::<Outcome<Vec<ChosenEffect>>>()?;
         Ok(Self {
             truth,
             fitted,
             rivals,
-            beside,
+            common_effects: beside,
             sizes,
             noise: None,
         })
     }
 
-    /// The effect that is to be told from the others.
-    pub(crate) fn effect(&self) -> &Effect {
+    /// The effect that is to be distinguished.
+    pub(crate) fn effect(&self) -> &LocatedEffect {
         &self.truth.named.effect
     }
 
-    /// Values of its parameters; none if they are not known.
+    /// Values of its parameters by symbol; empty if they are unknown.
     pub(crate) fn sizes(&self) -> &[(String, f64)] {
         &self.sizes
     }
 
-    /// Effects that are there in either case.
-    pub(crate) fn beside(&self) -> impl Iterator<Item = &Effect> {
-        self.beside.iter().map(|one| &one.named.effect)
+    /// Effects that are present in both cases.
+    pub(crate) fn common_effects(&self) -> impl Iterator<Item = &LocatedEffect> {
+        self.common_effects.iter().map(|one| &one.named.effect)
     }
 
-    /// One noise for all drives.
+    /// Sets the same noise for all drives, N or N m.
     pub(crate) fn set_noise(&mut self, size: f64, drives: usize) {
         self.noise = Some(vec![size; drives]);
     }
 
-    /// Noise of all drives together, if it is known.
+    /// The rms of the noise over all drives, N or N m, if it is known.
     pub(crate) fn noise(&self) -> Option<f64> {
         let noise = self.noise.as_ref()?;
         let squares: f64 = noise.iter().map(|n| n * n).sum();
         Some((squares / noise.len().max(1) as f64).sqrt())
     }
 
-    /// Takes from recordings what is not known: the noise, and the size of the effect by a fit beside the base.
-    pub(crate) fn learn(&mut self, model: &Model, data: &[Stretch]) -> Outcome {
+    /// Estimates from recordings what is not given: the noise, and the size of the effect by a fit together with the
+    /// base.
+    pub(crate) fn estimate_from_recordings(&mut self, model: &Model, data: &[RecordingSegment]) -> Outcome {
+        // Forces of all recordings are joined drive by drive.
         let mut measured: Vec<Vec<f64>> = Vec::new();
         for one in data {
-            let forces = crate::along::measured(one)?;
+            let forces = crate::along::measured_forces(one)?;
             measured.resize(forces.len(), Vec::new());
             for (whole, force) in measured.iter_mut().zip(forces) {
                 whole.extend(force);
             }
         }
+        // Noise below rounding of the forces is not possible.
         if self.noise.is_none() {
             let noise = |force: &Vec<f64>| {
                 let squares: f64 = force.iter().map(|f| f * f).sum();
                 let size = (squares / force.len().max(1) as f64).sqrt();
-                white_noise(force).max(ROUNDING * size)
+                white_noise(force).max(FORCE_ROUNDING * size)
             };
             let noise: Vec<f64> = measured.iter().map(noise).collect();
             self.noise = noise.iter().all(|n| *n > 0.0).then_some(noise);
@@ -187,19 +205,20 @@ impl Pair {
         if !self.sizes.is_empty() {
             return Ok(());
         }
-        let runs: Vec<(&Stretch, bool)> = data.iter().map(|one| (one, false)).collect();
+        // The size is fitted together with the base parameters, weighted by the noise.
+        let runs: Vec<(&RecordingSegment, bool)> = data.iter().map(|one| (one, false)).collect();
         let samples = measured.first().map_or(0, Vec::len);
-        let Some(terms) = self.terms(model, &runs)? else {
+        let Some(terms) = self.separation_columns(model, &runs)? else {
             return Ok(());
         };
         let weights = self.weights(model.drives().len());
-        // What is known is taken off.
-        let mut forces = Column::new(measured);
+        // The force of known parameters is subtracted.
+        let mut forces = ForceColumn::new(measured);
         forces.add(-1.0, &terms.known);
         let forces = matrix(&[forces], &weights, samples);
         let base = matrix(&terms.base, &weights, samples);
         let effect = matrix(&terms.truth.1, &weights, samples);
-        let found = fit(&base, &effect, forces.as_slice());
+        let found = fit_coefficients(&base, &effect, forces.as_slice());
         let found = &found[base.ncols()..];
         self.sizes = terms
             .truth
@@ -212,7 +231,7 @@ impl Pair {
         Ok(())
     }
 
-    /// Rows are divided by their noise relative to that of all.
+    /// Weights of the rows of each drive: the mean noise divided by its own.
     fn weights(&self, drives: usize) -> Vec<f64> {
         match (&self.noise, self.noise()) {
             (Some(noise), Some(all)) => noise.iter().map(|n| all / n).collect(),
@@ -220,13 +239,18 @@ impl Pair {
         }
     }
 
-    /// Columns along recordings; `None` if the effect has none.
-    fn terms(&self, model: &Model, runs: &[(&Stretch, bool)]) -> Outcome<Option<Terms>> {
-        let (mut columns, load, known) = base(model, runs)?;
+    /// Columns of all effects along segments; `None` if the effect has no force there.
+    fn separation_columns(
+        &self,
+        model: &Model,
+        runs: &[(&RecordingSegment, bool)],
+    ) -> Outcome<Option<SeparationColumns>> {
+        let (mut columns, load, known) = base_columns(model, runs)?;
         let Some((candidate, choices)) = self.truth.candidate(model, runs, &load)? else {
             return Ok(None);
         };
-        for one in &self.beside {
+        // Effects of both cases are fitted like base parameters.
+        for one in &self.common_effects {
             if let Some((_, choices)) = one.candidate(model, runs, &load)? {
                 columns.extend(choices.into_iter().flat_map(|choice| choice.columns));
             }
@@ -234,7 +258,7 @@ impl Pair {
         let Some(truth) = choices.into_iter().next() else {
             return Ok(None);
         };
-        Ok(Some(Terms {
+        Ok(Some(SeparationColumns {
             base: columns,
             load,
             known,
@@ -242,21 +266,22 @@ impl Pair {
         }))
     }
 
-    /// How far the effects are apart along recordings, from the rivals of some positions; `None` if the effect has no force
-    /// there.
-    pub(crate) fn along(
+    /// The distance of the effects along segments, for the alternatives with the indices `which`; `None` if the
+    /// effect has no force there.
+    pub(crate) fn distance_along(
         &self,
         model: &Model,
-        data: &[Stretch],
+        data: &[RecordingSegment],
         which: &[usize],
-    ) -> Outcome<Option<Apart>> {
-        let runs: Vec<(&Stretch, bool)> = data.iter().map(|one| (one, false)).collect();
+    ) -> Outcome<Option<EffectDistance>> {
+        let runs: Vec<(&RecordingSegment, bool)> = data.iter().map(|one| (one, false)).collect();
         let samples: usize = data.iter().map(|one| one.time().len()).sum();
-        let Some(terms) = self.terms(model, &runs)? else {
+        let Some(terms) = self.separation_columns(model, &runs)? else {
             return Ok(None);
         };
         let weights = self.weights(model.drives().len());
-        let of = |columns: &[Column]| matrix(columns, &weights, samples);
+        // All columns become matrices with weighted rows.
+        let of = |columns: &[ForceColumn]| matrix(columns, &weights, samples);
         let (candidate, columns) = &terms.truth;
         let fitted = match &self.fitted {
             Some(fitted) => fitted.candidate(model, &runs, &terms.load)?,
@@ -266,15 +291,16 @@ impl Pair {
             Some((_, choices)) => choices.iter().map(|c| of(&c.columns)).collect(),
             None => vec![of(columns)],
         };
+        // An alternative with searched constants has one column set for each choice.
         let mut owners: Vec<(usize, Vec<(String, f64)>)> = Vec::new();
         let mut rivals = Vec::new();
         for k in which {
             let rival = &self.rivals[*k].chosen;
             let found = rival.candidate(model, &runs, &terms.load)?;
-            // What has no effect mimics nothing.
+            // An alternative without force explains nothing.
             let choices = found.map_or_else(
                 || {
-                    vec![Choice {
+                    vec![ColumnChoice {
                         constants: Vec::new(),
                         columns: Vec::new(),
                     }]
@@ -286,20 +312,21 @@ impl Pair {
                 owners.push((*k, choice.constants));
             }
         }
-        let figures = separation(&Question {
+        let figures = measure_separation(&SeparationProblem {
             base: of(&terms.base),
             effect: self.force(candidate, &of(columns)),
             fitted,
             rivals,
         });
+        // A special case is distinguished in one direction only.
         Ok(figures.map(|figures| {
             let (rival, constants) = owners[figures.rival].clone();
-            let force = if self.rivals[rival].is_held {
-                figures.left
+            let force = if self.rivals[rival].is_special_case {
+                figures.residual
             } else {
-                figures.left.min(figures.reverse)
+                figures.residual.min(figures.reverse_residual)
             };
-            Apart {
+            EffectDistance {
                 figures,
                 rival,
                 constants,
@@ -308,32 +335,28 @@ impl Pair {
         }))
     }
 
-    /// The effect's force: its columns times their values, or each by itself in units where no value is known.
-    fn force(&self, candidate: &Candidate, columns: &DMatrix<f64>) -> DMatrix<f64> {
+    /// The effect's force: its columns times their values, or each column in its own unit if no value is known.
+    fn force(&self, candidate: &CandidateEffect, columns: &DMatrix<f64>) -> DMatrix<f64> {
         if self.sizes.is_empty() {
             return columns.clone();
         }
+        // Products of parameters have their own size.
         let value = |symbol: &str| {
             let known = self.sizes.iter().find(|(known, _)| known == symbol);
             known.map_or(0.0, |(_, value)| *value)
         };
-        let values: Vec<f64> = (candidate.parameters.iter())
-            .map(|p| value(&p.symbol))
-            .collect();
+        let values: Vec<f64> = (candidate.parameters.iter()).map(|p| value(&p.symbol)).collect();
         columns * DMatrix::from_column_slice(values.len(), 1, &values)
     }
 
-    /// Parameters whose values are of a sign that makes no sense.
+    /// Symbols of parameters whose values have an impossible sign.
     pub(crate) fn wrong_signs(&self) -> Vec<&str> {
         let wrong = |symbol: &str, value: f64| {
             let parameter = self.truth.kind.parameters.iter();
-            let sign = parameter
-                .filter(|p| p.symbol == symbol)
-                .map(|p| p.sign)
-                .next();
+            let sign = parameter.filter(|p| p.symbol == symbol).map(|p| p.sign).next();
             match sign.map(crate::diagnose::sign) {
-                Some(Sign::Positive) => value < 0.0,
-                Some(Sign::Negative) => value > 0.0,
+                Some(SignConstraint::Positive) => value < 0.0,
+                Some(SignConstraint::Negative) => value > 0.0,
                 _ => false,
             }
         };
@@ -344,40 +367,38 @@ impl Pair {
             .collect()
     }
 
-    /// Whether any force of an effect follows from nominal values.
+    /// Whether the force of any effect is computed from nominal values.
     pub(crate) fn needs_nominal(&self) -> bool {
         let rivals = self.rivals.iter().map(|rival| &rival.chosen);
         std::iter::once(&self.truth)
             .chain(rivals)
-            .chain(&self.beside)
-            .any(Chosen::needs_nominal)
+            .chain(&self.common_effects)
+            .any(ChosenEffect::needs_nominal)
     }
 }
 
-/// Whether both are one effect at the same places.
-fn is_same(one: &Named, other: &Named) -> bool {
+/// Whether both effects have the same kind and the same places, in any order.
+fn is_same_effect(one: &NamedEffect, other: &NamedEffect) -> bool {
     one.effect.kind == other.effect.kind
         && one.effect.at.len() == other.effect.at.len()
-        && one
-            .effect
-            .at
-            .iter()
-            .all(|place| other.effect.at.contains(place))
+        && one.effect.at.iter().all(|place| other.effect.at.contains(place))
 }
 
-/// Columns of a pair.
-struct Terms {
-    /// Of all that is fitted in any case.
-    base: Vec<Column>,
-    /// What the drives carry.
-    load: Column,
-    /// What the model's known parameters say.
-    known: Column,
-    truth: (Candidate, Vec<Column>),
+/// Columns of the effects along segments.
+struct SeparationColumns {
+    /// Columns of base parameters and of effects that are present in both cases.
+    base: Vec<ForceColumn>,
+    /// Load of the drives.
+    load: ForceColumn,
+    /// Force of the known parameters.
+    known: ForceColumn,
+    /// The effect and its columns.
+    truth: (CandidateEffect, Vec<ForceColumn>),
 }
 
-/// Columns with one drive below the other.
-fn matrix(columns: &[Column], weights: &[f64], samples: usize) -> DMatrix<f64> {
+/// Columns as a matrix, drive by drive, each drive multiplied by its weight.
+fn matrix(columns: &[ForceColumn], weights: &[f64], samples: usize) -> DMatrix<f64> {
+    // Drives are stacked below each other; a drive without force stays zero.
     let mut matrix = DMatrix::zeros(weights.len() * samples, columns.len());
     for (k, column) in columns.iter().enumerate() {
         for (d, (values, weight)) in column.0.iter().zip(weights).enumerate() {
@@ -391,49 +412,50 @@ fn matrix(columns: &[Column], weights: &[f64], samples: usize) -> DMatrix<f64> {
     matrix
 }
 
-/// A model with limits whose motion tells effects apart.
+/// A model with limits for the search of a motion that distinguishes effects.
 pub(crate) struct SeparatingPlant<'a> {
+    /// The model with its limits.
     pub inner: &'a ModelPlant<'a>,
+    /// The same model.
     pub model: &'a Model,
-    pub pair: &'a Pair,
-    /// Rivals that can be told apart at all.
+    /// The effects.
+    pub pair: &'a SeparationSetup,
+    /// Indices of the alternatives that can be distinguished.
     pub which: Vec<usize>,
 }
 
 impl SeparatingPlant<'_> {
-    /// How far the effects are apart along a motion.
-    pub(crate) fn along(&self, motion: &Motion, which: &[usize]) -> Option<Apart> {
+    /// The distance of the effects along a motion; `None` if a pose has no solution or the effect has no force.
+    pub(crate) fn distance_along(&self, motion: &ExcitationMotion, which: &[usize]) -> Option<EffectDistance> {
         let data = [recording(self.inner, motion)?];
-        self.pair.along(self.model, &data, which).ok()?
+        self.pair.distance_along(self.model, &data, which).ok()?
     }
 }
 
-impl Plant for SeparatingPlant<'_> {
-    fn regressor(&self, motion: &Motion) -> Option<DMatrix<f64>> {
-        // Without anything to find there is no condition.
-        self.inner
-            .regressor(motion)
-            .filter(|matrix| matrix.ncols() > 0)
+impl ExcitationPlant for SeparatingPlant<'_> {
+    fn regressor(&self, motion: &ExcitationMotion) -> Option<DMatrix<f64>> {
+        // Without unknown base parameters there is no condition number.
+        self.inner.regressor(motion).filter(|matrix| matrix.ncols() > 0)
     }
 
     fn limits(&self) -> Vec<String> {
         self.inner.limits()
     }
 
-    fn excess(&self, motion: &Motion) -> Option<Vec<Vec<f64>>> {
+    fn excess(&self, motion: &ExcitationMotion) -> Option<Vec<Vec<f64>>> {
         self.inner.excess(motion)
     }
 
-    fn apart(&self, motion: &Motion) -> Option<f64> {
-        self.along(motion, &self.which).map(|apart| apart.force)
+    fn separation(&self, motion: &ExcitationMotion) -> Option<f64> {
+        self.distance_along(motion, &self.which).map(|apart| apart.force)
     }
 }
 
-/// A motion as a recording with the forces of the nominal model.
-fn recording(plant: &ModelPlant<'_>, motion: &Motion) -> Option<Stretch> {
+/// A motion as a segment with the forces of the nominal model.
+fn recording(plant: &ModelPlant<'_>, motion: &ExcitationMotion) -> Option<RecordingSegment> {
     let samples = motion.q.first().map_or(0, Vec::len);
-    Some(Stretch {
-        run: Run {
+    Some(RecordingSegment {
+        run: PreparedRun {
             file: "the trajectory".to_owned(),
             time: (0..samples).map(|i| i as f64).collect(),
             q: motion.q.clone(),
@@ -443,10 +465,10 @@ fn recording(plant: &ModelPlant<'_>, motion: &Motion) -> Option<Stretch> {
             missing_force: Vec::new(),
             left_out: Vec::new(),
             lines: Vec::new(),
-            repeats: None,
-            prepared: PreparedAs {
+            repeatability: None,
+            prepared: PreparationRecord {
                 decimate: 1,
-                ..PreparedAs::default()
+                ..PreparationRecord::default()
             },
             notes: Vec::new(),
         },

@@ -1,93 +1,100 @@
-//! Telling effects apart: which effects can be told apart at all, by how much along the trajectory, and how
-//! many samples that takes.
+//! Planning of motions that distinguish effects: which effects can be distinguished at all, how much they differ
+//! along the trajectory, and how many samples that needs.
 
 use std::fmt::Write as _;
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{Message, OptionName, Remedy, RemedySpelling};
-use modelmill_identify::Note;
-use modelmill_identify::diagnose::Effect;
-use modelmill_identify::excite::{CoordinateLimits, Options, random_motions};
-use modelmill_spec::Carries;
+use modelmill_identify::RecordingNote;
+use modelmill_identify::diagnose::LocatedEffect;
+use modelmill_identify::excite::{ExcitationLimits, Options, random_motions};
+use modelmill_spec::PlaceLoad;
 use serde_json::{Map, Value, json};
 
 use crate::diagnose::words;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
-use crate::recording::{self, Recording};
-use crate::stretch::Stretch;
-use crate::text::table::{Align, count, significant, table};
+use crate::recording::{self, PreparedRecording};
+use crate::segment::RecordingSegment;
+use crate::text::table::{ColumnAlignment, count, significant, table};
 
-use super::Separate;
+use super::SeparationRequest;
 use super::plant::ModelPlant;
-use super::separate::{Apart, Pair, SeparatingPlant};
+use super::separate::{EffectDistance, SeparatingPlant, SeparationSetup};
 
-/// Motions that are looked at before the search, for what no motion can tell.
+/// Number of random motions before the search, to detect effects that no motion can distinguish.
 const LOOKED_AT: usize = 24;
-/// A difference is plain from this many standard deviations on, all samples taken together. `diagnose` calls effects
+/// A difference is clear from this many standard deviations on, over all samples. `diagnose` calls effects
 /// indistinguishable below three.
 const PLAIN: f64 = 5.0;
 
-/// Effects that are to be told apart, ready for the search.
-pub(crate) struct Asked {
-    pub(crate) pair: Pair,
-    /// Recordings to compare with.
-    data: Vec<Stretch>,
-    /// Rivals that can be told apart at all.
+/// Effects to be distinguished, prepared for the search.
+pub(crate) struct SeparationTask {
+    /// The effects.
+    pub(crate) pair: SeparationSetup,
+    /// Segments of the recordings for comparison.
+    data: Vec<RecordingSegment>,
+    /// Indices of the alternatives that can be distinguished.
     pub(crate) which: Vec<usize>,
-    /// Remarks.
-    pub(crate) notes: Vec<Note>,
+    /// Notes on the effects.
+    pub(crate) notes: Vec<RecordingNote>,
 }
 
-/// By how much effects differ along a trajectory.
-pub struct Separated {
+/// The difference of effects along a trajectory.
+pub struct SeparationResult {
     /// The effects.
-    pub(crate) asked: Asked,
-    /// Along the trajectory, with the samples of the file.
-    pub apart: Apart,
-    /// Along the best of the random trajectories.
+    pub(crate) task: SeparationTask,
+    /// Along the trajectory, with the samples of its file.
+    pub distance: EffectDistance,
+    /// The distance along the best of the random trajectories, N or N m.
     pub random: f64,
-    /// Along the recordings that were given.
-    pub before: Option<Apart>,
-    /// What forces are measured in.
+    /// Along the given recordings; `None` without any.
+    pub before: Option<EffectDistance>,
+    /// Unit of the forces.
     pub unit: &'static str,
-    /// How many drives there are.
+    /// Number of drives.
     pub drives: usize,
-    /// Samples of one period.
+    /// Number of samples of one period.
     pub samples: usize,
 }
 
-/// Derives what is asked and looks at random motions for what cannot be told at all.
-pub(crate) fn ask(
+/// Derives the requested effects, and evaluates random motions to find alternatives that cannot be distinguished.
+///
+/// Fails when the effect has no force, when base parameters absorb it, or when no alternative can
+/// be distinguished.
+pub(crate) fn prepare_separation(
     model: &Model,
     plant: &ModelPlant<'_>,
-    limits: &[CoordinateLimits],
+    limits: &[ExcitationLimits],
     options: &Options,
-    asked: &Separate,
-    recordings: &[&Recording],
-) -> Outcome<Asked> {
+    asked: &SeparationRequest,
+    recordings: &[&PreparedRecording],
+) -> Outcome<SeparationTask> {
     let mut notes = Vec::new();
-    // Whoever watches hears a remark even where there is no answer in the end.
-    let mut note = |note: Note| {
+    // The listener receives a note even if there is no result in the end.
+    let mut note = |note: RecordingNote| {
         model.host().note(&note);
         notes.push(note);
     };
-    let mut pair = Pair::new(model, &asked.effect, &asked.from, &asked.beside)?;
+    // Values, noise and recordings of the request.
+    let mut pair = SeparationSetup::new(model, &asked.effect, &asked.from, &asked.common_effects)?;
     if let Some(size) = asked.noise {
         pair.set_noise(size, model.drives().len());
     }
-    let [data, _] = recording::stretches(model, recordings, &[]);
+    let [data, _] = recording::segments(model, recordings, &[]);
     if !data.is_empty() {
-        pair.learn(model, &data)?;
+        pair.estimate_from_recordings(model, &data)?;
     }
     if let [first, ..] = pair.wrong_signs()[..] {
-        note(Note::warning(format!(
-            "the value of `{first}` has a sign that makes no sense for `{}`",
+        note(RecordingNote::warning(format!(
+            "the value of `{first}` has a sign that is not possible for `{}`",
             pair.effect().kind
         )));
     }
+    // A difference that no random motion shows is taken as impossible.
     let motions = random_motions(plant, limits, options, LOOKED_AT)
         .map_err(|error| Error::input(format!("{}: {error}", model.path)))?;
+    // Each alternative is tested alone along all random motions.
     let mut which = Vec::new();
     for k in 0..pair.rivals.len() {
         let probe = SeparatingPlant {
@@ -96,14 +103,12 @@ pub(crate) fn ask(
             pair: &pair,
             which: vec![k],
         };
-        let all: Vec<Apart> = motions
-            .iter()
-            .filter_map(|m| probe.along(m, &[k]))
-            .collect();
+        let all: Vec<EffectDistance> = motions.iter().filter_map(|m| probe.distance_along(m, &[k])).collect();
+        // An effect without force anywhere has missing nominal values, or is not in the load path.
         let name = words::effect(pair.effect());
         if all.is_empty() {
             let why = if pair.needs_nominal() {
-                "; its force follows from nominal values, which the model file must give"
+                "; its force is computed from nominal values, which the model file must give"
             } else {
                 ""
             };
@@ -112,19 +117,21 @@ pub(crate) fn ask(
                 model.path
             )));
         }
+        // What base parameters absorb along every motion cannot be found by any experiment.
         if all.iter().all(|one| one.figures.is_in_base()) {
             return Err(Error::input(format!(
-                "{}: base parameters take up {name} along every motion, so that no experiment finds it; it shows only as \
-                 values that are off their nominal ones",
+                "{}: base parameters absorb {name} along every motion, so that no experiment finds it; it appears only as \
+                 values that differ from the nominal ones",
                 model.path
             )));
         }
+        // An alternative that reproduces the effect along every motion is left out.
         if all.iter().all(|one| one.figures.is_mimicked()) {
             let rival = words::effect(pair.rivals[k].effect());
-            note(Note::warning(message!(
-                "no motion tells {name} from {rival}, which can say all that it says beside the base parameters{}; it is left \
-                 out",
-                if pair.beside().next().is_some() {
+            note(RecordingNote::warning(message!(
+                "no motion distinguishes {name} from {rival}, which explains the same forces together with the base parameters{}; \
+                 it is left out",
+                if pair.common_effects().next().is_some() {
                     message!(" and the effects of {}", Remedy::option(OptionName::Beside))
                 } else {
                     Message::new()
@@ -132,25 +139,21 @@ pub(crate) fn ask(
             )));
             continue;
         }
-        pair.rivals[k].is_held = all.iter().all(|one| one.figures.holds_rival());
+        // If the effect explains the alternative along every motion, only one direction counts.
+        pair.rivals[k].is_special_case = all.iter().all(|one| one.figures.can_explain_rival());
         which.push(k);
     }
+    // Without any alternative left there is no goal for the search.
     if which.is_empty() {
         return Err(Error::input(format!(
-            "{}: no experiment tells {} from {}; the simpler one is right until something else than forces speaks. Where \
-             only some values of the effect are the same, give others (NAME=VALUE behind a colon)",
+            "{}: no experiment distinguishes {} from {}; assume the simpler one unless other evidence contradicts it. If only \
+             some values of the effect are equivalent, give others (NAME=VALUE after a colon)",
             model.path,
             words::effect(pair.effect()),
-            words::effects(
-                &pair
-                    .rivals
-                    .iter()
-                    .map(|r| r.effect().clone())
-                    .collect::<Vec<_>>()
-            ),
+            words::effects(&pair.rivals.iter().map(|r| r.effect().clone()).collect::<Vec<_>>()),
         )));
     }
-    Ok(Asked {
+    Ok(SeparationTask {
         pair,
         data,
         which,
@@ -158,13 +161,9 @@ pub(crate) fn ask(
     })
 }
 
-impl Asked {
-    /// The plant for the search.
-    pub(crate) fn plant<'a>(
-        &'a self,
-        inner: &'a ModelPlant<'a>,
-        model: &'a Model,
-    ) -> SeparatingPlant<'a> {
+impl SeparationTask {
+    /// The model for the search.
+    pub(crate) fn plant<'a>(&'a self, inner: &'a ModelPlant<'a>, model: &'a Model) -> SeparatingPlant<'a> {
         SeparatingPlant {
             inner,
             model,
@@ -173,26 +172,27 @@ impl Asked {
         }
     }
 
-    /// How far the effects are apart along the recordings.
-    pub(crate) fn before(&self, model: &Model) -> Outcome<Option<Apart>> {
+    /// The distance of the effects along the recordings; `None` without recordings.
+    pub(crate) fn distance_along_recordings(&self, model: &Model) -> Outcome<Option<EffectDistance>> {
         if self.data.is_empty() {
             return Ok(None);
         }
-        self.pair.along(model, &self.data, &self.which)
+        self.pair.distance_along(model, &self.data, &self.which)
     }
 
-    /// Samples of the recordings.
+    /// Number of samples of the recordings.
     fn samples(&self) -> usize {
         self.data.iter().map(|one| one.time().len()).sum()
     }
 
-    fn rivals(&self) -> Vec<Effect> {
+    /// The alternatives that can be distinguished.
+    fn rivals(&self) -> Vec<LocatedEffect> {
         let of = |k: &usize| self.pair.rivals[*k].effect().clone();
         self.which.iter().map(of).collect()
     }
 
-    /// Both sides in words.
-    pub(crate) fn words(&self) -> String {
+    /// The effect and its alternatives as text.
+    pub(crate) fn description(&self) -> String {
         format!(
             "{} from {}",
             words::effect(self.pair.effect()),
@@ -201,14 +201,15 @@ impl Asked {
     }
 }
 
-/// What forces of a model are measured in.
-pub(crate) fn unit(model: &Model) -> &'static str {
+/// Unit of the forces of a model, or of both kinds.
+pub(crate) fn common_force_unit(model: &Model) -> &'static str {
     let mechanism = &model.derivation.mechanism;
-    let carries = |drive: &modelmill_spec::Drive| drive.kind.carries(&mechanism.coordinates);
+    let carries = |drive: &modelmill_spec::ModelDrive| drive.kind.place_load(&mechanism.coordinates);
+    // The unit is common only if all drives have it.
     let forces = mechanism
         .drives
         .iter()
-        .filter(|drive| carries(drive) == Carries::Force)
+        .filter(|drive| carries(drive) == PlaceLoad::Force)
         .count();
     match forces {
         0 => "N m",
@@ -217,32 +218,34 @@ pub(crate) fn unit(model: &Model) -> &'static str {
     }
 }
 
-impl Separated {
-    /// The difference in standard deviations of the white noise, over some samples of each drive; `None` where the noise is
-    /// not known.
-    fn deviations(&self, apart: &Apart, samples: usize) -> Option<f64> {
-        let noise = self.asked.pair.noise()?;
+impl SeparationResult {
+    /// The difference in standard deviations of white noise, over some samples of each drive; `None` if the noise is
+    /// unknown.
+    fn deviations(&self, apart: &EffectDistance, samples: usize) -> Option<f64> {
+        let noise = self.task.pair.noise()?;
         Some(apart.force / noise * ((samples * self.drives) as f64).sqrt())
     }
 
-    /// Periods of the trajectory until the difference is plain, at least one.
+    /// Number of periods of the trajectory until the difference is clear, at least one; `None` if the noise is unknown.
     fn periods(&self) -> Option<f64> {
-        let one = self.deviations(&self.apart, self.samples)?;
+        let one = self.deviations(&self.distance, self.samples)?;
         Some((PLAIN / one).powi(2).ceil().max(1.0))
     }
 
-    /// All of it as one JSON object.
+    /// The result as one JSON object.
     pub fn json(&self) -> Value {
-        let pair = &self.asked.pair;
-        let one = |apart: &Apart, samples: usize| {
+        // Directions that a special case cannot show are null.
+        let pair = &self.task.pair;
+        // Figures along a motion or a recording.
+        let one = |apart: &EffectDistance, samples: usize| {
             let constants = apart.constants.iter().map(|(s, v)| (s.clone(), json!(v)));
-            let is_held = pair.rivals[apart.rival].is_held;
+            let is_held = pair.rivals[apart.rival].is_special_case;
             json!({
                 "apart": apart.force,
                 "effect": apart.figures.effect,
-                "beyond_base": apart.figures.beyond,
-                "left": apart.figures.left,
-                "reverse": (!is_held).then_some(apart.figures.reverse),
+                "beyond_base": apart.figures.outside_base,
+                "left": apart.figures.residual,
+                "reverse": (!is_held).then_some(apart.figures.reverse_residual),
                 "nearest": {
                     "kind": pair.rivals[apart.rival].effect().kind,
                     "at": pair.rivals[apart.rival].effect().at,
@@ -252,51 +255,50 @@ impl Separated {
                 "deviations": self.deviations(apart, samples),
             })
         };
-        let left_out: Vec<&Effect> = (0..pair.rivals.len())
-            .filter(|k| !self.asked.which.contains(k))
+        // Alternatives that no motion distinguishes are listed separately.
+        let left_out: Vec<&LocatedEffect> = (0..pair.rivals.len())
+            .filter(|k| !self.task.which.contains(k))
             .map(|k| pair.rivals[k].effect())
             .collect();
         let values = pair.sizes().iter().map(|(s, v)| (s.clone(), json!(v)));
         json!({
             "effect": pair.effect(),
             "values": values.collect::<Map<_, _>>(),
-            "from": self.asked.rivals(),
+            "from": self.task.rivals(),
             "inseparable": left_out,
-            "beside": pair.beside().collect::<Vec<_>>(),
+            "beside": pair.common_effects().collect::<Vec<_>>(),
             "noise": pair.noise(),
             "unit": self.unit,
-            "trajectory": one(&self.apart, self.samples),
+            "trajectory": one(&self.distance, self.samples),
             "best_random": self.random,
             "periods_needed": self.periods(),
-            "recordings": self.before.as_ref().map(|before| one(before, self.asked.samples())),
+            "recordings": self.before.as_ref().map(|before| one(before, self.task.samples())),
         })
     }
 
-    /// For people.
-    pub fn text(
-        &self,
-        evaluations: usize,
-        random: usize,
-        spelling: &dyn RemedySpelling,
-    ) -> Vec<String> {
-        let pair = &self.asked.pair;
-        let mut lines = vec![format!("  tells {}", self.asked.words())];
-        let beside: Vec<Effect> = pair.beside().cloned().collect();
+    /// The result as lines of text. `evaluations` is the number of evaluated trajectories, `random` that of random
+    /// ones.
+    pub fn text(&self, evaluations: usize, random: usize, spelling: &dyn RemedySpelling) -> Vec<String> {
+        let pair = &self.task.pair;
+        let mut lines = vec![format!("  separates {}", self.task.description())];
+        let beside: Vec<LocatedEffect> = pair.common_effects().cloned().collect();
         if !beside.is_empty() {
-            lines.push(format!("  beside {}", words::effects(&beside)));
+            lines.push(format!("  in addition to {} in both cases", words::effects(&beside)));
         }
+        // The values of the effect scale all figures.
         let sizes: Vec<String> = (pair.sizes().iter())
             .map(|(symbol, value)| format!("{symbol} = {}", significant(*value, 5)))
             .collect();
         lines.push(if sizes.is_empty() {
-            "  no size is given: each parameter of the effect is 1 in its unit, of either sign"
-                .to_owned()
+            "  no size is given: each parameter of the effect is 1 in its unit, of either sign".to_owned()
         } else {
             format!("  with {}", sizes.join(", "))
         });
+        // One line for the recordings, one for the best random trajectory, one for the result.
         lines.push(String::new());
         let force = |value: f64| self.force(value);
-        let row = |name: &str, apart: &Apart, samples: usize| {
+        let row = |name: &str, apart: &EffectDistance, samples: usize| {
+            // The nearest alternative with the constants at which it is nearest.
             let nearest = pair.rivals[apart.rival].effect();
             let constants = apart.constants.iter();
             let constants: Vec<String> = constants
@@ -317,37 +319,31 @@ impl Separated {
         };
         let mut rows: Vec<Vec<String>> = Vec::new();
         if let Some(before) = &self.before {
-            rows.push(row("the recordings", before, self.asked.samples()));
+            rows.push(row("the recordings", before, self.task.samples()));
         }
         rows.push(vec![
-            format!(
-                "best of {}",
-                count(random, "random trajectory", "random trajectories")
-            ),
+            format!("best of {}", count(random, "random trajectory", "random trajectories")),
             String::new(),
             force(self.random),
             String::new(),
             String::new(),
         ]);
-        rows.push(row(
-            "one period of this trajectory",
-            &self.apart,
-            self.samples,
-        ));
+        rows.push(row("one period of this trajectory", &self.distance, self.samples));
         lines.extend(table(
             2,
             &[
-                ("root mean square, all drives", Align::Left),
-                ("effect", Align::Right),
-                ("apart", Align::Right),
-                ("in deviations", Align::Right),
-                ("nearest", Align::Left),
+                ("root mean square, all drives", ColumnAlignment::Left),
+                ("effect", ColumnAlignment::Right),
+                ("difference", ColumnAlignment::Right),
+                ("in std deviations", ColumnAlignment::Right),
+                ("nearest", ColumnAlignment::Left),
             ],
             &rows,
         ));
-        let gain = self.apart.force / self.random;
+        // The gain over random motions and recordings shows what the search achieved.
+        let gain = self.distance.force / self.random;
         let mut says = format!(
-            "{} times as far apart as along the best random trajectory",
+            "the difference is {} times that of the best random trajectory",
             significant(gain, 3)
         );
         if let Some(before) = &self.before
@@ -355,8 +351,8 @@ impl Separated {
         {
             let _ = write!(
                 says,
-                ", and {} times as far as in the recordings",
-                significant(self.apart.force / before.force, 3)
+                ", and {} times that of the recordings",
+                significant(self.distance.force / before.force, 3)
             );
         }
         lines.push(format!(
@@ -367,17 +363,18 @@ impl Separated {
         lines
     }
 
+    /// A force with its unit.
     fn force(&self, value: f64) -> String {
         format!("{} {}", significant(value, 3), self.unit)
     }
 
-    /// What the figures mean.
+    /// Explanations of the figures.
     fn remarks(&self, spelling: &dyn RemedySpelling) -> Vec<String> {
-        let pair = &self.asked.pair;
-        let mut lines = indented(&match (pair.noise(), self.periods()) {
+        let pair = &self.task.pair;
+        let mut lines = indent_lines(&match (pair.noise(), self.periods()) {
             (Some(noise), Some(periods)) => format!(
-                "Against white noise of {} it takes {} for {PLAIN} standard deviations of all samples together; noise that \
-                 resembles itself takes longer, and `diagnose` tells what a recording is worth.",
+                "With white noise of {}, {} of recording makes the difference {PLAIN} standard deviations, over all samples. \
+                 Correlated noise needs longer; `diagnose` states how much information a recording contains.",
                 self.force(noise),
                 if periods > 1.0 {
                     format!("{periods} periods")
@@ -386,17 +383,18 @@ impl Separated {
                 }
             ),
             _ => message!(
-                "With {}, or {}, it says how many periods it takes.",
+                "With {} or {} the number of required periods is computed.",
                 Remedy::option(OptionName::Noise).with_value("SIZE"),
                 Remedy::option(OptionName::Data).with_value("RUN")
             )
             .spell(spelling),
         });
-        for k in &self.asked.which {
+        // A special case is named, since forces cannot exclude the more general effect.
+        for k in &self.task.which {
             let rival = &pair.rivals[*k];
-            if rival.is_held {
-                lines.extend(indented(&format!(
-                    "{} is a special case of {} here: if it is the true one, nothing but its simplicity tells.",
+            if rival.is_special_case {
+                lines.extend(indent_lines(&format!(
+                    "{} is a special case of {} here: if it is the true effect, both explain the forces, and only its simplicity favours it.",
                     words::effect(rival.effect()),
                     words::effect(pair.effect())
                 )));
@@ -406,8 +404,8 @@ impl Separated {
     }
 }
 
-/// A sentence in lines.
-fn indented(says: &str) -> Vec<String> {
+/// A sentence wrapped into indented lines.
+fn indent_lines(says: &str) -> Vec<String> {
     let lines = words::lines(says, 98);
     lines.iter().map(|line| format!("  {line}")).collect()
 }

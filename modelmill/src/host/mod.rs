@@ -1,114 +1,156 @@
-//! What verbs get from outside: files, libraries of effects, and somebody who watches.
+//! The interface between the library and its caller: files, libraries of effects, and a listener for progress.
 
 pub(crate) mod kinds_of_files;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use modelmill_boundary::files::{Disk, Files};
-use modelmill_identify::{FitFile, Note};
-use modelmill_spec::edit::{EditFailure, Edited, NewEffect, add_to_model};
-use modelmill_spec::{EffectKind, Loaded};
+use modelmill_boundary::files::{DiskFiles, FileSource};
+use modelmill_identify::{FitFile, RecordingNote};
+use modelmill_spec::edit::{EditFailure, EditedModel, NewEffect, add_to_model};
+use modelmill_spec::{EffectKind, LoadedModel};
 
 use crate::error::{Error, Outcome};
-use crate::progress::{Job, Progress, Silent, watched};
+use crate::progress::{JobHandle, ProgressListener, SilentProgress, run_job};
 
-/// Where files come from, which kinds of effects there are besides the library's, and who hears what goes on.
+/// Provides files and libraries of effects in addition to the built-in one, and passes progress and notes to a
+/// listener.
 ///
-/// Every model keeps the host that it was read by, so that what a verb reads later, such as a variant with one more effect,
-/// comes from the same place.
+/// Every model keeps the host with which it was read. Files that are read for it later, such as recordings, come from
+/// the same source.
 #[derive(Clone)]
 pub struct Host {
-    files: Arc<dyn Files>,
+    /// Source of all files.
+    files: Arc<dyn FileSource>,
+    /// Paths of libraries of effects in addition to the built-in one.
     libraries: Vec<PathBuf>,
+    /// Whether constants are replaced by their numeric values before the derivation.
     is_at_values: bool,
-    progress: Arc<dyn Progress>,
+    /// Receives progress and notes.
+    progress: Arc<dyn ProgressListener>,
 }
 
 impl Default for Host {
     fn default() -> Self {
         Self {
-            files: Arc::new(Disk::default()),
+            files: Arc::new(DiskFiles::default()),
             libraries: Vec::new(),
             is_at_values: false,
-            progress: Arc::new(Silent),
+            progress: Arc::new(SilentProgress),
         }
     }
 }
 
 impl Host {
-    /// Files come from disk, there are no further libraries, and nobody listens.
+    /// A host that reads files from disk, uses only the built-in library of effects, and has no listener.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// With files from elsewhere, such as memory.
+    /// The host with another source of files, such as memory.
+    ///
+    /// ```
+    /// use std::sync::Arc;
+    /// use modelmill::Host;
+    /// use modelmill::files::MemoryFiles;
+    ///
+    /// let bytes = std::fs::read("../model-spec/models/two_link.toml").unwrap();
+    /// let files = MemoryFiles::default().with_file("arm.toml", bytes);
+    /// let arm = Host::new().with_files(Arc::new(files)).model("arm.toml")?;
+    /// assert_eq!(arm.name, "arm");
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     #[must_use]
-    pub fn with_files(mut self, files: Arc<dyn Files>) -> Self {
+    pub fn with_files(mut self, files: Arc<dyn FileSource>) -> Self {
         self.files = files;
         self
     }
 
-    /// Where files come from.
-    pub fn files(&self) -> &dyn Files {
+    /// The source of files.
+    pub fn files(&self) -> &dyn FileSource {
         &*self.files
     }
 
-    /// With further libraries of kinds of effects, for every model that is read.
+    /// The host with further libraries of effects, which every model that it reads may use.
     #[must_use]
     pub fn with_libraries(mut self, paths: impl IntoIterator<Item = PathBuf>) -> Self {
         self.libraries.extend(paths);
         self
     }
 
-    /// With somebody who hears what goes on and may stop it.
+    /// The host with a listener, which receives progress and notes and can stop jobs.
+    ///
+    /// ```
+    /// use std::sync::Arc;
+    /// use modelmill::Host;
+    /// use modelmill::progress::{JobHandle, ProgressListener};
+    ///
+    /// struct PrintJobs;
+    ///
+    /// impl ProgressListener for PrintJobs {
+    ///     fn on_job_start(&self, what: &str, _total: usize, _job: &Arc<JobHandle>) {
+    ///         println!("{what}");
+    ///     }
+    /// }
+    ///
+    /// let host = Host::new().with_progress(Arc::new(PrintJobs));
+    /// let arm = host.model("../model-spec/models/two_link.toml")?;
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     #[must_use]
-    pub fn with_progress(mut self, progress: Arc<dyn Progress>) -> Self {
+    pub fn with_progress(mut self, progress: Arc<dyn ProgressListener>) -> Self {
         self.progress = progress;
         self
     }
 
-    /// Whether models are derived for their files' values alone: constants stand as numbers ([`modelmill_spec::Mechanism::at_values`]),
-    /// so that fewer base parameters remain where geometry is special, and emitted code has no geometry to change.
+    /// Whether constants are replaced by their numeric values before the derivation
+    /// ([`modelmill_spec::Mechanism::with_numeric_constants`]).
+    ///
+    /// The model is then valid for this geometry only: special geometry can reduce the number of base parameters, and
+    /// generated code has no geometric constants as inputs.
     #[must_use]
     pub fn at_values(mut self, is_wanted: bool) -> Self {
         self.is_at_values = is_wanted;
         self
     }
 
-    /// Whether models are derived for their files' values alone.
+    /// Whether constants are replaced by their numeric values before the derivation.
     pub fn is_at_values(&self) -> bool {
         self.is_at_values
     }
 
-    /// The libraries that every model may use.
+    /// Paths of the further libraries of effects.
     pub fn libraries(&self) -> &[PathBuf] {
         &self.libraries
     }
 
-    /// The kinds of effects of the program's library and of the host's.
+    /// The kinds of effects of the built-in library and of the host's libraries.
     ///
-    /// Fails with every finding about the host's libraries, each with its place.
+    /// Fails with all errors and warnings of the host's libraries, each with its line and column.
+    ///
+    /// ```
+    /// let kinds = modelmill::Host::new().kinds()?;
+    /// assert!(kinds.iter().any(|kind| kind.name == "coulomb_friction"));
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     pub fn kinds(&self) -> Outcome<Vec<EffectKind>> {
         Ok(modelmill_spec::kinds_with(&self.libraries, self.files())?)
     }
 
-    /// Reads a model file and validates it, without deriving it.
+    /// Reads a model file and validates it, without deriving its equations.
     ///
-    /// Fails with every finding about the files, each with its place.
-    pub fn load(&self, path: &Path) -> Outcome<Loaded> {
-        watched(
-            &*self.progress,
-            &format!("reading {}", path.display()),
-            0,
-            |_| modelmill_spec::load_file_with(path, &self.libraries, self.files()),
-        )?
-        .map_err(|failure| match kinds_of_files::kind(self, path) {
+    /// Fails with all errors and warnings of the files, each with its line and column.
+    pub fn load(&self, path: &Path) -> Outcome<LoadedModel> {
+        run_job(&*self.progress, &format!("reading {}", path.display()), 0, |_| {
+            modelmill_spec::load_file_with(path, &self.libraries, self.files())
+        })?
+        // A valid file of another kind gets a message that names the kind.
+        .map_err(|failure| match kinds_of_files::file_kind(self, path) {
             Some(kind) => Error::input(format!(
                 "{} is {kind}; a model file (TOML) is expected, such as those in model-spec/models{}",
                 path.display(),
                 if kind.contains("rig") {
-                    ". `reduce` makes one of a rig and a plan"
+                    ". `reduce` makes one from a rig and a plan"
                 } else {
                     ""
                 }
@@ -117,54 +159,49 @@ impl Host {
         })
     }
 
-    /// Validates the text of a model file; `path` is what messages call it, and where the paths in it start.
+    /// Validates the text of a model file; `path` is its name in messages, and paths in the text are relative to it.
     ///
-    /// Fails with every finding about the files, each with its place.
-    pub fn load_text(&self, path: &Path, text: &str) -> Outcome<Loaded> {
+    /// Fails with all errors and warnings of the files, each with its line and column.
+    pub fn load_text(&self, path: &Path, text: &str) -> Outcome<LoadedModel> {
         let name = path.to_string_lossy();
-        Ok(modelmill_spec::load_with(
-            &name,
-            text,
-            &self.libraries,
-            self.files(),
-        )?)
+        Ok(modelmill_spec::load_with(&name, text, &self.libraries, self.files())?)
     }
 
     /// Adds an effect to the text of a model file, keeping its comments and layout; the result is validated.
     ///
-    /// Fails when the file with the effect has no meaning: unknown kind or place, a value that is missing, an effect twice.
-    pub fn edit(&self, path: &str, text: &str, effect: &NewEffect) -> Outcome<Edited> {
-        add_to_model(path, text, effect, &self.libraries, self.files()).map_err(|failure| {
-            match failure {
-                EditFailure::Effect(says) => Error::input(format!("{path}: {says}")),
-                EditFailure::Model(failure) => (*failure).into(),
-            }
+    /// Fails when the edited file is invalid, such as by an unknown kind or place, a missing value, or an effect that
+    /// the file already has.
+    pub fn edit(&self, path: &str, text: &str, effect: &NewEffect) -> Outcome<EditedModel> {
+        add_to_model(path, text, effect, &self.libraries, self.files()).map_err(|failure| match failure {
+            EditFailure::Effect(says) => Error::input(format!("{path}: {says}")),
+            EditFailure::Model(failure) => (*failure).into(),
         })
     }
 
-    /// Runs a job that somebody may watch and stop.
+    /// Runs a job. The listener receives its progress and can cancel it. `what` is the name of the job, and `total` its
+    /// number of steps, 0 if unknown.
     ///
-    /// Fails with [`Error::Cancelled`] if somebody asked it to stop.
-    pub fn watched<T>(&self, what: &str, total: usize, work: impl FnOnce(&Job) -> T) -> Outcome<T> {
-        watched(&*self.progress, what, total, work)
+    /// Fails with [`Error::Cancelled`] if the job was cancelled.
+    pub fn run_job<T>(&self, what: &str, total: usize, work: impl FnOnce(&JobHandle) -> T) -> Outcome<T> {
+        run_job(&*self.progress, what, total, work)
     }
 
-    /// Reads a fit, as [`crate::identify::Identification::json`] wrote it.
+    /// Reads a fit file: the JSON that `identify` writes.
     ///
-    /// Fails with the place of what is wrong with the file.
+    /// Fails if the file cannot be read or is not such a file; the error states the place of the fault.
     pub fn fit(&self, path: &Path) -> Outcome<FitFile> {
         Ok(FitFile::read_from(self.files(), path)?)
     }
 
-    /// Reads a fit from its text; `file` is what messages call it.
+    /// Reads a fit from the text of its file; `file` is the name of the file in messages.
     ///
-    /// Fails with the place of what is wrong with it.
+    /// Fails as [`Host::fit`] does.
     pub fn fit_of_text(&self, text: &str, file: &str) -> Outcome<FitFile> {
         Ok(FitFile::parse(text, file)?)
     }
 
-    /// Passes a remark on to whoever watches.
-    pub(crate) fn note(&self, note: &Note) {
-        self.progress.notes(note);
+    /// Passes a note to the listener.
+    pub(crate) fn note(&self, note: &RecordingNote) {
+        self.progress.on_note(note);
     }
 }

@@ -1,47 +1,54 @@
-//! What faults of sensors would have done to a fit, had they been left in: recordings go in, a sentence comes out.
+//! Influence of sensor faults on a fit: the recordings are fitted once more without their repair, and a sentence
+//! states the largest change of a base parameter.
 
-use modelmill_identify::{Note, ParameterInfo};
+use modelmill_identify::{ParameterInfo, RecordingNote};
 
-use super::options::Estimation;
-use super::regression::{self, Identified};
+use super::options::EstimatorOptions;
+use super::regression::{self, RegressionEstimate};
 use super::standstill;
+use super::thresholds::FAULT_INFLUENCE_LEAST_SIGMAS;
 use crate::model::Model;
-use crate::recording::Recording;
-use crate::stretch::Stretch;
+use crate::recording::PreparedRecording;
+use crate::segment::RecordingSegment;
 use crate::text::table::{number, significant};
 
-/// The base parameter that faults move most, in its deviations, by fitting once more with the faults left in; `None` where no
-/// fault was taken out, or no fit comes of it.
-pub(super) fn of_faults(
+/// The note on the base parameter that the faults change most, in its standard deviations; `None` if no fault was
+/// repaired, or the fit without repair fails.
+pub(super) fn fault_influence(
     model: &Model,
-    recordings: &[&Recording],
-    found: &Identified,
-    options: &Estimation,
-) -> Option<Note> {
+    recordings: &[&PreparedRecording],
+    found: &RegressionEstimate,
+    options: &EstimatorOptions,
+) -> Option<RecordingNote> {
+    // Recordings with repaired faults are replaced by their faulty versions, the others are kept.
     let mut files = Vec::new();
-    let mut data: Vec<Stretch> = Vec::new();
+    let mut data: Vec<RecordingSegment> = Vec::new();
     for one in recordings {
         match one.with_faults(model) {
             Some(faulty) => {
                 files.push(one.file());
                 data.extend(faulty);
             }
-            None => data.extend(one.stretches.iter().cloned()),
+            None => data.extend(one.segments.iter().cloned()),
         }
     }
     if files.is_empty() {
         return None;
     }
+    // The comparison uses the same equations as the fit.
     if let Some(part) = options.standstill {
-        standstill::leave_out(model, &mut data, part).ok()?;
+        standstill::exclude_standstill(model, &mut data, part).ok()?;
     }
+    // The second fit uses the same options, on the unrepaired recordings.
     let faulty = regression::identify(model, &data, &[], options).ok()?;
-    let infos = model.infos();
+    let infos = model.parameter_infos();
+    // The change of each parameter is measured in its standard deviations.
     let pairs = found.solution.values.iter().zip(&faulty.solution.values);
     let moved = pairs
         .zip(&found.deviations.std)
         .zip(&found.unknown)
         .filter(|((_, std), _)| std.is_finite() && **std > 0.0);
+    // Only parameters with a finite standard deviation can be compared.
     let most = moved.max_by(|(one, _), (other, _)| {
         let deviations = |((a, b), std): &((&f64, &f64), &f64)| (**b - **a).abs() / **std;
         deviations(one).total_cmp(&deviations(other))
@@ -49,21 +56,22 @@ pub(super) fn of_faults(
     let (((sound, faulty), std), k) = most?;
     let deviations = (faulty - sound).abs() / std;
     let files = files.join(", ");
-    let says = if deviations < 1.0 {
+    // A change below one standard deviation needs no name.
+    let says = if deviations < FAULT_INFLUENCE_LEAST_SIGMAS {
         format!(
-            "Left in, the faults of sensors in {files} would have moved no base parameter by more than {} of its standard \
+            "Without their repair, the sensor faults in {files} would have changed no base parameter by more than {} standard \
              deviations.",
             significant(deviations, 2)
         )
     } else {
         let ParameterInfo { name, unit, .. } = &infos[*k];
         format!(
-            "Left in, the faults of sensors in {files} would have moved {name} from {} to {} {unit} ({} standard deviations), \
-             and no base parameter by more of its deviations.",
+            "Without their repair, the sensor faults in {files} would have changed {name} from {} to {} {unit} ({} standard \
+             deviations), and all other base parameters by fewer standard deviations.",
             number(*sound),
             number(*faulty),
             significant(deviations, 3)
         )
     };
-    Some(Note::info(says))
+    Some(RecordingNote::info(says))
 }

@@ -1,62 +1,67 @@
-//! Instruments for recordings: the motion that was asked for, or the same motion one period later.
+//! Instruments of instrumental-variable estimation: the reference motion, or the measured motion one period later.
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
-use modelmill_identify::place_word;
+use modelmill_identify::sample_place_word;
 
 use crate::error::{Error, Outcome};
-use crate::identify::options::{Estimation, Weights};
-use crate::recording::Recording;
-use crate::stretch::Stretch;
+use crate::identify::options::{EquationWeights, EstimatorOptions};
+use crate::identify::thresholds::{
+    INSTRUMENT_FEWEST_PERIODS, INSTRUMENT_PERIOD_FEWEST_STEPS, INSTRUMENT_PERIOD_TOLERANCE_STEPS,
+    INSTRUMENT_TIME_TOLERANCE_STEPS,
+};
+use crate::recording::PreparedRecording;
+use crate::segment::RecordingSegment;
 
-/// What stands in for the states against noise that runs through the controller.
+/// The source of instruments, against noise that is correlated with the states through the controller.
 #[derive(Clone, Copy, Default)]
 pub enum Instruments<'a> {
-    /// Nothing.
+    /// No instruments: least squares.
     #[default]
     None,
-    /// The states one period later, s.
+    /// The states one period later; the period in s.
     Period(f64),
-    /// Recordings of the motion that was asked for, one for each of the fit, in step with it.
-    Recordings(&'a [&'a Recording]),
+    /// Recordings of the reference motion, one for each recording of the fit, with the same times.
+    Recordings(&'a [&'a PreparedRecording]),
 }
 
-/// One stretch of instruments for each of `data`; none if none are asked for.
-pub(crate) fn along(
-    data: &[Stretch],
+/// One segment of instruments for each of `data`; none without instruments.
+///
+/// Fails when the weights do not allow instruments, or when the times of the instruments differ.
+pub(crate) fn instrument_segments(
+    data: &[RecordingSegment],
     instruments: &Instruments<'_>,
-    options: &Estimation,
-) -> Outcome<Vec<Stretch>> {
+    options: &EstimatorOptions,
+) -> Outcome<Vec<RecordingSegment>> {
     if matches!(instruments, Instruments::None) {
         return Ok(Vec::new());
     }
-    if options.weights == Weights::Channels {
+    // Weights from residuals would make the estimate depend on itself.
+    if options.weights == EquationWeights::Channels {
         return Err(Error::options(message!(
-            "{} goes with {} or `variance`: weights from residuals would depend on the estimate that \
-             the instruments are to mend",
+            "{} needs {} or `variance`: weights from residuals would depend on the estimate that \
+             the instruments are to correct",
             Remedy::option(OptionName::Instruments),
             Remedy::option(OptionName::Weights).with_value("none")
         )));
     }
     match instruments {
+        // The first case has returned before.
         Instruments::None => Ok(Vec::new()),
-        Instruments::Period(period) => data.iter().map(|one| shifted(one, *period)).collect(),
+        Instruments::Period(period) => data.iter().map(|one| shift_by_period(one, *period)).collect(),
         Instruments::Recordings(recordings) => {
-            let all: Vec<Stretch> = recordings
-                .iter()
-                .flat_map(|one| one.stretches.clone())
-                .collect();
-            in_step(data, &all)?;
+            let all: Vec<RecordingSegment> = recordings.iter().flat_map(|one| one.segments.clone()).collect();
+            check_same_times(data, &all)?;
             Ok(all)
         }
     }
 }
 
-/// Fails unless instruments have the same times as the recordings.
-fn in_step(data: &[Stretch], instruments: &[Stretch]) -> Outcome {
+/// Fails unless the instruments have the same segments and times as the recordings.
+fn check_same_times(data: &[RecordingSegment], instruments: &[RecordingSegment]) -> Outcome {
     if data.len() != instruments.len() {
         return Err(Error::options(message!(
-            "{} gives {} for {} of {} (recordings count once for each stretch between gaps); give one for \
+            "{} gives {} for {} of {} (recordings count once for each segment between gaps); give one for \
              each, in the same order",
             Remedy::option(OptionName::Instruments),
             instruments.len(),
@@ -65,20 +70,19 @@ fn in_step(data: &[Stretch], instruments: &[Stretch]) -> Outcome {
         )));
     }
     for (own, theirs) in data.iter().zip(instruments) {
+        // Times are compared sample by sample, within a part of the smallest step.
         let (a, b) = (&own.run.time, &theirs.run.time);
-        let step = a
-            .windows(2)
-            .map(|w| w[1] - w[0])
-            .fold(f64::INFINITY, f64::min);
+        let step = a.windows(2).map(|w| w[1] - w[0]).fold(f64::INFINITY, f64::min);
+        // Times may differ by rounding only.
         let apart = a
             .iter()
             .zip(b)
-            .position(|(x, y)| (x - y).abs() > 0.01 * step);
+            .position(|(x, y)| (x - y).abs() > INSTRUMENT_TIME_TOLERANCE_STEPS * step);
         if let Some(sample) = apart {
             return Err(Error::input(format!(
                 "{}, {} {}: t = {} s, but t = {} s in the recording {}; instruments must have the same times",
                 theirs.run.file,
-                place_word(&theirs.run.file),
+                sample_place_word(&theirs.run.file),
                 theirs.run.lines.get(sample).copied().unwrap_or(0),
                 b[sample],
                 a[sample],
@@ -98,31 +102,29 @@ fn in_step(data: &[Stretch], instruments: &[Stretch]) -> Outcome {
     Ok(())
 }
 
-/// The same recording with the states of the next period, at its end with those of the one before.
-fn shifted(data: &Stretch, period: f64) -> Outcome<Stretch> {
+/// The recording with the states of the next period; near its end with those of the period before.
+///
+/// Fails when the recording is shorter than one and a half periods, or has no sample one period
+/// away.
+fn shift_by_period(data: &RecordingSegment, period: f64) -> Outcome<RecordingSegment> {
     let time = &data.run.time;
     let n = time.len();
-    let span = time
-        .last()
-        .zip(time.first())
-        .map_or(0.0, |(last, first)| last - first);
+    // A period must fit into the recording one and a half times.
+    let span = time.last().zip(time.first()).map_or(0.0, |(last, first)| last - first);
     let step = span / n.saturating_sub(1).max(1) as f64;
-    if span < 1.5 * period || period < 2.0 * step {
+    if span < INSTRUMENT_FEWEST_PERIODS * period || period < INSTRUMENT_PERIOD_FEWEST_STEPS * step {
         return Err(Error::input(format!(
             "{}: the recording lasts {span:.3} s, which is not one and a half periods of {period} s; instruments from \
              another period need two of them",
             data.run.file
         )));
     }
-    // By time, not by a number of samples, for steps may be uneven.
+    // By time, not by a number of samples, since steps may be uneven.
     let nearest = |t: f64| {
         let at = time.partition_point(|x| *x < t).clamp(1, n - 1);
-        if t - time[at - 1] < time[at] - t {
-            at - 1
-        } else {
-            at
-        }
+        if t - time[at - 1] < time[at] - t { at - 1 } else { at }
     };
+    // Near the end the period before is used.
     let mut places = Vec::with_capacity(n);
     for t in time {
         let wanted = if t + period <= time[n - 1] + 0.5 * step {
@@ -131,14 +133,15 @@ fn shifted(data: &Stretch, period: f64) -> Outcome<Stretch> {
             t - period
         };
         let at = nearest(wanted);
-        if (time[at] - wanted).abs() > 0.75 * step {
+        if (time[at] - wanted).abs() > INSTRUMENT_PERIOD_TOLERANCE_STEPS * step {
             return Err(Error::input(format!(
-                "{}: there is no sample one period of {period} s away from t = {t} s; are there gaps?",
+                "{}: there is no sample one period of {period} s away from t = {t} s; check the recording for gaps",
                 data.run.file
             )));
         }
         places.push(at);
     }
+    // Positions, derivatives and forces are shifted together.
     let mut shifted = data.clone();
     let run = &mut shifted.run;
     let columns = run

@@ -1,4 +1,5 @@
-//! `identify`: base parameters from recordings by least squares, with what they are worth.
+//! `identify`: base parameters from recordings by least squares, eq. (12), with standard deviations and error metrics
+//! (such as the NRMS).
 
 mod influence;
 mod instruments;
@@ -6,13 +7,15 @@ mod options;
 mod refine;
 pub mod regression;
 mod standstill;
+mod thresholds;
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_identify::estimate::FEWEST_ROWS;
 use modelmill_identify::fit_parameters;
 use modelmill_identify::{
-    Estimator, Figures, FitFile, FitParameter, Note, ParameterInfo, Repeats, Status,
+    ErrorFigures, EstimatorOutput, FitFile, FitParameter, ParameterInfo, ParameterStatus, RecordingNote,
+    RunRepeatability,
 };
 use modelmill_spec::Sign;
 
@@ -20,72 +23,90 @@ use crate::along;
 use crate::compare;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
-use crate::recording::{self, Recording};
-use crate::stretch::Stretch;
+use crate::recording::{self, PreparedRecording};
+use crate::segment::RecordingSegment;
 use crate::text::table::{count, number};
 
 pub use instruments::Instruments;
 pub use modelmill_identify::estimate::HUBER_BOUND;
-pub use options::{Estimation, Weights};
-pub use refine::{Refined, Refinement};
-use regression::{Identified, InstrumentsFound};
+pub use options::{EquationWeights, EstimatorOptions};
+pub use refine::{EstimateRefinement, RefinementResult};
+use regression::{InstrumentStatistics, RegressionEstimate};
+use thresholds::{IMPOSSIBLE_SIGN_SIGMAS, WEAK_INSTRUMENT_CORRELATION};
 
-/// Instruments whose smallest canonical correlation with the regressor is below this deserve a warning.
-const WEAK_INSTRUMENTS: f64 = 0.2;
-
-/// A fit with the figures that the nominal parameters have on the same recordings.
+/// A fit, with the error metrics of the nominal parameters on the same recordings.
 pub struct Identification {
-    /// The fit, as `--parameters` reads it.
+    /// The fit: the contents of a fit file.
     pub fit: FitFile,
-    /// Figures with nominal parameters on the recordings of the fit.
-    pub nominal_fit: Figures,
-    /// The same on the recordings of the check.
-    pub nominal_check: Option<Figures>,
-    /// What the estimator found.
-    pub found: Identified,
-    /// How it was asked.
-    pub options: Estimation,
-    /// What the user should know about the result; the fit holds it too.
-    pub notes: Vec<Note>,
-    /// Periods and noise floors of periodic recordings, by their names.
-    pub repeats: Vec<(String, Repeats)>,
+    /// Error metrics of the nominal parameters on the recordings of the fit.
+    pub nominal_fit: ErrorFigures,
+    /// Error metrics of the nominal parameters on the validation runs; `None` if there are none.
+    pub nominal_check: Option<ErrorFigures>,
+    /// The solution of the least-squares problem, with its statistics.
+    pub found: RegressionEstimate,
+    /// The options of the estimator, with automatic weights replaced by the chosen ones.
+    pub options: EstimatorOptions,
+    /// Notes on the result. `fit` contains them too, together with the notes on the recordings.
+    pub notes: Vec<RecordingNote>,
+    /// File names of the periodic recordings, each with the period and the noise floor.
+    pub repeats: Vec<(String, RunRepeatability)>,
 }
 
 impl Model {
-    /// Identifies the base parameters from the recordings of `fit`, eq. (12), and holds the result against those of `check`.
+    /// Identifies the base parameters from the recordings of `fit`, eq. (12), and validates the result with those of
+    /// `check`.
     ///
-    /// Fails when there are fewer equations than unknowns, when no force was measured, or when a recording leads where the
-    /// mechanism cannot stand.
+    /// Fails when there are fewer equations than unknown parameters, when no force was measured, or when a recording
+    /// contains a pose that the mechanism cannot reach.
     pub fn identify(
         &self,
-        fit: &[&Recording],
-        check: &[&Recording],
-        options: &Estimation,
+        fit: &[&PreparedRecording],
+        check: &[&PreparedRecording],
+        options: &EstimatorOptions,
     ) -> Outcome<Identification> {
         self.identify_with(fit, &Instruments::None, check, options)
     }
 
-    /// As [`Model::identify`], by instrumental variables against noise that runs through the controller.
+    /// As [`Model::identify`], by instrumental variables. They avoid the bias of least squares if the controller
+    /// correlates the measurement noise with the states.
+    ///
+    /// ```no_run
+    /// use modelmill::Model;
+    /// use modelmill::identify::{EstimatorOptions, Instruments};
+    /// use modelmill::recording::RecordingOptions;
+    ///
+    /// let model = Model::open("arm.toml")?;
+    /// let run = model.recording("run.csv", &RecordingOptions::default())?;
+    /// // The motion has a period of 8 s, so that the next period provides the instruments.
+    /// let instruments = Instruments::Period(8.0);
+    /// let fit = model.identify_with(&[&run], &instruments, &[], &EstimatorOptions::default())?;
+    /// println!("{:?}", fit.values());
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     pub fn identify_with(
         &self,
-        fit: &[&Recording],
+        fit: &[&PreparedRecording],
         instruments: &Instruments<'_>,
-        check: &[&Recording],
-        options: &Estimation,
+        check: &[&PreparedRecording],
+        options: &EstimatorOptions,
     ) -> Outcome<Identification> {
         let recordings = fit;
-        let [mut fit, check] = recording::stretches(self, fit, check);
+        // Segments are copied, since some of their equations may be excluded.
+        let [mut fit, check] = recording::segments(self, fit, check);
+        // Equations at standstill are excluded before instruments are assigned.
         if let Some(part) = options.standstill {
-            standstill::leave_out(self, &mut fit, part)?;
+            standstill::exclude_standstill(self, &mut fit, part)?;
         }
-        let instruments = instruments::along(&fit, instruments, options)?;
-        let options = Estimation {
-            weights: settled(self, &fit, &instruments, options.weights),
+        // Instruments must match the segments of the fit.
+        let instruments = instruments::instrument_segments(&fit, instruments, options)?;
+        let options = EstimatorOptions {
+            weights: resolve_weights(self, &fit, &instruments, options.weights),
             ..options.clone()
         };
         let mut found = identify(self, &fit, &instruments, &check, &options)?;
+        // The influence of faults costs a second fit, which instruments do not support.
         if instruments.is_empty()
-            && let Some(note) = influence::of_faults(self, recordings, &found.found, &options)
+            && let Some(note) = influence::fault_influence(self, recordings, &found.found, &options)
         {
             found.fit.data.push(note.clone());
             found.notes.push(note);
@@ -97,53 +118,66 @@ impl Model {
     }
 }
 
-/// What equations count where that is left open: each drive by its own residuals, where squares of different units would add
-/// up, and where nobody has said how a recording is prepared. Instruments do without.
-fn settled(model: &Model, data: &[Stretch], instruments: &[Stretch], weights: Weights) -> Weights {
-    if weights != Weights::Automatic {
+/// The weights if they are left open: by drive if drives have different units, so that squares of different units
+/// would be added, or if the preparation was chosen automatically. Instruments use none.
+fn resolve_weights(
+    model: &Model,
+    data: &[RecordingSegment],
+    instruments: &[RecordingSegment],
+    weights: EquationWeights,
+) -> EquationWeights {
+    if weights != EquationWeights::Automatic {
         return weights;
     }
     let drives = model.drives().len();
+    // Squares of N and N m must not be added without weights.
     let differ = (1..drives).any(|d| model.force_unit(d) != model.force_unit(0));
     let chosen = data.iter().any(|one| one.run.prepared.decimate_chosen);
     if instruments.is_empty() && drives > 1 && (differ || chosen) {
-        Weights::Channels
+        EquationWeights::Channels
     } else {
-        Weights::None
+        EquationWeights::None
     }
 }
 
-/// Identifies a model from some recordings and holds it against others.
+/// Identifies a model from the segments `data`, and validates the result with the segments `check`.
+///
+/// Fails when the equations cannot be solved, when a pose has no solution, or when the job is cancelled.
 pub fn identify(
     model: &Model,
-    data: &[Stretch],
-    instruments: &[Stretch],
-    check: &[Stretch],
-    options: &Estimation,
+    data: &[RecordingSegment],
+    instruments: &[RecordingSegment],
+    check: &[RecordingSegment],
+    options: &EstimatorOptions,
 ) -> Outcome<Identification> {
     let found = regression::identify(model, data, instruments, options)?;
+    // Parameters known from the file are inserted between the identified ones, in the order of the
+    // model.
     let solution = &found.solution;
-    let infos = model.infos();
+    let infos = model.parameter_infos();
     let unknown: Vec<ParameterInfo> = found.unknown.iter().map(|k| infos[*k].clone()).collect();
+    // Values, standard deviations and status of the estimated parameters.
     let mut parameters = fit_parameters(&unknown, solution, &found.deviations);
-    for one in found.refined.left_out() {
-        parameters[one].status = Status::NotEssential;
+    for one in found.refined.removed_parameters() {
+        parameters[one].status = ParameterStatus::NotEssential;
     }
     for (k, info) in infos.iter().enumerate() {
         if model.is_known(k) {
-            parameters.insert(k, known(info, model.nominal[k]));
+            parameters.insert(k, known_parameter(info, model.nominal[k]));
         }
     }
+    // Notes need all parameters, in the order of the model.
     let notes = remarks(model, &found, &parameters);
     let values: Vec<f64> = parameters.iter().map(|p| p.value).collect();
     let names: Vec<String> = unknown.into_iter().map(|info| info.expression).collect();
-    // One band for fit and check, so that their figures can be compared.
+    // Fit and validation use one band, so that their error metrics can be compared.
     let band = compare::band(data);
+    // Error metrics of identified and nominal values, on fit and validation runs.
     let (fit, nominal_fit) = both_figures(model, data, &values, band)?;
     let recordings = data.iter().chain(check);
     let repeats = recordings
         .clone()
-        .filter_map(|one| Some((one.run.file.clone(), one.run.repeats.clone()?)))
+        .filter_map(|one| Some((one.run.file.clone(), one.run.repeatability.clone()?)))
         .collect();
     let (check, nominal_check) = if check.is_empty() {
         (None, None)
@@ -152,8 +186,9 @@ pub fn identify(
         (Some(identified), Some(nominal))
     };
     let finite = |value: f64| value.is_finite().then_some(value);
-    let of_recordings = recordings.flat_map(Stretch::notes).cloned();
-    let mut all_notes: Vec<Note> = model.caution().into_iter().chain(of_recordings).collect();
+    let of_recordings = recordings.flat_map(RecordingSegment::notes).cloned();
+    // The fit file contains all notes, also those of the recordings.
+    let mut all_notes: Vec<RecordingNote> = model.caution().into_iter().chain(of_recordings).collect();
     all_notes.extend(notes.iter().cloned());
     let constants = &model.derivation.mechanism.constants;
     Ok(Identification {
@@ -164,15 +199,12 @@ pub fn identify(
             scaled_condition_number: finite(solution.scaled_condition_number),
             covariance: covariance(&found, parameters.len()),
             parameters,
-            constants: constants
-                .iter()
-                .map(|c| (c.name.clone(), c.value))
-                .collect(),
+            constants: constants.iter().map(|c| (c.name.clone(), c.value)).collect(),
             undetermined: solution.describe_undetermined(&names),
             fit,
             check,
             data: all_notes,
-            estimator: Estimator::default(),
+            estimator: EstimatorOutput::default(),
         },
         nominal_fit,
         nominal_check,
@@ -183,21 +215,21 @@ pub fn identify(
     })
 }
 
-/// The covariance of all base parameters, of which the known ones have none.
-fn covariance(found: &Identified, n: usize) -> Option<Vec<Vec<f64>>> {
+/// The covariance of all base parameters, with zeros for known ones; `None` unless all values are finite.
+fn covariance(found: &RegressionEstimate, n: usize) -> Option<Vec<Vec<f64>>> {
+    // Known parameters have no uncertainty.
     let mut rows = vec![vec![0.0; n]; n];
     for (a, i) in found.unknown.iter().enumerate() {
         for (b, j) in found.unknown.iter().enumerate() {
             rows[*i][*j] = found.deviations.covariance[(a, b)];
         }
     }
-    let is_known = found.deviations.std.iter().all(|s| s.is_finite())
-        && rows.iter().flatten().all(|c| c.is_finite());
+    let is_known = found.deviations.std.iter().all(|s| s.is_finite()) && rows.iter().flatten().all(|c| c.is_finite());
     is_known.then_some(rows)
 }
 
-/// A parameter that is a number of the model file.
-fn known(info: &ParameterInfo, value: f64) -> FitParameter {
+/// The entry of a parameter that is known from the model file.
+fn known_parameter(info: &ParameterInfo, value: f64) -> FitParameter {
     FitParameter {
         name: info.name.clone(),
         expression: info.expression.clone(),
@@ -207,74 +239,74 @@ fn known(info: &ParameterInfo, value: f64) -> FitParameter {
         effective_samples: None,
         unit: info.unit.clone(),
         nominal: info.nominal,
-        status: Status::Known,
+        status: ParameterStatus::Known,
     }
 }
 
-/// What is not as one would wish: known parameters, undetermined ones, no deviations, impossible values.
-fn remarks(model: &Model, found: &Identified, parameters: &[FitParameter]) -> Vec<Note> {
+/// Notes on the result: known and undetermined parameters, weak instruments, few equations, impossible signs.
+fn remarks(model: &Model, found: &RegressionEstimate, parameters: &[FitParameter]) -> Vec<RecordingNote> {
     let solution = &found.solution;
     let mut notes = Vec::new();
-    for p in parameters.iter().filter(|p| p.status == Status::Known) {
-        notes.push(Note::info(format!(
-            "{} = {} holds numbers of the model file only: it is known, its force is taken off the measured one, and it is \
-             not identified.",
+    for p in parameters.iter().filter(|p| p.status == ParameterStatus::Known) {
+        notes.push(RecordingNote::info(format!(
+            "{} = {} contains numbers of the model file only. It is known and not identified; its force is subtracted \
+             from the measured one.",
             p.name, p.expression
         )));
     }
     let unknown: Vec<&FitParameter> = found.unknown.iter().map(|k| &parameters[*k]).collect();
     let names: Vec<String> = unknown.iter().map(|p| p.expression.clone()).collect();
-    if let Some(InstrumentsFound { strength, .. }) = &found.instruments
-        && *strength < WEAK_INSTRUMENTS
+    if let Some(InstrumentStatistics { strength, .. }) = &found.instruments
+        && *strength < WEAK_INSTRUMENT_CORRELATION
     {
-        notes.push(Note::warning(format!(
-            "The instruments say little: their smallest correlation with the regressor is {}. Are they of the same motion, \
-             and in step with the recording?",
+        notes.push(RecordingNote::warning(format!(
+            "The instruments are weak: their smallest correlation with the regressor is {}. Check that they have the same \
+             motion as the recording and are synchronous with it.",
             number(*strength)
         )));
     }
-    if found
-        .weighting
-        .as_ref()
-        .is_some_and(|weighting| !weighting.settled)
-    {
-        notes.push(Note::warning(message!(
-            "The weights have not settled: residuals depend on the weights from one solution to the next; leave out \
+    // Reweighting may alternate between two solutions.
+    if found.weighting.as_ref().is_some_and(|weighting| !weighting.converged) {
+        notes.push(RecordingNote::warning(message!(
+            "The weights have not converged: residuals depend on the weights from one solution to the next; leave out \
              {} or {}.",
             Remedy::option(OptionName::Weights),
             Remedy::option(OptionName::Robust)
         )));
     }
+    // Each undetermined direction gets one note, with the values that were chosen in it.
     for direction in &solution.undetermined {
+        // The values along the direction are chosen nearest to the nominal ones.
         let kept: Vec<String> = direction
             .changes
             .iter()
-            .map(|(i, _)| kept(unknown[*i]))
+            .map(|(i, _)| undetermined_text(unknown[*i]))
             .collect();
         let how = if kept.len() == 1 {
             "it stays at"
         } else {
-            "of all values that fit equally well those nearest to the nominal ones are taken:"
+            "of all values that fit equally well, those nearest to the nominal ones are used:"
         };
-        notes.push(Note::warning(format!(
+        notes.push(RecordingNote::warning(format!(
             "{}; {how} {}.",
             direction.describe(&names),
             kept.join(", ")
         )));
     }
+    // Without degrees of freedom the residual is zero; with few, its estimate is poor.
     if solution.rows <= solution.rank {
-        notes.push(Note::warning(format!(
-            "There {} for as many unknown base parameters: no degree of freedom is left for the residuals, so neither \
-             standard deviations nor the error of the fit say anything; use a longer recording.",
+        notes.push(RecordingNote::warning(format!(
+            "There {} for as many unknown base parameters: the residuals have no degree of freedom, so standard \
+             deviations and the error of the fit are meaningless; use a longer recording.",
             match solution.rows {
                 1 => "is 1 equation".to_owned(),
                 n => format!("are {n} equations"),
             }
         )));
     } else if found.deviations.few_samples {
-        notes.push(Note::warning(format!(
-            "There are only {} equations for {}: standard deviations take the residuals for independent and are too small \
-             if they are not, and the error of the fit says little; use a longer recording (at least {FEWEST_ROWS} \
+        notes.push(RecordingNote::warning(format!(
+            "There are only {} equations for {}: standard deviations assume independent residuals and are too small \
+             if they are not, and the error of the fit is not reliable; use a longer recording (at least {FEWEST_ROWS} \
              equations for each parameter).",
             solution.rows,
             count(
@@ -284,16 +316,18 @@ fn remarks(model: &Model, found: &Identified, parameters: &[FitParameter]) -> Ve
             ),
         )));
     }
+    // A sign counts as wrong only if it is two standard deviations beyond zero.
     for (k, p) in parameters.iter().enumerate() {
-        let slack = 2.0 * p.std.unwrap_or(0.0);
+        // Undetermined parameters keep their nominal sign and are not tested.
+        let slack = IMPOSSIBLE_SIGN_SIGMAS * p.std.unwrap_or(0.0);
         let (wrong, expected) = match model.sign(k) {
             Sign::Positive => (p.value < -slack, "positive"),
             Sign::Negative => (p.value > slack, "negative"),
             Sign::Any => continue,
         };
-        if wrong && p.status == Status::Identified {
-            notes.push(Note::warning(format!(
-                "{} = {} comes out as {} {}, but must be {expected} to make physical sense: the model lacks something, or \
+        if wrong && p.status == ParameterStatus::Identified {
+            notes.push(RecordingNote::warning(format!(
+                "{} = {} is estimated as {} {}, but must be {expected} to be physically possible: the model lacks an effect, or \
                  the recording excites it too little.",
                 p.name,
                 p.expression,
@@ -305,33 +339,28 @@ fn remarks(model: &Model, found: &Identified, parameters: &[FitParameter]) -> Ve
     notes
 }
 
-/// The value of an undetermined parameter beside its nominal one.
-fn kept(p: &FitParameter) -> String {
+/// The value of an undetermined parameter, compared with its nominal one.
+fn undetermined_text(p: &FitParameter) -> String {
     let value = number(p.value);
     match p.nominal {
         Some(nominal) if number(nominal) == value => {
             format!("{} = {value} {} (its nominal value)", p.name, p.unit)
         }
-        Some(nominal) => format!(
-            "{} = {value} {} (nominal {})",
-            p.name,
-            p.unit,
-            number(nominal)
-        ),
+        Some(nominal) => format!("{} = {value} {} (nominal {})", p.name, p.unit, number(nominal)),
         None => format!(
-            "{} = {value} {} (the file gives no nominal value, 0 stands for it)",
+            "{} = {value} {} (the file gives no nominal value; 0 is used)",
             p.name, p.unit
         ),
     }
 }
 
-/// Figures with identified and with nominal values.
+/// Error metrics with identified and with nominal values, over all samples and over the rows of the fit.
 fn both_figures(
     model: &Model,
-    data: &[Stretch],
+    data: &[RecordingSegment],
     values: &[f64],
     band_hz: Option<f64>,
-) -> Outcome<(Figures, Figures)> {
+) -> Outcome<(ErrorFigures, ErrorFigures)> {
     let figures_of = |values: &[f64]| {
         let forces = data
             .iter()
@@ -345,7 +374,7 @@ fn both_figures(
 }
 
 impl Identification {
-    /// The identified values.
+    /// The values of all base parameters, in the order of the model and in their units.
     pub fn values(&self) -> Vec<f64> {
         self.fit.parameters.iter().map(|p| p.value).collect()
     }

@@ -1,39 +1,41 @@
-//! How parameters are estimated from the rows of a regressor.
+//! Options of the estimation of parameters.
 
-use crate::identify::refine::Refinement;
+use crate::identify::refine::EstimateRefinement;
 
-/// How parameters are estimated; [`Estimation::default`] is least squares, where need be with each drive by
-/// its own residuals.
+/// Options of the estimation. [`EstimatorOptions::default`] is least squares with [`EquationWeights::Automatic`].
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Estimation {
-    /// What each equation counts.
-    pub weights: Weights,
-    /// Huber's robust estimate: residuals beyond this many standard deviations (taken from their median) count less; 1.345
-    /// is usual.
+pub struct EstimatorOptions {
+    /// Weights of the equations.
+    pub weights: EquationWeights,
+    /// Bound of Huber's robust estimator (1): residuals larger than this many standard deviations get less weight. The
+    /// standard deviation is estimated per drive as 1.4826 times the median of the absolute residuals; 1.345 is usual.
+    /// `None` for no robust estimation.
     pub robust: Option<f64>,
-    /// What is made of the solution of least squares.
-    pub refinement: Refinement,
-    /// Leave an equation out of the fit while its drive is slower than this part of its fastest, for at rest the friction
-    /// takes any value; 0.01 is usual.
+    /// Refinement of the least-squares solution.
+    pub refinement: EstimateRefinement,
+    /// Bound of standstill (1): equations of a drive are excluded while it is slower than this fraction of its fastest
+    /// rate, since friction at standstill may have any value. 0.01 is usual; `None` excludes no equation.
     pub standstill: Option<f64>,
 }
 
-/// What each equation counts.
+/// Weights of the equations, one equation per drive and sample. A channel is the force of one drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Weights {
-    /// `Channels` where drives have different units, and where cut-off and decimation are chosen; else `None`.
+pub enum EquationWeights {
+    /// [`Self::Channels`] if drives have different units, or if cut-off and decimation were chosen automatically;
+    /// otherwise [`Self::None`]. With one drive or with instruments always [`Self::None`].
     #[default]
     Automatic,
-    /// All the same: ordinary least squares.
+    /// Equal weights: ordinary least squares.
     None,
-    /// Each drive's are divided by the standard deviation of its residuals (iterated).
+    /// Equations of each drive are divided by the standard deviation of its residuals. Fit and weights are iterated.
     Channels,
-    /// Each sample's are divided by the standard deviation of the recording's columns `DRIVE_var`.
+    /// Each equation is divided by the standard deviation of its measured force: the square root of the variance in the
+    /// column `DRIVE_var` of the recording.
     Variance,
 }
 
-impl Weights {
-    /// What the JSON calls it.
+impl EquationWeights {
+    /// Name of the weights in the JSON and in options.
     pub fn name(self) -> &'static str {
         match self {
             Self::Automatic => "automatic",

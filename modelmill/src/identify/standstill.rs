@@ -1,21 +1,23 @@
-//! Equations at standstill: while a drive hardly moves its friction takes any value, and the sign of its rate is noise,
-//! so that they may be left out of a fit.
+//! Equations at standstill: while a drive hardly moves, its friction may have any value and the sign of its rate is
+//! noise. Such equations may be excluded from a fit.
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
-use modelmill_identify::Note;
+use modelmill_identify::RecordingNote;
 
 use crate::along::drive_rates;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
-use crate::stretch::Stretch;
+use crate::segment::RecordingSegment;
 use crate::text::table::count;
 
-/// Gives equations at standstill the weight 0, and says how many there are.
+/// Gives equations at standstill the weight 0, and adds a note with their number.
 ///
-/// `part` is the share of a drive's fastest rate below which it stands still.
-pub(crate) fn leave_out(model: &Model, data: &mut [Stretch], part: f64) -> Outcome {
+/// `part` is the fraction of a drive's fastest rate below which it is at standstill. Fails when all equations of a
+/// drive would be excluded.
+pub(crate) fn exclude_standstill(model: &Model, data: &mut [RecordingSegment], part: f64) -> Outcome {
     let drives = model.drives();
+    // Rates at the decimated samples, since these are the equations of the fit.
     let rates: Vec<Vec<Vec<f64>>> = data
         .iter()
         .map(|one| {
@@ -24,6 +26,7 @@ pub(crate) fn leave_out(model: &Model, data: &mut [Stretch], part: f64) -> Outco
             Ok(rates.into_iter().map(pick).collect())
         })
         .collect::<Outcome<_>>()?;
+    // The fastest rate of each drive is taken over all recordings.
     let fastest: Vec<f64> = (0..drives.len())
         .map(|d| {
             let all = rates.iter().flat_map(|run| &run[d]);
@@ -35,9 +38,8 @@ pub(crate) fn leave_out(model: &Model, data: &mut [Stretch], part: f64) -> Outco
     for (one, run) in data.iter_mut().zip(&rates) {
         let samples = run.first().map_or(0, Vec::len);
         of += samples;
-        let weights = one
-            .weights
-            .get_or_insert_with(|| vec![1.0; samples * drives.len()]);
+        // Weights of other exclusions are kept.
+        let weights = one.weights.get_or_insert_with(|| vec![1.0; samples * drives.len()]);
         for (k, row) in weights.chunks_exact_mut(drives.len()).enumerate() {
             for (d, weight) in row.iter_mut().enumerate() {
                 if run[d][k].abs() <= part * fastest[d] {
@@ -47,20 +49,21 @@ pub(crate) fn leave_out(model: &Model, data: &mut [Stretch], part: f64) -> Outco
             }
         }
     }
+    // One note for each drive; a drive without any equation is an error.
     let standstill = Remedy::option(OptionName::Standstill);
     for (drive, out) in drives.iter().zip(out) {
         if out == of {
             return Err(Error::input(message!(
-                "`{drive}` stands still in all recordings of the fit, so {} leaves nothing of it; \
-                 use a recording in which it moves, or leave {} out",
+                "`{drive}` is at standstill in all recordings of the fit, so {} excludes all its equations; \
+                 use a recording in which it moves, or omit {}",
                 standstill,
                 standstill
             )));
         }
         if out > 0 {
-            data[0].note(model, Note::info(message!(
-                "Of the {} of `{drive}` {out} are left out of the fit: it is slower there than {part} of its fastest \
-                 ({}). Error figures count them.",
+            data[0].note(model, RecordingNote::info(message!(
+                "Of the {} of `{drive}`, {out} are left out of the fit: its rate there is below {part} of its fastest \
+                 ({}). Error figures include them.",
                 count(of, "equation", "equations"),
                 standstill,
             )));

@@ -1,50 +1,46 @@
-//! `diff`: what a variant changes, for people who review it.
+//! `diff`: the differences of two models, for reviewers.
 
-use modelmill_codegen::review::Equations;
-use modelmill_codegen::{OperationCount, Stage};
+use modelmill_codegen::review::ReducedEquations;
+use modelmill_codegen::{OperationCount, ProgramStage};
 
 use crate::model::Model;
 use crate::model::entries::entries;
 
-/// A named entry before and after; equal ones are left out.
+/// A named entry before and after a change.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Change {
-    /// What it is called: its table and its own name, or a product of parameters.
+pub struct EntryChange {
+    /// Its name: its table and its own name, or a product of parameters.
     pub name: String,
-    /// What it was; `None` if it is new.
+    /// Its text before; `None` if it is new.
     pub before: Option<String>,
-    /// What it is now; `None` if it is gone.
+    /// Its text after; `None` if it was removed.
     pub after: Option<String>,
 }
 
 /// Named entries that differ, in the order of the first list, then of the second.
-fn changed(before: &[(String, String)], after: &[(String, String)]) -> Vec<Change> {
-    let find = |list: &[(String, String)], name: &str| {
-        list.iter()
-            .find(|(n, _)| n == name)
-            .map(|(_, text)| text.clone())
-    };
-    let added = after
-        .iter()
-        .filter(|(name, _)| find(before, name).is_none());
+fn changed_entries(before: &[(String, String)], after: &[(String, String)]) -> Vec<EntryChange> {
+    let find =
+        |list: &[(String, String)], name: &str| list.iter().find(|(n, _)| n == name).map(|(_, text)| text.clone());
+    let added = after.iter().filter(|(name, _)| find(before, name).is_none());
     before
         .iter()
         .chain(added)
-        .map(|(name, _)| Change {
+        .map(|(name, _)| EntryChange {
             name: name.clone(),
             before: find(before, name),
             after: find(after, name),
         })
+        // Constants in numeric form may differ by rounding, which is no change.
         .filter(|change| match (&change.before, &change.after) {
-            (Some(before), Some(after)) => !is_same(before, after),
+            (Some(before), Some(after)) => !is_equal_but_for_rounding(before, after),
             (before, after) => before != after,
         })
         .collect()
 }
 
-/// Whether two texts are the same but for rounding in the last places of their numbers.
-fn is_same(a: &str, b: &str) -> bool {
-    /// A few roundings of a number of the machine.
+/// Whether two texts are equal apart from rounding in the last digits of their numbers.
+fn is_equal_but_for_rounding(a: &str, b: &str) -> bool {
+    /// Relative tolerance: a few roundings of double precision.
     const ROUNDING: f64 = 2e-15;
     let (mut a, mut b) = (pieces(a), pieces(b));
     loop {
@@ -60,7 +56,7 @@ fn is_same(a: &str, b: &str) -> bool {
     }
 }
 
-/// Numbers of a text, and what stands between them.
+/// The text split into numbers and the pieces between them.
 fn pieces(text: &str) -> impl Iterator<Item = &str> {
     let is_of_number = |c: char| c.is_ascii_digit() || c == '.';
     let mut rest = text;
@@ -74,52 +70,64 @@ fn pieces(text: &str) -> impl Iterator<Item = &str> {
     })
 }
 
-/// Everything that differs between two models.
+/// The differences of two models.
 #[derive(Clone, Debug)]
-pub struct Changes {
+pub struct ModelChanges {
     /// Entries of the model files.
-    pub entries: Vec<Change>,
-    /// p_g, eq. (5): which products are in it, or without effect.
-    pub products: Vec<Change>,
-    /// Dependences of columns, eq. (6).
-    pub dependencies: Vec<Change>,
-    /// p_min, eq. (16), by retained products.
-    pub base: Vec<Change>,
-    /// Operations of a call by the name of the function, before and after.
+    pub entries: Vec<EntryChange>,
+    /// p_g, eq. (5): products that enter it, or lose their effect.
+    pub products: Vec<EntryChange>,
+    /// Dependencies of columns, eq. (6).
+    pub dependencies: Vec<EntryChange>,
+    /// p_min, eq. (16), named by retained products.
+    pub base: Vec<EntryChange>,
+    /// Numbers of operations of a call, by the name of the function, before and after.
     pub operations: Vec<(&'static str, OperationCount, OperationCount)>,
 }
 
-impl Changes {
-    /// What changes from one model to another.
-    pub fn between(before: &Model, after: &Model) -> Self {
+impl ModelChanges {
+    /// The differences of `after` relative to `before`.
+    ///
+    /// ```
+    /// use modelmill::Model;
+    /// use modelmill::model::ModelChanges;
+    ///
+    /// let arm = Model::open("../model-spec/models/two_link.toml")?;
+    /// let same = ModelChanges::from_models(&arm, &arm);
+    /// assert!(same.entries.is_empty() && same.base.is_empty());
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
+    pub fn from_models(before: &Model, after: &Model) -> Self {
+        // Each list becomes pairs of a name and a text, which are compared by name.
         let products = |model: &Model| -> Vec<(String, String)> {
             let reduction = &model.derivation.reduction;
             let mechanism = &model.derivation.mechanism;
             let with = reduction.products.iter().map(|p| (p, "in p_g"));
-            let without = reduction
-                .without_effect
-                .iter()
-                .map(|p| (p, "without effect"));
+            let without = reduction.without_effect.iter().map(|p| (p, "without effect"));
             with.chain(without)
                 .map(|(p, text)| (p.text(mechanism), text.to_owned()))
                 .collect()
         };
         let base = |model: &Model| -> Vec<(String, String)> {
             let list = model.base.iter();
-            list.map(|b| (b.retained.clone(), b.expression.clone()))
-                .collect()
+            list.map(|b| (b.retained.clone(), b.expression.clone())).collect()
         };
         let count = |pick: &dyn Fn(&Model) -> OperationCount| (pick(before), pick(after));
-        let regressor = count(&|m| m.derivation.programs.regressor.count(Stage::State));
-        let dynamics = count(&|m| m.derivation.programs.inverse_dynamics.count(Stage::State));
+        let regressor = count(&|m| m.derivation.programs.regressor.count_operations(ProgramStage::State));
+        let dynamics = count(&|m| {
+            m.derivation
+                .programs
+                .inverse_dynamics
+                .count_operations(ProgramStage::State)
+        });
         Self {
-            entries: changed(
+            entries: changed_entries(
                 &entries(&before.derivation.mechanism),
                 &entries(&after.derivation.mechanism),
             ),
-            products: changed(&products(before), &products(after)),
-            dependencies: changed(&dependencies(before), &dependencies(after)),
-            base: changed(&base(before), &base(after)),
+            products: changed_entries(&products(before), &products(after)),
+            dependencies: changed_entries(&dependencies(before), &dependencies(after)),
+            base: changed_entries(&base(before), &base(after)),
             operations: vec![
                 ("regressor", regressor.0, regressor.1),
                 ("inverse dynamics", dynamics.0, dynamics.1),
@@ -128,9 +136,9 @@ impl Changes {
     }
 }
 
-/// The dependencies by product: `d1*h[m1*dc1] + d1^2*h[m1*dc1^2]`.
+/// The dependencies, eq. (6), named by product: `d1*h[m1*dc1] + d1^2*h[m1*dc1^2]`.
 fn dependencies(model: &Model) -> Vec<(String, String)> {
-    let equations = Equations::new(&model.derivation, None);
+    let equations = ReducedEquations::new(&model.derivation, None);
     equations
         .dependencies
         .into_iter()
@@ -139,6 +147,7 @@ fn dependencies(model: &Model) -> Vec<(String, String)> {
             let terms: Vec<String> = line
                 .equals
                 .iter()
+                // Factors of one are omitted, sums are put in brackets.
                 .map(|(retained, factor)| match factor.as_str() {
                     "1" => format!("h[{retained}]"),
                     "-1" => format!("-h[{retained}]"),
@@ -156,18 +165,21 @@ fn dependencies(model: &Model) -> Vec<(String, String)> {
 
 #[cfg(test)]
 mod tests {
-    use super::is_same;
+    use super::is_equal_but_for_rounding;
 
     #[test]
     fn rounding_is_no_change() {
-        assert!(is_same(
+        assert!(is_equal_but_for_rounding(
             "link: -2.138038093018084",
             "link: -2.1380380930180856"
         ));
-        assert!(!is_same("link: -2.138038093018084", "link: -2.13803809301"));
-        assert!(!is_same("a: 1", "b: 1"));
-        assert!(!is_same("a: 1", "a: -1"));
-        assert!(!is_same("a: 1", "a: 1 m"));
-        assert!(!is_same("p = d1*m2", "p = d1*m3"));
+        assert!(!is_equal_but_for_rounding(
+            "link: -2.138038093018084",
+            "link: -2.13803809301"
+        ));
+        assert!(!is_equal_but_for_rounding("a: 1", "b: 1"));
+        assert!(!is_equal_but_for_rounding("a: 1", "a: -1"));
+        assert!(!is_equal_but_for_rounding("a: 1", "a: 1 m"));
+        assert!(!is_equal_but_for_rounding("p = d1*m2", "p = d1*m3"));
     }
 }

@@ -1,16 +1,17 @@
-//! The entries of a model as pairs of a name and a text, so that two models can be compared.
+//! The entries of a model as pairs of a name and a text, so that two models can be compared. Each function describes
+//! one group of tables of the model file.
 
 use modelmill_spec::{
-    Angle, Axis, Convention, CoordinateIdx, DriveKind, Effect, Exact, Inertial, Length, Mechanism,
-    Place, PlaceQuantity, Step, Symbol, TwistAxes,
+    CoordinateIdx, DriveKind, EffectPlace, ExactAngle, ExactExpression, ExactLength, FrameAxis, FrameConvention,
+    FrameStep, Mechanism, ModelEffect, ModelSymbol, PartInertia, PlaceQuantity, TwistAxes,
 };
 
-/// Entries as they are collected.
+/// Collects entries: pairs of a name and a text, in the order of the file.
 #[derive(Default)]
-struct Entries(Vec<(String, String)>);
+struct ModelEntries(Vec<(String, String)>);
 
-impl Entries {
-    /// Entries of the same name are told apart by their place in the file.
+impl ModelEntries {
+    /// Adds an entry. Entries of the same name get a number, by their order in the file.
     fn add(&mut self, kind: &str, name: &str, text: String) {
         let mut key = format!("{kind} {name}").trim().to_owned();
         let mut twin = 1;
@@ -24,7 +25,7 @@ impl Entries {
 
 /// All entries in the order of the file, each named by its table and its own name.
 pub(crate) fn entries(m: &Mechanism) -> Vec<(String, String)> {
-    let mut entries = Entries::default();
+    let mut entries = ModelEntries::default();
     quantities(m, &mut entries);
     geometry(m, &mut entries);
     bodies(m, &mut entries);
@@ -32,7 +33,9 @@ pub(crate) fn entries(m: &Mechanism) -> Vec<(String, String)> {
     entries.0
 }
 
-fn quantities(m: &Mechanism, entries: &mut Entries) {
+/// Gravity, constants, parameters and coordinates.
+fn quantities(m: &Mechanism, entries: &mut ModelEntries) {
+    // Values carry their units, so that a changed unit is a change.
     entries.add("gravity", "", triple(m, &m.gravity));
     for c in &m.constants {
         entries.add("constant", &c.name, format!("{} {}", c.value, c.unit));
@@ -48,9 +51,11 @@ fn quantities(m: &Mechanism, entries: &mut Entries) {
     }
 }
 
-fn geometry(m: &Mechanism, entries: &mut Entries) {
+/// Frames and points.
+fn geometry(m: &Mechanism, entries: &mut ModelEntries) {
     for f in &m.frames {
-        if f.convention == Convention::Base {
+        // The base frame is part of every model.
+        if f.convention == FrameConvention::Base {
             continue;
         }
         let steps: Vec<String> = f.steps.iter().map(|s| step(m, s)).collect();
@@ -62,26 +67,25 @@ fn geometry(m: &Mechanism, entries: &mut Entries) {
         let what = format!("on {}, {steps}", m.frames[f.parent.0].name);
         entries.add("frame", &f.name, what);
     }
+    // Points are given in the axes of their frame.
     for p in &m.points {
         let what = format!("on {} at {}", m.frames[p.frame.0].name, triple(m, &p.at));
         entries.add("point", &p.name, what);
     }
 }
 
-fn bodies(m: &Mechanism, entries: &mut Entries) {
+/// Parts and lumped masses.
+fn bodies(m: &Mechanism, entries: &mut ModelEntries) {
+    // Both ways of giving an inertia are described as they are written.
     for p in &m.parts {
         let inertial = match &p.inertial {
-            Inertial::AboutCentre {
-                mass,
-                centre,
-                inertia,
-            } => format!(
+            PartInertia::AboutCentre { mass, centre, inertia } => format!(
                 "mass {}, centre {}, inertia about it {}",
                 text(m, mass),
                 triple(m, centre),
                 tensor(m, inertia)
             ),
-            Inertial::Linear {
+            PartInertia::Linear {
                 mass,
                 first_moment,
                 inertia,
@@ -95,6 +99,7 @@ fn bodies(m: &Mechanism, entries: &mut Entries) {
         let what = format!("on {}, {inertial}", m.frames[p.frame.0].name);
         entries.add("part", &p.name, what);
     }
+    // A lumped mass may act at different places in the two balances.
     for l in &m.lumped_masses {
         let places = if l.force_at == l.moment_at {
             format!("at {}", triple(m, &l.force_at))
@@ -111,56 +116,64 @@ fn bodies(m: &Mechanism, entries: &mut Entries) {
     }
 }
 
-fn actuation(m: &Mechanism, entries: &mut Entries) {
+/// Loops, couplings, drives, effects, retained products and columns of recordings.
+fn actuation(m: &Mechanism, entries: &mut ModelEntries) {
+    // Loops and couplings determine passive coordinates.
     for l in &m.loops {
         let [a, b] = l.joins.map(|p| m.points[p.0].name.clone());
         entries.add("loop", &l.name, format!("joins {a} and {b}"));
     }
     for c in &m.couplings {
         let terms = c.terms.iter();
-        let terms =
-            terms.map(|(i, factor)| format!("({})*{}", text(m, factor), m.coordinates[i.0].name));
+        let terms = terms.map(|(i, factor)| format!("({})*{}", text(m, factor), m.coordinates[i.0].name));
         let offset = (!c.offset.is_zero()).then(|| text(m, &c.offset));
         let all: Vec<String> = terms.chain(offset).collect();
         let name = &m.coordinates[c.coordinate.0].name;
         entries.add("coupling of", name, format!("follows {}", all.join(" + ")));
     }
+    // A drive acts on a joint or between two points.
     for d in &m.drives {
         let how = match d.kind {
             DriveKind::Joint(i) => format!("on the joint {}", m.coordinates[i.0].name),
-            DriveKind::Linear { from, to } => format!(
-                "linear, from {} to {}",
-                m.points[from.0].name, m.points[to.0].name
-            ),
+            DriveKind::Linear { from, to } => {
+                format!("linear, from {} to {}", m.points[from.0].name, m.points[to.0].name)
+            }
         };
         entries.add("drive", &d.name, how);
     }
+    // The places belong to the name of an effect, since a kind may occur several times.
     for e in &m.effects {
         let name = format!("{} at {}", e.kind, places(m, e));
         entries.add("effect", &name, terms(m, e));
     }
+    // The order of `retain` matters, so that the list is one entry.
     let retained: Vec<String> = m.retain.iter().map(|powers| product(m, powers)).collect();
     if !retained.is_empty() {
         entries.add("retain", "", retained.join(", "));
     }
+    // Columns of recordings are compared as they are written.
     for (ours, theirs) in &m.recording.columns {
         entries.add("column", ours, theirs.clone());
     }
 }
 
-fn triple(m: &Mechanism, vector: &[Exact; 3]) -> String {
+/// A vector as `(x, y, z)`.
+fn triple(m: &Mechanism, vector: &[ExactExpression; 3]) -> String {
     let entries: Vec<String> = vector.iter().map(|e| text(m, e)).collect();
     format!("({})", entries.join(", "))
 }
 
-fn text(m: &Mechanism, exact: &Exact) -> String {
+/// An exact expression in the names of the model.
+fn text(m: &Mechanism, exact: &ExactExpression) -> String {
     exact.to_text(&|symbol| m.symbol_name(symbol).to_owned())
 }
 
+/// A product of powers of parameters, such as `m1*dc1^2`.
 fn product(m: &Mechanism, powers: &[(modelmill_spec::ParameterIdx, u32)]) -> String {
     let factors: Vec<String> = powers
         .iter()
         .map(|(p, n)| match n {
+            // A power of one is not written.
             1 => m.parameters[p.0].name.clone(),
             n => format!("{}^{n}", m.parameters[p.0].name),
         })
@@ -168,7 +181,9 @@ fn product(m: &Mechanism, powers: &[(modelmill_spec::ParameterIdx, u32)]) -> Str
     factors.join("*")
 }
 
-fn tensor(m: &Mechanism, inertia: &[Exact; 6]) -> String {
+/// The entries of an inertia that are not zero, such as `xx I1, zz I3`.
+fn tensor(m: &Mechanism, inertia: &[ExactExpression; 6]) -> String {
+    // Zero entries are omitted, as in the model file.
     let entries: Vec<String> = ["xx", "xy", "xz", "yy", "yz", "zz"]
         .iter()
         .zip(inertia)
@@ -182,16 +197,21 @@ fn tensor(m: &Mechanism, inertia: &[Exact; 6]) -> String {
     }
 }
 
-fn step(m: &Mechanism, step: &Step) -> String {
-    let letter = |axis: &Axis| match axis {
-        Axis::X => "x",
-        Axis::Y => "y",
-        Axis::Z => "z",
+/// One step of a frame: a rotation, a translation, or a free body.
+fn step(m: &Mechanism, step: &FrameStep) -> String {
+    // Rotations and translations are written as `Rz(q1)` and `Tx(L)`.
+    let letter = |axis: &FrameAxis| match axis {
+        FrameAxis::X => "x",
+        FrameAxis::Y => "y",
+        FrameAxis::Z => "z",
     };
     match step {
-        Step::Rotate(axis, angle) => format!("R{}({})", letter(axis), angle_text(m, angle)),
-        Step::Translate(axis, length) => format!("T{}({})", letter(axis), length_text(m, length)),
-        Step::Free(body) => {
+        FrameStep::Rotate(axis, angle) => format!("R{}({})", letter(axis), angle_text(m, angle)),
+        FrameStep::Translate(axis, length) => {
+            format!("T{}({})", letter(axis), length_text(m, length))
+        }
+        // A free body is described by its coordinates and the axes of its twist.
+        FrameStep::Free(body) => {
             let names = |all: &[CoordinateIdx]| {
                 let names = all.iter().map(|i| m.coordinates[i.0].name.as_str());
                 names.collect::<Vec<_>>().join(", ")
@@ -211,12 +231,14 @@ fn step(m: &Mechanism, step: &Step) -> String {
     }
 }
 
-fn angle_text(m: &Mechanism, angle: &Angle) -> String {
+/// An angle: a linear combination of symbols and of pi.
+fn angle_text(m: &Mechanism, angle: &ExactAngle) -> String {
     let mut terms: Vec<String> = angle
         .terms
         .iter()
         .map(|(symbol, factor)| times(&factor.to_string(), m.symbol_name(*symbol)))
         .collect();
+    // Multiples of pi are exact.
     let pi = angle.pi.to_string();
     if pi != "0" {
         terms.push(times(&pi, "pi"));
@@ -224,11 +246,12 @@ fn angle_text(m: &Mechanism, angle: &Angle) -> String {
     join(&terms)
 }
 
-fn length_text(m: &Mechanism, length: &Length) -> String {
+/// A length: a linear combination of coordinates, and an offset.
+fn length_text(m: &Mechanism, length: &ExactLength) -> String {
     let mut terms: Vec<String> = length
         .coordinates
         .iter()
-        .map(|(i, factor)| times(&factor.to_string(), m.symbol_name(Symbol::Coordinate(*i))))
+        .map(|(i, factor)| times(&factor.to_string(), m.symbol_name(ModelSymbol::Coordinate(*i))))
         .collect();
     if !length.offset.is_zero() {
         terms.push(text(m, &length.offset));
@@ -236,6 +259,7 @@ fn length_text(m: &Mechanism, length: &Length) -> String {
     join(&terms)
 }
 
+/// A factor times a symbol, without a factor of one.
 fn times(factor: &str, what: &str) -> String {
     match factor {
         "1" => what.to_owned(),
@@ -244,6 +268,7 @@ fn times(factor: &str, what: &str) -> String {
     }
 }
 
+/// A sum of terms; `0` without terms.
 fn join(terms: &[String]) -> String {
     if terms.is_empty() {
         return "0".to_owned();
@@ -251,24 +276,27 @@ fn join(terms: &[String]) -> String {
     terms.join(" + ").replace("+ -", "- ")
 }
 
-fn places(m: &Mechanism, effect: &Effect) -> String {
+/// The names of an effect's places.
+fn places(m: &Mechanism, effect: &ModelEffect) -> String {
     let names = effect.places.iter().map(|place| m.place_name(*place));
     names.collect::<Vec<_>>().join(", ")
 }
 
-/// The name of a symbol of an effect. Where there is only one place, its quantities are called as the columns of a
-/// recording are.
-fn at_place(m: &Mechanism, effect: &Effect, symbol: Symbol) -> String {
-    let (Symbol::Place(quantity), [place]) = (symbol, effect.places.as_slice()) else {
+/// The name of a symbol of an effect. If the effect has one place, its quantities have the names of the columns of a
+/// recording.
+fn symbol_name_at_place(m: &Mechanism, effect: &ModelEffect, symbol: ModelSymbol) -> String {
+    // Symbols that are not those of a place have their own names.
+    let (ModelSymbol::Place(quantity), [place]) = (symbol, effect.places.as_slice()) else {
         return m.symbol_name(symbol).to_owned();
     };
+    // A drive on a joint is named by its coordinate, a linear drive by itself.
     let (name, position) = match place {
-        Place::Coordinate(i) => (&m.coordinates[i.0].name, ""),
-        Place::Drive(d) => match m.drives[d.0].kind {
+        EffectPlace::Coordinate(i) => (&m.coordinates[i.0].name, ""),
+        EffectPlace::Drive(d) => match m.drives[d.0].kind {
             DriveKind::Joint(i) => (&m.coordinates[i.0].name, ""),
             DriveKind::Linear { .. } => (&m.drives[d.0].name, "_length"),
         },
-        Place::Point(_) | Place::Part(_) | Place::Base | Place::Force => {
+        EffectPlace::Point(_) | EffectPlace::Part(_) | EffectPlace::Base | EffectPlace::Force => {
             return m.symbol_name(symbol).to_owned();
         }
     };
@@ -280,7 +308,10 @@ fn at_place(m: &Mechanism, effect: &Effect, symbol: Symbol) -> String {
     }
 }
 
-fn terms(m: &Mechanism, effect: &Effect) -> String {
+/// The force of an effect in its parameters; for effects with mechanics of their own, the names of their
+/// parameters and the values of their constants.
+fn terms(m: &Mechanism, effect: &ModelEffect) -> String {
+    // Effects that change the mechanics have no expression.
     if effect.mechanics.is_some() {
         let names = effect.terms.iter().map(|term| {
             let parameter = &m.parameters[term.parameter.0];
@@ -297,7 +328,8 @@ fn terms(m: &Mechanism, effect: &Effect) -> String {
             let name = &m.parameters[term.parameter.0].name;
             let expression = term
                 .expression
-                .to_text(&|symbol| at_place(m, effect, symbol));
+                .to_text(&|symbol| symbol_name_at_place(m, effect, symbol));
+            // Expressions with blanks or quotients need brackets behind a parameter.
             match expression.as_str() {
                 "1" => name.clone(),
                 expression if expression.contains([' ', '/']) => format!("{name}*({expression})"),

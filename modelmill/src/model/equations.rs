@@ -1,62 +1,69 @@
-//! `equations`: the reduced model for people and programs.
+//! `equations`: the reduced model as a page or as JSON.
 
-use modelmill_codegen::review::{Equations, Format, page};
-use modelmill_identify::Note;
+use modelmill_codegen::review::{PageFormat, ReducedEquations, page};
+use modelmill_identify::RecordingNote;
 
 use crate::error::Outcome;
 use crate::model::Model;
-use crate::model::sampled_rank::{SampledRank, judged_rank};
+use crate::model::sampled_rank::{SampledRank, judge_rank};
 
-/// The equations of a model, written out.
+/// The equations of a model as text.
 #[derive(Clone, Debug)]
-pub struct Written {
-    /// The text, in the form that was asked for.
+pub struct EquationsText {
+    /// The text, in the requested format.
     pub text: String,
-    /// What there is to know about the numeric rank, eq. (9), beside the exact one.
-    pub notes: Vec<Note>,
+    /// Notes on the numeric rank of the regressor, eq. (9), compared with the exact rank.
+    pub notes: Vec<RecordingNote>,
 }
 
 impl Model {
-    /// The equations as a page for people: p_g, dependences, p_min, intermediate variables, counts of operations. Those of a
-    /// long chain take seconds to write.
+    /// The equations as a page: parameter products p_g, linear dependencies of the regressor columns, base parameters
+    /// p_min, straight-line programs and numbers of operations. For a long chain this takes seconds.
     ///
-    /// Fails only when whoever watches stops it.
-    pub fn equations(&self, format: Format) -> Outcome<Written> {
+    /// Fails only when the listener stops the job.
+    ///
+    /// ```
+    /// use modelmill::Model;
+    /// use modelmill::model::PageFormat;
+    ///
+    /// let arm = Model::open("../model-spec/models/two_link.toml")?;
+    /// assert!(arm.equations(PageFormat::Markdown)?.text.contains("p1_min"));
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
+    pub fn equations(&self, format: PageFormat) -> Outcome<EquationsText> {
         let (rank, notes) = self.numeric_rank()?;
         let what = format!("writing the equations of {}", self.name);
-        let text = self.host().watched(&what, 0, |_| {
-            page(
-                &self.derivation,
-                format,
-                rank.as_ref().map(|rank| &rank.shown),
-            )
+        let text = self.host().run_job(&what, 0, |_| {
+            page(&self.derivation, format, rank.as_ref().map(|rank| &rank.numeric_rank))
         })?;
-        Ok(Written { text, notes })
+        Ok(EquationsText { text, notes })
     }
 
     /// The equations as one JSON object.
     ///
-    /// Fails only when whoever watches stops it.
-    pub fn equations_json(&self) -> Outcome<Written> {
+    /// Fails only when the listener stops the job.
+    pub fn equations_json(&self) -> Outcome<EquationsText> {
         let (rank, notes) = self.numeric_rank()?;
-        let rank = rank.as_ref().map(|rank| &rank.shown);
-        let mut equations = Equations::new(&self.derivation, rank);
+        let rank = rank.as_ref().map(|rank| &rank.numeric_rank);
+        let mut equations = ReducedEquations::new(&self.derivation, rank);
+        // The JSON names the model by its file, not by the mechanism.
         equations.model.clone_from(&self.name);
-        Ok(Written {
+        Ok(EquationsText {
             text: equations.json(),
             notes,
         })
     }
 
-    /// Eq. (9) on the file's values, with a warning where it says something else than exact reduction.
-    fn numeric_rank(&self) -> Outcome<(Option<SampledRank>, Vec<Note>)> {
-        let judged = judged_rank(self)?;
+    /// The numeric rank, eq. (9), at the file's values, with a warning if it contradicts the exact reduction. `None`
+    /// if it was not found. The notes are also passed to the listener.
+    fn numeric_rank(&self) -> Outcome<(Option<SampledRank>, Vec<RecordingNote>)> {
+        let judged = judge_rank(self)?;
         let warnings = judged.warnings.iter();
-        let mut notes: Vec<Note> = warnings
-            .map(|says| Note::warning(format!("{}: {says}", self.path)))
+        let mut notes: Vec<RecordingNote> = warnings
+            .map(|says| RecordingNote::warning(format!("{}: {says}", self.path)))
             .collect();
         if let Some(says) = judged.found.as_ref().and_then(SampledRank::remark) {
-            notes.push(Note::info(format!("{}: {says}", self.path)));
+            notes.push(RecordingNote::info(format!("{}: {says}", self.path)));
         }
         for note in &notes {
             self.host().note(note);

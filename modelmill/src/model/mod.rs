@@ -1,4 +1,4 @@
-//! A model file that was read and derived, with names for people.
+//! A model file that was read, with the equations derived from it and the names and units that users see.
 
 mod changes;
 mod entries;
@@ -13,63 +13,81 @@ use std::sync::Arc;
 use modelmill_boundary::message;
 use modelmill_boundary::text::{CommandName, Remedy};
 use modelmill_codegen::review::base_expression;
-use modelmill_codegen::{BaseParameter, Dependency, Derivation, Monomial};
-use modelmill_identify::estimate::Belief;
-use modelmill_identify::{Note, ParameterInfo};
+use modelmill_codegen::{BaseParameterEntry, ColumnDependency, Derivation, ParameterMonomial};
+use modelmill_identify::estimate::ParameterPrior;
+use modelmill_identify::{ParameterInfo, RecordingNote};
 use modelmill_spec::{
-    EffectKind, Exact, Inertial, Mechanism, ParameterIdx, PlaceQuantity, Sign, Symbol,
+    EffectKind, ExactExpression, Mechanism, ModelSymbol, ParameterIdx, PartInertia, PlaceQuantity, Sign,
 };
 use nalgebra::DMatrix;
 
 use crate::error::{Error, Outcome};
 use crate::host::Host;
 
-pub use changes::{Change, Changes};
-pub use equations::Written;
-pub use modelmill_codegen::review::Format;
-pub use modelmill_spec::Loaded;
+pub use changes::{EntryChange, ModelChanges};
+pub use equations::EquationsText;
+pub use modelmill_codegen::review::PageFormat;
+pub use modelmill_spec::LoadedModel;
 pub use sampled_rank::SampledRank;
-pub use summary::{Checked, Summary};
-pub use values::Values;
+pub use summary::{ModelCheck, ModelSummary};
+pub use values::BaseParameterValues;
 
-/// A model file that was read and derived. A clone shares what was derived.
+/// A model file that was read, with the equations derived from it. A clone shares the derivation.
 #[derive(Clone)]
 pub struct Model {
-    /// The file's name without folder and extension; what the JSON calls the model.
+    /// The file's name without folder and extension; also the name of the model in the JSON.
     pub name: String,
-    /// What messages call the file.
+    /// Name of the file in messages.
     pub path: String,
-    /// What the file says.
-    pub loaded: Arc<Loaded>,
-    /// Everything the mill knows about it.
+    /// The contents of the file.
+    pub loaded: Arc<LoadedModel>,
+    /// The derivation: parameter products p_g, linear dependencies of the regressor columns, base parameters p_min and
+    /// straight-line programs.
     pub derivation: Arc<Derivation>,
-    /// The base parameters.
-    pub base: Vec<BaseParameter>,
-    /// Their values from the file's nominal values.
+    /// The base parameters, eq. (16), with names, expressions and units.
+    pub base: Vec<BaseParameterEntry>,
+    /// Values of the base parameters, in their units: computed from the file's nominal values, or identified in a fit.
     pub nominal: Vec<f64>,
-    /// What was found on the way that may not be intended, beside the warnings of `loaded`.
-    pub notes: Vec<Note>,
-    /// Covariance of the values in `nominal`, where they are those of a fit that tells it.
+    /// Notes on the file in addition to the warnings of `loaded`, such as entries that are ignored.
+    pub notes: Vec<RecordingNote>,
+    /// Covariance of the values in `nominal`, if they come from a fit that has one.
     covariance: Option<Arc<DMatrix<f64>>>,
-    /// Whether the value in `nominal` was identified, in the file or in a fit that was given.
+    /// Whether each value in `nominal` was identified, in the file or in a fit.
     identified: Vec<bool>,
-    /// The sign that each dynamic parameter must have.
+    /// The sign that each dynamic parameter must have, in the order of the mechanism.
     signs: Vec<Sign>,
-    /// Where the file came from.
+    /// Provides the file, and all files that are read later.
     host: Host,
 }
 
 impl Model {
-    /// Reads a model file from disk and derives it.
+    /// Reads a model file from disk and derives its equations.
     ///
-    /// Fails with every finding about the file, each with its place, or with the reason why it cannot be derived.
+    /// Fails with all errors and warnings of the file, each with its line and column, or with the reason why the
+    /// equations cannot be derived.
+    ///
+    /// ```
+    /// use modelmill::Model;
+    ///
+    /// let arm = Model::open("../model-spec/models/two_link.toml")?;
+    /// assert_eq!(arm.drives(), ["joint1", "joint2"]);
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     pub fn open(path: impl AsRef<Path>) -> Outcome<Self> {
         Host::new().model(path)
     }
 
-    /// Derives a model from the text of its file, which extends nothing.
+    /// Reads a model from the text of its file and derives its equations. The text must not extend another file. `name`
+    /// is the name of the file in messages.
     ///
     /// Fails as [`Model::open`] does.
+    ///
+    /// ```
+    /// let text = std::fs::read_to_string("../model-spec/models/two_link.toml").unwrap();
+    /// let arm = modelmill::Model::from_text("arm.toml", &text)?;
+    /// assert_eq!(arm.name, "arm");
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     pub fn from_text(name: &str, text: &str) -> Outcome<Self> {
         let host = Host::new();
         let loaded = host.load_text(Path::new(name), text)?;
@@ -78,31 +96,33 @@ impl Model {
 }
 
 impl Host {
-    /// Reads a model file and derives it.
+    /// Reads a model file and derives its equations.
     ///
-    /// Fails with every finding about the file, each with its place, or with the reason why it cannot be derived.
+    /// Fails with all errors and warnings of the file, each with its line and column, or with the reason why the
+    /// equations cannot be derived.
     pub fn model(&self, path: impl AsRef<Path>) -> Outcome<Model> {
         let path = path.as_ref();
         let loaded = self.load(path)?;
         self.derive(&path.display().to_string(), loaded)
     }
 
-    /// Derives a model that was read from `path`.
+    /// Derives the equations of a model file that was read from `path`.
     ///
-    /// Fails with the reason why it cannot be derived.
-    pub fn derive(&self, path: &str, mut loaded: Loaded) -> Outcome<Model> {
+    /// Fails with the reason why the equations cannot be derived.
+    pub fn derive(&self, path: &str, mut loaded: LoadedModel) -> Outcome<Model> {
         if self.is_at_values() {
-            loaded.mechanism = loaded.mechanism.at_values();
+            loaded.mechanism = loaded.mechanism.with_numeric_constants();
         }
         let mechanism = &loaded.mechanism;
         let derivation = self
-            .watched(&format!("deriving {}", mechanism.name), 0, |_| {
+            .run_job(&format!("deriving {}", mechanism.name), 0, |_| {
                 modelmill_codegen::derive(mechanism)
             })?
             .map_err(|error| Error::derivation(path, error))?;
+        // Warnings about the derived model become notes with their line and column in the file.
         let mut notes = Vec::new();
         notes.extend(caution(&derivation, path));
-        for (k, says) in retained_in_vain(&derivation) {
+        for (k, says) in ineffective_retained(&derivation) {
             let place = loaded.retain.get(k).map(|span| {
                 let (line, column) = loaded.sources.line_and_column(*span);
                 let file = loaded.sources.files.get(span.file);
@@ -110,14 +130,16 @@ impl Host {
                 format!("{file}:{line}:{column}")
             });
             let place = place.unwrap_or_else(|| path.to_owned());
-            notes.push(Note::warning(format!("{place}: {says}")));
+            notes.push(RecordingNote::warning(format!("{place}: {says}")));
         }
         let found = derivation.identified_base();
         let said = derivation.mechanism.identified_base.len();
+        // Identified values are matched by expression: those of another geometry have no base
+        // parameter here.
         if found.len() < said {
-            notes.push(Note::warning(message!(
-                "{path}: {} of the {said} values of `identified.base` are of no base parameter of this model and left aside; \
-                 identify it again and let {} write the values",
+            notes.push(RecordingNote::warning(message!(
+                "{path}: {} of the {said} values of `identified.base` belong to no base parameter of this model and are ignored; \
+                 identify the model again and write the values with {}",
                 said - found.len(),
                 Remedy::command(CommandName::Adopt)
             )));
@@ -128,10 +150,7 @@ impl Host {
         }
         let stem = Path::new(path).file_stem();
         Ok(Model {
-            name: stem.map_or_else(
-                || mechanism.name.clone(),
-                |s| s.to_string_lossy().into_owned(),
-            ),
+            name: stem.map_or_else(|| mechanism.name.clone(), |s| s.to_string_lossy().into_owned()),
             path: path.to_owned(),
             base: base(&derivation),
             nominal: derivation.nominal_base_values(),
@@ -146,8 +165,8 @@ impl Host {
     }
 }
 
-/// The base parameters, with expressions as the page of equations writes them out.
-fn base(derivation: &Derivation) -> Vec<BaseParameter> {
+/// The base parameters, with the same expressions as on the page of equations.
+fn base(derivation: &Derivation) -> Vec<BaseParameterEntry> {
     let mut base = derivation.base_parameters();
     for (k, one) in base.iter_mut().enumerate() {
         one.expression = base_expression(derivation, k).text();
@@ -155,26 +174,27 @@ fn base(derivation: &Derivation) -> Vec<BaseParameter> {
     base
 }
 
-/// What must be known of a base that holds for one geometry only.
-fn caution(derivation: &Derivation, path: &str) -> Option<Note> {
+/// A warning if the base parameters are valid only for the geometry of the file; `None` if they are valid for all
+/// values of the constants.
+fn caution(derivation: &Derivation, path: &str) -> Option<RecordingNote> {
     let says = derivation.reduction.method.caution()?;
-    Some(Note::warning(format!("{path}: {says}")))
+    Some(RecordingNote::warning(format!("{path}: {says}")))
 }
 
-/// What `retain` asks for that cannot be, in words, by its place in the list.
-pub fn retained_in_vain(derivation: &Derivation) -> Vec<(usize, String)> {
+/// Entries of the list `retain` (products whose columns are to be kept) that cannot be retained, each with its index in
+/// the list and the reason.
+pub fn ineffective_retained(derivation: &Derivation) -> Vec<(usize, String)> {
     let reduction = &derivation.reduction;
     let mechanism = &derivation.mechanism;
     let mut says = Vec::new();
     for (k, powers) in mechanism.retain.iter().enumerate() {
-        let wanted = Monomial(powers.iter().map(|(p, n)| (p.0, *n)).collect());
+        let wanted = ParameterMonomial(powers.iter().map(|(p, n)| (p.0, *n)).collect());
         let name = wanted.text(mechanism);
+        // A product is retained, dependent, without effect, or unknown.
         let why = match reduction.products.iter().position(|p| *p == wanted) {
             Some(at) if reduction.retained.contains(&at) => continue,
             Some(_) => "its column depends on those of products that are retained before it",
-            None if reduction.without_effect.contains(&wanted) => {
-                "it has no effect on the drives: its column is zero"
-            }
+            None if reduction.without_effect.contains(&wanted) => "it has no effect on the drives: its column is zero",
             None => "there is no such product in the equations",
         };
         says.push((k, format!("`{name}` of `retain` cannot be retained: {why}")));
@@ -182,16 +202,17 @@ pub fn retained_in_vain(derivation: &Derivation) -> Vec<(usize, String)> {
     says
 }
 
-/// The sign that each dynamic parameter must have: masses, moments of inertia, and what kinds of effects say.
+/// The sign that each dynamic parameter must have: masses, moments of inertia, and what kinds of effects prescribe.
 fn signs(mechanism: &Mechanism, kinds: &[EffectKind]) -> Vec<Sign> {
+    // Masses and diagonal entries of the inertia must be positive.
     let mut signs = vec![Sign::Any; mechanism.parameters.len()];
-    let mut positive = |exact: &Exact| {
+    let mut positive = |exact: &ExactExpression| {
         if let Some(p) = multiple_of(exact) {
             signs[p.0] = Sign::Positive;
         }
     };
     for part in &mechanism.parts {
-        let (Inertial::AboutCentre { mass, inertia, .. } | Inertial::Linear { mass, inertia, .. }) =
+        let (PartInertia::AboutCentre { mass, inertia, .. } | PartInertia::Linear { mass, inertia, .. }) =
             &part.inertial;
         positive(mass);
         for i in [0, 3, 5] {
@@ -201,6 +222,7 @@ fn signs(mechanism: &Mechanism, kinds: &[EffectKind]) -> Vec<Sign> {
     for lumped in &mechanism.lumped_masses {
         positive(&lumped.mass);
     }
+    // Signs of effect parameters come from the kind; a kind that is unknown here prescribes none.
     for effect in &mechanism.effects {
         let Some(kind) = kinds.iter().find(|kind| kind.name == effect.kind) else {
             continue;
@@ -215,17 +237,17 @@ fn signs(mechanism: &Mechanism, kinds: &[EffectKind]) -> Vec<Sign> {
     signs
 }
 
-/// The parameter of which an expression is a positive rational multiple.
-fn multiple_of(exact: &Exact) -> Option<ParameterIdx> {
-    let is_positive = |exact: &Exact| {
+/// The parameter of which an expression is a positive rational multiple; `None` for other expressions.
+fn multiple_of(exact: &ExactExpression) -> Option<ParameterIdx> {
+    let is_positive = |exact: &ExactExpression| {
         let mut free = true;
         exact.for_each_symbol(&mut |_| free = false);
         free && exact.evaluate(&|_| 0.0) > 0.0
     };
     match exact {
-        Exact::Symbol(Symbol::Parameter(p)) => Some(*p),
-        Exact::Quotient(above, below) if is_positive(below) => multiple_of(above),
-        Exact::Product(factors) => {
+        ExactExpression::Symbol(ModelSymbol::Parameter(p)) => Some(*p),
+        ExactExpression::Quotient(above, below) if is_positive(below) => multiple_of(above),
+        ExactExpression::Product(factors) => {
             let mut others = factors.iter().filter(|factor| !is_positive(factor));
             let one = others.next()?;
             others.next().is_none().then(|| multiple_of(one))?
@@ -235,42 +257,39 @@ fn multiple_of(exact: &Exact) -> Option<ParameterIdx> {
 }
 
 impl Model {
-    /// Where the model came from.
+    /// The host with which the model was read.
     pub fn host(&self) -> &Host {
         &self.host
     }
 
-    /// The text of its file.
+    /// Text of the model file.
     pub fn text(&self) -> &str {
-        self.loaded
-            .sources
-            .files
-            .first()
-            .map_or("", |file| &file.text)
+        self.loaded.sources.files.first().map_or("", |file| &file.text)
     }
 
-    /// The files that it was read from.
+    /// Paths of all files that were read for the model: its own file, files that it extends, and libraries of effects.
     pub fn files(&self) -> impl Iterator<Item = &Path> {
         self.loaded.sources.paths()
     }
 
-    /// What must be known of base parameters that were found numerically, for this geometry only.
-    pub fn caution(&self) -> Option<Note> {
+    /// A warning if the base parameters are valid only for the geometry of this file (found numerically, or derived
+    /// with constants replaced by their values); otherwise `None`.
+    pub fn caution(&self) -> Option<RecordingNote> {
         caution(&self.derivation, &self.path)
     }
 
-    /// Gravity in the frame of the base with the constants of the file, m/s^2.
+    /// Gravity in the base frame for the constants of the file, m/s^2.
     pub fn gravity(&self) -> [f64; 3] {
         let mechanism = &self.derivation.mechanism;
         let value = |symbol| match symbol {
-            Symbol::Constant(c) => mechanism.constants[c.0].value,
+            ModelSymbol::Constant(c) => mechanism.constants[c.0].value,
             _ => 0.0,
         };
         mechanism.gravity.each_ref().map(|g| g.evaluate(&value))
     }
 
-    /// Active coordinates with whether they are angles.
-    pub fn motions(&self) -> Vec<(String, bool)> {
+    /// The active coordinates: name, and `true` for an angle (rad) or `false` for a length (m).
+    pub fn active_coordinate_types(&self) -> Vec<(String, bool)> {
         let coordinates = self.derivation.mechanism.coordinates.iter();
         coordinates
             .filter(|c| !c.passive)
@@ -278,17 +297,16 @@ impl Model {
             .collect()
     }
 
-    /// Products that a base parameter consists of, with what they are multiplied by for the file's constants.
-    pub fn products_of(&self, k: usize) -> Vec<(&Monomial, f64)> {
+    /// The products of dynamic parameters whose linear combination is the base parameter `k`, each with its
+    /// coefficient, evaluated with the constants of the file.
+    pub fn products_of(&self, k: usize) -> Vec<(&ParameterMonomial, f64)> {
         let reduction = &self.derivation.reduction;
         let constants = &self.derivation.mechanism.constants;
         let constants: Vec<f64> = constants.iter().map(|c| c.value).collect();
+        // The retained product has the factor 1; the others come from the dependencies of columns, eq.
+        // (6).
         let mut products = vec![(&reduction.products[reduction.retained[k]], 1.0)];
-        for (line, factors) in reduction
-            .dependencies
-            .iter()
-            .zip(reduction.factors(&constants))
-        {
+        for (line, factors) in reduction.dependencies.iter().zip(reduction.factors(&constants)) {
             if let Some(factor) = factors.get(&k) {
                 products.push((&reduction.products[line.product], *factor));
             }
@@ -296,38 +314,44 @@ impl Model {
         products
     }
 
-    /// The sign that a dynamic parameter must have.
+    /// The sign that a dynamic parameter must have. `parameter` is its index in the mechanism.
     pub fn sign_of(&self, parameter: usize) -> Sign {
         self.signs[parameter]
     }
 
-    /// What the nominal values say beforehand of some base parameters, each product of parameters with the relative standard
-    /// deviation `sigma`; nothing of those that the file gives no value for.
-    pub fn beliefs(&self, among: &[usize], sigma: f64) -> Vec<Belief> {
+    /// Priors for the base parameters `among`, with their nominal values as means. Each product of parameters in a base
+    /// parameter is assumed to have the relative standard deviation `sigma`, and these uncertainties are added as root
+    /// sum of squares. Base parameters without a nominal value get no prior.
+    ///
+    /// The index in each prior is a position in `among`.
+    pub fn parameter_priors(&self, among: &[usize], sigma: f64) -> Vec<ParameterPrior> {
         let parameters = &self.derivation.mechanism.parameters;
         let values: Vec<f64> = parameters.iter().map(|p| p.nominal).collect();
-        let believed = among.iter().enumerate().filter_map(|(i, k)| {
+        let priors = among.iter().enumerate().filter_map(|(i, k)| {
             // Summands may cancel, their uncertainties do not.
             let squares = self
                 .products_of(*k)
                 .iter()
                 .map(|(product, factor)| (factor * product.value(&values)).powi(2))
                 .sum::<f64>();
-            (squares > 0.0).then(|| Belief {
+            (squares > 0.0).then(|| ParameterPrior {
                 parameter: i,
                 value: self.nominal[*k],
                 std: sigma * squares.sqrt(),
             })
         });
-        believed.collect()
+        priors.collect()
     }
 
-    /// Whether a base parameter consists of numbers of the model file only, so that there is nothing to identify.
+    /// Whether a base parameter contains no dynamic parameter, only constants and numbers, so that its value is known
+    /// and not identified.
     pub fn is_known(&self, k: usize) -> bool {
         self.products_of(k).iter().all(|(p, _)| p.0.is_empty())
     }
 
-    /// Whether a base parameter belongs to an effect rather than to the bodies.
+    /// Whether a base parameter belongs to an effect, not to the bodies: its retained product contains a parameter of
+    /// an effect. The retained product is the product of parameters whose regressor column was kept for this base
+    /// parameter.
     pub fn is_effect(&self, k: usize) -> bool {
         let reduction = &self.derivation.reduction;
         let powers = &reduction.products[reduction.retained[k]].0;
@@ -336,9 +360,11 @@ impl Model {
         terms.any(|term| powers.iter().any(|(p, _)| *p == term.parameter.0))
     }
 
-    /// The sign that a base parameter must have, where all of its summands must have the same.
+    /// The sign that a base parameter must have: that of its products if all of them must have the same sign, otherwise
+    /// `Any`.
     pub fn sign(&self, k: usize) -> Sign {
-        let sign_of = |(product, factor): &(&Monomial, f64)| {
+        // Even powers keep the sign; a factor of unknown sign leaves the product open.
+        let sign_of = |(product, factor): &(&ParameterMonomial, f64)| {
             let mut is_positive = *factor > 0.0;
             for (p, power) in &product.0 {
                 match self.signs[*p] {
@@ -348,17 +374,10 @@ impl Model {
                     Sign::Any => return Sign::Any,
                 }
             }
-            if is_positive {
-                Sign::Positive
-            } else {
-                Sign::Negative
-            }
+            if is_positive { Sign::Positive } else { Sign::Negative }
         };
         let products = self.products_of(k);
-        let mut signs = products
-            .iter()
-            .filter(|(_, factor)| *factor != 0.0)
-            .map(sign_of);
+        let mut signs = products.iter().filter(|(_, factor)| *factor != 0.0).map(sign_of);
         let first = signs.next().unwrap_or(Sign::Any);
         if signs.all(|sign| sign == first) {
             first
@@ -368,15 +387,16 @@ impl Model {
     }
 
     /// Names of the active coordinates, in the order of the file.
-    pub fn active(&self) -> Vec<String> {
+    pub fn active_coordinates(&self) -> Vec<String> {
         self.coordinates(false)
     }
 
     /// Names of the passive coordinates, in the order of the file.
-    pub fn passive(&self) -> Vec<String> {
+    pub fn passive_coordinates(&self) -> Vec<String> {
         self.coordinates(true)
     }
 
+    /// Names of the passive or of the active coordinates.
     fn coordinates(&self, passive: bool) -> Vec<String> {
         let coordinates = self.derivation.mechanism.coordinates.iter();
         coordinates
@@ -385,29 +405,27 @@ impl Model {
             .collect()
     }
 
-    /// Names of the drives.
+    /// Names of the regressor rows, in their order: drives, and rows without an actuator.
     pub fn drives(&self) -> Vec<String> {
         let drives = self.derivation.mechanism.drives.iter();
         drives.map(|d| d.name.clone()).collect()
     }
 
-    /// Names of the rows on which no drive acts, among [`Model::drives`].
-    pub fn undriven(&self) -> Vec<String> {
+    /// Names of the regressor rows without an actuator, a subset of [`Model::drives`], which lists all rows.
+    pub fn undriven_rows(&self) -> Vec<String> {
         let drives = self.derivation.mechanism.drives.iter();
         let undriven = drives.filter(|drive| !drive.is_driven);
         undriven.map(|drive| drive.name.clone()).collect()
     }
 
-    /// Unit of a drive's force: N or N m.
+    /// Unit of the force of a drive: `N` or `N m`. `drive` is an index into [`Model::drives`].
     pub fn force_unit(&self, drive: usize) -> &'static str {
         let mechanism = &self.derivation.mechanism;
-        mechanism.drives[drive]
-            .kind
-            .force_unit(&mechanism.coordinates)
+        mechanism.drives[drive].kind.force_unit(&mechanism.coordinates)
     }
 
-    /// The base parameters as a fit describes them.
-    pub fn infos(&self) -> Vec<ParameterInfo> {
+    /// The base parameters in the form of a fit file: name, expression, unit and nominal value.
+    pub fn parameter_infos(&self) -> Vec<ParameterInfo> {
         self.base
             .iter()
             .enumerate()
@@ -420,14 +438,23 @@ impl Model {
             .collect()
     }
 
-    /// The model with other values of its base parameters in the place of the file's, such as those of a fit; in its order.
+    /// The model with other values of its base parameters, such as those of a fit. `values` has the order of `base`,
+    /// and its values count as identified.
+    ///
+    /// # Panics
+    /// If the number of values differs from the number of base parameters.
+    ///
+    /// ```
+    /// use modelmill::Model;
+    ///
+    /// let arm = Model::open("../model-spec/models/two_link.toml")?;
+    /// let values: Vec<f64> = arm.nominal.iter().map(|value| 1.1 * value).collect();
+    /// assert_eq!(arm.with_values(&values).nominal, values);
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     #[must_use]
     pub fn with_values(&self, values: &[f64]) -> Self {
-        assert_eq!(
-            values.len(),
-            self.base.len(),
-            "one value per base parameter"
-        );
+        assert_eq!(values.len(), self.base.len(), "one value per base parameter");
         Self {
             nominal: values.to_vec(),
             covariance: None,
@@ -436,39 +463,35 @@ impl Model {
         }
     }
 
-    /// The model with the values of a fit, see [`Model::values_of`]. Where the fit tells how well it knows them, what
-    /// [`Model::diagnose`] holds may be off by as much.
+    /// The model with the values of a fit, see [`Model::values_of`].
+    ///
+    /// If the fit has a covariance and a diagnosis fixes all parameters, [`Model::diagnose`] does not fix them exactly:
+    /// it uses the values and their covariance as a prior.
     #[must_use]
-    pub fn with_fit(&self, fit: &Values) -> Self {
+    pub fn with_fit(&self, fit: &BaseParameterValues) -> Self {
         Self {
             covariance: fit.covariance.clone().map(Arc::new),
             ..self.with_values(&fit.values)
         }
     }
 
-    /// How well the values of some base parameters are known: the inverse of their covariance, if it has one.
+    /// The information matrix of some base parameters, the inverse of their covariance; `None` without one.
     pub(crate) fn information(&self, parameters: &[usize]) -> Option<DMatrix<f64>> {
         let covariance = self.covariance.as_ref()?;
         let n = parameters.len();
         let part = DMatrix::from_fn(n, n, |i, j| covariance[(parameters[i], parameters[j])]);
-        // Parameters differ by orders of magnitude.
+        // Scaling to equal variances keeps the inverse accurate, since parameters differ by orders of magnitude.
         let scale = part.diagonal().map(|variance| variance.sqrt().recip());
         let scaled = DMatrix::from_fn(n, n, |i, j| part[(i, j)] * scale[i] * scale[j]);
         let inverse = scaled.cholesky()?.inverse();
         let information = DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]);
-        information
-            .iter()
-            .all(|x| x.is_finite())
-            .then_some(information)
+        information.iter().all(|x| x.is_finite()).then_some(information)
     }
 
-    /// The model with the values of another one for all base parameters that both have.
+    /// The model with the identified values of another model for all base parameters with the same expression.
     pub(crate) fn with_values_of(mut self, other: &Self) -> Self {
         for (k, base) in self.base.iter().enumerate() {
-            let same = other
-                .base
-                .iter()
-                .position(|one| one.expression == base.expression);
+            let same = other.base.iter().position(|one| one.expression == base.expression);
             if let Some(i) = same.filter(|i| other.identified[*i]) {
                 self.nominal[k] = other.nominal[i];
                 self.identified[k] = true;
@@ -477,23 +500,26 @@ impl Model {
         self
     }
 
-    /// Whether the value of a base parameter was identified as a whole, in the file or in a fit, rather than made of parameters.
+    /// Whether the value of a base parameter was identified (in a fit, or as `identified.base` in the file), and not
+    /// computed from the nominal values of parameters.
     pub fn is_identified(&self, k: usize) -> bool {
         self.identified[k]
     }
 
-    /// Whether the file gives a nominal value for anything that a base parameter consists of, or its value was identified.
+    /// Whether a base parameter has a nominal value: it was identified, or the file gives nominal values other than
+    /// zero for all factors of one of its products.
     pub fn has_nominal(&self, k: usize) -> bool {
         if self.identified[k] {
             return true;
         }
+        // All products that are merged into this base parameter, also indirectly.
         let reduction = &self.derivation.reduction;
         let parameters = &self.derivation.mechanism.parameters;
-        let is_in = |line: &&Dependency| line.equals.iter().any(|(at, _)| *at == k);
+        let is_in = |line: &&ColumnDependency| line.equals.iter().any(|(at, _)| *at == k);
         let mut lumped: Vec<usize> = (reduction.dependencies.iter().filter(is_in))
             .map(|line| line.product)
             .collect();
-        // What others bring into these is in it as well.
+        // Products that depend via these are part of it as well.
         while let Some(more) = (reduction.dependencies.iter())
             .filter(|line| line.via.iter().any(|(product, _)| lumped.contains(product)))
             .map(|line| line.product)
@@ -501,30 +527,31 @@ impl Model {
         {
             lumped.push(more);
         }
-        std::iter::once(reduction.retained[k])
-            .chain(lumped)
-            .any(|product| {
-                let powers = &reduction.products[product].0;
-                powers.iter().all(|(p, _)| parameters[*p].nominal != 0.0)
-            })
+        // A product has a nominal value if all its factors have one that is not zero.
+        std::iter::once(reduction.retained[k]).chain(lumped).any(|product| {
+            let powers = &reduction.products[product].0;
+            powers.iter().all(|(p, _)| parameters[*p].nominal != 0.0)
+        })
     }
 
-    /// Whether passive coordinates are followed from state to state by Newton's method, for want of a closed form.
-    pub fn follows_loops(&self) -> bool {
+    /// Whether passive coordinates (determined by loop closure) are solved for iteratively, by Newton's method from
+    /// state to state, because there is no closed form.
+    pub fn has_iterative_loops(&self) -> bool {
         matches!(
             self.derivation.programs.passive_position,
             modelmill_codegen::PassivePosition::Newton(_)
         )
     }
 
-    /// Effects whose force depends on the load of the drive.
-    pub fn load_dependent(&self) -> Vec<&str> {
+    /// Kinds of the model's effects whose force depends on the load of the drive. An effect appears once for each entry
+    /// in the file.
+    pub fn load_dependent_effects(&self) -> Vec<&str> {
         let effects = self.derivation.mechanism.effects.iter();
         effects
             .filter(|effect| {
                 effect.terms.iter().any(|term| {
                     term.expression
-                        .mentions(&|symbol| symbol == Symbol::Place(PlaceQuantity::Load))
+                        .mentions(&|symbol| symbol == ModelSymbol::Place(PlaceQuantity::Load))
                 })
             })
             .map(|effect| effect.kind.as_str())

@@ -1,114 +1,117 @@
-//! Eq. (9) on the model file's own values: random states around the nominal pose go in, the
-//! numeric rank of the stacked regressor comes out. A statement about these values and samples,
-//! beside the exact one about all values.
+//! Eq. (9) at the values of the model file: the numeric rank of the regressor stacked over random states around the
+//! nominal pose. It is a statement about these values and samples, in addition to the exact rank, which holds for all
+//! values.
 //!
-//! Decision: random states have no order, while Newton's method starts from the state before. So they are evaluated
-//! one by one as soon as one of them has no solution.
+//! Decision: random states have no order, while Newton's method starts from the state before. Therefore they are
+//! evaluated one by one if one of them has no solution.
 
 use std::cmp::Ordering;
 
 use modelmill_codegen::review::NumericRank;
-use modelmill_codegen::{Evaluator, Method, PoseFault, PoseReason, States};
+use modelmill_codegen::{ModelEvaluator, MotionStates, PoseFault, PoseReason, ReductionMethod};
 use modelmill_identify::estimate::{condition_number, numeric_rank};
+use modelmill_runtime::RandomBits;
 use nalgebra::DMatrix;
 
 use crate::error::Outcome;
 use crate::model::Model;
 use crate::text::table::{count, significant};
 
-/// Fewest random states.
+/// Smallest number of random states.
 const SAMPLES: usize = 40;
-/// Largest step from the nominal pose, rad and m; smaller where loops would not close.
+/// Largest distance from the nominal pose, rad or m; reduced if loops cannot close.
 const REACH: f64 = 1.0;
-/// Ranges of rates and accelerations, per s and s^2, and of loads, N or N m.
+/// Range of rates, per s.
 const RATE: f64 = 2.0;
+/// Range of accelerations, per s^2.
 const ACCELERATION: f64 = 5.0;
+/// Range of loads, N or N m.
 const LOAD: f64 = 100.0;
 
-/// Below this ratio of the last singular value that counts to the first that does not, the rank is a matter of opinion.
+/// Below this ratio of the last singular value that counts to the first that does not, the rank is unclear.
 const SMALL_GAP: f64 = 1e3;
-/// Beyond this condition number a reader of the equations wants to know how clear the rank is.
+/// Above this condition number, the pages of equations report how clear the rank is.
 const HIGH_CONDITION: f64 = 1e6;
 
-/// A numeric rank with what a reader needs to judge it.
+/// A numeric rank with the figures that are needed to judge it.
 pub struct SampledRank {
-    /// What the pages of equations print.
-    pub shown: NumericRank,
+    /// Rank, number of states and condition number.
+    pub numeric_rank: NumericRank,
     /// Ratio of the last singular value that counts to the first that does not, or to the level of rounding.
     pub gap: f64,
-    /// How many random states were left out since the model is singular or undefined there.
+    /// Number of random states that were left out because the model is singular or undefined there.
     pub left_out: usize,
 }
 
-/// The numeric rank, and what is to be said about it.
-pub(crate) struct Judged {
-    /// The rank, if one was found.
+/// The numeric rank, and warnings about it.
+pub(crate) struct RankJudgement {
+    /// The rank; `None` if sampling failed.
     pub found: Option<SampledRank>,
-    /// Where it says something else than exact reduction, or nothing that one can rely on.
+    /// Contradictions with the exact reduction, and reasons to doubt the rank.
     pub warnings: Vec<String>,
 }
 
 impl SampledRank {
-    /// The rank with what it stands on, in words.
+    /// The rank with its figures, as a phrase.
     pub fn text(&self) -> String {
         let left_out = match self.left_out {
             0 => String::new(),
             n => format!(" ({n} more left out, where the model is singular or undefined)"),
         };
-        let condition = self.shown.condition;
+        let condition = self.numeric_rank.condition;
         let condition = condition.map_or_else(
             || ", condition number infinite to rounding".to_owned(),
             |c| format!(", condition number {}", significant(c, 3)),
         );
         format!(
             "{} over {}{left_out}{condition}, {}",
-            self.shown.rank,
-            count(self.shown.samples, "random state", "random states"),
+            self.numeric_rank.rank,
+            count(self.numeric_rank.samples, "random state", "random states"),
             self.gap_text()
         )
     }
 
+    /// The gap as a phrase.
     fn gap_text(&self) -> String {
-        format!(
-            "gap of {} to the next singular value",
-            significant(self.gap, 2)
-        )
+        format!("gap of {} to the next singular value", significant(self.gap, 2))
     }
 
-    /// What the pages of equations leave out: states that were not used, and the gap where the condition is poor.
+    /// A remark for the pages of equations: states that were left out, or a poor condition number; `None` otherwise.
     pub fn remark(&self) -> Option<String> {
-        let is_poor = self.shown.condition.is_none_or(|c| c > HIGH_CONDITION);
+        let is_poor = self.numeric_rank.condition.is_none_or(|c| c > HIGH_CONDITION);
         (self.left_out > 0 || is_poor).then(|| format!("the numeric rank is {}", self.text()))
     }
 
-    /// The same as JSON.
+    /// The rank with its figures as JSON.
     pub fn json(&self) -> serde_json::Value {
         serde_json::json!({
-            "rank": self.shown.rank,
-            "samples": self.shown.samples,
+            "rank": self.numeric_rank.rank,
+            "samples": self.numeric_rank.samples,
             "left_out": self.left_out,
-            "condition_number": self.shown.condition,
+            "condition_number": self.numeric_rank.condition,
             "gap": self.gap.is_finite().then_some(self.gap),
         })
     }
 }
 
-/// The rank of H on the file's values, and in words where it says something else than exact reduction.
-pub(crate) fn judged_rank(model: &Model) -> Outcome<Judged> {
+/// The numeric rank of H at the file's values, with warnings if it contradicts the exact reduction.
+pub(crate) fn judge_rank(model: &Model) -> Outcome<RankJudgement> {
     let message = format!("sampling {}", model.name);
-    let found = match model.host().watched(&message, 0, |_| sampled_rank(model))? {
+    let found = match model.host().run_job(&message, 0, |_| sampled_rank(model))? {
         Ok(found) => found,
         Err(reason) => {
             let says = format!("the numeric rank of eq. (9) was not found: {reason}");
-            return Ok(Judged {
+            return Ok(RankJudgement {
                 found: None,
                 warnings: vec![says],
             });
         }
     };
     let retained = model.base.len();
-    let rank = found.shown.rank;
-    let is_exact = matches!(model.derivation.reduction.method, Method::Exact { .. });
+    let rank = found.numeric_rank.rank;
+    let is_exact = matches!(model.derivation.reduction.method, ReductionMethod::Exact { .. });
+    // A rank below or above the number of base parameters means different things for exact and numeric
+    // reduction.
     let mut warnings = Vec::new();
     let undetermined = || count(retained - rank, "direction", "directions");
     match rank.cmp(&retained) {
@@ -133,38 +136,40 @@ pub(crate) fn judged_rank(model: &Model) -> Outcome<Judged> {
     }
     if found.gap < SMALL_GAP {
         warnings.push(format!(
-            "the numeric rank {rank} stands on a small {}; the file's values nearly tie columns, other states could give \
+            "the numeric rank {rank} is based on a small {}; the file's values make columns nearly dependent, other states could give \
              another rank, and identification will find directions that are hardly determined",
             found.gap_text()
         ));
     }
-    Ok(Judged {
+    Ok(RankJudgement {
         found: Some(found),
         warnings,
     })
 }
 
-/// The rank of H on the file's values; the reason in words if there is none.
+/// The numeric rank of H at the file's values; as error the reason as text.
 fn sampled_rank(model: &Model) -> Result<SampledRank, String> {
     let n_products = model.derivation.reduction.products.len();
     if n_products == 0 {
         return Err("no product of parameters has an effect on the drives".to_owned());
     }
+    // The stacked regressor has at least four rows for each product.
     let n_drives = model.derivation.mechanism.drives.len().max(1);
     let wanted = SAMPLES.max((4 * n_products).div_ceil(n_drives));
-    let evaluator = Evaluator::new(&model.derivation);
-    let mut sampling = Sampling::new(model, n_drives);
+    let evaluator = ModelEvaluator::new(&model.derivation);
+    let mut sampling = StateSampling::new(model, n_drives);
+    // States that Newton's method cannot follow in a row are evaluated one by one.
     sampling.draw(&evaluator, wanted)?;
     let (full, retained) = match both_regressors(&evaluator, &sampling.states()) {
         Ok(both) => both,
-        Err(fault) if is_of_the_pose(&fault) => one_by_one(&evaluator, &mut sampling, wanted)?,
+        Err(fault) if is_pose_dependent(&fault) => regressors_state_by_state(&evaluator, &mut sampling, wanted)?,
         Err(fault) => return Err(fault.to_string()),
     };
     let found = numeric_rank(&full).map_err(|error| error.to_string())?;
-    // Of the base as it is printed, also where its columns are fewer in truth.
+    // The condition number is that of the printed base, even if its columns are dependent at these values.
     let condition = condition_number(&retained).map_err(|error| error.to_string())?;
     Ok(SampledRank {
-        shown: NumericRank {
+        numeric_rank: NumericRank {
             rank: found.rank,
             samples: wanted,
             condition,
@@ -174,44 +179,43 @@ fn sampled_rank(model: &Model) -> Result<SampledRank, String> {
     })
 }
 
-/// H for all products and H_min at some states.
+/// H for all products and H_min at given states, rows interleaved by drive.
 fn both_regressors(
-    evaluator: &Evaluator<'_>,
-    states: &States<'_>,
+    evaluator: &ModelEvaluator<'_>,
+    states: &MotionStates<'_>,
 ) -> Result<(DMatrix<f64>, DMatrix<f64>), PoseFault> {
-    Ok((
-        evaluator.full_regressor(states)?,
-        evaluator.regressor(states)?,
-    ))
+    Ok((evaluator.full_regressor(states)?, evaluator.regressor(states)?))
 }
 
-/// Whether another pose would do.
-fn is_of_the_pose(fault: &PoseFault) -> bool {
+/// Whether the fault depends on the pose, so that another state may have a solution.
+fn is_pose_dependent(fault: &PoseFault) -> bool {
     matches!(
         fault.reason,
         PoseReason::Singular | PoseReason::OutOfReach | PoseReason::Undefined
     )
 }
 
-/// The regressors at states that are looked at each for itself: in a row, Newton's method would start from the state
-/// before, and states drawn at random are no neighbours. Where the mechanism is singular another state takes the place.
-fn one_by_one(
-    evaluator: &Evaluator<'_>,
-    sampling: &mut Sampling,
+/// The regressors at states that are evaluated one by one. In a row, Newton's method would start from the state before,
+/// but random states are not neighbours. A state where the mechanism is singular is replaced by another one.
+///
+/// Fails when as many states as wanted were left out.
+fn regressors_state_by_state(
+    evaluator: &ModelEvaluator<'_>,
+    sampling: &mut StateSampling,
     wanted: usize,
 ) -> Result<(DMatrix<f64>, DMatrix<f64>), String> {
     let (mut full, mut retained) = (Vec::new(), Vec::new());
     while full.len() < wanted {
-        match both_regressors(evaluator, &sampling.state(full.len())) {
+        match both_regressors(evaluator, &sampling.single_state(full.len())) {
             Ok((all, few)) => {
                 full.push(all);
                 retained.push(few);
             }
-            Err(fault) if is_of_the_pose(&fault) && sampling.left_out < wanted => {
-                sampling.leave_out(full.len());
+            Err(fault) if is_pose_dependent(&fault) && sampling.left_out < wanted => {
+                sampling.exclude_state(full.len());
                 sampling.draw(evaluator, wanted)?;
             }
-            Err(fault) if !is_of_the_pose(&fault) => return Err(fault.to_string()),
+            Err(fault) if !is_pose_dependent(&fault) => return Err(fault.to_string()),
             Err(_) => {
                 return Err(format!(
                     "the model is singular or undefined at {} of {} random states around the nominal pose",
@@ -221,31 +225,34 @@ fn one_by_one(
             }
         }
     }
-    Ok((stacked(&full), stacked(&retained)))
+    Ok((stack_rows(&full), stack_rows(&retained)))
 }
 
 /// Matrices of equal width, one below the other.
-fn stacked(parts: &[DMatrix<f64>]) -> DMatrix<f64> {
+fn stack_rows(parts: &[DMatrix<f64>]) -> DMatrix<f64> {
     let rows: Vec<_> = parts.iter().flat_map(|part| part.row_iter()).collect();
     DMatrix::from_rows(&rows)
 }
 
-/// Random states at which the mechanism can stand.
-struct Sampling {
+/// Random states that the mechanism can reach.
+struct StateSampling {
     /// Nominal values and motions of the active coordinates.
     active: Vec<(f64, bool)>,
+    /// Number of drives, which have a load each.
     n_drives: usize,
-    draws: Draws,
+    random: RandomBits,
     /// Positions, rates, accelerations and loads, each as columns of samples.
     columns: [Vec<Vec<f64>>; 4],
+    /// Current largest distance from the nominal pose, rad; half of it for lengths, m.
     reach: f64,
-    /// Poses at which the mechanism cannot stand.
+    /// Number of poses that the mechanism cannot reach.
     refused: usize,
-    /// States that were left out as singular or undefined.
+    /// Number of states that were left out as singular or undefined.
     left_out: usize,
 }
 
-impl Sampling {
+impl StateSampling {
+    /// Without states yet.
     fn new(model: &Model, n_drives: usize) -> Self {
         let coordinates = model.derivation.mechanism.coordinates.iter();
         let active: Vec<(f64, bool)> = coordinates
@@ -256,7 +263,7 @@ impl Sampling {
         Self {
             active,
             n_drives,
-            draws: Draws(0x6d69_6c6c),
+            random: RandomBits::new(0x6d69_6c6c),
             columns: [n, n, n, n_drives].map(|n| vec![Vec::new(); n]),
             reach: REACH,
             refused: 0,
@@ -264,35 +271,35 @@ impl Sampling {
         }
     }
 
-    /// Draws until there are as many states as wanted; the reason if poses are not to be found.
-    fn draw(&mut self, evaluator: &Evaluator<'_>, wanted: usize) -> Result<(), String> {
+    /// Draws until there are as many states as wanted.
+    ///
+    /// Fails when too many poses cannot be reached; the error is the reason as text.
+    fn draw(&mut self, evaluator: &ModelEvaluator<'_>, wanted: usize) -> Result<(), String> {
         let n = self.active.len();
         let zero = vec![0.0; n.max(self.n_drives)];
         let resting = |n: usize| zero[..n].iter().map(std::slice::from_ref).collect();
         while self.columns[1].first().map_or(0, Vec::len) < wanted {
+            // A pose counts if the regressor exists there at standstill.
             let q: Vec<f64> = self
                 .active
                 .iter()
                 .map(|(nominal, is_angle)| {
-                    let reach = if *is_angle {
-                        self.reach
-                    } else {
-                        0.5 * self.reach
-                    };
-                    nominal + reach * self.draws.next()
+                    let reach = if *is_angle { self.reach } else { 0.5 * self.reach };
+                    nominal + reach * draw(&mut self.random)
                 })
                 .collect();
-            let still = States {
+            let still = MotionStates {
                 q: q.iter().map(std::slice::from_ref).collect(),
                 qd: resting(n),
                 qdd: resting(n),
                 load: resting(self.n_drives),
             };
+            // Every refused pose narrows the range around the nominal pose.
             if evaluator.full_regressor(&still).is_err() {
                 self.refused += 1;
                 if self.refused > 20 * wanted {
                     return Err(format!(
-                        "no poses were found around the nominal one at which the mechanism can stand ({} tried)",
+                        "no poses were found around the nominal one that the mechanism can reach ({} tried)",
                         self.refused
                     ));
                 }
@@ -304,16 +311,17 @@ impl Sampling {
             }
             for (set, range) in self.columns[1..].iter_mut().zip([RATE, ACCELERATION, LOAD]) {
                 for column in set {
-                    column.push(range * self.draws.next());
+                    column.push(range * draw(&mut self.random));
                 }
             }
         }
         Ok(())
     }
 
-    fn states(&self) -> States<'_> {
+    /// All states.
+    fn states(&self) -> MotionStates<'_> {
         let slices = |k: usize| self.columns[k].iter().map(Vec::as_slice).collect();
-        States {
+        MotionStates {
             q: slices(0),
             qd: slices(1),
             qdd: slices(2),
@@ -321,15 +329,13 @@ impl Sampling {
         }
     }
 
-    /// One of them.
-    fn state(&self, sample: usize) -> States<'_> {
+    /// One state.
+    fn single_state(&self, sample: usize) -> MotionStates<'_> {
         let one = |k: usize| {
             let columns = self.columns[k].iter();
-            columns
-                .map(|column| std::slice::from_ref(&column[sample]))
-                .collect()
+            columns.map(|column| std::slice::from_ref(&column[sample])).collect()
         };
-        States {
+        MotionStates {
             q: one(0),
             qd: one(1),
             qdd: one(2),
@@ -337,8 +343,8 @@ impl Sampling {
         }
     }
 
-    /// Forgets a state at which the mechanism is singular.
-    fn leave_out(&mut self, sample: usize) {
+    /// Removes a state at which the mechanism is singular, and counts it.
+    fn exclude_state(&mut self, sample: usize) {
         for column in self.columns.iter_mut().flatten() {
             column.remove(sample);
         }
@@ -346,16 +352,7 @@ impl Sampling {
     }
 }
 
-/// Uniform numbers in (-1, 1), the same on every machine (Steele et al., `SplitMix`, 2014).
-struct Draws(u64);
-
-impl Draws {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^= z >> 31;
-        (z >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    }
+/// A uniform number in [-1, 1).
+fn draw(random: &mut RandomBits) -> f64 {
+    2.0 * random.below_one() - 1.0
 }

@@ -1,46 +1,55 @@
-//! `check`: what a model file holds, and how sound its base is.
+//! `check`: contents of a model file, and the consistency of its base parameters.
 
 use modelmill_codegen::Derivation;
-use modelmill_identify::Note;
+use modelmill_identify::RecordingNote;
 
 use crate::error::Outcome;
 use crate::model::Model;
-use crate::model::sampled_rank::{SampledRank, judged_rank};
+use crate::model::sampled_rank::{SampledRank, judge_rank};
 
-/// A model that was looked over.
-pub struct Checked {
+/// The result of a check.
+pub struct ModelCheck {
     /// The model.
     pub model: Model,
-    /// What it consists of.
-    pub summary: Summary,
-    /// Eq. (9) on the file's values, where it has an answer.
+    /// Its contents.
+    pub summary: ModelSummary,
+    /// Numeric rank of the regressor over random states, eq. (9), at the values of the file. `None` if it could not be
+    /// computed.
     pub rank: Option<SampledRank>,
-    /// Where the numeric rank says something else than exact reduction.
+    /// Contradictions between the numeric rank and the exact reduction.
     pub warnings: Vec<String>,
 }
 
 impl Model {
-    /// What the model consists of.
-    pub fn summary(&self) -> Summary {
-        Summary::new(&self.derivation)
+    /// Contents of the model, by names.
+    pub fn summary(&self) -> ModelSummary {
+        ModelSummary::new(&self.derivation)
     }
 
-    /// Looks the model over: what it consists of, and its rank in numbers beside the exact one.
+    /// Checks the model: its contents, and the numeric rank of its regressor (over random states) compared with the
+    /// exact rank.
     ///
-    /// Fails only when whoever watches stops it.
-    pub fn check(&self) -> Outcome<Checked> {
-        // Without any product there is nothing whose rank could be looked at.
+    /// Fails only when the listener stops the job.
+    ///
+    /// ```
+    /// let checked = modelmill::Model::open("../model-spec/models/two_link.toml")?.check()?;
+    /// assert_eq!(checked.summary.bodies, 2);
+    /// assert!(checked.rank.is_some());
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
+    pub fn check(&self) -> Outcome<ModelCheck> {
+        // Without products of parameters there is no regressor and no rank.
         let (rank, warnings) = if self.derivation.reduction.products.is_empty() {
             (None, Vec::new())
         } else {
-            let judged = judged_rank(self)?;
+            let judged = judge_rank(self)?;
             (judged.found, judged.warnings)
         };
         for says in &warnings {
             self.host()
-                .note(&Note::warning(format!("{}: {says}", self.path)));
+                .note(&RecordingNote::warning(format!("{}: {says}", self.path)));
         }
-        Ok(Checked {
+        Ok(ModelCheck {
             model: self.clone(),
             summary: self.summary(),
             rank,
@@ -49,30 +58,30 @@ impl Model {
     }
 }
 
-/// What a model consists of.
+/// Contents of a model.
 #[derive(Clone, Debug)]
-pub struct Summary {
-    /// Parts.
+pub struct ModelSummary {
+    /// Number of parts.
     pub bodies: usize,
-    /// Lumped masses.
+    /// Number of lumped masses.
     pub lumped_masses: usize,
-    /// Active coordinates.
+    /// Names of the active coordinates.
     pub active: Vec<String>,
-    /// Passive coordinates.
+    /// Names of the passive coordinates (determined by loop closure).
     pub passive: Vec<String>,
-    /// Loops.
+    /// Names of the loops.
     pub loops: Vec<String>,
-    /// Drives.
+    /// Names of the drives, including those that share rows.
     pub drives: Vec<String>,
-    /// Rows on which no drive acts.
+    /// Names of the regressor rows without an actuator.
     pub undriven: Vec<String>,
-    /// Kinds of the effects.
+    /// Kinds of the effects, one for each effect.
     pub effects: Vec<String>,
-    /// Dynamic parameters.
+    /// Names of the dynamic parameters.
     pub parameters: Vec<String>,
 }
 
-impl Summary {
+impl ModelSummary {
     fn new(derivation: &Derivation) -> Self {
         let m = &derivation.mechanism;
         let coordinates = |passive: bool| {

@@ -1,75 +1,76 @@
-//! Values of base parameters: the file's nominal ones, or those of a fit.
+//! Values of base parameters: nominal values of the file, or those of a fit.
 
-use modelmill_identify::{FitFile, FitParameter, Note};
+use modelmill_identify::{FitFile, FitParameter, RecordingNote};
 use nalgebra::DMatrix;
 
 use crate::error::Outcome;
 use crate::model::Model;
 
-/// Values of the base parameters of a model, in its order, and what there is to know about them.
+/// Values of the base parameters of a model, in its order, with notes on them.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Values {
+pub struct BaseParameterValues {
     /// The values, in the units of the base parameters.
     pub values: Vec<f64>,
-    /// Their covariance where a fit tells it; rows and columns of what the model file knows are zero.
+    /// Their covariance, if a fit has it; rows and columns of parameters known from the file are zero.
     pub covariance: Option<DMatrix<f64>>,
-    /// Remarks.
-    pub notes: Vec<Note>,
+    /// Notes on the values.
+    pub notes: Vec<RecordingNote>,
 }
 
 impl Model {
-    /// The nominal values; 0 stands for what the file does not give, and a note says so.
-    pub fn nominal_values(&self) -> Values {
+    /// The nominal values. Base parameters for which the file gives none are 0, which a note states.
+    pub fn nominal_values(&self) -> BaseParameterValues {
         let without: Vec<&str> = (0..self.base.len())
             .filter(|k| !self.has_nominal(*k))
             .map(|k| self.base[k].expression.as_str())
             .collect();
         let mut notes = Vec::new();
         if !without.is_empty() {
-            notes.push(Note::warning(format!(
-                "{} gives no nominal value for {}; 0 is taken",
+            notes.push(RecordingNote::warning(format!(
+                "{} gives no nominal value for {}; 0 is used",
                 self.path,
                 without.join(", ")
             )));
         }
-        Values {
+        BaseParameterValues {
             values: self.nominal.clone(),
             covariance: None,
             notes,
         }
     }
 
-    /// The values of a fit; `file` is what messages call it.
+    /// The values of a fit; `file` is its name in messages.
     ///
     /// Fails when the fit lacks a base parameter of this model.
-    pub fn values_of(&self, fit: &FitFile, file: &str) -> Outcome<Values> {
+    pub fn values_of(&self, fit: &FitFile, file: &str) -> Outcome<BaseParameterValues> {
         let names: Vec<(&str, &str)> = self
             .base
             .iter()
             .map(|base| (base.name.as_str(), base.expression.as_str()))
             .collect();
+        // Parameters are matched by name, and their expressions must be equal.
         let values = fit.values_for(&names, file)?;
         let constants = self.derivation.mechanism.constants.iter();
         let constants: Vec<(&str, f64)> = constants.map(|c| (c.name.as_str(), c.value)).collect();
-        let others = fit.other_constants(&constants, file)?;
+        // Other constants of geometry change the meaning of base parameters, but not their number.
+        let others = fit.differing_constants(&constants, file)?;
         let notes = others.into_iter().map(|(name, then, now)| {
-            Note::warning(format!(
-                "{file} was made with {name} = {then}, but {} has {name} = {now}; identify again unless this is meant",
+            RecordingNote::warning(format!(
+                "{file} was made with {name} = {then}, but {} has {name} = {now}; identify again unless this is intended",
                 self.path
             ))
         });
-        Ok(Values {
+        Ok(BaseParameterValues {
             values,
             covariance: self.covariance_of(fit),
             notes: notes.collect(),
         })
     }
 
-    /// The covariance of a fit's values in the order of the model; `None` where a deviation is not known.
+    /// The covariance of a fit's values in the order of the model; `None` if a standard deviation is unknown.
     fn covariance_of(&self, fit: &FitFile) -> Option<DMatrix<f64>> {
-        let unknown: Vec<usize> = (0..self.base.len())
-            .filter(|k| !self.is_known(*k))
-            .collect();
+        let unknown: Vec<usize> = (0..self.base.len()).filter(|k| !self.is_known(*k)).collect();
+        // The fit may list its parameters in another order.
         let place = |k: &usize| {
             let named = |one: &FitParameter| one.name == self.base[*k].name;
             fit.parameters.iter().position(named)

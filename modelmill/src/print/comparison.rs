@@ -1,19 +1,20 @@
-//! How far a model is off, as JSON and for people.
+//! Errors of a model on recordings, as JSON for scripts and as text for people.
 
 use serde_json::{Value, json};
 
-use crate::compare::Compared;
+use crate::compare::ModelComparison;
 use crate::error::{Error, Outcome};
 use crate::print::{RemedySpelling, notes, tables};
-use crate::text::Style;
+use crate::text::TerminalStyle;
 use crate::text::table::count;
 
-impl Compared {
-    /// Figures, regions and remarks as one JSON object; `parameters` says whose values they are: `nominal` or a file.
+impl ModelComparison {
+    /// Errors, regions and notes as one JSON object; `parameters` is `nominal` or the file that the values come from.
     pub fn json(&self, parameters: &str, spelling: &dyn RemedySpelling) -> Outcome<Value> {
         let mut object = json!({ "model": self.model, "parameters": parameters });
         let figures = serde_json::to_value(&self.figures);
         let figures = figures.map_err(|error| Error::input(error.to_string()))?;
+        // The figures are part of the object itself, not a member of it.
         if let (Some(object), Some(figures)) = (object.as_object_mut(), figures.as_object()) {
             object.extend(figures.clone());
             object.insert("where".to_owned(), json!(self.places.regions));
@@ -22,8 +23,8 @@ impl Compared {
         Ok(object)
     }
 
-    /// The same for people.
-    pub fn text(&self, parameters: &str, style: Style) -> String {
+    /// The comparison as text: figures of each drive, and the regions of the error.
+    pub fn text(&self, parameters: &str, style: TerminalStyle) -> String {
         let mut lines = vec![style.bold(&format!(
             "{} with {parameters} parameters on {}",
             self.model,
@@ -34,7 +35,7 @@ impl Compared {
         lines.push(String::new());
         lines.extend(tables::figures(&[("error", &self.figures)]));
         lines.push(String::new());
-        lines.push(style.bold("where the error lives"));
+        lines.push(style.bold("Where the error is largest"));
         lines.extend(tables::places(&self.places));
         lines.join("\n")
     }

@@ -1,17 +1,18 @@
-//! What a recording holds, as JSON and for people.
+//! Contents of a recording (tables, columns, sample rates), as JSON for scripts and as text for people.
 
 use std::fmt::Write as _;
 
 use modelmill_identify::TableInfo;
 use serde_json::{Value, json};
 
-use crate::recording::Contents;
-use crate::text::Style;
-use crate::text::table::{Align, count, number, significant, table};
+use crate::recording::RecordingContents;
+use crate::text::TerminalStyle;
+use crate::text::table::{ColumnAlignment, count, number, significant, table};
 
-impl Contents {
-    /// The tables as one JSON object.
+impl RecordingContents {
+    /// The tables as one JSON object: names, types, number of samples, rate (Hz), start and end (s), and columns.
     pub fn json(&self) -> Value {
+        // Units are Hz and s; a table without time has neither rate nor limits.
         let of_table = |table: &TableInfo| {
             let columns = table.columns.iter();
             let columns = columns.map(|column| json!({ "name": column.name, "type": column.kind }));
@@ -29,11 +30,12 @@ impl Contents {
         json!({ "file": self.file, "tables": self.tables.iter().map(of_table).collect::<Vec<_>>() })
     }
 
-    /// The tables for people.
-    pub fn text(&self, style: Style) -> String {
+    /// The tables as text: for each a line with its size and time, and a list of its columns.
+    pub fn text(&self, style: TerminalStyle) -> String {
         let mut lines = vec![style.bold(&self.file)];
         for one in &self.tables {
             let mut head = String::new();
+            // Files with a single table, such as CSV, have no name for it.
             if !one.name.is_empty() {
                 head = format!("{} ({}): ", one.name, one.kind);
             }
@@ -46,6 +48,7 @@ impl Contents {
             }
             lines.push(String::new());
             lines.push(format!("  {head}"));
+            // A remark of the reader, such as on what was not read.
             if let Some(remark) = &one.remark {
                 lines.push(format!("  {remark}"));
             }
@@ -54,7 +57,7 @@ impl Contents {
                 .map(|column| vec![column.name.clone(), column.kind.clone()])
                 .collect();
             if !rows.is_empty() {
-                let head = [("column", Align::Left), ("type", Align::Left)];
+                let head = [("column", ColumnAlignment::Left), ("type", ColumnAlignment::Left)];
                 lines.extend(table(4, &head, &rows));
             }
         }

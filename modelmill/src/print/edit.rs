@@ -1,15 +1,15 @@
-//! An edit of a model file: its difference, and the effect that was added.
+//! An edit of a model file: its difference as text, and the added effect as JSON.
 
 use modelmill_spec::edit::NewEffect;
 use serde_json::{Value, json};
 use similar::TextDiff;
 
-use crate::text::Style;
+use crate::text::TerminalStyle;
 
-/// Lines around a change that the difference shows.
+/// Unchanged lines that the difference shows before and after a change.
 const CONTEXT: usize = 3;
 
-/// The change as a unified diff.
+/// The change of a text as a unified diff; `before` and `after` are the names in its header.
 pub fn difference(old: &str, new: &str, [before, after]: [&str; 2]) -> String {
     TextDiff::from_lines(old, new)
         .unified_diff()
@@ -18,9 +18,10 @@ pub fn difference(old: &str, new: &str, [before, after]: [&str; 2]) -> String {
         .to_string()
 }
 
-/// A diff for the terminal.
-pub fn coloured(difference: &str, style: Style) -> String {
+/// A diff with the colours of the terminal.
+pub fn colour_diff(difference: &str, style: TerminalStyle) -> String {
     let lines = difference.lines().map(|line| {
+        // The lines with file names begin like added and removed lines, so they are tested first.
         if line.starts_with("+++") || line.starts_with("---") {
             style.bold(line)
         } else if line.starts_with('+') {
@@ -36,8 +37,8 @@ pub fn coloured(difference: &str, style: Style) -> String {
     lines.collect::<Vec<_>>().join("\n")
 }
 
-/// An effect as scripts read it.
-pub fn described(effect: &NewEffect) -> Value {
+/// An effect as JSON: kind, places, parameters with name and nominal value, constants with value.
+pub fn effect_json(effect: &NewEffect) -> Value {
     let parameters = effect.parameters.iter().map(|one| {
         let said = json!({ "name": one.name, "nominal": one.nominal });
         (one.symbol.clone(), said)

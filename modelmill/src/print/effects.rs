@@ -1,96 +1,102 @@
-//! `effects`: the library of effects, as a list or one kind in words.
+//! Output of `effects`: the library of effects as JSON, as a table, or one kind in detail.
 
-use modelmill_spec::{
-    ActsOn, Carries, EffectKind, KindConstant, KindParameter, Scale, Search, Sign,
-};
+use modelmill_spec::{ActsOn, ConstantSearch, EffectKind, KindConstant, KindParameter, PlaceLoad, Scale, Sign};
 use serde_json::{Value, json};
 
 use crate::error::{Error, Outcome};
-use crate::text::Style;
-use crate::text::table::{Align, table};
+use crate::text::TerminalStyle;
+use crate::text::table::{ColumnAlignment, table};
 
-/// Letters of a line of text.
+/// Width of a line of text, letters.
 const WIDTH: usize = 96;
 
-/// The kinds as one JSON object.
+/// The kinds as one JSON object: where each acts, its expression, and its parameters and constants with units.
 pub fn json(kinds: &[EffectKind]) -> Value {
-    json!({ "kinds": kinds.iter().map(described).collect::<Vec<_>>() })
+    json!({ "kinds": kinds.iter().map(kind_json).collect::<Vec<_>>() })
 }
 
 /// The kinds as a table, a line for each.
-pub fn listed(kinds: &[EffectKind]) -> Vec<String> {
+pub fn kind_table(kinds: &[EffectKind]) -> Vec<String> {
+    // Name, places and expression fit into one line for most kinds.
     let rows: Vec<Vec<String>> = kinds
         .iter()
-        .map(|kind| vec![kind.name.clone(), places(kind), adds(kind)])
+        .map(|kind| vec![kind.name.clone(), places(kind), addition_text(kind)])
         .collect();
     let columns = [
-        ("effect", Align::Left),
-        ("acts on", Align::Left),
-        ("adds", Align::Left),
+        ("effect", ColumnAlignment::Left),
+        ("acts on", ColumnAlignment::Left),
+        ("adds", ColumnAlignment::Left),
     ];
     table(0, &columns, &rows)
 }
 
-/// A kind by its name; fails, with those that are known, if there is none of that name.
+/// A kind by its name.
+///
+/// Fails if there is no kind of that name; the message lists the known ones.
 pub fn kind<'a>(kinds: &'a [EffectKind], name: &str) -> Outcome<&'a EffectKind> {
     let found = kinds.iter().find(|kind| kind.name == name);
-    found.ok_or_else(|| unknown(name, kinds))
+    found.ok_or_else(|| unknown_kind_error(name, kinds))
 }
 
-fn unknown(name: &str, kinds: &[EffectKind]) -> Error {
+/// The error for an unknown kind; it lists the known ones.
+fn unknown_kind_error(name: &str, kinds: &[EffectKind]) -> Error {
     let names: Vec<&str> = kinds.iter().map(|kind| kind.name.as_str()).collect();
     Error::input(format!(
-        "there is no kind of effect `{name}`; known are {}",
+        "there is no kind of effect `{name}`; the known kinds are {}",
         names.join(", ")
     ))
 }
 
 /// Where a kind acts, in words.
 fn places(kind: &EffectKind) -> String {
-    let all: Vec<&str> = kind.on.iter().map(|on| on.words()).collect();
+    // A kind may act on several sorts of places.
+    let all: Vec<&str> = kind.on.iter().map(|on| on.description()).collect();
     let joined = all.join(" or ");
     match (kind.places, kind.other) {
-        (_, Some(other)) => format!("{joined}, by another place that {}", other.words()),
+        // Effects such as those of gears depend on a second place.
+        (_, Some(other)) => format!("{joined}, as a function of another place that {}", other.description()),
         (Some(2), None) => format!("two of: {joined}"),
         _ => joined,
     }
 }
 
-fn adds(kind: &EffectKind) -> String {
+/// What a kind adds to the forces: its expression, or the change of the mechanics in words.
+fn addition_text(kind: &EffectKind) -> String {
     match kind.mechanics {
-        Some(mechanics) => mechanics.words().to_owned(),
+        Some(mechanics) => mechanics.description().to_owned(),
         None => kind.expression.clone(),
     }
 }
 
-/// One kind in words.
-pub fn explained(kind: &EffectKind, style: Style) -> String {
+/// Everything about one kind, as text.
+pub fn kind_text(kind: &EffectKind, style: TerminalStyle) -> String {
     let mut lines = vec![style.bold(&kind.name)];
-    lines.extend(wrapped(&kind.says, 0));
+    lines.extend(wrap_text(&kind.says, 0));
     lines.push(String::new());
     lines.push(format!("acts on  {}", places(kind)));
-    lines.push(format!("adds     {}", adds(kind)));
+    lines.push(format!("adds     {}", addition_text(kind)));
+    // Parameters are identified, constants are fixed or searched.
     let mut symbols: Vec<Vec<String>> = Vec::new();
+    // Parameters come first, with the sign that they must have.
     for one in &kind.parameters {
         let sign = sign(one);
         symbols.push(vec![
             one.symbol.clone(),
             units(&one.units),
-            format!(
-                "parameter{}",
-                sign.map_or_else(String::new, |s| format!(", {s}"))
-            ),
+            format!("parameter{}", sign.map_or_else(String::new, |s| format!(", {s}"))),
             one.note.clone(),
         ]);
     }
+    // Constants follow, with their default or the range of their search.
     for one in &kind.constants {
+        // A default stands in parentheses, as text of the library.
         let value = one.value.as_ref();
         let default = value.map_or_else(String::new, |v| format!(" ({v} if not given)"));
         symbols.push(vec![
             one.symbol.clone(),
             units(&one.units),
             format!("constant{default}"),
-            [one.note.clone(), sought(one)]
+            [one.note.clone(), search_text(one)]
                 .into_iter()
                 .filter(|text| !text.is_empty())
                 .collect::<Vec<_>>()
@@ -100,29 +106,31 @@ pub fn explained(kind: &EffectKind, style: Style) -> String {
     if !symbols.is_empty() {
         lines.push(String::new());
         let columns = [
-            ("symbol", Align::Left),
-            ("unit", Align::Left),
-            ("", Align::Left),
-            ("", Align::Left),
+            ("symbol", ColumnAlignment::Left),
+            ("unit", ColumnAlignment::Left),
+            ("", ColumnAlignment::Left),
+            ("", ColumnAlignment::Left),
         ];
         lines.extend(table(0, &columns, &symbols));
     }
+    // The explanations of the library.
     for (head, text) in [
         ("what it is", &kind.explains),
-        ("told from its doubles", &kind.doubles),
+        ("what it can be confused with", &kind.doubles),
     ] {
         if !text.is_empty() {
             lines.push(String::new());
             lines.push(style.bold(head));
-            lines.extend(wrapped(text, 2));
+            lines.extend(wrap_text(text, 2));
         }
     }
     lines.join("\n")
 }
 
-/// Text in lines of even width.
-fn wrapped(text: &str, indent: usize) -> Vec<String> {
+/// Text in lines of at most `WIDTH` letters.
+fn wrap_text(text: &str, indent: usize) -> Vec<String> {
     let mut lines = vec![" ".repeat(indent)];
+    // A word longer than a line gets a line of its own.
     for word in text.split_whitespace() {
         let line = lines.last_mut().expect("there is a line");
         if line.chars().count() + 1 + word.chars().count() > WIDTH && line.trim() != "" {
@@ -137,12 +145,15 @@ fn wrapped(text: &str, indent: usize) -> Vec<String> {
     lines
 }
 
-fn units(units: &[(Carries, String)]) -> String {
+/// Units for the places where a symbol may stand, without repetition.
+fn units(units: &[(PlaceLoad, String)]) -> String {
     let mut all: Vec<&str> = units.iter().map(|(_, unit)| unit.as_str()).collect();
+    // Forces and torques often have different units; equal ones are named once.
     all.dedup();
     all.join(" or ")
 }
 
+/// The bound of a parameter's sign in words; `None` if it may have either.
 fn sign(parameter: &KindParameter) -> Option<&'static str> {
     match parameter.sign {
         Sign::Positive => Some("not negative"),
@@ -151,35 +162,39 @@ fn sign(parameter: &KindParameter) -> Option<&'static str> {
     }
 }
 
-/// How a constant is found where it is not known.
-fn sought(constant: &KindConstant) -> String {
+/// How a constant is determined if no value is given.
+fn search_text(constant: &KindConstant) -> String {
     match constant.search {
         None => String::new(),
-        Some(Search::Linear) => "found linearly".to_owned(),
-        Some(Search::Range { from, to, of }) => {
+        Some(ConstantSearch::Linear) => "estimated linearly".to_owned(),
+        Some(ConstantSearch::Range { from, to, of }) => {
+            // Ranges may be relative to the motion of the place.
             let of = match of {
-                Scale::Rate => " of the largest rate",
-                Scale::Travel => " of the travel",
+                Scale::Rate => " times the largest rate",
+                Scale::Travel => " times the travel",
                 Scale::One => "",
             };
-            format!("sought from {from} to {to}{of}")
+            format!("searched from {from} to {to}{of}")
         }
     }
 }
 
-fn described(kind: &EffectKind) -> Value {
-    let by_place = |units: &[(Carries, String)]| -> Value {
-        let name = |carries: &Carries| match carries {
-            Carries::Force => "force",
-            Carries::Torque => "torque",
-            Carries::Mass => "point",
-            Carries::Elsewhere => "elsewhere",
+/// A kind as JSON.
+fn kind_json(kind: &EffectKind) -> Value {
+    // Units depend on whether the place is one of forces, torques or points.
+    let by_place = |units: &[(PlaceLoad, String)]| -> Value {
+        let name = |carries: &PlaceLoad| match carries {
+            PlaceLoad::Force => "force",
+            PlaceLoad::Torque => "torque",
+            PlaceLoad::Mass => "point",
+            PlaceLoad::Elsewhere => "elsewhere",
         };
         let entries = units
             .iter()
             .map(|(carries, unit)| (name(carries).to_owned(), json!(unit)));
         Value::Object(entries.collect())
     };
+    // The kinds of places on which the effect can act.
     let on = kind.on.iter().map(|on| match on {
         ActsOn::Drive => "drive",
         ActsOn::Coordinate => "coordinate",
@@ -200,6 +215,7 @@ fn described(kind: &EffectKind) -> Value {
             "note": one.note,
         })
     });
+    // How a constant is found: linearly, by a search in a range, or not at all.
     let constants = kind.constants.iter().map(|one| {
         json!({
             "symbol": one.symbol,
@@ -207,8 +223,8 @@ fn described(kind: &EffectKind) -> Value {
             "value": one.value,
             "search": match one.search {
                 None => Value::Null,
-                Some(Search::Linear) => json!("linear"),
-                Some(Search::Range { from, to, of }) => json!({
+                Some(ConstantSearch::Linear) => json!("linear"),
+                Some(ConstantSearch::Range { from, to, of }) => json!({
                     "from": from,
                     "to": to,
                     "of": match of {
@@ -225,7 +241,7 @@ fn described(kind: &EffectKind) -> Value {
         "name": kind.name,
         "on": on.collect::<Vec<_>>(),
         "places": kind.places,
-        "adds": adds(kind),
+        "adds": addition_text(kind),
         "parameters": parameters.collect::<Vec<_>>(),
         "constants": constants.collect::<Vec<_>>(),
         "says": kind.says,

@@ -1,56 +1,65 @@
-//! An excitation as JSON and for people.
+//! An exciting trajectory, as JSON for scripts and as text for people: condition number, limits, coefficients.
 
-use modelmill_identify::excite::Criterion;
+use modelmill_identify::excite::ExcitationCriterion;
 use serde_json::{Map, Value, json};
 
-use crate::excite::plant::used;
-use crate::excite::{Excited, Separated};
+use crate::excite::plant::used_fraction;
+use crate::excite::{ExcitationResult, SeparationResult};
 use crate::print::RemedySpelling;
-use crate::text::Style;
-use crate::text::table::{Align, count, number, significant, table};
+use crate::text::TerminalStyle;
+use crate::text::table::{ColumnAlignment, count, number, significant, table};
 
-impl Excited {
+impl ExcitationResult {
+    /// Number of limits that the trajectory exceeds.
     fn violations(&self) -> usize {
         let margins = self.found.margins.iter();
         margins.filter(|margin| margin.excess > 0.0).count()
     }
 
-    /// All that was found as one JSON object.
+    /// The trajectory and its quality as one JSON object.
+    ///
+    /// - `condition_number` of the regressor, `start` for the best random trajectory, `scaled_condition_number`
+    ///   with columns of equal norm
+    /// - `value` and `ends`: the criterion at the result and at the end of each start
+    /// - `limits`: the part of each limit that is used (1), and whether it is proven for all times
+    /// - `coefficients`: offset and Fourier coefficients of each coordinate (m or rad); `period` is in s
     pub fn json(&self) -> Value {
         let found = &self.found;
         let names = &self.coordinates;
+        // The trajectory is `offset + sum of mu and nu terms` of each coordinate.
         let coefficients = names.iter().zip(&found.series).map(|(name, series)| {
             let one = json!({ "offset": series.offset, "mu": series.mu, "nu": series.nu });
             (name.clone(), one)
         });
+        // A limit that is zero has no share that is used; JSON has null there.
         let limits = found.margins.iter().map(|margin| {
             json!({
                 "name": margin.name,
                 "excess": margin.excess,
-                "used": Some(used(margin)).filter(|used| used.is_finite()),
+                "used": Some(used_fraction(margin)).filter(|used| used.is_finite()),
                 "proven": margin.proven,
             })
         });
         // The search takes the logarithm of the condition number; people do not.
         let criterion = |value: f64| match self.options.criterion {
-            Criterion::Condition => value.exp(),
-            Criterion::LogDet => value,
-            Criterion::Separation => (-value).exp(),
+            ExcitationCriterion::Condition => value.exp(),
+            ExcitationCriterion::LogDet => value,
+            ExcitationCriterion::Separation => (-value).exp(),
         };
         json!({
             "model": self.model,
             "condition_number": found.condition_number,
-            "start": found.start,
-            "random": found.random,
+            "start": found.start_condition_number,
+            "random": found.feasible_starts,
             "scaled_condition_number": self.scaled,
             "criterion": match self.options.criterion {
-                Criterion::Condition => "condition",
-                Criterion::LogDet => "log_det",
-                Criterion::Separation => "separation",
+                ExcitationCriterion::Condition => "condition",
+                ExcitationCriterion::LogDet => "log_det",
+                ExcitationCriterion::Separation => "separation",
             },
-            "separation": self.separated.as_ref().map(Separated::json),
+            "separation": self.separated.as_ref().map(SeparationResult::json),
             "value": criterion(found.value),
-            "ends": found.ends.iter().map(|end| criterion(*end)).collect::<Vec<_>>(),
+            "ends": found.end_values.iter().map(|end| criterion(*end)).collect::<Vec<_>>(),
             "evaluations": found.evaluations,
             "violations": self.violations(),
             "limits": limits.collect::<Vec<_>>(),
@@ -61,17 +70,19 @@ impl Excited {
         })
     }
 
-    /// The same for people.
-    pub fn text(&self, style: Style, spelling: &dyn RemedySpelling) -> String {
+    /// The trajectory as text: quality first, then the use of its limits.
+    pub fn text(&self, style: TerminalStyle, spelling: &dyn RemedySpelling) -> String {
         let found = &self.found;
+        // The head has what was asked for.
         let mut lines = vec![style.bold(&format!(
             "{}: {} of {} s",
             self.model,
             count(self.options.harmonics, "harmonic", "harmonics"),
             self.options.period
         ))];
+        // The goal of the search decides which figures are printed.
         if let Some(separated) = &self.separated {
-            lines.extend(separated.text(found.evaluations, found.random, spelling));
+            lines.extend(separated.text(found.evaluations, found.feasible_starts, spelling));
         } else {
             lines.extend(self.conditions());
         }
@@ -80,23 +91,25 @@ impl Excited {
         lines.join("\n")
     }
 
-    /// What the trajectory is worth for the base parameters.
+    /// How well the trajectory determines the base parameters.
     fn conditions(&self) -> Vec<String> {
         let found = &self.found;
+        // The best random trajectory shows what the search gained.
         let mut lines = vec![format!(
-            "  condition number {}, against {} of the best of {} ({} times better)",
+            "  condition number {}; {} for the best of {} ({} times better)",
             number(found.condition_number),
-            number(found.start),
+            number(found.start_condition_number),
             count(
-                found.random,
+                found.feasible_starts,
                 "random trajectory within the limits",
                 "random trajectories within the limits"
             ),
-            significant(found.start / found.condition_number, 3),
+            significant(found.start_condition_number / found.condition_number, 3),
         )];
+        // Scaled columns make the number independent of units.
         if let Some(scaled) = self.scaled {
             lines.push(format!(
-                "  {} with columns of equal norm; the regressor was evaluated for {}",
+                "  {} after scaling the columns to equal norm; {} evaluated",
                 number(scaled),
                 count(found.evaluations, "trajectory", "trajectories")
             ));
@@ -107,13 +120,14 @@ impl Excited {
     /// How close the trajectory comes to its limits.
     fn limits(&self) -> Vec<String> {
         let found = &self.found;
+        // A limit is kept at all times if a bound proves it, otherwise at the samples of a fine grid.
         let rows: Vec<Vec<String>> = found
             .margins
             .iter()
             .map(|margin| {
                 vec![
                     margin.name.clone(),
-                    format!("{} %", significant(100.0 * used(margin), 4)),
+                    format!("{} %", significant(100.0 * used_fraction(margin), 4)),
                     if margin.excess > 0.0 {
                         "exceeded".to_owned()
                     } else {
@@ -130,10 +144,10 @@ impl Excited {
         table(
             2,
             &[
-                ("limit", Align::Left),
-                ("used", Align::Right),
-                ("", Align::Left),
-                ("checked", Align::Left),
+                ("limit", ColumnAlignment::Left),
+                ("used", ColumnAlignment::Right),
+                ("", ColumnAlignment::Left),
+                ("checked", ColumnAlignment::Left),
             ],
             &rows,
         )

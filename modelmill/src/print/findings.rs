@@ -1,23 +1,43 @@
-//! What a diagnosis found as JSON and for people.
+//! Findings of a diagnosis, as JSON for scripts and as text for people: verdict, errors after each step,
+//! effects, disturbances, rejected candidates and next steps.
 
-use modelmill_identify::diagnose::{Rung, Verdict};
+use modelmill_identify::diagnose::{DiagnosisVerdict, LocatedEffect, SelectionStep};
 use serde_json::{Map, Value, json};
 
 use super::laws;
-use crate::diagnose::{Estimate, Findings, words};
+use crate::diagnose::{DiagnosisFindings, EffectEstimate, UndecidedEffect, words};
 use crate::print::{OptionName, Remedy, StepSpelling, notes};
-use crate::text::Style;
-use crate::text::table::{Align, number, percent, significant, table};
+use crate::text::TerminalStyle;
+use crate::text::table::{ColumnAlignment, number, percent, significant, table};
 
-/// Candidates that the text names.
-const NAMED: usize = 6;
+/// Rejected candidates that the text names at most.
+const MOST_CANDIDATES: usize = 6;
+/// Least share of the squared error that a rejected candidate must explain alone to be named. By judgement.
+const NAMED_LEAST_SHARE: f64 = 0.01;
 
-impl Findings {
-    /// All that was found as one JSON object; `spelling` says how its reader asks for what it advises.
+impl DiagnosisFindings {
+    /// All findings as one JSON object; `spelling` writes commands or calls for its reader.
+    ///
+    /// - `verdict`, `noise_floor` (relative to the force, as all errors here)
+    /// - `budget`: for each drive the parts of its residual relative to its force, whose `rms` is in `unit`
+    /// - `disturbances`: faults of the recordings, with estimates and times (`interval`, s)
+    /// - `steps`: errors after each added effect, on fitted (`fit`) and validation data (`check`)
+    /// - `effects`: missing effects with estimates, probability and alternatives
+    /// - `candidates`: all effects that were tried, with the share of the squared error that each explains
+    ///   alone and the reason of its rejection
+    /// - `untold`: effects that the recordings can neither show nor exclude
+    /// - `laws`: hypotheses for the residual
+    /// - `parameters_off_nominal`: base parameters that differ from the file, in standard deviations (`sigmas`)
+    /// - `unexplained`: drives with a repeatable residual that no effect explains
+    /// - `data`, `where`: notes on the recordings, and regions where the error is largest
+    /// - `with_nominal_parameters`: the diagnosis with all parameters fixed
     pub fn json(&self, spelling: &dyn StepSpelling) -> Value {
         let diagnosis = &self.diagnosis;
+        // Values are by drive, in the order of the model.
         let channels = self.channels();
         let model = &self.before.model;
+        // Missing effects with the motion that would separate them from their alternatives. Kinds and places have
+        // the names of the model file.
         let effects: Vec<Value> = (self.missing.iter())
             .map(|missing| {
                 let separation = missing.separation.as_ref();
@@ -27,34 +47,35 @@ impl Findings {
                     "estimates": estimates(&missing.estimates),
                     "probability": missing.probability,
                     "indistinguishable_from": missing.indistinguishable_from,
-                    "separate_by": missing.separate_by,
+                    "separating_experiment": missing.separating_experiment,
                     "separate_command": separation.and_then(|asked| spelling.spell_separation(model, asked)),
                 })
             })
             .collect();
+        // All candidates, including those that were found; they have no rejection reason. A script can sort them
+        // by either share.
         let candidates: Vec<Value> = (diagnosis.candidates.iter())
             .map(|c| {
-                json!({"kind": c.effect.kind, "at": c.effect.at, "explained": c.explained, "gain": c.gain, "refused": c.refused})
+                json!({"kind": c.effect.kind, "at": c.effect.at, "explained": c.explained, "gain": c.gain, "refused": c.rejection_reason})
             })
             .collect();
+        // Base parameters that differ from the file.
         let off: Vec<Value> = (self.off_nominal.iter())
             .map(|off| {
                 let p = &off.parameter;
                 json!({"name": p.name, "expression": p.expression, "nominal": off.nominal, "value": p.value, "sigmas": off.sigmas, "unit": p.unit})
             })
             .collect();
+        // Parts of the residual are relative to the rms force of the drive.
         let budget: Map<String, Value> = (channels.iter().zip(&diagnosis.budgets).enumerate())
             .map(|(d, (channel, budget))| {
+                // A drive without force has no relative parts.
                 let part = |x: f64| {
-                    if budget.force > 0.0 {
-                        x / budget.force
-                    } else {
-                        0.0
-                    }
+                    if budget.force > 0.0 { x / budget.force } else { 0.0 }
                 };
                 let value = json!({
                     "noise": part(budget.noise),
-                    "not_repeating": part(budget.not_repeating),
+                    "not_repeating": part(budget.non_repeatable),
                     "model": part(budget.model),
                     "unit": model.force_unit(d),
                     "rms": budget.force,
@@ -62,34 +83,37 @@ impl Findings {
                 (channel.clone(), value)
             })
             .collect();
+        // Disturbances with estimates, recordings and times.
         let disturbances: Vec<Value> = (diagnosis.disturbances.iter())
             .map(|one| {
                 json!({
                     "kind": one.kind,
                     "at": one.at,
-                    "says": one.says,
+                    "says": one.description,
                     "estimates": one.estimates.iter().map(|q| {
-                        json!({"name": q.name, "value": q.value, "std": q.deviation, "unit": q.unit})
+                        json!({"name": q.name, "value": q.value, "std": q.standard_deviation, "unit": q.unit})
                     }).collect::<Vec<_>>(),
                     "recordings": one.recordings,
                     "interval": one.interval,
                 })
             })
             .collect();
+        // Drives whose residual is repeatable, so that a model could explain it.
         let unexplained: Vec<Value> = (diagnosis.unexplained.iter())
-            .map(|d| json!({"channel": channels[*d], "reproducible": diagnosis.reproducible[*d]}))
+            .map(|d| json!({"channel": channels[*d], "reproducible": diagnosis.repeatable_share[*d]}))
             .collect();
+        // Keys are part of the interface; their meaning is listed above.
         json!({
             "model": model.name,
             "verdict": diagnosis.verdict,
             "noise_floor": diagnosis.noise_floor,
             "budget": budget,
             "disturbances": disturbances,
-            "steps": steps(&diagnosis.ladder),
+            "steps": steps(&diagnosis.steps),
             "effects": effects,
             "candidates": candidates,
-            "untold": self.untold.iter().map(|one| {
-                json!({"kind": one.effect.kind, "at": one.effect.at, "says": one.says, "separate_by": one.separate_by})
+            "untold": self.undecided.iter().map(|one| {
+                json!({"kind": one.effect.kind, "at": one.effect.at, "says": one.reason, "separate_by": one.separating_experiment})
             }).collect::<Vec<_>>(),
             "laws": laws::laws(&self.laws, model, spelling),
             "parameters_off_nominal": off,
@@ -99,7 +123,7 @@ impl Findings {
             "with_nominal_parameters": self.with_nominal.as_ref().map(|held| {
                 json!({
                     "verdict": held.diagnosis.verdict,
-                    "steps": steps(&held.diagnosis.ladder),
+                    "steps": steps(&held.diagnosis.steps),
                     "effects": held.missing.iter().map(|(effect, found)| {
                         json!({"kind": effect.kind, "at": effect.at, "estimates": estimates(found)})
                     }).collect::<Vec<_>>(),
@@ -108,94 +132,95 @@ impl Findings {
         })
     }
 
-    /// The answer for people, line by line.
-    pub fn text(&self, style: Style, spelling: &dyn StepSpelling) -> Vec<String> {
+    /// The findings as lines of text, the verdict first.
+    pub fn text(&self, style: TerminalStyle, spelling: &dyn StepSpelling) -> Vec<String> {
         let diagnosis = &self.diagnosis;
         let channels = self.channels();
-        let verdict = words::verdict(diagnosis, channels, self.judged);
+        let verdict = words::verdict(diagnosis, channels, self.validation);
         let mut lines: Vec<String> = (words::lines(&verdict, 100).iter())
             .map(|line| style.bold(line))
             .collect();
         lines.push(String::new());
-        lines.push(style.bold("the ladder: relative error, step by step"));
-        let rows: Vec<Vec<String>> = (diagnosis.ladder.iter())
-            .map(|rung| {
-                vec![
-                    words::rung(rung),
-                    percent(Some(rung.fit)),
-                    percent(Some(rung.check)),
-                ]
-            })
+        lines.push(style.bold("Error after each added effect, relative to the force (nrms)"));
+        // Errors after each step, on fitted and on validation data.
+        let rows: Vec<Vec<String>> = (diagnosis.steps.iter())
+            .map(|rung| vec![words::rung(rung), percent(Some(rung.fit)), percent(Some(rung.check))])
             .collect();
         lines.extend(table(
             2,
             &[
-                ("step", Align::Left),
-                ("fit", Align::Right),
-                (self.judged.short(), Align::Right),
+                ("step", ColumnAlignment::Left),
+                ("fit", ColumnAlignment::Right),
+                (self.validation.label(), ColumnAlignment::Right),
             ],
             &rows,
         ));
-        lines.push(format!("  {}", words::floor(diagnosis)));
+        // The noise floor follows the table, as the lower bound of all errors.
+        lines.push(format!("  {}", words::noise_floor_text(diagnosis)));
         self.missing_text(style, spelling, &mut lines);
         self.disturbances_text(style, &mut lines);
         lines.push(String::new());
-        lines.push(style.bold(if diagnosis.verdict == Verdict::Unexplained {
-            "where what is left sits"
+        lines.push(style.bold(if diagnosis.verdict == DiagnosisVerdict::Unexplained {
+            "Where the residual is largest"
         } else {
-            "where the error of the model as it is sits"
+            "Where the error without added effects is largest"
         }));
         let places = &self.regions;
         lines.extend(places.iter().map(|region| format!("  {}.", region.says)));
         if places.is_empty() {
-            lines.push("  No region of coordinates, rates, loads or time stands out.".to_owned());
+            lines.push("  Nowhere in particular: no range of a coordinate, rate, load or time stands out.".to_owned());
         }
         lines.extend(laws::text(&self.laws, &self.before.model, style, spelling));
         self.refused_text(style, &mut lines);
-        self.untold_text(style, &mut lines);
-        self.off_text(style, spelling, &mut lines);
-        let mut next: Vec<String> = (self.to_add().iter())
+        self.undecided_text(style, &mut lines);
+        self.off_nominal_text(style, spelling, &mut lines);
+        // Entries to add first, then advice for what a model file cannot contain. Steps are commands or calls,
+        // depending on the reader.
+        let mut next: Vec<String> = (self.entries_to_add().iter())
             .map(|entry| spelling.spell_effect(&self.before.model, entry))
             .collect();
-        next.extend(self.beside_the_file().map(str::to_owned));
+        next.extend(self.further_action().map(str::to_owned));
         if !next.is_empty() {
             lines.push(String::new());
-            lines.push(style.bold("how to go on"));
+            lines.push(style.bold("Next steps"));
             lines.extend(next.iter().map(|line| format!("  {line}")));
         }
+        // Effects that were found may contradict the model file.
         if let Err(says) = &self.after
             && !says.is_empty()
         {
             lines.push(format!(
-                "  The model with what was found cannot be made: {}",
+                "  The model with the added effects cannot be built: {}",
                 says.spell(spelling)
             ));
         }
         lines
     }
 
-    /// What the recordings have besides, and where the error that is left comes from.
-    fn disturbances_text(&self, style: Style, lines: &mut Vec<String>) {
+    /// Disturbances of the recordings, and the parts of the residual of each drive.
+    fn disturbances_text(&self, style: TerminalStyle, lines: &mut Vec<String>) {
         let diagnosis = &self.diagnosis;
         if !diagnosis.disturbances.is_empty() {
             lines.push(String::new());
-            lines.push(style.bold("what the recordings have besides, and the model does not lack"));
+            lines.push(style.bold("Disturbances in the recordings (not model errors)"));
             for one in &diagnosis.disturbances {
-                let says = format!("{}.", one.says.as_deref().unwrap_or_default());
-                let told = words::lines(&says, 98);
-                lines.extend(told.iter().map(|line| format!("  {line}")));
+                let says = format!("{}.", one.description.as_deref().unwrap_or_default());
+                let wrapped = words::lines(&says, 98);
+                lines.extend(wrapped.iter().map(|line| format!("  {line}")));
             }
         }
         lines.push(String::new());
-        lines.push(style.bold("what is left of each drive, as a part of its force"));
+        lines.push(style.bold("Remaining error of each drive, % of its force (rms)"));
         let part = |x: f64, force: f64| percent((force > 0.0).then(|| x / force));
+        // Parts of the residual of each drive, relative to its force.
         let rows: Vec<Vec<String>> = (self.channels().iter().zip(&diagnosis.budgets))
             .map(|(channel, budget)| {
+                // Noise, what does not repeat, and what a model could explain.
                 let of = |x: f64| part(x, budget.force);
                 vec![
                     channel.clone(),
                     of(budget.noise),
-                    of(budget.not_repeating),
+                    of(budget.non_repeatable),
                     of(budget.model),
                 ]
             })
@@ -203,23 +228,30 @@ impl Findings {
         lines.extend(table(
             2,
             &[
-                ("drive", Align::Left),
-                ("noise", Align::Right),
-                ("not repeating", Align::Right),
-                ("model", Align::Right),
+                ("drive", ColumnAlignment::Left),
+                ("noise", ColumnAlignment::Right),
+                ("disturbances", ColumnAlignment::Right),
+                ("repeatable, unexplained", ColumnAlignment::Right),
             ],
             &rows,
         ));
     }
 
-    /// What was found, with values and doubles.
-    fn missing_text(&self, style: Style, spelling: &dyn StepSpelling, lines: &mut Vec<String>) {
+    /// Missing effects with their estimates, and effects that explain the recordings equally well. What a kind
+    /// means and how to separate it are printed once, at its first place.
+    fn missing_text(&self, style: TerminalStyle, spelling: &dyn StepSpelling, lines: &mut Vec<String>) {
         if self.missing.is_empty() {
             return;
         }
         lines.push(String::new());
-        lines.push(style.bold("what is missing"));
+        lines.push(style.bold("Missing effects"));
+        // Each kind is explained at its first place only.
+        let mut explained: Vec<&str> = Vec::new();
         for found in &self.missing {
+            let name = found.effect.kind.as_str();
+            let is_first = !explained.contains(&name);
+            explained.push(name);
+            // Values with standard deviations and units.
             let values: Vec<String> = (found.estimates.iter())
                 .map(|e| {
                     let std = e
@@ -230,98 +262,113 @@ impl Findings {
                     said.trim_end().to_owned().trim_end().to_owned()
                 })
                 .collect();
-            lines.push(format!(
-                "  {}: {}",
-                words::effect(&found.effect),
-                values.join(", ")
-            ));
+            lines.push(format!("  {}: {}", words::effect(&found.effect), values.join(", ")));
+            // Kinds of the libraries have a text of their own; others are explained here.
+            // The text of the library comes first, since users can add kinds.
             let mut kinds = self.answer.candidates.kinds.iter();
             let kind = kinds.find(|kind| kind.name == found.effect.kind);
-            let meaning = kind.map_or_else(
-                || words::meaning(&found.effect.kind),
-                |kind| Some(kind.says.as_str()),
-            );
-            if let Some(meaning) = meaning {
+            let meaning = kind.map_or_else(|| words::meaning(&found.effect.kind), |kind| Some(kind.says.as_str()));
+            if let Some(meaning) = meaning.filter(|_| is_first) {
                 lines.push(style.dim(&format!("    {meaning}")));
             }
+            // Alternatives follow with the motion that would distinguish them.
             if !found.indistinguishable_from.is_empty() {
                 lines.push(format!(
-                    "    These recordings cannot tell it from {}.",
+                    "    With these recordings it is not distinguishable from {}.",
                     words::effects(&found.indistinguishable_from)
                 ));
-                if let Some(says) = &found.separate_by {
+                if let Some(says) = found.separating_experiment.as_ref().filter(|_| is_first) {
                     let wrapped = words::lines(says, 96);
                     lines.extend(wrapped.iter().map(|line| style.dim(&format!("    {line}"))));
                 }
                 if let Some(asked) = &found.separation
                     && let Some(command) = spelling.spell_separation(&self.before.model, asked)
                 {
-                    lines.push("    Motion that tells them apart is sought by".to_owned());
+                    lines.push("    To plan a motion that distinguishes them:".to_owned());
                     lines.push(format!("      {command}"));
                 }
             }
         }
     }
 
-    /// The best of what was refused, with the reason.
-    fn refused_text(&self, style: Style, lines: &mut Vec<String>) {
+    /// The rejected candidates that explain most of the error alone, with the reason.
+    fn refused_text(&self, style: TerminalStyle, lines: &mut Vec<String>) {
+        let has_effects = !self.diagnosis.effects.is_empty();
+        // Candidates are sorted by what they explain alone, so the first are the closest rivals.
         let candidates = self.diagnosis.candidates.iter();
         let rows: Vec<Vec<String>> = candidates
             .filter_map(|c| {
-                let why = c.refused.clone()?;
-                (c.explained > 0.01).then(|| {
+                let why = c.rejection_reason.clone()?;
+                (c.explained > NAMED_LEAST_SHARE).then(|| {
                     vec![
                         words::effect(&c.effect),
                         percent(Some(c.explained)),
-                        if why == "sign" {
-                            "beside what was found its sign makes no sense".to_owned()
-                        } else {
-                            why
-                        },
+                        words::refusal(&why, has_effects).to_owned(),
                     ]
                 })
             })
-            .take(NAMED)
+            .take(MOST_CANDIDATES)
             .collect();
         if rows.is_empty() {
             return;
         }
         lines.push(String::new());
-        lines.push(style.bold("what was considered and refused"));
+        lines.push(style.bold("Rejected candidates"));
         lines.extend(table(
             2,
             &[
-                ("candidate", Align::Left),
-                ("explains alone", Align::Right),
-                ("refused because", Align::Left),
+                ("candidate", ColumnAlignment::Left),
+                ("alone it would explain", ColumnAlignment::Right),
+                ("rejected because", ColumnAlignment::Left),
             ],
             &rows,
         ));
     }
 
-    /// What the recordings leave open, with the experiment that would tell.
-    fn untold_text(&self, style: Style, lines: &mut Vec<String>) {
-        if self.untold.is_empty() {
+    /// Effects that these recordings can neither show nor exclude, each with the experiment that would decide.
+    fn undecided_text(&self, style: TerminalStyle, lines: &mut Vec<String>) {
+        if self.undecided.is_empty() {
             return;
         }
         lines.push(String::new());
-        lines.push(style.bold("what these recordings cannot tell"));
-        for one in &self.untold {
-            let says = words::lines(
-                &format!("{}: {}.", words::effect(&one.effect), one.says),
-                98,
-            );
-            lines.extend(says.iter().map(|line| format!("  {line}")));
-            let wrapped = words::lines(&one.separate_by, 96);
+        lines.push(style.bold("Effects that these recordings can neither show nor exclude"));
+        // Effects of one kind share their text, so it is printed once with all places.
+        let mut groups: Vec<(&UndecidedEffect, Vec<&LocatedEffect>)> = Vec::new();
+        for one in &self.undecided {
+            let is_alike = |(first, _): &&mut (&UndecidedEffect, _)| {
+                (&first.effect.kind, &first.reason) == (&one.effect.kind, &one.reason)
+            };
+            match groups.iter_mut().find(is_alike) {
+                Some((_, effects)) => effects.push(&one.effect),
+                None => groups.push((one, vec![&one.effect])),
+            }
+        }
+        // One place has its own text; several places share one.
+        for (first, effects) in groups {
+            let (title, experiment) = match effects.as_slice() {
+                [one] => (words::effect(one), first.separating_experiment.clone()),
+                all => {
+                    let kind = &first.effect.kind;
+                    let places: Vec<String> = all.iter().map(|one| one.at.join(", ")).collect();
+                    (
+                        format!("{} ({})", words::kind(kind), places.join("; ")),
+                        self.deciding_experiment(kind, "each of these places"),
+                    )
+                }
+            };
+            let reason = words::lines(&format!("{title}: {}.", first.reason), 98);
+            lines.extend(reason.iter().map(|line| format!("  {line}")));
+            let wrapped = words::lines(&experiment, 96);
             lines.extend(wrapped.iter().map(|line| style.dim(&format!("    {line}"))));
         }
     }
 
-    /// Parameters that differ from what the file says.
-    fn off_text(&self, style: Style, spelling: &dyn StepSpelling, lines: &mut Vec<String>) {
+    /// Base parameters whose estimates differ from the nominal values of the file.
+    fn off_nominal_text(&self, style: TerminalStyle, spelling: &dyn StepSpelling, lines: &mut Vec<String>) {
         if self.off_nominal.is_empty() {
             return;
         }
+        // The difference is given in standard deviations, so that its size can be judged.
         let rows: Vec<Vec<String>> = (self.off_nominal.iter())
             .map(|off| {
                 let p = &off.parameter;
@@ -336,48 +383,44 @@ impl Findings {
             })
             .collect();
         lines.push(String::new());
-        lines.push(style.bold("base parameters off their nominal values"));
+        lines.push(style.bold("Base parameters that differ from their nominal values"));
         lines.extend(table(
             2,
             &[
-                ("", Align::Left),
-                ("nominal", Align::Right),
-                ("identified", Align::Right),
-                ("sigmas", Align::Right),
-                ("unit", Align::Left),
-                ("", Align::Left),
+                ("", ColumnAlignment::Left),
+                ("nominal", ColumnAlignment::Right),
+                ("identified", ColumnAlignment::Right),
+                ("difference / std", ColumnAlignment::Right),
+                ("unit", ColumnAlignment::Left),
+                ("expression", ColumnAlignment::Left),
             ],
             &rows,
         ));
         lines.push(
-            "  They make up for what the nominal values lack, such as a payload, a misplaced mass or a wrong length."
+            "  Possible causes: a payload, a misplaced mass or a wrong length that the nominal values do not contain."
                 .to_owned(),
         );
+        // A second diagnosis with fixed parameters shows which effects could explain the differences.
         let Some(held) = &self.with_nominal else {
             return;
         };
-        let says = words::verdict(&held.diagnosis, self.channels(), self.judged);
-        let says = format!("With all parameters held at their nominal values: {says}");
-        lines.extend(
-            words::lines(&says, 98)
-                .iter()
-                .map(|line| format!("  {line}")),
-        );
-        let held = Remedy::option(OptionName::Held).spell(spelling);
-        lines.push(format!("  ({held} tells more.)"));
+        let says = words::verdict(&held.diagnosis, self.channels(), self.validation);
+        let says = format!("With all parameters fixed at their nominal values: {says}");
+        lines.extend(words::lines(&says, 98).iter().map(|line| format!("  {line}")));
+        let fix_parameters = Remedy::option(OptionName::Held).spell(spelling);
+        lines.push(format!("  (Details: {fix_parameters}.)"));
     }
 }
 
-/// Estimates as scripts read them.
-pub(super) fn estimates(all: &[Estimate]) -> Vec<Value> {
-    let one =
-        |e: &Estimate| json!({"name": e.name, "value": e.value, "std": e.std, "unit": e.unit});
+/// Estimates as JSON.
+pub(super) fn estimates(all: &[EffectEstimate]) -> Vec<Value> {
+    let one = |e: &EffectEstimate| json!({"name": e.name, "value": e.value, "std": e.std, "unit": e.unit});
     all.iter().map(one).collect()
 }
 
-/// The ladder as scripts read it.
-fn steps(ladder: &[Rung]) -> Vec<Value> {
-    let step = |rung: &Rung| {
+/// The steps of the search as JSON.
+fn steps(ladder: &[SelectionStep]) -> Vec<Value> {
+    let step = |rung: &SelectionStep| {
         json!({
             "added": rung.added.first(),
             "also_added": rung.added.get(1..).unwrap_or_default(),

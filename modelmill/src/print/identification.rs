@@ -1,21 +1,25 @@
-//! An identification as JSON and for people.
+//! Result of an identification, as JSON for scripts and as text for people: base parameters with standard
+//! deviations, errors and the next step.
 
-use modelmill_identify::Status;
+use modelmill_identify::ParameterStatus;
 use serde_json::{Value, json};
 
 use crate::error::{Error, Outcome};
 use crate::identify::Identification;
 use crate::model::Model;
 use crate::print::{RemedySpelling, estimation, notes, tables};
-use crate::text::Style;
-use crate::text::table::{count, number};
+use crate::text::TerminalStyle;
+use crate::text::table::{count, significant};
 
 impl Identification {
     /// The fit with all figures as one JSON object, from which [`modelmill_identify::FitFile`] is read again.
+    ///
+    /// Fails when the fit cannot be written as JSON.
     pub fn json(&self, model: &Model, spelling: &dyn RemedySpelling) -> Outcome<Value> {
         let value = serde_json::to_value(&self.fit);
         let mut value = value.map_err(|error| Error::input(error.to_string()))?;
         if let Some(object) = value.as_object_mut() {
+            // Notes contain remedies, which are spelled for the reader.
             if let Some(data) = object.get_mut("data") {
                 *data = notes(&self.fit.data, spelling);
             }
@@ -23,10 +27,12 @@ impl Identification {
                 "nominal".to_owned(),
                 json!({ "fit": self.nominal_fit, "check": self.nominal_check }),
             );
+            // Figures of the estimator belong to this output only; a fit file is read without them.
             object.insert(
                 "estimator".to_owned(),
                 estimation::json(model, &self.found, &self.options),
             );
+            // Periods exist for periodic recordings only.
             if !self.repeats.is_empty() {
                 let repeats = self
                     .repeats
@@ -39,11 +45,12 @@ impl Identification {
         Ok(value)
     }
 
-    /// The result for people.
-    pub fn text(&self, model: &Model, style: Style, spelling: &dyn RemedySpelling) -> String {
+    /// The result as text: parameters, quality of the estimate, errors, and the next step.
+    pub fn text(&self, model: &Model, style: TerminalStyle, spelling: &dyn RemedySpelling) -> String {
         let fit = &self.fit;
-        let estimator = estimation::text(model, &self.found, &model.infos());
-        let identified = fit.parameters.iter().filter(|p| p.status != Status::Known);
+        let estimator = estimation::text(model, &self.found, &model.parameter_infos());
+        // Parameters known from the file are not counted as identified.
+        let identified = fit.parameters.iter().filter(|p| p.status != ParameterStatus::Known);
         let identified = identified.count();
         let mut lines = vec![style.bold(&format!(
             "{}: {} from {}",
@@ -55,16 +62,18 @@ impl Identification {
         lines.push(String::new());
         lines.extend(tables::parameters(&fit.parameters));
         lines.push(String::new());
+        // The condition number shows whether the motion excites all parameters.
         lines.push(format!(
-            "  condition number {}, {} with columns of equal norm",
+            "  condition number {} ({} after scaling the columns to equal norm; below 100 is good)",
             fit.condition_number
-                .map_or_else(|| "infinite".to_owned(), number),
+                .map_or_else(|| "infinite".to_owned(), |value| significant(value, 4)),
             fit.scaled_condition_number
-                .map_or_else(|| "infinite".to_owned(), number),
+                .map_or_else(|| "infinite".to_owned(), |value| significant(value, 3)),
         ));
         lines.extend(estimator.iter().map(|line| format!("  {line}")));
         lines.push(String::new());
-        lines.push(style.bold("error"));
+        lines.push(style.bold("Error"));
+        // Errors with nominal values mean nothing if the file has none.
         let has_nominal = (0..model.base.len()).any(|k| model.has_nominal(k));
         let mut figures = Vec::new();
         if has_nominal {
@@ -73,9 +82,9 @@ impl Identification {
         figures.push(("fit, identified", &fit.fit));
         if let (Some(check), Some(nominal)) = (&fit.check, &self.nominal_check) {
             if has_nominal {
-                figures.push(("check, nominal", nominal));
+                figures.push(("validation, nominal", nominal));
             }
-            figures.push(("check, identified", check));
+            figures.push(("validation, identified", check));
         }
         lines.extend(tables::figures(&figures));
         lines.push(String::new());

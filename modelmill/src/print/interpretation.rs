@@ -1,20 +1,26 @@
-//! Physical parameters as JSON and for people.
+//! Physical parameters solved from base parameters, as JSON for scripts and as text for people.
 
 use modelmill_boundary::message;
-use modelmill_identify::interpret::{Interpretation, Physical};
+use modelmill_identify::interpret::{PhysicalInterpretation, PhysicalSolution};
 use serde_json::{Map, Value, json};
 
-use crate::interpret::Interpreted;
+use crate::interpret::InterpretationResult;
 use crate::print::{OptionName, Remedy, RemedySpelling};
-use crate::text::Style;
-use crate::text::table::{Align, count, number, significant, table};
+use crate::text::TerminalStyle;
+use crate::text::table::{ColumnAlignment, count, number, significant, table};
 
-impl Interpreted {
-    /// All that was found as one JSON object.
+impl InterpretationResult {
+    /// All solutions as one JSON object; values in SI units.
+    ///
+    /// - `identifiable`, `method`: whether and how the base parameters determine the unknowns
+    /// - `solutions`: values with standard deviations, and whether each is plausible; `fit`: residuals of each solution
+    /// - `determined`: unknowns with a unique value; `undetermined`: sentences about the others
+    /// - `base_parameters`: those that were used as equations
     pub fn json(&self) -> Value {
         let parameters = &self.model.derivation.mechanism.parameters;
         let names = self.names();
-        let solution = |one: &Physical| -> Value {
+        // A value is plausible if its sign is possible.
+        let solution = |one: &PhysicalSolution| -> Value {
             let entries = names.iter().enumerate().map(|(i, name)| {
                 let parameter = &parameters[self.unknown[i]];
                 let value = json!({
@@ -22,13 +28,14 @@ impl Interpreted {
                     "std": one.std.as_ref().map(|std| std[i]),
                     "unit": parameter.unit,
                     "nominal": parameter.nominal,
-                    "plausible": self.objection(i, one.values[i]).is_none(),
+                    "plausible": self.sign_violation(i, one.values[i]).is_none(),
                 });
                 (name.clone(), value)
             });
             Value::Object(entries.collect::<Map<_, _>>())
         };
-        let residuals = |one: &Physical| -> Value {
+        // Residuals show which base parameters contradict the solution.
+        let residuals = |one: &PhysicalSolution| -> Value {
             let entries = self.used.iter().zip(&one.residuals);
             let entries = entries.map(|(k, r)| (self.model.base[*k].name.clone(), json!(r)));
             json!({
@@ -36,13 +43,15 @@ impl Interpreted {
                 "residuals": Value::Object(entries.collect::<Map<_, _>>()),
             })
         };
+        // `none` means that the base parameters do not determine the unknowns.
         let method = match &self.found {
-            Interpretation::Exact { .. } => "exact",
-            Interpretation::LeastSquares { .. } => "least_squares",
-            Interpretation::Undetermined { .. } => "none",
+            PhysicalInterpretation::Exact { .. } => "exact",
+            PhysicalInterpretation::LeastSquares { .. } => "least_squares",
+            PhysicalInterpretation::Undetermined { .. } => "none",
         };
+        // If not all unknowns are determined, some may still be.
         let determined: Vec<&String> = match &self.found {
-            Interpretation::Undetermined { determined, .. } => {
+            PhysicalInterpretation::Undetermined { determined, .. } => {
                 let pairs = names.iter().zip(determined);
                 pairs.filter(|(_, d)| **d).map(|(name, _)| name).collect()
             }
@@ -50,80 +59,81 @@ impl Interpreted {
         };
         json!({
             "model": self.model.name,
-            "identifiable": !matches!(self.found, Interpretation::Undetermined { .. }),
+            "identifiable": !matches!(self.found, PhysicalInterpretation::Undetermined { .. }),
             "method": method,
             "solutions": self.solutions().iter().map(solution).collect::<Vec<_>>(),
             "fit": self.solutions().iter().map(residuals).collect::<Vec<_>>(),
-            "undetermined": self.undetermined(),
+            "undetermined": self.undetermined_directions(),
             "determined": determined,
             "base_parameters": self.used.iter().map(|k| self.model.base[*k].name.clone()).collect::<Vec<_>>(),
         })
     }
 
-    /// The same for people.
-    pub fn text(&self, style: Style, spelling: &dyn RemedySpelling) -> String {
+    /// The solutions as text, each as a table, after a headline with the method.
+    pub fn text(&self, style: TerminalStyle, spelling: &dyn RemedySpelling) -> String {
         let solutions = self.solutions();
-        let unknowns = count(
-            self.unknown.len(),
-            "unknown parameter",
-            "unknown parameters",
-        );
+        let unknowns = count(self.unknown.len(), "unknown parameter", "unknown parameters");
         let equations = count(self.used.len(), "base parameter", "base parameters");
+        // The headline states the method, and for exact solutions that there are no others.
         let head = match &self.found {
-            Interpretation::Undetermined { .. } => format!(
-                "{}: {equations} do not determine {unknowns}",
-                self.model.name
-            ),
-            Interpretation::Exact { .. } => format!(
-                "{}: {} for {unknowns} from {equations}, and no others",
+            PhysicalInterpretation::Undetermined { .. } => {
+                format!("{}: {equations} do not determine {unknowns}", self.model.name)
+            }
+            PhysicalInterpretation::Exact { .. } => format!(
+                "{}: {} for {unknowns} from {equations}; there are no others",
                 self.model.name,
                 count(solutions.len(), "real solution", "real solutions"),
             ),
-            Interpretation::LeastSquares {
-                is_linear: true, ..
-            } => format!(
+            PhysicalInterpretation::LeastSquares { is_linear: true, .. } => format!(
                 "{}: {unknowns} from {equations} by weighted least squares",
                 self.model.name
             ),
-            Interpretation::LeastSquares { starts, .. } => format!(
-                "{}: {} of weighted least squares for {unknowns} from {equations}, looked for from {}",
+            PhysicalInterpretation::LeastSquares { starts, .. } => format!(
+                "{}: {} of weighted least squares for {unknowns} from {equations}, searched from {}",
                 self.model.name,
                 count(solutions.len(), "minimum", "minima"),
-                count(*starts, "start", "starts"),
+                count(*starts, "starting point", "starting points"),
             ),
         };
         let mut lines = vec![style.bold(&head)];
-        for says in self.undetermined() {
+        // Undetermined directions are listed before any solution.
+        for says in self.undetermined_directions() {
             lines.push(format!("  {says}."));
         }
+        // Each direction needs one more known parameter.
         if !self.directions().is_empty() {
             let how = message!(
-                "  Hold one parameter of each line at its nominal value, that is, leave it out of {}.",
+                "  Fix one parameter of each line at its nominal value: leave it out of {}.",
                 Remedy::option(OptionName::Unknown)
             );
             lines.push(how.spell(spelling));
         }
-        if let (Interpretation::Exact { .. }, []) = (&self.found, solutions) {
+        // Exact equations may have complex solutions only.
+        if let (PhysicalInterpretation::Exact { .. }, []) = (&self.found, solutions) {
             lines.push(
-                "  No real values of these parameters give the base parameters; hold others at their nominal values."
+                "  No real values of these parameters give the base parameters. Fix other parameters at their nominal values."
                     .to_owned(),
             );
         }
+        // Solutions are numbered if there are several.
         for (k, one) in solutions.iter().enumerate() {
             lines.push(String::new());
             if solutions.len() > 1 {
                 lines.push(format!("  solution {}", k + 1));
             }
             lines.extend(self.table(one));
-            if matches!(self.found, Interpretation::LeastSquares { .. }) {
+            if matches!(self.found, PhysicalInterpretation::LeastSquares { .. }) {
                 lines.extend(self.residuals(one));
             }
         }
         lines.join("\n")
     }
 
-    fn table(&self, one: &Physical) -> Vec<String> {
+    /// A solution as a table: nominal and solved values, standard deviations, and objections to values that are
+    /// not plausible.
+    fn table(&self, one: &PhysicalSolution) -> Vec<String> {
         let parameters = &self.model.derivation.mechanism.parameters;
+        // The last column is empty unless a value is impossible.
         let rows: Vec<Vec<String>> = (0..self.unknown.len())
             .map(|i| {
                 let parameter = &parameters[self.unknown[i]];
@@ -135,43 +145,39 @@ impl Interpreted {
                         .as_ref()
                         .map_or_else(|| "-".to_owned(), |std| significant(std[i], 2)),
                     parameter.unit.clone(),
-                    self.objection(i, one.values[i])
-                        .unwrap_or_default()
-                        .to_owned(),
+                    self.sign_violation(i, one.values[i]).unwrap_or_default().to_owned(),
                 ]
             })
             .collect();
         let columns = [
-            ("parameter", Align::Left),
-            ("nominal", Align::Right),
-            ("solved", Align::Right),
-            ("std", Align::Right),
-            ("unit", Align::Left),
-            ("", Align::Left),
+            ("parameter", ColumnAlignment::Left),
+            ("nominal", ColumnAlignment::Right),
+            ("solved", ColumnAlignment::Right),
+            ("std", ColumnAlignment::Right),
+            ("unit", ColumnAlignment::Left),
+            ("", ColumnAlignment::Left),
         ];
         table(2, &columns, &rows)
     }
 
-    fn residuals(&self, one: &Physical) -> Vec<String> {
+    /// Residuals of the base parameters for a solution by least squares, each in the unit of its base parameter.
+    fn residuals(&self, one: &PhysicalSolution) -> Vec<String> {
         let rows: Vec<Vec<String>> = self
             .used
             .iter()
             .zip(&one.residuals)
             .map(|(k, residual)| {
                 let base = &self.model.base[*k];
-                vec![
-                    base.name.clone(),
-                    significant(*residual, 3),
-                    base.unit.clone(),
-                ]
+                vec![base.name.clone(), significant(*residual, 3), base.unit.clone()]
             })
             .collect();
         let columns = [
-            ("base parameter", Align::Left),
-            ("residual", Align::Right),
-            ("unit", Align::Left),
+            ("base parameter", ColumnAlignment::Left),
+            ("residual", ColumnAlignment::Right),
+            ("unit", ColumnAlignment::Left),
         ];
         let mut lines = table(2, &columns, &rows);
+        // The sum of squares in standard deviations judges the fit as a whole.
         if let Some(chi_squared) = one.chi_squared {
             lines.push(format!("  chi^2 {}", number(chi_squared)));
         }

@@ -1,35 +1,38 @@
-//! Laws that a diagnosis proposes, as JSON and for people.
+//! Laws that a diagnosis proposes for the residual, as JSON for scripts and as text for people.
 
 use serde_json::{Value, json};
 
 use super::findings::estimates;
-use crate::diagnose::{Hypothesis, Law, words};
+use crate::diagnose::{LawHypothesis, ProposedLaw, words};
 use crate::model::Model;
 use crate::print::StepSpelling;
-use crate::text::Style;
+use crate::text::TerminalStyle;
 use crate::text::table::{number, percent, significant};
 
-/// What is said of every law.
+/// The caution that goes with every law.
 pub(crate) const HYPOTHESIS: &str =
-    "A hypothesis that these recordings suggest, no finding: nothing says that the machine has it.";
-/// What an entry of a library needs to be known, and where the law cannot be written down.
+    "A hypothesis that these recordings suggest, not a finding: nothing proves that the machine has it.";
+/// Name of the file that the text suggests for the entry of a library.
 pub(crate) const LIBRARY: &str = "laws.toml";
-pub(crate) const REMEMBERS: &str = "It depends on the way there, which no formula of a library says; it is told so that it can be looked for.";
+/// Why a law with memory has no entry.
+pub(crate) const PATH_DEPENDENT_NOTE: &str = "It depends on the earlier motion, which no formula of a library can express. It is reported so that you can search for the cause.";
 
-/// Laws as scripts read them.
-pub(super) fn laws(laws: &[Hypothesis], model: &Model, spelling: &dyn StepSpelling) -> Vec<Value> {
-    let one = |hypothesis: &Hypothesis| {
-        let mut told = law(&hypothesis.law, model, spelling);
+/// Laws as JSON, the best first, each with its alternatives.
+pub(super) fn laws(laws: &[LawHypothesis], model: &Model, spelling: &dyn StepSpelling) -> Vec<Value> {
+    let one = |hypothesis: &LawHypothesis| {
+        // `near_ties` has the labels of the alternatives, `ties` all of them in full.
+        let mut object = law(&hypothesis.law, model, spelling);
         let ties = hypothesis.near_ties.iter();
-        told["near_ties"] = ties.clone().map(|tie| json!(tie.says())).collect();
-        told["ties"] = ties.map(|tie| law(tie, model, spelling)).collect();
-        told["says"] = json!(HYPOTHESIS);
-        told
+        object["near_ties"] = ties.clone().map(|tie| json!(tie.label())).collect();
+        object["ties"] = ties.map(|tie| law(tie, model, spelling)).collect();
+        object["says"] = json!(HYPOTHESIS);
+        object
     };
     laws.iter().map(one).collect()
 }
 
-fn law(law: &Law, model: &Model, spelling: &dyn StepSpelling) -> Value {
+/// A law as JSON, with its entry for a library and the step that adds it.
+fn law(law: &ProposedLaw, model: &Model, spelling: &dyn StepSpelling) -> Value {
     let entry = law.entry.as_ref();
     json!({
         "expression": law.expression,
@@ -44,11 +47,11 @@ fn law(law: &Law, model: &Model, spelling: &dyn StepSpelling) -> Value {
     })
 }
 
-/// Laws for people, line by line.
+/// Laws as lines of text.
 pub(super) fn text(
-    laws: &[Hypothesis],
+    laws: &[LawHypothesis],
     model: &Model,
-    style: Style,
+    style: TerminalStyle,
     spelling: &dyn StepSpelling,
 ) -> Vec<String> {
     let mut lines = Vec::new();
@@ -56,34 +59,31 @@ pub(super) fn text(
         return lines;
     }
     lines.push(String::new());
-    lines.push(style.bold("which law would explain what is left: a hypothesis, to be tried"));
+    lines.push(style.bold("Laws that would explain the residual (hypotheses, to be tested)"));
     for hypothesis in laws {
+        // Expression, values, and the share that it explains.
         let law = &hypothesis.law;
-        lines.push(format!("  {}", law.says()));
+        lines.push(format!("  {}", law.label()));
         lines.push(format!("    {}", values(law)));
         let wrapped = words::lines(&gain(law), 96);
         lines.extend(wrapped.iter().map(|line| format!("    {line}")));
         if !hypothesis.near_ties.is_empty() {
-            lines.push("    As near to these recordings are".to_owned());
+            lines.push("    These explain the recordings equally well:".to_owned());
             for tie in &hypothesis.near_ties {
-                lines.push(format!("      {}", tie.says()));
+                lines.push(format!("      {}", tie.label()));
             }
         }
+        // A law without memory has an entry for a library and the step that adds it.
         match &law.entry {
             Some(entry) => {
-                lines.push(format!("    As a library, {LIBRARY}:"));
-                lines.extend(
-                    entry
-                        .text
-                        .lines()
-                        .map(|line| style.dim(&format!("      {line}"))),
-                );
-                lines.push("    and with it".to_owned());
+                lines.push(format!("    As a library file, {LIBRARY}:"));
+                lines.extend(entry.text.lines().map(|line| style.dim(&format!("      {line}"))));
+                lines.push("    and to add it:".to_owned());
                 let command = spelling.spell_effect_of_library(model, &entry.effect, LIBRARY);
                 lines.push(format!("      {command}"));
             }
             None => {
-                let wrapped = words::lines(REMEMBERS, 96);
+                let wrapped = words::lines(PATH_DEPENDENT_NOTE, 96);
                 lines.extend(wrapped.iter().map(|line| format!("    {line}")));
             }
         }
@@ -91,11 +91,10 @@ pub(super) fn text(
     lines
 }
 
-/// Parameters with their deviations and units.
-pub(crate) fn values(law: &Law) -> String {
-    let value = |p: &crate::diagnose::Estimate| {
-        let deviation =
-            (p.std).map_or_else(String::new, |std| format!(" ± {}", significant(std, 2)));
+/// Parameters of a law with standard deviations and units.
+pub(crate) fn values(law: &ProposedLaw) -> String {
+    let value = |p: &crate::diagnose::EffectEstimate| {
+        let deviation = (p.std).map_or_else(String::new, |std| format!(" ± {}", significant(std, 2)));
         let unit = if p.unit == "1" { "" } else { &p.unit };
         let said = format!("{} = {}{deviation} {unit}", p.name, number(p.value));
         said.trim_end().to_owned()
@@ -104,14 +103,15 @@ pub(crate) fn values(law: &Law) -> String {
     all.join(", ")
 }
 
-/// What it takes off, and what it makes needless.
-pub(crate) fn gain(law: &Law) -> String {
+/// Which share of the residual a law explains, and which effects it makes unnecessary.
+pub(crate) fn gain(law: &ProposedLaw) -> String {
     let mut says = format!(
-        "takes off {} of the squared error that is left where it was not fitted",
+        "explains {} of the squared residual on data that were not fitted",
         percent(Some(law.gain))
     );
+    // A law may replace several effects that approximate it.
     if !law.instead_of.is_empty() {
-        says.push_str(", and then the recordings need no ");
+        says.push_str(", and makes these effects unnecessary: ");
         says.push_str(&words::effects(&law.instead_of));
     }
     says.push('.');

@@ -1,4 +1,5 @@
-//! Printers of results: JSON objects for scripts, text for people. Each prints a value of the library; none looks anything up.
+//! Output of results. Each module takes one value of the library and returns JSON for scripts and text for
+//! people; none reads files or computes.
 
 mod changes;
 mod comparison;
@@ -12,6 +13,7 @@ mod identification;
 mod interpretation;
 pub(crate) mod laws;
 mod next_step;
+#[cfg(feature = "import")]
 mod reduction;
 mod runs;
 mod spelling;
@@ -19,16 +21,15 @@ mod summary;
 pub mod tables;
 mod variants;
 
-use modelmill_identify::Note;
+use modelmill_identify::RecordingNote;
 use serde_json::Value;
 
 pub use spelling::{
-    CommandName, LibrarySpelling, Message, OptionName, OptionSetting, Remedy, RemedySpelling,
-    StepSpelling,
+    CommandName, LibrarySpelling, Message, OptionName, OptionSetting, Remedy, RemedySpelling, StepSpelling,
 };
 pub use summary::{faults, refusal, warnings};
 
-/// Remarks as JSON.
-pub(crate) fn notes(notes: &[Note], spelling: &dyn RemedySpelling) -> Value {
+/// Notes as JSON.
+pub(crate) fn notes(notes: &[RecordingNote], spelling: &dyn RemedySpelling) -> Value {
     notes.iter().map(|note| note.json(spelling)).collect()
 }

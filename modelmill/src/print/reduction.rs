@@ -1,13 +1,13 @@
-//! A reduction of a rig as JSON and for people.
+//! Reduction of a rig to a model, as JSON for scripts and as text for people.
 
 use std::fmt::Write as _;
 
-use modelmill_reduction::Report;
+use modelmill_reduction::ReductionReport;
 use serde_json::{Value, json};
 
-use crate::reduce::Reduced;
+use crate::reduce::RigReduction;
 
-impl Reduced {
+impl RigReduction {
     /// Findings and forces as one JSON object; `out` is where the model file goes.
     pub fn json(&self, out: &str) -> Value {
         json!({
@@ -19,10 +19,10 @@ impl Reduced {
         })
     }
 
-    /// The same for people.
+    /// The same as text: the report of the reduction, and the error of each drive's force.
     pub fn text(&self) -> String {
         let mut text = self.reduction.report.text();
-        text.push_str("Price - forces of the model against those of the rig, relative\n");
+        text.push_str("Error - forces of the model compared with those of the rig, relative (nrms)\n");
         for one in &self.forces {
             let _ = writeln!(text, "  {:<16}{:.1e}", one.drive, one.nrms);
         }
@@ -30,14 +30,15 @@ impl Reduced {
     }
 }
 
-fn findings(report: &Report) -> Vec<Value> {
+/// Findings of the reduction as JSON, with the sizes that led to each.
+fn findings(report: &ReductionReport) -> Vec<Value> {
     let findings = report.findings.iter();
     findings
         .map(|finding| {
             let sizes: Vec<Value> = finding
                 .sizes
                 .iter()
-                .map(|size| json!({ "of": size.of, "value": size.value, "unit": size.unit, "is_felt": size.is_felt() }))
+                .map(|size| json!({ "of": size.quantity, "value": size.value, "unit": size.unit, "is_felt": size.is_significant() }))
                 .collect();
             json!({ "step": finding.step, "about": finding.about, "says": finding.says, "sizes": sizes })
         })

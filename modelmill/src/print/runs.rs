@@ -1,25 +1,34 @@
-//! What differs between runs as JSON and for people.
+//! Differences between runs of one machine, as JSON for scripts and as text for people.
 
 use modelmill_identify::ParameterInfo;
 use serde_json::{Value, json};
 
 use crate::print::RemedySpelling;
-use crate::runs::{ChangePoint, Changed, Compared, Fitted, OneRun, SharedFit, Valued, What};
-use crate::text::Style;
-use crate::text::table::{Align, count, table, with_deviation};
+use crate::runs::{
+    ChangePoint, FittedValue, PhysicalChange, RunChange, RunReport, RunValue, RunsComparison, SharedFit,
+};
+use crate::text::TerminalStyle;
+use crate::text::table::{ColumnAlignment, count, table, with_deviation};
 
-impl Compared {
-    /// All that was found as one JSON object.
+impl RunsComparison {
+    /// All differences as one JSON object; values in SI units.
+    ///
+    /// - `together`: base parameters of one fit to all runs; `runs`: those of each run fitted separately
+    /// - `moved`: base parameters that differ between the first run and another, in standard deviations (`sigmas`)
+    /// - `changes`: physical changes of a run relative to the first
+    /// - `change_points`: lasting changes, from four runs on
+    /// - `unread`: files that could not be evaluated, with the reason
+    /// - `per_run`: the joint fit in which runs have some values for themselves, if it was requested
     pub fn json(&self, spelling: &dyn RemedySpelling) -> Value {
         let later = || self.runs.iter().enumerate().skip(1);
-        let moved =
-            later().flat_map(|(k, run)| run.moved.iter().map(move |p| self.moved_json(k, *p)));
+        // All figures are relative to the first run.
+        let moved = later().flat_map(|(k, run)| run.moved.iter().map(move |p| self.moved_parameter_json(k, *p)));
         let all = self.runs.iter().enumerate();
-        let changes =
-            all.flat_map(|(k, run)| run.changes.iter().map(move |one| change_json([0, k], one)));
+        // Events within the first run are listed as well, with the pair of indices 0 and 0.
+        let changes = all.flat_map(|(k, run)| run.changes.iter().map(move |one| change_json([0, k], one)));
         let unread = self.unread.iter();
-        let unread =
-            unread.map(|one| json!({ "file": one.file, "says": one.error.spell(spelling) }));
+        let unread = unread.map(|one| json!({ "file": one.file, "says": one.error.spell(spelling) }));
+        // Each run with its own fit.
         let runs = self.runs.iter().map(|run| {
             json!({
                 "file": run.file,
@@ -39,13 +48,15 @@ impl Compared {
         })
     }
 
+    /// A lasting change as JSON: the run from which on it is there, means before and since, and physical causes.
     fn point_json(&self, point: &ChangePoint) -> Value {
+        // Means of each parameter before and since the change.
         let steps = point.steps.iter().map(|step| {
             json!({
                 "parameter": self.parameters[step.parameter].name,
                 "before": step.before.value,
                 "now": step.now.value,
-                "std": step.before.beside(step.now),
+                "std": step.before.difference_deviation(step.now),
                 "unit": self.parameters[step.parameter].unit,
             })
         });
@@ -58,20 +69,25 @@ impl Compared {
         })
     }
 
-    /// The fit in which some values are each run's own.
+    /// The joint fit, in which some values are shared and each run has others for itself.
     fn shared_json(&self, fit: &SharedFit) -> Value {
+        // Names and units come from the model.
         let shared = self.parameters.iter().zip(&fit.shared);
+        // Base parameters that are separate for each run are not in the shared list.
         let shared = shared.filter_map(|(info, value)| {
             let value = (*value)?;
             Some(json!({ "name": info.name, "expression": info.expression, "value": value.value, "std": value.deviation, "unit": info.unit }))
         });
-        let gains = fit.gains.iter().map(
-            |(drive, gain)| json!({ "drive": drive, "gain": gain.value, "std": gain.deviation }),
-        );
+        // Factors of force signals, which need a known load.
+        let gains = fit
+            .gains
+            .iter()
+            .map(|(drive, gain)| json!({ "drive": drive, "gain": gain.value, "std": gain.deviation }));
+        // Values of each run, absolute or relative to the first run.
         let runs = fit.runs.iter().map(|(file, values)| {
             let values = values.iter().map(|one| {
                 json!({
-                    "of": one.of,
+                    "of": one.quantity,
                     "name": one.name,
                     "value": one.value.value,
                     "std": one.value.deviation,
@@ -88,9 +104,11 @@ impl Compared {
         })
     }
 
-    fn parameters_json(&self, fitted: &[Fitted]) -> Vec<Value> {
+    /// Base parameters with one fitted value each as JSON.
+    fn parameters_json(&self, fitted: &[FittedValue]) -> Vec<Value> {
+        // A parameter that the run does not determine has no standard deviation.
         let pairs = self.parameters.iter().zip(fitted);
-        let one = |(info, fitted): (&ParameterInfo, &Fitted)| {
+        let one = |(info, fitted): (&ParameterInfo, &FittedValue)| {
             json!({
                 "name": info.name,
                 "expression": info.expression,
@@ -103,9 +121,10 @@ impl Compared {
     }
 
     /// A base parameter of a run that differs from that of the first.
-    fn moved_json(&self, run: usize, k: usize) -> Value {
+    fn moved_parameter_json(&self, run: usize, k: usize) -> Value {
+        // Both values are from separate fits, so their errors are independent.
         let (before, now) = (self.runs[0].alone[k], self.runs[run].alone[k]);
-        let deviation = before.beside(now);
+        let deviation = before.difference_deviation(now);
         json!({
             "parameter": self.parameters[k].name,
             "sigmas": (now.value - before.value).abs() / deviation,
@@ -117,87 +136,94 @@ impl Compared {
         })
     }
 
-    /// The same for people.
-    pub fn text(&self, style: Style, spelling: &dyn RemedySpelling) -> String {
+    /// The comparison as text: lasting changes, joint fit, and each run.
+    pub fn text(&self, style: TerminalStyle, spelling: &dyn RemedySpelling) -> String {
         let [first, later @ ..] = &self.runs[..] else {
             return String::new();
         };
         let mut lines = vec![style.bold(&format!(
-            "{}: {} against {}",
+            "{}: {} compared with {}",
             self.model,
             count(later.len(), "run", "runs"),
             first.file
         ))];
-        if later.len() > SINGLY {
-            self.say_points(&mut lines, style);
+        // With many runs the lasting changes come first, since single runs fill pages.
+        if later.len() > MOST_DETAILED_RUNS {
+            self.write_change_points(&mut lines, style);
         }
         if let Some(shared) = &self.shared {
-            say_shared(shared, &mut lines, style);
+            write_shared_fit(shared, &mut lines, style);
         }
+        // Changes of the first run are its contacts and pushes.
         if !first.changes.is_empty() {
             lines.push(String::new());
             lines.push(style.bold(&first.file));
             lines.extend(first.changes.iter().map(|one| format!("  {}", one.says)));
         }
-        if later.len() > SINGLY {
-            say_many(later, &mut lines, style);
+        if later.len() > MOST_DETAILED_RUNS {
+            write_many_runs(later, &mut lines, style);
         } else {
             for run in later {
-                self.say_run(first, run, &mut lines, style);
+                self.write_run(first, run, &mut lines, style);
             }
-            self.say_points(&mut lines, style);
+            self.write_change_points(&mut lines, style);
         }
+        // Files that could not be evaluated come last, with the reason.
         for one in &self.unread {
             lines.push(String::new());
             let why = one.error.spell(spelling);
-            lines.push(format!("{} gave no answer: {why}", one.file));
+            lines.push(format!("{} was not evaluated: {why}", one.file));
         }
         lines.push(String::new());
         lines.join("\n")
     }
 
-    /// A run against the first.
-    fn say_run(&self, first: &OneRun, run: &OneRun, lines: &mut Vec<String>, style: Style) {
+    /// A run compared with the first one.
+    fn write_run(&self, first: &RunReport, run: &RunReport, lines: &mut Vec<String>, style: TerminalStyle) {
         lines.push(String::new());
         lines.push(style.bold(&run.file));
-        say_changes(&run.changes, lines);
-        let is_event = |one: &Changed| matches!(one.what, What::ContactEvent { .. });
+        write_changes(&run.changes, lines);
+        // A contact within a run is no change of the machine.
+        let is_event = |one: &RunChange| matches!(one.change, PhysicalChange::ContactEvent { .. });
         if run.changes.iter().all(is_event) {
-            let else_ = if run.changes.is_empty() { "" } else { " else" };
+            let other = if run.changes.is_empty() { "" } else { "other " };
             lines.push(format!(
-                "  nothing{else_} changed beyond what chance, the noise of the runs and the errors of the model make"
+                "  No {other}change found that is larger than noise and model error."
             ));
         }
         if !run.moved.is_empty() {
-            lines.push("  Base parameters that moved, each run fitted alone:".to_owned());
+            lines.push("  Base parameters that changed (each run fitted separately):".to_owned());
+            // Parameters before and now, with the standard deviation of the difference.
             let rows: Vec<Vec<String>> = run
                 .moved
                 .iter()
-                .map(|k| self.moved(first, run, *k))
+                .map(|k| self.moved_parameter_row(first, run, *k))
                 .collect();
             let columns = [
-                ("name", Align::Left),
-                ("before", Align::Right),
-                ("now", Align::Right),
-                ("+-", Align::Right),
-                ("unit", Align::Left),
-                ("expression", Align::Left),
+                ("name", ColumnAlignment::Left),
+                ("before", ColumnAlignment::Right),
+                ("now", ColumnAlignment::Right),
+                ("std", ColumnAlignment::Right),
+                ("unit", ColumnAlignment::Left),
+                ("expression", ColumnAlignment::Left),
             ];
             lines.extend(table(4, &columns, &rows));
         }
     }
 
-    /// When something changed and stayed changed.
-    fn say_points(&self, lines: &mut Vec<String>, style: Style) {
+    /// Changes that last over two or more runs; nothing for fewer than four runs.
+    fn write_change_points(&self, lines: &mut Vec<String>, style: TerminalStyle) {
+        // A lasting change needs two runs before and two after it.
         if self.runs.len() < 4 {
             return;
         }
         lines.push(String::new());
-        lines.push(style.bold("Over the order of the runs"));
+        lines.push(style.bold("Lasting changes, in the order of the runs"));
         if self.points.is_empty() {
-            lines.push("  no base parameter changed and stayed changed".to_owned());
+            lines.push("  No base parameter changed for two or more runs.".to_owned());
         }
         for point in &self.points {
+            // Six names are enough to recognise the change; the JSON has all.
             let names: Vec<&str> = (point.steps.iter().take(6))
                 .map(|step| self.parameters[step.parameter].name.as_str())
                 .collect();
@@ -214,18 +240,19 @@ impl Compared {
                 },
             ));
             let mut said = Vec::new();
-            say_changes(&point.changes, &mut said);
+            write_changes(&point.changes, &mut said);
             lines.extend(said.iter().map(|line| format!("  {line}")));
         }
     }
 
-    fn moved(&self, first: &OneRun, run: &OneRun, k: usize) -> Vec<String> {
+    /// A row of the table of changed base parameters. The standard deviation is that of the difference of both runs.
+    fn moved_parameter_row(&self, first: &RunReport, run: &RunReport, k: usize) -> Vec<String> {
         let (before, now) = (first.alone[k], run.alone[k]);
         let info = &self.parameters[k];
-        let [value, deviation] = with_deviation(now.value, before.beside(now));
+        let [value, deviation] = with_deviation(now.value, before.difference_deviation(now));
         vec![
             info.name.clone(),
-            with_deviation(before.value, before.beside(now))[0].clone(),
+            with_deviation(before.value, before.difference_deviation(now))[0].clone(),
             value,
             deviation,
             info.unit.clone(),
@@ -234,42 +261,46 @@ impl Compared {
     }
 }
 
-/// Up to so many later runs are told one after the other with their base parameters.
-const SINGLY: usize = 12;
+/// Up to this number of later runs each run is listed with its base parameters; beyond, only changes are listed.
+const MOST_DETAILED_RUNS: usize = 12;
 
-fn say_changes(changes: &[Changed], lines: &mut Vec<String>) {
+/// Adds one line for each change, with the changes that explain the runs equally well.
+fn write_changes(changes: &[RunChange], lines: &mut Vec<String>) {
     for change in changes {
         lines.push(format!("  {}", change.says));
         if !change.rivals.is_empty() {
             lines.push(format!(
-                "    these runs cannot tell it from: {}",
+                "    with these runs it is not distinguishable from: {}",
                 change.rivals.join("; ")
             ));
         }
     }
 }
 
-/// Many runs, each with its changes alone; those without any are counted.
-fn say_many(later: &[OneRun], lines: &mut Vec<String>, style: Style) {
+/// Many runs: only those with changes are listed, the others are counted.
+fn write_many_runs(later: &[RunReport], lines: &mut Vec<String>, style: TerminalStyle) {
     let unchanged = later.iter().filter(|run| run.changes.is_empty()).count();
     lines.push(String::new());
     lines.push(format!(
-        "Against the first run {unchanged} of {} later ones changed in nothing",
+        "{unchanged} of {} later runs show no change relative to the first run",
         later.len()
     ));
     for run in later.iter().filter(|run| !run.changes.is_empty()) {
         lines.push(style.bold(&run.file));
-        say_changes(&run.changes, lines);
+        write_changes(&run.changes, lines);
     }
 }
 
-fn change_json(between: [usize; 2], change: &Changed) -> Value {
-    let (kind, at, estimates) = change.what.parts(change.unit);
+/// A change as JSON; `between` are the indices of both runs.
+fn change_json(between: [usize; 2], change: &RunChange) -> Value {
+    let (kind, at, estimates) = change.change.parts(change.unit);
+    // Sizes of the change with standard deviations.
     let estimates = estimates.iter().map(|(name, estimate, unit)| {
         json!({ "name": name, "value": estimate.value, "std": estimate.deviation, "unit": unit })
     });
-    let interval = match &change.what {
-        What::ContactEvent { interval, .. } => Some(interval),
+    // Only contacts have a time.
+    let interval = match &change.change {
+        PhysicalChange::ContactEvent { interval, .. } => Some(interval),
         _ => None,
     };
     json!({
@@ -284,67 +315,64 @@ fn change_json(between: [usize; 2], change: &Changed) -> Value {
     })
 }
 
-/// Values of the fit in which some are each run's own.
-fn say_shared(fit: &SharedFit, lines: &mut Vec<String>, style: Style) {
+/// The joint fit: factors of force signals, and values that each run has for itself.
+fn write_shared_fit(fit: &SharedFit, lines: &mut Vec<String>, style: TerminalStyle) {
     lines.push(String::new());
+    // Base parameters that are separate for each run are not counted.
     let n = fit.shared.iter().flatten().count();
     lines.push(style.bold(&format!(
-        "One fit of all runs, with {} shared",
+        "Joint fit of all runs, with {} shared",
         count(n, "base parameter", "base parameters")
     )));
-    let text = |value: Fitted| match value.deviation {
+    // A value without standard deviation was not determined.
+    let text = |value: FittedValue| match value.deviation {
         Some(deviation) => with_deviation(value.value, deviation),
-        None => ["not told".to_owned(), String::new()],
+        None => ["not identifiable".to_owned(), String::new()],
     };
     if !fit.gains.is_empty() {
-        lines.push("  True forces are the measured ones times".to_owned());
+        lines.push("  Factors of the force signals (true force = factor times measured force):".to_owned());
+        // One row for each drive.
         let rows: Vec<Vec<String>> = (fit.gains.iter())
             .map(|(drive, gain)| [vec![drive.clone()], text(*gain).to_vec()].concat())
             .collect();
         let columns = [
-            ("drive", Align::Left),
-            ("factor", Align::Right),
-            ("+-", Align::Right),
+            ("drive", ColumnAlignment::Left),
+            ("factor", ColumnAlignment::Right),
+            ("std", ColumnAlignment::Right),
         ];
         lines.extend(table(4, &columns, &rows));
     }
+    // Runs without values of their own are left out.
     for (file, values) in fit.runs.iter().filter(|(_, values)| !values.is_empty()) {
         lines.push(format!("  {file}"));
-        let row = |one: &Valued| {
+        // A change relative to the first run is marked as such.
+        let row = |one: &RunValue| {
             let [value, deviation] = text(one.value);
             let against = if one.is_against_first {
-                "against the first run"
+                "relative to the first run"
             } else {
                 ""
             };
-            [
-                one.of.as_str(),
-                &one.name,
-                &value,
-                &deviation,
-                &one.unit,
-                against,
-            ]
-            .map(str::to_owned)
-            .to_vec()
+            [one.quantity.as_str(), &one.name, &value, &deviation, &one.unit, against]
+                .map(str::to_owned)
+                .to_vec()
         };
-        let told = values.iter().filter(|one| one.value.deviation.is_some());
-        let rows: Vec<Vec<String>> = told.map(row).collect();
+        // Values that a run does not determine are listed below the table.
+        let known = values.iter().filter(|one| one.value.deviation.is_some());
+        let rows: Vec<Vec<String>> = known.map(row).collect();
         let columns = [
-            ("of", Align::Left),
-            ("", Align::Left),
-            ("value", Align::Right),
-            ("+-", Align::Right),
-            ("unit", Align::Left),
-            ("", Align::Left),
+            ("of", ColumnAlignment::Left),
+            ("", ColumnAlignment::Left),
+            ("value", ColumnAlignment::Right),
+            ("std", ColumnAlignment::Right),
+            ("unit", ColumnAlignment::Left),
+            ("", ColumnAlignment::Left),
         ];
         lines.extend(table(4, &columns, &rows));
-        let not_told = values.iter().filter(|one| one.value.deviation.is_none());
-        let not_told: Vec<String> = not_told
-            .map(|one| format!("{} of {}", one.name, one.of))
-            .collect();
-        if !not_told.is_empty() {
-            lines.push(format!("    not told: {}", not_told.join(", ")));
+        let unknown = values.iter().filter(|one| one.value.deviation.is_none());
+        let unknown: Vec<String> = unknown.map(|one| format!("{} of {}", one.name, one.quantity)).collect();
+        if !unknown.is_empty() {
+            lines.push(format!("    not identifiable: {}", unknown.join(", ")));
         }
     }
 }

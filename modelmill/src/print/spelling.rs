@@ -1,6 +1,7 @@
-//! How the reader of a text asks for what the text advises: on a command line, in a notebook, in Rust.
+//! Formats remedies and recommended next steps for the reader: as commands, as Python calls, or in words for a caller
+//! of the Rust library.
 //!
-//! [`RemedySpelling`] spells remedies inside of messages, [`StepSpelling`] whole steps with a model.
+//! [`RemedySpelling`] formats remedies within messages, [`StepSpelling`] complete steps with a model.
 
 use std::fmt::Write as _;
 
@@ -9,36 +10,32 @@ pub use modelmill_boundary::text::{
 };
 use modelmill_spec::edit::NewEffect;
 
-use crate::diagnose::Separation;
+use crate::diagnose::SeparationProposal;
 use crate::model::Model;
 
-/// How the reader of a text asks for the steps that a diagnosis advises. The program spells commands, a notebook calls.
+/// Formats the recommended next steps after a diagnosis for the reader. The program writes commands, the Python package
+/// writes calls.
 pub trait StepSpelling: RemedySpelling {
     /// Adds an effect to the file of a model.
     fn spell_effect(&self, model: &Model, effect: &NewEffect) -> String;
 
-    /// Adds an effect of a kind that a further library holds, which is kept in a file of some name.
+    /// Adds an effect whose kind is defined in the library file `library`.
     fn spell_effect_of_library(&self, model: &Model, effect: &NewEffect, library: &str) -> String {
         let effect = self.spell_effect(model, effect);
         format!("{effect}, with the library {library}")
     }
 
-    /// Identifies a model once more from the same recordings.
+    /// Identifies a model again from the same recordings.
     fn spell_identification(&self, model: &Model) -> String;
 
-    /// Seeks motion along which effects differ; `None` where that cannot be asked for.
-    fn spell_separation(&self, model: &Model, separation: &Separation) -> Option<String>;
+    /// Plans a motion that distinguishes effects; `None` if the reader has no command for it.
+    fn spell_separation(&self, model: &Model, separation: &SeparationProposal) -> Option<String>;
 }
 
-/// Plain words, for whoever calls the library.
+/// Plain words for a caller of the library.
 impl StepSpelling for LibrarySpelling {
     fn spell_effect(&self, model: &Model, effect: &NewEffect) -> String {
-        let mut says = format!(
-            "{}: add {} at {}",
-            model.name,
-            effect.kind,
-            effect.at.join(", ")
-        );
+        let mut says = format!("{}: add {} at {}", model.name, effect.kind, effect.at.join(", "));
         let parameters = effect.parameters.iter();
         let values = parameters.filter_map(|p| Some((p.symbol.as_str(), p.nominal?)));
         let constants = effect.constants.iter().map(|(s, v)| (s.as_str(), *v));
@@ -53,11 +50,11 @@ impl StepSpelling for LibrarySpelling {
         format!("{}: identify again", model.name)
     }
 
-    fn spell_separation(&self, model: &Model, separation: &Separation) -> Option<String> {
+    fn spell_separation(&self, model: &Model, separation: &SeparationProposal) -> Option<String> {
         let effect = &separation.effect.effect;
         let rivals: Vec<&str> = separation.rivals.iter().map(|r| r.kind.as_str()).collect();
         Some(format!(
-            "{}: seek motion that tells {} at {} from {}",
+            "{}: plan a motion that distinguishes {} at {} from {}",
             model.name,
             effect.kind,
             effect.at.join(", "),

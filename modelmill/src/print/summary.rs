@@ -1,25 +1,29 @@
-//! What a model file holds, as JSON and for people; and what is wrong with one that has no meaning, as JSON.
+//! Output of `check`: contents of a model file as JSON and as text for people, and the errors of an invalid
+//! file as JSON.
 
 use modelmill_boundary::text::plain;
 use modelmill_codegen::review::NumericMethod;
-use modelmill_codegen::{Derivation, Method, Reduction, module_name};
+use modelmill_codegen::{BaseReduction, Derivation, ReductionMethod};
+use modelmill_emit::module_name;
 use modelmill_spec::{
-    Diagnostic, DriveKind, Failure, Loaded, Mechanism, Motion, Severity, Sources,
+    CoordinateMotion, Diagnostic, DiagnosticSeverity, DriveKind, LoadFailure, LoadedModel, Mechanism, SourceFiles,
 };
 use serde_json::{Value, json};
 
-use crate::model::{Checked, SampledRank, Summary, retained_in_vain};
+use crate::model::{ModelCheck, ModelSummary, SampledRank, ineffective_retained};
 use crate::print::RemedySpelling;
-use crate::text::Style;
+use crate::text::TerminalStyle;
 use crate::text::table::count;
 
-impl Checked {
-    /// What the model holds as one JSON object, with all warnings.
+impl ModelCheck {
+    /// Contents of the model as one JSON object, with all warnings.
     pub fn json(&self, spelling: &dyn RemedySpelling) -> Value {
         let model = &self.model;
         let loaded = &model.loaded;
         let mut warnings = self::warnings(loaded, spelling);
-        let in_vain = retained_in_vain(&model.derivation).into_iter();
+        // Warnings of the derivation come after those of the file: retained products that the reduction could not
+        // use.
+        let in_vain = ineffective_retained(&model.derivation).into_iter();
         warnings.extend(in_vain.map(|(k, says)| {
             let span = loaded.retain.get(k);
             let place = span.map(|span| loaded.sources.line_and_column(*span));
@@ -31,25 +35,24 @@ impl Checked {
                 "column": place.map(|p| p.1),
             })
         }));
+        // A reduction for one geometry and a rank that is uncertain.
         let caution = model.derivation.reduction.method.caution();
         let judged = caution.iter().chain(&self.warnings);
-        warnings.extend(
-            judged.map(|says| json!({ "severity": "warning", "says": says, "file": model.path })),
-        );
+        warnings.extend(judged.map(|says| json!({ "severity": "warning", "says": says, "file": model.path })));
         let mut object = self.summary.json(&model.name, &model.derivation, &warnings);
         object["numeric_rank"] = self.rank.as_ref().map_or(Value::Null, SampledRank::json);
         object
     }
 
     /// The same for people.
-    pub fn text(&self, style: Style) -> String {
+    pub fn text(&self, style: TerminalStyle) -> String {
         let model = &self.model;
         self.summary
             .text(&model.name, &model.derivation, self.rank.as_ref(), style)
     }
 }
 
-/// Why a model that has a meaning cannot be used, as one JSON object.
+/// Why a valid model cannot be used, as one JSON object.
 pub fn refusal(says: &str, path: &str) -> Value {
     json!({
         "valid": false,
@@ -57,27 +60,25 @@ pub fn refusal(says: &str, path: &str) -> Value {
     })
 }
 
-/// What is wrong with a file that has no meaning, as one JSON object.
-pub fn faults(failure: &Failure, spelling: &dyn RemedySpelling) -> Value {
+/// Errors of an invalid model file, as one JSON object.
+pub fn faults(failure: &LoadFailure, spelling: &dyn RemedySpelling) -> Value {
     json!({
         "valid": false,
         "diagnostics": diagnostics(&failure.diagnostics, &failure.sources, spelling),
     })
 }
 
-/// What may not be intended in a file that has a meaning, each as a JSON object.
-pub fn warnings(loaded: &Loaded, spelling: &dyn RemedySpelling) -> Vec<Value> {
+/// Warnings of a valid model file, each as a JSON object.
+pub fn warnings(loaded: &LoadedModel, spelling: &dyn RemedySpelling) -> Vec<Value> {
     diagnostics(&loaded.warnings, &loaded.sources, spelling)
 }
 
-fn diagnostics(
-    found: &[Diagnostic],
-    sources: &Sources,
-    spelling: &dyn RemedySpelling,
-) -> Vec<Value> {
+/// Diagnostics of a model file as JSON, with file, line and column where they are known.
+fn diagnostics(found: &[Diagnostic], sources: &SourceFiles, spelling: &dyn RemedySpelling) -> Vec<Value> {
     found
         .iter()
         .map(|one| {
+            // Files that are included have their own path.
             let place = one.span.map(|span| {
                 let (line, column) = sources.line_and_column(span);
                 let file = sources.files.get(span.file);
@@ -85,8 +86,8 @@ fn diagnostics(
             });
             json!({
                 "severity": match one.severity {
-                    Severity::Error => "error",
-                    Severity::Warning => "warning",
+                    DiagnosticSeverity::Error => "error",
+                    DiagnosticSeverity::Warning => "warning",
                 },
                 "says": one.message,
                 "file": place.as_ref().map(|p| &p.0),
@@ -99,7 +100,8 @@ fn diagnostics(
         .collect()
 }
 
-impl Summary {
+impl ModelSummary {
+    /// Contents as one JSON object; `warnings` are those of file and derivation.
     fn json(&self, name: &str, derivation: &Derivation, warnings: &[Value]) -> Value {
         json!({
             "model": name,
@@ -122,87 +124,77 @@ impl Summary {
         })
     }
 
-    fn text(
-        &self,
-        name: &str,
-        derivation: &Derivation,
-        rank: Option<&SampledRank>,
-        style: Style,
-    ) -> String {
+    /// Contents as lines of text, each with a name in front; lists are omitted if they are empty.
+    fn text(&self, name: &str, derivation: &Derivation, rank: Option<&SampledRank>, style: TerminalStyle) -> String {
         let m = &derivation.mechanism;
-        let mut lines = vec![style.bold(&format!("{}: sound", plain(name)))];
+        // The file is valid, otherwise its errors would be printed.
+        let mut lines = vec![style.bold(&format!("{}: valid", plain(name)))];
         if let Some(title) = &m.title {
             lines.push(format!("  {}", plain(title)));
         }
+        // Each line begins with what it counts, padded to one width.
         let mut line = |what: &str, text: String| lines.push(format!("  {what:<20}{text}"));
         let list = |names: &[String]| match names {
             [] => String::new(),
             names => format!(": {}", names.join(", ")),
         };
+        // Emitted code cannot use a reserved word as the name of a module.
         let module = module_name(&m.name);
         let whose = if module == m.name {
             "the file's `name`"
         } else {
-            "for the file's `name`, which is a word of Rust or of emitted code"
+            "instead of the file's `name`, which is a reserved word of Rust or of emitted code"
         };
         line("module", format!("{module} ({whose})"));
         line("bodies", self.bodies.to_string());
+        // Most models have none.
         if self.lumped_masses > 0 {
             line("lumped masses", self.lumped_masses.to_string());
         }
+        // Joints are named with their motion, since most are revolute.
         let joints: Vec<String> = m
             .coordinates
             .iter()
             .map(|c| joint(c.motion, &c.name, c.passive))
             .collect();
         line("joints", format!("{}{}", joints.len(), list(&joints)));
-        line(
-            "loops",
-            format!("{}{}", self.loops.len(), list(&self.loops)),
-        );
-        line(
-            "actuators",
-            format!("{}{}", self.drives.len(), list(&drives(m, true))),
-        );
+        line("loops", format!("{}{}", self.loops.len(), list(&self.loops)));
+        line("actuators", format!("{}{}", self.drives.len(), list(&drives(m, true))));
+        // Rows of the equations without a drive have force zero.
         if !self.undriven.is_empty() {
             line(
                 "undriven",
                 format!("{}{}", self.undriven.len(), list(&drives(m, false))),
             );
         }
+        // Each row of the equations belongs to one degree of freedom.
         line("degrees of freedom", m.drives.len().to_string());
         if !self.effects.is_empty() {
-            line(
-                "effects",
-                format!("{}{}", self.effects.len(), list(&self.effects)),
-            );
+            line("effects", format!("{}{}", self.effects.len(), list(&self.effects)));
         }
         line(
             "parameters",
             format!("{}{}", self.parameters.len(), list(&self.parameters)),
         );
+        // Numbers of products and of their combinations that can be identified.
         let reduction = &derivation.reduction;
         line(
             "p_g and p_min",
             format!(
-                "{} with an effect on the actuators, {}",
+                "{} of parameters with an effect on the drives, {} (combinations that can be identified)",
                 count(reduction.products.len(), "product", "products"),
-                count(
-                    reduction.retained.len(),
-                    "base parameter",
-                    "base parameters"
-                ),
+                count(reduction.retained.len(), "base parameter", "base parameters"),
             ),
         );
+        // A reduction for one geometry only is stated, since its base is not general.
         match reduction.method {
-            Method::Numeric { .. } => line(
-                "reduced",
-                "numerically, on the values of this file".to_owned(),
-            ),
-            Method::Exact {
-                at_values: true, ..
-            } => line("reduced", "for the values of this file alone".to_owned()),
-            Method::Exact { .. } | Method::Unreduced => {}
+            ReductionMethod::Numeric { .. } => {
+                line("reduced", "numerically, for the values of this file only".to_owned());
+            }
+            ReductionMethod::Exact { at_values: true, .. } => {
+                line("reduced", "exactly, for the values of this file only".to_owned());
+            }
+            ReductionMethod::Exact { .. } | ReductionMethod::Unreduced => {}
         }
         if let Some(rank) = rank {
             line("numeric rank", rank.text());
@@ -212,29 +204,29 @@ impl Summary {
 }
 
 /// How columns were reduced to a base.
-fn reduction(reduction: &Reduction) -> Value {
+fn reduction(reduction: &BaseReduction) -> Value {
     match NumericMethod::from_reduction(reduction) {
         Some(method) => json!(method),
         None => json!({
             "name": "exact",
-            "at_values": matches!(reduction.method, Method::Exact { at_values: true, .. }),
+            "at_values": matches!(reduction.method, ReductionMethod::Exact { at_values: true, .. }),
         }),
     }
 }
 
-fn joint(motion: Motion, name: &str, passive: bool) -> String {
-    let unusual = (motion != Motion::Revolute).then(|| motion.name());
-    let remarks: Vec<&str> = unusual
-        .into_iter()
-        .chain(passive.then_some("passive"))
-        .collect();
+/// Name of a joint, with its motion if it is not revolute, and `passive`.
+fn joint(motion: CoordinateMotion, name: &str, passive: bool) -> String {
+    let unusual = (motion != CoordinateMotion::Revolute).then(|| motion.name());
+    let remarks: Vec<&str> = unusual.into_iter().chain(passive.then_some("passive")).collect();
     if remarks.is_empty() {
         return name.to_owned();
     }
     format!("{name} ({})", remarks.join(", "))
 }
 
+/// Drives with the joint or the points between which they act, either the actuated or the undriven ones.
 fn drives(m: &Mechanism, is_driven: bool) -> Vec<String> {
+    // Drives beyond the degrees of freedom are listed with the others.
     let shared = m.shared_drives.iter();
     m.drives
         .iter()

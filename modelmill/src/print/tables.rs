@@ -1,31 +1,35 @@
-//! Results in text, for people: parameters, figures and regions.
+//! Tables of text for people: base parameters, error figures, and regions where the error is largest.
 
-use modelmill_identify::{Figures, FitParameter, Status, TRIMMED_PART};
+use modelmill_identify::{ErrorFigures, FitParameter, ParameterStatus, TRIMMED_PART};
 
-use crate::compare::{Places, ROUNDING};
+use crate::compare::{ErrorLocations, ROUNDING};
 use crate::model::Model;
-use crate::text::table::{Align, count, number, percent, significant, table};
+use crate::text::table::{ColumnAlignment, number, percent, significant, table};
 
-/// Identified base parameters beside their nominal values.
+/// Identified base parameters with nominal values and standard deviations, absolute and relative.
 pub fn parameters(parameters: &[FitParameter]) -> Vec<String> {
+    // One row for each parameter; the second `std` is relative to the value.
     let rows: Vec<Vec<String>> = parameters
         .iter()
         .map(|p| {
             vec![
                 p.name.clone(),
                 p.nominal.map_or_else(|| "-".to_owned(), number),
-                if p.status == Status::Identified {
+                // Values that were not identified are in parentheses.
+                if p.status == ParameterStatus::Identified {
                     number(p.value)
                 } else {
                     format!("({})", number(p.value))
                 },
+                // A parameter that was not identified says why.
                 match (p.status, p.std) {
-                    (Status::Known, _) => "known".to_owned(),
-                    (Status::NotEssential, _) => "not essential".to_owned(),
-                    (Status::Undetermined, _) => "not determined".to_owned(),
-                    (Status::Identified, Some(std)) => significant(std, 2),
-                    (Status::Identified, None) => "—".to_owned(),
+                    (ParameterStatus::Known, _) => "known".to_owned(),
+                    (ParameterStatus::NotEssential, _) => "not essential".to_owned(),
+                    (ParameterStatus::Undetermined, _) => "not determined".to_owned(),
+                    (ParameterStatus::Identified, Some(std)) => significant(std, 2),
+                    (ParameterStatus::Identified, None) => "—".to_owned(),
                 },
+                // A value of zero has no relative standard deviation.
                 p.std.map_or_else(String::new, |std| {
                     if p.value == 0.0 {
                         "-".to_owned()
@@ -40,19 +44,20 @@ pub fn parameters(parameters: &[FitParameter]) -> Vec<String> {
     table(
         2,
         &[
-            ("parameter", Align::Left),
-            ("nominal", Align::Right),
-            ("identified", Align::Right),
-            ("std", Align::Right),
-            ("std", Align::Right),
-            ("unit", Align::Left),
+            ("parameter", ColumnAlignment::Left),
+            ("nominal", ColumnAlignment::Right),
+            ("identified", ColumnAlignment::Right),
+            ("std", ColumnAlignment::Right),
+            ("std", ColumnAlignment::Right),
+            ("unit", ColumnAlignment::Left),
         ],
         &rows,
     )
 }
 
-/// Which name stands for which expression, as JSON and fits write it: `p1_min = ...`.
+/// Expressions of the base parameters as JSON and fit files write them: `p1_min = ...`.
 pub fn expressions(indent: usize, model: &Model) -> Vec<String> {
+    // The expression shows which physical parameters a base parameter combines.
     let indent = " ".repeat(indent);
     let lines = model.base.iter();
     lines
@@ -60,11 +65,15 @@ pub fn expressions(indent: usize, model: &Model) -> Vec<String> {
         .collect()
 }
 
-/// Error figures of several comparisons, one line for the total, where there is one, and one for each channel.
-pub fn figures(named: &[(&str, &Figures)]) -> Vec<String> {
+/// Error figures of several comparisons: a line for all drives together, where they have one unit, and a line
+/// for each drive. Errors are in the unit of the force, `nrms` and its like relative to it. The rows that a fit
+/// used follow as a second table.
+pub fn figures(named: &[(&str, &ErrorFigures)]) -> Vec<String> {
     let mut rows = Vec::new();
+    // The name stands in the first row of its comparison only.
     for (name, figures) in named {
         let mut name = (*name).to_owned();
+        // A total needs one unit: forces and torques are not added up.
         if let Some(rms) = figures.rms {
             rows.push(vec![
                 std::mem::take(&mut name),
@@ -81,7 +90,9 @@ pub fn figures(named: &[(&str, &Figures)]) -> Vec<String> {
                 common_unit(figures),
             ]);
         }
+        // One row for each drive, with its error in the band if there is one.
         for (channel, one) in &figures.channels {
+            // The band is the same for all drives.
             let band = figures.band.as_ref();
             let band = band.and_then(|band| band.channels.get(channel));
             rows.push(vec![
@@ -97,65 +108,92 @@ pub fn figures(named: &[(&str, &Figures)]) -> Vec<String> {
             ]);
         }
     }
+    // Relative errors come first, absolute ones after them.
     let mut lines = table(
         2,
         &[
-            ("", Align::Left),
-            ("drive", Align::Left),
-            ("nrms", Align::Right),
-            ("in band", Align::Right),
-            ("sum|e|/sum|f|", Align::Right),
-            ("mean relative", Align::Right),
-            ("rms", Align::Right),
-            ("largest", Align::Right),
-            ("unit", Align::Left),
+            ("", ColumnAlignment::Left),
+            ("drive", ColumnAlignment::Left),
+            ("nrms", ColumnAlignment::Right),
+            ("in band", ColumnAlignment::Right),
+            ("sum|e|/sum|f|", ColumnAlignment::Right),
+            ("mean relative", ColumnAlignment::Right),
+            ("rms", ColumnAlignment::Right),
+            ("largest", ColumnAlignment::Right),
+            ("unit", ColumnAlignment::Left),
         ],
         &rows,
     );
+    lines.push("  nrms: rms of the error divided by rms of the measured force".to_owned());
     if let Some(band) = named.iter().find_map(|(_, figures)| figures.band.as_ref()) {
         lines.push(format!(
-            "  in band: nrms with both forces below {} Hz (Butterworth of order 4, both ways; {} of the samples dropped at \
-             each end)",
+            "  in band: the same error with measured and calculated force low-pass filtered at {} Hz, without {} of the \
+             samples at each end",
             significant(band.cutoff_hz, 3),
             percent(Some(TRIMMED_PART)),
         ));
     }
-    for (name, figures) in named {
-        let Some(rows) = &figures.rows else { continue };
-        let drives = rows.channels.iter();
-        let drives = drives.map(|(drive, one)| format!("{drive} {}", percent(one.nrms)));
-        let drives: Vec<String> = drives.collect();
-        lines.push(format!(
-            "  {name}: {} in the {} that are left of it, both forces below {} Hz ({})",
-            percent(rows.nrms),
-            count(rows.samples, "sample", "samples"),
-            significant(rows.cutoff_hz, 3),
-            drives.join(", ")
-        ));
+    lines.extend(rows_of_fits(named));
+    lines
+}
+
+/// Errors on the rows that the fits used, after low-pass and decimation: a column for each comparison that has them.
+fn rows_of_fits(named: &[(&str, &ErrorFigures)]) -> Vec<String> {
+    // Only fits after decimation have rows of their own.
+    let fits = named.iter();
+    let fits = fits.filter_map(|(name, figures)| Some((*name, figures.rows.as_ref()?)));
+    let fits: Vec<_> = fits.collect();
+    let Some((_, first)) = fits.first() else {
+        return Vec::new();
+    };
+    // A row has a title and one cell for each comparison.
+    let row = |title: &str, cell: &dyn Fn(usize) -> String| {
+        let cells = (0..fits.len()).map(cell);
+        std::iter::once(title.to_owned()).chain(cells).collect()
+    };
+    let mut rows: Vec<Vec<String>> = vec![
+        row("rows", &|k| fits[k].1.samples.to_string()),
+        row("low-pass, Hz", &|k| significant(fits[k].1.cutoff_hz, 3)),
+        row("nrms of all", &|k| percent(fits[k].1.nrms)),
+    ];
+    // One line for each drive, one column for each comparison.
+    for drive in first.channels.keys() {
+        let cell = |k: usize| {
+            let one = fits[k].1.channels.get(drive);
+            one.map_or_else(String::new, |one| percent(one.nrms))
+        };
+        rows.push(row(drive, &cell));
     }
+    // The comparisons are the columns.
+    let heads = fits.iter().map(|(name, _)| (*name, ColumnAlignment::Right));
+    let columns: Vec<(&str, ColumnAlignment)> = std::iter::once(("", ColumnAlignment::Left)).chain(heads).collect();
+    let mut lines = vec![
+        String::new(),
+        "  On the rows that the fit used, after low-pass and decimation:".to_owned(),
+    ];
+    lines.extend(table(2, &columns, &rows));
     lines
 }
 
 /// The unit that all drives have.
-fn common_unit(figures: &Figures) -> String {
+fn common_unit(figures: &ErrorFigures) -> String {
     let first = figures.channels.values().next();
     first.map_or_else(String::new, |one| one.unit.clone())
 }
 
-/// Where an error lives, one sentence for each region.
-pub fn places(places: &Places) -> Vec<String> {
+/// Where an error is largest, one sentence for each region.
+pub fn places(places: &ErrorLocations) -> Vec<String> {
     let regions = places.regions.iter();
-    let mut lines: Vec<String> = regions
-        .map(|region| format!("  {}.", region.says))
-        .collect();
+    let mut lines: Vec<String> = regions.map(|region| format!("  {}.", region.says)).collect();
+    // Errors at the level of rounding have no place that means anything.
     if !places.rounding.is_empty() {
         lines.push(format!(
-            "  The error of {} is below {ROUNDING:e} of the force, which is rounding: there is nothing to find.",
+            "  The error of {} is rounding (below {ROUNDING:e} of the force): there is nothing to find.",
             places.rounding.join(", ")
         ));
     }
     if lines.is_empty() {
-        lines.push("  No region of coordinates, rates, loads or time stands out.".to_owned());
+        lines.push("  Nowhere in particular: no range of a coordinate, rate, load or time stands out.".to_owned());
     }
     lines
 }

@@ -1,121 +1,128 @@
-//! How a recording is smoothed where nobody says how: candidates go in, the one that leaves least of the forces on held-out
-//! time comes out.
+//! Choice of the smoothing of a recording if the user gave none: candidates are tested, and the one with the smallest
+//! force residual on held-out parts of the run is taken.
 //!
-//! Spectra of positions alone cannot tell noise of clocks and encoders from motion; forces can. For each cut-off of a ladder
-//! the model's regressor, with friction and an offset of every drive beside, is fitted to the forces on four fifths of the
-//! time, both through one low-pass at the band of the motion, and held against the last fifth. A cut-off that is too low leaves
-//! of the forces what the model could explain, one that is too high hides it in noise. Octaves above the band count as far as
-//! the model explains anything of them. The figure is the geometric mean over the drives of what is left: the likelihood of
-//! errors whose size is not known, which knows no units. A motion that repeats itself may also be a Fourier series, whose
-//! harmonics are tried in the same way: it averages over the periods what a low-pass lets through. Local polynomials are no
-//! candidates: at the same cut-off they leave as much as the low-pass, on all recordings that were looked at.
+//! Spectra of positions alone cannot distinguish noise of clocks and encoders from motion; forces can. For each
+//! cut-off on a list, the model's regressor, with friction and an offset of every drive added, is fitted to the
+//! forces on four fifths of the time. Both sides pass one low-pass at the band of the motion, and the fit is compared
+//! with the last fifth. A cut-off that is too low leaves a residual that the model could explain; one that is too
+//! high hides it in noise. Octaves above the band count as far as the model explains part of them. The figure is the
+//! geometric mean of the residual over the drives: the likelihood of errors of unknown size, which does not depend on
+//! units. A periodic motion may also be fitted by a Fourier series, whose harmonics are tested in the same way: it
+//! averages over the periods what a low-pass lets through. Local polynomials are no candidates: at the same cut-off
+//! their residual equals that of the low-pass on all recordings that were examined.
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
-use modelmill_codegen::{Evaluator, States};
-use modelmill_identify::{LowPass, Note, Open, PASSED_BY_DECIMATION, Recording as Raw, Run};
+use modelmill_codegen::{ModelEvaluator, MotionStates};
+use modelmill_identify::{
+    DECIMATION_PASSBAND, LowPass, PreparationChoices, PreparedRun, RecordingNote, SignalRecording as Raw,
+};
 use nalgebra::{DMatrix, DVector};
 
 use super::free;
-use super::options::Reading;
-use super::smoother::{Smoother, series_up_to, whole};
+use super::options::RecordingOptions;
+use super::smoother::{SmootherCandidate, floor_to_count, series_up_to};
+use super::thresholds::{
+    SAME_RESIDUAL_TOLERANCE, SMOOTHING_LEAST_GAIN, SMOOTHING_ROWS_PER_COLUMN, WINDOW_FEWEST_SAMPLES,
+};
 use crate::error::Outcome;
 use crate::model::Model;
 use crate::text::table::{percent, significant};
 
-/// Ratio of neighbouring cut-offs.
+/// Ratio of successive cut-offs.
 const RATIO: f64 = 1.6;
-/// The highest cut-off, in parts of the sampling rate: beyond, differences take more than the filter leaves.
+/// The highest cut-off relative to the sampling rate: above it, differentiation amplifies more noise than the filter
+/// removes.
 const HIGHEST: f64 = 0.2;
-/// The same in parts of the band of the forces: noise above says nothing of them, and makes the model's forces rough.
+/// The highest cut-off relative to the band of the forces: noise above it says nothing about them, and roughens the
+/// model's forces.
 const FARTHEST: f64 = 8.0;
-/// The lowest cut-off, in parts of the band of the forces.
+/// The lowest cut-off, relative to the band of the forces.
 const LOWEST: f64 = 0.15;
-/// Parts of the time, each of which is held out once.
+/// Number of parts of the time, each of which is held out once.
 const FOLDS: usize = 5;
-/// Octaves above the band of the motion that are looked at.
+/// Number of octaves above the band of the motion that are evaluated.
 const OCTAVES: usize = 2;
-/// Samples that are looked at for each candidate, at most; beyond, windows are spread over the recording.
+/// Largest number of samples for each candidate; longer recordings are evaluated in windows.
 const LOOKED_AT: usize = 12_000;
-/// Samples in a period of the highest frequency that is looked at.
+/// Samples per period of the highest frequency that is evaluated.
 const FINE: f64 = 5.0;
-/// Windows of a long recording.
+/// Number of windows of a long recording.
 const WINDOWS: usize = 10;
-/// Periods of the band that are dropped at both ends of a stretch that is held out, and the part of it that may be dropped.
+/// Periods of the band that are dropped at both ends of a held-out part, and the largest share of it that may be
+/// dropped.
 const DROPPED: (f64, f64) = (1.5, 0.2);
-/// Bands of the parallel filter that are tried, in parts of the band of the forces.
+/// Passbands of the decimation that are tested, relative to the band of the forces.
 const PARALLEL: [f64; 3] = [0.5, 1.0, 2.0];
-/// Samples beside a window, of those that are looked at, beyond which its low-pass remembers nothing.
+/// Samples next to a window, at the rate of the evaluation, beyond which the low-pass has no influence.
 const BEYOND: usize = 60;
-/// Fewest samples of a window.
-const FEWEST: usize = 40;
-/// What is left of a force below this part of it is rounding.
+/// A residual below this fraction of the force is rounding.
 const ROUNDING: f64 = 1e-6;
-/// A candidate must be better by this part of the error to be preferred to one that smooths more.
-const BETTER: f64 = 0.005;
-/// A cut-off that leaves so much more than the best ends the search downwards.
+/// A cut-off whose residual exceeds the smallest by this factor ends the search downwards.
 const HOPELESS: f64 = 1.5;
 
-/// The preparation with what was open settled, and what was chosen; nothing where nothing is open, or where forces do not
-/// tell.
-pub(super) fn choose(
+/// The reading options with all open choices of the preparation made, and a note on them; `None` if nothing is open,
+/// or if the recording has no forces to decide it.
+pub(super) fn choose_preparation(
     model: &Model,
     raw: &Raw,
-    reading: &Reading,
-) -> Outcome<Option<(Reading, Note)>> {
+    reading: &RecordingOptions,
+) -> Outcome<Option<(RecordingOptions, RecordingNote)>> {
     let drives = model.drives();
-    let has_forces = !drives.is_empty() && drives.iter().all(|drive| raw.has(drive));
+    let has_forces = !drives.is_empty() && drives.iter().all(|drive| raw.has_column(drive));
     if !has_forces || model.base.is_empty() {
         return Ok(None);
     }
-    let open = raw.open(&model.active(), &drives, &reading.preparation)?;
+    let open = raw.find_open_choices(&model.active_coordinates(), &drives, &reading.preparation)?;
     Ok(open.and_then(|open| {
-        let search = Search {
+        let search = SmootherSearch {
             model,
             raw,
             reading,
             open,
         };
-        search.chosen()
+        search.best_reading()
     }))
 }
 
-/// What is left of the forces on held-out time.
+/// Force residual on held-out parts.
 #[derive(Clone, Copy)]
-struct Left {
-    /// The logarithm of the geometric mean over the drives of what is left, in units of the forces.
+struct HeldOutResidual {
+    /// The logarithm of the geometric mean of the residual over the drives, in units of the forces.
     figure: f64,
-    /// The geometric mean over the drives of their relative errors below the band of the motion.
+    /// The geometric mean of the relative residuals below the band of the motion over the drives.
     relative: f64,
 }
 
-/// Smoothers of one kind that were tried, the one that passes most first.
-struct Tried {
-    all: Vec<(Smoother, Left)>,
-    /// Which is the smoothest of those that leave nearly the least.
+/// Smoothers of one kind that were tested, in the order of decreasing bandwidth.
+struct SmootherTrials {
+    /// Each smoother with its residual.
+    all: Vec<(SmootherCandidate, HeldOutResidual)>,
+    /// Index of the smoothest of those with nearly the smallest residual.
     best: usize,
 }
 
-impl Tried {
-    fn best(&self) -> (Smoother, Left) {
+impl SmootherTrials {
+    /// The chosen smoother with its residual.
+    fn best(&self) -> (SmootherCandidate, HeldOutResidual) {
         self.all[self.best]
     }
 
-    /// What the neighbours of the best would cost, as words to be joined.
+    /// How the residual grows with the neighbours of the best, one phrase each.
     fn neighbours(&self) -> impl Iterator<Item = String> {
         let beside = [self.best.checked_sub(1), Some(self.best + 1)];
         beside.into_iter().flatten().filter_map(|at| {
             let (smoother, other) = self.all.get(at)?;
-            let cost = cost(other.figure - self.best().1.figure);
-            Some(format!("{cost} at {}", smoother.place()))
+            let cost = cost_text(other.figure - self.best().1.figure);
+            Some(format!("{cost} at {}", smoother.frequency_text()))
         })
     }
 }
 
-/// How much more is left, of the difference of two figures.
-fn cost(difference: f64) -> String {
+/// The change of the residual in per cent, from the difference of two figures.
+fn cost_text(difference: f64) -> String {
     let more = difference.exp() - 1.0;
-    if more.abs() < 1e-3 {
+    if more.abs() < SAME_RESIDUAL_TOLERANCE {
         "as much".to_owned()
     } else if more < 0.0 {
         format!("{} less", percent(Some(-more)))
@@ -124,21 +131,28 @@ fn cost(difference: f64) -> String {
     }
 }
 
-struct Search<'a> {
+/// The search for the best smoother of one recording.
+struct SmootherSearch<'a> {
+    /// The model that is fitted.
     model: &'a Model,
+    /// The recording before preparation.
     raw: &'a Raw,
-    reading: &'a Reading,
-    open: Open,
+    /// The options of the user.
+    reading: &'a RecordingOptions,
+    /// The choices that are open, with rate, band and period of the motion.
+    open: PreparationChoices,
 }
 
-impl Search<'_> {
-    fn chosen(&self) -> Option<(Reading, Note)> {
-        let Open {
+impl SmootherSearch<'_> {
+    /// The options with the best smoother and decimation, and the note that states the choice.
+    fn best_reading(&self) -> Option<(RecordingOptions, RecordingNote)> {
+        let PreparationChoices {
             rate_hz,
             band_hz,
             cutoff_hz,
             period,
         } = self.open;
+        // The list of cut-offs goes up to three steps above the default, and down to the lowest.
         let highest = (HIGHEST * rate_hz).min(FARTHEST * band_hz);
         let lowest = (LOWEST * band_hz).min(cutoff_hz);
         let mut ladder = vec![cutoff_hz.min(highest)];
@@ -148,57 +162,55 @@ impl Search<'_> {
         while ladder[ladder.len() - 1] / RATIO >= lowest {
             ladder.push(ladder[ladder.len() - 1] / RATIO);
         }
-        let ladder: Vec<Smoother> = ladder.into_iter().map(Smoother::low_pass).collect();
-        // The lowest cut-off drops most samples; what it leaves is looked at for all.
+        let ladder: Vec<SmootherCandidate> = ladder.into_iter().map(SmootherCandidate::low_pass).collect();
+        // The lowest cut-off loses the most samples at the ends, so that its windows exist for all candidates.
         let runs = self.runs(ladder[ladder.len() - 1])?;
         let looked_at = self.windows(&runs);
-        let filtered = self.tried(&ladder, &looked_at)?;
+        let filtered = self.try_smoothers(&ladder, &looked_at)?;
         let series = period.and_then(|period| {
             let ladder = series_up_to(filtered.best().0.cutoff, period);
-            self.tried(&ladder, &looked_at)
+            self.try_smoothers(&ladder, &looked_at)
         });
         let (low_pass, by_filter) = filtered.best();
-        let is_better = |series: &Tried| series.best().1.figure < by_filter.figure - BETTER;
+        // A series must be clearly better than the low-pass to be preferred.
+        let is_better = |series: &SmootherTrials| series.best().1.figure < by_filter.figure - SMOOTHING_LEAST_GAIN;
         let (tried, other) = match series {
             Some(series) if is_better(&series) => {
-                let more = cost(by_filter.figure - series.best().1.figure);
+                let more = cost_text(by_filter.figure - series.best().1.figure);
                 (
                     series,
-                    Some(format!("{more} by a low-pass at {}", low_pass.place())),
+                    Some(format!("{more} by a low-pass at {}", low_pass.frequency_text())),
                 )
             }
             Some(series) => {
                 let (smoother, left) = series.best();
-                let more = cost(left.figure - by_filter.figure);
+                let more = cost_text(left.figure - by_filter.figure);
                 (
                     filtered,
-                    Some(format!(
-                        "{more} by a Fourier series of {}",
-                        smoother.place()
-                    )),
+                    Some(format!("{more} by a Fourier series of {}", smoother.frequency_text())),
                 )
             }
             None => (filtered, None),
         };
+        // Decimation is chosen last, for the smoother that was found.
         let (smoother, left) = tried.best();
         let (decimate, left) = self.decimation(smoother, &looked_at).unwrap_or((1, left));
         let mut reading = self.reading.clone();
-        smoother.goes_into(&mut reading.preparation);
+        smoother.apply_to(&mut reading.preparation);
         reading.preparation.decimate = decimate;
         reading.preparation.chosen = true;
+        // The note states how the residual changes with the alternatives.
         let mut others = vec![String::new()];
         others.extend(tried.neighbours().chain(other));
         let others = others.join(", ");
         let every = if decimate > 1 {
-            format!(
-                ", and one in {decimate} samples kept after the parallel filter on forces and regressor"
-            )
+            format!(", and decimated by {decimate} after a low-pass on forces and regressor")
         } else {
             String::new()
         };
         let says = message!(
-            "{} {}{every}, since that leaves least of the forces on held-out time: {} below {} Hz (geometric mean over the \
-             drives){others}; {}, {} and {} say otherwise.",
+            "{} {}{every}. This was chosen automatically, since it predicts held-out parts of the run best. The error there is {} \
+             (below {} Hz, geometric mean over the drives){others}. Set it yourself with {}, {} and {}.",
             self.raw.file(),
             smoother.describe(),
             percent(Some(left.relative)),
@@ -207,15 +219,15 @@ impl Search<'_> {
             Remedy::option(OptionName::Smoothing),
             Remedy::option(OptionName::Decimate),
         );
-        Some((reading, Note::info(says)))
+        Some((reading, RecordingNote::info(says)))
     }
 
-    /// Smoothers that are tried one after the other, the one that passes most first, until nothing is to be hoped for.
-    fn tried(&self, ladder: &[Smoother], looked_at: &[Window]) -> Option<Tried> {
-        let mut all: Vec<(Smoother, Left)> = Vec::new();
+    /// Tests smoothers in the order of decreasing bandwidth, until the residual is clearly too large.
+    fn try_smoothers(&self, ladder: &[SmootherCandidate], looked_at: &[TimeWindow]) -> Option<SmootherTrials> {
+        let mut all: Vec<(SmootherCandidate, HeldOutResidual)> = Vec::new();
         let mut least = f64::INFINITY;
         for smoother in ladder {
-            let Some(left) = self.left(*smoother, self.open.band_hz, looked_at) else {
+            let Some(left) = self.held_out_residual(*smoother, self.open.band_hz, looked_at) else {
                 continue;
             };
             all.push((*smoother, left));
@@ -224,20 +236,22 @@ impl Search<'_> {
                 break;
             }
         }
-        let is_good = |(_, left): &(Smoother, Left)| left.figure <= least + BETTER;
+        // Of all that are nearly as good, the last one smooths most.
+        let is_good = |(_, left): &(SmootherCandidate, HeldOutResidual)| left.figure <= least + SMOOTHING_LEAST_GAIN;
         let best = all.iter().rposition(is_good)?;
-        Some(Tried { all, best })
+        Some(SmootherTrials { all, best })
     }
 
-    /// The factor of decimation, and what is left with it on held-out time.
-    fn decimation(&self, smoother: Smoother, looked_at: &[Window]) -> Option<(usize, Left)> {
-        let mut best: Option<(usize, Left)> = None;
+    /// The factor of decimation, with the residual on held-out parts; `None` if it cannot be evaluated.
+    fn decimation(&self, smoother: SmootherCandidate, looked_at: &[TimeWindow]) -> Option<(usize, HeldOutResidual)> {
+        let mut best: Option<(usize, HeldOutResidual)> = None;
+        // Passbands increase, so that the strongest decimation is tested first.
         for part in PARALLEL {
             let passed = part * self.open.band_hz;
-            let factor = whole(PASSED_BY_DECIMATION * self.open.rate_hz / passed).max(1);
+            let factor = floor_to_count(DECIMATION_PASSBAND * self.open.rate_hz / passed).max(1);
             let passed = if factor == 1 { f64::INFINITY } else { passed };
-            let left = self.left(smoother, passed, looked_at)?;
-            if best.is_none_or(|(_, least)| left.figure < least.figure - BETTER) {
+            let left = self.held_out_residual(smoother, passed, looked_at)?;
+            if best.is_none_or(|(_, least)| left.figure < least.figure - SMOOTHING_LEAST_GAIN) {
                 best = Some((factor, left));
             }
             if factor == 1 {
@@ -247,27 +261,28 @@ impl Search<'_> {
         best
     }
 
-    /// The runs that a smoother gives.
-    fn runs(&self, smoother: Smoother) -> Option<Vec<Run>> {
+    /// The recording prepared with a smoother; `None` if that fails.
+    fn runs(&self, smoother: SmootherCandidate) -> Option<Vec<PreparedRun>> {
         let mut preparation = self.reading.preparation.clone();
-        smoother.goes_into(&mut preparation);
-        // Band and period were found already, and cost a look at all positions.
+        smoother.apply_to(&mut preparation);
+        // Band and period are known already; finding them again would need all positions.
         preparation.band_hz = Some(self.open.band_hz);
         preparation.unexamined = true;
         let mut runs = free::runs(self.model, self.raw, &preparation).ok()?;
+        // Forces of a model with delay belong to earlier states.
         let delay = self.model.derivation.mechanism.force_delay;
         if delay != 0.0 {
             for run in &mut runs {
-                run.pair_with_earlier_states(delay)?;
+                run.shift_states_by_delay(delay)?;
             }
         }
         Some(runs)
     }
 
-    /// The stretches of time that all candidates have, or windows of them.
-    fn windows(&self, runs: &[Run]) -> Vec<Window> {
+    /// The intervals of time that all candidates have, or windows of them in a long recording.
+    fn windows(&self, runs: &[PreparedRun]) -> Vec<TimeWindow> {
         let total: f64 = runs.iter().map(duration).sum();
-        let step = self.fine().recip();
+        let step = self.evaluation_rate().recip();
         let most = step * LOOKED_AT as f64;
         let share = if total > most { most / total } else { 1.0 };
         let mut windows = Vec::new();
@@ -279,7 +294,7 @@ impl Search<'_> {
             let length = (last - first) / parts as f64;
             for part in 0..parts {
                 let from = first + length * part as f64;
-                windows.push(Window {
+                windows.push(TimeWindow {
                     from,
                     to: from + share * length,
                 });
@@ -288,46 +303,54 @@ impl Search<'_> {
         windows
     }
 
-    /// The highest frequency that is looked at, Hz.
-    fn highest(&self) -> f64 {
+    /// The highest frequency that is evaluated, Hz.
+    fn highest_frequency(&self) -> f64 {
         let octaves = 2.0_f64.powi(i32::try_from(OCTAVES).unwrap_or(0));
         (octaves * self.open.band_hz).min(HIGHEST * self.open.rate_hz)
     }
 
-    /// Samples per second at which the model is evaluated.
-    fn fine(&self) -> f64 {
-        (FINE * self.highest()).min(self.open.rate_hz)
+    /// Rate at which the model is evaluated, Hz.
+    fn evaluation_rate(&self) -> f64 {
+        (FINE * self.highest_frequency()).min(self.open.rate_hz)
     }
 
-    /// What is left on held-out time by a smoother, where rows below `passed`, Hz, are fitted.
-    fn left(&self, smoother: Smoother, passed: f64, windows: &[Window]) -> Option<Left> {
+    /// The residual of a smoother on held-out parts, fitted to rows below `passed`, Hz; `None` if there are too few
+    /// samples.
+    fn held_out_residual(
+        &self,
+        smoother: SmootherCandidate,
+        passed: f64,
+        windows: &[TimeWindow],
+    ) -> Option<HeldOutResidual> {
         let runs = self.runs(smoother)?;
-        let every = whole(self.open.rate_hz / self.fine()).max(1);
+        let every = floor_to_count(self.open.rate_hz / self.evaluation_rate()).max(1);
         let rate = self.open.rate_hz / every as f64;
+        // Windows are found again in each run by their times, with one sample of tolerance.
         let slack = 1.0 / self.open.rate_hz;
         let samples = windows
             .iter()
             .map(|window| {
                 let run = runs.iter().find(|run| {
-                    run.time[0] <= window.from + slack
-                        && run.time[run.time.len() - 1] >= window.to - slack
+                    run.time[0] <= window.from + slack && run.time[run.time.len() - 1] >= window.to - slack
                 })?;
                 self.samples(run, window, every)
             })
-            .collect::<Option<Vec<Samples>>>()?;
+            .collect::<Option<Vec<WindowSamples>>>()?;
         let total: usize = samples.iter().map(|one| one.forces.nrows()).sum();
+        // Stage 1: sums of each fold, and the parts of windows that belong to it.
         let mut before = 0;
-        let mut folds: Vec<Rows> = Vec::new();
+        let mut folds: Vec<FoldSums> = Vec::new();
         let mut parts: Vec<(usize, usize, usize, usize)> = Vec::new();
         for (window, one) in samples.iter().enumerate() {
             let n = one.forces.nrows();
-            let filtered = one.below(passed, rate)?;
+            let filtered = one.low_passed(passed, rate)?;
             let margin = margin(n, rate, self.open.band_hz);
-            let thin = whole(rate / (4.0 * passed.min(self.open.band_hz * 4.0))).max(1);
+            let thin = floor_to_count(rate / (4.0 * passed.min(self.open.band_hz * 4.0))).max(1);
             if folds.is_empty() {
-                folds = vec![Rows::new(one.forces.ncols(), one.regressor.ncols()); FOLDS];
+                folds = vec![FoldSums::new(one.forces.ncols(), one.regressor.ncols()); FOLDS];
             }
             let fold_of = |i: usize| ((before + i) * FOLDS / total).min(FOLDS - 1);
+            // Filtered rows are correlated, so that only some of them are added.
             for i in (margin..n - margin).step_by(thin) {
                 folds[fold_of(i)].add(&filtered, i);
             }
@@ -340,13 +363,15 @@ impl Search<'_> {
             }
             before += n;
         }
-        let values = fitted(&folds)?;
+        // Stage 2: each fold is predicted by values that were fitted to the others.
+        let values = fit_folds(&folds)?;
         let drives = samples.first()?.forces.ncols();
+        // Octaves start at the band and are bounded by the rate of the evaluation.
         let edges: Vec<f64> = (0..=OCTAVES)
             .map(|k| self.open.band_hz * 2.0_f64.powi(i32::try_from(k).unwrap_or(0)))
             .filter(|edge| *edge < 0.45 * rate)
             .collect();
-        let mut octaves = vec![vec![Octave::default(); edges.len()]; drives];
+        let mut octaves = vec![vec![OctavePower::default(); edges.len()]; drives];
         for (window, fold, start, end) in parts {
             let one = &samples[window];
             let margin = margin(end - start, rate, self.open.band_hz);
@@ -358,15 +383,12 @@ impl Search<'_> {
                         (one.forces[(i, d)], products.sum::<f64>())
                     })
                     .unzip();
+                // Differences of successive low-passes are the octaves.
                 let mut below: [Option<Vec<f64>>; 2] = [None, None];
                 for (octave, edge) in octaves.iter_mut().zip(&edges) {
-                    let passed = LowPass::butterworth(4, *edge, rate).and_then(|low_pass| {
-                        Ok([
-                            low_pass.zero_phase(&measured)?,
-                            low_pass.zero_phase(&model)?,
-                        ])
-                    });
-                    // A part that is too short to be filtered is passed over.
+                    let passed = LowPass::butterworth(4, *edge, rate)
+                        .and_then(|low_pass| Ok([low_pass.zero_phase(&measured)?, low_pass.zero_phase(&model)?]));
+                    // A part that is too short to be filtered is skipped.
                     let Ok(passed) = passed else { continue };
                     let [y, m] = [0, 1].map(|k| match &below[k] {
                         Some(below) => passed[k].iter().zip(below).map(|(a, b)| a - b).collect(),
@@ -377,6 +399,7 @@ impl Search<'_> {
                 }
             }
         }
+        // Stage 3: the figure over the drives.
         let mut figure = 0.0;
         let mut relative = 0.0;
         for octaves in &octaves {
@@ -385,34 +408,34 @@ impl Search<'_> {
                 return None;
             }
             let rounding = ROUNDING * ROUNDING * size;
-            let above: f64 = octaves[1..].iter().map(|octave| octave.left(true)).sum();
-            let within = octaves[0].left(false).max(rounding);
+            let above: f64 = octaves[1..].iter().map(|octave| octave.residual_power(true)).sum();
+            let within = octaves[0].residual_power(false).max(rounding);
             figure += 0.5 * (within + above).ln();
             relative += 0.5 * (within / size).ln();
         }
         let n = drives as f64;
-        Some(Left {
+        Some(HeldOutResidual {
             figure: figure / n,
             relative: (relative / n).exp(),
         })
     }
 
-    /// Regressor and forces at every so many samples of a window.
-    fn samples(&self, run: &Run, window: &Window, every: usize) -> Option<Samples> {
+    /// Regressor and forces at every `every`-th sample of a window; `None` if there are too few samples.
+    fn samples(&self, run: &PreparedRun, window: &TimeWindow, every: usize) -> Option<WindowSamples> {
         let forces = run.force.as_deref()?;
         let start = run.time.partition_point(|t| *t < window.from);
         let end = run.time.partition_point(|t| *t <= window.to);
         let samples: Vec<usize> = (start..end).step_by(every).collect();
-        if samples.len() < FEWEST {
+        if samples.len() < WINDOW_FEWEST_SAMPLES {
             return None;
         }
         let regressor = self.regressor(run, &samples)?;
         let mut picked = DMatrix::zeros(samples.len(), forces.len());
-        // What the filter feels beyond the window, with room to spare.
+        // The filter also depends on samples outside the window.
         let from = start.saturating_sub(BEYOND * every);
         for (d, force) in forces.iter().enumerate() {
             let around = &force[from..(end + BEYOND * every).min(force.len())];
-            // The noise of the forces must not fold down.
+            // A low-pass before thinning prevents aliasing of the force noise.
             let smooth = if every > 1 {
                 let rate = self.open.rate_hz;
                 let low_pass = LowPass::butterworth(4, 0.4 * rate / every as f64, rate).ok()?;
@@ -424,32 +447,34 @@ impl Search<'_> {
                 picked[(i, d)] = smooth[*sample - from];
             }
         }
-        Some(Samples {
+        Some(WindowSamples {
             regressor,
             forces: picked,
         })
     }
 
-    /// The model's regressor at some samples, with friction and an offset of every drive beside; row of sample and drive.
-    fn regressor(&self, run: &Run, samples: &[usize]) -> Option<DMatrix<f64>> {
+    /// The model's regressor at given samples, with friction and an offset of every drive added; one row per sample
+    /// and drive.
+    fn regressor(&self, run: &PreparedRun, samples: &[usize]) -> Option<DMatrix<f64>> {
         let pick = |columns: &[Vec<f64>]| -> Vec<Vec<f64>> {
             let pick = |column: &Vec<f64>| samples.iter().map(|k| column[*k]).collect();
             columns.iter().map(pick).collect()
         };
         let states = [&run.q, &run.qd, &run.qdd].map(|columns| pick(columns));
         let load = pick(run.force.as_deref().unwrap_or(&[]));
-        let states = States {
+        let states = MotionStates {
             q: states[0].iter().map(Vec::as_slice).collect(),
             qd: states[1].iter().map(Vec::as_slice).collect(),
             qdd: states[2].iter().map(Vec::as_slice).collect(),
             load: load.iter().map(Vec::as_slice).collect(),
         };
-        let evaluator = Evaluator::new(&self.model.derivation);
+        let evaluator = ModelEvaluator::new(&self.model.derivation);
         let regressor = evaluator.regressor(&states).ok()?;
         let n = self.model.drives().len();
-        let rates = evaluator.drives(&states).ok()?;
+        let rates = evaluator.drive_motion(&states).ok()?;
         let rates = rates.get(n..2 * n)?;
         let width = regressor.ncols();
+        // Three more columns for each drive: rate, its sign, and a constant.
         let mut more = regressor.resize_horizontally(width + 3 * n, 0.0);
         for (d, rate) in rates.iter().enumerate() {
             for (i, rate) in rate.iter().enumerate() {
@@ -463,21 +488,25 @@ impl Search<'_> {
     }
 }
 
-/// A stretch of time, s.
-struct Window {
+/// An interval of time, s.
+struct TimeWindow {
+    /// First time.
     from: f64,
+    /// Last time.
     to: f64,
 }
 
-/// Rows of the regressor per sample and drive, and forces per sample.
-struct Samples {
+/// Rows of the regressor, one per sample and drive, and forces, one row per sample and one column per drive.
+struct WindowSamples {
+    /// Row `sample * n_drives + drive`, with the columns of friction and offset behind those of the model.
     regressor: DMatrix<f64>,
+    /// `[sample, drive]`.
     forces: DMatrix<f64>,
 }
 
-impl Samples {
-    /// The same below a frequency, Hz; `None` where there are too few samples.
-    fn below(&self, passed: f64, rate: f64) -> Option<Self> {
+impl WindowSamples {
+    /// The same rows after a low-pass, Hz; `None` if there are too few samples. `rate` is that of the rows, Hz.
+    fn low_passed(&self, passed: f64, rate: f64) -> Option<Self> {
         let mut filtered = Self {
             regressor: self.regressor.clone(),
             forces: self.forces.clone(),
@@ -505,15 +534,19 @@ impl Samples {
     }
 }
 
-/// Inner products of measured and model force in an octave.
+/// Inner products of measured force and model force in one octave of one drive.
 #[derive(Clone, Default)]
-struct Octave {
+struct OctavePower {
+    /// Sum of squares of the measured force.
     measured: f64,
+    /// Inner product of both forces.
     product: f64,
+    /// Sum of squares of the model force.
     model: f64,
 }
 
-impl Octave {
+impl OctavePower {
+    /// Adds samples of both forces.
     fn add(&mut self, measured: &[f64], model: &[f64]) {
         for (y, m) in measured.iter().zip(model) {
             self.measured += y * y;
@@ -522,9 +555,9 @@ impl Octave {
         }
     }
 
-    /// What the model leaves of the measured force. It may be damped where it says less than it adds, as a filter will do
-    /// above the band of the motion: noise there costs nothing but what it hides.
-    fn left(&self, may_be_damped: bool) -> f64 {
+    /// Residual power of the measured force. Where the model overestimates an octave, its force may be damped, as a
+    /// filter does above the band of the motion: noise there costs only what it hides.
+    fn residual_power(&self, may_be_damped: bool) -> f64 {
         let scale = if may_be_damped && self.model > 0.0 {
             (self.product / self.model).clamp(0.0, 1.0)
         } else {
@@ -534,28 +567,34 @@ impl Octave {
     }
 }
 
-/// Samples at both ends of `n` that a low-pass at `band` spoils.
+/// Number of samples at both ends of `n` that a low-pass at `band`, Hz, distorts.
 fn margin(n: usize, rate: f64, band: f64) -> usize {
-    whole((DROPPED.0 * rate / band).min(DROPPED.1 * n as f64))
+    floor_to_count((DROPPED.0 * rate / band).min(DROPPED.1 * n as f64))
 }
 
-/// Inner products of the rows of one fold, drive by drive.
+/// Sums over the rows of one fold, drive by drive.
 #[derive(Clone)]
-struct Rows {
-    drives: Vec<Products>,
+struct FoldSums {
+    drives: Vec<DriveNormalEquations>,
 }
 
+/// Normal equations of one drive.
 #[derive(Clone)]
-struct Products {
+struct DriveNormalEquations {
+    /// Gram matrix of the columns, lower triangle.
     normal: DMatrix<f64>,
+    /// Inner products of columns and force.
     right: DVector<f64>,
+    /// Sum of squares of the force.
     size: f64,
+    /// Number of rows.
     rows: usize,
 }
 
-impl Rows {
+impl FoldSums {
+    /// Sums without rows.
     fn new(drives: usize, width: usize) -> Self {
-        let products = Products {
+        let products = DriveNormalEquations {
             normal: DMatrix::zeros(width, width),
             right: DVector::zeros(width),
             size: 0.0,
@@ -566,7 +605,8 @@ impl Rows {
         }
     }
 
-    fn add(&mut self, samples: &Samples, i: usize) {
+    /// Adds the rows of all drives at a sample.
+    fn add(&mut self, samples: &WindowSamples, i: usize) {
         let drives = self.drives.len();
         for (d, one) in self.drives.iter_mut().enumerate() {
             let row = samples.regressor.row(i * drives + d).transpose();
@@ -579,17 +619,17 @@ impl Rows {
     }
 }
 
-/// For each fold the values that fit the others; `None` where there are too few rows, or nothing is measured.
-fn fitted(folds: &[Rows]) -> Option<Vec<DVector<f64>>> {
+/// For each fold the values that fit the others; `None` if there are too few rows, or a force is zero.
+fn fit_folds(folds: &[FoldSums]) -> Option<Vec<DVector<f64>>> {
     let n = folds.first()?.drives.len();
     let width = folds[0].drives[0].right.len();
     let total = |d: usize| -> f64 { folds.iter().map(|fold| fold.drives[d].size).sum() };
     let sizes: Vec<f64> = (0..n).map(total).collect();
     let rows: usize = folds.iter().map(|fold| fold.drives[0].rows).sum();
-    if rows * n < 3 * width || sizes.iter().any(|size| *size <= 0.0) {
+    if rows * n < SMOOTHING_ROWS_PER_COLUMN * width || sizes.iter().any(|size| *size <= 0.0) {
         return None;
     }
-    // Drives count alike at first, then by what is left of them.
+    // All drives have equal relative weights first, then weights from their residuals.
     let mut left = sizes.clone();
     let mut values = Vec::new();
     for _ in 0..2 {
@@ -598,6 +638,7 @@ fn fitted(folds: &[Rows]) -> Option<Vec<DVector<f64>>> {
             .collect();
         left = vec![0.0; n];
         values.clear();
+        // All folds except the one that is held out.
         for (out, judged) in folds.iter().enumerate() {
             let mut normal = DMatrix::zeros(width, width);
             let mut right = DVector::zeros(width);
@@ -607,10 +648,10 @@ fn fitted(folds: &[Rows]) -> Option<Vec<DVector<f64>>> {
                     right += &one.right * *weight;
                 }
             }
-            let found = solved(&normal, &right)?;
+            let found = solve_scaled(&normal, &right)?;
+            // The sum of squares of the residual follows from the sums of the fold.
             for (left, one) in left.iter_mut().zip(&judged.drives) {
-                let explained =
-                    2.0 * one.right.dot(&found) - (symmetric(&one.normal) * &found).dot(&found);
+                let explained = 2.0 * one.right.dot(&found) - (symmetric(&one.normal) * &found).dot(&found);
                 *left += (one.size - explained).max(0.0);
             }
             values.push(found);
@@ -619,8 +660,8 @@ fn fitted(folds: &[Rows]) -> Option<Vec<DVector<f64>>> {
     Some(values)
 }
 
-/// Values of scaled normal equations with a trace of a ridge, since columns may be the same.
-fn solved(normal: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
+/// Solves scaled normal equations with a small ridge, since columns may be equal.
+fn solve_scaled(normal: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
     let mut normal = symmetric(normal);
     let n = right.len();
     let scale: Vec<f64> = (0..n)
@@ -638,14 +679,15 @@ fn solved(normal: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
     Some(normal.cholesky()?.solve(&scaled).component_mul(&scale))
 }
 
-/// The whole of a matrix of which the lower triangle is there.
+/// The symmetric matrix of a lower triangle.
 fn symmetric(lower: &DMatrix<f64>) -> DMatrix<f64> {
     let mut whole = lower.clone();
     whole.fill_upper_triangle_with_lower_triangle();
     whole
 }
 
-fn duration(run: &Run) -> f64 {
+/// Duration of a run, s.
+fn duration(run: &PreparedRun) -> f64 {
     match run.time.as_slice() {
         [first, .., last] => last - first,
         _ => 0.0,

@@ -1,33 +1,35 @@
-//! Which columns of a recording are ours: the user's `--map`, then what the model file says, applied to the names
-//! that the file has.
+//! Assigns columns of a recording to the names of the model: first by the user's options, then by the model file.
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{Message, OptionName, Remedy};
-use modelmill_identify::{Computed, NotFinite, ReadOptions};
-use modelmill_spec::{ColumnFault, ColumnSum, Quantity, read_column};
+use modelmill_identify::{ComputedColumn, NonFinitePolicy, ReadOptions};
+use modelmill_spec::{ColumnFault, ColumnQuantity, ColumnSum, read_column};
 
-use super::options::Reading;
+use super::options::RecordingOptions;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 
-/// How a recording whose columns are called `header` is read; `file` is what messages call it.
-/// Fails when a mapping makes no sense for this model, or asks for columns that are not there.
+/// Options for reading a recording with the columns `header`; `file` is its name in messages.
+///
+/// Fails when a mapping is not possible for this model, or uses columns that do not exist.
 pub(crate) fn read_options(
     model: &Model,
-    args: &Reading,
+    args: &RecordingOptions,
     header: &[String],
     file: &str,
 ) -> Outcome<ReadOptions> {
     let mechanism = &model.derivation.mechanism;
     let known = mechanism.columns();
-    let mut mapping = Mapping::default();
-    // All faults are told at once.
+    // Options of the user come first, since they override the model file.
+    let mut mapping = ColumnMapping::default();
+    // All faults are collected and reported together.
     let mut faults = Vec::new();
     for (k, (ours, text)) in args.columns.iter().enumerate() {
         let Some(quantity) = quantity_of(&known, ours) else {
-            faults.push(unknown(model, &known, ours));
+            faults.push(unknown_column_error(model, &known, ours));
             continue;
         };
+        // A name with two columns is ambiguous.
         if args.columns[..k].iter().any(|(other, _)| other == ours) {
             faults.push(Error::options(message!(
                 "{}: `{ours}` is mapped twice; give each name one mapping",
@@ -35,9 +37,9 @@ pub(crate) fn read_options(
             )));
             continue;
         }
-        match read(model, text, quantity, header) {
+        match parse_column_sum(model, text, quantity, header) {
             Ok(sum) => mapping.add(ours, sum),
-            // The reader of the recording says what is missing and lists what there is.
+            // The reader of the recording reports the missing column and lists the existing ones.
             Err(ColumnFault::Missing { column, .. }) if column == *text => {
                 mapping.renames.push((ours.clone(), text.clone()));
             }
@@ -45,7 +47,7 @@ pub(crate) fn read_options(
                 faults.push(Error::input(message!(
                     "{file}: {}: {fault} {}",
                     map(ours, text),
-                    listed(header)
+                    column_list_text(header)
                 )));
             }
             Err(fault) => {
@@ -53,53 +55,57 @@ pub(crate) fn read_options(
             }
         }
     }
+    // Mappings of the model file follow; those of the user have priority.
     for (ours, text) in &mechanism.recording.columns {
         if args.columns.iter().any(|(mine, _)| mine == ours) {
             continue;
         }
+        // Names that the model does not read are ignored in its own list.
         let Some(quantity) = quantity_of(&known, ours) else {
             continue;
         };
-        match read(model, text, quantity, header) {
-            Ok(sum) if mapping.takes_away(&sum) => {}
+        match parse_column_sum(model, text, quantity, header) {
+            Ok(sum) if mapping.is_conflicting(&sum) => {}
             Ok(sum) => mapping.add(ours, sum),
-            // A recording may have our names, or lack what can be done without.
-            Err(ColumnFault::Missing { .. })
-                if header.contains(ours) || can_lack(ours, quantity) => {}
+            // A recording may use the names of the model, or lack optional columns.
+            Err(ColumnFault::Missing { .. }) if header.contains(ours) || is_optional(ours, quantity) => {}
             Err(fault) => {
                 faults.push(Error::input(message!(
                     "{file}: the model file takes `{ours}` from `{text}`, but {fault} {} \
                      Map one onto it with {}",
-                    listed(header),
+                    column_list_text(header),
                     map(ours, "THEIRS")
                 )));
             }
         }
     }
+    // Motor torques are scaled to the drive, their variances by the square.
     for (drive, factor) in &mechanism.recording.torque {
         mapping.scale(drive, *factor, header);
         mapping.scale(&format!("{drive}_var"), factor * factor, header);
     }
-    if let Some(fault) = together(faults) {
+    if let Some(fault) = combined_error(faults) {
         return Err(fault);
     }
+    // Only columns that the model needs are read.
     Ok(ReadOptions {
         renames: mapping.renames,
         computed: mapping.computed,
         not_finite: if args.skip_bad_samples {
-            NotFinite::LeaveOut
+            NonFinitePolicy::LeaveOut
         } else {
-            NotFinite::Refuse
+            NonFinitePolicy::Refuse
         },
         wanted: Some(known.into_iter().map(|(name, _)| name).collect()),
-        may_lack: may_lack(model),
-        between: args.between,
+        may_be_missing: optional_forces(model),
+        time_interval: args.between,
         ..ReadOptions::default()
     })
 }
 
-/// Forces of which samples may be missing. Those of drives that share rows are looked at before they are repaired.
-fn may_lack(model: &Model) -> Vec<String> {
+/// Forces with samples that may be missing. None if drives share rows, since their forces are added before samples are
+/// repaired.
+fn optional_forces(model: &Model) -> Vec<String> {
     if model.derivation.mechanism.shared_drives.is_empty() {
         model.drives()
     } else {
@@ -107,14 +113,13 @@ fn may_lack(model: &Model) -> Vec<String> {
     }
 }
 
-/// Several faults as one, each on a line of its own; wrong options weigh more than what the recording lacks.
-fn together(mut faults: Vec<Error>) -> Option<Error> {
+/// Several faults as one error, one line each; a wrong option outweighs a fault of the recording.
+fn combined_error(mut faults: Vec<Error>) -> Option<Error> {
     if faults.len() < 2 {
         return faults.pop();
     }
-    let is_wrong_option = faults
-        .iter()
-        .any(|fault| matches!(fault, Error::Options(_)));
+    let is_wrong_option = faults.iter().any(|fault| matches!(fault, Error::Options(_)));
+    // A single fault is returned as it is.
     let lines = faults.iter().map(|fault| message!("- {}", fault.message()));
     let says = message!(
         "{} mappings of columns are at fault:\n{}",
@@ -128,20 +133,24 @@ fn together(mut faults: Vec<Error>) -> Option<Error> {
     })
 }
 
-/// What was found so far.
+/// The assignments that were found.
 #[derive(Default)]
-struct Mapping {
+struct ColumnMapping {
+    /// Names of the model with the column that is read for each.
     renames: Vec<(String, String)>,
-    computed: Vec<Computed>,
+    /// Names of the model with a sum of columns.
+    computed: Vec<ComputedColumn>,
 }
 
-impl Mapping {
+impl ColumnMapping {
+    /// Adds an assignment: a rename if the sum is a single column without factor and offset.
     fn add(&mut self, ours: &str, sum: ColumnSum) {
+        // A rename keeps the numbers of the file unchanged.
         match sum.terms.as_slice() {
             [(theirs, factor)] if factor.total_cmp(&1.0).is_eq() && sum.offset == 0.0 => {
                 self.renames.push((ours.to_owned(), theirs.clone()));
             }
-            _ => self.computed.push(Computed {
+            _ => self.computed.push(ComputedColumn {
                 name: ours.to_owned(),
                 terms: sum.terms,
                 offset: sum.offset,
@@ -149,40 +158,39 @@ impl Mapping {
         }
     }
 
-    /// Multiplies what becomes a column of ours.
+    /// Multiplies the values of a column of the model by a factor.
     fn scale(&mut self, ours: &str, factor: f64, header: &[String]) {
+        // A sum is scaled in all its terms.
         if let Some(known) = self.computed.iter_mut().find(|one| one.name == ours) {
             known.offset *= factor;
             known.terms.iter_mut().for_each(|(_, term)| *term *= factor);
             return;
         }
+        // A rename becomes a sum with one term.
         let renamed = self.renames.iter().position(|(name, _)| name == ours);
         let theirs = match renamed {
             Some(place) => self.renames.remove(place).1,
             None if header.iter().any(|name| name == ours) => ours.to_owned(),
             None => return,
         };
-        self.computed.push(Computed {
+        self.computed.push(ComputedColumn {
             name: ours.to_owned(),
             terms: vec![(theirs, factor)],
             offset: 0.0,
         });
     }
 
-    /// Whether a column that the user has given another name would be needed under this one.
-    fn takes_away(&self, sum: &ColumnSum) -> bool {
-        sum.terms.len() == 1
-            && self
-                .renames
-                .iter()
-                .any(|(_, theirs)| *theirs == sum.terms[0].0)
+    /// Whether the user has assigned the only column of a sum to another name.
+    fn is_conflicting(&self, sum: &ColumnSum) -> bool {
+        sum.terms.len() == 1 && self.renames.iter().any(|(_, theirs)| *theirs == sum.terms[0].0)
     }
 }
 
-fn read(
+/// Reads a sum of columns; names of constants of the model are known in it.
+fn parse_column_sum(
     model: &Model,
     text: &str,
-    quantity: Quantity,
+    quantity: ColumnQuantity,
     header: &[String],
 ) -> Result<ColumnSum, ColumnFault> {
     let constants = &model.derivation.mechanism.constants;
@@ -191,22 +199,25 @@ fn read(
     })
 }
 
-fn quantity_of(known: &[(String, Quantity)], ours: &str) -> Option<Quantity> {
+/// The quantity of a column of the model; `None` if there is no such column.
+fn quantity_of(known: &[(String, ColumnQuantity)], ours: &str) -> Option<ColumnQuantity> {
     let found = known.iter().find(|(name, _)| name == ours);
     found.map(|(_, quantity)| *quantity)
 }
 
-/// Derivatives, forces and variances may be missing: they are prepared, or asked for where they are needed.
-fn can_lack(ours: &str, quantity: Quantity) -> bool {
+/// Derivatives, forces and variances may be missing: they are computed, or requested when they are needed.
+fn is_optional(ours: &str, quantity: ColumnQuantity) -> bool {
     match quantity {
-        Quantity::Time | Quantity::Number => false,
-        Quantity::Angle(order) | Quantity::Length(order) => order > 0 && ours.contains("_d"),
+        ColumnQuantity::Time | ColumnQuantity::Number => false,
+        ColumnQuantity::Angle(order) | ColumnQuantity::Length(order) => order > 0 && ours.contains("_d"),
         _ => true,
     }
 }
 
-fn unknown(model: &Model, known: &[(String, Quantity)], ours: &str) -> Error {
-    let why = if model.passive().iter().any(|name| name == ours) {
+/// The error of a name that is no column of the model.
+fn unknown_column_error(model: &Model, known: &[(String, ColumnQuantity)], ours: &str) -> Error {
+    // Passive coordinates are a frequent mistake.
+    let why = if model.passive_coordinates().iter().any(|name| name == ours) {
         "is passive: it is computed from the loops and not read"
     } else {
         "is no name of this model"
@@ -219,17 +230,15 @@ fn unknown(model: &Model, known: &[(String, Quantity)], ours: &str) -> Error {
     ))
 }
 
-/// The option that maps a column of the recording onto one of ours.
+/// The option that assigns a column of the recording to one of the model.
 fn map(ours: &str, theirs: &str) -> Remedy {
     Remedy::option(OptionName::Columns).with_value(format!("{ours}={theirs}"))
 }
 
-fn listed(header: &[String]) -> String {
-    let shown: Vec<String> = header
-        .iter()
-        .take(40)
-        .map(|name| format!("`{name}`"))
-        .collect();
+/// The columns of the recording as text, at most 40 of them.
+fn column_list_text(header: &[String]) -> String {
+    // Long lists are cut off, with their number.
+    let shown: Vec<String> = header.iter().take(40).map(|name| format!("`{name}`")).collect();
     let more = if header.len() > 40 {
         format!(" and {} more", header.len() - 40)
     } else {

@@ -1,5 +1,5 @@
-//! Recordings of a model: read with the names that the model and the user give, prepared, and looked at before anything is
-//! believed.
+//! Recordings for a model: read with the column names given in the model file or by the user, prepared, and checked
+//! before any result is computed.
 
 mod choice;
 mod columns;
@@ -8,74 +8,80 @@ pub(crate) mod free;
 mod leverage;
 mod options;
 mod smoother;
+mod thresholds;
 
 use std::path::Path;
 use std::sync::Arc;
 
-use modelmill_boundary::files::Memory;
+use modelmill_boundary::files::MemoryFiles;
 use modelmill_boundary::message;
 use modelmill_boundary::text::{Message, OptionName, OptionSetting, Remedy};
-use modelmill_identify::diagnose::{Disturbance, Quantity};
-use modelmill_identify::{Note, PositionFault, Recording as Raw, RecordingFiles};
+use modelmill_identify::diagnose::{Disturbance, EstimatedQuantity};
+use modelmill_identify::{PositionFault, RecordingFiles, RecordingNote, SignalRecording as Raw};
 
 use crate::audit;
 use crate::error::{Error, Outcome};
 use crate::host::kinds_of_files;
 use crate::model::Model;
-use crate::stretch::{Stretch, variances};
+use crate::segment::{RecordingSegment, variances};
 use crate::text::table::significant;
 
 use columns::read_options;
-use leverage::Leverage;
+use leverage::DriveLeverage;
 
-pub use contents::{ColumnInfo, Contents, TableInfo};
-pub use modelmill_identify::{DerivativeSource, MAX_FILTER_ORDER, has_ending_of_a_recording};
-pub use modelmill_identify::{Preparation, Run, Smoothing};
-pub use options::Reading;
+pub use contents::{ColumnInfo, RecordingContents, TableInfo};
+pub use modelmill_identify::{DerivativeSource, MAX_FILTER_ORDER, has_recording_extension};
+pub use modelmill_identify::{PreparedRun, SmoothingMethod, StatePreparation};
+pub use options::RecordingOptions;
 
-/// Reads a recording with the columns that a model needs.
-fn read_raw(model: &Model, file: &RecordingFiles, reading: &Reading) -> Outcome<Raw> {
+/// Reads a recording with the columns that a model needs, completes free bodies and repairs faults of sensors.
+///
+/// Fails when the file cannot be read or lacks columns.
+fn read_raw(model: &Model, file: &RecordingFiles, reading: &RecordingOptions) -> Outcome<Raw> {
     let name = file.name();
+    // Names of the file are needed to resolve the mapping.
     let options = read_options(model, reading, &file.names()?, name)?;
     let mut raw = model
         .host()
-        .watched(&format!("reading {name}"), 0, |_| file.read(&options))??;
+        .run_job(&format!("reading {name}"), 0, |_| file.read(&options))??;
     for note in free::complete(model, &mut raw)? {
         model.host().note(&note);
     }
-    let leverage = Leverage::new(model, &raw);
+    // Force peaks near singular poses are no outliers.
+    let leverage = DriveLeverage::new(model, &raw);
     raw.repair(
-        &model.active(),
+        &model.active_coordinates(),
         &model.drives(),
         reading.skip_bad_samples,
-        &|drive, sample| leverage.peaks(drive, sample),
+        &|drive, sample| leverage.is_peak(drive, sample),
     );
     Ok(raw)
 }
 
-/// The stretches of a recording; where the model says that forces are read late, each force has the states of the moment at
-/// which it acted.
-fn prepared(model: &Model, raw: &Raw, reading: &Reading) -> Outcome<Vec<Stretch>> {
+/// The prepared segments of a recording. If the model has a delay of the force signal, each force gets the states of
+/// the time at which it acted.
+fn prepare_segments(model: &Model, raw: &Raw, reading: &RecordingOptions) -> Outcome<Vec<RecordingSegment>> {
+    // The delay is a property of the model, not of the file.
     let delay = model.derivation.mechanism.force_delay;
     let mut data = prepare(model, raw, reading, delay)?;
     note_idle_options(&mut data, reading);
-    for note in data.iter().flat_map(Stretch::notes) {
+    for note in data.iter().flat_map(RecordingSegment::notes) {
         model.host().note(note);
     }
     Ok(data)
 }
 
-/// The stretches of a recording with states and forces as it has them side by side.
+/// The prepared segments of a recording, without compensation of a delay.
 pub(crate) fn read_as_recorded(
     model: &Model,
     path: &Path,
-    reading: &Reading,
-) -> Outcome<Vec<Stretch>> {
+    reading: &RecordingOptions,
+) -> Outcome<Vec<RecordingSegment>> {
     let file = RecordingFiles::open(model.host().files(), &[path])?;
     let raw = read_raw(model, &file, reading)?;
-    let (mut reading, note) = settled(model, &raw, reading)?;
+    let (mut reading, note) = resolve_reading(model, &raw, reading)?;
     if reading.preparation.chosen {
-        // Rows of a fit are of no interest here.
+        // Decimation was chosen for fits; forces are wanted at every sample.
         reading.preparation.decimate = 1;
     }
     let reading = &reading;
@@ -84,99 +90,105 @@ pub(crate) fn read_as_recorded(
         first.run.notes.push(note);
     }
     note_idle_options(&mut data, reading);
-    for note in data.iter().flat_map(Stretch::notes) {
+    for note in data.iter().flat_map(RecordingSegment::notes) {
         model.host().note(note);
     }
     Ok(data)
 }
 
-/// The reading with what it leaves open of the preparation chosen, and what was chosen.
-fn settled(model: &Model, raw: &Raw, reading: &Reading) -> Outcome<(Reading, Option<Note>)> {
+/// The reading options with all open choices of the preparation made, and a note on the choice.
+fn resolve_reading(
+    model: &Model,
+    raw: &Raw,
+    reading: &RecordingOptions,
+) -> Outcome<(RecordingOptions, Option<RecordingNote>)> {
     let says = format!("choosing how {} is smoothed", raw.file());
     let chosen = model
         .host()
-        .watched(&says, 0, |_| choice::choose(model, raw, reading))??;
+        .run_job(&says, 0, |_| choice::choose_preparation(model, raw, reading))??;
     Ok(match chosen {
         Some((reading, note)) => (reading, Some(note)),
         None => (reading.clone(), None),
     })
 }
 
-/// Gives every force the states of the moment at which it acted, by the model's delay.
-fn pair(run: &mut Run, delay: f64) -> Outcome {
+/// Assigns to every force the states at the time at which it acted, by the model's delay, s.
+fn compensate_delay(run: &mut PreparedRun, delay: f64) -> Outcome {
     if delay == 0.0 {
         return Ok(());
     }
     let ms = 1e3 * delay;
-    let Some((start, end)) = run.pair_with_earlier_states(delay) else {
+    let Some((start, end)) = run.shift_states_by_delay(delay) else {
         return Err(Error::input(format!(
-            "{}: the model's `time_delay` of {ms} ms leaves fewer than four of {} samples with states to go with; check T, \
+            "{}: the model's `time_delay` of {ms} ms leaves fewer than four of {} samples with states; check T, \
              which is in seconds",
             run.file,
             run.time.len()
         )));
     };
-    let (side, lost) = if start > 0 {
-        ("first", start)
-    } else {
-        ("last", end)
-    };
+    // A delay loses samples at the start, a lead at the end.
+    let (side, lost) = if start > 0 { ("first", start) } else { ("last", end) };
     let lost = match lost {
         0 => String::new(),
-        1 => format!("; the {side} sample has no states to go with and is left out"),
-        n => format!("; the {side} {n} samples have no states to go with and are left out"),
+        1 => format!("; the {side} sample has no states and is left out"),
+        n => format!("; the {side} {n} samples have no states and are left out"),
     };
-    run.notes.push(Note::info(format!(
-        "Forces of {} are held against the states of {ms} ms before, as the model's `time_delay` says{lost}.",
+    run.notes.push(RecordingNote::info(format!(
+        "Forces of {} are compared with the states {ms} ms before, by the model's `time_delay`{lost}.",
         run.file
     )));
     Ok(())
 }
 
-fn prepare(model: &Model, recording: &Raw, args: &Reading, delay: f64) -> Outcome<Vec<Stretch>> {
+/// Prepares all segments of a recording: states, notes on suspicious signals, delay, variances and
+/// disturbances.
+fn prepare(model: &Model, recording: &Raw, args: &RecordingOptions, delay: f64) -> Outcome<Vec<RecordingSegment>> {
     let preparation = &args.preparation;
-    let mut runs =
-        model
-            .host()
-            .watched(&format!("preparing {}", recording.file()), 0, |_| {
-                free::runs(model, recording, preparation)
-            })??;
+    // States are prepared for each segment between gaps.
+    let mut runs = model
+        .host()
+        .run_job(&format!("preparing {}", recording.file()), 0, |_| {
+            free::runs(model, recording, preparation)
+        })??;
     let is_examined = !preparation.unexamined;
+    // Notes on the recording are added to its first segment.
     if let Some(first) = runs.first_mut().filter(|_| is_examined) {
-        let mut motions = model.motions();
-        // Twists are no derivatives of the coordinates whose names they have.
+        let mut coordinates = model.active_coordinate_types();
+        // Rates of free bodies are twists, no derivatives of the coordinates with their names.
         let free: Vec<&str> = free::free_bodies(&model.derivation.mechanism)
             .flat_map(|body| body.position.iter().chain(&body.quaternion))
             .map(|i| model.derivation.mechanism.coordinates[i.0].name.as_str())
             .collect();
-        motions.retain(|(name, _)| !free.contains(&name.as_str()));
-        let suspicions = recording.suspicions(&motions, preparation.source);
+        coordinates.retain(|(name, _)| !free.contains(&name.as_str()));
+        let suspicions = recording.suspicious_columns(&coordinates, preparation.source);
         first.notes.splice(0..0, suspicions);
-        let oddities = recording.oddities(&model.motions(), &model.drives());
+        let oddities = recording.signal_notes(&model.active_coordinate_types(), &model.drives());
         first.notes.splice(0..0, oddities);
     }
-    let motions = model.motions();
-    let angles = motions.iter().filter(|(_, is_angle)| *is_angle);
+    // Remedies for angles in degrees are kept, in case the audit finds such angles.
+    let coordinates = model.active_coordinate_types();
+    let angles = coordinates.iter().filter(|(_, is_angle)| *is_angle);
     let maps_from_degrees: Vec<OptionSetting> = angles
-        .flat_map(|(name, _)| recording.maps_from_degrees(name))
+        .flat_map(|(name, _)| recording.degree_conversion_options(name))
         .collect();
     for run in &mut runs {
         if is_examined {
-            let idle = run.suspicious_forces(&model.drives(), &model.undriven());
+            let idle = run.zero_force_notes(&model.drives(), &model.undriven_rows());
             run.notes.extend(idle);
         }
-        pair(run, delay)?;
+        compensate_delay(run, delay)?;
     }
+    // Faults of positions count as disturbances of every segment.
     let faults: Vec<Disturbance> = if is_examined {
-        (recording.position_faults(&model.active()).into_iter())
+        (recording.position_faults(&model.active_coordinates()).into_iter())
             .map(|fault| position_fault(model, recording.file(), &fault))
             .collect()
     } else {
         Vec::new()
     };
     let with_variance = runs.into_iter().map(|run| {
-        let variance = variances::recorded(recording, &run, &model.drives())?;
-        Ok(Stretch {
+        let variance = variances::recorded_variances(recording, &run, &model.drives())?;
+        Ok(RecordingSegment {
             run,
             variance,
             weights: None,
@@ -188,8 +200,9 @@ fn prepare(model: &Model, recording: &Raw, args: &Reading, delay: f64) -> Outcom
     with_variance.collect()
 }
 
-/// A fault of positions as a diagnosis tells it.
+/// A fault of the positions as a disturbance for the diagnosis.
 fn position_fault(model: &Model, file: &str, fault: &PositionFault) -> Disturbance {
+    // Both faults have one number with a unit.
     let (kind, at, name, value, unit, says) = match fault {
         PositionFault::Jitter { time } => (
             "time_jitter",
@@ -198,14 +211,14 @@ fn position_fault(model: &Model, file: &str, fault: &PositionFault) -> Disturban
             *time,
             "s",
             format!(
-                "the time stamps of {file} jitter: positions err in proportion to the rate, all coordinates by the same time, \
-                 {} ms in the mean square",
+                "the time stamps of {file} jitter: the position error is proportional to the rate, with the same time error for all coordinates, \
+                 {} ms rms",
                 significant(1e3 * time, 2)
             ),
         ),
-        PositionFault::Play { coordinate, width } => {
+        PositionFault::Backlash { coordinate, width } => {
             let is_angle = |(name, is): &(String, bool)| name == coordinate && *is;
-            let unit = if model.motions().iter().any(is_angle) {
+            let unit = if model.active_coordinate_types().iter().any(is_angle) {
                 "rad"
             } else {
                 "m"
@@ -217,7 +230,7 @@ fn position_fault(model: &Model, file: &str, fault: &PositionFault) -> Disturban
                 *width,
                 unit,
                 format!(
-                    "backlash between the encoder of {coordinate} and its load: in {file} the reading jumps to and fro by {} {unit}",
+                    "backlash between the encoder of {coordinate} and its load: in {file} the reading jumps back and forth by {} {unit}",
                     significant(*width, 2)
                 ),
             )
@@ -226,16 +239,17 @@ fn position_fault(model: &Model, file: &str, fault: &PositionFault) -> Disturban
     Disturbance {
         kind: kind.to_owned(),
         at: vec![at.to_owned()],
-        estimates: vec![Quantity::new(name, value, unit)],
+        estimates: vec![EstimatedQuantity::new(name, value, unit)],
         recordings: vec![file.to_owned()],
         interval: None,
-        says: Some(says),
+        description: Some(says),
     }
 }
 
-/// Says that options of the filter do nothing where all derivatives are recorded.
-fn note_idle_options(data: &mut [Stretch], args: &Reading) {
-    let usual = Preparation::default();
+/// Warns about filter options that have no effect because all derivatives are recorded.
+fn note_idle_options(data: &mut [RecordingSegment], args: &RecordingOptions) {
+    let usual = StatePreparation::default();
+    // Only options that the user changed are named.
     let given: Vec<Message> = [
         args.preparation.cutoff_hz.map(|_| OptionName::CutoffHz),
         (args.preparation.order != usual.order).then_some(OptionName::Order),
@@ -249,8 +263,8 @@ fn note_idle_options(data: &mut [Stretch], args: &Reading) {
     }
     if let Some(one) = data.first_mut() {
         let does = if given.len() == 1 { "does" } else { "do" };
-        one.run.notes.push(Note::warning(message!(
-            "{} {does} nothing to {}: it holds all rates and accelerations, so none are made from positions; ask for \
+        one.run.notes.push(RecordingNote::warning(message!(
+            "{} {does} nothing to {}: it has all rates and accelerations, so none are computed from positions; request \
              that with {}.",
             Message::join(given, " and "),
             one.run.file,
@@ -259,57 +273,83 @@ fn note_idle_options(data: &mut [Stretch], args: &Reading) {
     }
 }
 
-/// Warns of recordings that are given twice, also as copies: they count twice, or make a check that proves nothing.
-pub fn note_twins(model: &Model, data: &mut [Stretch], check: &mut [Stretch]) {
+/// Adds warnings about recordings that are given twice, also as copies. In the fit (`data`) such a recording has double
+/// weight; as a validation run (`check`) it proves nothing.
+pub fn note_duplicates(model: &Model, data: &mut [RecordingSegment], check: &mut [RecordingSegment]) {
+    // A recording is compared with all earlier ones.
     for k in 1..data.len() {
         let (before, rest) = data.split_at_mut(k);
-        if let Some(twin) = before.iter().find(|other| other.is_twin_of(&rest[0])) {
+        if let Some(twin) = before.iter().find(|other| other.has_same_samples(&rest[0])) {
             let says = format!(
-                "{} and {} are the same recording: it counts twice, and deviations come out too small; give it once.",
+                "{} and {} are the same recording: it has double weight, and standard deviations become too small; give it once.",
                 twin.run.file, rest[0].run.file
             );
-            rest[0].note(model, Note::warning(says));
+            rest[0].note(model, RecordingNote::warning(says));
         }
     }
     for one in check {
-        if let Some(twin) = data.iter().find(|other| other.is_twin_of(one)) {
+        if let Some(twin) = data.iter().find(|other| other.has_same_samples(one)) {
             let says = format!(
-                "{} is used for the fit and {} for the check, but they are the same recording: such a check proves \
-                 nothing; check on another motion.",
+                "{} is used for the fit and {} for validation, but they are the same recording: such a validation proves nothing; \
+                 validate with another motion.",
                 twin.run.file, one.run.file
             );
-            one.note(model, Note::warning(says));
+            one.note(model, RecordingNote::warning(says));
         }
     }
 }
 
-/// A recording of a model: as it was read, and its stretches between gaps in time, prepared for the model.
+/// A recording that was read and prepared for a model.
 #[derive(Clone)]
-pub struct Recording {
-    /// One stretch or, where the recording is cut at gaps in time, several.
-    pub stretches: Vec<Stretch>,
+pub struct PreparedRecording {
+    /// The parts of the recording without gaps in time, each with its states and forces. There is one if the recording
+    /// has no gaps.
+    pub segments: Vec<RecordingSegment>,
+    /// The recording before preparation.
     raw: Arc<Raw>,
-    reading: Reading,
+    /// The options with which it was prepared, including automatic choices.
+    reading: RecordingOptions,
 }
 
 impl Model {
-    /// Reads a recording (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2), prepares its states, and looks at it before anything is believed:
-    /// what was done and what looks odd stands in the notes of its stretches.
+    /// Reads a recording (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2), computes positions, rates and accelerations from
+    /// it (filtered, differentiated and decimated as needed), and checks it. Its notes list these steps and all
+    /// suspicious signals.
     ///
-    /// Fails with place and remedy when a column is missing or holds no number, or time stands still.
-    pub fn recording(&self, path: impl AsRef<Path>, reading: &Reading) -> Outcome<Recording> {
+    /// Fails when a column is missing or contains no numbers, or when time does not increase. The error states the
+    /// place and the remedy.
+    ///
+    /// ```no_run
+    /// use modelmill::Model;
+    /// use modelmill::recording::RecordingOptions;
+    ///
+    /// let model = Model::open("arm.toml")?;
+    /// // The recording calls the first joint `pos1`, in degrees.
+    /// let options = RecordingOptions {
+    ///     columns: vec![("q1".to_owned(), "pos1 [deg]".to_owned())],
+    ///     ..RecordingOptions::default()
+    /// };
+    /// let run = model.recording("run.csv", &options)?;
+    /// // `says` is the text of a note. Its remedies are written here as fields of the Rust options.
+    /// for note in run.notes() {
+    ///     println!("{}", note.says.in_library_words());
+    /// }
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
+    pub fn recording(&self, path: impl AsRef<Path>, reading: &RecordingOptions) -> Outcome<PreparedRecording> {
         self.recording_of(&[path.as_ref()], reading)
     }
 
-    /// As [`Model::recording`], of several files of one run, whose columns are joined on time: the slowest gives the
-    /// samples, and the others are interpolated.
-    pub fn recording_of(&self, paths: &[&Path], reading: &Reading) -> Outcome<Recording> {
+    /// As [`Model::recording`], for several files of one run. Their columns are joined on time: the file with the
+    /// lowest sampling rate determines the sample times, and the others are interpolated to them.
+    pub fn recording_of(&self, paths: &[&Path], reading: &RecordingOptions) -> Outcome<PreparedRecording> {
         let opened = RecordingFiles::open(self.host().files(), paths);
         let read = opened
             .map_err(Error::from)
             .and_then(|file| read_raw(self, &file, reading));
+        // A file of another kind, such as a model file, gets a message that names the kind.
         let raw = read.map_err(|failure| {
-            let kinds = paths.iter().map(|path| (path, kinds_of_files::kind(self.host(), path)));
+            let kinds = paths.iter().map(|path| (path, kinds_of_files::file_kind(self.host(), path)));
             let mut others = kinds.filter_map(|(path, kind)| Some((path.display(), kind?)));
             others.next().map_or(failure, |(path, kind)| {
                 Error::input(format!(
@@ -318,95 +358,97 @@ impl Model {
                 ))
             })
         })?;
-        Recording::new(self, raw, reading)
+        PreparedRecording::new(self, raw, reading)
     }
 
-    /// As [`Model::recording`], of columns that are in memory, such as those of a data frame, with their names; NaN stands
-    /// for what is missing. `name` is what messages call them.
+    /// As [`Model::recording`], for named columns in memory, such as those of a data frame. NaN marks
+    /// missing values. `name` is the name of the table in messages.
     ///
     /// Fails as [`Model::recording`] does, and when columns differ in length.
     pub fn recording_of_table(
         &self,
         name: &str,
         columns: Vec<(String, Vec<f64>)>,
-        reading: &Reading,
-    ) -> Outcome<Recording> {
-        let raw = read_raw(self, &RecordingFiles::of_table(name, columns)?, reading)?;
-        Recording::new(self, raw, reading)
+        reading: &RecordingOptions,
+    ) -> Outcome<PreparedRecording> {
+        let raw = read_raw(self, &RecordingFiles::from_table(name, columns)?, reading)?;
+        PreparedRecording::new(self, raw, reading)
     }
 
-    /// As [`Model::recording`], of a file that is in memory, such as an object of a store. `name` is what messages call it, and its
-    /// ending says what it is.
+    /// As [`Model::recording`], for a file in memory, such as one downloaded from object storage. `name` is its name in
+    /// messages, and its extension determines the format.
     ///
     /// Fails as [`Model::recording`] does.
     pub fn recording_of_bytes(
         &self,
         name: &str,
         bytes: Vec<u8>,
-        reading: &Reading,
-    ) -> Outcome<Recording> {
-        let files = Memory::default().with(name, bytes);
+        reading: &RecordingOptions,
+    ) -> Outcome<PreparedRecording> {
+        let files = MemoryFiles::default().with_file(name, bytes);
         let file = RecordingFiles::open(&files, &[Path::new(name)])?;
         let raw = read_raw(self, &file, reading)?;
-        Recording::new(self, raw, reading)
+        PreparedRecording::new(self, raw, reading)
     }
 }
 
-impl Recording {
-    fn new(model: &Model, raw: Raw, reading: &Reading) -> Outcome<Self> {
+impl PreparedRecording {
+    /// Prepares a raw recording; unless it is `unexamined`, open choices are made and the audit runs.
+    fn new(model: &Model, raw: Raw, reading: &RecordingOptions) -> Outcome<Self> {
         let raw = Arc::new(raw);
         if reading.preparation.unexamined {
             return Ok(Self {
-                stretches: prepared(model, &raw, reading)?,
+                segments: prepare_segments(model, &raw, reading)?,
                 raw,
                 reading: reading.clone(),
             });
         }
-        let (reading, note) = settled(model, &raw, reading)?;
-        let mut stretches = prepared(model, &raw, &reading)?;
+        let (reading, note) = resolve_reading(model, &raw, reading)?;
+        let mut stretches = prepare_segments(model, &raw, &reading)?;
         if let (Some(note), Some(first)) = (note, stretches.first_mut()) {
             first.note(model, note);
         }
         audit::examine(model, &mut stretches, reading.leave_out_events);
         Ok(Self {
-            stretches,
+            segments: stretches,
             raw,
             reading,
         })
     }
 
-    /// The same recording with other stretches.
-    pub(crate) fn with(&self, stretches: Vec<Stretch>) -> Self {
+    /// The same recording with other segments.
+    pub(crate) fn with_segments(&self, stretches: Vec<RecordingSegment>) -> Self {
         Self {
-            stretches,
+            segments: stretches,
             raw: self.raw.clone(),
             reading: self.reading.clone(),
         }
     }
 
-    /// What messages call its file.
+    /// Name of the file in messages.
     pub fn file(&self) -> &str {
         self.raw.file()
     }
 
-    /// The readings of a column by our name, one for each sample, as they were before anything was filtered; `None` where there
-    /// is none that holds numbers alone.
+    /// The values of a column as they were recorded, one for each sample, before any filter. `name` is its name in the
+    /// model. `None` if there is no such column, or if it has values that are not finite.
     pub fn raw_column(&self, name: &str) -> Option<&[f64]> {
         self.raw.column(name).ok()
     }
 
-    /// Remarks on all stretches.
-    pub fn notes(&self) -> impl Iterator<Item = &Note> {
-        self.stretches.iter().flat_map(Stretch::notes)
+    /// The notes of all segments.
+    pub fn notes(&self) -> impl Iterator<Item = &RecordingNote> {
+        self.segments.iter().flat_map(RecordingSegment::notes)
     }
 
-    /// The stretches with the faults of its sensors left in; `None` where none were taken out, or they cannot be prepared then.
-    pub(crate) fn with_faults(&self, model: &Model) -> Option<Vec<Stretch>> {
-        let faulty = self.raw.with_faults()?;
+    /// The segments without repair of sensor faults; `None` if nothing was repaired, or they cannot be prepared
+    /// without.
+    pub(crate) fn with_faults(&self, model: &Model) -> Option<Vec<RecordingSegment>> {
+        let faulty = self.raw.restore_sensor_faults()?;
         let delay = model.derivation.mechanism.force_delay;
         let mut stretches = prepare(model, &faulty, &self.reading, delay).ok()?;
-        // What else was left out of them stays so.
-        for (faulty, sound) in stretches.iter_mut().zip(&self.stretches) {
+        // Weights of other exclusions are kept.
+        for (faulty, sound) in stretches.iter_mut().zip(&self.segments) {
             if faulty.samples() == sound.samples() {
                 faulty.weights.clone_from(&sound.weights);
             }
@@ -414,23 +456,21 @@ impl Recording {
         Some(stretches)
     }
 
-    /// The stretches prepared once more, for another model of the same machine, whose forces may act later.
-    pub(crate) fn prepared_for(&self, model: &Model) -> Outcome<Vec<Stretch>> {
-        prepared(model, &self.raw, &self.reading)
+    /// The segments prepared again for another model of the same machine, which may have another delay of the force
+    /// signal.
+    pub(crate) fn prepare_for(&self, model: &Model) -> Outcome<Vec<RecordingSegment>> {
+        prepare_segments(model, &self.raw, &self.reading)
     }
 }
 
-/// The stretches of recordings for fit and check, with remarks on those that are given twice.
-pub(crate) fn stretches(
+/// The segments of recordings for fit and validation, with notes on recordings that are given twice.
+pub(crate) fn segments(
     model: &Model,
-    fit: &[&Recording],
-    check: &[&Recording],
-) -> [Vec<Stretch>; 2] {
-    let [mut fit, mut check] = [fit, check].map(|all| {
-        all.iter()
-            .flat_map(|one| one.stretches.clone())
-            .collect::<Vec<_>>()
-    });
-    note_twins(model, &mut fit, &mut check);
+    fit: &[&PreparedRecording],
+    check: &[&PreparedRecording],
+) -> [Vec<RecordingSegment>; 2] {
+    let [mut fit, mut check] =
+        [fit, check].map(|all| all.iter().flat_map(|one| one.segments.clone()).collect::<Vec<_>>());
+    note_duplicates(model, &mut fit, &mut check);
     [fit, check]
 }

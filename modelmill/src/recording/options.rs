@@ -1,19 +1,21 @@
-//! How a recording is read and its states are prepared.
+//! Options for reading a recording and preparing its states.
 
-use modelmill_identify::Preparation;
+use modelmill_identify::StatePreparation;
 
-/// How a recording is read and its states are prepared; [`Reading::default`] suits a file with our names.
+/// Options for reading a recording and preparing its states. [`RecordingOptions::default`] is for a file with the
+/// names of the model.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Reading {
-    /// Our columns with what the recording calls them, `("theta1", "pos_left")`, or with a sum of its columns, in other
-    /// units perhaps: `("q6", "(pos6 - pos5)/32 - 90 [deg]")`. Ours are `t`, a coordinate, a coordinate with `_d` or `_dd`,
-    /// a drive, and a drive with `_var` for the variance of its force.
+pub struct RecordingOptions {
+    /// Columns of the model, each with its name in the recording, `("theta1", "pos_left")`, or with a sum of columns,
+    /// possibly in other units: `("q6", "(pos6 - pos5)/32 - 90 [deg]")`. Columns of the model are `t`, a coordinate,
+    /// a coordinate with `_d` or `_dd`, a drive, and a drive with `_var` for the variance of its force.
     pub columns: Vec<(String, String)>,
-    /// How positions are filtered and differentiated, and what is left out.
-    pub preparation: Preparation,
-    /// Leave out samples with NaN, infinite or empty fields instead of refusing the recording.
+    /// How positions are filtered and differentiated, and which samples are left out.
+    pub preparation: StatePreparation,
+    /// Whether to leave out samples with NaN, infinite or empty fields. If not, such a recording is refused.
     pub skip_bad_samples: bool,
-    /// Leave the forces of contacts and pushes out of fits and figures: intervals in which no parameters explain them.
+    /// Whether to leave forces during contacts and pushes out of fits and error metrics: intervals in which no
+    /// parameters explain the forces.
     pub leave_out_events: bool,
     /// Read only the samples between these times, s.
     pub between: Option<(f64, f64)>,

@@ -1,54 +1,53 @@
-//! Ways to smooth positions that are tried against each other: low-passes, and Fourier series where a motion repeats itself.
+//! Candidates for the smoothing of positions: low-pass filters, and Fourier series if a motion is periodic.
 
-use modelmill_identify::{Preparation, Smoothing};
+use modelmill_identify::{SmoothingMethod, StatePreparation};
 
 use crate::text::table::significant;
 
-/// Ratio of neighbouring numbers of harmonics.
+/// Ratio of successive numbers of harmonics.
 const FEWER: f64 = 1.35;
-/// Harmonics of a series, at most.
+/// Largest number of harmonics of a series.
 const MOST_HARMONICS: usize = 100;
 
-/// A way to smooth positions.
+/// A candidate for the smoothing of positions.
 #[derive(Clone, Copy)]
-pub(super) struct Smoother {
-    /// Hz.
+pub(super) struct SmootherCandidate {
+    /// Cut-off frequency of the low-pass, or highest frequency of the series, Hz.
     pub(super) cutoff: f64,
-    /// The period of a Fourier series, s; none of a low-pass.
+    /// The period of a Fourier series, s; `None` for a low-pass.
     period: Option<f64>,
 }
 
-impl Smoother {
+impl SmootherCandidate {
+    /// A low-pass with a cut-off frequency, Hz.
     pub(super) fn low_pass(cutoff: f64) -> Self {
-        Self {
-            cutoff,
-            period: None,
-        }
+        Self { cutoff, period: None }
     }
 
+    /// A Fourier series with a period, s, and a number of harmonics.
     pub(super) fn series(period: f64, harmonics: usize) -> Self {
         Self {
-            // Rounding must not take the last one.
+            // The margin keeps the last harmonic when the number is rounded down.
             cutoff: (harmonics as f64 + 1e-6) / period,
             period: Some(period),
         }
     }
 
+    /// Number of harmonics; `None` for a low-pass.
     pub(super) fn harmonics(self) -> Option<usize> {
-        Some(whole(self.cutoff * self.period?))
+        Some(floor_to_count(self.cutoff * self.period?))
     }
 
-    pub(super) fn goes_into(self, preparation: &mut Preparation) {
+    /// Sets the candidate in the options of a preparation.
+    pub(super) fn apply_to(self, preparation: &mut StatePreparation) {
         preparation.cutoff_hz = Some(self.cutoff);
         if self.period.is_some() {
-            preparation.smoothing = Smoothing::Fourier {
-                period: self.period,
-            };
+            preparation.smoothing = SmoothingMethod::Fourier { period: self.period };
         }
     }
 
-    /// Where it is, beside others of its kind.
-    pub(super) fn place(self) -> String {
+    /// The cut-off or the number of harmonics as text.
+    pub(super) fn frequency_text(self) -> String {
         match self.harmonics() {
             Some(1) => "1 harmonic".to_owned(),
             Some(n) => format!("{n} harmonics"),
@@ -56,25 +55,26 @@ impl Smoother {
         }
     }
 
+    /// The candidate as a predicate about a recording.
     pub(super) fn describe(self) -> String {
         match self.period {
             Some(period) => format!(
-                "is taken for a Fourier series of period {} s with {}",
+                "is fitted by a Fourier series of period {} s with {}",
                 significant(period, 5),
-                self.place()
+                self.frequency_text()
             ),
-            None => format!("is smoothed at {}", self.place()),
+            None => format!("is smoothed by a low-pass at {}", self.frequency_text()),
         }
     }
 }
 
-/// Series up to a frequency, Hz, of ever fewer harmonics.
-pub(super) fn series_up_to(highest: f64, period: f64) -> Vec<Smoother> {
-    let mut harmonics = whole(highest * period).clamp(1, MOST_HARMONICS);
+/// Fourier series up to a frequency, Hz, with decreasing numbers of harmonics.
+pub(super) fn series_up_to(highest: f64, period: f64) -> Vec<SmootherCandidate> {
+    let mut harmonics = floor_to_count(highest * period).clamp(1, MOST_HARMONICS);
     let mut ladder = Vec::new();
     while harmonics > 0 {
-        ladder.push(Smoother::series(period, harmonics));
-        harmonics = whole(harmonics as f64 / FEWER);
+        ladder.push(SmootherCandidate::series(period, harmonics));
+        harmonics = floor_to_count(harmonics as f64 / FEWER);
     }
     ladder
 }
@@ -85,6 +85,6 @@ pub(super) fn series_up_to(highest: f64, period: f64) -> Vec<Smoother> {
     clippy::cast_sign_loss,
     reason = "a float becomes the nearest count there is"
 )]
-pub(super) fn whole(value: f64) -> usize {
+pub(super) fn floor_to_count(value: f64) -> usize {
     value as usize
 }

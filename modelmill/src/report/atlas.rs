@@ -5,28 +5,29 @@ use std::fmt::Write as _;
 use modelmill_draw::page as pages;
 
 use super::page::end;
-use super::tables::{Cell, table};
-use super::units::pretty;
-use crate::atlas::{ABOUT, Entry};
+use super::tables::{TableCell, table};
+use super::units::typographic_unit;
+use crate::atlas::{ABOUT, AtlasEntry};
 use crate::model::Model;
 use crate::text::svg::escape;
 use crate::text::table::significant;
 
-/// A mechanism of the page: what the atlas says of it, its model, and its picture as SVG.
-pub struct Pictured {
-    /// Counts.
-    pub entry: Entry,
+/// A mechanism of the page: its counts in the atlas, its model, and its picture as SVG.
+pub struct AtlasMechanism {
+    /// Counts of the mechanism.
+    pub entry: AtlasEntry,
     /// The model.
     pub model: Model,
-    /// SVG that can stand in a page.
+    /// The picture as SVG for a page.
     pub picture: String,
 }
 
-/// The page's text.
-pub fn atlas(mechanisms: &[Pictured]) -> String {
+/// The page as HTML.
+pub fn atlas(mechanisms: &[AtlasMechanism]) -> String {
     let mut page = pages::begin("Atlas of mechanisms");
+    // The explanation comes first, then the table, then one section for each mechanism.
     for paragraph in ABOUT {
-        let _ = writeln!(page, "<p>{}</p>", emphasized(paragraph));
+        let _ = writeln!(page, "<p>{}</p>", emphasis_html(paragraph));
     }
     page.push_str(&counts(mechanisms));
     for one in mechanisms {
@@ -36,9 +37,10 @@ pub fn atlas(mechanisms: &[Pictured]) -> String {
     page
 }
 
-/// Text with what stands between stars or backticks in type of its own.
-fn emphasized(text: &str) -> String {
+/// HTML of a text in which `*x*` is emphasised and `` `x` `` is code.
+fn emphasis_html(text: &str) -> String {
     let mut html = String::new();
+    // Code is replaced after emphasis, in the result of the first pass.
     for (mark, tag) in [('*', "em"), ('`', "code")] {
         let source = if html.is_empty() {
             escape(text)
@@ -55,16 +57,20 @@ fn emphasized(text: &str) -> String {
     html
 }
 
-fn counts(mechanisms: &[Pictured]) -> String {
-    let whole = |n: usize| Cell::number(&n.to_string(), n as f64);
-    let rows: Vec<Vec<Cell>> = mechanisms
+/// The table of all mechanisms: numbers of joints, loops, drives and base parameters, operations, and seconds
+/// of the derivation.
+fn counts(mechanisms: &[AtlasMechanism]) -> String {
+    // Numbers are sorted by value.
+    let whole = |n: usize| TableCell::number(&n.to_string(), n as f64);
+    let rows: Vec<Vec<TableCell>> = mechanisms
         .iter()
-        .map(|Pictured { entry, .. }| {
+        .map(|AtlasMechanism { entry, .. }| {
             let name = escape(&entry.name);
+            // Additions and multiplications are added up, so that columns can be sorted.
             let operations = |k: usize| entry.operations[k].add + entry.operations[k].mul;
             vec![
-                Cell::html(format!("<a href=\"#{name}\">{name}</a>")),
-                Cell::text(&entry.joints_in_letters()),
+                TableCell::html(format!("<a href=\"#{name}\">{name}</a>")),
+                TableCell::text(&entry.joints_in_letters()),
                 whole(entry.passive),
                 whole(entry.loops),
                 whole(entry.drives),
@@ -72,14 +78,14 @@ fn counts(mechanisms: &[Pictured]) -> String {
                 whole(entry.base[1]),
                 whole(entry.at_values),
                 match entry.effects {
-                    [0, _] => Cell::text(""),
+                    [0, _] => TableCell::text(""),
                     [_, base] => whole(base),
                 },
                 whole(operations(0)),
                 whole(operations(1)),
                 match entry.seconds {
-                    Some(seconds) => Cell::number(&significant(seconds, 2), seconds),
-                    None => Cell::text(""),
+                    Some(seconds) => TableCell::number(&significant(seconds, 2), seconds),
+                    None => TableCell::text(""),
                 },
             ]
         })
@@ -101,8 +107,10 @@ fn counts(mechanisms: &[Pictured]) -> String {
     table("sortable", &head, &rows)
 }
 
-fn mechanism(one: &Pictured) -> String {
-    let Pictured { entry, picture, .. } = one;
+/// The section of one mechanism: title, picture and base parameters.
+fn mechanism(one: &AtlasMechanism) -> String {
+    let AtlasMechanism { entry, picture, .. } = one;
+    // Imported mechanisms have no table of expressions.
     let expressions = if entry.is_imported {
         String::new()
     } else {
@@ -112,24 +120,25 @@ fn mechanism(one: &Pictured) -> String {
         "<section id=\"{name}\">\n<h2>{name}</h2>\n<p>{}. {}.</p>\n<figure class=\"picture\">{picture}</figure>\n\
          {expressions}</section>\n",
         escape(&entry.title),
-        escape(&entry.in_words()),
+        escape(&entry.summary_text()),
         name = escape(&entry.name),
     )
 }
 
+/// Base parameters with expressions, nominal values and units, folded.
 fn expressions(model: &Model) -> String {
-    let rows: Vec<Vec<Cell>> = (model.base.iter().zip(&model.nominal).enumerate())
+    let rows: Vec<Vec<TableCell>> = (model.base.iter().zip(&model.nominal).enumerate())
         .map(|(k, (base, value))| {
             let value = if model.has_nominal(k) {
-                Cell::number(&significant(*value, 6), *value)
+                TableCell::number(&significant(*value, 6), *value)
             } else {
-                Cell::text("")
+                TableCell::text("")
             };
             vec![
-                Cell::html(format!("<code>{}</code>", escape(&base.name))),
-                Cell::html(format!("<code>{}</code>", escape(&base.expression))),
+                TableCell::html(format!("<code>{}</code>", escape(&base.name))),
+                TableCell::html(format!("<code>{}</code>", escape(&base.expression))),
                 value,
-                Cell::text(&pretty(&base.unit)),
+                TableCell::text(&typographic_unit(&base.unit)),
             ]
         })
         .collect();
@@ -146,7 +155,7 @@ mod tests {
     #[test]
     fn marks_become_type() {
         assert_eq!(
-            emphasized("columns of `H` at *values* of p < q"),
+            emphasis_html("columns of `H` at *values* of p < q"),
             "columns of <code>H</code> at <em>values</em> of p &lt; q"
         );
     }

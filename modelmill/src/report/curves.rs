@@ -1,7 +1,7 @@
-//! Measured and calculated forces over time: pictures that stand by themselves, and the same numbers packed for the script
-//! that zooms into them.
+//! Measured and calculated forces over time: pictures that need no script, and the same numbers packed for the
+//! script that zooms.
 //!
-//! Long recordings keep the least and the largest value of each of many stretches, so that no peak is lost and the page
+//! Long recordings keep the least and the largest value of each of many segments, so that no peak is lost and the page
 //! stays small; values are packed as 16-bit steps between the least and the largest of a curve.
 //!
 //! Decision: every picture is an SVG that is complete without its script, so that the page reads on paper and under
@@ -12,47 +12,55 @@ use std::fmt::Write as _;
 
 use serde_json::json;
 
-use super::draw::{Axis, LEFT, Picture, RIGHT, WIDTH, attribute, line, range, with_room};
+use super::draw::{LEFT, PlotAxis, RIGHT, SvgPicture, WIDTH, attribute, line, range, with_room};
 use super::units::force_unit;
-use crate::diagnose::{Along, Version};
-use crate::text::svg::{escape, thinned};
+use crate::diagnose::{ForceComparison, ModelVersion};
+use crate::text::svg::{escape, thin_out};
 
-/// Values that all curves of a page may have together.
+/// Largest number of values of all curves of a page.
 const BUDGET: usize = 420_000;
-/// Values that a curve has at least, if it has as many.
+/// Smallest number of values of a curve, if the recording has as many.
 const LEAST: usize = 1200;
-/// Points of a curve in the picture that stands by itself.
+/// Largest number of points of a curve in the picture without script.
 const STILL: usize = 600;
-/// Recordings of which curves are shown.
+/// Largest number of recordings whose curves are shown.
 pub(crate) const MOST_RUNS: usize = 6;
 /// Height of a panel.
 const HEIGHT: f64 = 190.0;
 
-struct Curve {
+/// A curve of one panel.
+struct PlotCurve {
+    /// Name in the key.
     name: String,
+    /// Class of the style, which gives the colour.
     class: &'static str,
+    /// Times of the first and the last value, s.
     span: [f64; 2],
+    /// Evenly spaced values, N or N m.
     values: Vec<f64>,
 }
 
-/// Measured and calculated forces over time and their errors, of all recordings, those of the check first and open; `names` are
-/// those of both models' curves. The same numbers stand beside them for the script of pages.
-pub fn section(before: &Version, after: Option<&Version>, names: [&str; 2]) -> String {
+/// Measured and calculated forces over time and their errors for each recording, validation runs first. `names`
+/// are the names of the curves before and after. The same numbers follow as JSON for the script of pages.
+pub fn section(before: &ModelVersion, after: Option<&ModelVersion>, names: [&str; 2]) -> String {
+    // Validation runs come first, since they decide.
     let mut order: Vec<usize> = (0..before.runs.len()).collect();
     order.sort_by_key(|k| !before.runs[*k].is_check);
     let shown = order.len().min(MOST_RUNS);
     let drives = before.model.drives().len();
     let curves = shown * drives * if after.is_some() { 5 } else { 3 };
+    // Many recordings and drives share the budget, so that the page stays small.
     let most = (BUDGET / curves.max(1)).max(LEAST);
     let mut html = String::new();
     for (place, k) in order[..shown].iter().enumerate() {
+        // Each recording is folded, with the first one open.
         let run = &before.runs[*k];
         let title = format!(
             "{} {}",
             if run.is_check {
-                "Check run"
+                "Validation run"
             } else {
-                "Run of the fit"
+                "Run used for the fit"
             },
             run.name
         );
@@ -62,57 +70,51 @@ pub fn section(before: &Version, after: Option<&Version>, names: [&str; 2]) -> S
             "<details class=\"run\"{open} data-curves=\"run{k}\">\n<summary>{}</summary>",
             escape(&title)
         );
-        html.push_str(&of_run(before, after, names, *k, most));
+        html.push_str(&run_panels(before, after, names, *k, most));
         html.push_str("</details>\n");
     }
+    // Recordings without curves are counted.
     if shown < order.len() {
         let _ = writeln!(
             html,
-            "<p>{} more recordings are in the figures and not drawn here.</p>",
+            "<p>{} more recordings are part of the error figures, but are not drawn here.</p>",
             order.len() - shown
         );
     }
     html
 }
 
-fn of_run(
-    before: &Version,
-    after: Option<&Version>,
-    names: [&str; 2],
-    k: usize,
-    most: usize,
-) -> String {
+/// All panels of one recording, and their numbers as JSON for the script. `most` bounds the values of a curve.
+fn run_panels(before: &ModelVersion, after: Option<&ModelVersion>, names: [&str; 2], k: usize, most: usize) -> String {
     let mut html = String::new();
     let mut packed = Vec::new();
     for (d, drive) in before.model.drives().iter().enumerate() {
         let unit = force_unit(&before.model, d);
+        // Two panels for each drive: forces, and their errors.
         for (title, curves) in panels(before, after, names, k, d, drive) {
             let title = format!("{title}, {unit}");
-            html.push_str(&still(&title, &curves));
+            html.push_str(&static_picture(&title, &curves));
             let curves: Vec<_> = curves.iter().map(|curve| pack(curve, most)).collect();
             packed.push(json!({ "title": title, "unit": unit, "curves": curves }));
         }
     }
-    // Text of a script must not hold what ends it.
+    // Text of a script must not contain `</`, which would end it.
     let text = json!({ "panels": packed }).to_string();
     let text = text.replace('<', "\\u003c");
-    let _ = writeln!(
-        html,
-        "<script type=\"application/json\" id=\"run{k}\">{text}</script>"
-    );
+    let _ = writeln!(html, "<script type=\"application/json\" id=\"run{k}\">{text}</script>");
     html
 }
 
 /// Forces of a drive, and below them their errors.
 fn panels(
-    before: &Version,
-    after: Option<&Version>,
+    before: &ModelVersion,
+    after: Option<&ModelVersion>,
     names: [&str; 2],
     k: usize,
     d: usize,
     drive: &str,
-) -> [(String, Vec<Curve>); 2] {
-    let curve = |name: &str, class, run: &Along, values: Vec<f64>| Curve {
+) -> [(String, Vec<PlotCurve>); 2] {
+    let curve = |name: &str, class, run: &ForceComparison, values: Vec<f64>| PlotCurve {
         name: name.to_owned(),
         class,
         span: [
@@ -121,8 +123,8 @@ fn panels(
         ],
         values,
     };
-    // "model as it is" has an "error as it is".
-    let error = |name: &str| format!("error {}", name.trim_start_matches("model "));
+    let error = |name: &str| format!("error of the {name}");
+    // The measured force, the model as it is, and the model with effects.
     let run = &before.runs[k];
     let mut forces = vec![
         curve("measured", "c-measured", run, run.measured[d].clone()),
@@ -136,18 +138,19 @@ fn panels(
     }
     [
         (drive.to_owned(), forces),
-        (format!("{drive}: measured less model"), errors),
+        (format!("{drive}: measured minus model"), errors),
     ]
 }
 
 /// The picture without any script.
-fn still(title: &str, curves: &[Curve]) -> String {
+fn static_picture(title: &str, curves: &[PlotCurve]) -> String {
+    // Both axes cover all curves of the panel.
     let spans: Vec<f64> = curves.iter().flat_map(|c| c.span).collect();
     let time = range(&spans);
     let values = with_room(range(curves.iter().flat_map(|c| &c.values)), 0.05);
-    let x = Axis::new(time, [LEFT, WIDTH - RIGHT]);
-    let y = Axis::new(values, [HEIGHT - 34.0, 8.0]);
-    let mut picture = Picture::new(WIDTH, HEIGHT);
+    let x = PlotAxis::new(time, [LEFT, WIDTH - RIGHT]);
+    let y = PlotAxis::new(values, [HEIGHT - 34.0, 8.0]);
+    let mut picture = SvgPicture::new(WIDTH, HEIGHT);
     picture.frame(&x, &y, "time, s", [9, 4]);
     for curve in curves {
         picture.path(
@@ -155,6 +158,7 @@ fn still(title: &str, curves: &[Curve]) -> String {
             &line(&curve.values, &x, curve.span, &y, STILL),
         );
     }
+    // The names of the curves are their key, with the class that gives the colour.
     let names: Vec<String> = curves
         .iter()
         .map(|c| {
@@ -175,10 +179,12 @@ fn still(title: &str, curves: &[Curve]) -> String {
 }
 
 /// A curve for the script: the number that a step stands for, and the steps.
-fn pack(curve: &Curve, most: usize) -> serde_json::Value {
+fn pack(curve: &PlotCurve, most: usize) -> serde_json::Value {
     let values = &curve.values;
-    let kept: Vec<f64> = thinned(values, most).into_iter().map(|(_, v)| v).collect();
+    // Extremes of each segment are kept.
+    let kept: Vec<f64> = thin_out(values, most).into_iter().map(|(_, v)| v).collect();
     let [low, high] = range(&kept);
+    // A constant curve has a step of zero.
     let (low, step) = if high > low {
         (low, (high - low) / 65_534.0)
     } else {
@@ -191,6 +197,7 @@ fn pack(curve: &Curve, most: usize) -> serde_json::Value {
             clippy::cast_sign_loss,
             reason = "between 0 and 65534"
         )]
+        // The largest number marks values that are not finite.
         let steps = if !value.is_finite() {
             u16::MAX
         } else if step > 0.0 {
@@ -216,6 +223,7 @@ fn base64(bytes: &[u8]) -> String {
     const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
     for three in bytes.chunks(3) {
+        // Three bytes are four letters; missing bytes at the end are padded.
         let byte = |i: usize| u32::from(three.get(i).copied().unwrap_or(0));
         let bits = byte(0) << 16 | byte(1) << 8 | byte(2);
         for i in 0..4 {
@@ -254,7 +262,7 @@ mod tests {
         let mut values = vec![0.0; 50_000];
         values[31_234] = 7.0;
         values[100] = -3.0;
-        let curve = Curve {
+        let curve = PlotCurve {
             name: "error".to_owned(),
             class: "c-before",
             span: [0.0, 10.0],

@@ -1,8 +1,9 @@
-//! Drawing by hand: axes with round ticks, panels, and paths of SVG. Colours are classes, so that a page may be light or dark.
+//! Drawing of pictures as SVG: axes with round ticks, panels, and paths. Colours are classes of the style, so that
+//! a page may be light or dark.
 
 use std::fmt::Write as _;
 
-use crate::text::svg::{escape, thinned};
+use crate::text::svg::{escape, thin_out};
 
 /// Width of a picture in its own units.
 pub(crate) const WIDTH: f64 = 860.0;
@@ -11,24 +12,29 @@ pub(crate) const LEFT: f64 = 66.0;
 /// Room at the right.
 pub(crate) const RIGHT: f64 = 14.0;
 
-/// An axis from one value to another over a stretch of the picture.
+/// An axis from one value to another over a part of the picture.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Axis {
+pub(crate) struct PlotAxis {
+    /// Value at the start.
     pub from: f64,
+    /// Value at the end.
     pub to: f64,
+    /// Position of the start in the picture, its own units.
     pub start: f64,
+    /// Position of the end in the picture.
     pub end: f64,
     /// Whether decades are of equal length.
     pub log: bool,
 }
 
-impl Axis {
-    /// An axis; one that has no length gets some.
+impl PlotAxis {
+    /// A linear axis; a range without length is widened.
     pub(crate) fn new(range: [f64; 2], pixels: [f64; 2]) -> Self {
         let [mut from, mut to] = range;
         if !(from.is_finite() && to.is_finite()) {
             (from, to) = (0.0, 1.0);
         }
+        // A constant curve would divide by zero: it gets room on both sides.
         if to - from <= f64::EPSILON * from.abs().max(to.abs()) {
             let room = 0.5 * from.abs().max(f64::MIN_POSITIVE * 1e10);
             (from, to) = (from - room, to + room);
@@ -42,8 +48,9 @@ impl Axis {
         }
     }
 
-    /// An axis of decades; values must be positive.
+    /// A logarithmic axis; values must be positive.
     pub(crate) fn decades(range: [f64; 2], pixels: [f64; 2]) -> Self {
+        // Zero has no logarithm, and a range below a factor of 1.5 has too few ticks.
         let from = range[0].max(1e-300);
         let to = range[1].max(from * 1.5);
         Self {
@@ -52,8 +59,9 @@ impl Axis {
         }
     }
 
-    /// Where a value lies, kept within the axis.
-    pub(crate) fn at(&self, value: f64) -> f64 {
+    /// The position of a value, kept within the axis.
+    pub(crate) fn position(&self, value: f64) -> f64 {
+        // The share of the axis between its ends.
         let share = if self.log {
             (value.max(1e-300) / self.from).ln() / (self.to / self.from).ln()
         } else {
@@ -78,6 +86,7 @@ impl Axis {
                 step = round_step(0.4 * step);
             }
         }
+        // The first multiple of the step within the axis.
         let first = (self.from / step - 1e-9).ceil();
         let mut ticks = Vec::new();
         for k in 0..=2 * most.max(1) {
@@ -90,24 +99,15 @@ impl Axis {
         ticks
     }
 
+    /// Powers of ten along the axis, with steps between them if there are few.
     fn decade_ticks(&self, most: usize) -> Vec<(f64, String)> {
         let decades = (self.to / self.from).log10();
         let mut ticks = Vec::new();
-        let steps: &[f64] = if decades <= 2.0 {
-            &[1.0, 2.0, 5.0]
-        } else {
-            &[1.0]
-        };
+        // Up to two decades have room for steps of 1, 2 and 5.
+        let steps: &[f64] = if decades <= 2.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
         #[expect(clippy::cast_possible_truncation, reason = "exponents of ten")]
-        let (low, high) = (
-            self.from.log10().floor() as i32,
-            self.to.log10().ceil() as i32,
-        );
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a few decades"
-        )]
+        let (low, high) = (self.from.log10().floor() as i32, self.to.log10().ceil() as i32);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few decades")]
         let every = ((decades / most.max(1) as f64).ceil() as usize).max(1);
         for exponent in (low..=high).step_by(every) {
             for step in steps {
@@ -121,42 +121,44 @@ impl Axis {
     }
 }
 
-/// The next of 1, 2 or 5 times a power of ten that is not below a number.
+/// The smallest of 1, 2 or 5 times a power of ten that is not below a number.
 fn round_step(rough: f64) -> f64 {
     let rough = rough.max(f64::MIN_POSITIVE * 1e10);
     let decade = 10_f64.powf(rough.log10().floor());
+    // Readers can interpolate between these steps.
     let steps = [1.0, 2.0, 5.0, 10.0];
     let step = steps.into_iter().find(|s| s * decade >= rough * 0.999);
     step.unwrap_or(10.0) * decade
 }
 
-/// A tick's label with as many digits as steps need.
+/// The label of a tick, with as many digits as steps need.
 fn label(value: f64, step: f64) -> String {
+    // A sum of steps may miss zero by rounding.
     if value.abs() < 1e-9 * step.abs() {
         return "0".to_owned();
     }
+    // Longer numbers would not fit in front of the axis.
     if value.abs() >= 1e5 || step.abs() < 1e-4 {
         let text = format!("{value:.1e}");
         return text.replace(".0e", "e");
     }
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a few decimals"
-    )]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few decimals")]
     let decimals = (-(step.abs() * 1.001).log10().floor()).max(0.0) as usize;
     format!("{value:.decimals$}").replace('-', "−")
 }
 
-/// A picture as it grows.
-pub(crate) struct Picture {
+/// A picture under construction.
+pub(crate) struct SvgPicture {
+    /// SVG elements so far.
     body: String,
+    /// Width of the picture, in its own units.
     width: f64,
+    /// Height of the picture.
     height: f64,
 }
 
-impl Picture {
-    /// An empty one.
+impl SvgPicture {
+    /// An empty picture.
     pub(crate) fn new(width: f64, height: f64) -> Self {
         Self {
             body: String::new(),
@@ -165,20 +167,23 @@ impl Picture {
         }
     }
 
-    /// Grid, ticks and a frame around a pair of axes; `x` may be without labels.
-    pub(crate) fn frame(&mut self, x: &Axis, y: &Axis, title: &str, n_ticks: [usize; 2]) {
+    /// Draws grid, ticks and a frame for a pair of axes. `n_ticks` are the numbers of ticks of both; `title` is
+    /// that of the axis across.
+    pub(crate) fn frame(&mut self, x: &PlotAxis, y: &PlotAxis, title: &str, n_ticks: [usize; 2]) {
         let (left, right) = (x.start, x.end);
         let (bottom, top) = (y.start, y.end);
+        // Lines and labels of the axis across.
         for (value, label) in x.ticks(n_ticks[0]) {
-            let at = x.at(value);
+            let at = x.position(value);
             let _ = write!(
                 self.body,
                 r#"<path class="grid" d="M{at:.1} {top:.1}V{bottom:.1}"/><text class="tick" x="{at:.1}" y="{:.1}" text-anchor="middle">{label}</text>"#,
                 bottom + 15.0
             );
         }
+        // Lines and labels of the axis upwards.
         for (value, label) in y.ticks(n_ticks[1]) {
-            let at = y.at(value);
+            let at = y.position(value);
             let _ = write!(
                 self.body,
                 r#"<path class="grid" d="M{left:.1} {at:.1}H{right:.1}"/><text class="tick" x="{:.1}" y="{:.1}" text-anchor="end">{label}</text>"#,
@@ -200,12 +205,12 @@ impl Picture {
         }
     }
 
-    /// A path with a class.
+    /// Adds a path with a class of the style.
     pub(crate) fn path(&mut self, class: &str, d: &str) {
         let _ = write!(self.body, r#"<path class="{class}" d="{d}"/>"#);
     }
 
-    /// Text at a place; `anchor` as SVG has it.
+    /// Adds a text at a place; `anchor` is `start`, `middle` or `end`.
     pub(crate) fn text(&mut self, class: &str, at: [f64; 2], anchor: &str, text: &str) {
         let _ = write!(
             self.body,
@@ -216,7 +221,7 @@ impl Picture {
         );
     }
 
-    /// A rectangle from one corner to the opposite one.
+    /// Adds a rectangle between two opposite corners.
     pub(crate) fn rect(&mut self, class: &str, a: [f64; 2], b: [f64; 2]) {
         let _ = write!(
             self.body,
@@ -228,7 +233,7 @@ impl Picture {
         );
     }
 
-    /// A dot.
+    /// Adds a dot.
     pub(crate) fn dot(&mut self, class: &str, at: [f64; 2], radius: f64) {
         let _ = write!(
             self.body,
@@ -237,7 +242,7 @@ impl Picture {
         );
     }
 
-    /// The picture's text; `says` is what it shows, for those who cannot see it.
+    /// The picture as SVG; `says` describes it for screen readers.
     pub(crate) fn finish(self, says: &str) -> String {
         format!(
             r#"<svg role="img" aria-label="{}" viewBox="0 0 {:.0} {:.0}">{}</svg>"#,
@@ -249,29 +254,31 @@ impl Picture {
     }
 }
 
-/// Text within an attribute.
+/// A text as the value of an attribute.
 pub(crate) fn attribute(text: &str) -> String {
     escape(text)
 }
 
-/// A curve over an axis, thinned to what can be seen; values that are no numbers are gaps.
-pub(crate) fn line(values: &[f64], x: &Axis, span: [f64; 2], y: &Axis, points: usize) -> String {
+/// The path of a curve, thinned out to `points` points; values that are not finite are gaps. `span` are the values
+/// of `x` at both ends.
+pub(crate) fn line(values: &[f64], x: &PlotAxis, span: [f64; 2], y: &PlotAxis, points: usize) -> String {
     let last = values.len().max(2) - 1;
     let mut d = String::new();
     let mut pen = 'M';
-    for (i, value) in thinned(values, points) {
+    for (i, value) in thin_out(values, points) {
         if !value.is_finite() {
+            // A value that is not finite interrupts the line.
             pen = 'M';
             continue;
         }
         let at = span[0] + (span[1] - span[0]) * i as f64 / last as f64;
-        let _ = write!(d, "{pen}{:.0} {:.1}", x.at(at), y.at(value));
+        let _ = write!(d, "{pen}{:.0} {:.1}", x.position(at), y.position(value));
         pen = 'L';
     }
     d
 }
 
-/// Least and largest of all finite values.
+/// Smallest and largest of all finite values.
 pub(crate) fn range<'a>(values: impl IntoIterator<Item = &'a f64>) -> [f64; 2] {
     let finite = values.into_iter().filter(|v| v.is_finite());
     finite.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| {
@@ -279,7 +286,7 @@ pub(crate) fn range<'a>(values: impl IntoIterator<Item = &'a f64>) -> [f64; 2] {
     })
 }
 
-/// The range with some room at both ends.
+/// The range extended at both ends by a share of its length.
 pub(crate) fn with_room([low, high]: [f64; 2], share: f64) -> [f64; 2] {
     let room = share * (high - low);
     [low - room, high + room]
@@ -291,30 +298,27 @@ mod tests {
 
     #[test]
     fn ticks_are_round_and_within_the_axis() {
-        let axis = Axis::new([-0.37, 1.13], [0.0, 100.0]);
+        let axis = PlotAxis::new([-0.37, 1.13], [0.0, 100.0]);
         let labels: Vec<String> = axis.ticks(6).into_iter().map(|(_, l)| l).collect();
         assert_eq!(labels, ["0", "0.5", "1.0"]);
         // Few ticks are two at least.
-        let axis = Axis::new([-4.5, 4.5], [0.0, 100.0]);
+        let axis = PlotAxis::new([-4.5, 4.5], [0.0, 100.0]);
         let labels: Vec<String> = axis.ticks(2).into_iter().map(|(_, l)| l).collect();
         assert_eq!(
             labels,
             ["-4", "-2", "0", "2", "4"].map(|l| l.replace('-', "\u{2212}"))[..]
         );
-        let axis = Axis::decades([3e-4, 0.2], [0.0, 100.0]);
+        let axis = PlotAxis::decades([3e-4, 0.2], [0.0, 100.0]);
         let ticks: Vec<f64> = axis.ticks(6).into_iter().map(|(v, _)| v).collect();
         assert_eq!(ticks.len(), 3);
-        assert!((axis.at(0.2) - 100.0).abs() < 1e-9 && axis.at(3e-4).abs() < 1e-9);
+        assert!((axis.position(0.2) - 100.0).abs() < 1e-9 && axis.position(3e-4).abs() < 1e-9);
     }
 
     #[test]
     fn odd_ranges_do_no_harm() {
         for range in [[0.0, 0.0], [f64::NAN, 1.0], [5.0, 5.0], [1e300, -1e300]] {
-            let axis = Axis::new(range, [0.0, 100.0]);
-            assert!(
-                axis.at(0.0).is_finite() && axis.ticks(5).len() < 20,
-                "{range:?}"
-            );
+            let axis = PlotAxis::new(range, [0.0, 100.0]);
+            assert!(axis.position(0.0).is_finite() && axis.ticks(5).len() < 20, "{range:?}");
         }
     }
 }

@@ -1,21 +1,26 @@
-//! The ladder: errors on fit and check step by step on an axis of decades, against the noise of the forces.
+//! Picture of the error after each added effect, on the fitted and on the validation runs, on a logarithmic
+//! axis with the noise of the forces.
 
-use modelmill_identify::diagnose::Rung;
+use modelmill_identify::diagnose::SelectionStep;
 
-use super::draw::{Axis, Picture, WIDTH};
-use crate::diagnose::words::{self, Judged};
+use super::draw::{PlotAxis, SvgPicture, WIDTH};
+use crate::diagnose::words::{self, ValidationMethod};
 use crate::text::table::percent;
 
-/// Least height of a step, and that of a line of its label.
+/// Smallest height of a step.
 const ROW: f64 = 46.0;
+/// Height of a line of a label.
 const LINE: f64 = 14.0;
+/// Space above the first step.
 const TOP: f64 = 34.0;
+/// Space left of the axis, for the labels.
 const LEFT: f64 = 290.0;
-/// Longest line of a label.
+/// Largest number of letters of a line of a label.
 const LETTERS: usize = 38;
 
-/// The picture.
-pub(crate) fn picture(ladder: &[Rung], noise: f64, judged: Judged) -> String {
+/// The picture as SVG; `noise` is relative to the force.
+pub(crate) fn picture(ladder: &[SelectionStep], noise: f64, judged: ValidationMethod) -> String {
+    // The axis covers all errors and the noise.
     let errors = ladder.iter().flat_map(|rung| [rung.fit, rung.check]);
     let all: Vec<f64> = errors.chain([noise]).filter(|e| *e > 0.0).collect();
     let low = all.iter().copied().fold(f64::INFINITY, f64::min);
@@ -27,34 +32,36 @@ pub(crate) fn picture(ladder: &[Rung], noise: f64, judged: Judged) -> String {
         .iter()
         .map(|rung| words::lines(&words::rung(rung), LETTERS))
         .collect();
+    // All rows have the height of the longest label.
     let longest = labels.iter().map(Vec::len).max().unwrap_or(1);
     let row = ROW.max(LINE * longest as f64 + 8.0);
     let bottom = TOP + row * ladder.len() as f64;
+    // The axis has room of a factor 1.6 at both ends.
     let percents = [100.0 * low / 1.6, 100.0 * high * 1.6];
-    let x = Axis::decades(percents, [LEFT, WIDTH - 110.0]);
-    let y = Axis::new([0.0, 1.0], [bottom, TOP]);
-    let mut picture = Picture::new(WIDTH, bottom + 40.0);
+    let x = PlotAxis::decades(percents, [LEFT, WIDTH - 176.0]);
+    let y = PlotAxis::new([0.0, 1.0], [bottom, TOP]);
+    let mut picture = SvgPicture::new(WIDTH, bottom + 40.0);
     picture.frame(&x, &y, "error / force, %", [7, 0]);
+    // The noise is a vertical line with its value.
     if noise > 0.0 {
-        let at = x.at(100.0 * noise);
+        let at = x.position(100.0 * noise);
         picture.path("noise", &format!("M{at:.1} {TOP:.1}V{bottom:.1}"));
-        let anchor = if at > 0.5 * (x.start + x.end) {
-            "end"
-        } else {
-            "start"
-        };
+        // The label stays inside of the picture on either half of the axis.
+        let anchor = if at > 0.5 * (x.start + x.end) { "end" } else { "start" };
         let aside = if anchor == "end" { -5.0 } else { 5.0 };
         picture.text(
             "tick",
             [at + aside, TOP - 8.0],
             anchor,
-            &format!("noise {}", percent(Some(noise))),
+            &format!("{} {}", words::floor_label(noise), percent(Some(noise))),
         );
     }
     let mut last: Option<[f64; 3]> = None;
+    // One row for each step: two dots, lines to those of the step before, values at the right, label at the
+    // left.
     for (k, rung) in ladder.iter().enumerate() {
         let middle = TOP + row * (k as f64 + 0.5);
-        let [fit, check] = [rung.fit, rung.check].map(|e| x.at(100.0 * e));
+        let [fit, check] = [rung.fit, rung.check].map(|e| x.position(100.0 * e));
         if let Some([fit_before, check_before, before]) = last {
             picture.path(
                 "rung c-fit",
@@ -62,17 +69,13 @@ pub(crate) fn picture(ladder: &[Rung], noise: f64, judged: Judged) -> String {
             );
             picture.path(
                 "rung c-after",
-                &format!(
-                    "M{check_before:.1} {:.1}L{check:.1} {:.1}",
-                    before + 14.0,
-                    middle + 7.0
-                ),
+                &format!("M{check_before:.1} {:.1}L{check:.1} {:.1}", before + 14.0, middle + 7.0),
             );
         }
         picture.dot("dot c-fit", [fit, middle - 7.0], 5.0);
         picture.dot("dot c-after", [check, middle + 7.0], 5.0);
         last = Some([fit, check, middle - 7.0]);
-        let right = WIDTH - 104.0;
+        let right = WIDTH - 170.0;
         picture.text(
             "tick c-fit",
             [right, middle - 3.0],
@@ -83,7 +86,7 @@ pub(crate) fn picture(ladder: &[Rung], noise: f64, judged: Judged) -> String {
             "tick c-after",
             [right, middle + 12.0],
             "start",
-            &format!("{} {}", judged.short(), percent(Some(rung.check))),
+            &format!("{} {}", judged.label(), percent(Some(rung.check))),
         );
         for (i, line) in labels[k].iter().enumerate() {
             let up = 0.5 * LINE * (labels[k].len() as f64 - 1.0);
@@ -91,5 +94,5 @@ pub(crate) fn picture(ladder: &[Rung], noise: f64, judged: Judged) -> String {
             picture.text("label", at, "end", line);
         }
     }
-    picture.finish("errors on the fit and where it was not fitted, step by step")
+    picture.finish("error after each added effect, on fitted and on validation data")
 }

@@ -1,37 +1,45 @@
-//! Error maps: for each drive the size of the error over the two variables in which it is gathered most, before and after
-//! on one scale.
+//! Error maps: for each drive, the size of the error over the two variables that concentrate it most, before and
+//! after with one scale.
 
 use std::fmt::Write as _;
 
-use super::draw::{Axis, Picture, range};
+use super::draw::{PlotAxis, SvgPicture, range};
 use super::units::{force_unit, variable_unit};
-use crate::diagnose::Version;
+use crate::diagnose::ModelVersion;
 use crate::text::svg::escape;
 use crate::text::table::significant;
 
+/// Number of cells of a map across; few enough that each has several samples.
 const COLUMNS: usize = 22;
+/// Number of cells of a map upwards.
 const ROWS: usize = 14;
-/// Shades of the map; the page has a class for each.
+/// Number of shades of a map; the page has a class for each.
 const SHADES: usize = 9;
-/// Samples that a cell must hold to be shown.
+/// Smallest number of samples of a cell that is shown.
 const LEAST: usize = 2;
 
-/// A variable along the recordings that are judged.
-pub(crate) type Variable = (String, Vec<f64>);
+/// A variable with its name, along the validation runs.
+pub(crate) type MapVariable = (String, Vec<f64>);
 
-/// Where each sample lies in a map; the cells of both variables.
-struct Grid {
+/// The cells of a map over two variables.
+struct ErrorGrid {
+    /// Least and largest value of the variable across.
     x: [f64; 2],
+    /// Least and largest value of the variable upwards.
     y: [f64; 2],
+    /// Index of the cell of each sample, row by row from below.
     cells: Vec<usize>,
 }
 
-impl Grid {
+impl ErrorGrid {
+    /// The cells of two variables; `None` if one of them is constant.
     fn new(x: &[f64], y: &[f64]) -> Option<Self> {
         let (of_x, of_y) = (range(x), range(y));
+        // A variable that does not change has no cells.
         if !(of_x[1] > of_x[0] && of_y[1] > of_y[0]) {
             return None;
         }
+        // The largest value belongs to the last cell.
         let cell = |v: f64, [low, high]: [f64; 2], n: usize| -> usize {
             #[expect(
                 clippy::cast_possible_truncation,
@@ -62,8 +70,10 @@ impl Grid {
         sums
     }
 
-    /// How much of the spread of the squared error is between cells, less what as many cells would show by chance.
-    fn gathers(&self, error: &[f64]) -> f64 {
+    /// The fraction of the variance of the squared error that is between cells, adjusted for what as many cells
+    /// show by chance.
+    fn error_concentration(&self, error: &[f64]) -> f64 {
+        // Adjusted coefficient of determination of an analysis of variance, with the cell as the only factor.
         let n = error.len() as f64;
         let mean = error.iter().map(|e| e * e).sum::<f64>() / n;
         let total: f64 = error.iter().map(|e| (e * e - mean).powi(2)).sum();
@@ -83,7 +93,7 @@ impl Grid {
 }
 
 /// Pairs of variables that may explain an error: a motion and its rate. Two positions would only retrace the path.
-fn pairs(variables: &[Variable]) -> Vec<(usize, usize)> {
+fn pairs(variables: &[MapVariable]) -> Vec<(usize, usize)> {
     let at = |name: &str| variables.iter().position(|(n, _)| n == name);
     let mut pairs = Vec::new();
     for (i, (name, _)) in variables.iter().enumerate() {
@@ -101,25 +111,27 @@ fn pairs(variables: &[Variable]) -> Vec<(usize, usize)> {
     pairs
 }
 
-/// A figure for each drive.
-pub(crate) fn figures(before: &Version, after: Option<&Version>, variables: &[Variable]) -> String {
-    let judged = before.judged();
+/// A figure for each drive, with maps before and after the effects.
+pub(crate) fn figures(before: &ModelVersion, after: Option<&ModelVersion>, variables: &[MapVariable]) -> String {
+    let judged = before.validation_runs();
     let mut html = String::new();
     for (d, drive) in before.model.drives().iter().enumerate() {
+        // Errors on the runs that judge the model.
         let error = before.errors(&judged, d);
         // With a delay the model with effects has other samples.
         let rest = after.map(|after| after.errors(&judged, d));
         let rest = rest.filter(|rest| rest.len() == error.len());
-        let mut best: Option<(f64, usize, usize, Grid)> = None;
+        let mut best: Option<(f64, usize, usize, ErrorGrid)> = None;
         for (i, j) in pairs(variables) {
             let (x, y) = (&variables[i].1, &variables[j].1);
             if x.len() != error.len() || y.len() != error.len() {
                 continue;
             }
-            let Some(grid) = Grid::new(x, y) else {
+            let Some(grid) = ErrorGrid::new(x, y) else {
                 continue;
             };
-            let gathers = grid.gathers(&error);
+            // The map is drawn over the pair of variables that concentrates the error most.
+            let gathers = grid.error_concentration(&error);
             if best.as_ref().is_none_or(|(most, ..)| gathers > *most) {
                 best = Some((gathers, i, j, grid));
             }
@@ -127,16 +139,18 @@ pub(crate) fn figures(before: &Version, after: Option<&Version>, variables: &[Va
         let Some((_, i, j, grid)) = best else {
             continue;
         };
+        // Cells with too few samples stay empty.
         let sizes = |error: &[f64]| -> Vec<Option<f64>> {
             let sums = grid.sums(error).into_iter();
             sums.map(|(count, sum)| (count >= LEAST).then(|| (sum / count as f64).sqrt()))
                 .collect()
         };
-        let maps: Vec<(&str, Vec<Option<f64>>)> = [Some(("model as it is", sizes(&error)))]
+        let maps: Vec<(&str, Vec<Option<f64>>)> = [Some(("given model", sizes(&error)))]
             .into_iter()
             .chain([rest.map(|rest| ("with the effects", sizes(&rest)))])
             .flatten()
             .collect();
+        // Names of the axes with units.
         let names = [i, j].map(|k| {
             let name = &variables[k].0;
             format!("{name}, {}", variable_unit(&before.model, name))
@@ -145,7 +159,7 @@ pub(crate) fn figures(before: &Version, after: Option<&Version>, variables: &[Va
         let picture = picture(&maps, &grid, &names, unit);
         let _ = writeln!(
             html,
-            "<figure class=\"still\"><figcaption><b>{}: size of the error over {} and {}</b></figcaption>\n{picture}</figure>",
+            "<figure class=\"still\"><figcaption><b>{}: rms error over {} and {}</b></figcaption>\n{picture}</figure>",
             escape(drive),
             escape(&variables[i].0),
             escape(&variables[j].0),
@@ -154,32 +168,28 @@ pub(crate) fn figures(before: &Version, after: Option<&Version>, variables: &[Va
     html
 }
 
-fn picture(
-    maps: &[(&str, Vec<Option<f64>>)],
-    grid: &Grid,
-    names: &[String; 2],
-    unit: &str,
-) -> String {
+/// Maps side by side with one scale of shades; `names` are the variables across and upwards, `unit` is that of
+/// the error.
+fn picture(maps: &[(&str, Vec<Option<f64>>)], grid: &ErrorGrid, names: &[String; 2], unit: &str) -> String {
     let (width, height, top) = (330.0, 190.0, 30.0);
+    // Both maps use the scale of the larger error.
     let largest = maps
         .iter()
         .flat_map(|(_, map)| map.iter().flatten())
         .fold(0.0_f64, |m, v| m.max(*v));
-    let mut picture = Picture::new(860.0, top + height + 66.0);
+    let mut picture = SvgPicture::new(860.0, top + height + 66.0);
     for (k, (title, map)) in maps.iter().enumerate() {
+        // The second map is to the right of the first.
         let left = 62.0 + k as f64 * (width + 62.0);
-        let x = Axis::new(grid.x, [left, left + width]);
-        let y = Axis::new(grid.y, [top + height, top]);
+        let x = PlotAxis::new(grid.x, [left, left + width]);
+        let y = PlotAxis::new(grid.y, [top + height, top]);
         picture.text("label", [left, top - 8.0], "start", title);
         let (w, h) = (width / COLUMNS as f64, height / ROWS as f64);
         let mut shades = vec![String::new(); SHADES];
+        // Cells of one shade are one path, so that the file stays small.
         for (cell, size) in map.iter().enumerate() {
             let Some(size) = size else { continue };
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "a shade"
-            )]
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a shade")]
             let shade = (size / largest.max(f64::MIN_POSITIVE) * SHADES as f64) as usize;
             let (column, row) = (cell % COLUMNS, cell / COLUMNS);
             let _ = write!(
@@ -194,15 +204,11 @@ fn picture(
         }
         picture.frame(&x, &y, &names[0], [5, 4]);
     }
-    // The scale.
+    // The scale of the shades is below the maps.
     let foot = top + height + 48.0;
     for shade in 0..SHADES {
         let at = 62.0 + 16.0 * shade as f64;
-        picture.rect(
-            &format!("heat h{shade}"),
-            [at, foot],
-            [at + 16.0, foot + 10.0],
-        );
+        picture.rect(&format!("heat h{shade}"), [at, foot], [at + 16.0, foot + 10.0]);
     }
     let right = 62.0 + 16.0 * SHADES as f64 + 8.0;
     picture.text(
@@ -210,7 +216,7 @@ fn picture(
         [right, foot + 9.0],
         "start",
         &format!(
-            "0 to {} {unit} (root mean square in a cell); upwards: {}",
+            "0 to {} {unit} (rms in a cell); vertical axis: {}",
             significant(largest, 2),
             names[1]
         ),
@@ -232,15 +238,15 @@ mod tests {
             .zip(&rate)
             .map(|(q, v)| if *q > 0.5 && *v < 0.0 { 3.0 } else { 0.1 })
             .collect();
-        let right = Grid::new(&q, &rate).unwrap().gathers(&error);
-        let wrong = Grid::new(&other, &rate).unwrap().gathers(&error);
+        let right = ErrorGrid::new(&q, &rate).unwrap().error_concentration(&error);
+        let wrong = ErrorGrid::new(&other, &rate).unwrap().error_concentration(&error);
         assert!(right > 0.8 && wrong < 0.5 * right, "{right} {wrong}");
-        assert!(Grid::new(&q, &vec![1.0; q.len()]).is_none());
+        assert!(ErrorGrid::new(&q, &vec![1.0; q.len()]).is_none());
     }
 
     #[test]
     fn pairs_are_motions_with_their_rates() {
-        let variables: Vec<Variable> = ["q_d", "q_dd", "q", "left_length", "left_d", "left"]
+        let variables: Vec<MapVariable> = ["q_d", "q_dd", "q", "left_length", "left_d", "left"]
             .into_iter()
             .map(|name| (name.to_owned(), Vec::new()))
             .collect();

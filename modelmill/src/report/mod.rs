@@ -1,9 +1,9 @@
-//! `report`: what a diagnosis found as one self-contained page.
+//! `report`: the findings of a diagnosis as one self-contained HTML page.
 //!
-//! [`runs_page`] is the page of what differs between runs, [`atlas()`] that of many mechanisms.
+//! [`runs_page`] is the page of differences between runs, [`atlas()`] that of many mechanisms.
 //!
-//! `words`, `tables`, and pictures (`ladder`, `curves`, `maps`, `regions`, `spectrum`) -> `page`. The pictures stand by
-//! themselves; `page.js` makes curves that can be zoomed and tables that can be sorted out of them.
+//! `words`, `tables`, and pictures (`ladder`, `curves`, `maps`, `regions`, `spectrum`) -> `page`. The pictures need no
+//! script; with `page.js` curves can be zoomed and tables sorted.
 
 mod atlas;
 mod curves;
@@ -17,26 +17,26 @@ mod spectrum;
 mod tables;
 mod units;
 
-use crate::diagnose::{Findings, Version, words};
+use crate::diagnose::{DiagnosisFindings, ModelVersion, words};
 
-pub use atlas::{Pictured, atlas};
+pub use atlas::{AtlasMechanism, atlas};
 pub use curves::section as curves;
 pub use modelmill_draw::page::{begin as begin_page, end as end_page};
 pub use page::{STYLE, page, scripts};
-pub use runs::{over_runs, runs_page};
-pub use tables::{Cell, table};
+pub use runs::{parameter_history, runs_page};
+pub use tables::{TableCell, table};
 
-/// The ladder of a diagnosis as a picture: errors of fit and check step by step, beside the noise.
-pub fn ladder(findings: &Findings) -> String {
+/// Picture (SVG) of the error after each added effect, on the fitted and on the validation runs, with the noise.
+pub fn ladder(findings: &DiagnosisFindings) -> String {
     let diagnosis = &findings.diagnosis;
-    ladder::picture(&diagnosis.ladder, diagnosis.noise_floor, findings.judged)
+    ladder::picture(&diagnosis.steps, diagnosis.noise_floor, findings.validation)
 }
 
-/// Which colour is which model.
-fn keys(with_after: bool) -> &'static str {
+/// The key of the colours: the model before and after the effects.
+fn legend(with_after: bool) -> &'static str {
     if with_after {
-        "<span class=\"key c-before\">as it is</span> <span class=\"key c-after\">with the effects</span>"
+        "<span class=\"key c-before\">given model</span> <span class=\"key c-after\">with the effects</span>"
     } else {
-        "<span class=\"key c-before\">as it is</span>"
+        "<span class=\"key c-before\">given model</span>"
     }
 }

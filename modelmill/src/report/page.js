@@ -1,5 +1,4 @@
-// Curves that are drawn anew for the stretch of time that is seen, and tables that can be sorted. Without this script the pictures
-// stand as they are.
+// Redraws curves for the visible segment of time, and makes tables sortable. Without this script the pictures are static.
 (() => {
   'use strict';
   const SVG = 'http://www.w3.org/2000/svg';
@@ -45,7 +44,7 @@
     return found;
   };
 
-  // Which values of a curve lie within a stretch of time, with one more at each end.
+  // Indices of the values of a curve within a segment of time, with one more at each end.
   const within = (curve, from, to) => {
     const last = curve.values.length - 1;
     const at = (t) => (t - curve.from) / Math.max(curve.to - curve.from, Number.MIN_VALUE) * last;
@@ -64,7 +63,7 @@
       root.addEventListener('toggle', () => this.draw());
     }
 
-    // Shows a stretch of time, kept within the recording and not shorter than some samples.
+    // Shows a segment of time, limited to the recording and to a least length.
     show(from, to) {
       const [first, last] = this.whole;
       const least = (last - first) * 1e-4;
@@ -91,7 +90,7 @@
     draw() {
       if (this.waiting || !this.plots) return;
       this.waiting = true;
-      // Drawing once for many events; at once where frames do not come, as in a tab that is not seen.
+      // Many events are drawn once. The timer draws where frames are not requested, as in a hidden tab.
       const now = () => {
         if (!this.waiting) return;
         this.waiting = false;
@@ -207,7 +206,7 @@
       return this.run.from + Math.min(Math.max(share, 0), 1) * (this.run.to - this.run.from);
     }
 
-    // Time is what is zoomed, the scale of forces follows by itself.
+    // Only time is zoomed; the scale of forces follows the visible values.
     listen(figure) {
       const { svg, run } = this;
       const share = (x) => this.time({ clientX: svg.getBoundingClientRect().left + x * svg.getBoundingClientRect().width });
@@ -232,7 +231,7 @@
       });
     }
 
-    // Values below the pointer.
+    // Shows the values at the pointer.
     tell(event) {
       if (!this.x || !this.cursor) return;
       const t = this.time(event);
@@ -254,10 +253,10 @@
     observer.observe(document.querySelector('main'));
   } else window.addEventListener('resize', again);
 
-  // What was folded has its width as soon as it is opened for paper.
+  // Folded parts get their width only when they are opened for printing.
   window.addEventListener('beforeprint', again);
 
-  // What stands in an element; what stood in one that is gone is forgotten.
+  // Adds the script to the curves and tables of an element, and forgets those of removed elements.
   window.enliven = (part) => {
     runs = runs.filter((run) => run.root.isConnected);
     runs.push(...[...part.querySelectorAll('[data-curves]')].map((root) => new Run(root)));
@@ -282,7 +281,7 @@
           const rows = [...body.rows].map((row) => [key(row), row]);
           rows.sort(([a], [b]) => {
             if (typeof a === 'number' && typeof b === 'number') return a - b;
-            // What has no number comes first, which is last when falling.
+            // Cells without a number come first in rising order, last in falling order.
             if (typeof a !== typeof b) return typeof a === 'string' ? -1 : 1;
             return a.localeCompare(b);
           });

@@ -1,59 +1,62 @@
-//! The page: what a user asks, in that order; one file that needs no other.
+//! The page of a diagnosis: verdict, errors, effects, curves, maps, candidates, parameters, recordings and
+//! equations, in the order in which a user needs them. Input are findings, output is one HTML file that needs
+//! no other file.
 
 use std::fmt::Write as _;
 
-use modelmill_codegen::review::Format;
+use modelmill_codegen::review::PageFormat;
 use modelmill_draw::page as pages;
-use modelmill_identify::diagnose::Verdict;
+use modelmill_identify::diagnose::DiagnosisVerdict;
 
-use super::{Findings, curves, keys, ladder, maps, regions, spectrum, tables, words};
-use crate::compare::Places;
+use super::{DiagnosisFindings, curves, ladder, legend, maps, regions, spectrum, tables, words};
+use crate::compare::ErrorLocations;
 use crate::error::Outcome;
-use crate::print::{StepSpelling, laws as told};
+use crate::print::{StepSpelling, laws as law_texts};
 use crate::text::svg::escape;
 use crate::text::table::percent;
 
-/// The page's text; `spelling` says how its reader asks for what it advises.
+/// The HTML of the page; `spelling` writes commands or calls for its reader.
 ///
-/// Fails only when whoever watches stops it.
-pub fn page(findings: &Findings, spelling: &dyn StepSpelling) -> Outcome<String> {
-    let last = findings.last();
-    let equations = last.model.equations(Format::Html)?.text;
+/// Fails only if the derivation of the equations is cancelled.
+pub fn page(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> Outcome<String> {
+    // Equations are those of the model with the effects, if it could be built.
+    let final_version = findings.final_version();
+    let equations = final_version.model.equations(PageFormat::Html)?.text;
     let name = &findings.before.model.name;
-    let title = format!("{name}: what the model lacks");
+    let title = format!("{name}: effects that the model lacks");
     let mut page = pages::begin(&title);
+    // The sections in the order in which a user needs them, each with its id and title.
     let sections = [
-        ("ladder", "How the error falls", the_ladder(findings)),
+        ("ladder", "Error after each added effect", ladder_section(findings)),
         (
             "found",
-            "What was found, and how to go on",
-            found(findings, spelling),
+            "Missing effects and next steps",
+            missing_section(findings, spelling),
         ),
-        (
-            "curves",
-            "Measured and calculated forces",
-            the_curves(findings),
-        ),
-        ("where", "Where the error lives", location(findings)),
+        ("curves", "Measured and calculated forces", curves_section(findings)),
+        ("where", "Where the error is largest", location(findings)),
         (
             "frequency",
-            "At which frequencies",
+            "Spectrum of the error",
             spectrum::figures(&findings.before, findings.after.as_ref().ok()),
         ),
-        ("candidates", "What else was tried", candidates(findings)),
+        ("candidates", "All candidates", candidates(findings)),
         ("parameters", "Parameters", parameters(findings)),
         (
             "data",
-            "What was done to the recordings",
+            "Recordings and their preparation",
             tables::data(findings, spelling),
         ),
-        ("equations", "Equations", embedded(findings, &equations)),
+        ("equations", "Equations", embed_equations(findings, &equations)),
     ];
+    // Links to all sections at the top of the page.
     page.push_str("<nav>");
+    // Each link leads to the id of its section.
     for (id, title, _) in &sections {
         let _ = write!(page, "<a href=\"#report-{id}\">{title}</a> ");
     }
     page.push_str("</nav>\n");
+    // The summary is above all sections, so that the result is seen first.
     page.push_str(&summary(findings));
     for (id, title, html) in &sections {
         let _ = write!(
@@ -70,41 +73,47 @@ pub(super) fn end() -> String {
     pages::end(&[CURVES])
 }
 
-/// What makes curves that are drawn anew as they are zoomed, and tables that can be sorted.
+/// Script for curves that can be zoomed and tables that can be sorted.
 const CURVES: &str = include_str!("page.js");
 
 /// The style of all pages.
 pub use pages::STYLE;
 
-/// Scripts of pages, once they stand. Who puts parts of a page into another one later calls `enliven(element)` on them.
+/// Scripts of pages. If parts of a page are put into another page later, call `enliven(element)` on them.
 pub fn scripts() -> impl Iterator<Item = &'static str> {
     pages::SCRIPTS.into_iter().chain([CURVES])
 }
 
-/// What stands between two marks; empty if they are missing.
-pub(super) fn between<'a>(text: &'a str, from: &str, to: &str) -> &'a str {
-    let inner = text
-        .split_once(from)
-        .and_then(|(_, rest)| rest.split_once(to));
+/// Text between two marks; empty if they are missing.
+pub(super) fn text_between<'a>(text: &'a str, from: &str, to: &str) -> &'a str {
+    // The first occurrence of each mark counts.
+    let inner = text.split_once(from).and_then(|(_, rest)| rest.split_once(to));
     inner.map_or("", |(inner, _)| inner)
 }
 
-fn summary(findings: &Findings) -> String {
+/// Verdict and tiles with the main figures.
+fn summary(findings: &DiagnosisFindings) -> String {
     let diagnosis = &findings.diagnosis;
+    // The class of the verdict gives its colour.
     let (class, word) = match diagnosis.verdict {
-        Verdict::Adequate => ("adequate", "adequate"),
-        Verdict::MissingEffect => ("missing", "an effect is missing"),
-        Verdict::Unexplained => ("unexplained", "unexplained"),
+        DiagnosisVerdict::Adequate => ("adequate", "model is adequate"),
+        DiagnosisVerdict::MissingEffect => ("missing", "an effect is missing"),
+        DiagnosisVerdict::Unexplained => ("unexplained", "error is not explained"),
     };
-    let says = words::verdict(diagnosis, &findings.before.model.drives(), findings.judged);
+    // The same sentences as in the text output.
+    let says = words::verdict(diagnosis, &findings.before.model.drives(), findings.validation);
+    // Tiles: verdict, error before and after, noise.
     let mut tiles = vec![("verdict", word.to_owned())];
-    if let (Some(first), Some(last)) = (diagnosis.ladder.first(), diagnosis.ladder.last()) {
-        tiles.push(("error as it is", percent(Some(first.check))));
-        if diagnosis.ladder.len() > 1 {
-            tiles.push(("with the effects", percent(Some(last.check))));
+    if let (Some(first), Some(last)) = (diagnosis.steps.first(), diagnosis.steps.last()) {
+        tiles.push(("error of the given model", percent(Some(first.check))));
+        if diagnosis.steps.len() > 1 {
+            tiles.push(("error with the effects", percent(Some(last.check))));
         }
     }
-    tiles.push(("noise", percent(Some(diagnosis.noise_floor))));
+    // Errors cannot fall below the noise.
+    let noise = words::floor_label(diagnosis.noise_floor);
+    tiles.push((noise, percent(Some(diagnosis.noise_floor))));
+    // A list of terms, which also makes sense without style.
     let tiles: Vec<String> = tiles
         .iter()
         .map(|(name, value)| format!("<div><dt>{name}</dt><dd>{}</dd></div>", escape(value)))
@@ -116,22 +125,26 @@ fn summary(findings: &Findings) -> String {
     )
 }
 
-fn the_ladder(findings: &Findings) -> String {
+/// Errors after each added effect, as picture and table, and errors of each drive.
+fn ladder_section(findings: &DiagnosisFindings) -> String {
+    // The picture shows the steps, the table has the numbers.
     let diagnosis = &findings.diagnosis;
     format!(
         "<figure class=\"still\"><figcaption><b>Error relative to the force</b> <span class=\"key c-fit\">fit</span> \
          <span class=\"key c-after\">{}</span></figcaption>\n{}</figure>\n{}\n\
-         <p>An error is the root of the squared difference of measured and calculated forces over the squared measured ones. \
-         Steps were judged {}.</p>\n{}",
-        findings.judged.words(),
-        ladder::picture(&diagnosis.ladder, diagnosis.noise_floor, findings.judged),
+         <p>All errors are nrms: rms of measured minus calculated force, divided by rms of the measured force. Each step was \
+         tested {}.</p>\n{}",
+        findings.validation.phrase(),
+        ladder::picture(&diagnosis.steps, diagnosis.noise_floor, findings.validation),
         tables::ladder(findings),
-        findings.judged.words(),
+        findings.validation.phrase(),
         tables::drives(findings)
     )
 }
 
-fn found(findings: &Findings, spelling: &dyn StepSpelling) -> String {
+/// Missing effects with next steps, then laws.
+fn missing_section(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String {
+    // Effects of the library come before laws, which are only hypotheses.
     let mut html = effects(findings, spelling);
     if !findings.laws.is_empty() {
         html.push_str(&laws(findings, spelling));
@@ -139,113 +152,119 @@ fn found(findings: &Findings, spelling: &dyn StepSpelling) -> String {
     html
 }
 
-/// Laws that would explain what is left.
-fn laws(findings: &Findings, spelling: &dyn StepSpelling) -> String {
+/// Laws that would explain the residual.
+fn laws(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String {
     let model = &findings.before.model;
     let mut html = format!(
-        "<h3>Which law would explain what is left</h3>\n<p>{}</p>\n",
-        escape(told::HYPOTHESIS)
+        "<h3>Laws that would explain the residual</h3>\n<p>{}</p>\n",
+        escape(law_texts::HYPOTHESIS)
     );
     for hypothesis in &findings.laws {
+        // Each law with its values, the share that it explains, and its alternatives.
         let law = &hypothesis.law;
         let _ = writeln!(
             html,
             "<p><code>{}</code> with {}: it {}</p>",
-            escape(&law.says()),
-            escape(&told::values(law)),
-            escape(&told::gain(law))
+            escape(&law.label()),
+            escape(&law_texts::values(law)),
+            escape(&law_texts::gain(law))
         );
+        // Alternatives that the recordings do not distinguish.
         if !hypothesis.near_ties.is_empty() {
-            html.push_str("<p>As near to these recordings are</p>\n<ul>\n");
+            html.push_str("<p>These laws explain the recordings equally well:</p>\n<ul>\n");
             for tie in &hypothesis.near_ties {
-                let _ = writeln!(html, "<li><code>{}</code></li>", escape(&tie.says()));
+                let _ = writeln!(html, "<li><code>{}</code></li>", escape(&tie.label()));
             }
             html.push_str("</ul>\n");
         }
+        // A law without memory can be added from a library file.
         match &law.entry {
             Some(entry) => {
-                let command = spelling.spell_effect_of_library(model, &entry.effect, told::LIBRARY);
+                let command = spelling.spell_effect_of_library(model, &entry.effect, law_texts::LIBRARY);
                 let _ = writeln!(
                     html,
-                    "<p>As a library, <code>{}</code>, and with it:</p>\n<pre class=\"commands\"><code>{}</code></pre>\n\
+                    "<p>As a library file, <code>{}</code>, and the step that adds it:</p>\n<pre class=\"commands\"><code>{}</code></pre>\n\
                      <pre class=\"commands\"><code>{}</code></pre>",
-                    told::LIBRARY,
+                    law_texts::LIBRARY,
                     escape(&entry.text),
                     escape(&command)
                 );
             }
             None => {
-                let _ = writeln!(html, "<p>{}</p>", escape(told::REMEMBERS));
+                let _ = writeln!(html, "<p>{}</p>", escape(law_texts::PATH_DEPENDENT_NOTE));
             }
         }
     }
     html
 }
 
-fn effects(findings: &Findings, spelling: &dyn StepSpelling) -> String {
-    if findings.to_add().is_empty() {
-        if let Some(says) = findings.beside_the_file() {
+/// Missing effects and the steps that add them, or the reason why none should be added.
+fn effects(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String {
+    // Without entries to add there may still be findings, such as a delayed force signal.
+    if findings.entries_to_add().is_empty() {
+        if let Some(says) = findings.further_action() {
             return format!("{}<p>{says}</p>\n", tables::effects(findings));
         }
         let says = match findings.diagnosis.verdict {
-            Verdict::Adequate => {
-                "Nothing needs to be added. The parameters below are those that the recordings ask for."
+            DiagnosisVerdict::Adequate => {
+                "Nothing needs to be added. The parameters below are fitted to the recordings."
             }
             _ => {
-                "No effect of the library may be added in good faith. Below it says where the error lives; a kind of your own \
-                 can be given in the model file or a library."
+                "No effect of the library explains the error reliably. Look below where the error is largest. You can define a \
+                 kind of effect of your own in the model file or in a library."
             }
         };
         return format!("<p>{says}</p>\n");
     }
+    // The effects with values, then the steps.
     let mut html = tables::effects(findings);
     if let Err(says) = &findings.after {
         let _ = writeln!(
             html,
-            "<p class=\"alias\">The model with these effects could not be made: {}</p>",
+            "<p class=\"alias\">The model with these effects could not be built: {}</p>",
             escape(&says.spell(spelling))
         );
     }
     let model = &findings.before.model;
+    // The steps: one for each effect, and a new identification.
     let mut commands: Vec<String> = findings
-        .to_add()
+        .entries_to_add()
         .iter()
         .map(|entry| spelling.spell_effect(model, entry))
         .collect();
     commands.push(spelling.spell_identification(model));
     let _ = writeln!(
         html,
-        "<p>Add it to the model file, which keeps its comments, and identify again:</p>\n<pre class=\"commands\"><code>{}</code></pre>",
+        "<p>Add the effects to the model file (its comments stay), and identify again:</p>\n<pre class=\"commands\"><code>{}</code></pre>",
         escape(&commands.join("\n"))
     );
     html
 }
 
-fn the_curves(findings: &Findings) -> String {
+/// Forces over time, with help for the mouse.
+fn curves_section(findings: &DiagnosisFindings) -> String {
     format!(
-        "<p class=\"script-only\">Turn the wheel over a picture to zoom, drag to move, drag with Shift to mark a stretch, double \
-         click for the whole. With the keyboard: + and −, arrows, 0. A click on a name hides its curve, one on a number of a \
-         table copies its digits.</p>\n{}",
+        "<p class=\"script-only\">Mouse wheel: zoom. Drag: move. Shift and drag: zoom to a time interval. Double click: show all. \
+         Keys: + and −, arrows, 0. Click on a name to hide its curve. Click on a number of a table to copy it.</p>\n{}",
         curves::section(
             &findings.before,
             findings.after.as_ref().ok(),
-            ["model as it is", "with the effects"]
+            ["given model", "model with the effects"]
         )
     )
 }
 
-fn location(findings: &Findings) -> String {
+/// Regions of the error before and after the effects, and error maps.
+fn location(findings: &DiagnosisFindings) -> String {
+    // Both models are shown if the second one could be built.
     let after = findings.after.as_ref().ok();
     let mut html = String::new();
-    html.push_str(&sentences(
-        &findings.places,
-        "The error of the model as it is",
-    ));
+    html.push_str(&sentences(&findings.places, "The error of the given model"));
     if !findings.places.regions.is_empty() {
         let _ = writeln!(
             html,
-            "<p>Each picture shows mean and standard deviation of the error over its variable, the region shaded. {}</p>",
-            keys(after.is_some())
+            "<p>Each picture shows mean and standard deviation of the error over one variable. The range named in its caption is shaded. Each picture looks at one variable alone, so the ranges overlap. {}</p>",
+            legend(after.is_some())
         );
         html.push_str(&regions::figures(
             &findings.places.regions,
@@ -254,9 +273,10 @@ fn location(findings: &Findings) -> String {
             &findings.variables,
         ));
     }
-    if let Some(left) = &findings.left {
-        html.push_str("<h3>What is left with the effects</h3>\n");
-        html.push_str(&sentences(left, "What is left"));
+    // Regions of the residual are listed without pictures.
+    if let Some(left) = &findings.residual_locations {
+        html.push_str("<h3>Residual with the effects</h3>\n");
+        html.push_str(&sentences(left, "The residual"));
         if !left.regions.is_empty() {
             html.push_str("<ul>\n");
             for region in &left.regions {
@@ -274,62 +294,67 @@ fn location(findings: &Findings) -> String {
     html
 }
 
-/// What there is to say where there is no region.
-fn sentences(places: &Places, what: &str) -> String {
+/// A sentence in place of regions: the error is rounding, or no region stands out.
+fn sentences(places: &ErrorLocations, what: &str) -> String {
     let mut html = String::new();
+    // Regions of rounding errors would mislead.
     if !places.rounding.is_empty() {
         let _ = writeln!(
             html,
-            "<p>{what} of {} is rounding of the numbers in the recording: there is nothing to find.</p>",
+            "<p>{what} of {} is only rounding error of the recorded numbers, so it contains no further effect.</p>",
             escape(&places.rounding.join(", "))
         );
     } else if places.regions.is_empty() {
         let _ = writeln!(
             html,
-            "<p>No region of coordinates, rates, loads or time stands out in {}.</p>",
-            what.to_lowercase()
+            "<p>{what} is largest nowhere in particular: no range of a coordinate, rate, load or time stands out.</p>",
         );
     }
     html
 }
 
-fn candidates(findings: &Findings) -> String {
+/// Table of all candidates with an explanation of its columns.
+fn candidates(findings: &DiagnosisFindings) -> String {
     format!(
-        "<p>Every kind of the library at every place that it fits. The first share is of the squared error of the model as it is; \
-         the gain is of what is left beside the effects that were found, for a found one what would be lost without it.\
-         <span class=\"script-only\"> A click on a head sorts.</span></p>\n{}",
+        "<p>The table has every kind of effect and fault at every place (drive, joint, point, part) where it can act. The first share is \
+         the part of the squared error that the candidate alone would remove. The gain is the part of the squared residual that it \
+         removes in addition to the effects found; for an effect that was found, in addition to the other effects.\
+         <span class=\"script-only\"> Click on the heading of a column to sort.</span></p>\n{}",
         tables::candidates(findings)
     )
 }
 
-fn parameters(findings: &Findings) -> String {
+/// Base parameters with the effects, and folded those without.
+fn parameters(findings: &DiagnosisFindings) -> String {
     if findings.before.identified.is_none() {
         return tables::parameters(&findings.before);
     }
     let mut html = String::new();
     match &findings.after {
         Ok(after) => {
-            html.push_str("<p>Base parameters of the model with the effects, identified from the recordings of the fit with drives weighted by their residuals. Deviations allow for residuals that resemble their neighbours.</p>\n");
+            html.push_str("<p>Base parameters of the model with the effects, fitted by weighted least squares: the equations of each drive are divided by the standard deviation of its residual. The standard deviations below take into account that residuals are correlated in time.</p>\n");
             html.push_str(&tables::parameters(after));
             let _ = writeln!(
                 html,
-                "<details>\n<summary>The same without the effects</summary>\n{}</details>",
+                "<details>\n<summary>Parameters without the effects</summary>\n{}</details>",
                 tables::parameters(&findings.before)
             );
         }
         Err(_) => {
-            html.push_str("<p>Base parameters, identified from the recordings of the fit with drives weighted by their residuals. Deviations allow for residuals that resemble their neighbours.</p>\n");
+            html.push_str("<p>Base parameters, fitted by weighted least squares: the equations of each drive are divided by the standard deviation of its residual. The standard deviations below take into account that residuals are correlated in time.</p>\n");
             html.push_str(&tables::parameters(&findings.before));
         }
     }
     html
 }
 
-/// The page of equations within this one: names of places on it get a prefix, headings go down two steps.
-fn embedded(findings: &Findings, page: &str) -> String {
-    let inner = between(page, "<main>", "</main>")
+/// The page of equations inside this page: its anchors get a prefix, its headings go down two levels.
+fn embed_equations(findings: &DiagnosisFindings, page: &str) -> String {
+    // Only the main part is taken; styles and scripts are on this page already.
+    let inner = text_between(page, "<main>", "</main>")
         .replace(" id=\"", " id=\"equations-")
         .replace("href=\"#", "href=\"#equations-");
+    // Headings become lower ones in an order in which no replacement meets the result of another.
     let mut inner = inner;
     for (from, to) in [("h3", "h5"), ("h2", "h4"), ("h1", "h3")] {
         inner = inner
@@ -337,12 +362,13 @@ fn embedded(findings: &Findings, page: &str) -> String {
             .replace(&format!("<{from}>"), &format!("<{to}>"))
             .replace(&format!("</{from}>"), &format!("</{to}>"));
     }
+    // The summary of the folded part names the model.
     let what = if findings.after.is_ok() {
         "The model with the effects"
     } else {
         "The model"
     };
     format!(
-        "<details class=\"embedded\">\n<summary>{what}: how it was derived, p_g, dependences, p_min, programs</summary>\n{inner}</details>\n",
+        "<details class=\"embedded\">\n<summary>{what}: derivation, p_g, dependences, p_min, programs</summary>\n{inner}</details>\n",
     )
 }

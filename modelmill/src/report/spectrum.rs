@@ -1,41 +1,46 @@
-//! Spectra of what the model leaves, by averaged windowed segments (P. Welch, IEEE Trans. Audio Electroacoustics 15 (1967)).
+//! Spectra of the residuals, by averaged windowed segments (P. Welch, IEEE Trans. Audio Electroacoustics 15 (1967)).
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 
-use super::draw::{Axis, LEFT, Picture, RIGHT, WIDTH, range};
+use super::draw::{LEFT, PlotAxis, RIGHT, SvgPicture, WIDTH, range};
 use super::units::force_unit;
-use crate::diagnose::Version;
+use crate::diagnose::ModelVersion;
 use crate::text::svg::escape;
 
+/// Height of a picture.
 const HEIGHT: f64 = 170.0;
-/// Samples of a segment.
+/// Largest number of samples of a segment.
 const SEGMENT: usize = 2048;
-/// Frequencies, evenly spaced in decades.
+/// Number of frequencies, evenly spaced on a logarithmic axis.
 const FREQUENCIES: usize = 140;
 
-/// Density of a signal at some frequencies, unit^2/Hz: `(frequency in Hz, density)`.
+/// Power spectral density of a signal at some frequencies, one-sided: `(frequency in Hz, unit^2/Hz)`. `rate` is the
+/// sampling rate, Hz. Empty for fewer than 32 samples.
 pub(crate) fn density(signal: &[f64], rate: f64) -> Vec<(f64, f64)> {
+    // Short signals are one segment, very short ones have no spectrum.
     let n = SEGMENT.min(signal.len());
     if n < 32 || !(rate > 0.0 && rate.is_finite()) {
         return Vec::new();
     }
+    // The window of Hann, which keeps a strong line from hiding weak frequencies next to it.
     let window: Vec<f64> = (0..n)
         .map(|i| 0.5 - 0.5 * (TAU * (i as f64 + 0.5) / n as f64).cos())
         .collect();
+    // The window removes power, for which the density is corrected.
     let power: f64 = window.iter().map(|w| w * w).sum();
+    // Segments overlap by half, as Welch recommends for this window.
     let starts: Vec<usize> = (0..=signal.len() - n).step_by(n / 2).collect();
     let segments: Vec<Vec<f64>> = starts
         .iter()
         .map(|start| {
             let part = &signal[*start..start + n];
+            // The mean would leak into low frequencies.
             let mean = part.iter().sum::<f64>() / n as f64;
-            part.iter()
-                .zip(&window)
-                .map(|(x, w)| (x - mean) * w)
-                .collect()
+            part.iter().zip(&window).map(|(x, w)| (x - mean) * w).collect()
         })
         .collect();
+    // Frequencies are bins of the discrete Fourier transform; low ones may coincide.
     let mut bins: Vec<usize> = (0..FREQUENCIES)
         .map(|k| {
             let share = k as f64 / (FREQUENCIES - 1) as f64;
@@ -52,6 +57,7 @@ pub(crate) fn density(signal: &[f64], rate: f64) -> Vec<(f64, f64)> {
     bins.iter()
         .map(|bin| {
             let sum: f64 = segments.iter().map(|s| goertzel(s, *bin)).sum();
+            // One-sided density: the factor 2 adds the negative frequencies.
             let density = 2.0 * sum / (segments.len() as f64 * power * rate);
             (*bin as f64 * rate / n as f64, density)
         })
@@ -68,13 +74,13 @@ fn goertzel(values: &[f64], bin: usize) -> f64 {
     one * one + two * two - factor * one * two
 }
 
-/// A figure for each drive: what is left over frequency, before and after.
-pub(crate) fn figures(before: &Version, after: Option<&Version>) -> String {
+/// A figure for each drive: density of the residual over frequency, before and after the effects.
+pub(crate) fn figures(before: &ModelVersion, after: Option<&ModelVersion>) -> String {
     let mut html = String::new();
     for (d, drive) in before.model.drives().iter().enumerate() {
-        let of = |version: &Version| -> Vec<(f64, f64)> {
-            // The longest run says most about low frequencies.
-            let judged = version.judged();
+        let of = |version: &ModelVersion| -> Vec<(f64, f64)> {
+            // The longest run resolves the lowest frequencies.
+            let judged = version.validation_runs();
             let longest = judged.iter().max_by_key(|k| version.runs[**k].time.len());
             let Some(run) = longest.map(|k| &version.runs[*k]) else {
                 return Vec::new();
@@ -83,48 +89,46 @@ pub(crate) fn figures(before: &Version, after: Option<&Version>) -> String {
             if n < 2 {
                 return Vec::new();
             }
+            // The mean rate after decimation.
             let rate = (n - 1) as f64 / (run.time[n - 1] - run.time[0]);
             density(&run.error(d), rate)
         };
-        let curves = [
-            Some(("c-before", of(before))),
-            after.map(|v| ("c-after", of(v))),
-        ];
+        let curves = [Some(("c-before", of(before))), after.map(|v| ("c-after", of(v)))];
         let curves: Vec<(&str, Vec<(f64, f64)>)> = curves.into_iter().flatten().collect();
+        // The picture shows amplitude densities, whose unit is that of the force per root of Hz.
         let roots: Vec<f64> = curves
             .iter()
             .flat_map(|(_, c)| c.iter().map(|(_, v)| v.sqrt()))
             .filter(|v| *v > 0.0)
             .collect();
-        let frequencies: Vec<f64> = curves
-            .iter()
-            .flat_map(|(_, c)| c.iter().map(|(f, _)| *f))
-            .collect();
+        let frequencies: Vec<f64> = curves.iter().flat_map(|(_, c)| c.iter().map(|(f, _)| *f)).collect();
         if roots.is_empty() {
             continue;
         }
-        let x = Axis::decades(range(&frequencies), [LEFT, WIDTH - RIGHT]);
+        // Both axes are logarithmic, since densities cover decades.
+        let x = PlotAxis::decades(range(&frequencies), [LEFT, WIDTH - RIGHT]);
         let [low, high] = range(&roots);
-        let y = Axis::decades(
+        let y = PlotAxis::decades(
+            // At most eight decades are shown; what is below is rounding.
             [(low / 1.5).max(high * 1e-8), high * 1.5],
             [HEIGHT - 34.0, 8.0],
         );
-        let mut picture = Picture::new(WIDTH, HEIGHT);
+        let mut picture = SvgPicture::new(WIDTH, HEIGHT);
         picture.frame(&x, &y, "frequency, Hz", [8, 4]);
         for (class, curve) in &curves {
             let mut path = String::new();
             for (k, (f, v)) in curve.iter().enumerate() {
                 let pen = if k == 0 { 'M' } else { 'L' };
-                let _ = write!(path, "{pen}{:.1} {:.1}", x.at(*f), y.at(v.sqrt()));
+                let _ = write!(path, "{pen}{:.1} {:.1}", x.position(*f), y.position(v.sqrt()));
             }
             picture.path(&format!("curve {class}"), &path);
         }
         let unit = force_unit(&before.model, d);
         let _ = write!(
             html,
-            "<figure class=\"still\"><figcaption><b>{}: error over frequency, {unit}/√Hz</b> {}</figcaption>\n{}</figure>\n",
+            "<figure class=\"still\"><figcaption><b>{}: amplitude spectral density of the error, {unit}/√Hz</b> {}</figcaption>\n{}</figure>\n",
             escape(drive),
-            super::keys(after.is_some()),
+            super::legend(after.is_some()),
             picture.finish(&format!("spectrum of the error of {drive}"))
         );
     }
@@ -153,9 +157,7 @@ mod tests {
                 .wrapping_add(1_442_695_040_888_963_407);
             (state >> 11) as f64 / (1_u64 << 53) as f64
         };
-        let noise: Vec<f64> = (0..60_000)
-            .map(|_| (uniform() - 0.5) * 12_f64.sqrt())
-            .collect();
+        let noise: Vec<f64> = (0..60_000).map(|_| (uniform() - 0.5) * 12_f64.sqrt()).collect();
         let found = density(&noise, rate);
         let mean = found.iter().map(|(_, v)| v).sum::<f64>() / found.len() as f64;
         assert!((mean * rate / 2.0 - 1.0).abs() < 0.1, "{mean}");

@@ -1,4 +1,4 @@
-//! Units of what a model's recordings hold.
+//! Units of forces and variables of recordings, for axes and sentences.
 
 use crate::model::Model;
 
@@ -7,7 +7,8 @@ pub(crate) fn force_unit(model: &Model, drive: usize) -> &'static str {
     model.force_unit(drive)
 }
 
-/// Unit of a variable by its name: a coordinate or the length of a drive, their rates and accelerations, a force, the time.
+/// Unit of a variable by its name: a coordinate or the length of a drive, their rates and accelerations, a
+/// force, the time.
 pub(crate) fn variable_unit(model: &Model, name: &str) -> String {
     let mechanism = &model.derivation.mechanism;
     if name == modelmill_identify::TIME_COLUMN {
@@ -30,6 +31,6 @@ pub(crate) fn variable_unit(model: &Model, name: &str) -> String {
 }
 
 /// A unit as it is written by hand: `kg m^2` as `kg m²`.
-pub(crate) fn pretty(unit: &str) -> String {
+pub(crate) fn typographic_unit(unit: &str) -> String {
     unit.replace("^2", "²").replace("^3", "³")
 }

@@ -1,202 +1,199 @@
-//! What a change is in physics.
+//! Physical changes between runs: their kinds, values and texts.
 //!
-//! Decision: where a drive carries nothing but its friction, more friction and a larger force scale are the same.
-//! Friction changes every day and sensors hardly ever, so friction is named first and the scale as its alternative.
+//! Decision: at a drive whose only force is its own friction, more friction and a larger scale of the force are
+//! indistinguishable. Friction changes every day and sensors hardly ever, so friction is named first and the scale
+//! as its alternative.
 
-use modelmill_identify::changes::{Candidate, Change, Values};
-use modelmill_spec::{DriveKind, Place};
+use modelmill_identify::changes::{JointValues, PossibleChange, SelectedChange};
+use modelmill_spec::{DriveKind, EffectPlace};
 use nalgebra::DVector;
 
-use crate::audit::events::Event;
+use crate::audit::events::ContactEvent;
 use crate::model::Model;
-use crate::runs::layout::Layout;
-use crate::runs::payload::{Payloads, TEN};
+use crate::runs::layout::RunColumnLayout;
+use crate::runs::payload::{PayloadColumns, TEN};
+use crate::runs::thresholds::{KNOWN_VALUE_SIGMAS, SCALE_CHANGE_RARITY};
 use crate::text::table::{significant, with_deviation};
 
-/// A value with its standard deviation.
+/// An estimated value with its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Estimate {
-    /// The value.
+pub struct ChangeEstimate {
+    /// The value, in the unit of the quantity.
     pub value: f64,
-    /// Its standard deviation.
+    /// Its standard deviation, in the same unit.
     pub deviation: f64,
 }
 
-impl Estimate {
+impl ChangeEstimate {
+    /// The value with its standard deviation and unit.
     fn text(self, unit: &str) -> String {
         let [value, deviation] = with_deviation(self.value, self.deviation);
-        format!("{value} +- {deviation} {unit}")
-            .trim_end()
-            .to_owned()
+        format!("{value} +- {deviation} {unit}").trim_end().to_owned()
     }
 
-    /// Whether it is known to a third of its size.
+    /// Whether its standard deviation is below a third of its size.
     fn is_known(self) -> bool {
-        3.0 * self.deviation < self.value.abs()
+        KNOWN_VALUE_SIGMAS * self.deviation < self.value.abs()
     }
 }
 
-/// What changed.
+/// A physical change of the machine or of its recording.
 #[derive(Clone, Debug, PartialEq)]
-pub enum What {
+pub enum PhysicalChange {
     /// Another load on a body.
     Payload {
-        /// The frame that carries it.
+        /// The frame that carries the load.
         frame: String,
-        /// What it weighs, kg; `None` where the motion does not tell.
-        mass: Option<Estimate>,
-        /// Its centre in the frame, m; `None` for directions that the motion does not tell.
-        centre: [Option<Estimate>; 3],
+        /// Mass of the load, kg; `None` if the motion does not determine it.
+        mass: Option<ChangeEstimate>,
+        /// Centre of the load in the frame, m; `None` for directions that the motion does not determine.
+        centre: [Option<ChangeEstimate>; 3],
     },
-    /// Other friction of a drive.
+    /// Changed friction of a drive.
     Friction {
         /// The drive.
         drive: String,
-        /// Dry friction, N or N m.
-        dry: Estimate,
-        /// Viscous friction, N or N m per m/s or rad/s.
-        viscous: Estimate,
-        /// Both as parts of what the first run has, where the model has such friction.
+        /// Change of the dry friction, N or N m.
+        dry: ChangeEstimate,
+        /// Change of the viscous friction, N or N m per m/s or rad/s.
+        viscous: ChangeEstimate,
+        /// Both relative to the friction in the first run, if the model has such friction.
         parts: [Option<f64>; 2],
     },
-    /// Another constant force of a drive, N or N m.
+    /// A changed constant force of a drive.
     Offset {
         /// The drive.
         drive: String,
-        /// The force.
-        force: Estimate,
+        /// Change of the force, N or N m.
+        force: ChangeEstimate,
     },
-    /// Another scale of a drive's measured force.
+    /// A changed scale of a drive's measured force.
     Scale {
         /// The drive.
         drive: String,
-        /// The factor; 1 where nothing changed.
-        factor: Estimate,
+        /// The factor; 1 without a change.
+        factor: ChangeEstimate,
     },
-    /// Another clock.
+    /// A changed clock.
     Clock {
-        /// How many times as fast as its time stamps say the run was; 1 where nothing changed.
-        factor: Estimate,
+        /// Ratio of the true speed to that of the time stamps; 1 without a change.
+        factor: ChangeEstimate,
     },
     /// A contact or a push within the run.
     ContactEvent {
-        /// The drives on which it shows, each with the largest force that nothing explains, N or N m.
+        /// The drives on which it acts, each with the largest unexplained force, N or N m.
         drives: Vec<(String, f64)>,
-        /// When it begins and ends, s.
+        /// Start and end, s.
         interval: [f64; 2],
     },
-    /// Another zero of an encoder.
+    /// A changed zero of an encoder.
     EncoderZero {
         /// The coordinate.
         coordinate: String,
-        /// By how much the true position lies above the recorded one, rad or m.
-        shift: Estimate,
+        /// True position minus recorded position, rad or m.
+        shift: ChangeEstimate,
     },
 }
 
-/// A value with its name and unit.
-pub type Named = (&'static str, Estimate, &'static str);
+/// A value with its symbol and unit.
+pub type NamedEstimate = (&'static str, ChangeEstimate, &'static str);
 
-impl What {
-    /// What scripts call it, where it is, and its values with their names and units; `unit` is that of the force or coordinate.
-    pub fn parts(&self, unit: &'static str) -> (&'static str, Vec<&str>, Vec<Named>) {
+impl PhysicalChange {
+    /// The kind for scripts, its places, and its values with symbols and units; `unit` is the unit of the force or
+    /// coordinate.
+    pub fn parts(&self, unit: &'static str) -> (&'static str, Vec<&str>, Vec<NamedEstimate>) {
         let (kind, at, estimates) = match self {
             Self::ContactEvent { drives, interval } => {
                 let names = drives.iter().map(|(name, _)| name.as_str()).collect();
-                // An event is told by its samples, which lie a step apart.
-                let [from, to] = interval.map(|value| Estimate {
-                    value,
-                    deviation: 0.0,
-                });
+                // The times of an event are those of samples, so that they have no standard deviation.
+                let [from, to] = interval.map(|value| ChangeEstimate { value, deviation: 0.0 });
                 let times = vec![("from", from, "s"), ("to", to, "s")];
                 return ("contact_event", names, times);
             }
-            Self::Payload {
-                frame,
-                mass,
-                centre,
-            } => {
+            Self::Payload { frame, mass, centre } => {
                 let of_mass = mass.iter().map(|mass| ("mass", *mass, "kg"));
                 let at = ["x", "y", "z"].into_iter().zip(centre);
                 let at = at.filter_map(|(axis, at)| Some((axis, (*at)?, "m")));
                 ("payload", frame, of_mass.chain(at).collect())
             }
             Self::Friction {
-                drive,
-                dry,
-                viscous,
-                ..
+                drive, dry, viscous, ..
             } => (
                 "friction",
                 drive,
-                vec![("Fc", *dry, unit), ("Fv", *viscous, per_rate(unit))],
+                vec![("Fc", *dry, unit), ("Fv", *viscous, viscous_unit(unit))],
             ),
             Self::Offset { drive, force } => ("offset", drive, vec![("F0", *force, unit)]),
             Self::Scale { drive, factor } => ("drive_gain", drive, vec![("gain", *factor, "1")]),
             Self::Clock { factor } => {
                 return ("time_base", vec!["t"], vec![("factor", *factor, "1")]);
             }
-            Self::EncoderZero { coordinate, shift } => {
-                ("encoder_zero", coordinate, vec![("shift", *shift, unit)])
-            }
+            Self::EncoderZero { coordinate, shift } => ("encoder_zero", coordinate, vec![("shift", *shift, unit)]),
         };
         (kind, vec![at.as_str()], estimates)
     }
 }
 
-/// A change of a run against the first one.
+/// A change of a run relative to the first run.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Changed {
-    /// What it is.
-    pub what: What,
-    /// By how much the sum of squares of the white residual would rise without it; 0 for events, which are looked for by
-    /// themselves.
+pub struct RunChange {
+    /// The physical change.
+    pub change: PhysicalChange,
+    /// Rise of the sum of squares of the white residual without the change; 0 for events, which are found
+    /// separately.
     pub gain: f64,
-    /// Unit of its values where it is that of a drive or a coordinate.
+    /// Unit of its values, if that depends on the drive or coordinate.
     pub unit: &'static str,
-    /// Changes that explain nearly as much in its place, in words.
+    /// Names of changes that explain nearly as much in its place.
     pub rivals: Vec<String>,
-    /// The change in words.
+    /// The change as text.
     pub says: String,
 }
 
-/// Kinds of change, each with the drive or frame that it belongs to.
+/// Kinds of change, each with the frame, drive or coordinate that it belongs to.
 #[derive(Clone, Debug)]
-pub(crate) enum Kind {
+pub(crate) enum ChangeKind {
+    /// A load on a frame, by its name.
     Payload(String),
+    /// Friction of a drive, by its index.
     Friction(usize),
+    /// A constant force on a drive, by its index.
     Offset(usize),
+    /// The scale of a drive's measured force, by its index.
     Scale(usize),
+    /// The clock of the run.
     Clock,
+    /// The zero of an encoder, by the index of the active coordinate.
     EncoderZero(usize),
 }
 
-/// A change that is possible.
+/// A hypothesis of the search.
 #[derive(Clone, Debug)]
-pub(crate) struct Possible {
-    pub(crate) kind: Kind,
-    /// What the search knows of it.
-    pub(crate) candidate: Candidate,
+pub(crate) struct ChangeHypothesis {
+    /// The kind and its place.
+    pub(crate) kind: ChangeKind,
+    /// Its columns and its cost in the search.
+    pub(crate) candidate: PossibleChange,
 }
 
-/// What a drive's other scale is charged beside its value: friction changes every day, sensors, torque constants and gears
-/// hardly ever. It decides where both explain the same, as at a drive that carries nothing but its own friction.
-const RARE: f64 = 0.2;
-
-/// All changes that are possible.
-pub(crate) fn possible(model: &Model, payloads: &Payloads, layout: Layout) -> Vec<Possible> {
-    let possible = |kind: Kind, columns: Vec<usize>| {
+/// All hypotheses of the search: payloads, then friction, offset and scale of each drive, clock, zeros of encoders.
+pub(crate) fn possible_changes(
+    model: &Model,
+    payloads: &PayloadColumns,
+    layout: RunColumnLayout,
+) -> Vec<ChangeHypothesis> {
+    let possible = |kind: ChangeKind, columns: Vec<usize>| {
         let (most, rarity) = match kind {
-            // Dry and viscous friction rise and fall together.
-            Kind::Friction(_) => (1, 0.0),
-            Kind::Scale(_) => (1, RARE),
+            // Dry and viscous friction usually change together, so that they cost as much as one value.
+            ChangeKind::Friction(_) => (1, 0.0),
+            ChangeKind::Scale(_) => (1, SCALE_CHANGE_RARITY),
             _ => (columns.len(), 0.0),
         };
-        Possible {
+        ChangeHypothesis {
             kind,
-            candidate: Candidate {
+            candidate: PossibleChange {
                 columns,
-                most,
+                max_charged_values: most,
                 rarity,
             },
         }
@@ -204,169 +201,162 @@ pub(crate) fn possible(model: &Model, payloads: &Payloads, layout: Layout) -> Ve
     let mut all = Vec::new();
     for (f, frame) in payloads.frames.iter().enumerate() {
         let at = layout.payload(f);
-        all.push(possible(
-            Kind::Payload(frame.clone()),
-            (at..at + TEN).collect(),
-        ));
+        all.push(possible(ChangeKind::Payload(frame.clone()), (at..at + TEN).collect()));
     }
     for drive in 0..model.drives().len() {
         let friction = layout.friction(drive);
         for (kind, columns) in [
-            (Kind::Friction(drive), vec![friction, friction + 1]),
-            (Kind::Offset(drive), vec![layout.offset(drive)]),
-            (Kind::Scale(drive), vec![layout.scale(drive)]),
+            (ChangeKind::Friction(drive), vec![friction, friction + 1]),
+            (ChangeKind::Offset(drive), vec![layout.offset(drive)]),
+            (ChangeKind::Scale(drive), vec![layout.scale(drive)]),
         ] {
             all.push(possible(kind, columns));
         }
     }
-    all.push(possible(Kind::Clock, vec![layout.clock()]));
-    let zeros =
-        (0..layout.coordinates).map(|i| possible(Kind::EncoderZero(i), vec![layout.zero(i)]));
+    all.push(possible(ChangeKind::Clock, vec![layout.clock()]));
+    let zeros = (0..layout.coordinates).map(|i| possible(ChangeKind::EncoderZero(i), vec![layout.zero(i)]));
     all.extend(zeros);
     all
 }
 
-/// A change that was found, with what it is; `values` are the base parameters of the first run that are no known numbers.
-pub(crate) fn told(
+/// A change that was found, with its physical meaning; `values` are the unknown base parameters of the first run.
+pub(crate) fn identified_change(
     model: &Model,
-    possible: &[Possible],
-    found: &Change,
+    possible: &[ChangeHypothesis],
+    found: &SelectedChange,
     values: &DVector<f64>,
-) -> Changed {
-    let what = what(model, &possible[found.which].kind, found, values);
-    Changed {
-        says: says(model, &what),
-        unit: unit(model, &possible[found.which].kind),
-        what,
+) -> RunChange {
+    let what = physical_change(model, &possible[found.candidate].kind, found, values);
+    RunChange {
+        says: change_text(model, &what),
+        unit: unit(model, &possible[found.candidate].kind),
+        change: what,
         gain: found.gain,
-        rivals: found
-            .rivals
-            .iter()
-            .map(|k| name(model, &possible[*k].kind))
-            .collect(),
+        rivals: found.rivals.iter().map(|k| name(model, &possible[*k].kind)).collect(),
     }
 }
 
-/// A contact or a push within a run.
-pub(crate) fn event(model: &Model, event: &Event) -> Changed {
+/// The change of a contact or push within a run.
+pub(crate) fn event(model: &Model, event: &ContactEvent) -> RunChange {
     let names = model.drives();
     let drives = event.drives.iter();
-    let what = What::ContactEvent {
-        drives: drives
-            .map(|(d, largest, _)| (names[*d].clone(), *largest))
-            .collect(),
+    let what = PhysicalChange::ContactEvent {
+        drives: drives.map(|(d, largest, _)| (names[*d].clone(), *largest)).collect(),
         interval: [event.from, event.to],
     };
-    Changed {
-        says: says(model, &what),
+    RunChange {
+        says: change_text(model, &what),
         unit: "s",
-        what,
+        change: what,
         gain: 0.0,
         rivals: Vec::new(),
     }
 }
 
-fn what(model: &Model, kind: &Kind, found: &Change, values: &DVector<f64>) -> What {
-    let estimate = |i: usize| Estimate {
+/// The physical values of a change that was found.
+fn physical_change(model: &Model, kind: &ChangeKind, found: &SelectedChange, values: &DVector<f64>) -> PhysicalChange {
+    let estimate = |i: usize| ChangeEstimate {
         value: found.values[i],
         deviation: found.covariance[(i, i)].max(0.0).sqrt(),
     };
     let drive = |d: &usize| model.drives()[*d].clone();
     match kind {
-        Kind::Payload(frame) => {
-            let mass = found.determined[0]
-                .then(|| estimate(0))
-                .filter(|m| m.is_known());
-            What::Payload {
+        ChangeKind::Payload(frame) => {
+            // Mass and centre are given only if the mass is known.
+            let mass = found.determined[0].then(|| estimate(0)).filter(|m| m.is_known());
+            PhysicalChange::Payload {
                 frame: frame.clone(),
                 mass,
-                centre: centre(&Values {
+                centre: centre(&JointValues {
                     values: found.values.clone(),
                     covariance: found.covariance.clone(),
                     determined: found.determined.clone(),
                 }),
             }
         }
-        Kind::Friction(d) => {
+        ChangeKind::Friction(d) => {
+            // Relative changes exist only if the model has friction on this drive.
             let before = friction(model, *d).map(|k| k.map(|k| values[k]));
             let part = |i: usize| before[i].filter(|f| *f != 0.0).map(|f| found.values[i] / f);
-            What::Friction {
+            PhysicalChange::Friction {
                 drive: drive(d),
                 dry: estimate(0),
                 viscous: estimate(1),
                 parts: [part(0), part(1)],
             }
         }
-        Kind::Offset(d) => What::Offset {
+        ChangeKind::Offset(d) => PhysicalChange::Offset {
             drive: drive(d),
             force: estimate(0),
         },
-        Kind::Scale(d) => What::Scale {
+        ChangeKind::Scale(d) => PhysicalChange::Scale {
             drive: drive(d),
-            factor: one_more(estimate(0)),
+            factor: one_plus(estimate(0)),
         },
-        Kind::Clock => What::Clock {
-            factor: one_more(estimate(0)),
+        ChangeKind::Clock => PhysicalChange::Clock {
+            factor: one_plus(estimate(0)),
         },
-        Kind::EncoderZero(i) => What::EncoderZero {
-            coordinate: model.active()[*i].clone(),
+        ChangeKind::EncoderZero(i) => PhysicalChange::EncoderZero {
+            coordinate: model.active_coordinates()[*i].clone(),
             shift: estimate(0),
         },
     }
 }
 
-/// The unit of a force of a drive, or of a coordinate.
-fn unit(model: &Model, kind: &Kind) -> &'static str {
+/// The unit of the values of a change: of a force, a coordinate, or none.
+fn unit(model: &Model, kind: &ChangeKind) -> &'static str {
     match kind {
-        Kind::Friction(d) | Kind::Offset(d) | Kind::Scale(d) => model.force_unit(*d),
-        Kind::EncoderZero(i) if model.motions()[*i].1 => "rad",
-        Kind::EncoderZero(_) | Kind::Payload(_) => "m",
-        Kind::Clock => "1",
+        ChangeKind::Friction(d) | ChangeKind::Offset(d) | ChangeKind::Scale(d) => model.force_unit(*d),
+        ChangeKind::EncoderZero(i) if model.active_coordinate_types()[*i].1 => "rad",
+        ChangeKind::EncoderZero(_) | ChangeKind::Payload(_) => "m",
+        ChangeKind::Clock => "1",
     }
 }
 
-/// The unit of viscous friction of a drive whose force has the unit.
-pub(crate) fn per_rate(unit: &str) -> &'static str {
+/// The unit of viscous friction of a drive, from the unit of its force.
+pub(crate) fn viscous_unit(unit: &str) -> &'static str {
     if unit == "N" { "N s/m" } else { "N m s/rad" }
 }
 
-fn one_more(part: Estimate) -> Estimate {
-    Estimate {
+/// A factor from its difference to 1.
+fn one_plus(part: ChangeEstimate) -> ChangeEstimate {
+    ChangeEstimate {
         value: 1.0 + part.value,
         ..part
     }
 }
 
-/// Columns of a drive's dry and viscous friction, where they are base parameters of their own.
+/// Columns of a drive's dry and viscous friction, if they are separate base parameters.
 pub(crate) fn friction(model: &Model, drive: usize) -> [Option<usize>; 2] {
     ["coulomb_friction", "viscous_friction"].map(|kind| column_of(model, drive, kind))
 }
 
-/// The column of a drive's constant force, where it is a base parameter of its own.
+/// The column of a drive's constant force, if it is a separate base parameter.
 pub(crate) fn offset(model: &Model, drive: usize) -> Option<usize> {
     column_of(model, drive, "force_offset")
 }
 
-/// The column of a kind of effect with one parameter on a drive.
+/// The column of an effect kind with one parameter on a drive, counted among the unknown base parameters.
 fn column_of(model: &Model, drive: usize, kind: &str) -> Option<usize> {
     let mechanism = &model.derivation.mechanism;
-    let is_here = |place: &Place| match (place, mechanism.drives[drive].kind) {
-        (Place::Drive(d), _) => d.0 == drive,
-        (Place::Coordinate(a), DriveKind::Joint(b)) => *a == b,
+    // The place is the drive, or the joint on which it acts.
+    let is_here = |place: &EffectPlace| match (place, mechanism.drives[drive].kind) {
+        (EffectPlace::Drive(d), _) => d.0 == drive,
+        (EffectPlace::Coordinate(a), DriveKind::Joint(b)) => *a == b,
         _ => false,
     };
     let mut effects = mechanism.effects.iter();
     let effect = effects.find(|e| e.kind == kind && e.places.iter().all(is_here))?;
     let name = &mechanism.parameters[effect.terms.first()?.parameter.0].name;
-    let infos = model.infos();
+    let infos = model.parameter_infos();
     let mut unknown = (0..model.base.len()).filter(|k| !model.is_known(*k));
     unknown.position(|k| infos[k].expression == *name)
 }
 
-/// The centre of a body whose first four values are mass and first moments: first moment over mass, with the deviations of both
-/// and what they share; `None` for directions that are not told.
-pub(crate) fn centre(found: &Values) -> [Option<Estimate>; 3] {
-    let estimate = |i: usize| Estimate {
+/// The centre of a body whose first four values are mass and first moments, m: first moment over mass, with the
+/// standard deviation from both and their covariance. `None` for directions that are not determined.
+pub(crate) fn centre(found: &JointValues) -> [Option<ChangeEstimate>; 3] {
+    let estimate = |i: usize| ChangeEstimate {
         value: found.values[i],
         deviation: found.covariance[(i, i)].max(0.0).sqrt(),
     };
@@ -374,46 +364,42 @@ pub(crate) fn centre(found: &Values) -> [Option<Estimate>; 3] {
         let mass = found.determined[0].then(|| estimate(0));
         let mass = mass.filter(|mass| mass.is_known())?;
         let value = found.values[i] / mass.value;
+        // Variance of a quotient to first order.
         let c = |a: usize, b: usize| found.covariance[(a, b)];
         let variance = c(i, i) - 2.0 * value * c(0, i) + value * value * c(0, 0);
-        found.determined[i].then(|| Estimate {
+        found.determined[i].then(|| ChangeEstimate {
             value,
             deviation: variance.max(0.0).sqrt() / mass.value.abs(),
         })
     })
 }
 
-/// What a kind of change is called.
-pub(crate) fn name(model: &Model, kind: &Kind) -> String {
+/// The name of a kind of change, as a noun phrase.
+pub(crate) fn name(model: &Model, kind: &ChangeKind) -> String {
     let drive = |d: &usize| model.drives()[*d].clone();
     match kind {
-        Kind::Payload(frame) => format!("a load on {frame}"),
-        Kind::Friction(d) => format!("friction of {}", drive(d)),
-        Kind::Offset(d) => format!("a constant force on {}", drive(d)),
-        Kind::Scale(d) => format!("the scale of {}", drive(d)),
-        Kind::Clock => "the clock".to_owned(),
-        Kind::EncoderZero(i) => format!("the zero of {}", model.active()[*i]),
+        ChangeKind::Payload(frame) => format!("a load on {frame}"),
+        ChangeKind::Friction(d) => format!("friction of {}", drive(d)),
+        ChangeKind::Offset(d) => format!("a constant force on {}", drive(d)),
+        ChangeKind::Scale(d) => format!("the scale of {}", drive(d)),
+        ChangeKind::Clock => "the clock".to_owned(),
+        ChangeKind::EncoderZero(i) => format!("the zero of {}", model.active_coordinates()[*i]),
     }
 }
 
-fn says(model: &Model, what: &What) -> String {
+/// The change as a clause, with its values.
+fn change_text(model: &Model, what: &PhysicalChange) -> String {
     let unit = |name: &str| {
         let at = model.drives().iter().position(|drive| drive == name);
         at.map_or("", |d| model.force_unit(d))
     };
     match what {
-        What::Payload {
-            frame,
-            mass,
-            centre,
-        } => {
+        PhysicalChange::Payload { frame, mass, centre } => {
             let Some(mass) = mass else {
-                return format!(
-                    "another load on {frame}; what it weighs is not told by this motion"
-                );
+                return format!("another load on {frame}; this motion does not determine its mass");
             };
             let more = if mass.value > 0.0 { "more" } else { "less" };
-            let weighs = Estimate {
+            let weighs = ChangeEstimate {
                 value: mass.value.abs(),
                 ..*mass
             };
@@ -428,14 +414,14 @@ fn says(model: &Model, what: &What) -> String {
             };
             format!("{} {more} on {frame}{there}", weighs.text("kg"))
         }
-        What::Friction {
+        PhysicalChange::Friction {
             drive,
             dry,
             viscous,
             parts,
         } => {
-            let part =
-                |p: Option<f64>| p.map_or(String::new(), |p| format!(" ({:+.0} %)", 100.0 * p));
+            // Signs decide between the usual causes of more and of less friction.
+            let part = |p: Option<f64>| p.map_or(String::new(), |p| format!(" ({:+.0} %)", 100.0 * p));
             let total: f64 = parts.iter().flatten().sum();
             let why = if total > 0.0 || (parts == &[None, None] && dry.value > 0.0) {
                 "colder, worn, or other grease"
@@ -444,55 +430,54 @@ fn says(model: &Model, what: &What) -> String {
             };
             format!(
                 "friction of {drive}: dry {} {}{}, viscous {} {}{}; {why}",
-                signed(*dry),
+                signed_text(*dry),
                 unit(drive),
                 part(parts[0]),
-                signed(*viscous),
-                per_rate(unit(drive)),
+                signed_text(*viscous),
+                viscous_unit(unit(drive)),
                 part(parts[1]),
             )
         }
-        What::Offset { drive, force } => format!(
-            "a constant force of {} on {drive}: the zero of its sensor, or weight that this motion does not turn",
+        PhysicalChange::Offset { drive, force } => format!(
+            "a constant force of {} on {drive}: the zero of its sensor, or weight whose direction does not change in this motion",
             force.text(unit(drive))
         ),
-        What::Scale { drive, factor } => format!(
+        PhysicalChange::Scale { drive, factor } => format!(
             "measured force of {drive} scaled by {}: its sensor, torque constant or gear",
             factor.text("")
         ),
-        What::Clock { factor } => format!(
-            "the time base: this run was {} times as fast as its time stamps say",
+        PhysicalChange::Clock { factor } => format!(
+            "the time base: this run was {} times as fast as its time stamps state",
             factor.text("")
         ),
-        What::ContactEvent {
+        PhysicalChange::ContactEvent {
             drives,
             interval: [from, to],
         } => {
             let drives: Vec<String> = drives
                 .iter()
-                .map(|(name, force)| {
-                    format!("{name} by up to {} {}", significant(*force, 3), unit(name))
-                })
+                .map(|(name, force)| format!("{name} by up to {} {}", significant(*force, 3), unit(name)))
                 .collect();
             format!(
-                "a contact or a push from {} to {} s: {}; left out of what follows",
+                "a contact or a push from {} to {} s: {}; excluded from what follows",
                 significant(*from, 5),
                 significant(*to, 5),
                 drives.join(", ")
             )
         }
-        What::EncoderZero { coordinate, shift } => {
+        PhysicalChange::EncoderZero { coordinate, shift } => {
             let is_angle = |(name, is): &(String, bool)| name == coordinate && *is;
-            let is_angle = model.motions().iter().any(is_angle);
+            let is_angle = model.active_coordinate_types().iter().any(is_angle);
             format!(
-                "the zero of {coordinate}: it stands {} from where its encoder says",
+                "the zero of {coordinate}: the true position is {} from the encoder's",
                 shift.text(if is_angle { "rad" } else { "m" })
             )
         }
     }
 }
 
-fn signed(estimate: Estimate) -> String {
+/// A change with its sign.
+fn signed_text(estimate: ChangeEstimate) -> String {
     let sign = if estimate.value > 0.0 { "+" } else { "" };
     format!("{sign}{}", estimate.text(""))
 }

@@ -1,37 +1,36 @@
-//! The rows of a stretch: base columns, and those of everything that may have changed.
+//! The columns of a segment: those of the base parameters, and those of everything that may have changed.
 
-use modelmill_codegen::Evaluator;
-use modelmill_identify::diagnose::Column;
+use modelmill_codegen::ModelEvaluator;
+use modelmill_identify::diagnose::ForceColumn;
 use nalgebra::DVector;
 
-use crate::along::{self, decimated, measured};
+use crate::along::{self, filter_and_decimate, measured_forces};
 use crate::error::Outcome;
 use crate::model::Model;
 use crate::regressors::regressor;
-use crate::runs::payload::Payloads;
-use crate::stretch::Stretch;
+use crate::runs::payload::PayloadColumns;
+use crate::segment::RecordingSegment;
 
-/// The part by which a clock, and the rad or m by which an encoder is turned to see what that does.
+/// Step of the central differences: fraction of a clock's rate, or rad or m of an encoder's zero.
 const TURNED: f64 = 1e-3;
 
-/// The rows of one stretch, drive by drive.
-pub(crate) struct Laid {
-    columns: Vec<Column>,
-    /// Measured forces less those of known parameters, `[drive][sample]`.
+/// The rows of one segment, drive by drive.
+pub(crate) struct SegmentRows {
+    /// Columns in the order of [`RunColumnLayout`](crate::runs::layout::RunColumnLayout).
+    columns: Vec<ForceColumn>,
+    /// Measured forces minus those of known parameters, `[drive][sample]`, N or N m.
     pub(crate) forces: Vec<Vec<f64>>,
-    /// Which of them count.
+    /// Whether each of them counts.
     counts: Vec<Vec<bool>>,
 }
 
-impl Laid {
-    /// The base columns alone.
-    pub(crate) fn base(model: &Model, stretch: &Stretch) -> Outcome<Self> {
-        let base = regressor(
-            &[(stretch, false)],
-            &Evaluator::new(&model.derivation),
-            model,
-        )?;
-        let mut forces = measured(stretch)?;
+impl SegmentRows {
+    /// The columns of the unknown base parameters alone; the force of known ones is subtracted.
+    ///
+    /// Fails when a pose has no solution, or a force was not measured.
+    pub(crate) fn base_columns(model: &Model, stretch: &RecordingSegment) -> Outcome<Self> {
+        let base = regressor(&[(stretch, false)], &ModelEvaluator::new(&model.derivation), model)?;
+        let mut forces = measured_forces(stretch)?;
         let mut columns = Vec::new();
         for (k, column) in base.into_iter().enumerate() {
             if model.is_known(k) {
@@ -44,12 +43,13 @@ impl Laid {
                 columns.push(column);
             }
         }
+        // Samples that do not count are zero on both sides of the equations.
         let counts = counts(stretch, &forces);
         for (force, counts) in forces.iter_mut().zip(&counts) {
-            silence(force, counts);
+            zero_uncounted(force, counts);
         }
         for column in &mut columns {
-            leave_out(column, &counts);
+            clear_uncounted(column, &counts);
         }
         Ok(Self {
             columns,
@@ -58,34 +58,39 @@ impl Laid {
         })
     }
 
-    /// All columns; `values` are base parameters on which scales, clocks and encoders' zeros are built.
-    pub(crate) fn all(
+    /// All columns. `values` are the base parameters with which the columns of scales, clocks and encoders' zeros
+    /// are computed.
+    ///
+    /// Fails as [`Self::base_columns`] does.
+    pub(crate) fn all_columns(
         model: &Model,
-        stretch: &Stretch,
-        payloads: &Payloads,
+        stretch: &RecordingSegment,
+        payloads: &PayloadColumns,
         values: &DVector<f64>,
     ) -> Outcome<Self> {
-        let mut laid = Self::base(model, stretch)?;
-        let mut further = of_payloads(model, stretch, payloads)?;
-        further.extend(of_drives(model, stretch, laid.samples())?);
-        further.extend(of_prediction(model, stretch, &laid, values)?);
+        let mut laid = Self::base_columns(model, stretch)?;
+        let mut further = payload_columns(model, stretch, payloads)?;
+        further.extend(drive_columns(model, stretch, laid.samples())?);
+        further.extend(prediction_columns(model, stretch, &laid, values)?);
         for column in &mut further {
-            leave_out(column, &laid.counts);
+            clear_uncounted(column, &laid.counts);
         }
         laid.columns.extend(further);
         Ok(laid)
     }
 
+    /// Number of decimated samples.
     pub(crate) fn samples(&self) -> usize {
         self.forces.first().map_or(0, Vec::len)
     }
 
+    /// A column on a drive; `None` if it is zero there.
     pub(crate) fn column(&self, k: usize, drive: usize) -> Option<&[f64]> {
         self.columns.get(k)?.0.get(drive)?.as_deref()
     }
 
-    /// What values of the first columns leave of a drive's force.
-    pub(crate) fn rest(&self, drive: usize, values: &DVector<f64>) -> Vec<f64> {
+    /// The residual of a drive's force for values of the first columns.
+    pub(crate) fn residual(&self, drive: usize, values: &DVector<f64>) -> Vec<f64> {
         let mut rest = self.forces[drive].clone();
         for (k, value) in values.iter().enumerate() {
             let column = self.column(k, drive).unwrap_or_default();
@@ -96,11 +101,12 @@ impl Laid {
         rest
     }
 
-    /// Stretches of samples that count.
+    /// Ranges of consecutive samples that count.
     pub(crate) fn pieces(&self, drive: usize) -> Vec<std::ops::Range<usize>> {
         let counts = &self.counts[drive];
         let mut pieces = Vec::new();
         let mut start = 0;
+        // A sample that does not count ends a range.
         for end in 0..=counts.len() {
             if end == counts.len() || !counts[end] {
                 if end > start {
@@ -113,9 +119,10 @@ impl Laid {
     }
 }
 
-/// Which forces count, `[drive][sample]`. A kept sample has heard of all that its filter saw.
-fn counts(stretch: &Stretch, forces: &[Vec<f64>]) -> Vec<Vec<bool>> {
+/// Whether each force counts, `[drive][sample]`. A decimated sample depends on all samples that its filter used.
+fn counts(stretch: &RecordingSegment, forces: &[Vec<f64>]) -> Vec<Vec<bool>> {
     let n = forces.len();
+    // Weights of zero exclude a sample, as at standstill.
     let weighs = |drive: usize, i: usize| {
         let weights = stretch.weights.as_ref();
         weights.is_none_or(|weights| weights[i * n + drive] > 0.0)
@@ -123,76 +130,77 @@ fn counts(stretch: &Stretch, forces: &[Vec<f64>]) -> Vec<Vec<bool>> {
     let of_drive = |(drive, force): (usize, &Vec<f64>)| {
         let samples = 0..force.len();
         samples
-            .map(|i| weighs(drive, i) && !stretch.hears_of_faults(drive, i))
+            .map(|i| weighs(drive, i) && !stretch.has_excluded_input(drive, i))
             .collect()
     };
     forces.iter().enumerate().map(of_drive).collect()
 }
 
-/// Ten columns for each body.
-fn of_payloads(model: &Model, stretch: &Stretch, payloads: &Payloads) -> Outcome<Vec<Column>> {
-    let evaluator = Evaluator::new(&payloads.derivation);
+/// The columns of payloads: ten for each body.
+fn payload_columns(model: &Model, stretch: &RecordingSegment, payloads: &PayloadColumns) -> Outcome<Vec<ForceColumn>> {
+    let evaluator = ModelEvaluator::new(&payloads.derivation);
     let columns = regressor(&[(stretch, false)], &evaluator, model)?;
     let of = |k: &Option<usize>| k.map(|k| columns[k].clone()).unwrap_or_default();
     Ok(payloads.columns.iter().flatten().map(of).collect())
 }
 
-/// Dry and viscous friction of each drive, then a constant force on each.
-fn of_drives(model: &Model, stretch: &Stretch, samples: usize) -> Outcome<Vec<Column>> {
+/// Columns of dry and viscous friction of each drive, followed by a constant force on each.
+fn drive_columns(model: &Model, stretch: &RecordingSegment, samples: usize) -> Outcome<Vec<ForceColumn>> {
     let n = model.drives().len();
+    // Each of these columns acts on one drive.
     let only = |drive: usize, values: Vec<f64>| {
-        let mut column = Column(vec![None; n]);
+        let mut column = ForceColumn(vec![None; n]);
         column.0[drive] = Some(values);
         column
     };
     let mut columns = Vec::new();
     for (drive, rate) in along::drive_rates(model, stretch)?.into_iter().enumerate() {
+        // At exact standstill dry friction has no direction.
         let sign = |x: &f64| if *x == 0.0 { 0.0 } else { x.signum() };
         let signs = rate.iter().map(sign).collect();
-        let both = decimated(vec![signs, rate], stretch)?;
+        let both = filter_and_decimate(vec![signs, rate], stretch)?;
         columns.extend(both.into_iter().map(|values| only(drive, values)));
     }
     columns.extend((0..n).map(|drive| only(drive, vec![1.0; samples])));
     Ok(columns)
 }
 
-/// Puts 0 where a sample does not count.
-fn silence(values: &mut [f64], counts: &[bool]) {
-    for (value, _) in values
-        .iter_mut()
-        .zip(counts)
-        .filter(|(_, counts)| !**counts)
-    {
+/// Sets values to 0 where a sample does not count.
+fn zero_uncounted(values: &mut [f64], counts: &[bool]) {
+    for (value, _) in values.iter_mut().zip(counts).filter(|(_, counts)| !**counts) {
         *value = 0.0;
     }
 }
 
-/// A column without the samples that do not count.
-fn leave_out(column: &mut Column, counts: &[Vec<bool>]) {
+/// Sets a column to 0 where a sample does not count.
+fn clear_uncounted(column: &mut ForceColumn, counts: &[Vec<bool>]) {
     for (values, counts) in column.0.iter_mut().zip(counts) {
         if let Some(values) = values {
-            silence(values, counts);
+            zero_uncounted(values, counts);
         }
     }
 }
 
-/// Columns that are built on predicted forces: a scale of each drive; a clock that runs by a part slower, so that rates and
-/// accelerations come out larger by once and twice that part; and each encoder with another zero.
-fn of_prediction(
+/// Columns that are computed from predicted forces: a scale of each drive; a clock that is slow by a fraction, so
+/// that rates and accelerations become larger by once and twice that fraction; and another zero of each encoder.
+fn prediction_columns(
     model: &Model,
-    stretch: &Stretch,
-    laid: &Laid,
+    stretch: &RecordingSegment,
+    laid: &SegmentRows,
     values: &DVector<f64>,
-) -> Outcome<Vec<Column>> {
+) -> Outcome<Vec<ForceColumn>> {
     let n = laid.forces.len();
     let mut columns = Vec::new();
+    // The column of a scale is the predicted force itself.
     for drive in 0..n {
-        let rest = laid.rest(drive, values);
-        let mut column = Column(vec![None; n]);
+        // Measured force minus residual is the prediction.
+        let rest = laid.residual(drive, values);
+        let mut column = ForceColumn(vec![None; n]);
         let pairs = laid.forces[drive].iter().zip(&rest);
         column.0[drive] = Some(pairs.map(|(y, r)| y - r).collect());
         columns.push(column);
     }
+    // Known and unknown base parameters are joined in the order of the model.
     let mut next = values.iter();
     let all: Vec<f64> = (0..model.base.len())
         .map(|k| {
@@ -203,11 +211,12 @@ fn of_prediction(
             }
         })
         .collect();
-    let forces = |turned: &Stretch| {
-        along::forces(model, turned, &all).and_then(|forces| decimated(forces, stretch))
+    let forces = |turned: &RecordingSegment| {
+        along::forces(model, turned, &all).and_then(|forces| filter_and_decimate(forces, stretch))
     };
-    // Central differences.
-    let slope = |turn: &dyn Fn(&mut Stretch, f64)| -> Outcome<Column> {
+    // The derivative of the predicted forces, by central differences.
+    let slope = |turn: &dyn Fn(&mut RecordingSegment, f64)| -> Outcome<ForceColumn> {
+        // The model is evaluated with the motion changed in either direction.
         let [ahead, back] = [TURNED, -TURNED].map(|by| {
             let mut turned = stretch.clone();
             turn(&mut turned, by);
@@ -215,22 +224,21 @@ fn of_prediction(
         });
         let pairs = ahead?.into_iter().zip(back?);
         let of_drive = |(a, b): (Vec<f64>, Vec<f64>)| -> Vec<f64> {
-            a.iter()
-                .zip(&b)
-                .map(|(a, b)| (a - b) / (2.0 * TURNED))
-                .collect()
+            a.iter().zip(&b).map(|(a, b)| (a - b) / (2.0 * TURNED)).collect()
         };
-        Ok(Column::new(pairs.map(of_drive).collect()))
+        Ok(ForceColumn::new(pairs.map(of_drive).collect()))
     };
     let scaled = |values: &mut [Vec<f64>], factor: f64| {
         for x in values.iter_mut().flatten() {
             *x *= factor;
         }
     };
+    // Clock: rates scale once, accelerations twice.
     columns.push(slope(&|turned, part| {
         scaled(&mut turned.run.qd, 1.0 + part);
         scaled(&mut turned.run.qdd, (1.0 + part).powi(2));
     })?);
+    // Zeros: positions are shifted, one coordinate after the other.
     for coordinate in 0..stretch.run.q.len() {
         columns.push(slope(&|turned, by| {
             for q in &mut turned.run.q[coordinate] {

@@ -1,28 +1,32 @@
-//! What a further body on each body of a mechanism adds to the forces: ten columns for each, linear in its mass, first moments
-//! and inertia about the frame's origin.
+//! Columns of loads: the force of a further body on each body of a mechanism, ten columns each, linear in its mass,
+//! first moments and inertia about the frame's origin.
 
 use modelmill_codegen::{Derivation, derive_columns};
-use modelmill_spec::{Exact, FrameIdx, Inertial, Mechanism, Parameter, ParameterIdx, Part, Symbol};
+use modelmill_spec::{
+    DynamicParameter, ExactExpression, FrameIdx, Mechanism, ModelPart, ModelSymbol, ParameterIdx, PartInertia,
+};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 
-/// Parameters of a body: mass, first moments x, y, z, and inertia xx, xy, xz, yy, yz, zz.
+/// Number of parameters of a body: mass, first moments x, y, z, and inertia xx, xy, xz, yy, yz, zz.
 pub(crate) const TEN: usize = 10;
 
-/// Columns of further bodies.
-pub(crate) struct Payloads {
-    /// Frames that carry them, one after the other.
+/// Columns of loads on all bodies.
+pub(crate) struct PayloadColumns {
+    /// Names of the frames that may carry a load, one after the other.
     pub(crate) frames: Vec<String>,
-    /// For each frame the columns of the derivation that are those of its ten parameters; `None` where one has no effect.
+    /// For each frame, the columns of the derivation that belong to its ten parameters; `None` if a parameter has
+    /// no effect.
     pub(crate) columns: Vec<[Option<usize>; TEN]>,
-    /// H for these parameters alone.
+    /// The derivation of H for these parameters alone.
     pub(crate) derivation: Derivation,
 }
 
-impl Payloads {
-    /// Of all frames that carry parts or lumped masses.
+impl PayloadColumns {
+    /// The columns for all frames that carry parts or lumped masses.
     pub(crate) fn new(model: &Model) -> Outcome<Self> {
+        // The base frame has the index 0 and cannot carry a load.
         let mechanism = &model.derivation.mechanism;
         let mut frames: Vec<FrameIdx> = Vec::new();
         let parts = mechanism.parts.iter().map(|part| part.frame);
@@ -33,11 +37,11 @@ impl Payloads {
         }
         frames.sort_by_key(|frame| frame.0);
         let (variant, own) = with_bodies(mechanism, &frames);
-        let is_wanted =
-            |product: &modelmill_codegen::Monomial| matches!(product.0[..], [(p, 1)] if p >= own);
-        let derivation = derive_columns(&variant, &is_wanted)
-            .map_err(|error| Error::derivation(&model.path, error))?;
+        // Only products of a single new parameter are derived.
+        let is_wanted = |product: &modelmill_codegen::ParameterMonomial| matches!(product.0[..], [(p, 1)] if p >= own);
+        let derivation = derive_columns(&variant, &is_wanted).map_err(|error| Error::derivation(&model.path, error))?;
         let reduction = &derivation.reduction;
+        // Parameters without effect on the drives have no column.
         let products: Vec<usize> = reduction
             .retained
             .iter()
@@ -57,29 +61,30 @@ impl Payloads {
     }
 }
 
-/// The mechanism with a further body on each of some frames, and where the parameters of these bodies begin.
+/// The mechanism with a further body on each of some frames, and the index of the first of their parameters.
 fn with_bodies(mechanism: &Mechanism, frames: &[FrameIdx]) -> (Mechanism, usize) {
     let mut variant = mechanism.clone();
     let own = variant.parameters.len();
     for frame in frames {
         let first = variant.parameters.len();
-        let value = |i: usize| Exact::Symbol(Symbol::Parameter(ParameterIdx(first + i)));
-        variant.parts.push(Part {
+        let value = |i: usize| ExactExpression::Symbol(ModelSymbol::Parameter(ParameterIdx(first + i)));
+        variant.parts.push(ModelPart {
             name: format!("payload of {}", variant.frames[frame.0].name),
             frame: *frame,
-            inertial: Inertial::Linear {
+            inertial: PartInertia::Linear {
                 mass: value(0),
                 first_moment: std::array::from_fn(|i| value(1 + i)),
                 inertia: std::array::from_fn(|i| value(4 + i)),
             },
         });
+        // Nominal values are 0: only the columns are used.
         for i in 0..TEN {
             let unit = match i {
                 0 => "kg",
                 1..=3 => "kg m",
                 _ => "kg m^2",
             };
-            variant.parameters.push(Parameter {
+            variant.parameters.push(DynamicParameter {
                 name: format!("payload{first}_{i}"),
                 nominal: 0.0,
                 unit: unit.to_owned(),

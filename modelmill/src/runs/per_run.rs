@@ -1,23 +1,23 @@
-//! One fit of all runs in which base parameters are shared and what is named is each run's own, and the scales of measured forces
-//! from a load of known mass.
+//! One fit of all runs in which base parameters are shared and requested values are separate for each run. Loads of
+//! known mass determine the scales of measured forces.
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_identify::ParameterInfo;
-use modelmill_identify::changes::{Joint, Part, Values, joint};
+use modelmill_identify::changes::{JointFit, JointRun, JointValues, fit_jointly};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
-use crate::runs::changes::{friction, offset, per_rate};
-use crate::runs::layout::Layout;
-use crate::runs::payload::{Payloads, TEN};
-use crate::runs::rows::White;
-use crate::runs::{Estimate, Fitted, centre};
+use crate::runs::changes::{friction, offset, viscous_unit};
+use crate::runs::layout::RunColumnLayout;
+use crate::runs::payload::{PayloadColumns, TEN};
+use crate::runs::rows::WhitenedRun;
+use crate::runs::{ChangeEstimate, FittedValue, centre};
 
-/// Kinds of values that a run may have of its own.
+/// Kinds of values that may be separate for each run.
 const KINDS: [&str; 6] = ["payload", "friction", "offset", "gain", "clock", "zero"];
-/// What a body's ten parameters are called, with their units.
-const OF_BODY: [(&str, &str); TEN] = [
+/// Names and units of a body's ten parameters.
+const BODY_PARAMETERS: [(&str, &str); TEN] = [
     ("mass", "kg"),
     ("mx", "kg m"),
     ("my", "kg m"),
@@ -30,30 +30,40 @@ const OF_BODY: [(&str, &str); TEN] = [
     ("zz", "kg m^2"),
 ];
 
-/// Values that each run has of its own: a kind, and where.
+/// Values that are separate for each run: a kind, and optionally a place.
+///
+/// ```
+/// use modelmill::runs::PerRunSelection;
+///
+/// assert!(PerRunSelection::parse("payload@flange").is_ok());
+/// assert!(PerRunSelection::parse("payload").is_err());
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct PerRun {
+pub struct PerRunSelection {
+    /// One of [`KINDS`], or the name of a base parameter.
     what: String,
+    /// Frame, drive or coordinate; `None` selects all places of the kind.
     at: Option<String>,
 }
 
-impl PerRun {
-    /// Reads `payload@FRAME`, `friction`, `friction@DRIVE`, `offset`, `offset@DRIVE`, `gain`, `gain@DRIVE`, `clock`, `zero`,
-    /// `zero@COORDINATE`, or the name of a base parameter.
+impl PerRunSelection {
+    /// Reads `payload@FRAME`, `friction`, `friction@DRIVE`, `offset`, `offset@DRIVE`, `gain`, `gain@DRIVE`, `clock`,
+    /// `zero`, `zero@COORDINATE`, or the name of a base parameter.
     ///
-    /// Fails with what is expected.
+    /// Fails with the expected form, as text.
     pub fn parse(text: &str) -> Result<Self, String> {
         let (what, at) = match text.split_once('@') {
             Some((what, at)) => (what.trim(), Some(at.trim())),
             None => (text.trim(), None),
         };
+        // What is no kind may be the name of a base parameter, which is checked with the model.
         let is_kind = KINDS.contains(&what);
         let says = if what.is_empty() || at == Some("") {
             "a kind and a place are expected, such as `payload@flange` or `friction`"
         } else if what == "payload" && at.is_none() {
             "a payload needs its body, as in `payload@flange`"
         } else if what == "clock" && at.is_some() {
-            "a run has one clock; write `clock`"
+            "a run has one clock; use `clock` without a place"
         } else if !is_kind && at.is_some() {
             "kinds are payload, friction, offset, gain, clock, zero"
         } else {
@@ -67,11 +77,18 @@ impl PerRun {
 }
 
 /// A load of known mass on a body in one of the runs.
+///
+/// ```
+/// use modelmill::runs::KnownLoad;
+///
+/// let load = KnownLoad::parse("with-tool.csv=2.8@flange").unwrap();
+/// assert_eq!((load.mass, load.frame.as_str()), (2.8, "flange"));
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct KnownLoad {
-    /// Which run: the end of its file's name.
+    /// The run: the end of its file name.
     pub run: String,
-    /// What the load weighs, kg.
+    /// Mass of the load, kg.
     pub mass: f64,
     /// The frame that carries it.
     pub frame: String,
@@ -80,13 +97,10 @@ pub struct KnownLoad {
 impl KnownLoad {
     /// Reads `RUN=MASS@FRAME`, such as `with-tool.csv=2.8@flange`.
     ///
-    /// Fails with what is expected.
+    /// Fails with the expected form, as text.
     pub fn parse(text: &str) -> Result<Self, String> {
-        let expected = || {
-            format!(
-                "`{text}`: a run, its load in kg and the body are expected, as in `with-tool.csv=2.8@flange`"
-            )
-        };
+        let expected =
+            || format!("`{text}`: a run, its load in kg and the body are expected, as in `with-tool.csv=2.8@flange`");
         let (run, load) = text.rsplit_once('=').ok_or_else(expected)?;
         let (mass, frame) = load.split_once('@').ok_or_else(expected)?;
         let mass: f64 = mass.trim().parse().map_err(|_| expected())?;
@@ -101,67 +115,79 @@ impl KnownLoad {
     }
 }
 
-/// A value of one run.
+/// A separate value of one run.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Valued {
-    /// What it belongs to, as it was asked for: `payload@flange`, `friction@joint1`.
-    pub of: String,
-    /// Its name there.
+pub struct RunValue {
+    /// The quantity, as it was requested: `payload@flange`, `friction@joint1`.
+    pub quantity: String,
+    /// Its symbol within the quantity.
     pub name: String,
     /// Its unit.
     pub unit: String,
-    /// Whether it is told against the first run, which has none of it, rather than as it is.
+    /// Whether the value is relative to the first run, where it is zero, and not absolute.
     pub is_against_first: bool,
     /// The value.
-    pub value: Fitted,
+    pub value: FittedValue,
 }
 
-/// All runs in one fit.
+/// The fit of all runs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SharedFit {
-    /// Shared base parameters, by position; `None` for those that are each run's own.
-    pub shared: Vec<Option<Fitted>>,
-    /// By which factor each drive's measured force becomes the true one, where a known load tells.
-    pub gains: Vec<(String, Fitted)>,
-    /// The runs, each with its own values.
-    pub runs: Vec<(String, Vec<Valued>)>,
+    /// Shared base parameters, by index; `None` for those that are separate for each run.
+    pub shared: Vec<Option<FittedValue>>,
+    /// The factor by which each drive's measured force becomes the true one, if a known load determines it.
+    pub gains: Vec<(String, FittedValue)>,
+    /// The runs, each with its separate values.
+    pub runs: Vec<(String, Vec<RunValue>)>,
 }
 
-/// Columns that belong to one thing that was asked for.
-struct Own {
-    of: String,
+/// Columns of one requested quantity.
+struct PerRunColumns {
+    /// Its name, as in [`RunValue::quantity`].
+    quantity: String,
+    /// Indices of its columns.
     columns: Vec<usize>,
-    /// Names and units of the values.
+    /// Symbols and units of the values.
     names: Vec<(String, String)>,
+    /// Whether the first run has none of it.
     is_against_first: bool,
-    /// What stands for no change: 1 for factors.
+    /// Value without a change: 1 for factors, else 0.
     origin: f64,
 }
 
-/// A fit that gathers its runs.
-pub(crate) struct Asking<'a> {
+/// Collects the runs of the fit.
+pub(crate) struct SharedFitBuilder<'a> {
+    /// The model.
     model: &'a Model,
-    layout: Layout,
-    own: Vec<Own>,
+    /// Order of the columns.
+    layout: RunColumnLayout,
+    /// Columns that are separate for each run.
+    own: Vec<PerRunColumns>,
+    /// Loads of known mass.
     loads: &'a [KnownLoad],
     /// First column of each load's body.
     loaded: Vec<usize>,
-    /// Columns that are used at all.
+    /// Columns that the fit uses, ascending.
     used: Vec<usize>,
-    runs: Vec<(String, Vec<modelmill_identify::changes::Moments>)>,
+    /// File name and sums of each run: one for each drive if there are loads, else one.
+    runs: Vec<(String, Vec<modelmill_identify::changes::NormalEquations>)>,
 }
 
-impl<'a> Asking<'a> {
+impl<'a> SharedFitBuilder<'a> {
+    /// An empty fit for the requests.
+    ///
+    /// Fails when a request names something that the model does not have.
     pub(crate) fn new(
         model: &'a Model,
-        payloads: &Payloads,
-        layout: Layout,
-        asked: &'a super::Asked,
+        payloads: &PayloadColumns,
+        layout: RunColumnLayout,
+        asked: &'a super::RunsOptions,
     ) -> Outcome<Self> {
-        let infos = model.infos();
-        let mut own: Vec<Own> = Vec::new();
+        let infos = model.parameter_infos();
+        let mut own: Vec<PerRunColumns> = Vec::new();
+        // Two requests of the same columns count once.
         for one in &asked.per_run {
-            for further in owned(model, payloads, layout, &infos, one)? {
+            for further in per_run_columns(model, payloads, layout, &infos, one)? {
                 if own.iter().all(|other| other.columns != further.columns) {
                     own.push(further);
                 }
@@ -171,6 +197,7 @@ impl<'a> Asking<'a> {
             .map(|load| Ok(layout.payload(frame(payloads, &load.frame)?)))
             .collect();
         let loaded = loaded?;
+        // Of all possible changes, only the requested columns are kept.
         let of_base = 0..layout.base;
         let mut used: Vec<usize> = of_base
             .chain(own.iter().flat_map(|one| one.columns.iter().copied()))
@@ -189,50 +216,57 @@ impl<'a> Asking<'a> {
         })
     }
 
-    fn is_asked(&self) -> bool {
+    /// Whether a fit was requested.
+    fn is_requested(&self) -> bool {
         !self.own.is_empty() || !self.loads.is_empty()
     }
 
-    /// Takes what the fit needs of a run.
-    pub(crate) fn take(&mut self, file: &str, white: &White) {
-        if !self.is_asked() {
+    /// Adds a run, by the sums of its used columns.
+    pub(crate) fn add_run(&mut self, file: &str, white: &WhitenedRun) {
+        if !self.is_requested() {
             return;
         }
+        // Scales of forces need the sums of each drive, otherwise their total suffices.
         let sums = if self.loads.is_empty() {
-            vec![white.whole().of(&self.used)]
+            vec![white.total().select_columns(&self.used)]
         } else {
-            white.drives.iter().map(|one| one.of(&self.used)).collect()
+            white.drives.iter().map(|one| one.select_columns(&self.used)).collect()
         };
         self.runs.push((file.to_owned(), sums));
     }
 
+    /// The index of a column among the used ones.
     fn place(&self, column: usize) -> usize {
         self.used.partition_point(|other| *other < column)
     }
 
-    /// The fit; `None` if none was asked for.
+    /// The fit; `None` if none was requested.
+    ///
+    /// Fails when the name of a load's run is not unique.
     pub(crate) fn answer(self) -> Outcome<Option<SharedFit>> {
-        if !self.is_asked() {
+        if !self.is_requested() {
             return Ok(None);
         }
-        let loads: Outcome<Vec<usize>> = self.loads.iter().map(|load| self.run(load)).collect();
+        let loads: Outcome<Vec<usize>> = self.loads.iter().map(|load| self.run_of_load(load)).collect();
         let loads = loads?;
+        // Base parameters that are separate for each run are not shared.
         let absolute = (self.own.iter()).filter(|one| !one.is_against_first);
         let not_shared: Vec<usize> = absolute.flat_map(|one| one.columns.clone()).collect();
-        let shared: Vec<usize> = (0..self.layout.base)
-            .filter(|k| !not_shared.contains(k))
-            .collect();
-        let parts: Vec<(Part, Vec<&Own>)> =
-            (0..self.runs.len()).map(|r| self.part(r, &loads)).collect();
-        let (parts, owns): (Vec<Part>, Vec<Vec<&Own>>) = parts.into_iter().unzip();
+        let shared: Vec<usize> = (0..self.layout.base).filter(|k| !not_shared.contains(k)).collect();
+        let parts: Vec<(JointRun, Vec<&PerRunColumns>)> =
+            (0..self.runs.len()).map(|r| self.run_part(r, &loads)).collect();
+        let (parts, owns): (Vec<JointRun>, Vec<Vec<&PerRunColumns>>) = parts.into_iter().unzip();
         let places: Vec<usize> = shared.iter().map(|k| self.place(*k)).collect();
-        let found = joint(&parts, &places, !self.loads.is_empty());
-        Ok(Some(self.told(&found, &shared, &parts, &owns)))
+        let found = fit_jointly(&parts, &places, !self.loads.is_empty());
+        Ok(Some(self.shared_fit(&found, &shared, &parts, &owns)))
     }
 
-    /// Which run carries a load.
-    fn run(&self, load: &KnownLoad) -> Outcome<usize> {
+    /// The index of the run that carries a load.
+    ///
+    /// Fails when no run or several runs match its name.
+    fn run_of_load(&self, load: &KnownLoad) -> Outcome<usize> {
         let names = self.runs.iter().enumerate();
+        // The name must be complete path components at the end of the file name.
         let found: Vec<usize> = names
             .filter(|(_, (file, _))| {
                 let before = file.strip_suffix(load.run.as_str());
@@ -243,7 +277,7 @@ impl<'a> Asking<'a> {
         match found[..] {
             [one] => Ok(one),
             _ => Err(Error::options(message!(
-                "`{}` of {} is the name of {} of the runs that were read; give the end of one file's name: {}",
+                "`{}` of {} matches {} of the runs; give the end of one file name: {}",
                 load.run,
                 Remedy::option(OptionName::Loads),
                 if found.is_empty() { "none" } else { "several" },
@@ -256,18 +290,16 @@ impl<'a> Asking<'a> {
         }
     }
 
-    /// What a run has of its own.
-    fn part(&self, r: usize, loads: &[usize]) -> (Part, Vec<&Own>) {
-        let owns: Vec<&Own> = (self.own.iter())
-            .filter(|one| r > 0 || !one.is_against_first)
-            .collect();
+    /// The separate columns of a run, with the known mass of its load.
+    fn run_part(&self, r: usize, loads: &[usize]) -> (JointRun, Vec<&PerRunColumns>) {
+        let owns: Vec<&PerRunColumns> = (self.own.iter()).filter(|one| r > 0 || !one.is_against_first).collect();
         let mut own: Vec<usize> = owns.iter().flat_map(|one| one.columns.clone()).collect();
         let mut known = Vec::new();
         for ((load, at), _) in (self.loads.iter().zip(&self.loaded))
             .zip(loads)
             .filter(|(_, run)| **run == r)
         {
-            // The first of ten is the mass; where the centre is and how the load turns is not known.
+            // The first of the ten columns is the mass; centre and inertia of the load are unknown.
             known.push((self.place(*at), load.mass));
             let further = (*at + 1..*at + TEN).filter(|k| !own.contains(k));
             let further: Vec<usize> = further.collect();
@@ -275,7 +307,7 @@ impl<'a> Asking<'a> {
         }
         let is_known = |k: &usize| known.iter().any(|(at, _)| at == k);
         let own = own.into_iter().map(|k| self.place(k));
-        let part = Part {
+        let part = JointRun {
             channels: self.runs[r].1.clone(),
             own: own.filter(|k| !is_known(k)).collect(),
             known,
@@ -283,39 +315,39 @@ impl<'a> Asking<'a> {
         (part, owns)
     }
 
-    fn told(
+    /// The result, in the order of the model's base parameters.
+    fn shared_fit(
         &self,
-        found: &Joint,
+        found: &JointFit,
         shared: &[usize],
-        parts: &[Part],
-        owns: &[Vec<&Own>],
+        parts: &[JointRun],
+        owns: &[Vec<&PerRunColumns>],
     ) -> SharedFit {
         let unknown: Vec<usize> = (0..self.model.base.len())
             .filter(|k| !self.model.is_known(*k))
             .collect();
         let of_base = |k: usize| match unknown.iter().position(|one| *one == k) {
-            None => Some(Fitted {
+            None => Some(FittedValue {
                 value: self.model.nominal[k],
                 deviation: Some(0.0),
             }),
             Some(column) => {
                 let at = shared.iter().position(|one| *one == column)?;
-                Some(fitted(&found.shared, at))
+                Some(fitted_value(&found.shared, at))
             }
         };
+        // The fit has the scale of the measured force; its inverse corrects the force.
         let gain = |(d, drive): (usize, String)| {
-            let scale = fitted(&found.shared, shared.len() + d);
+            let scale = fitted_value(&found.shared, shared.len() + d);
             let value = scale.value.recip();
             let deviation = scale.deviation.map(|one| one * value * value);
-            (drive, Fitted { value, deviation })
+            (drive, FittedValue { value, deviation })
         };
         let drives = self.model.drives().into_iter().enumerate();
         let runs = self.runs.iter().zip(parts).zip(owns).zip(&found.own);
         SharedFit {
             shared: (0..self.model.base.len()).map(of_base).collect(),
-            gains: (drives.filter(|_| !self.loads.is_empty()))
-                .map(gain)
-                .collect(),
+            gains: (drives.filter(|_| !self.loads.is_empty())).map(gain).collect(),
             runs: runs
                 .map(|((((file, _), part), owns), values)| {
                     let own = owns.iter().flat_map(|own| self.values(own, part, values));
@@ -325,89 +357,87 @@ impl<'a> Asking<'a> {
         }
     }
 
-    /// Values of one thing in a run.
-    fn values(&self, own: &Own, part: &Part, values: &Values) -> Vec<Valued> {
+    /// The values of one quantity in a run, with the centre of a load.
+    fn values(&self, own: &PerRunColumns, part: &JointRun, values: &JointValues) -> Vec<RunValue> {
         let at = |column: &usize| {
             let place = self.place(*column);
             part.own.iter().position(|one| *one == place)
         };
         let places: Vec<Option<usize>> = own.columns.iter().map(at).collect();
-        let valued = |name: &str, unit: &str, value: Fitted| Valued {
-            of: own.of.clone(),
+        let valued = |name: &str, unit: &str, value: FittedValue| RunValue {
+            quantity: own.quantity.clone(),
             name: name.to_owned(),
             unit: unit.to_owned(),
             is_against_first: own.is_against_first,
             value,
         };
-        let mut told: Vec<Valued> = (own.names.iter().zip(&places))
+        let mut told: Vec<RunValue> = (own.names.iter().zip(&places))
             .filter_map(|((name, unit), place)| {
-                let mut one = fitted(values, (*place)?);
+                let mut one = fitted_value(values, (*place)?);
                 one.value += own.origin;
                 Some(valued(name, unit, one))
             })
             .collect();
+        // The centre needs mass and first moments in the fit.
         if let (TEN, Some(places)) = (
             own.columns.len(),
-            places
-                .iter()
-                .take(4)
-                .copied()
-                .collect::<Option<Vec<usize>>>(),
+            places.iter().take(4).copied().collect::<Option<Vec<usize>>>(),
         ) {
-            let four = Values {
+            let four = JointValues {
                 values: values.values.select_rows(&places),
-                covariance: values
-                    .covariance
-                    .select_rows(&places)
-                    .select_columns(&places),
+                covariance: values.covariance.select_rows(&places).select_columns(&places),
                 determined: places.iter().map(|k| values.determined[*k]).collect(),
             };
             let axes = ["x", "y", "z"].into_iter().zip(centre(&four));
             told.extend(axes.filter_map(|(axis, at)| {
-                let Estimate { value, deviation } = at?;
+                let ChangeEstimate { value, deviation } = at?;
                 let deviation = Some(deviation);
-                Some(valued(axis, "m", Fitted { value, deviation }))
+                Some(valued(axis, "m", FittedValue { value, deviation }))
             }));
         }
         told
     }
 }
 
-fn fitted(values: &Values, at: usize) -> Fitted {
+/// The value at an index of the fit, with its standard deviation.
+fn fitted_value(values: &JointValues, at: usize) -> FittedValue {
     let variance = values.covariance[(at, at)].max(0.0);
-    Fitted {
+    FittedValue {
         value: values.values[at],
         deviation: values.determined[at].then(|| variance.sqrt()),
     }
 }
 
-/// Position of a frame among those that may carry a load.
-fn frame(payloads: &Payloads, name: &str) -> Outcome<usize> {
+/// Index of a frame among those that may carry a load.
+///
+/// Fails when there is no such body; the message lists all.
+fn frame(payloads: &PayloadColumns, name: &str) -> Outcome<usize> {
     let at = payloads.frames.iter().position(|frame| frame == name);
-    at.ok_or_else(|| no_such("body", name, &payloads.frames))
+    at.ok_or_else(|| unknown_name_error("body", name, &payloads.frames))
 }
 
-fn no_such(what: &str, name: &str, names: &[String]) -> Error {
-    Error::options(format!(
-        "there is no {what} `{name}`; there are {}",
-        names.join(", ")
-    ))
+/// The error of an unknown name.
+fn unknown_name_error(what: &str, name: &str, names: &[String]) -> Error {
+    Error::options(format!("there is no {what} `{name}`; there are {}", names.join(", ")))
 }
 
-/// The columns that something asked for has.
-fn owned(
+/// The columns of a request, one entry for each of its places.
+///
+/// Fails when the kind or the place is unknown.
+fn per_run_columns(
     model: &Model,
-    payloads: &Payloads,
-    layout: Layout,
+    payloads: &PayloadColumns,
+    layout: RunColumnLayout,
     infos: &[ParameterInfo],
-    asked: &PerRun,
-) -> Outcome<Vec<Own>> {
-    let PerRun { what, at } = asked;
+    asked: &PerRunSelection,
+) -> Outcome<Vec<PerRunColumns>> {
+    let PerRunSelection { what, at } = asked;
+    // Without a place, all places of the kind are used.
     let places = |what: &str, names: Vec<String>| match at {
         None => Ok((0..names.len()).collect::<Vec<usize>>()),
         Some(at) => match names.iter().position(|name| name == at) {
             Some(k) => Ok(vec![k]),
-            None => Err(no_such(what, at, &names)),
+            None => Err(unknown_name_error(what, at, &names)),
         },
     };
     let named = |all: &[(&str, &str)]| -> Vec<(String, String)> {
@@ -419,10 +449,10 @@ fn owned(
         "payload" => {
             let name = at.as_deref().unwrap_or_default();
             let start = layout.payload(frame(payloads, name)?);
-            vec![Own {
-                of: format!("payload@{name}"),
+            vec![PerRunColumns {
+                quantity: format!("payload@{name}"),
                 columns: (start..start + TEN).collect(),
-                names: named(&OF_BODY),
+                names: named(&BODY_PARAMETERS),
                 is_against_first: true,
                 origin: 0.0,
             }]
@@ -431,16 +461,16 @@ fn owned(
             .map(|d| {
                 let unit = model.force_unit(d);
                 let start = layout.friction(d);
-                // Friction that the model has is told as it is.
+                // Friction of the model is given as an absolute value.
                 let own = friction(model, d);
                 let (columns, is_against_first) = match own {
                     [Some(dry), Some(viscous)] => (vec![dry, viscous], false),
                     _ => (vec![start, start + 1], true),
                 };
-                Own {
-                    of: format!("friction@{}", drives[d]),
+                PerRunColumns {
+                    quantity: format!("friction@{}", drives[d]),
                     columns,
-                    names: named(&[("Fc", unit), ("Fv", per_rate(unit))]),
+                    names: named(&[("Fc", unit), ("Fv", viscous_unit(unit))]),
                     is_against_first,
                     origin: 0.0,
                 }
@@ -449,8 +479,8 @@ fn owned(
         "offset" => (places("drive", drives.clone())?.into_iter())
             .map(|d| {
                 let own = offset(model, d);
-                Own {
-                    of: format!("offset@{}", drives[d]),
+                PerRunColumns {
+                    quantity: format!("offset@{}", drives[d]),
                     columns: vec![own.unwrap_or(layout.offset(d))],
                     names: named(&[("F0", model.force_unit(d))]),
                     is_against_first: own.is_none(),
@@ -459,44 +489,47 @@ fn owned(
             })
             .collect(),
         "gain" => (places("drive", drives.clone())?.into_iter())
-            .map(|d| Own {
-                of: format!("gain@{}", drives[d]),
+            .map(|d| PerRunColumns {
+                quantity: format!("gain@{}", drives[d]),
                 columns: vec![layout.scale(d)],
                 names: named(&[("gain", "1")]),
                 is_against_first: true,
                 origin: 1.0,
             })
             .collect(),
-        "clock" => vec![Own {
-            of: "clock".to_owned(),
+        "clock" => vec![PerRunColumns {
+            quantity: "clock".to_owned(),
             columns: vec![layout.clock()],
             names: named(&[("factor", "1")]),
             is_against_first: true,
             origin: 1.0,
         }],
-        "zero" => (places("coordinate", model.active())?.into_iter())
-            .map(|i| Own {
-                of: format!("zero@{}", model.active()[i]),
-                columns: vec![layout.zero(i)],
-                names: named(&[("shift", if model.motions()[i].1 { "rad" } else { "m" })]),
-                is_against_first: true,
-                origin: 0.0,
+        "zero" => (places("coordinate", model.active_coordinates())?.into_iter())
+            .map(|i| {
+                let (name, is_angle) = &model.active_coordinate_types()[i];
+                PerRunColumns {
+                    quantity: format!("zero@{name}"),
+                    columns: vec![layout.zero(i)],
+                    names: named(&[("shift", if *is_angle { "rad" } else { "m" })]),
+                    is_against_first: true,
+                    origin: 0.0,
+                }
             })
             .collect(),
         name => vec![base_parameter(model, payloads, infos, name)?],
     })
 }
 
-/// A base parameter by its name.
+/// The column of an unknown base parameter with a name.
+///
+/// Fails when there is no such parameter, or when its value is known.
 fn base_parameter(
     model: &Model,
-    payloads: &Payloads,
+    payloads: &PayloadColumns,
     infos: &[ParameterInfo],
     name: &str,
-) -> Outcome<Own> {
-    let unknown: Vec<usize> = (0..model.base.len())
-        .filter(|k| !model.is_known(*k))
-        .collect();
+) -> Outcome<PerRunColumns> {
+    let unknown: Vec<usize> = (0..model.base.len()).filter(|k| !model.is_known(*k)).collect();
     let Some(column) = unknown.iter().position(|k| infos[*k].name == name) else {
         return Err(Error::options(format!(
             "`{name}` is neither a base parameter whose value is unknown nor a kind; kinds are {}, as in `payload@{}`, \
@@ -506,8 +539,8 @@ fn base_parameter(
             model.drives().first().map_or("drive", String::as_str)
         )));
     };
-    Ok(Own {
-        of: name.to_owned(),
+    Ok(PerRunColumns {
+        quantity: name.to_owned(),
         columns: vec![column],
         names: vec![(name.to_owned(), infos[unknown[column]].unit.clone())],
         is_against_first: false,

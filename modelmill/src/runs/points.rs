@@ -1,106 +1,105 @@
-//! When parameters changed and stayed changed, over the order of the runs, and what that is in physics.
+//! Permanent changes of parameters over the order of the runs, and their physical meaning.
 
-use modelmill_identify::changes::{Moments, Runs, Told, mean, segments};
+use modelmill_identify::changes::{NormalEquations, RunPair, UncertainValue, change_points, weighted_mean};
 
 use nalgebra::DVector;
 
-use crate::runs::rows::Sizes;
-use crate::runs::{Bench, Changed, Fitted};
+use crate::runs::rows::MeasuredMoments;
+use crate::runs::thresholds::CHANGE_POINT_RUNS;
+use crate::runs::{FittedValue, RunAnalyser, RunChange};
 
-/// A change of one parameter from one stretch of runs to the next.
+/// A permanent change of one parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Step {
-    /// Which base parameter.
+pub struct ParameterStep {
+    /// Index of the base parameter.
     pub parameter: usize,
-    /// Its mean over the runs since the change before.
-    pub before: Fitted,
-    /// Its mean over the runs until the next.
-    pub now: Fitted,
+    /// Its mean over the runs since the previous change.
+    pub before: FittedValue,
+    /// Its mean over the runs until the next change.
+    pub now: FittedValue,
 }
 
-impl Step {
+impl ParameterStep {
+    /// The size of the step in its standard deviations.
     fn deviations(&self) -> f64 {
-        (self.now.value - self.before.value).abs() / self.before.beside(self.now)
+        (self.now.value - self.before.value).abs() / self.before.difference_deviation(self.now)
     }
 }
 
-/// A run from which on something was different and stayed so.
+/// A run from which on something has changed permanently.
 #[derive(Clone, Debug)]
 pub struct ChangePoint {
-    /// The first run after the change.
+    /// Index of the first run after the change.
     pub run: usize,
     /// Parameters that changed there, the clearest first.
-    pub steps: Vec<Step>,
-    /// What it is: the runs since the change before, held against those until the next.
-    pub changes: Vec<Changed>,
+    pub steps: Vec<ParameterStep>,
+    /// The physical changes: the runs since the previous change point, compared with those until the next.
+    pub changes: Vec<RunChange>,
 }
 
-/// Change points over the runs; `runs` are the base parameters of each, fitted alone, `wholes` their sums and `within` by what
-/// parts of each differ among themselves. `sizes` and `values` are those of a run that the others are held against.
-pub(crate) fn found(
-    bench: &Bench<'_>,
-    runs: &[&[Fitted]],
-    wholes: &[Moments],
+/// Change points over the runs. `runs` are the base parameters of each run fitted alone, `wholes` their sums, and
+/// `within` the differences between the parts of each. `sizes` and `values` are those of the reference run.
+pub(crate) fn find_change_points(
+    bench: &RunAnalyser<'_>,
+    runs: &[&[FittedValue]],
+    wholes: &[NormalEquations],
     within: &[f64],
-    sizes: &Sizes,
+    sizes: &MeasuredMoments,
     values: &DVector<f64>,
 ) -> Vec<ChangePoint> {
     let parameters: Vec<usize> = (0..bench.model.base.len())
         .filter(|k| !bench.model.is_known(*k))
         .collect();
-    let mut steps: Vec<(usize, Step)> = Vec::new();
+    // Stage 1: steps of each parameter over the order of the runs.
+    let mut steps: Vec<(usize, ParameterStep)> = Vec::new();
     for parameter in &parameters {
-        let told: Vec<Option<Told>> = runs.iter().map(|run| told(run[*parameter])).collect();
-        let mut bounds = segments(&told, parameters.len());
+        let told: Vec<Option<UncertainValue>> = runs.iter().map(|run| known_value(run[*parameter])).collect();
+        let mut bounds = change_points(&told, parameters.len());
         bounds.insert(0, 0);
         bounds.push(runs.len());
         for three in bounds.windows(3) {
             let [before, now] = [three[0]..three[1], three[1]..three[2]].map(|some| {
-                let (value, deviation) = mean(&told[some])?;
+                let (value, deviation) = weighted_mean(&told[some])?;
                 let deviation = Some(deviation);
-                Some(Fitted { value, deviation })
+                Some(FittedValue { value, deviation })
             });
             if let (Some(before), Some(now)) = (before, now) {
                 let parameter = *parameter;
-                steps.push((
-                    three[1],
-                    Step {
-                        parameter,
-                        before,
-                        now,
-                    },
-                ));
+                steps.push((three[1], ParameterStep { parameter, before, now }));
             }
         }
     }
-    let starts = together(&steps);
+    // Stage 2: steps of neighbouring runs belong to one change point.
+    let starts = step_runs(&steps);
     let bounds: Vec<usize> = [0].into_iter().chain(starts).chain([runs.len()]).collect();
+    // Stage 3: the sums before and after each point are searched for physical changes.
     let point = |three: &[usize]| {
         let (start, at, end) = (three[0], three[1], three[2]);
-        let own = steps.iter().filter(|(run, _)| run.abs_diff(at) <= 1);
-        let mut own: Vec<Step> = own.map(|(_, step)| *step).collect();
+        let own = steps.iter().filter(|(run, _)| run.abs_diff(at) <= CHANGE_POINT_RUNS);
+        let mut own: Vec<ParameterStep> = own.map(|(_, step)| *step).collect();
         own.sort_by(|a, b| b.deviations().total_cmp(&a.deviations()));
-        let both = Runs {
+        let both = RunPair {
             reference: wholes[start..at].to_vec(),
             later: wholes[at..end].to_vec(),
-            within: middle(&within[start..end]),
+            within_run_spread: median(&within[start..end]),
         };
         ChangePoint {
             run: at,
             steps: own,
-            changes: bench.told(&bench.large(&both, sizes), values),
+            changes: bench.identified_changes(&bench.significant_changes(&both, sizes), values),
         }
     };
     bounds.windows(3).map(point).collect()
 }
 
-fn told(fitted: Fitted) -> Option<Told> {
+/// The value with its standard deviation, if the run determines it.
+fn known_value(fitted: FittedValue) -> Option<UncertainValue> {
     Some((fitted.value, fitted.deviation.filter(|d| *d > 0.0)?))
 }
 
-/// Runs at which steps begin; of neighbours the one with the clearest steps, since a parameter that is known badly in one run may
-/// be seen to change one run later.
-fn together(steps: &[(usize, Step)]) -> Vec<usize> {
+/// Indices of runs at which steps begin. Of neighbouring runs the one with the clearest steps is taken, since a
+/// parameter with a large uncertainty in one run may show its change one run later.
+fn step_runs(steps: &[(usize, ParameterStep)]) -> Vec<usize> {
     let mut weights: Vec<(usize, f64)> = Vec::new();
     for (run, step) in steps {
         let weight = step.deviations().powi(2);
@@ -112,7 +111,7 @@ fn together(steps: &[(usize, Step)]) -> Vec<usize> {
     weights.sort_by(|a, b| b.1.total_cmp(&a.1));
     let mut kept: Vec<usize> = Vec::new();
     for (run, _) in weights {
-        if kept.iter().all(|other| other.abs_diff(run) > 1) {
+        if kept.iter().all(|other| other.abs_diff(run) > CHANGE_POINT_RUNS) {
             kept.push(run);
         }
     }
@@ -120,7 +119,8 @@ fn together(steps: &[(usize, Step)]) -> Vec<usize> {
     kept
 }
 
-fn middle(values: &[f64]) -> f64 {
+/// The median of some values; 0 without values.
+fn median(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)

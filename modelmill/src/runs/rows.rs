@@ -1,56 +1,59 @@
-//! A run as sums over its rows. Rows are laid out piece by piece, so that however long a run is, no more of it is held than its
-//! states and a piece of its columns.
+//! A run as sums over its rows. Rows are computed piece by piece, so that memory is needed only for its states and
+//! for one piece of its columns.
 
 use std::ops::Range;
 
 use modelmill_identify::LeastSquares;
-use modelmill_identify::changes::{Coloured, Moments};
+use modelmill_identify::changes::{AutoregressiveNoise, NormalEquations};
 use nalgebra::DVector;
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
-use crate::runs::columns::Laid;
-use crate::runs::layout::Layout;
-use crate::runs::payload::Payloads;
-use crate::stretch::Stretch;
+use crate::runs::columns::SegmentRows;
+use crate::runs::layout::RunColumnLayout;
+use crate::runs::payload::PayloadColumns;
+use crate::runs::thresholds::NOISE_FLOOR_SHARE;
+use crate::segment::RecordingSegment;
 
-/// Blocks of a run that decide for each other.
+/// Number of blocks of a run for cross-validation.
 pub(crate) const BLOCKS: usize = 8;
-/// Rounds of weighing the drives by what is left.
+/// Number of iterations of the weights from residuals.
 const ROUNDS: usize = 2;
-/// Noise that every run is taken to have besides, as a part of a drive's effective force: no model is better.
-const FLOOR: f64 = 1e-3;
-/// The most samples of a piece, after decimation.
+/// Largest number of samples of a piece, after decimation.
 const PIECE: usize = 4096;
-/// Runs of so many pieces keep their columns; those of longer ones are made anew for each look.
+/// Runs of up to this many pieces keep their columns; longer ones compute them again in each pass.
 const KEPT: usize = 2;
 
 /// The rows of one run.
-pub(crate) struct Rows<'a> {
+pub(crate) struct RunRows<'a> {
+    /// The model.
     model: &'a Model,
-    payloads: &'a Payloads,
-    pieces: Vec<Stretch>,
-    kept: Option<Vec<Laid>>,
-    /// Base parameters on which scales and clocks are built: those of the first run.
+    /// Columns of loads.
+    payloads: &'a PayloadColumns,
+    /// The segments in pieces.
+    pieces: Vec<RecordingSegment>,
+    /// Columns of all pieces, if they are kept.
+    kept: Option<Vec<SegmentRows>>,
+    /// Base parameters with which the columns of scales and clocks are computed: those of the first run.
     pub(crate) values: DVector<f64>,
-    /// Sums over the rows of each drive as they were measured.
-    sums: Vec<Moments>,
+    /// Sums over the rows of each drive as measured.
+    sums: Vec<NormalEquations>,
 }
 
-/// A run whose rows are white: what it says.
-pub(crate) struct White {
-    /// Block by block, all drives together.
-    pub(crate) blocks: Vec<Moments>,
-    /// Drive by drive, the whole run.
-    pub(crate) drives: Vec<Moments>,
-    /// The base columns alone, all drives together: a triangle keeps the digits that sums of products lose.
+/// Sums over white rows of a run.
+pub(crate) struct WhitenedRun {
+    /// Block by block, over all drives.
+    pub(crate) blocks: Vec<NormalEquations>,
+    /// Drive by drive, over the complete run.
+    pub(crate) drives: Vec<NormalEquations>,
+    /// The base columns alone, over all drives, as an R factor, which keeps the digits that sums of products lose.
     pub(crate) base: LeastSquares,
 }
 
-impl White {
-    /// The whole run.
-    pub(crate) fn whole(&self) -> Moments {
-        let mut whole = Moments::new(self.blocks[0].rhs.len());
+impl WhitenedRun {
+    /// Sums over the complete run.
+    pub(crate) fn total(&self) -> NormalEquations {
+        let mut whole = NormalEquations::new(self.blocks[0].rhs.len());
         for block in &self.blocks {
             whole.merge(block);
         }
@@ -58,27 +61,28 @@ impl White {
     }
 }
 
-impl<'a> Rows<'a> {
-    /// The rows of stretches; `values` are base parameters of the run before, in whose place come those of this run where there
-    /// is none before.
+impl<'a> RunRows<'a> {
+    /// The rows of segments. `values` are the base parameters of the first run; `None` for the first run, which
+    /// uses its own.
+    ///
+    /// Fails when a pose has no solution, a force was not measured, or values are too large for a fit.
     pub(crate) fn new(
         model: &'a Model,
-        stretches: &[Stretch],
-        payloads: &'a Payloads,
+        segments: &[RecordingSegment],
+        payloads: &'a PayloadColumns,
         values: Option<&DVector<f64>>,
     ) -> Outcome<Self> {
-        let layout = Layout::new(model, payloads);
-        let pieces: Vec<Stretch> = (stretches.iter())
-            .flat_map(|stretch| stretch.pieces(PIECE))
-            .collect();
+        let layout = RunColumnLayout::new(model, payloads);
+        let pieces: Vec<RecordingSegment> = (segments.iter()).flat_map(|stretch| stretch.pieces(PIECE)).collect();
+        // The first run is fitted with its base columns alone.
         let values = match values {
             Some(values) => values.clone(),
             None => {
-                let mut sums = vec![Moments::new(layout.base); layout.drives];
+                let mut sums = vec![NormalEquations::new(layout.base); layout.drives];
                 for piece in &pieces {
-                    add(&mut sums, &Laid::base(model, piece)?);
+                    add_rows(&mut sums, &SegmentRows::base_columns(model, piece)?);
                 }
-                weighed(&sums)?
+                weighted_least_squares(&sums)?
             }
         };
         let mut rows = Self {
@@ -90,36 +94,38 @@ impl<'a> Rows<'a> {
             sums: Vec::new(),
         };
         if rows.pieces.len() <= KEPT {
-            let laid = rows.pieces.iter().map(|piece| rows.laid(piece));
+            let laid = rows.pieces.iter().map(|piece| rows.segment_rows(piece));
             rows.kept = Some(laid.collect::<Outcome<_>>()?);
         }
-        let mut sums = vec![Moments::new(layout.total()); layout.drives];
+        // The sums over all columns need one pass over the pieces.
+        let mut sums = vec![NormalEquations::new(layout.total()); layout.drives];
         rows.visit(|laid| {
-            add(&mut sums, laid);
+            add_rows(&mut sums, laid);
             Ok(())
         })?;
         rows.sums = sums;
         Ok(rows)
     }
 
-    fn laid(&self, piece: &Stretch) -> Outcome<Laid> {
-        Laid::all(self.model, piece, self.payloads, &self.values)
+    /// All columns of a piece.
+    fn segment_rows(&self, piece: &RecordingSegment) -> Outcome<SegmentRows> {
+        SegmentRows::all_columns(self.model, piece, self.payloads, &self.values)
     }
 
-    /// Shows the columns, one piece after the other.
-    fn visit(&self, mut look: impl FnMut(&Laid) -> Outcome) -> Outcome {
+    /// Calls `look` with the columns of each piece.
+    fn visit(&self, mut look: impl FnMut(&SegmentRows) -> Outcome) -> Outcome {
         match &self.kept {
             Some(kept) => kept.iter().try_for_each(look),
-            None => (self.pieces.iter()).try_for_each(|piece| look(&self.laid(piece)?)),
+            None => (self.pieces.iter()).try_for_each(|piece| look(&self.segment_rows(piece)?)),
         }
     }
 
-    /// Sums over the rows as they were measured.
-    pub(crate) fn sizes(self) -> Sizes {
-        Sizes(self.sums)
+    /// Sums over the rows as measured.
+    pub(crate) fn sizes(self) -> MeasuredMoments {
+        MeasuredMoments(self.sums)
     }
 
-    /// The force of some columns along the run, drive by drive.
+    /// The force of some columns along the run, drive by drive, N or N m.
     pub(crate) fn force(&self, columns: &[usize], values: &DVector<f64>) -> Outcome<Vec<Vec<f64>>> {
         let mut forces: Vec<Vec<f64>> = vec![Vec::new(); self.sums.len()];
         self.visit(|laid| {
@@ -138,58 +144,55 @@ impl<'a> Rows<'a> {
         Ok(forces)
     }
 
-    /// The rows with the memory of each drive's noise taken out, as sums.
-    pub(crate) fn white(&self) -> Outcome<White> {
-        let layout = Layout::new(self.model, self.payloads);
+    /// Sums over the rows after a filter that whitens each drive's noise.
+    ///
+    /// Fails when values are too large for a fit.
+    pub(crate) fn whitened_run(&self) -> Outcome<WhitenedRun> {
+        let layout = RunColumnLayout::new(self.model, self.payloads);
         let columns = layout.total();
-        let values = weighed(&self.sums)?;
+        // Stage 1: the residual of each drive, in ranges without gaps.
+        let values = weighted_least_squares(&self.sums)?;
         let mut rests: Vec<Vec<Vec<f64>>> = vec![Vec::new(); self.sums.len()];
         self.visit(|laid| {
             for (drive, rests) in rests.iter_mut().enumerate() {
-                let rest = laid.rest(drive, &values);
-                rests.extend(
-                    laid.pieces(drive)
-                        .into_iter()
-                        .map(|some| rest[some].to_vec()),
-                );
+                let rest = laid.residual(drive, &values);
+                rests.extend(laid.pieces(drive).into_iter().map(|some| rest[some].to_vec()));
             }
             Ok(())
         })?;
-        let noise = |(rests, sums): (&Vec<Vec<f64>>, &Moments)| {
+        // Stage 2: an autoregressive model of each drive's residual.
+        let noise = |(rests, sums): (&Vec<Vec<f64>>, &NormalEquations)| {
             let rests: Vec<&[f64]> = rests.iter().map(Vec::as_slice).collect();
-            Coloured::of(&rests, FLOOR * size(sums, sums.total))
+            AutoregressiveNoise::from_residual(&rests, NOISE_FLOOR_SHARE * effective_value(sums, sums.total))
         };
-        let noise: Vec<Coloured> = rests.iter().zip(&self.sums).map(noise).collect();
+        let noise: Vec<AutoregressiveNoise> = rests.iter().zip(&self.sums).map(noise).collect();
         let length: usize = (self.pieces.iter())
             .map(|piece| piece.samples().div_ceil(piece.decimation()))
             .sum();
-        let mut white = White {
-            blocks: vec![Moments::new(columns); BLOCKS],
-            drives: vec![Moments::new(columns); self.sums.len()],
+        // Stage 3: sums over the filtered rows.
+        let mut white = WhitenedRun {
+            blocks: vec![NormalEquations::new(columns); BLOCKS],
+            drives: vec![NormalEquations::new(columns); self.sums.len()],
             base: LeastSquares::with_channels(layout.base, layout.drives),
         };
         let mut before = 0;
         let zeros = [0.0; TOGETHER];
         self.visit(|laid| {
-            for (drive, noise) in noise.iter().enumerate().filter(|(_, n)| n.deviation > 0.0) {
+            for (drive, noise) in noise.iter().enumerate().filter(|(_, n)| n.standard_deviation > 0.0) {
+                // The filter restarts after each gap.
                 for some in laid.pieces(drive) {
                     let start = before + some.start;
                     whiten(laid, drive, some, noise, columns, |i, z, y| {
-                        let mut sums = Moments::new(columns);
+                        let mut sums = NormalEquations::new(columns);
                         sums.add_rows(z, y);
-                        // Neighbouring blocks, each of the same part of the run.
+                        // Blocks are consecutive in time, the same part of the run for all drives.
                         let block = BLOCKS * (start + i) / length.max(1);
                         white.blocks[block.min(BLOCKS - 1)].merge(&sums);
                         white.drives[drive].merge(&sums);
                         let z = z[..layout.base].iter();
-                        let z: Vec<&[f64]> = z
-                            .map(|column| column.unwrap_or(&zeros[..y.len()]))
-                            .collect();
+                        let z: Vec<&[f64]> = z.map(|column| column.unwrap_or(&zeros[..y.len()])).collect();
                         white.base.add_columns(drive, &z, y).map_err(|error| {
-                            Error::input(format!(
-                                "the rows of {}: {error}",
-                                drive_name(self.model, drive)
-                            ))
+                            Error::input(format!("the rows of {}: {error}", drive_name(self.model, drive)))
                         })
                     })?;
                 }
@@ -201,19 +204,20 @@ impl<'a> Rows<'a> {
     }
 }
 
-/// Sums over the rows of each drive as they were measured.
+/// Sums over the rows of each drive as measured.
 #[derive(Clone)]
-pub(crate) struct Sizes(pub(crate) Vec<Moments>);
+pub(crate) struct MeasuredMoments(pub(crate) Vec<NormalEquations>);
 
-impl Sizes {
-    /// What the best base parameters leave of the force of each drive, as a part of it: with `base` columns at the front.
-    pub(crate) fn left(&self, base: usize) -> Outcome<Vec<f64>> {
+impl MeasuredMoments {
+    /// The relative residual of each drive with the best base parameters; `base` is the number of base columns,
+    /// which come first.
+    pub(crate) fn residual_ratios(&self, base: usize) -> Outcome<Vec<f64>> {
         let base: Vec<usize> = (0..base).collect();
-        let sums: Vec<Moments> = self.0.iter().map(|one| one.of(&base)).collect();
-        let values = weighed(&sums)?;
-        let part = |one: &Moments| {
+        let sums: Vec<NormalEquations> = self.0.iter().map(|one| one.select_columns(&base)).collect();
+        let values = weighted_least_squares(&sums)?;
+        let part = |one: &NormalEquations| {
             if one.total > 0.0 {
-                (one.rest(&values) / one.total).sqrt()
+                (one.residual_squares(&values) / one.total).sqrt()
             } else {
                 0.0
             }
@@ -221,10 +225,10 @@ impl Sizes {
         Ok(sums.iter().map(part).collect())
     }
 
-    /// How large the force of some columns is on the drive where it is largest, as a part of what that drive does.
-    pub(crate) fn part(&self, columns: &[usize], values: &DVector<f64>) -> f64 {
-        let of_drive = |sums: &Moments| {
-            let force = values.dot(&(sums.of(columns).gram * values));
+    /// The rms force of some columns relative to the drive's force, on the drive where this is largest.
+    pub(crate) fn force_fraction(&self, columns: &[usize], values: &DVector<f64>) -> f64 {
+        let of_drive = |sums: &NormalEquations| {
+            let force = values.dot(&(sums.select_columns(columns).gram * values));
             if sums.total > 0.0 {
                 (force.max(0.0) / sums.total).sqrt()
             } else {
@@ -235,27 +239,28 @@ impl Sizes {
     }
 }
 
+/// The name of a drive.
 fn drive_name(model: &Model, drive: usize) -> String {
     model.drives()[drive].clone()
 }
 
-/// Rows that are shown at once.
+/// Number of rows that are processed at once.
 const TOGETHER: usize = 256;
 
-/// Shows white rows of a stretch of samples by their columns, some hundreds at a time, with the place of the first.
+/// Calls `show` with whitened rows of a range of samples, column by column, in groups of [`TOGETHER`] rows, with
+/// the index of the first.
 fn whiten(
-    laid: &Laid,
+    laid: &SegmentRows,
     drive: usize,
     some: Range<usize>,
-    noise: &Coloured,
+    noise: &AutoregressiveNoise,
     columns: usize,
     mut show: impl FnMut(usize, &[Option<&[f64]>], &[f64]) -> Outcome,
 ) -> Outcome {
-    let white = |values: &[f64]| noise.whitened(&values[some.clone()]);
+    // The same filter is applied to force and columns.
+    let white = |values: &[f64]| noise.whiten(&values[some.clone()]);
     let y = white(&laid.forces[drive]);
-    let z: Vec<Option<Vec<f64>>> = (0..columns)
-        .map(|k| laid.column(k, drive).map(white))
-        .collect();
+    let z: Vec<Option<Vec<f64>>> = (0..columns).map(|k| laid.column(k, drive).map(white)).collect();
     for start in (0..y.len()).step_by(TOGETHER) {
         let rows = start..(start + TOGETHER).min(y.len());
         let z: Vec<Option<&[f64]>> = z
@@ -267,8 +272,8 @@ fn whiten(
     Ok(())
 }
 
-/// Adds the rows of a stretch to sums of each drive.
-fn add(sums: &mut [Moments], laid: &Laid) {
+/// Adds the rows of a segment to the sums of each drive.
+fn add_rows(sums: &mut [NormalEquations], laid: &SegmentRows) {
     for (drive, sums) in sums.iter_mut().enumerate() {
         let columns = 0..sums.rhs.len();
         let z: Vec<Option<&[f64]>> = columns.map(|k| laid.column(k, drive)).collect();
@@ -276,30 +281,33 @@ fn add(sums: &mut [Moments], laid: &Laid) {
     }
 }
 
-/// Effective value of so large a sum of squares over the rows of a drive.
-fn size(sums: &Moments, squares: f64) -> f64 {
+/// The rms value over the rows of a drive, from a sum of squares.
+fn effective_value(sums: &NormalEquations, squares: f64) -> f64 {
     (squares / sums.rows.max(1) as f64).sqrt()
 }
 
-/// Least squares with every drive weighed by what is left on it.
-fn weighed(sums: &[Moments]) -> Outcome<DVector<f64>> {
-    let mut deviations: Vec<f64> = sums.iter().map(|one| size(one, one.total)).collect();
+/// Least squares with each drive weighted by its residual.
+fn weighted_least_squares(sums: &[NormalEquations]) -> Outcome<DVector<f64>> {
+    let mut deviations: Vec<f64> = sums.iter().map(|one| effective_value(one, one.total)).collect();
     let floors: Vec<f64> = deviations.iter().map(|size| 1e-6 * size).collect();
     let mut values = DVector::zeros(0);
+    // Weights start from the forces and are then computed from the residuals.
     for _ in 0..=ROUNDS {
-        let mut all = Moments::new(sums.first().map_or(0, |one| one.rhs.len()));
+        let mut all = NormalEquations::new(sums.first().map_or(0, |one| one.rhs.len()));
         for (one, deviation) in sums.iter().zip(&deviations) {
             if *deviation > 0.0 {
-                all.merge(&one.times(deviation.powi(-2)));
+                all.merge(&one.scale_weight(deviation.powi(-2)));
             }
         }
         values = all.solve().values;
         if values.iter().any(|x| !x.is_finite()) {
             return Err(Error::input(
-                "a run has numbers that are too large to be fitted; look at its units".to_owned(),
+                "a run has numbers that are too large for a fit; check its units".to_owned(),
             ));
         }
-        let left = sums.iter().map(|one| size(one, one.rest(&values)));
+        let left = sums
+            .iter()
+            .map(|one| effective_value(one, one.residual_squares(&values)));
         deviations = left.zip(&floors).map(|(d, floor)| d.max(*floor)).collect();
     }
     Ok(values)

@@ -1,64 +1,71 @@
-//! Runs of many machines of one kind as sums over the same columns, so that they add: those of a day, of a machine, of a fleet.
+//! Runs of many machines of one kind as additive statistics over the same columns: sums of a day, of a machine, of
+//! a fleet.
 //!
-//! What a column means must not depend on the run: those of scales, clocks and encoders' zeros are built on parameters that
-//! are the same for all, from reference runs ([`CommonGround`]). Rows are made white by each run's own noise, and count
-//! independent numbers of variance 1 whichever run they came from.
+//! The meaning of a column must not depend on the run: columns of scales, clocks and encoders' zeros are computed
+//! with parameters that are the same for all, from reference runs ([`ReferenceFit`]). Rows are whitened by the
+//! noise of their run, so that they count as independent values of variance 1 in every run.
 
 use std::sync::Arc;
 
-use modelmill_identify::changes::{Moments, Runs, alone, gains};
-use modelmill_identify::{LeastSquaresError, Triangle};
+use modelmill_identify::changes::{NormalEquations, RunPair, fit_single_change, single_change_gains};
+use modelmill_identify::{LeastSquaresError, RFactor};
 use nalgebra::DVector;
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
-use crate::recording::Recording;
-use crate::runs::layout::Layout;
-use crate::runs::payload::Payloads;
-use crate::runs::rows::{Rows, Sizes};
-use crate::runs::{Bench, Changed, Fitted, beside_known, changes};
+use crate::recording::PreparedRecording;
+use crate::runs::layout::RunColumnLayout;
+use crate::runs::payload::PayloadColumns;
+use crate::runs::rows::{MeasuredMoments, RunRows};
+use crate::runs::{FittedValue, RunAnalyser, RunChange, changes, merge_known};
 
-/// What all runs of a fleet are summed up and held against.
+/// The reference of a fleet, with which all runs are summed up and compared.
 #[derive(Clone)]
-pub struct CommonGround {
+pub struct ReferenceFit {
+    /// The model of all machines.
     model: Model,
-    payloads: Arc<Payloads>,
+    /// Columns of loads.
+    payloads: Arc<PayloadColumns>,
+    /// Unknown base parameters of the reference runs.
     values: DVector<f64>,
-    sizes: Sizes,
+    /// Sums over the rows of the reference runs, as measured.
+    sizes: MeasuredMoments,
 }
 
-/// One run as sums over its rows.
+/// One run as additive statistics.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunSums {
-    /// Samples that were used, after decimation.
+    /// Number of samples that were used, after decimation.
     pub samples: usize,
-    /// Sums over rows of variance 1: base columns that are no known numbers, then those of every possible change.
-    pub whole: Moments,
-    /// The triangle of the base columns alone, over the same rows.
-    pub base: Triangle,
-    /// By what the parts of the run differ among themselves.
+    /// Sums over rows of variance 1: columns of unknown base parameters, followed by those of every possible
+    /// change.
+    pub total: NormalEquations,
+    /// The R factor of the base columns alone, over the same rows.
+    pub base: RFactor,
+    /// Difference between the parts of the run, the scale of what is no change.
     pub within: f64,
-    /// What the run's own parameters leave of the force of each drive, as a part of it.
-    pub left: Vec<f64>,
-    /// Contacts and pushes, whose forces are left out.
-    pub events: Vec<Changed>,
+    /// Relative residual of the force of each drive with the run's own parameters.
+    pub residual_ratios: Vec<f64>,
+    /// Contacts and pushes, whose forces are excluded.
+    pub events: Vec<RunChange>,
 }
 
-impl CommonGround {
-    /// The ground that reference runs make: their parameters, fitted to all of them at once, and the size of their forces.
+impl ReferenceFit {
+    /// The reference from reference runs: parameters fitted to all of them at once, and the size of their forces.
     ///
-    /// Fails without runs, and where a run cannot be fitted.
-    pub fn of(model: &Model, reference: &[&Recording]) -> Outcome<Self> {
+    /// Fails without runs, and when a run cannot be fitted.
+    pub fn from_reference_runs(model: &Model, reference: &[&PreparedRecording]) -> Outcome<Self> {
         let stretches: Vec<_> = (reference.iter())
-            .flat_map(|one| one.stretches.iter().cloned())
+            .flat_map(|one| one.segments.iter().cloned())
             .collect();
         if stretches.is_empty() {
             return Err(Error::options(
-                "there is no reference run; give one or more recordings of sound machines",
+                "there is no reference run; give one or more recordings of machines without faults",
             ));
         }
-        let payloads = Payloads::new(model)?;
-        let rows = Rows::new(model, &stretches, &payloads, None)?;
+        let payloads = PayloadColumns::new(model)?;
+        // All reference runs are treated as one run.
+        let rows = RunRows::new(model, &stretches, &payloads, None)?;
         let values = rows.values.clone();
         let sizes = rows.sizes();
         Ok(Self {
@@ -69,16 +76,16 @@ impl CommonGround {
         })
     }
 
-    /// The same ground from what was kept of it: [`CommonGround::values`] and [`CommonGround::sizes`].
+    /// The same reference from its stored parts: [`ReferenceFit::values`] and [`ReferenceFit::sizes`].
     ///
-    /// Fails where they are of another model.
-    pub fn kept(model: &Model, values: &[f64], sizes: Vec<Moments>) -> Outcome<Self> {
-        let payloads = Payloads::new(model)?;
-        let layout = Layout::new(model, &payloads);
-        let fits = |one: &Moments| one.rhs.len() == layout.total();
+    /// Fails when they belong to another model.
+    pub fn from_parts(model: &Model, values: &[f64], sizes: Vec<NormalEquations>) -> Outcome<Self> {
+        let payloads = PayloadColumns::new(model)?;
+        let layout = RunColumnLayout::new(model, &payloads);
+        let fits = |one: &NormalEquations| one.rhs.len() == layout.total();
         if values.len() != layout.base || sizes.len() != layout.drives || !sizes.iter().all(fits) {
             return Err(Error::input(format!(
-                "the reference has {} parameters and sums of {} drives where {} has {} and {}; make it anew with this model",
+                "the reference has {} parameters and sums of {} drives where {} has {} and {}; create it again with this model",
                 values.len(),
                 sizes.len(),
                 model.name,
@@ -90,7 +97,7 @@ impl CommonGround {
             model: model.clone(),
             payloads: Arc::new(payloads),
             values: DVector::from_column_slice(values),
-            sizes: Sizes(sizes),
+            sizes: MeasuredMoments(sizes),
         })
     }
 
@@ -99,50 +106,51 @@ impl CommonGround {
         &self.model
     }
 
-    /// Base parameters of the reference runs that are no known numbers.
+    /// Base parameters of the reference runs, without those known from the file.
     pub fn values(&self) -> &[f64] {
         self.values.as_slice()
     }
 
-    /// Sums over the rows of each drive of the reference runs, as they were measured.
-    pub fn sizes(&self) -> &[Moments] {
+    /// Sums over the rows of each drive of the reference runs, as measured.
+    pub fn sizes(&self) -> &[NormalEquations] {
         &self.sizes.0
     }
 
-    /// Number of columns of [`RunSums::whole`].
+    /// Number of columns of [`RunSums::total`].
     pub fn n_columns(&self) -> usize {
-        Layout::new(&self.model, &self.payloads).total()
+        RunColumnLayout::new(&self.model, &self.payloads).total()
     }
 
-    /// Number of base columns, which stand first.
+    /// Number of base columns, which come first.
     pub fn n_base(&self) -> usize {
         self.values.len()
     }
 
-    fn bench(&self) -> Bench<'_> {
-        Bench::new(&self.model, &self.payloads)
+    /// The analysis that is the same for all runs.
+    fn analyser(&self) -> RunAnalyser<'_> {
+        RunAnalyser::new(&self.model, &self.payloads)
     }
 
-    /// A recording as sums.
+    /// The sums of a recording.
     ///
-    /// Fails where a force was not measured, or the recording cannot be evaluated.
-    pub fn sums(&self, recording: &Recording) -> Outcome<RunSums> {
-        let run = self.bench().looked_at(recording, Some(&self.values))?;
+    /// Fails when a force was not measured, or the recording cannot be evaluated.
+    pub fn sums(&self, recording: &PreparedRecording) -> Outcome<RunSums> {
+        let run = self.analyser().analyse_run(recording, Some(&self.values))?;
         Ok(RunSums {
             samples: run.samples,
-            whole: run.white.whole(),
-            base: Triangle::new(&run.white.base),
+            total: run.white.total(),
+            base: RFactor::new(&run.white.base),
             within: run.within,
-            left: run.sizes.left(self.n_base())?,
+            residual_ratios: run.sizes.residual_ratios(self.n_base())?,
             events: run.events,
         })
     }
 
-    /// The base parameters that a triangle gives, with those of the file that are known numbers. Deviations take the rows to be
-    /// independent and of variance 1, or more where they scatter more.
+    /// The base parameters from an R factor, with those known from the file. Standard deviations assume independent
+    /// rows of variance 1, or more if they scatter more.
     ///
-    /// Fails where the triangle is of another model or holds no rows.
-    pub fn fitted(&self, base: &Triangle) -> Outcome<Vec<Fitted>> {
+    /// Fails when the R factor belongs to another model or has no rows.
+    pub fn fit_parameters(&self, base: &RFactor) -> Outcome<Vec<FittedValue>> {
         let of = |error: LeastSquaresError| Error::input(error.to_string());
         if base.rows() == 0 {
             return Err(of(LeastSquaresError::NoRows));
@@ -153,56 +161,56 @@ impl CommonGround {
                 expected: self.n_base(),
             }));
         }
+        // Directions without information stay at the reference.
         let solved = base.solve_near(self.values()).map_err(of)?;
         let noise = Some(solved.residual_variance()).filter(|x| x.is_finite());
         let noise = noise.unwrap_or(1.0).max(1.0);
         let covariance = solved.unit_covariance();
-        Ok(beside_known(&self.model, |i| Fitted {
+        Ok(merge_known(&self.model, |i| FittedValue {
             value: solved.values[i],
             deviation: solved.determined[i].then(|| (noise * covariance[(i, i)]).sqrt()),
         }))
     }
 
-    /// What later runs do not share with those before, the largest first; `within` is by what parts of one run, or runs that are
-    /// taken to be alike, differ among themselves.
-    pub fn changes(&self, before: &[Moments], later: &[Moments], within: f64) -> Vec<Changed> {
-        let bench = self.bench();
-        let runs = Runs {
+    /// Changes of later runs relative to those before, the largest first. `within` is the difference between parts
+    /// of one run, or between runs that are assumed to be equal.
+    pub fn changes(&self, before: &[NormalEquations], later: &[NormalEquations], within: f64) -> Vec<RunChange> {
+        let bench = self.analyser();
+        let runs = RunPair {
             reference: before.to_vec(),
             later: later.to_vec(),
-            within,
+            within_run_spread: within,
         };
-        bench.told(&bench.large(&runs, &self.sizes), &self.values)
+        bench.identified_changes(&bench.significant_changes(&runs, &self.sizes), &self.values)
     }
 
-    /// By how much every possible change, each with no other beside it, explains what a later run does not share with those
-    /// before: sums of squares over the variance of what is left. The order is always the same.
-    pub fn gains(&self, before: &[Moments], later: &Moments) -> Vec<f64> {
-        gains(&pair(before, later), &self.bench().search)
+    /// The gain of every possible change, each alone, in explaining what a later run does not share with those
+    /// before: sums of squares over the variance of the residual. The order is always the same.
+    pub fn gains(&self, before: &[NormalEquations], later: &NormalEquations) -> Vec<f64> {
+        single_change_gains(&pair_runs(before, later), &self.analyser().search)
     }
 
-    /// One of these changes, by its place among them, whatever it explains.
-    pub fn alone(&self, before: &[Moments], later: &Moments, which: usize) -> Changed {
-        let bench = self.bench();
-        let found = alone(&pair(before, later), &bench.search, which);
-        changes::told(&self.model, &bench.possible, &found, &self.values)
+    /// One of these changes, by its index, whatever it explains.
+    pub fn single_change(&self, before: &[NormalEquations], later: &NormalEquations, which: usize) -> RunChange {
+        let bench = self.analyser();
+        let found = fit_single_change(&pair_runs(before, later), &bench.search, which);
+        changes::identified_change(&self.model, &bench.possible, &found, &self.values)
     }
 
-    /// What one of these changes is called.
+    /// The name of one of these changes.
     pub fn name_of_change(&self, which: usize) -> String {
-        self.bench()
+        self.analyser()
             .possible
             .get(which)
-            .map_or_else(String::new, |possible| {
-                changes::name(&self.model, &possible.kind)
-            })
+            .map_or_else(String::new, |possible| changes::name(&self.model, &possible.kind))
     }
 }
 
-fn pair(before: &[Moments], later: &Moments) -> Runs {
-    Runs {
+/// The sums of earlier runs and of one later run.
+fn pair_runs(before: &[NormalEquations], later: &NormalEquations) -> RunPair {
+    RunPair {
         reference: before.to_vec(),
         later: vec![later.clone()],
-        within: 0.0,
+        within_run_spread: 0.0,
     }
 }

@@ -1,11 +1,11 @@
-//! Columns of numbers as CSV text.
+//! Writes columns of numbers as CSV text.
 
 use std::fmt::Write as _;
 
 use modelmill_boundary::text::csv_field;
 
-/// A line of names and one line per sample. Recordings read names again as they are, but for what steers a terminal or
-/// breaks a line.
+/// A line of names and one line for each sample. Recordings read the names back unchanged, except for control
+/// characters and line breaks, which are replaced.
 ///
 /// # Panics
 /// If a column is shorter than the first.
@@ -18,6 +18,7 @@ pub fn csv(columns: &[(&str, &[f64])]) -> String {
     let names = columns.iter().map(|(name, _)| csv_field(name));
     let mut text = names.collect::<Vec<_>>().join(",");
     text.push('\n');
+    // The first column is the time, which all others follow.
     let samples = columns.first().map_or(0, |(_, values)| values.len());
     for i in 0..samples {
         for (k, (_, values)) in columns.iter().enumerate() {
@@ -30,7 +31,7 @@ pub fn csv(columns: &[(&str, &[f64])]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use modelmill_identify::{ReadOptions, Recording};
+    use modelmill_identify::{ReadOptions, SignalRecording};
 
     use super::*;
 
@@ -54,23 +55,18 @@ mod tests {
         let values = [1.5, -0.25e-30];
         let columns: Vec<(&str, &[f64])> = names.iter().map(|name| (*name, &values[..])).collect();
         let options = ReadOptions::default();
-        let read = Recording::from_bytes(csv(&columns).as_bytes(), "run.csv", &options).unwrap();
+        let read = SignalRecording::from_bytes(csv(&columns).as_bytes(), "run.csv", &options).unwrap();
         for name in names {
             assert_eq!(read.column(name).unwrap(), values, "{name}");
         }
-        // What would break the line or steer a terminal is not written.
+        // Line breaks and control characters of a terminal are replaced.
         let steering = csv(&[("two\r\nlines\t\u{1b}[2J\u{202e}", &values)]);
-        assert_eq!(
-            steering.lines().next(),
-            Some("two lines \u{fffd}[2J\u{fffd}")
-        );
-        // No spreadsheet takes a field for a formula.
+        assert_eq!(steering.lines().next(), Some("two lines \u{fffd}[2J\u{fffd}"));
+        // A field that begins with such a sign would be a formula in a spreadsheet.
         let header = csv(&columns);
         let header = header.lines().next().unwrap_or_default();
         for sign in ["=", "+", "-", "@"] {
-            assert!(
-                !header.contains(&format!(",{sign}")) && !header.contains(&format!(",\"{sign}"))
-            );
+            assert!(!header.contains(&format!(",{sign}")) && !header.contains(&format!(",\"{sign}")));
         }
     }
 }

@@ -1,8 +1,8 @@
-//! Text for people: tables, numbers, marks for a terminal, pictures.
+//! Formatting of text for users: tables, numbers, terminal styles, figures.
 
 pub mod csv;
 pub mod style;
 pub mod svg;
 pub mod table;
 
-pub use style::Style;
+pub use style::TerminalStyle;

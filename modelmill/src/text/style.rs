@@ -1,15 +1,16 @@
-//! Marks in text for a terminal: bold, dim, colours.
+//! Styles of text in a terminal: bold, dim, colours.
 
-/// Marks text for the terminal, or leaves it as it is.
+/// Styles text for a terminal, or returns it unchanged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Style(bool);
+pub struct TerminalStyle(bool);
 
-impl Style {
+impl TerminalStyle {
     /// With ANSI escape sequences for colours.
     pub const COLOURED: Self = Self(true);
-    /// Without any mark.
+    /// Without styles.
     pub const PLAIN: Self = Self(false);
 
+    /// Text between the escape sequence of a code and the reset, if styles are on.
     fn paint(self, code: &str, text: &str) -> String {
         if self.0 {
             format!("\x1b[{code}m{text}\x1b[0m")
@@ -18,12 +19,12 @@ impl Style {
         }
     }
 
-    /// What deserves attention.
+    /// Warnings.
     pub fn yellow(self, text: &str) -> String {
         self.paint("1;33", text)
     }
 
-    /// What went wrong.
+    /// Errors.
     pub fn bold_red(self, text: &str) -> String {
         self.paint("1;31", text)
     }
@@ -33,22 +34,22 @@ impl Style {
         self.paint("1", text)
     }
 
-    /// What is there for reference.
+    /// Details for reference.
     pub fn dim(self, text: &str) -> String {
         self.paint("2", text)
     }
 
-    /// What got better or was added.
+    /// Improvements and added lines.
     pub fn green(self, text: &str) -> String {
         self.paint("32", text)
     }
 
-    /// What got worse or was removed.
+    /// Deteriorations and removed lines.
     pub fn red(self, text: &str) -> String {
         self.paint("31", text)
     }
 
-    /// What draws the eye.
+    /// Commands and positions.
     pub fn cyan(self, text: &str) -> String {
         self.paint("36", text)
     }

@@ -1,18 +1,24 @@
-//! Figures as SVG files: panels of curves over one axis, one below the other.
+//! Figures as SVG files: panels of curves over one time axis, one below the other. Lengths are in SVG units.
 
 use std::fmt::Write as _;
 
+/// Width of a figure.
 const WIDTH: f64 = 900.0;
+/// Height of a panel.
 const PANEL: f64 = 150.0;
+/// Room between panels, for the names of curves.
 const GAP: f64 = 34.0;
+/// Margin left of the panels, for the scale.
 const LEFT: f64 = 80.0;
+/// Margin right of the panels.
 const RIGHT: f64 = 16.0;
+/// Space above the first panel, for the title.
 const TOP: f64 = 44.0;
-/// Points of a curve; more would not be seen.
+/// Largest number of points of a curve; more would not be visible.
 const POINTS: usize = 820;
-/// Colours of curves in the style.
+/// Number of curve colours in the style.
 const COLOURS: usize = 3;
-/// Light and dark, with the colours of all pages; a figure is a file of its own too.
+/// Style sheet for light and dark mode, with the colours of all pages; it is part of each figure.
 const STYLE: &str = "\
 .figure{--paper:#fff;--ink:#1a1d21;--faint:#59636c;--line:#d9dee3;--c0:#1f5fa8;--c1:#b53d26;--c2:#2a7147;font-family:system-ui,sans-serif}
 @media screen and (prefers-color-scheme:dark){.figure{--paper:#14171a;--ink:#e4e7ea;--faint:#a2acb5;--line:#343b42;--c0:#74b2f5;--c1:#f0826a;--c2:#6cc492}}
@@ -30,24 +36,28 @@ const STYLE: &str = "\
 .figure text.scale{font-size:11px;fill:var(--faint)}
 ";
 
-/// How a panel looks, beyond what its curves say.
+/// Options of a panel.
 #[derive(Default)]
-pub struct Look<'a> {
-    /// Largest magnitude that is shown, what is beyond is cut off; that of the curves if absent.
+pub struct PanelStyle<'a> {
+    /// Largest magnitude of the scale; larger values are cut off. `None` takes the largest of the curves.
     pub limit: Option<f64>,
     /// Times of vertical lines, s.
     pub marks: &'a [f64],
 }
 
-/// A figure as it grows.
-pub struct Figure<'a> {
+/// A figure under construction.
+pub struct SvgFigure<'a> {
+    /// Title as SVG text.
     title: String,
+    /// Times of the samples, s.
     time: &'a [f64],
+    /// SVG of the panels so far.
     body: String,
+    /// Number of panels so far.
     panels: usize,
 }
 
-impl<'a> Figure<'a> {
+impl<'a> SvgFigure<'a> {
     /// A figure over the given times, s.
     pub fn new(title: &str, time: &'a [f64]) -> Self {
         Self {
@@ -60,11 +70,11 @@ impl<'a> Figure<'a> {
 
     /// Adds a panel with its curves, one value for each time.
     pub fn panel(&mut self, title: &str, curves: &[(&str, &[f64])]) {
-        self.panel_with(title, curves, &Look::default());
+        self.panel_with(title, curves, &PanelStyle::default());
     }
 
-    /// The same with a scale of its own or marks.
-    pub fn panel_with(&mut self, title: &str, curves: &[(&str, &[f64])], look: &Look<'_>) {
+    /// As [`Self::panel`], with a fixed scale or marks.
+    pub fn panel_with(&mut self, title: &str, curves: &[(&str, &[f64])], look: &PanelStyle<'_>) {
         let top = TOP + GAP + self.panels as f64 * (PANEL + GAP);
         let largest = curves
             .iter()
@@ -72,6 +82,7 @@ impl<'a> Figure<'a> {
             .fold(0.0_f64, |m, v| m.max(v.abs()));
         let limit = look.limit.unwrap_or(largest).max(f64::MIN_POSITIVE);
         let plot_width = WIDTH - LEFT - RIGHT;
+        // Zero is in the middle of the panel; larger values are cut off at its edge.
         let y = |value: f64| top + PANEL * (0.5 - 0.5 * (value / limit).clamp(-1.0, 1.0));
         let body = &mut self.body;
         let _ = writeln!(
@@ -97,21 +108,13 @@ impl<'a> Figure<'a> {
                 top + PANEL
             );
         }
-        // A scale that was asked for is a round number.
+        // A given limit is a round number and is printed unchanged.
         let text = |value: f64| match look.limit {
             Some(_) => value.to_string(),
             None => format!("{value:.4}"),
         };
-        for (value, label) in [
-            (limit, text(limit)),
-            (0.0, "0".to_owned()),
-            (-limit, text(-limit)),
-        ] {
-            let label = if label.len() > 9 {
-                format!("{value:.2e}")
-            } else {
-                label
-            };
+        for (value, label) in [(limit, text(limit)), (0.0, "0".to_owned()), (-limit, text(-limit))] {
+            let label = if label.len() > 9 { format!("{value:.2e}") } else { label };
             let _ = writeln!(
                 body,
                 r#"<text x="{:.1}" y="{:.1}" text-anchor="end" class="scale">{label}</text>"#,
@@ -125,8 +128,9 @@ impl<'a> Figure<'a> {
             let behind: f64 = curves[k + 1..].iter().map(|(name, _)| width(name)).sum();
             let colour = k % COLOURS;
             let n = values.len().max(2) - 1;
+            // Long curves are thinned out, which keeps all peaks.
             let mut points = String::new();
-            for (i, value) in thinned(values, POINTS) {
+            for (i, value) in thin_out(values, POINTS) {
                 let x = LEFT + plot_width * i as f64 / n as f64;
                 let _ = write!(points, "{x:.1},{:.1} ", y(value));
             }
@@ -143,7 +147,7 @@ impl<'a> Figure<'a> {
         self.panels += 1;
     }
 
-    /// The file's text.
+    /// The text of the file, with the time axis below the last panel.
     pub fn finish(self) -> String {
         let bottom = TOP + GAP + self.panels as f64 * (PANEL + GAP);
         let height = bottom + 10.0;
@@ -163,8 +167,9 @@ impl<'a> Figure<'a> {
     }
 }
 
-/// A sheet of 900 units with a title, in the colours of all figures: classes `c0`, `c1` and `c2` of curves, discs and their names,
-/// `zero` of lines, `scale` of small text, `part` of what is marked. `title` and `body` are SVG.
+/// A sheet of 900 units with a title, in the colours of all figures. Classes are `c0`, `c1` and `c2` for curves,
+/// discs and their names, `zero` for lines, `scale` for small text, `part` for marked areas. `title` and `body` are
+/// SVG.
 pub fn sheet(title: &str, left: f64, height: f64, body: &str) -> String {
     format!(
         r#"<svg xmlns="http://www.w3.org/2000/svg" class="figure" role="img" aria-label="{title}" viewBox="0 0 {WIDTH} {height:.0}">
@@ -177,16 +182,20 @@ pub fn sheet(title: &str, left: f64, height: f64, body: &str) -> String {
     )
 }
 
-/// Least and largest value of each of half as many stretches as points are wanted, with their places; all values where
-/// they are few enough.
-pub fn thinned(values: &[f64], wanted: usize) -> Vec<(usize, f64)> {
+/// A curve in about `wanted` points, each with its index: the smallest and the largest value of each of many
+/// segments, so that every peak is kept. All values if they are few enough.
+///
+/// ```
+/// assert_eq!(modelmill::text::svg::thin_out(&[0.0, 5.0], 10), [(0, 0.0), (1, 5.0)]);
+/// ```
+pub fn thin_out(values: &[f64], wanted: usize) -> Vec<(usize, f64)> {
     if values.len() <= wanted {
         return values.iter().copied().enumerate().collect();
     }
-    let stretch = values.len().div_ceil((wanted / 2).max(1));
+    let segment = values.len().div_ceil((wanted / 2).max(1));
     let mut points = Vec::with_capacity(wanted + 2);
-    for (k, span) in values.chunks(stretch).enumerate() {
-        let at = |i: usize| (k * stretch + i, span[i]);
+    for (k, span) in values.chunks(segment).enumerate() {
+        let at = |i: usize| (k * segment + i, span[i]);
         let by = |a: &usize, b: &usize| span[*a].total_cmp(&span[*b]);
         let low = (0..span.len()).min_by(by).unwrap_or(0);
         let high = (0..span.len()).max_by(by).unwrap_or(0);
@@ -198,7 +207,7 @@ pub fn thinned(values: &[f64], wanted: usize) -> Vec<(usize, f64)> {
     points
 }
 
-/// Text as HTML and SVG take it.
+/// Text with the characters escaped that HTML and SVG reserve.
 pub fn escape(text: &str) -> String {
     modelmill_boundary::text::html(text).into_owned()
 }

@@ -1,18 +1,28 @@
-//! Tables and numbers in text.
+//! Formats tables and numbers.
 
-/// How a column stands.
+/// Alignment of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Align {
-    /// Text.
+pub enum ColumnAlignment {
+    /// Left, for text.
     Left,
-    /// Numbers.
+    /// Right, for numbers.
     Right,
 }
 
-/// Lays out rows under a head, two blanks between columns, `indent` blanks in front; no trailing blanks.
-pub fn table(indent: usize, columns: &[(&str, Align)], rows: &[Vec<String>]) -> Vec<String> {
+/// Lays out rows below a header, with two blanks between columns and `indent` blanks in front; without trailing
+/// blanks.
+///
+/// ```
+/// use modelmill::text::table::{ColumnAlignment, table};
+///
+/// let columns = [("a", ColumnAlignment::Left), ("n", ColumnAlignment::Right)];
+/// let rows = [vec!["x".to_owned(), "10".to_owned()]];
+/// assert_eq!(table(2, &columns, &rows), ["  a   n", "  x  10"]);
+/// ```
+pub fn table(indent: usize, columns: &[(&str, ColumnAlignment)], rows: &[Vec<String>]) -> Vec<String> {
     let head: Vec<String> = columns.iter().map(|(name, _)| (*name).to_owned()).collect();
     let all: Vec<&Vec<String>> = std::iter::once(&head).chain(rows).collect();
+    // A column is as wide as its longest cell, in letters rather than bytes.
     let widths: Vec<usize> = (0..columns.len())
         .map(|j| {
             all.iter()
@@ -29,26 +39,33 @@ pub fn table(indent: usize, columns: &[(&str, Align)], rows: &[Vec<String>]) -> 
                 let cell = row.get(j).map_or("", String::as_str);
                 let fill = " ".repeat(widths[j] - cell.chars().count());
                 let parts = match align {
-                    Align::Left => [cell, &fill],
-                    Align::Right => [&fill, cell],
+                    ColumnAlignment::Left => [cell, &fill],
+                    ColumnAlignment::Right => [&fill, cell],
                 };
                 line.extend(parts);
                 line.push_str("  ");
             }
+            // Blanks at the end of a line would show as changes in quotations.
             line.trim_end().to_owned()
         })
         .collect()
 }
 
-/// A number with six significant digits, without needless zeros.
+/// A number with six significant digits.
 pub fn number(value: f64) -> String {
     significant(value, 6)
 }
 
-/// A value and its standard deviation, both to the second digit of the deviation.
+/// A value and its standard deviation, both rounded to the second digit of the standard deviation.
+///
+/// ```
+/// assert_eq!(modelmill::text::table::with_deviation(1.23456, 0.012), ["1.235", "0.012"]);
+/// ```
 pub fn with_deviation(value: f64, deviation: f64) -> [String; 2] {
+    // Position of the first digit of the standard deviation.
     let exponent = deviation.abs().log10().floor();
     let decimals = 1.0 - exponent;
+    // Very large and very small standard deviations use significant digits instead.
     if !(value.is_finite() && (0.0..=12.0).contains(&decimals)) {
         return [number(value), number(deviation)];
     }
@@ -62,6 +79,10 @@ pub fn with_deviation(value: f64, deviation: f64) -> [String; 2] {
 }
 
 /// A number with some significant digits; very large and very small ones with an exponent.
+///
+/// ```
+/// assert_eq!(modelmill::text::table::significant(0.123456, 3), "0.123");
+/// ```
 pub fn significant(value: f64, digits: usize) -> String {
     if value == 0.0 {
         return "0".to_owned();
@@ -69,11 +90,13 @@ pub fn significant(value: f64, digits: usize) -> String {
     if !value.is_finite() {
         return value.to_string();
     }
+    // Formatting rounds first, so that 999999.9 gets the exponent of 1e6.
     let scientific = format!("{value:.*e}", digits.saturating_sub(1));
     let exponent: i32 = scientific
         .split_once('e')
         .and_then(|(_, e)| e.parse().ok())
         .unwrap_or(0);
+    // Plain decimals up to this size are easier to read than exponents.
     if !(-4..9).contains(&exponent) {
         return scientific;
     }
@@ -81,17 +104,21 @@ pub fn significant(value: f64, digits: usize) -> String {
     format!("{value:.decimals$}")
 }
 
-/// A relative figure in per cent: `11.3 %`, `6.28e-5 %`.
+/// A relative figure in per cent: `11.3 %`, `6.28e-5 %`; `-` without a value.
+///
+/// ```
+/// assert_eq!(modelmill::text::table::percent(Some(0.113)), "11.3 %");
+/// ```
 pub fn percent(value: Option<f64>) -> String {
     match value {
         None => "-".to_owned(),
         Some(0.0) => "0 %".to_owned(),
-        Some(value) => format!("{} %", short(100.0 * value)),
+        Some(value) => format!("{} %", three_digits(100.0 * value)),
     }
 }
 
 /// Three significant digits, with an exponent below a thousandth.
-fn short(value: f64) -> String {
+fn three_digits(value: f64) -> String {
     if value.abs() < 1e-3 {
         format!("{value:.2e}")
     } else {
@@ -99,7 +126,11 @@ fn short(value: f64) -> String {
     }
 }
 
-/// `1 loop`, `2 loops`.
+/// A count with its noun, such as `1 loop`, `2 loops`.
+///
+/// ```
+/// assert_eq!(modelmill::text::table::count(2, "loop", "loops"), "2 loops");
+/// ```
 pub fn count(n: usize, one: &str, many: &str) -> String {
     if n == 1 {
         format!("1 {one}")
@@ -129,7 +160,11 @@ mod tests {
             vec!["a".to_owned(), "1".to_owned()],
             vec!["long".to_owned(), "10".to_owned()],
         ];
-        let lines = table(2, &[("name", Align::Left), ("n", Align::Right)], &rows);
+        let lines = table(
+            2,
+            &[("name", ColumnAlignment::Left), ("n", ColumnAlignment::Right)],
+            &rows,
+        );
         assert_eq!(lines, ["  name   n", "  a      1", "  long  10"]);
     }
 }

@@ -1,8 +1,8 @@
-//! What a drive has to give along motions: force, power and work.
+//! Requirements on a drive along motions: force, power and work.
 
-/// What a drive has to give. Power is force times the rate along which the drive acts.
+/// Requirements on a drive. Power is force times the rate along which the drive acts.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Effort {
+pub struct DriveEffort {
     /// The largest magnitude of the force, N or N m.
     pub peak: f64,
     /// Root mean square of the force over all samples, N or N m.
@@ -11,26 +11,33 @@ pub struct Effort {
     pub peak_power: f64,
     /// Root mean square of the power over all samples, W.
     pub rms_power: f64,
-    /// Work that the drive does while it gives power, J; what it takes up is not set off.
+    /// Work of the drive while its power is positive, J; negative power is not subtracted.
     pub work: f64,
-    /// Work given less work taken up, J.
+    /// Positive minus negative work, J.
     pub net_work: f64,
 }
 
-/// Sums over samples.
+/// Sums over samples, from which the requirements are computed.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Gathered {
+pub(super) struct EffortSums {
+    /// Number of samples.
     samples: usize,
+    /// Largest magnitude of the force, N or N m.
     peak: f64,
+    /// Sum of squares of the force.
     squares: f64,
+    /// Largest magnitude of the power, W.
     peak_power: f64,
+    /// Sum of squares of the power.
     squares_of_power: f64,
+    /// Positive work, J.
     work: f64,
+    /// Positive minus negative work, J.
     net_work: f64,
 }
 
-impl Gathered {
-    /// Adds a motion: times, forces and rates, a number for each sample. Between samples power is taken to be linear.
+impl EffortSums {
+    /// Adds a motion: times, s, forces and rates, one value for each sample. Power is linear between samples.
     pub(super) fn add(&mut self, time: &[f64], force: &[f64], rate: &[f64]) {
         let power: Vec<f64> = force.iter().zip(rate).map(|(f, v)| f * v).collect();
         for (f, p) in force.iter().zip(&power) {
@@ -47,10 +54,10 @@ impl Gathered {
         }
     }
 
-    /// The figures of all that was added.
-    pub(super) fn effort(self) -> Effort {
+    /// The requirements over all motions that were added.
+    pub(super) fn effort(self) -> DriveEffort {
         let mean = |squares: f64| (squares / self.samples.max(1) as f64).sqrt();
-        Effort {
+        DriveEffort {
             peak: self.peak,
             rms: mean(self.squares),
             peak_power: self.peak_power,
@@ -61,7 +68,7 @@ impl Gathered {
     }
 }
 
-/// The mean of the positive part of what goes from `a` to `b` on a line.
+/// The mean of the positive part of a line from `a` to `b`.
 fn mean_of_positive(a: f64, b: f64) -> f64 {
     match (a > 0.0, b > 0.0) {
         (true, true) => 0.5 * (a + b),
@@ -84,7 +91,7 @@ mod tests {
         let time: Vec<f64> = (0..=n).map(angle).collect();
         let force: Vec<f64> = time.iter().map(|t| 3.0 * t.sin()).collect();
         let rate: Vec<f64> = time.iter().map(|t| 2.0 * t.cos()).collect();
-        let mut gathered = Gathered::default();
+        let mut gathered = EffortSums::default();
         gathered.add(&time, &force, &rate);
         // Power is 3 sin(2 t): its positive halves hold 3 J each, and nothing is left of a whole turn.
         let found = gathered.effort();
@@ -101,7 +108,7 @@ mod tests {
 
     #[test]
     fn only_what_is_given_counts_as_work() {
-        let mut gathered = Gathered::default();
+        let mut gathered = EffortSums::default();
         // One second from 2 W to -1 W: two thirds of it give 2/3 J; the rest takes 1/6 J up.
         gathered.add(&[0.0, 1.0], &[2.0, -1.0], &[1.0, 1.0]);
         let found = gathered.effort();

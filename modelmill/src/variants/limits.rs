@@ -1,18 +1,16 @@
-//! Limits of the model files along motions: which the variant exceeds, and which both do.
+//! Limits of the model files along motions: the use of each limit by two variants.
 
-use modelmill_identify::excite::{Margin, Motion, Plant};
+use modelmill_identify::excite::{ExcitationMotion, ExcitationPlant, LimitMargin};
 
+use super::thresholds::LIMIT_TOLERANCE;
 use crate::error::{Error, Outcome};
-use crate::excite::plant::{AXES, ModelPlant, used};
+use crate::excite::plant::{AXES, ModelPlant, used_fraction};
 use crate::model::Model;
-use crate::stretch::{BLOCK, Stretch};
+use crate::segment::{BLOCK, RecordingSegment};
 
-/// The part beyond 1 that is rounding.
-const ROUNDING: f64 = 1e-9;
-
-/// How two models keep a limit.
+/// The state of a limit in two models.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Crossing {
+pub enum LimitCrossing {
     /// The second model exceeds it, the first one does not.
     NowExceeded,
     /// Both exceed it.
@@ -23,43 +21,46 @@ pub enum Crossing {
     Kept,
 }
 
-/// How far two models go within a limit. Each is held against the limit of its own file.
+/// The use of a limit by two models. Each is compared with the limit of its own file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LimitUse {
-    /// What is limited, named as `excite` names it: `theta1`, `theta1_d`, `spindle_left`, `R3m.x`, `singularity of the loops`.
+    /// The limited quantity, with the name that `excite` uses: `theta1`, `theta1_d`, `spindle_left`, `R3m.x`,
+    /// `singularity of the loops`.
     pub limit: String,
-    /// The ranges of both files, in the unit of what is limited; none where a file says none, and for singularities.
+    /// The ranges of both files, in the unit of the quantity; `None` if a file has none, and for singularities.
     pub ranges: [Option<[f64; 2]>; 2],
-    /// The part of the limit that each uses, 1 at the limit, counted from the middle of its range; none without a limit.
+    /// The fraction of the limit that each model uses, 1 at the limit, counted from the middle of the range; `None`
+    /// without a limit.
     pub used: [Option<f64>; 2],
 }
 
 impl LimitUse {
-    /// Whether it is exceeded, and by which.
-    pub fn crossing(&self) -> Crossing {
+    /// Whether the limit is exceeded, and by which model.
+    pub fn crossing(&self) -> LimitCrossing {
         let is_beyond = self
             .used
-            .map(|used| used.is_some_and(|used| used > 1.0 + ROUNDING));
+            .map(|used| used.is_some_and(|used| used > 1.0 + LIMIT_TOLERANCE));
         match is_beyond {
-            [false, true] => Crossing::NowExceeded,
-            [true, true] => Crossing::StillExceeded,
-            [true, false] => Crossing::NoLongerExceeded,
-            [false, false] => Crossing::Kept,
+            [false, true] => LimitCrossing::NowExceeded,
+            [true, true] => LimitCrossing::StillExceeded,
+            [true, false] => LimitCrossing::NoLongerExceeded,
+            [false, false] => LimitCrossing::Kept,
         }
     }
 }
 
-/// The limits of two models, as far as they were used.
-pub(super) struct Limits {
+/// The limits of two models, with their use so far.
+pub(super) struct VariantLimits {
+    /// One entry for each limit of either file.
     found: Vec<LimitUse>,
-    /// The limits that poses tell, without those of forces: these come from forces under the model's own load.
-    of_poses: [modelmill_spec::Limits; 2],
+    /// Limits that depend on poses, without those of forces: forces are computed under the model's own load.
+    of_poses: [modelmill_spec::MotionLimits; 2],
 }
 
-impl Limits {
+impl VariantLimits {
     /// The limits of both files, without motion yet.
-    pub(super) fn of(models: [&Model; 2]) -> Self {
-        let of_poses = models.map(|model| modelmill_spec::Limits {
+    pub(super) fn from_models(models: [&Model; 2]) -> Self {
+        let of_poses = models.map(|model| modelmill_spec::MotionLimits {
             forces: Vec::new(),
             ..model.derivation.mechanism.limits.clone()
         });
@@ -69,17 +70,20 @@ impl Limits {
         }
     }
 
-    /// Adds a motion: the states of each model, and its forces `[drive][sample]`.
+    /// Adds a motion: the states of each model, and its forces `[drive][sample]`, N or N m.
+    ///
+    /// Fails when a model cannot follow the motion.
     pub(super) fn add(
         &mut self,
         models: [&Model; 2],
-        states: &[Stretch; 2],
+        states: &[RecordingSegment; 2],
         forces: [&[Vec<f64>]; 2],
     ) -> Outcome {
         for (m, model) in models.into_iter().enumerate() {
             let mechanism = &model.derivation.mechanism;
             let run = &states[m].run;
             let (active, _) = model.derivation.coordinates();
+            // Limits of active coordinates and of their derivatives are compared sample by sample.
             for (i, limits) in &mechanism.limits.coordinates {
                 let Some(k) = active.iter().position(|a| *a == i.0) else {
                     continue;
@@ -92,49 +96,49 @@ impl Limits {
                 ];
                 for (name, range, values) in ranges {
                     if let Some(range) = range {
-                        self.see(m, &name, Some(range), within(values, range));
+                        self.record_use(m, &name, Some(range), used_share_of_range(values, range));
                     }
                 }
             }
+            // Limits of forces use the forces of the variant itself.
             for (drive, range) in &mechanism.limits.forces {
                 let name = &mechanism.drives[drive.0].name;
                 let values = &forces[m][drive.0];
-                self.see(m, name, Some(*range), within(values, *range));
+                self.record_use(m, name, Some(*range), used_share_of_range(values, *range));
             }
             self.add_poses(m, model, &states[m])?;
         }
         Ok(())
     }
 
-    /// Passive coordinates, points and distances from singular poses.
-    fn add_poses(&mut self, m: usize, model: &Model, states: &Stretch) -> Outcome {
+    /// Adds passive coordinates, points and singular values, which need the pose of every sample.
+    ///
+    /// Fails when the model cannot follow the motion.
+    fn add_poses(&mut self, m: usize, model: &Model, states: &RecordingSegment) -> Outcome {
         let limits = self.of_poses[m].clone();
         let plant = ModelPlant::new(model, &limits);
         let names = plant.limits();
         if names.is_empty() {
             return Ok(());
         }
-        let what = format!("holding {} against its limits", model.name);
+        let what = format!("comparing {} with its limits", model.name);
         let run = &states.run;
         let samples = states.samples();
-        let found = model.host().watched(&what, samples, |job| {
+        let found = model.host().run_job(&what, samples, |job| {
             let mut most = vec![f64::NEG_INFINITY; names.len()];
+            // The motion is evaluated in blocks, so that progress is reported and memory stays small.
             for start in (0..samples).step_by(BLOCK) {
                 let end = (start + BLOCK).min(samples);
                 job.step(end - start)?;
-                let piece =
-                    |all: &[Vec<f64>]| all.iter().map(|one| one[start..end].to_vec()).collect();
-                let motion = Motion {
+                let piece = |all: &[Vec<f64>]| all.iter().map(|one| one[start..end].to_vec()).collect();
+                let motion = ExcitationMotion {
                     q: piece(&run.q),
                     qd: piece(&run.qd),
                     qdd: piece(&run.qdd),
                 };
-                let excess = plant.excess(&motion).ok_or_else(|| {
-                    Error::input(format!(
-                        "{} cannot follow the motion of {}",
-                        model.path, run.file
-                    ))
-                })?;
+                let excess = plant
+                    .excess(&motion)
+                    .ok_or_else(|| Error::input(format!("{} cannot follow the motion of {}", model.path, run.file)))?;
                 for (most, excess) in most.iter_mut().zip(excess) {
                     *most = excess.into_iter().fold(*most, f64::max);
                 }
@@ -143,18 +147,19 @@ impl Limits {
         })??;
         for (name, excess) in names.into_iter().zip(found) {
             let range = range_of(model, &limits, &name);
-            let margin = Margin {
+            let margin = LimitMargin {
                 name,
                 excess,
                 proven: false,
             };
-            self.see(m, &margin.name, range, used(&margin));
+            self.record_use(m, &margin.name, range, used_fraction(&margin));
         }
         Ok(())
     }
 
-    /// Keeps the largest part of a limit that a model uses.
-    fn see(&mut self, m: usize, name: &str, range: Option<[f64; 2]>, used: f64) {
+    /// Keeps the largest fraction of a limit that a model uses, over all motions.
+    fn record_use(&mut self, m: usize, name: &str, range: Option<[f64; 2]>, used: f64) {
+        // The first use of a limit adds its entry.
         let known = self.found.iter().position(|one| one.limit == name);
         let k = known.unwrap_or_else(|| {
             self.found.push(LimitUse {
@@ -169,27 +174,29 @@ impl Limits {
         one.used[m] = Some(one.used[m].map_or(used, |before| before.max(used)));
     }
 
-    /// All limits.
-    pub(super) fn found(self) -> Vec<LimitUse> {
+    /// The uses of all limits.
+    pub(super) fn into_uses(self) -> Vec<LimitUse> {
         self.found
     }
 }
 
-/// The part of a range that values use, from its middle.
-fn within(values: &[f64], [low, high]: [f64; 2]) -> f64 {
+/// The largest fraction of a range that values use, from its middle.
+fn used_share_of_range(values: &[f64], [low, high]: [f64; 2]) -> f64 {
     let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
     let far = values.iter().map(|v| (v - middle).abs() / half);
     far.fold(0.0, f64::max)
 }
 
-/// The range of a passive coordinate or of a point along an axis.
-fn range_of(model: &Model, limits: &modelmill_spec::Limits, name: &str) -> Option<[f64; 2]> {
+/// The range of a passive coordinate or of a point along an axis, by the name of its limit; `None` for other
+/// limits.
+fn range_of(model: &Model, limits: &modelmill_spec::MotionLimits, name: &str) -> Option<[f64; 2]> {
     let mechanism = &model.derivation.mechanism;
     let coordinates = limits.coordinates.iter();
     let mut coordinates = coordinates.filter(|(i, _)| mechanism.coordinates[i.0].name == name);
     if let Some((_, limits)) = coordinates.next() {
         return limits.position;
     }
+    // Points have names such as `R3m.x`.
     let (point, axis) = name.rsplit_once('.')?;
     let axis = AXES.iter().position(|a| *a == axis)?;
     let mut points = limits.points.iter();

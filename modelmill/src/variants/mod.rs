@@ -1,117 +1,132 @@
-//! Two variants of a machine along the same motions: what each drive has to give, which products of parameters make the
-//! difference, which limits are exceeded, and how far each is off what was measured.
+//! Comparison of two variants of a machine along the same motions: requirements on each drive, the products of
+//! parameters that cause the difference, exceeded limits, and errors against measured forces.
 
 mod counterparts;
 mod effort;
 mod limits;
 mod terms;
+mod thresholds;
 
 use modelmill_boundary::message;
-use modelmill_identify::{Figures, Note};
+use modelmill_identify::{ErrorFigures, RecordingNote};
 
 use crate::along;
 use crate::compare;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
-use crate::recording::Recording;
-use crate::stretch::Stretch;
+use crate::recording::PreparedRecording;
+use crate::segment::RecordingSegment;
 
-use counterparts::Counterparts;
-use effort::Gathered;
-use terms::Terms;
+use counterparts::ModelCounterparts;
+use effort::EffortSums;
+use terms::SummandColumns;
+use thresholds::FORCE_DIFFERENCE_LEAST_SHARE;
 
-pub use effort::Effort;
-pub use limits::{Crossing, LimitUse};
+pub use effort::DriveEffort;
+pub use limits::{LimitCrossing, LimitUse};
 pub use terms::{ProductShare, TermShare};
 
-/// A difference of forces below this part of them is rounding: nothing makes it.
-const ROUNDING: f64 = 1e-8;
-
-/// Two models of one machine along the same motions.
+/// The comparison of two models of one machine along the same motions.
 #[derive(Clone, Debug)]
-pub struct Variants {
-    /// Names of the recordings whose motions these are.
+pub struct VariantComparison {
+    /// File names of the recordings that provide the motions.
     pub recordings: Vec<String>,
-    /// Samples of all recordings.
+    /// Number of samples of all recordings.
     pub samples: usize,
-    /// Time from the first to the last sample of each stretch, summed up, s.
+    /// Total duration of the segments, s.
     pub seconds: f64,
-    /// The drives that both models have, in the order of the first.
+    /// The drives that both models have, in the order of the first model.
     pub drives: Vec<DriveVariants>,
-    /// The limits of both files; those that neither model exceeds as well.
+    /// The limits of both files, including those that neither model exceeds.
     pub limits: Vec<LimitUse>,
-    /// Error figures against measured forces, as [`Model::compare`] gives them; `None` where a model was held against none.
-    pub errors: [Option<Figures>; 2],
-    /// What was left out and taken for granted, and what each recording is to be read with.
-    pub notes: Vec<Note>,
+    /// Error metrics, by comparison with measured forces, as [`Model::compare`] computes them; `None` for a model
+    /// without measured forces.
+    pub errors: [Option<ErrorFigures>; 2],
+    /// Notes: what was left out, assumptions, and notes on the recordings.
+    pub notes: Vec<RecordingNote>,
 }
 
-/// A drive in both models.
+/// The comparison of one drive.
 #[derive(Clone, Debug)]
 pub struct DriveVariants {
     /// Its name.
     pub drive: String,
     /// Unit of its force: N or N m.
     pub unit: &'static str,
-    /// What the first model asks of it.
-    pub before: Effort,
-    /// What the second model asks of it.
-    pub after: Effort,
-    /// The force of the second model less that of the first, sample by sample.
-    pub difference: Difference,
-    /// What makes the difference, the largest share first; empty where there is none. Shares add up to 1.
+    /// Requirements of the first model.
+    pub before: DriveEffort,
+    /// Requirements of the second model.
+    pub after: DriveEffort,
+    /// The force of the second model minus that of the first, sample by sample.
+    pub difference: ForceDifference,
+    /// Causes of the difference, the largest share first; empty without a difference. Shares add up to 1.
     pub products: Vec<ProductShare>,
 }
 
 /// A difference of forces along motions, N or N m.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Difference {
+pub struct ForceDifference {
     /// The largest magnitude.
     pub peak: f64,
     /// Root mean square over all samples.
     pub rms: f64,
 }
 
-impl Variants {
-    /// Fails where two models cannot be held beside each other, as [`Variants::along`] would, before any recording is read.
+impl VariantComparison {
+    /// Fails when two models cannot be compared, as [`VariantComparison::along_recordings`] would, before any
+    /// recording is read.
+    ///
+    /// ```
+    /// use modelmill::Model;
+    /// use modelmill::variants::VariantComparison;
+    ///
+    /// let arm = Model::open("../model-spec/models/two_link.toml")?;
+    /// VariantComparison::check([&arm, &arm])?;
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     pub fn check(models: [&Model; 2]) -> Outcome {
-        Counterparts::between(models).map(|_| ())
+        ModelCounterparts::match_models(models).map(|_| ())
     }
 
-    /// Holds two models beside each other along the motions of recordings: `runs` are the same recordings as the first and as
-    /// the second model reads them. Motions are those of the first reading, base parameters those of the files. Effects that
-    /// depend on the load see the force that their own model has without them, so that a recording needs no forces.
+    /// Compares two models along the motions of recordings: `runs` are the same recordings, read for the first and
+    /// for the second model. Motions are those of the first, base parameters those of the files. Effects that
+    /// depend on the load use the force of their own model without these effects, so that a recording needs no
+    /// forces.
     ///
-    /// Fails when the models do not have the same active coordinates, have no drive in common, or cannot follow a motion.
-    pub fn along(models: [&Model; 2], runs: [&[&Recording]; 2]) -> Outcome<Self> {
-        let counterparts = Counterparts::between(models)?;
-        let stretches = |runs: &[&Recording]| -> Vec<Stretch> {
-            runs.iter().flat_map(|one| one.stretches.clone()).collect()
+    /// Fails when the models do not have the same active coordinates, have no drive in common, or cannot follow
+    /// a motion.
+    pub fn along_recordings(models: [&Model; 2], runs: [&[&PreparedRecording]; 2]) -> Outcome<Self> {
+        // Stage 1: assign coordinates and drives, and collect notes of both models.
+        let counterparts = ModelCounterparts::match_models(models)?;
+        let stretches = |runs: &[&PreparedRecording]| -> Vec<RecordingSegment> {
+            runs.iter().flat_map(|one| one.segments.clone()).collect()
         };
         let motions = stretches(runs[0]);
         let mut notes = counterparts.notes.clone();
-        notes.extend(by_load(models));
+        notes.extend(load_note(models));
         for note in models.into_iter().flat_map(|m| m.nominal_values().notes) {
             if !notes.contains(&note) {
                 notes.push(note);
             }
         }
-        let mut terms = Terms::between(models);
-        let mut limits = limits::Limits::of(models);
+        // Stage 2: sums over all motions: efforts, differences, causes and limits.
+        let mut terms = SummandColumns::from_models(models);
+        let mut limits = limits::VariantLimits::from_models(models);
         let n = counterparts.drives.len();
-        let mut gathered = vec![[Gathered::default(); 2]; n];
+        let mut gathered = vec![[EffortSums::default(); 2]; n];
         let mut differences = vec![(0.0_f64, 0.0_f64); n];
         let (mut samples, mut seconds) = (0, 0.0);
         for motion in &motions {
             let time = &motion.run.time;
             let own = counterparts.own_states(models, motion)?;
-            let forces = both(|m| forces_of(models[m], &own[m]))?;
-            let rates = both(|m| along::drive_rates(models[m], &own[m]))?;
+            let forces = for_both(|m| forces_of(models[m], &own[m]))?;
+            let rates = for_both(|m| along::drive_rates(models[m], &own[m]))?;
             let mut rest = Vec::new();
             for (k, [d, e]) in counterparts.drives.iter().copied().enumerate() {
                 for (m, i) in [d, e].into_iter().enumerate() {
                     gathered[k][m].add(time, &forces[m][i], &rates[m][i]);
                 }
+                // The difference of the forces, with its peak and sum of squares.
                 let pairs = forces[1][e].iter().zip(&forces[0][d]);
                 let rest_of_drive: Vec<f64> = pairs.map(|(after, before)| after - before).collect();
                 for x in &rest_of_drive {
@@ -123,22 +138,20 @@ impl Variants {
             terms.add(models, &own, &counterparts.drives, &rest)?;
             limits.add(models, &own, [&forces[0], &forces[1]])?;
             samples += time.len();
-            seconds += time
-                .last()
-                .zip(time.first())
-                .map_or(0.0, |(end, start)| end - start);
+            seconds += time.last().zip(time.first()).map_or(0.0, |(end, start)| end - start);
         }
+        // Stage 3: the results of each drive.
         let drives = (counterparts.drives.iter().enumerate()).map(|(k, [d, _])| {
-            let [before, after] = gathered[k].map(Gathered::effort);
+            let [before, after] = gathered[k].map(EffortSums::effort);
             let (peak, squares) = differences[k];
             let rms = (squares / samples.max(1) as f64).sqrt();
-            let is_rounding = rms <= ROUNDING * before.rms.max(after.rms);
+            let is_rounding = rms <= FORCE_DIFFERENCE_LEAST_SHARE * before.rms.max(after.rms);
             DriveVariants {
                 drive: models[0].derivation.mechanism.drives[*d].name.clone(),
                 unit: models[0].force_unit(*d),
                 before,
                 after,
-                difference: Difference { peak, rms },
+                difference: ForceDifference { peak, rms },
                 products: if is_rounding {
                     Vec::new()
                 } else {
@@ -147,10 +160,11 @@ impl Variants {
             }
         });
         let drives = drives.collect();
-        let errors = both(|m| errors(models[m], &stretches(runs[m])))?;
+        // Stage 4: each model is compared with measured forces in its own reading.
+        let errors = for_both(|m| errors(models[m], &stretches(runs[m])))?;
         if errors.iter().all(Option::is_none) {
-            notes.push(Note::info(
-                "No recording has the forces of all drives, so that neither model is held against measured ones.",
+            notes.push(RecordingNote::info(
+                "No recording has the forces of all drives, so neither model is compared with measured forces.",
             ));
         }
         Ok(Self {
@@ -158,47 +172,46 @@ impl Variants {
             samples,
             seconds,
             drives,
-            limits: limits.found(),
+            limits: limits.into_uses(),
             errors,
             notes,
         })
     }
 }
 
-/// Something of the first model and of the second.
-fn both<T>(mut of: impl FnMut(usize) -> Outcome<T>) -> Outcome<[T; 2]> {
+/// Computes a value for the first and for the second model.
+fn for_both<T>(mut of: impl FnMut(usize) -> Outcome<T>) -> Outcome<[T; 2]> {
     Ok([of(0)?, of(1)?])
 }
 
-/// Forces of a model for the values of its file, `[drive][sample]`.
-fn forces_of(model: &Model, states: &Stretch) -> Outcome<Vec<Vec<f64>>> {
+/// Forces of a model at the values of its file, `[drive][sample]`, N or N m.
+///
+/// Fails when the model cannot follow the motion; the message names it.
+fn forces_of(model: &Model, states: &RecordingSegment) -> Outcome<Vec<Vec<f64>>> {
     along::forces(model, states, &model.nominal).map_err(|error| match error {
         Error::Cancelled => error,
-        // Which of both models cannot follow is not seen from the recording.
-        error => Error::input(message!(
-            "{} cannot follow the motion: {}",
-            model.path,
-            error.message()
-        )),
+        // The error names the model, since the recording does not show which of both cannot follow.
+        error => Error::input(message!("{} cannot follow the motion: {}", model.path, error.message())),
     })
 }
 
-/// Which effects see the load, and what they take for it.
-fn by_load(models: [&Model; 2]) -> Option<Note> {
-    let mut effects: Vec<&str> = models.iter().flat_map(|m| m.load_dependent()).collect();
+/// The note on effects that depend on the load, and on the load that they use; `None` without such effects.
+fn load_note(models: [&Model; 2]) -> Option<RecordingNote> {
+    let mut effects: Vec<&str> = models.iter().flat_map(|m| m.load_dependent_effects()).collect();
+    // Both models may have the same effect.
     effects.sort_unstable();
     effects.dedup();
     (!effects.is_empty()).then(|| {
-        Note::info(format!(
-            "What a drive carries, on which {} depends, is the force of each model itself without that effect, not the measured \
-             one; errors take the measured one, as `compare` does.",
+        RecordingNote::info(format!(
+            "The load of a drive, on which {} depends, is the force of each model without that effect, not the measured \
+             one. Errors use the measured one, as `compare` does.",
             effects.join(", ")
         ))
     })
 }
 
-/// Error figures of a model along those recordings that have forces.
-fn errors(model: &Model, runs: &[Stretch]) -> Outcome<Option<Figures>> {
+/// Error metrics of a model along those recordings that have forces; `None` if none has.
+fn errors(model: &Model, runs: &[RecordingSegment]) -> Outcome<Option<ErrorFigures>> {
     let mut measured = runs.to_vec();
     measured.retain(|one| one.run.force.is_some());
     if measured.is_empty() {

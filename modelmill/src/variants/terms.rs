@@ -1,32 +1,32 @@
-//! What makes the difference of forces between two models: the summands of base parameters, eq. (16), each with its column.
+//! Causes of a difference of forces between two models: the summands of base parameters, eq. (16), each with its
+//! column.
 //!
-//! Forces are linear in base parameters, `f = sum_k h_k p_k`, and each base parameter is a sum of products of parameters, so
-//! that the difference of forces is a sum too: for each summand `h'_k v' - h_k v`, with its values and columns in both models.
-//! The share of a summand for a drive is what its part of the difference projects on the whole of it,
-//! `<h'_k v' - h_k v, f' - f> / <f' - f, f' - f>` over all samples. Shares add up to 1; one that works against the difference
-//! is negative, and where summands nearly cancel, shares are large. A share falls into what the value does along the mean
-//! column, `<(h_k + h'_k)/2 (v' - v), f' - f>`, and what the column does with the mean value, which is geometry and effects.
+//! Forces are linear in base parameters, `f = sum_k h_k p_k`, and each base parameter is a sum of products of
+//! parameters. Therefore the difference of forces is a sum too: for each summand `h'_k v' - h_k v`, with its values
+//! and columns in both models. The share of a summand for a drive is the projection of its part on the complete
+//! difference, `<h'_k v' - h_k v, f' - f> / <f' - f, f' - f>` over all samples. Shares add up to 1. A summand that
+//! reduces the difference has a negative share; where summands nearly cancel, shares are large. A share has two
+//! parts: the change of the value along the mean column, `<(h_k + h'_k)/2 (v' - v), f' - f>`, and the change of the
+//! column with the mean value, which is due to geometry and effects.
 
 use std::collections::BTreeMap;
 
-use modelmill_codegen::{Evaluator, PoseFault, review};
+use modelmill_codegen::{ModelEvaluator, PoseFault, review};
 
+use super::thresholds::CAUSE_LEAST_SHARE;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
-use crate::stretch::Stretch;
+use crate::segment::RecordingSegment;
 
-/// Shares below this are rounding and left out.
-const ROUNDING: f64 = 1e-12;
-
-/// The share that a product of parameters has in a difference of forces, through all base parameters that it is in. Unlike
-/// that of a single summand it does not depend on which columns are retained.
+/// The share of a product of parameters in a difference of forces, over all base parameters that contain it. Unlike
+/// the share of a single summand, it does not depend on which columns are retained.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProductShare {
-    /// The product of p_g, eq. (5), such as `mP`; an expression of p_min where its value was identified as a whole.
+    /// The product of p_g, eq. (5), such as `mP`; an expression of p_min if its value was identified as one number.
     pub product: String,
-    /// Its share.
+    /// Its share, 1 for the complete difference.
     pub share: f64,
-    /// Its summands in base parameters, the largest share first; theirs add up to that of the product.
+    /// Its summands in base parameters, the largest share first; they add up to the share of the product.
     pub terms: Vec<TermShare>,
 }
 
@@ -35,47 +35,54 @@ pub struct ProductShare {
 pub struct TermShare {
     /// The summand, such as `LB*mP`.
     pub term: String,
-    /// The base parameter that it is in, by its retained product.
+    /// The retained product of the base parameter that contains it.
     pub retained: String,
     /// Unit of its value.
     pub unit: String,
-    /// Its value in the first model; absent where it is no summand there.
+    /// Its value in the first model; `None` if it is no summand there.
     pub before: Option<f64>,
-    /// Its value in the second model; absent where it is no summand there.
+    /// Its value in the second model; `None` if it is no summand there.
     pub after: Option<f64>,
     /// Its share.
     pub share: f64,
-    /// What its value makes of that share; the rest is its column, which other geometry and other constants of effects change.
+    /// The part of the share from its value; the rest is from its column, which other geometry and other constants
+    /// of effects change.
     pub by_value: f64,
 }
 
 /// A summand in both models.
-struct Slot {
+struct SummandPair {
+    /// The product of parameters, as text.
     product: String,
+    /// The retained product of its base parameter.
     retained: String,
-    /// Where it stands in each model.
-    places: [Option<Place>; 2],
+    /// Its place in each model; `None` if it is no summand there.
+    places: [Option<SummandPlace>; 2],
 }
 
-/// A summand in a model.
+/// The place of a summand in a model.
 #[derive(Clone, Copy)]
-struct Place {
+struct SummandPlace {
+    /// Index of the base parameter.
     base: usize,
-    /// Position in p_g; none where the base parameter is taken as a whole.
+    /// Index in p_g; `None` if the base parameter is treated as one number.
     product: Option<usize>,
+    /// Its value, in the unit of the base parameter.
     value: f64,
 }
 
-/// Summands, and their columns held against the differences of forces.
-pub(super) struct Terms {
-    slots: Vec<Slot>,
+/// Summands, and the inner products of their columns with the differences of forces.
+pub(super) struct SummandColumns {
+    /// One entry for each summand of either model.
+    slots: Vec<SummandPair>,
     /// For each model `<h_k, f' - f>`, by pair of drives and base parameter.
     inner: [Vec<Vec<f64>>; 2],
 }
 
-impl Terms {
+impl SummandColumns {
     /// The summands of both models, without samples yet.
-    pub(super) fn between(models: [&Model; 2]) -> Self {
+    pub(super) fn from_models(models: [&Model; 2]) -> Self {
+        // A base parameter that was identified as one number in either model has no summands in both.
         let is_whole = |retained: &str| {
             models.iter().any(|model| {
                 let mut base = model.base.iter().zip(0..);
@@ -83,13 +90,14 @@ impl Terms {
             })
         };
         let mut places: BTreeMap<(String, String), usize> = BTreeMap::new();
-        let mut slots: Vec<Slot> = Vec::new();
+        let mut slots: Vec<SummandPair> = Vec::new();
         for (m, model) in models.into_iter().enumerate() {
             for (product, place) in summands(model, &is_whole) {
+                // Summands are matched by retained product and product.
                 let retained = model.base[place.base].retained.clone();
                 let key = (retained.clone(), product.clone());
                 let slot = *places.entry(key).or_insert_with(|| {
-                    slots.push(Slot {
+                    slots.push(SummandPair {
                         product,
                         retained,
                         places: [None; 2],
@@ -105,11 +113,14 @@ impl Terms {
         }
     }
 
-    /// Adds a motion: the states of each model, pairs of drives, and for each pair the difference of forces, `[pair][sample]`.
+    /// Adds a motion: the states of each model, pairs of drives, and for each pair the difference of forces,
+    /// `[pair][sample]`.
+    ///
+    /// Fails when a pose has no solution, or when it is cancelled.
     pub(super) fn add(
         &mut self,
         models: [&Model; 2],
-        states: &[Stretch; 2],
+        states: &[RecordingSegment; 2],
         pairs: &[[usize; 2]],
         rest: &[Vec<f64>],
     ) -> Outcome {
@@ -117,17 +128,15 @@ impl Terms {
             let n = model.base.len();
             let sums = &mut self.inner[m];
             sums.resize(pairs.len(), vec![0.0; n]);
-            let evaluator = Evaluator::new(&model.derivation);
-            let what = format!(
-                "seeing what makes the difference along {}",
-                states[m].run.file
-            );
+            let evaluator = ModelEvaluator::new(&model.derivation);
+            let what = format!("finding the causes of the difference along {}", states[m].run.file);
             let mut start = 0;
-            model.host().watched(&what, states[m].samples(), |job| {
+            model.host().run_job(&what, states[m].samples(), |job| {
                 states[m].for_each_block(model, |block| {
                     job.step(block.len())?;
                     let found = evaluator.regressor_blocks(block, |len, columns| {
                         for ((sums, pair), rest) in sums.iter_mut().zip(pairs).zip(rest) {
+                            // Only the columns of the compared drive contribute.
                             let rest = &rest[start..start + len];
                             let own = &columns[pair[m] * n..][..n];
                             for (sum, column) in sums.iter_mut().zip(own) {
@@ -144,27 +153,24 @@ impl Terms {
         Ok(())
     }
 
-    /// The shares for a pair of drives; `squares` is the sum of the squared difference of forces, not 0.
-    pub(super) fn shares(
-        &self,
-        models: [&Model; 2],
-        pair: usize,
-        squares: f64,
-    ) -> Vec<ProductShare> {
+    /// The shares for a pair of drives, the largest first; `squares` is the sum of squares of the difference, not
+    /// 0.
+    pub(super) fn shares(&self, models: [&Model; 2], pair: usize, squares: f64) -> Vec<ProductShare> {
         let mut products: Vec<ProductShare> = Vec::new();
         for slot in &self.slots {
             let [before, after] = [0, 1].map(|m| {
                 let place = slot.places[m]?;
                 Some((place.value, self.inner[m][pair][place.base]))
             });
+            // The share of the summand in the difference, and the part of it from its value.
             let part = |one: Option<(f64, f64)>| one.map_or(0.0, |(value, inner)| value * inner);
             let share = (part(after) - part(before)) / squares;
             let by_value = match (before, after) {
                 (Some((v, u)), Some((w, x))) => 0.5 * (w - v) * (u + x) / squares,
-                // What is new or gone has one column only.
+                // A summand of one model only has one column.
                 _ => share,
             };
-            if share.abs() < ROUNDING && by_value.abs() < ROUNDING {
+            if share.abs() < CAUSE_LEAST_SHARE && by_value.abs() < CAUSE_LEAST_SHARE {
                 continue;
             }
             let term = TermShare {
@@ -176,6 +182,7 @@ impl Terms {
                 share,
                 by_value,
             };
+            // Summands are grouped by their product.
             match products.iter_mut().find(|one| one.product == slot.product) {
                 Some(one) => {
                     one.share += share;
@@ -189,24 +196,23 @@ impl Terms {
             }
         }
         for one in &mut products {
-            one.terms
-                .sort_by(|a, b| b.share.abs().total_cmp(&a.share.abs()));
+            one.terms.sort_by(|a, b| b.share.abs().total_cmp(&a.share.abs()));
         }
         products.sort_by(|a, b| b.share.abs().total_cmp(&a.share.abs()));
         products
     }
 }
 
-impl Slot {
-    /// The place in the second model, or in the first where there is none.
-    fn last<'a>(&self, models: [&'a Model; 2]) -> Option<(&'a Model, Place)> {
+impl SummandPair {
+    /// The place in the second model, or in the first if there is none.
+    fn latest_place<'a>(&self, models: [&'a Model; 2]) -> Option<(&'a Model, SummandPlace)> {
         let last = |m: usize| Some((models[m], self.places[m]?));
         last(1).or_else(|| last(0))
     }
 
-    /// The summand as people read it.
+    /// The summand as text, with its factor.
     fn text(&self, models: [&Model; 2]) -> String {
-        let last = self.last(models);
+        let last = self.latest_place(models);
         let text = last.map(|(model, place)| match place.product {
             Some(product) => review::base_summand(&model.derivation, place.base, product).text(),
             None => model.base[place.base].expression.clone(),
@@ -214,16 +220,16 @@ impl Slot {
         text.unwrap_or_default()
     }
 
+    /// The unit of its base parameter.
     fn unit(&self, models: [&Model; 2]) -> String {
-        let last = self.last(models);
-        last.map_or_else(String::new, |(model, place)| {
-            model.base[place.base].unit.clone()
-        })
+        let last = self.latest_place(models);
+        last.map_or_else(String::new, |(model, place)| model.base[place.base].unit.clone())
     }
 }
 
-/// What the base parameters of a model are sums of, with the products in words; one that `is_whole` names is one summand.
-fn summands(model: &Model, is_whole: &dyn Fn(&str) -> bool) -> Vec<(String, Place)> {
+/// The summands of all base parameters of a model, each with its product as text; a base parameter for which
+/// `is_whole` holds is one summand.
+fn summands(model: &Model, is_whole: &dyn Fn(&str) -> bool) -> Vec<(String, SummandPlace)> {
     let mechanism = &model.derivation.mechanism;
     let reduction = &model.derivation.reduction;
     let parameters: Vec<f64> = mechanism.parameters.iter().map(|p| p.nominal).collect();
@@ -232,7 +238,7 @@ fn summands(model: &Model, is_whole: &dyn Fn(&str) -> bool) -> Vec<(String, Plac
     let mut found = Vec::new();
     for (base, one) in model.base.iter().enumerate() {
         if is_whole(&one.retained) {
-            let place = Place {
+            let place = SummandPlace {
                 base,
                 product: None,
                 value: model.nominal[base],
@@ -240,13 +246,13 @@ fn summands(model: &Model, is_whole: &dyn Fn(&str) -> bool) -> Vec<(String, Plac
             found.push((one.retained.clone(), place));
             continue;
         }
+        // The retained product has the factor 1, the dependent ones those of eq. (6).
         let lines = reduction.dependencies.iter().zip(&factors);
-        let dependent =
-            lines.filter_map(|(line, factors)| Some((line.product, *factors.get(&base)?)));
+        let dependent = lines.filter_map(|(line, factors)| Some((line.product, *factors.get(&base)?)));
         let retained = std::iter::once((reduction.retained[base], 1.0));
         for (product, factor) in retained.chain(dependent) {
             let monomial = &reduction.products[product];
-            let place = Place {
+            let place = SummandPlace {
                 base,
                 product: Some(product),
                 value: factor * monomial.value(&parameters),

@@ -140,7 +140,7 @@ def _pair(of: Callable[[Any], Any]) -> Callable[[Any], Any]:
 
 _TYPES: list[tuple[tuple[str, ...], str, Callable[[Any], Any]]] = [
     (("cutoff_hz", "period", "band_hz"), "a number", float),
-    (("order", "decimate"), "a whole number", index),
+    (("order", "decimate"), "an integer", index),
     (("trim",), "a number of samples, or two of them", _pair(index)),
     (("between",), "two times in s", _pair(float)),
 ]
@@ -671,9 +671,9 @@ class Model:
         _warn(read.notes)
         return read
 
-    def _recordings(self, data: Any, reading: Mapping[str, Any], progress: Progress, what: str) -> list[_core.Recorded]:
+    def _recordings(self, data: Any, reading: Mapping[str, Any], progress: Progress, what: str) -> list[_core.Recording]:
         sources = [] if data is None else data if isinstance(data, list) else [data]
-        read: list[_core.Recorded] = []
+        read: list[_core.Recording] = []
         for k, source in enumerate(sources):
             name = what if len(sources) == 1 else f"{what} {k + 1}"
             read.append(self._read(source, reading, progress, name)._core)
@@ -825,7 +825,7 @@ class Model:
         """
         if isinstance(data, (str, os.PathLike)) or not isinstance(data, Sequence):
             raise ModelmillError("runs() compares several recordings with the first: pass a list of recordings")
-        read: list[_core.Recorded] = []
+        read: list[_core.Recording] = []
         unread: list[tuple[int, str, str]] = []
         for k, source in enumerate(data):
             try:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ._model import Model
 
     #: Result of the compiled part: JSON, text and notes.
-    Answer = Union[_core.Found, _core.Excited, _core.Simulated]
+    Answer = Union[_core.Result, _core.Excitation, _core.Simulation]
 
 Remarks = list[tuple[str, str]]
 AnswerT = TypeVar("AnswerT", bound="Answer")
@@ -191,7 +191,7 @@ class Identification(Result):
         Values of the base parameters in the order of ``Model.p_min``, in their units.
     """
 
-    def __init__(self, found: _core.Found, model: Model) -> None:
+    def __init__(self, found: _core.Result, model: Model) -> None:
         super().__init__(found)
         self.values: NDArray[np.float64] = found.values
         self._model = model
@@ -272,7 +272,7 @@ class Effect:
 class Diagnosis(Result):
     """The physical effects that a model lacks, with the evidence."""
 
-    def __init__(self, found: _core.Found, better: Model | None) -> None:
+    def __init__(self, found: _core.Result, better: Model | None) -> None:
         super().__init__(found)
         self._page = found.page or ""
         self._better = better
@@ -379,7 +379,7 @@ class Difference(Result):
 class Runs(Result):
     """What changed between recordings of one machine."""
 
-    def __init__(self, found: _core.Found) -> None:
+    def __init__(self, found: _core.Result) -> None:
         super().__init__(found)
         self._page = found.page or ""
 
@@ -429,7 +429,7 @@ class Excitation(Result):
         The trajectory as SVG.
     """
 
-    def __init__(self, found: _core.Excited, coordinates: list[str]) -> None:
+    def __init__(self, found: _core.Excitation, coordinates: list[str]) -> None:
         super().__init__(found)
         self.t, *motion = found.motion()
         self.q, self.qd, self.qdd = (np.stack(part, axis=1) for part in motion)

@@ -1,4 +1,4 @@
-"""Rigs, numeric models of whole machines: recordings without hardware, and reduction to planar models."""
+"""Rigs, numeric models of complete machines: recordings without hardware, and reduction to planar models."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Simulation(Result):
         ``t`` (s), the coordinates (rad or m), and the forces of the drives (N or N m).
     """
 
-    def __init__(self, made: _core.Simulated) -> None:
+    def __init__(self, made: _core.Simulation) -> None:
         super().__init__(made)
         self.columns: dict[str, Floats] = dict(made.columns())
         self._csv = made.csv
@@ -56,7 +56,7 @@ class Reduction(Result):
         The model file.
     """
 
-    def __init__(self, found: _core.Found, text: str) -> None:
+    def __init__(self, found: _core.Result, text: str) -> None:
         super().__init__(found)
         self.text = text
 

@@ -1,58 +1,59 @@
-//! Effects that descriptions of robots know: friction, inertia of drives and springs of joints and tendons, and elements
-//! between two points.
+//! Converts effects of a model to properties that robot descriptions have: friction, inertia of drives and springs of
+//! joints and tendons, and elements between two points. Other effects are reported.
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::Message;
-use modelmill_spec::{DriveKind, Effect, Mechanics, Mechanism, Place, PointIdx};
+use modelmill_spec::{DriveKind, EffectPlace, Mechanics, Mechanism, ModelEffect, PointIdx};
 
-use super::Format;
+use super::DescriptionFormat;
 
-/// What a joint or tendon has by itself.
+/// Passive properties of a joint or tendon.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Passive {
-    /// N s/m or N m s/rad
+pub(super) struct PassiveProperties {
+    /// Viscous friction, N s/m or N m s/rad.
     pub(super) damping: f64,
-    /// N or N m
+    /// Coulomb friction, N or N m.
     pub(super) friction: f64,
-    /// kg or kg m^2
+    /// Inertia of the drive, kg or kg m^2.
     pub(super) armature: f64,
-    /// N/m or N m/rad
+    /// Stiffness, N/m or N m/rad.
     pub(super) stiffness: f64,
-    /// Where the spring is at rest, m or rad.
+    /// Position or length at which the spring is relaxed, m or rad.
     pub(super) rest: f64,
 }
 
-/// Effects by what has them.
+/// The passive properties of a mechanism.
 #[derive(Clone, Debug)]
-pub(super) struct Friction {
-    /// Of each coordinate.
-    pub(super) joints: Vec<Passive>,
-    /// Of each drive that is a line between two points.
-    pub(super) drives: Vec<Passive>,
+pub(super) struct PassiveEffects {
+    /// For each coordinate.
+    pub(super) joints: Vec<PassiveProperties>,
+    /// For each drive; used for drives between two points.
+    pub(super) drives: Vec<PassiveProperties>,
     /// Elements between two points.
-    pub(super) elements: Vec<([PointIdx; 2], Passive)>,
+    pub(super) elements: Vec<([PointIdx; 2], PassiveProperties)>,
 }
 
-/// Sorts the effects of a mechanism; those that a format does not know become remarks.
-pub(super) fn friction(
+/// Converts the effects of a mechanism; adds a remark for each effect that the format does not have.
+pub(super) fn passive_effects(
     mechanism: &Mechanism,
-    format: Format,
+    format: DescriptionFormat,
     remarks: &mut Vec<Message>,
-) -> Friction {
-    let mut found = Friction {
-        joints: vec![Passive::default(); mechanism.coordinates.len()],
-        drives: vec![Passive::default(); mechanism.drives.len()],
+) -> PassiveEffects {
+    let mut found = PassiveEffects {
+        joints: vec![PassiveProperties::default(); mechanism.coordinates.len()],
+        drives: vec![PassiveProperties::default(); mechanism.drives.len()],
         elements: Vec::new(),
     };
     for effect in &mechanism.effects {
+        // Effects with zero values change nothing.
         let is_zero = |p: &usize| mechanism.parameters[*p].nominal == 0.0;
         if !effect.terms.is_empty() && effect.terms.iter().all(|term| is_zero(&term.parameter.0)) {
             continue;
         }
-        if !said(mechanism, effect, format, &mut found) {
-            let places: Vec<String> = effect.places.iter().map(|p| name(mechanism, *p)).collect();
+        if !add_effect(mechanism, effect, format, &mut found) {
+            let places: Vec<String> = effect.places.iter().map(|p| place_text(mechanism, *p)).collect();
             remarks.push(message!(
-                "`{}` at {} is left out: {} has nothing like it",
+                "`{}` at {} is left out: {} has no such effect",
                 effect.kind,
                 places.join(", "),
                 format.name().to_uppercase()
@@ -62,46 +63,44 @@ pub(super) fn friction(
     found
 }
 
-/// Takes an effect in; false if the format has nothing like it.
-fn said(mechanism: &Mechanism, effect: &Effect, format: Format, found: &mut Friction) -> bool {
+/// Adds an effect to the properties; false if the format does not have it.
+fn add_effect(
+    mechanism: &Mechanism,
+    effect: &ModelEffect,
+    format: DescriptionFormat,
+    found: &mut PassiveEffects,
+) -> bool {
+    // Nominal value of a parameter or a constant of the effect; zero if it has none.
     let value = |symbol: &str| {
         let term = effect.terms.iter().find(|term| term.symbol == symbol);
         term.map_or(0.0, |term| mechanism.parameters[term.parameter.0].nominal)
     };
     let constant = |symbol: &str| {
         let constant = effect.constants.iter().find(|(name, _)| name == symbol);
-        constant.map_or(0.0, |(_, value)| {
-            value.evaluate(&|s| mechanism.symbol_nominal(s))
-        })
+        constant.map_or(0.0, |(_, value)| value.evaluate(&|s| mechanism.symbol_nominal(s)))
     };
+    // A spring and damper between two points.
     if effect.mechanics == Some(Mechanics::Strut) {
         let (stiffness, constant) = (value("k"), value("F0"));
-        let [Place::Point(from), Place::Point(to)] = effect.places[..] else {
+        let [EffectPlace::Point(from), EffectPlace::Point(to)] = effect.places[..] else {
             return false;
         };
-        // A pull of `F0 + k l` is a spring with the length at rest of `-F0/k`, which must be one.
-        let rest = if constant == 0.0 {
-            0.0
-        } else {
-            -constant / stiffness
-        };
-        if format != Format::Mjcf || !rest.is_finite() || rest < 0.0 {
+        // A pull of `F0 + k l` is a spring with the relaxed length `-F0/k`, which must be a valid length.
+        let rest = if constant == 0.0 { 0.0 } else { -constant / stiffness };
+        if format != DescriptionFormat::Mjcf || !rest.is_finite() || rest < 0.0 {
             return false;
         }
-        let passive = Passive {
+        let passive = PassiveProperties {
             damping: value("Fv"),
             stiffness,
             rest,
-            ..Passive::default()
+            ..PassiveProperties::default()
         };
         found.elements.push(([from, to], passive));
         return true;
     }
-    // Bodies are added up with those of the links, and gravity is turned already.
-    let is_body = effect
-        .places
-        .iter()
-        .all(|place| matches!(place, Place::Point(_)));
+    // Effects that are bodies are added to the links elsewhere, and a tilt of the base is in gravity already.
+    let is_body = effect.places.iter().all(|place| matches!(place, EffectPlace::Point(_)));
     if matches!(
         effect.mechanics,
         Some(Mechanics::Part | Mechanics::Placement | Mechanics::Tilt)
@@ -109,41 +108,45 @@ fn said(mechanism: &Mechanism, effect: &Effect, format: Format, found: &mut Fric
     {
         return true;
     }
-    let change: &dyn Fn(&mut Passive) = match effect.kind.as_str() {
+    // What the effect changes; URDF has viscous and Coulomb friction only.
+    let change: &dyn Fn(&mut PassiveProperties) = match effect.kind.as_str() {
         "viscous_friction" => &|one| one.damping += value("Fv"),
         "coulomb_friction" => &|one| one.friction += value("Fc"),
-        "drive_inertia" if format == Format::Mjcf => &|one| one.armature += value("Ia"),
-        "spring" if format == Format::Mjcf => &|one| {
+        "drive_inertia" if format == DescriptionFormat::Mjcf => &|one| one.armature += value("Ia"),
+        "spring" if format == DescriptionFormat::Mjcf => &|one| {
             let (k, rest) = (value("k"), constant("rest"));
+            // Two springs act as one, with the sum of the stiffnesses and the weighted mean of the relaxed positions.
             let sum = one.stiffness + k;
             one.rest = (one.stiffness * one.rest + k * rest) / sum;
             one.stiffness = sum;
         },
         _ => return false,
     };
+    // Apply it at each place, as far as the format has such a place.
     for place in &effect.places {
         match *place {
-            Place::Coordinate(i) => change(&mut found.joints[i.0]),
-            Place::Drive(d) => match mechanism.drives[d.0].kind {
+            EffectPlace::Coordinate(i) => change(&mut found.joints[i.0]),
+            EffectPlace::Drive(d) => match mechanism.drives[d.0].kind {
                 DriveKind::Joint(i) => change(&mut found.joints[i.0]),
-                DriveKind::Linear { .. } if format == Format::Mjcf => {
+                DriveKind::Linear { .. } if format == DescriptionFormat::Mjcf => {
                     change(&mut found.drives[d.0]);
                 }
                 DriveKind::Linear { .. } => return false,
             },
-            Place::Point(_) | Place::Part(_) | Place::Base | Place::Force => return false,
+            EffectPlace::Point(_) | EffectPlace::Part(_) | EffectPlace::Base | EffectPlace::Force => return false,
         }
     }
     true
 }
 
-fn name(mechanism: &Mechanism, place: Place) -> String {
+/// The name of the place of an effect, in quotes.
+fn place_text(mechanism: &Mechanism, place: EffectPlace) -> String {
     match place {
-        Place::Drive(d) => format!("`{}`", mechanism.drives[d.0].name),
-        Place::Coordinate(i) => format!("`{}`", mechanism.coordinates[i.0].name),
-        Place::Point(p) => format!("`{}`", mechanism.points[p.0].name),
-        Place::Part(p) => format!("`{}`", mechanism.parts[p.0].name),
-        Place::Base => "`base`".to_owned(),
-        Place::Force => "`force`".to_owned(),
+        EffectPlace::Drive(d) => format!("`{}`", mechanism.drives[d.0].name),
+        EffectPlace::Coordinate(i) => format!("`{}`", mechanism.coordinates[i.0].name),
+        EffectPlace::Point(p) => format!("`{}`", mechanism.points[p.0].name),
+        EffectPlace::Part(p) => format!("`{}`", mechanism.parts[p.0].name),
+        EffectPlace::Base => "`base`".to_owned(),
+        EffectPlace::Force => "`force`".to_owned(),
     }
 }

@@ -1,64 +1,67 @@
-//! What links carry: the inertia of parts, lumped masses and such effects as are bodies, added up.
+//! The inertia of links: parts, lumped masses and effects that are bodies go in, their sums per link come out. Also
+//! completes and checks inertias for simulators.
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{CommandName, Message, OptionName, Remedy};
-use modelmill_spec::{Exact, FrameIdx, Inertial, LumpedMass, Mechanism, Part, Place};
+use modelmill_spec::{EffectPlace, ExactExpression, FrameIdx, LumpedMass, Mechanism, ModelPart, PartInertia};
 use nalgebra::{Matrix3, Vector3};
 
 use super::ExportError;
-use super::tree::{Placed, Tree};
+use super::tree::{LinkPlacement, LinkTree};
 
-/// Below this share of a link's own size, numbers are rounding.
+/// Numbers below this share of a link's own size are rounding.
 const ROUNDING: f64 = 1e-12;
 
-/// Radius of gyration of a link that never turns, m.
-const UNFELT_RADIUS: f64 = 0.05;
-/// Moments across the direction about which a link turns, as parts of that about it: a body somewhat thicker than a plate.
-const ACROSS: f64 = 0.6;
+/// Radius of gyration that is assumed for a link that never rotates, m.
+const DEFAULT_RADIUS_OF_GYRATION: f64 = 0.05;
+/// Transverse moments of a link that rotates about one axis, relative to the moment about that axis: slightly more than
+/// for a plate.
+const TRANSVERSE_RATIO: f64 = 0.6;
 
-/// Ten numbers about the origin of a link, in its axes.
+/// The ten inertial parameters of a link about its origin, in its axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Body {
-    /// kg
+pub(super) struct LinkInertia {
+    /// Mass, kg.
     pub(super) mass: f64,
-    /// kg m
+    /// First moment, kg m.
     pub(super) first: Vector3<f64>,
-    /// About the origin, kg m^2.
+    /// Inertia about the origin, kg m^2.
     pub(super) inertia: Matrix3<f64>,
 }
 
-impl Body {
+impl LinkInertia {
+    /// A link without mass.
     const NONE: Self = Self {
         mass: 0.0,
         first: Vector3::new(0.0, 0.0, 0.0),
         inertia: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
     };
 
-    /// Centre of mass, m; the origin where there is no mass.
-    pub(super) fn centre(&self) -> Vector3<f64> {
+    /// Centre of mass, m; the origin if the mass is zero.
+    pub(super) fn centre_of_mass(&self) -> Vector3<f64> {
         if self.mass == 0.0 {
             return Vector3::zeros();
         }
         self.first / self.mass
     }
 
-    /// About the centre of mass, kg m^2.
-    pub(super) fn central(&self) -> Matrix3<f64> {
-        let c = self.centre();
+    /// Inertia about the centre of mass, kg m^2.
+    pub(super) fn central_inertia(&self) -> Matrix3<f64> {
+        let c = self.centre_of_mass();
         self.inertia - self.mass * (c.norm_squared() * Matrix3::identity() - c * c.transpose())
     }
 
-    /// Whether there is nothing.
-    pub(super) fn is_none(&self) -> bool {
+    /// Whether all ten parameters are zero.
+    pub(super) fn is_zero(&self) -> bool {
         *self == Self::NONE
     }
 
-    /// The same body about the origin of a frame in which its own one is placed.
-    fn seen(&self, placed: &Placed) -> Self {
+    /// The same body about the origin of the outer frame, in which its own frame has the pose `placed`.
+    fn in_outer_frame(&self, placed: &LinkPlacement) -> Self {
         let (r, t) = (placed.rotation, placed.origin);
+        // Turn into the axes of the outer frame, then shift by the pose (Steiner).
         let turned = r * self.first;
-        let square =
-            |a: &Vector3<f64>, b: &Vector3<f64>| a.dot(b) * Matrix3::identity() - a * b.transpose();
+        let square = |a: &Vector3<f64>, b: &Vector3<f64>| a.dot(b) * Matrix3::identity() - a * b.transpose();
         Self {
             mass: self.mass,
             first: turned + self.mass * t,
@@ -69,6 +72,7 @@ impl Body {
         }
     }
 
+    /// Adds a body given about the same origin.
     fn add(&mut self, other: &Self) {
         self.mass += other.mass;
         self.first += other.first;
@@ -76,145 +80,164 @@ impl Body {
     }
 }
 
-/// What each link carries.
-pub(super) fn bodies(mechanism: &Mechanism, tree: &Tree) -> Result<Vec<Body>, ExportError> {
-    let value = |exact: &Exact| exact.evaluate(&|symbol| mechanism.symbol_nominal(symbol));
-    let vector = |exact: &[Exact; 3]| Vector3::from_fn(|k, _| value(&exact[k]));
-    let mut bodies = vec![Body::NONE; tree.links.len()];
-    let mut add = |frame: FrameIdx, body: &Body| {
+/// The inertia of each link, with the nominal values of the parameters.
+///
+/// Fails if a lumped mass has different positions in the balances of forces and of moments.
+pub(super) fn bodies(mechanism: &Mechanism, tree: &LinkTree) -> Result<Vec<LinkInertia>, ExportError> {
+    // Values of exact expressions at the nominal values of all symbols.
+    let value = |exact: &ExactExpression| exact.evaluate(&|symbol| mechanism.symbol_nominal(symbol));
+    let vector = |exact: &[ExactExpression; 3]| Vector3::from_fn(|k, _| value(&exact[k]));
+    let mut bodies = vec![LinkInertia::NONE; tree.links.len()];
+    // Add a body on a frame to the link that carries the frame.
+    let mut add = |frame: FrameIdx, body: &LinkInertia| {
         let link = tree.link_of[frame.0];
-        let placed = tree.links[link].placed.sees(&tree.frames[frame.0]);
-        bodies[link].add(&body.seen(&placed));
+        let placed = tree.links[link].placed.relative_placement(&tree.frames[frame.0]);
+        bodies[link].add(&body.in_outer_frame(&placed));
     };
+    // Some effects are bodies.
     let of_effects = mechanism.effects.iter().map(|effect| &effect.bodies);
     let parts = mechanism.parts.iter();
     for part in parts.chain(of_effects.clone().flat_map(|bodies| &bodies.parts)) {
-        add(part.frame, &of_part(part, &value, &vector));
+        add(part.frame, &from_part(part, &value, &vector));
     }
     let lumps = mechanism.lumped_masses.iter();
     for lump in lumps.chain(of_effects.flat_map(|bodies| &bodies.lumped_masses)) {
         let (forces, moments) = (vector(&lump.force_at), vector(&lump.moment_at));
+        // Such a mass fits measurements, but no body has it.
         if (forces - moments).norm() > ROUNDING * (forces.norm() + moments.norm()) {
             return Err(ExportError(format!(
-                "a lumped mass on `{}` stands at different places for the balances of forces and of moments, which no body \
-                 does; export a model whose `moment_at` are where its `force_at` are",
+                "a lumped mass on `{}` has different places in the balances of forces and of moments, which is impossible for a \
+                 body; export a model in which `moment_at` equals `force_at`",
                 mechanism.frames[lump.frame.0].name
             )));
         }
+        // A mass in shares at several points.
         let share = lump_share(lump);
-        add(lump.frame, &point(share * value(&lump.mass), forces));
+        add(lump.frame, &point_mass(share * value(&lump.mass), forces));
     }
+    // Effects at points are point masses.
     for effect in mechanism.effects.iter().filter(|e| e.mechanics.is_none()) {
         for place in &effect.places {
-            let Place::Point(at) = place else { continue };
+            let EffectPlace::Point(at) = place else {
+                continue;
+            };
             let at = &mechanism.points[at.0];
             for term in &effect.terms {
                 let mass = mechanism.parameters[term.parameter.0].nominal * value(&term.expression);
-                add(at.frame, &point(mass, vector(&at.at)));
+                add(at.frame, &point_mass(mass, vector(&at.at)));
             }
         }
     }
     Ok(bodies)
 }
 
+/// The share of a lumped mass at its point.
 fn lump_share(lump: &LumpedMass) -> f64 {
-    Exact::Rational(lump.share.clone()).evaluate(&|_| 0.0)
+    ExactExpression::Rational(lump.share.clone()).evaluate(&|_| 0.0)
 }
 
-fn point(mass: f64, at: Vector3<f64>) -> Body {
-    Body {
+/// The inertia of a point mass.
+fn point_mass(mass: f64, at: Vector3<f64>) -> LinkInertia {
+    LinkInertia {
         mass,
         first: mass * at,
         inertia: mass * (at.norm_squared() * Matrix3::identity() - at * at.transpose()),
     }
 }
 
-fn of_part(
-    part: &Part,
-    value: &dyn Fn(&Exact) -> f64,
-    vector: &dyn Fn(&[Exact; 3]) -> Vector3<f64>,
-) -> Body {
-    let matrix = |six: &[Exact; 6]| {
+/// The inertia of a part about the origin of its frame.
+fn from_part(
+    part: &ModelPart,
+    value: &dyn Fn(&ExactExpression) -> f64,
+    vector: &dyn Fn(&[ExactExpression; 3]) -> Vector3<f64>,
+) -> LinkInertia {
+    // The symmetric matrix of six expressions.
+    let matrix = |six: &[ExactExpression; 6]| {
         let [xx, xy, xz, yy, yz, zz] = [0, 1, 2, 3, 4, 5].map(|k: usize| value(&six[k]));
         Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
     };
     match &part.inertial {
-        Inertial::Linear {
+        PartInertia::Linear {
             mass,
             first_moment,
             inertia,
-        } => Body {
+        } => LinkInertia {
             mass: value(mass),
             first: vector(first_moment),
             inertia: matrix(inertia),
         },
-        Inertial::AboutCentre {
-            mass,
-            centre,
-            inertia,
-        } => {
-            let mut body = point(value(mass), vector(centre));
+        PartInertia::AboutCentre { mass, centre, inertia } => {
+            // Steiner: the inertia of the mass at the centre, plus the inertia about the centre.
+            let mut body = point_mass(value(mass), vector(centre));
             body.inertia += matrix(inertia);
             body
         }
     }
 }
 
-/// Gives links that only slide, or turn about one direction, moments of inertia that a body can have: those that the model
-/// does not say are not felt.
-pub(super) fn complete(tree: &Tree, bodies: &mut [Body], remarks: &mut Vec<Message>) {
+/// Completes the inertia of links that only translate, or rotate about one direction only, so that it is physically
+/// possible. The moments that a model lacks have no effect on the motion of such links.
+pub(super) fn complete_inertias(tree: &LinkTree, bodies: &mut [LinkInertia], remarks: &mut Vec<Message>) {
     let mut completed = Vec::new();
     for (l, link) in tree.links.iter().enumerate().skip(1) {
         let body = &mut bodies[l];
-        if body.mass <= 0.0 || fault(body).is_none() {
+        // Only links with mass and an impossible inertia are completed.
+        if body.mass <= 0.0 || inertia_fault(body).is_none() {
             continue;
         }
-        let central = match turns(tree, l) {
-            Turns::Never => body.mass * UNFELT_RADIUS.powi(2) * Matrix3::identity(),
-            Turns::About(axis) => {
+        let central = match link_rotation(tree, l) {
+            LinkRotation::Never => body.mass * DEFAULT_RADIUS_OF_GYRATION.powi(2) * Matrix3::identity(),
+            LinkRotation::OneAxis(axis) => {
+                // The moment about the axis has an effect and is kept; the others get possible values.
                 let n = link.placed.rotation.transpose() * axis;
-                let about = n.dot(&(body.central() * n));
-                let across = ACROSS * about;
+                let about = n.dot(&(body.central_inertia() * n));
+                let across = TRANSVERSE_RATIO * about;
                 across * Matrix3::identity() + (about - across) * n * n.transpose()
             }
-            Turns::Anyhow => continue,
+            LinkRotation::AnyAxis => continue,
         };
-        let other = Body {
-            inertia: body.inertia - body.central() + central,
+        // Replace the central inertia; mass and first moment stay.
+        let other = LinkInertia {
+            inertia: body.inertia - body.central_inertia() + central,
             ..*body
         };
-        if fault(&other).is_none() {
+        if inertia_fault(&other).is_none() {
             *body = other;
             completed.push(format!("`{}`", link.name));
         }
     }
     if !completed.is_empty() {
         remarks.push(message!(
-            "moments of inertia that no motion feels are chosen so that a body can have them: of {}",
+            "moments of inertia without effect on any motion are set to physically possible values: {}",
             completed.join(", ")
         ));
     }
 }
 
-/// How a link turns against the base.
-enum Turns {
+/// How a link rotates relative to the base.
+enum LinkRotation {
+    /// It only translates.
     Never,
-    About(Vector3<f64>),
-    Anyhow,
+    /// About one direction, a unit vector in the axes of the base.
+    OneAxis(Vector3<f64>),
+    /// About several directions.
+    AnyAxis,
 }
 
-fn turns(tree: &Tree, mut link: usize) -> Turns {
-    let mut turns = Turns::Never;
+/// How a link rotates, by the axes of all joints between it and the base.
+fn link_rotation(tree: &LinkTree, mut link: usize) -> LinkRotation {
+    let mut turns = LinkRotation::Never;
     while link != 0 {
         let one = &tree.links[link];
         if one.joints.is_empty() {
-            return Turns::Anyhow;
+            return LinkRotation::AnyAxis;
         }
         for joint in one.joints.iter().filter(|joint| joint.is_rotation) {
+            // Parallel axes are one direction.
             turns = match turns {
-                Turns::Never => Turns::About(joint.axis),
-                Turns::About(axis) if axis.cross(&joint.axis).norm() < 1e-9 => Turns::About(axis),
-                _ => return Turns::Anyhow,
+                LinkRotation::Never => LinkRotation::OneAxis(joint.axis),
+                LinkRotation::OneAxis(axis) if axis.cross(&joint.axis).norm() < 1e-9 => LinkRotation::OneAxis(axis),
+                _ => return LinkRotation::AnyAxis,
             };
         }
         link = one.parent;
@@ -222,9 +245,10 @@ fn turns(tree: &Tree, mut link: usize) -> Turns {
     turns
 }
 
-/// Why nothing can be such a body.
-fn fault(body: &Body) -> Option<&'static str> {
-    let moments = body.central().symmetric_eigenvalues();
+/// Why an inertia is physically impossible; none if it is possible.
+fn inertia_fault(body: &LinkInertia) -> Option<&'static str> {
+    // Principal moments must be positive and satisfy the triangle inequality.
+    let moments = body.central_inertia().symmetric_eigenvalues();
     let size = body.inertia.norm();
     let (least, largest) = (moments.min(), moments.max());
     if body.mass <= 0.0 {
@@ -238,14 +262,15 @@ fn fault(body: &Body) -> Option<&'static str> {
     }
 }
 
-/// Tells of links that no body can be: simulators refuse them, or move them as nothing moves.
-pub(super) fn judge(tree: &Tree, bodies: &[Body], remarks: &mut Vec<Message>) {
+/// Adds a remark for each link with an impossible inertia; simulators refuse such links or become unstable.
+pub(super) fn report_impossible(tree: &LinkTree, bodies: &[LinkInertia], remarks: &mut Vec<Message>) {
     for (link, body) in tree.links.iter().zip(bodies).skip(1) {
-        let Some(fault) = fault(body).filter(|_| !body.is_none()) else {
+        let Some(fault) = inertia_fault(body).filter(|_| !body.is_zero()) else {
             continue;
         };
         remarks.push(message!(
-            "`{}` {fault}, which no body does: simulators refuse it or go astray; identify with {} and let {} write that fit",
+            "`{}` {fault}, which is impossible for a body. Simulators refuse it or become unstable. Identify with {} and write \
+             the fit with {}",
             link.name,
             Remedy::option(OptionName::Physical),
             Remedy::command(CommandName::Adopt)

@@ -1,30 +1,32 @@
-//! MJCF: bodies within bodies, loops as `connect`, drives between two points as tendons.
+//! Writes MJCF: a tree of links with inertias and passive properties goes in; XML comes out, with loops as `connect`
+//! and drives between two points as tendons.
 
 use std::fmt::Write as _;
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::Message;
-use modelmill_spec::{CoordinateIdx, Drive, DriveKind, Mechanism, PointIdx};
+use modelmill_spec::{CoordinateIdx, DriveKind, Mechanism, ModelDrive, PointIdx};
 use nalgebra::UnitQuaternion;
 
-use super::friction::{Friction, Passive};
-use super::inertia::Body;
-use super::tree::{Joint, Tree};
+use super::friction::{PassiveEffects, PassiveProperties};
+use super::inertia::LinkInertia;
+use super::tree::{ExportedJoint, LinkTree};
 use super::urdf::{clean, orthonormal};
-use super::{list, number};
+use super::{number_list, number_text};
 
-/// MuJoCo moves no body without mass: what one gets that has none, kg.
-const NEXT_TO_NOTHING: f64 = 1e-9;
+/// Mass of a moving body that has none in the model, kg; MuJoCo requires one.
+const NEGLIGIBLE_MASS: f64 = 1e-9;
 
+/// The MJCF of a mechanism; `at` are the coordinates at which the bodies are drawn.
 pub(super) fn write(
     mechanism: &Mechanism,
-    tree: &Tree,
-    bodies: &[Body],
-    friction: &Friction,
+    tree: &LinkTree,
+    bodies: &[LinkInertia],
+    friction: &PassiveEffects,
     at: &[f64],
     remarks: &mut Vec<Message>,
 ) -> String {
-    let mut writer = Writer {
+    let mut writer = MjcfWriter {
         mechanism,
         tree,
         bodies,
@@ -34,31 +36,40 @@ pub(super) fn write(
         text: String::new(),
         depth: 0,
     };
-    writer.all();
+    writer.write_all();
     writer.text
 }
 
-struct Writer<'a> {
+/// The text as it is written, and its inputs.
+struct MjcfWriter<'a> {
+    /// The mechanism.
     mechanism: &'a Mechanism,
-    tree: &'a Tree,
-    bodies: &'a [Body],
-    friction: &'a Friction,
-    /// Coordinates at which the bodies are drawn.
+    /// Its links and joints.
+    tree: &'a LinkTree,
+    /// Inertia of each link.
+    bodies: &'a [LinkInertia],
+    /// Passive properties of joints, tendons and elements.
+    friction: &'a PassiveEffects,
+    /// Coordinates at which the bodies are drawn, rad or m.
     at: &'a [f64],
+    /// Remarks on what MJCF states differently.
     remarks: &'a mut Vec<Message>,
+    /// The XML so far.
     text: String,
+    /// Depth of the present element, for its indentation.
     depth: usize,
 }
 
-impl Writer<'_> {
+impl MjcfWriter<'_> {
+    /// A line with the present indentation.
     fn line(&mut self, text: &str) {
         self.text += &"  ".repeat(self.depth);
         self.text += text;
         self.text += "\n";
     }
 
-    /// An element with others in it.
-    fn within(&mut self, tag: &str, attributes: &str, inside: impl FnOnce(&mut Self)) {
+    /// An element with contents.
+    fn write_element(&mut self, tag: &str, attributes: &str, inside: impl FnOnce(&mut Self)) {
         self.line(&format!("<{tag}{attributes}>"));
         self.depth += 1;
         inside(self);
@@ -66,33 +77,38 @@ impl Writer<'_> {
         self.line(&format!("</{tag}>"));
     }
 
-    fn all(&mut self) {
+    /// The complete file.
+    fn write_all(&mut self) {
+        // Bodies first; the sections after them refer to bodies, joints and sites by name.
         let name = format!(" model=\"{}\"", self.mechanism.name);
-        self.within("mujoco", &name, |w| {
+        self.write_element("mujoco", &name, |w| {
             w.line("<compiler angle=\"radian\" autolimits=\"true\"/>");
+            // Gravity is an expression in constants of the model.
             let gravity: Vec<f64> = (w.mechanism.gravity.iter())
                 .map(|g| g.evaluate(&|s| w.mechanism.symbol_nominal(s)))
                 .collect();
-            w.line(&format!("<option gravity=\"{}\"/>", list(&gravity)));
-            w.within("worldbody", "", |w| w.inside(0));
+            w.line(&format!("<option gravity=\"{}\"/>", number_list(&gravity)));
+            w.write_element("worldbody", "", |w| w.write_link(0));
             w.equalities();
             w.tendons();
             w.actuators();
         });
     }
 
-    /// What is on a link, and the links behind it.
-    fn inside(&mut self, link: usize) {
+    /// The contents of a link: its sites and its child bodies.
+    fn write_link(&mut self, link: usize) {
+        // Sites for the points of this link that loops, drives or elements need.
         for p in 0..self.mechanism.points.len() {
             let (on, at) = self.tree.point(self.mechanism, PointIdx(p));
             if on == link && self.is_used(PointIdx(p)) {
                 let name = &self.mechanism.points[p].name;
                 self.line(&format!(
                     "<site name=\"{name}\" pos=\"{}\"/>",
-                    list(clean(at).as_slice())
+                    number_list(clean(at).as_slice())
                 ));
             }
         }
+        // Bodies are nested: each child stands inside of its parent.
         for child in 1..self.tree.links.len() {
             if self.tree.links[child].parent == link {
                 self.body(child);
@@ -100,9 +116,11 @@ impl Writer<'_> {
         }
     }
 
+    /// Whether a loop, a drive or an element uses a point, so that it needs a site.
     fn is_used(&self, point: PointIdx) -> bool {
         let m = self.mechanism;
-        let is_end = |drive: &Drive| match drive.kind {
+        // Drives between two points; drives of joints have no points.
+        let is_end = |drive: &ModelDrive| match drive.kind {
             DriveKind::Linear { from, to } => from == point || to == point,
             DriveKind::Joint(_) => false,
         };
@@ -111,18 +129,21 @@ impl Writer<'_> {
             || (self.friction.elements.iter()).any(|(ends, _)| ends.contains(&point))
     }
 
+    /// A body with its joints, its inertia and its contents.
     fn body(&mut self, at: usize) {
         let link = &self.tree.links[at];
-        let placed = self.tree.links[link.parent].placed.sees(&link.placed);
+        // Pose relative to the parent, as position and quaternion.
+        let placed = self.tree.links[link.parent].placed.relative_placement(&link.placed);
         let turn = UnitQuaternion::from_rotation_matrix(&orthonormal(&placed.rotation));
         let head = format!(
             " name=\"{}\" pos=\"{}\" quat=\"{}\"",
             link.name,
-            list(clean(placed.origin).as_slice()),
-            list(&[turn.w, turn.i, turn.j, turn.k])
+            number_list(clean(placed.origin).as_slice()),
+            number_list(&[turn.w, turn.i, turn.j, turn.k])
         );
-        self.within("body", &head, |w| {
+        self.write_element("body", &head, |w| {
             let link = &w.tree.links[at];
+            // Links without joints are free bodies.
             if link.joints.is_empty() {
                 w.line(&format!("<freejoint name=\"{}_free\"/>", link.name));
             }
@@ -132,134 +153,136 @@ impl Writer<'_> {
             }
             let inertial = w.inertial(at);
             w.line(&inertial);
-            w.inside(at);
+            w.write_link(at);
         });
     }
 
-    fn joint(&self, joint: &Joint, link: usize) -> String {
+    /// A joint. Limits and passive properties belong to the joint that has the name of its coordinate.
+    fn joint(&self, joint: &ExportedJoint, link: usize) -> String {
+        // Anchor and axis in the axes of the body.
         let placed = &self.tree.links[link].placed;
         let coordinate = &self.mechanism.coordinates[joint.coordinate];
         let mut text = format!(
             "<joint name=\"{}\" type=\"{}\" pos=\"{}\" axis=\"{}\"",
             joint.name,
             if joint.is_rotation { "hinge" } else { "slide" },
-            list(clean(placed.sees_point(&joint.origin)).as_slice()),
-            list(clean(placed.rotation.transpose() * joint.axis).as_slice()),
+            number_list(clean(placed.relative_point(&joint.origin)).as_slice()),
+            number_list(clean(placed.rotation.transpose() * joint.axis).as_slice()),
         );
+        // The value of the joint at the pose in which the bodies are drawn.
         let reference = joint.ratio * self.at[joint.coordinate];
         if reference != 0.0 {
-            let _ = write!(text, " ref=\"{}\"", number(reference));
+            let _ = write!(text, " ref=\"{}\"", number_text(reference));
         }
+        // Limits and losses are written once, at the joint with the name of the coordinate.
         if joint.name == coordinate.name {
             let limits = self.mechanism.limits.coordinates.iter();
             let of = limits.clone().find(|(i, _)| i.0 == joint.coordinate);
             if let Some([low, high]) = of.and_then(|(_, one)| one.position) {
-                let _ = write!(text, " range=\"{} {}\"", number(low), number(high));
+                let _ = write!(text, " range=\"{} {}\"", number_text(low), number_text(high));
             }
-            text += &passive(&self.friction.joints[joint.coordinate], "springref");
+            text += &passive_attributes(&self.friction.joints[joint.coordinate], "springref");
         }
         text + "/>"
     }
 
+    /// The inertia of a body; a negligible one if it has no mass.
     fn inertial(&mut self, at: usize) -> String {
         let body = &self.bodies[at];
         if body.mass == 0.0 {
             self.remarks.push(message!(
-                "`{}` has no mass, and MuJoCo moves no body without: it gets {NEXT_TO_NOTHING:e} kg",
+                "`{}` has no mass, but MuJoCo requires one for a moving body; it gets {NEGLIGIBLE_MASS:e} kg",
                 self.tree.links[at].name
             ));
-            let inertia = number(1e-3 * NEXT_TO_NOTHING);
+            let inertia = number_text(1e-3 * NEGLIGIBLE_MASS);
             return format!(
-                "<inertial pos=\"0 0 0\" mass=\"{NEXT_TO_NOTHING:e}\" diaginertia=\"{inertia} {inertia} {inertia}\"/>"
+                "<inertial pos=\"0 0 0\" mass=\"{NEGLIGIBLE_MASS:e}\" diaginertia=\"{inertia} {inertia} {inertia}\"/>"
             );
         }
-        let i = body.central();
-        let six = [
-            i[(0, 0)],
-            i[(1, 1)],
-            i[(2, 2)],
-            i[(0, 1)],
-            i[(0, 2)],
-            i[(1, 2)],
-        ];
+        // MuJoCo's sequence of the six entries: the diagonal, then xy, xz, yz.
+        let i = body.central_inertia();
+        let six = [i[(0, 0)], i[(1, 1)], i[(2, 2)], i[(0, 1)], i[(0, 2)], i[(1, 2)]];
         format!(
             "<inertial pos=\"{}\" mass=\"{}\" fullinertia=\"{}\"/>",
-            list(body.centre().as_slice()),
-            number(body.mass),
-            list(&six)
+            number_list(body.centre_of_mass().as_slice()),
+            number_text(body.mass),
+            number_list(&six)
         )
     }
 
-    /// Loops, and joints that move with others.
+    /// Equalities: loops, and joints that follow others.
     fn equalities(&mut self) {
         let m = self.mechanism;
         let mut lines = Vec::new();
+        // A loop: two sites coincide.
         for one in &m.loops {
             let [a, b] = one.joins.map(|point| &m.points[point.0].name);
+            // Names of loops may have other characters than letters and digits.
             let name = one.name.replace(|c: char| !c.is_alphanumeric(), "_");
-            lines.push(format!(
-                "<connect name=\"{name}\" site1=\"{a}\" site2=\"{b}\"/>"
-            ));
+            lines.push(format!("<connect name=\"{name}\" site1=\"{a}\" site2=\"{b}\"/>"));
         }
+        // Joints of a coordinate that moves several joints follow the one with its name.
         for joint in self.tree.links.iter().flat_map(|link| &link.joints) {
             let owner = &m.coordinates[joint.coordinate].name;
             if joint.name != *owner {
-                // Both are seen from where the bodies are drawn.
+                // MuJoCo's polynomial relates deviations from the drawn pose, where both joints have their references.
                 lines.push(format!(
                     "<joint joint1=\"{}\" joint2=\"{owner}\" polycoef=\"0 {} 0 0 0\"/>",
                     joint.name,
-                    number(joint.ratio)
+                    number_text(joint.ratio)
                 ));
             }
         }
         for one in &self.tree.followed {
-            // Seen from where the bodies are drawn.
-            let [own, other] = [one.coordinate, one.of].map(|i| self.at[i]);
+            // The same for coordinates with `follows`: the constant term is the difference at the drawn pose.
+            let [own, other] = [one.coordinate, one.leader].map(|i| self.at[i]);
             lines.push(format!(
                 "<joint joint1=\"{}\" joint2=\"{}\" polycoef=\"{} {} 0 0 0\"/>",
                 m.coordinates[one.coordinate].name,
-                m.coordinates[one.of].name,
-                number(one.offset + one.factor * other - own),
-                number(one.factor)
+                m.coordinates[one.leader].name,
+                number_text(one.offset + one.factor * other - own),
+                number_text(one.factor)
             ));
         }
         if lines.is_empty() {
             return;
         }
         self.remarks.push(
-            "MuJoCo holds loops and coupled joints by soft constraints: forces of its inverse dynamics agree as far as these \
-             are held (`solref`, `solimp`)"
+            "MuJoCo closes loops and couples joints by soft constraints: forces of its inverse dynamics agree only as well as \
+             these are satisfied (`solref`, `solimp`)"
                 .into(),
         );
-        self.within("equality", "", |w| {
+        self.write_element("equality", "", |w| {
             for line in lines {
                 w.line(&line);
             }
         });
     }
 
-    /// Drives and passive elements between two points.
+    /// Tendons: drives and passive elements between two points.
     fn tendons(&mut self) {
         let m = self.mechanism;
         let mut lines: Vec<(String, [PointIdx; 2])> = Vec::new();
         let drives = m.drives.iter().enumerate().map(|(d, one)| (Some(d), one));
         for (d, drive) in drives.chain(m.shared_drives.iter().map(|one| (None, one))) {
             if let DriveKind::Linear { from, to } = drive.kind {
-                let own = d.map_or(Passive::default(), |d| self.friction.drives[d]);
-                let rest = passive(&own, "springlength");
+                // Shared drives have no passive properties.
+                let own = d.map_or(PassiveProperties::default(), |d| self.friction.drives[d]);
+                let rest = passive_attributes(&own, "springlength");
                 lines.push((format!("name=\"{}_line\"{rest}", drive.name), [from, to]));
             }
         }
+        // Springs and dampers between two points, without a drive.
         for (k, (ends, own)) in self.friction.elements.iter().enumerate() {
-            let rest = passive(own, "springlength");
+            let rest = passive_attributes(own, "springlength");
             lines.push((format!("name=\"element_{}\"{rest}", k + 1), *ends));
         }
         if lines.is_empty() {
             return;
         }
-        self.within("tendon", "", |w| {
+        self.write_element("tendon", "", |w| {
             for (head, ends) in lines {
-                w.within("spatial", &format!(" {head}"), |w| {
+                w.write_element("spatial", &format!(" {head}"), |w| {
                     for point in ends {
                         let name = &w.mechanism.points[point.0].name;
                         w.line(&format!("<site site=\"{name}\"/>"));
@@ -269,12 +292,14 @@ impl Writer<'_> {
         });
     }
 
+    /// Actuators: a motor for each drive that has a joint or a tendon, with its force limits.
     fn actuators(&mut self) {
         let m = self.mechanism;
         let drives = m.drives.iter().enumerate().map(|(d, one)| (Some(d), one));
         let all = drives.chain(m.shared_drives.iter().map(|one| (None, one)));
         let mut lines = Vec::new();
         for (d, drive) in all.filter(|(_, drive)| drive.is_driven) {
+            // What the motor acts on; coordinates of quaternions have no joint of their own.
             let on = match drive.kind {
                 DriveKind::Joint(CoordinateIdx(i)) => {
                     if m.coordinates[i].motion.is_quaternion() || !self.has_joint(i) {
@@ -284,31 +309,34 @@ impl Writer<'_> {
                 }
                 DriveKind::Linear { .. } => format!("tendon=\"{}_line\"", drive.name),
             };
+            // The control of a motor is its force, so that limits of the force are its range.
             let limits = m.limits.forces.iter();
             let range = limits.clone().find(|(i, _)| Some(i.0) == d);
             let range = range.map_or(String::new(), |(_, [low, high])| {
-                format!(" ctrlrange=\"{} {}\"", number(*low), number(*high))
+                format!(" ctrlrange=\"{} {}\"", number_text(*low), number_text(*high))
             });
             lines.push(format!("<motor name=\"{}\" {on}{range}/>", drive.name));
         }
         if lines.is_empty() {
             return;
         }
-        self.within("actuator", "", |w| {
+        self.write_element("actuator", "", |w| {
             for line in lines {
                 w.line(&line);
             }
         });
     }
 
+    /// Whether a joint moves with a coordinate.
     fn has_joint(&self, coordinate: usize) -> bool {
         let mut joints = self.tree.links.iter().flat_map(|link| &link.joints);
         joints.any(|joint| joint.coordinate == coordinate)
     }
 }
 
-/// Attributes of what a joint or tendon has by itself.
-fn passive(one: &Passive, rest: &str) -> String {
+/// Attributes of the passive properties of a joint or tendon; `rest` is the name of the attribute for the relaxed
+/// position.
+fn passive_attributes(one: &PassiveProperties, rest: &str) -> String {
     let mut text = String::new();
     for (name, value) in [
         ("damping", one.damping),
@@ -317,11 +345,12 @@ fn passive(one: &Passive, rest: &str) -> String {
         ("stiffness", one.stiffness),
     ] {
         if value != 0.0 {
-            let _ = write!(text, " {name}=\"{}\"", number(value));
+            let _ = write!(text, " {name}=\"{}\"", number_text(value));
         }
     }
+    // A spring needs its relaxed position.
     if one.stiffness != 0.0 {
-        let _ = write!(text, " {rest}=\"{}\"", number(one.rest));
+        let _ = write!(text, " {rest}=\"{}\"", number_text(one.rest));
     }
     text
 }

@@ -1,8 +1,9 @@
-//! A model as a robot description of other programs, URDF or MJCF: the way back of [`import`](fn@crate::import).
+//! Exports a model as a robot description of other programs, URDF or MJCF; the inverse of [`import`](fn@crate::import).
 //!
-//! A mechanism with the nominal values of its parameters goes in. `tree` makes one link of all frames that move as one, with
-//! joints between links; `inertia` adds up what they carry; `mjcf` and `urdf` write both down. What a format cannot say is a
-//! remark, never dropped; what would give other forces without a word is an error.
+//! A mechanism with the nominal values of its parameters goes in, text and remarks come out. `tree` merges frames that
+//! move together into links, with joints between them; `inertia` adds up masses and inertias of links; `mjcf` and
+//! `urdf` write the text. A remark reports everything that a format cannot express. If the description would give other
+//! forces without a remark, export fails.
 
 mod friction;
 mod inertia;
@@ -14,18 +15,18 @@ use std::fmt;
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{CommandName, Message, OptionName, Remedy};
-use modelmill_spec::{Exact, Mechanism};
+use modelmill_spec::{ExactExpression, Mechanism};
 
 /// A format of robot descriptions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
-    /// Of ROS: trees without loops.
+pub enum DescriptionFormat {
+    /// The format of ROS: trees without loops.
     Urdf,
-    /// Of MuJoCo: loops, linear drives as tendons, inertia of drives, springs.
+    /// The format of MuJoCo: loops, linear drives as tendons, inertia of drives, springs.
     Mjcf,
 }
 
-impl Format {
+impl DescriptionFormat {
     /// All of them.
     pub const ALL: [Self; 2] = [Self::Urdf, Self::Mjcf];
 
@@ -37,8 +38,8 @@ impl Format {
         }
     }
 
-    /// The format that an ending of a file's name (without the dot) stands for.
-    pub fn of_ending(ending: &str) -> Option<Self> {
+    /// The format for the ending of a file name, without the dot.
+    pub fn from_extension(ending: &str) -> Option<Self> {
         match ending {
             "urdf" => Some(Self::Urdf),
             "xml" | "mjcf" => Some(Self::Mjcf),
@@ -47,16 +48,16 @@ impl Format {
     }
 }
 
-/// A robot description that was made of a model.
+/// A robot description of a model.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Exported {
+pub struct DescriptionExport {
     /// Its text.
     pub text: String,
-    /// What the format does not say, or says otherwise.
+    /// What the format lacks or states differently; one sentence each.
     pub remarks: Vec<Message>,
 }
 
-/// Why a model cannot be written down in a format.
+/// Why a model cannot be exported in a format: one sentence with a remedy.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ExportError(String);
 
@@ -70,62 +71,69 @@ impl std::error::Error for ExportError {}
 
 /// Writes a mechanism with its nominal values as a robot description.
 ///
-/// Fails where a joint moves in a way that the format does not know, or a mass sits at different places for the balances of
-/// forces and of moments.
-pub fn export(mechanism: &Mechanism, format: Format) -> Result<Exported, ExportError> {
+/// Fails if a coordinate moves its joints only by ratios other than one, or a mass has different places in the balances
+/// of forces and of moments.
+pub fn export(mechanism: &Mechanism, format: DescriptionFormat) -> Result<DescriptionExport, ExportError> {
     let mut remarks = Vec::new();
-    // Closed loops are shown as they stand; the zeros of a tree are its own.
+    // With loops, bodies are drawn at the nominal pose, where loops are closed; without loops at zero.
     let at: Vec<f64> = match format {
-        Format::Mjcf if !mechanism.loops.is_empty() => {
+        DescriptionFormat::Mjcf if !mechanism.loops.is_empty() => {
             mechanism.coordinates.iter().map(|c| c.nominal).collect()
         }
         _ => vec![0.0; mechanism.coordinates.len()],
     };
-    let mut tree = tree::tree(mechanism, &at)?;
-    tree.followed = followed(mechanism, &mut remarks);
+    // Links and joints, then inertias of the links, which simulators check.
+    let mut tree = tree::link_tree(mechanism, &at)?;
+    tree.followed = followed_coordinates(mechanism, &mut remarks);
     let mut bodies = inertia::bodies(mechanism, &tree)?;
-    inertia::complete(&tree, &mut bodies, &mut remarks);
-    inertia::judge(&tree, &bodies, &mut remarks);
+    inertia::complete_inertias(&tree, &mut bodies, &mut remarks);
+    inertia::report_impossible(&tree, &bodies, &mut remarks);
+    // Values of base parameters cannot be distributed to bodies.
     if !mechanism.identified_base.is_empty() {
         remarks.push(message!(
-            "the values under `[identified]` are those of base parameters, which say nothing of single bodies: bodies have \
-             their nominal values here; identify with {} and let {} write that fit for a description of the real machine",
+            "the values under `[identified]` are those of base parameters, which do not determine single bodies, so bodies have \
+             their nominal values. For a description of the real machine, identify with {} and write the fit with {}",
             Remedy::option(OptionName::Physical),
             Remedy::command(CommandName::Adopt)
         ));
     }
-    let friction = friction::friction(mechanism, format, &mut remarks);
+    let friction = friction::passive_effects(mechanism, format, &mut remarks);
     let text = match format {
-        Format::Urdf => urdf::write(mechanism, &tree, &bodies, &friction, &mut remarks),
-        Format::Mjcf => mjcf::write(mechanism, &tree, &bodies, &friction, &at, &mut remarks),
+        DescriptionFormat::Urdf => urdf::write(mechanism, &tree, &bodies, &friction, &mut remarks),
+        DescriptionFormat::Mjcf => mjcf::write(mechanism, &tree, &bodies, &friction, &at, &mut remarks),
     };
-    Ok(Exported { text, remarks })
+    Ok(DescriptionExport { text, remarks })
 }
 
 /// A coordinate that follows a single other one.
 #[derive(Clone, Debug)]
-struct Followed {
+struct FollowedCoordinate {
+    /// Index of the coordinate.
     coordinate: usize,
-    of: usize,
+    /// Index of the coordinate that it follows.
+    leader: usize,
+    /// Factor of the leader.
     factor: f64,
+    /// Constant part, rad or m.
     offset: f64,
 }
 
-/// Couplings that formats have; those to several coordinates they have not, which is said.
-fn followed(mechanism: &Mechanism, remarks: &mut Vec<Message>) -> Vec<Followed> {
-    let value = |exact: &Exact| exact.evaluate(&|symbol| mechanism.symbol_nominal(symbol));
+/// Couplings to a single coordinate, with numeric values. Formats have no others, so a remark reports them.
+fn followed_coordinates(mechanism: &Mechanism, remarks: &mut Vec<Message>) -> Vec<FollowedCoordinate> {
+    let value = |exact: &ExactExpression| exact.evaluate(&|symbol| mechanism.symbol_nominal(symbol));
     let mut found = Vec::new();
     for coupling in &mechanism.couplings {
+        // Both formats know couplings to one joint only.
         if let [(of, factor)] = &coupling.terms[..] {
-            found.push(Followed {
+            found.push(FollowedCoordinate {
                 coordinate: coupling.coordinate.0,
-                of: of.0,
+                leader: of.0,
                 factor: value(factor),
                 offset: value(&coupling.offset),
             });
         } else {
             remarks.push(message!(
-                "`{}` follows several joints, which the format has no word for: it moves by itself",
+                "`{}` follows several joints, which the format cannot express; it is independent in the description",
                 mechanism.coordinates[coupling.coordinate.0].name
             ));
         }
@@ -133,17 +141,18 @@ fn followed(mechanism: &Mechanism, remarks: &mut Vec<Message>) -> Vec<Followed> 
     found
 }
 
-/// Numbers with spaces between them, each with as many digits as it needs.
-fn list(values: &[f64]) -> String {
-    let words: Vec<String> = values.iter().map(|x| number(*x)).collect();
+/// Numbers separated by spaces, with all digits.
+fn number_list(values: &[f64]) -> String {
+    let words: Vec<String> = values.iter().map(|x| number_text(*x)).collect();
     words.join(" ")
 }
 
-/// A number with as many digits as it needs; rounding below 1e-15 is zero.
-fn number(value: f64) -> String {
+/// A number with all digits; magnitudes below 1e-15 are rounding and become zero.
+fn number_text(value: f64) -> String {
     if value.abs() < 1e-15 {
         return "0".to_owned();
     }
+    // Integers without a decimal point.
     if value.fract() == 0.0 && value.abs() < 1e15 {
         return format!("{value:.0}");
     }

@@ -1,91 +1,109 @@
-//! The frames of a model in numbers: where they are, and how points of them move with the variables.
+//! Numeric kinematics of the imported frames. Values of the variables go in; poses of frames, gaps of loop closures and
+//! their Jacobian come out, and values at which the loops close.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
-use super::placed::{Placed, about};
+use super::placed::{DescriptionPose, rotation_about};
 
 /// One elementary motion of a frame: `ratio*variable + offset` about or along an axis of the frame.
 #[derive(Clone, Copy)]
-pub(crate) struct Move {
+pub(crate) struct ChainMotion {
+    /// Whether it is a rotation; else a translation.
     pub(crate) is_turn: bool,
-    /// Of unit length, in the axes reached so far.
+    /// Unit vector in the axes that the motions before have reached.
     pub(crate) axis: Vector3<f64>,
+    /// Index of the variable; none for a constant.
     pub(crate) variable: Option<usize>,
+    /// Factor of the variable.
     pub(crate) ratio: f64,
+    /// Constant part, rad or m.
     pub(crate) offset: f64,
 }
 
-/// A frame: a place in its parent, then its motions.
-pub(crate) struct Node {
-    /// None is the base.
+/// A frame: a fixed pose in its parent, then its motions.
+pub(crate) struct ChainFrame {
+    /// Index of the parent; none is the base.
     pub(crate) on: Option<usize>,
-    pub(crate) at: Placed,
-    pub(crate) moves: Vec<Move>,
+    /// Fixed pose in the parent.
+    pub(crate) at: DescriptionPose,
+    /// Motions in sequence.
+    pub(crate) moves: Vec<ChainMotion>,
 }
 
-/// Two points that coincide, each of a frame.
+/// Two points of two frames that coincide when the loops are closed.
 #[derive(Clone, Copy)]
-pub(crate) struct Pair {
+pub(crate) struct CoincidentPair {
+    /// Frame (none is the base) and the point in it, m.
     pub(crate) ends: [(Option<usize>, Vector3<f64>); 2],
     /// Index of the closure.
     pub(crate) closure: usize,
 }
 
-/// A frame at a pose: where it is, and its motions' axes and origins in the base.
-struct Posed {
-    at: Placed,
+/// A frame at given values of the variables.
+struct PosedFrame {
+    /// Its pose in the base.
+    at: DescriptionPose,
+    /// Axis and origin of each motion, in the base.
     moves: Vec<(Vector3<f64>, Vector3<f64>)>,
 }
 
-pub(crate) struct Chain {
-    /// Parents stand before their children.
-    pub(crate) nodes: Vec<Node>,
+/// All frames of a mechanism.
+pub(crate) struct FrameChain {
+    /// Frames; parents stand before their children.
+    pub(crate) nodes: Vec<ChainFrame>,
+    /// Number of variables.
     pub(crate) n_variables: usize,
 }
 
-impl Chain {
-    fn pose(&self, values: &[f64]) -> Vec<Posed> {
-        let mut out: Vec<Posed> = Vec::with_capacity(self.nodes.len());
+impl FrameChain {
+    /// Forward kinematics: all frames in the base.
+    fn pose(&self, values: &[f64]) -> Vec<PosedFrame> {
+        let mut out: Vec<PosedFrame> = Vec::with_capacity(self.nodes.len());
         for node in &self.nodes {
+            // The fixed pose, then one motion after the other.
             let mut at = node
                 .on
-                .map_or(Placed::identity(), |on| out[on].at)
-                .then(&node.at);
+                .map_or(DescriptionPose::identity(), |on| out[on].at)
+                .compose(&node.at);
             let mut moves = Vec::new();
             for motion in &node.moves {
-                let value =
-                    motion.variable.map_or(0.0, |v| motion.ratio * values[v]) + motion.offset;
+                let value = motion.variable.map_or(0.0, |v| motion.ratio * values[v]) + motion.offset;
+                // The axis as the motions before have left it.
                 moves.push((at.r * motion.axis, at.p));
-                at = at.then(&if motion.is_turn {
-                    Placed {
+                at = at.compose(&if motion.is_turn {
+                    DescriptionPose {
                         p: Vector3::zeros(),
-                        r: about(&motion.axis, value),
+                        r: rotation_about(&motion.axis, value),
                     }
                 } else {
-                    Placed {
+                    DescriptionPose {
                         p: motion.axis * value,
                         r: Matrix3::identity(),
                     }
                 });
             }
-            out.push(Posed { at, moves });
+            out.push(PosedFrame { at, moves });
         }
         out
     }
 
-    /// Gaps of all pairs, their derivatives by the variables, and the size of the mechanism.
-    pub(crate) fn gaps(&self, pairs: &[Pair], values: &[f64]) -> (DVector<f64>, DMatrix<f64>, f64) {
+    /// Gaps of all pairs (three rows each, m), their Jacobian with respect to the variables, and the size of the
+    /// mechanism: the largest coordinate of a closure point, m.
+    pub(crate) fn gaps(&self, pairs: &[CoincidentPair], values: &[f64]) -> (DVector<f64>, DMatrix<f64>, f64) {
         let posed = self.pose(values);
         let mut gaps = DVector::zeros(3 * pairs.len());
         let mut rows = DMatrix::zeros(3 * pairs.len(), self.n_variables);
+        // The size is at least a millimetre, also if all points are at the origin.
         let mut size = 1e-3_f64;
         for (k, pair) in pairs.iter().enumerate() {
             for ((frame, local), sign) in pair.ends.iter().zip([1.0, -1.0]) {
-                let place = frame.map_or(Placed::identity(), |frame| posed[frame].at);
+                // The point in the base, with opposite signs for both ends.
+                let place = frame.map_or(DescriptionPose::identity(), |frame| posed[frame].at);
                 let point = place.p + place.r * local;
                 size = size.max(point.amax());
                 let mut block = gaps.fixed_rows_mut::<3>(3 * k);
                 block += sign * point;
+                // Each motion between the frame and the base moves the point: columns of the geometric Jacobian.
                 let mut here = *frame;
                 while let Some(frame) = here {
                     let node = &self.nodes[frame];
@@ -108,36 +126,41 @@ impl Chain {
         (gaps, rows, size)
     }
 
-    /// Moves the second point of each pair to where the first one is.
-    pub(crate) fn meet(&self, pairs: &mut [Pair], values: &[f64]) {
+    /// Redefines the second point of each pair so that it coincides with the first at these values.
+    pub(crate) fn align_pairs(&self, pairs: &mut [CoincidentPair], values: &[f64]) {
         let posed = self.pose(values);
         for pair in pairs {
             let [place, other] = pair
                 .ends
-                .map(|(frame, _)| frame.map_or(Placed::identity(), |frame| posed[frame].at));
+                .map(|(frame, _)| frame.map_or(DescriptionPose::identity(), |frame| posed[frame].at));
+            // The first point in the frame of the second one.
             let first = place.p + place.r * pair.ends[0].1;
             pair.ends[1].1 = other.r.transpose() * (first - other.p);
         }
     }
 
-    /// Moves the variables until the pairs coincide as well as they can; the largest gap that is left, of the size.
-    pub(crate) fn close(&self, pairs: &[Pair], values: &mut [f64]) -> f64 {
-        /// Steps are no longer than this, rad or m.
+    /// Solves for values at which the pairs coincide, by damped Gauss-Newton steps with a pseudoinverse. Returns the
+    /// largest remaining gap relative to the size.
+    pub(crate) fn close_pairs(&self, pairs: &[CoincidentPair], values: &mut [f64]) -> f64 {
+        /// Largest step of a variable, rad or m.
         const LONGEST_STEP: f64 = 0.2;
         let mut left = f64::INFINITY;
         for _ in 0..300 {
             let (gaps, rows, size) = self.gaps(pairs, values);
             let now = gaps.amax() / size;
+            // Close to rounding, a step that does not halve the gap is the last one.
             let is_idle = now >= 0.5 * left && now < 1e-12;
             left = now;
             if now < 1e-15 || is_idle {
                 break;
             }
+            // Small singular values are cut off: redundant conditions are usual in closed loops.
             let svd = rows.svd(true, true);
             let cut = 1e-7 * svd.singular_values.max();
             let Ok(step) = svd.solve(&gaps, cut) else {
                 break;
             };
+            // Shorten long steps, so that the assembly mode hardly changes.
             let scale = (LONGEST_STEP / step.amax()).min(1.0);
             if !scale.is_finite() {
                 break;
@@ -150,13 +173,15 @@ impl Chain {
     }
 }
 
-/// Number of singular values above a share of the largest, and the least of these as a share.
+/// Numeric rank of a matrix: the number of singular values above a share of the largest, and the smallest of these
+/// relative to the largest.
 pub(crate) fn rank(matrix: &DMatrix<f64>, share: f64) -> (usize, f64) {
     if matrix.is_empty() {
         return (0, 1.0);
     }
     let values = matrix.clone().singular_values();
     let largest = values.max();
+    // Values that count, and the smallest of them.
     let kept: Vec<f64> = values
         .iter()
         .copied()

@@ -1,51 +1,53 @@
-//! Closures beside a URDF: the `robot.yaml` of the collection example-parallel-robots.
+//! Reads the loop closures of a URDF from the `robot.yaml` of the collection example-parallel-robots.
 //!
-//! Of YAML it is keys at the start of lines with lists behind them, in brackets or behind dashes, which is what these files
-//! hold; other keys are told.
+//! Only the part of YAML that these files use is read: keys at the start of lines, followed by lists in brackets or
+//! with dashes. Unknown keys are reported.
 
-/// What the file says.
+/// Contents of the file.
 #[derive(Debug, Default)]
-pub(crate) struct Closures {
-    pub(crate) pairs: Vec<Pair>,
-    /// Joints that are driven; all where there are none.
+pub(crate) struct ClosureFile {
+    /// Loop closures.
+    pub(crate) pairs: Vec<CoincidentFrames>,
+    /// Names of the driven joints; empty if all are driven.
     pub(crate) drives: Vec<String>,
-    /// Joints with what they are, whatever the URDF has in their place: it knows neither balls nor crosses.
-    pub(crate) joints: Vec<(String, Becomes)>,
+    /// Joints with their true kinds, which replace those of the URDF. URDF has neither ball joints nor universal
+    /// joints.
+    pub(crate) joints: Vec<(String, JointReplacement)>,
     /// What is not read; one sentence each.
     pub(crate) remarks: Vec<String>,
 }
 
-/// What a joint of the URDF is in truth.
+/// True kind of a joint that URDF cannot express.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Becomes {
+pub(crate) enum JointReplacement {
+    /// Three rotations.
     Ball,
+    /// No motion.
     Fixed,
-    /// Two hinges, about axes of its frame one after the other.
+    /// A universal joint: two hinges in sequence about these axes of its frame.
     Cross([char; 2]),
 }
 
 /// Two frames that coincide.
 #[derive(Debug)]
-pub(crate) struct Pair {
+pub(crate) struct CoincidentFrames {
+    /// Names of links, or of joints whose child links are meant.
     pub(crate) ends: [String; 2],
-    /// In orientation too.
+    /// Whether the orientations coincide as well as the origins.
     pub(crate) is_full: bool,
+    /// Line of the closures in the file.
     pub(crate) line: u32,
 }
 
-/// Keys that are read.
-const READ: [&str; 5] = [
-    "closed_loop",
-    "type",
-    "name_mot",
-    "joint_name",
-    "joint_type",
-];
+/// Keys that are read; others are reported.
+const KNOWN_KEYS: [&str; 5] = ["closed_loop", "type", "name_mot", "joint_name", "joint_type"];
 
-/// Reads the file, or says what is wrong.
-pub(crate) fn read(text: &str) -> Result<Closures, String> {
+/// Reads the file; fails with the line and what was expected.
+pub(crate) fn read(text: &str) -> Result<ClosureFile, String> {
+    // Lines that start with a blank, a dash or a bracket continue the value of the key before.
     let mut entries: Vec<(u32, &str, String)> = Vec::new();
     for (line, text) in (1..).zip(text.lines()) {
+        // Remove comments, and skip empty lines and the start of the document.
         let text = text.split(" #").next().unwrap_or_default();
         if text.trim().is_empty() || text.starts_with('#') || text.trim() == "---" {
             continue;
@@ -57,26 +59,29 @@ pub(crate) fn read(text: &str) -> Result<Closures, String> {
             }
             continue;
         }
-        let (key, value) = text.split_once(':').ok_or_else(|| {
-            format!("line {line} of the file of closures: expected `key: value`, found `{text}`")
-        })?;
+        let (key, value) = text
+            .split_once(':')
+            .ok_or_else(|| format!("line {line} of the file of closures: expected `key: value`, found `{text}`"))?;
         entries.push((line, key.trim(), value.to_owned()));
     }
+    // Line and words of a key; no words without the key.
     let list = |key: &str| -> (u32, Vec<String>) {
         let entry = entries.iter().find(|(_, name, _)| *name == key);
-        entry.map_or((0, Vec::new()), |(line, _, value)| (*line, words(value)))
+        entry.map_or((0, Vec::new()), |(line, _, value)| (*line, list_words(value)))
     };
     let (line, ends) = list("closed_loop");
     let (_, kinds) = list("type");
+    // The list of closures is flat after this: two names for each.
     let (pairs, rest) = ends.as_chunks::<2>();
     if !rest.is_empty() || (!kinds.is_empty() && kinds.len() != pairs.len()) {
         return Err(format!(
             "line {line} of the file of closures: expected pairs in `closed_loop`, each with its `type`"
         ));
     }
-    let mut out = Closures {
+    // Drives, and joints with their true kinds.
+    let mut out = ClosureFile {
         drives: list("name_mot").1,
-        ..Closures::default()
+        ..ClosureFile::default()
     };
     let (_, names) = list("joint_name");
     let (line_of_types, types) = list("joint_type");
@@ -87,11 +92,11 @@ pub(crate) fn read(text: &str) -> Result<Closures, String> {
     }
     for (name, kind) in names.into_iter().zip(types) {
         let becomes = match kind.to_uppercase().as_str() {
-            "SPHERICAL" => Becomes::Ball,
-            "FIXED" => Becomes::Fixed,
-            "UJOINT_XY" => Becomes::Cross(['x', 'y']),
-            "UJOINT_YZ" => Becomes::Cross(['y', 'z']),
-            "UJOINT_ZX" => Becomes::Cross(['z', 'x']),
+            "SPHERICAL" => JointReplacement::Ball,
+            "FIXED" => JointReplacement::Fixed,
+            "UJOINT_XY" => JointReplacement::Cross(['x', 'y']),
+            "UJOINT_YZ" => JointReplacement::Cross(['y', 'z']),
+            "UJOINT_ZX" => JointReplacement::Cross(['z', 'x']),
             _ => {
                 return Err(format!(
                     "line {line_of_types} of the file of closures: expected SPHERICAL, FIXED, UJOINT_XY, UJOINT_YZ or UJOINT_ZX \
@@ -101,13 +106,14 @@ pub(crate) fn read(text: &str) -> Result<Closures, String> {
         };
         out.joints.push((name, becomes));
     }
+    // Other keys get a remark.
     for (line, key, _) in &entries {
-        if !READ.contains(key) {
-            out.remarks.push(format!(
-                "line {line} of the file of closures: `{key}` is not read"
-            ));
+        if !KNOWN_KEYS.contains(key) {
+            out.remarks
+                .push(format!("line {line} of the file of closures: `{key}` is not read"));
         }
     }
+    // Closures of three conditions (origins) or six (complete frames).
     for (k, ends) in pairs.iter().enumerate() {
         let is_full = match kinds.get(k).map(|kind| kind.to_lowercase()).as_deref() {
             None | Some("6d") => true,
@@ -118,7 +124,7 @@ pub(crate) fn read(text: &str) -> Result<Closures, String> {
                 ));
             }
         };
-        out.pairs.push(Pair {
+        out.pairs.push(CoincidentFrames {
             ends: ends.clone(),
             is_full,
             line,
@@ -127,14 +133,11 @@ pub(crate) fn read(text: &str) -> Result<Closures, String> {
     Ok(out)
 }
 
-/// All words of a list, nested or not.
-fn words(text: &str) -> Vec<String> {
+/// All words of a list, with nested lists flattened and quotes removed.
+fn list_words(text: &str) -> Vec<String> {
     text.split([',', '[', ']', '\n'])
         .map(|word| {
-            let word = word
-                .trim()
-                .trim_start_matches("- ")
-                .trim_start_matches("- ");
+            let word = word.trim().trim_start_matches("- ").trim_start_matches("- ");
             word.trim().trim_matches(['\'', '"']).to_owned()
         })
         .filter(|word| !word.is_empty() && word != "-")

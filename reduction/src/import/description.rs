@@ -1,97 +1,119 @@
-//! A robot as all formats describe it: links in a tree, joints, closures, couplings.
+//! A robot description independent of the format: a tree of links with joints, loop closures and couplings. The readers
+//! of the formats produce it; `model_text` writes the model file from it.
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::placed::Placed;
+use super::placed::DescriptionPose;
 
 /// A robot description.
 #[derive(Default)]
-pub(crate) struct Description {
+pub(crate) struct RobotDescription {
+    /// Name of the robot.
     pub(crate) name: String,
-    /// The format, for people.
+    /// Name of the format, for messages.
     pub(crate) format: &'static str,
-    /// Acceleration of gravity in world axes, m/s^2; none where the format does not say it.
+    /// Acceleration of gravity in world axes, m/s^2; none if the format does not specify it.
     pub(crate) gravity: Option<Vector3<f64>>,
-    /// Parents stand before their children.
-    pub(crate) links: Vec<Link>,
-    pub(crate) closures: Vec<Closure>,
-    pub(crate) couplings: Vec<Coupling>,
-    pub(crate) lines: Vec<StraightDrive>,
-    /// Values of joints from which loops are closed, by name of the joint.
+    /// Links; parents stand before their children.
+    pub(crate) links: Vec<DescriptionLink>,
+    /// Loop closures.
+    pub(crate) closures: Vec<DescriptionClosure>,
+    /// Joints that follow others.
+    pub(crate) couplings: Vec<DescriptionCoupling>,
+    /// Drives between two points.
+    pub(crate) straight_drives: Vec<StraightDrive>,
+    /// Values of joints from which loops are closed, by name of the joint; rad or m.
     pub(crate) pose: Vec<(String, f64)>,
-    /// What was left out or made up.
+    /// What was left out or assumed; one sentence each.
     pub(crate) remarks: Vec<String>,
 }
 
-/// A link and how it moves on its parent.
-pub(crate) struct Link {
+/// A link, its pose and its joints to the parent.
+pub(crate) struct DescriptionLink {
+    /// Name in the description.
     pub(crate) name: String,
-    /// None is the world.
+    /// Index of the parent; none is the world.
     pub(crate) parent: Option<usize>,
-    /// In the frame of the parent where every joint has its `zero`.
-    pub(crate) at: Placed,
-    /// One after the other; none where the link is fixed to its parent.
-    pub(crate) joints: Vec<Joint>,
-    pub(crate) inertial: Inertial,
+    /// Pose in the frame of the parent while every joint has its value `zero`.
+    pub(crate) at: DescriptionPose,
+    /// Joints in sequence; empty if the link is fixed to its parent.
+    pub(crate) joints: Vec<DescriptionJoint>,
+    /// Mass and inertia.
+    pub(crate) inertial: DescriptionInertia,
 }
 
-/// What a link weighs; all zero where the description gives nothing.
+/// Mass and inertia of a link; all zero if the description specifies none.
 #[derive(Clone, Copy)]
-pub(crate) struct Inertial {
+pub(crate) struct DescriptionInertia {
+    /// Mass, kg.
     pub(crate) mass: f64,
     /// The centre of mass and the axes of `inertia` in the frame of the link.
-    pub(crate) at: Placed,
-    /// About the centre of mass, kg m^2.
+    pub(crate) at: DescriptionPose,
+    /// About the centre of mass, in the axes of `at`, kg m^2.
     pub(crate) inertia: Matrix3<f64>,
 }
 
-impl Default for Inertial {
+impl Default for DescriptionInertia {
     fn default() -> Self {
         Self {
             mass: 0.0,
-            at: Placed::identity(),
+            at: DescriptionPose::identity(),
             inertia: Matrix3::zeros(),
         }
     }
 }
 
-/// How a joint moves.
+/// Kind of a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Kind {
-    Turn,
-    Slide,
+pub(crate) enum DescriptionJointKind {
+    /// One rotation about the axis.
+    Revolute,
+    /// One translation along the axis.
+    Prismatic,
+    /// Three rotations about the anchor.
     Ball,
+    /// Six degrees of freedom: a body that is not connected to its parent.
     Free,
 }
 
 /// A joint of a link.
 #[derive(Clone)]
-pub(crate) struct Joint {
+pub(crate) struct DescriptionJoint {
+    /// Name in the description.
     pub(crate) name: String,
     /// Line in the description.
     pub(crate) line: u32,
-    pub(crate) kind: Kind,
-    /// A point of the axis in the frame of the link.
+    /// Kind of motion.
+    pub(crate) kind: DescriptionJointKind,
+    /// A point of the axis in the frame of the link, m.
     pub(crate) anchor: Vector3<f64>,
-    /// Direction in the axes of the link; its length does not matter.
+    /// Direction in the axes of the link, of any length.
     pub(crate) axis: Vector3<f64>,
-    /// Value of the coordinate at the pose that the description gives.
+    /// Value of the coordinate at the pose of the description, rad or m.
     pub(crate) zero: f64,
+    /// Limits of the position, rad or m.
     pub(crate) range: Option<[f64; 2]>,
+    /// Largest rate, rad/s or m/s.
     pub(crate) rate: Option<f64>,
+    /// Limits of the drive's force, N m or N.
     pub(crate) force: Option<[f64; 2]>,
+    /// Viscous friction, N m s/rad or N s/m.
     pub(crate) damping: f64,
+    /// Coulomb friction, N m or N.
     pub(crate) friction: f64,
-    /// Inertia of the rotor as felt at the joint.
+    /// Inertia of the rotor reflected to the joint, kg m^2 or kg.
     pub(crate) armature: f64,
+    /// Stiffness of a spring, N m/rad or N/m.
     pub(crate) stiffness: f64,
-    /// Where the spring is at rest.
+    /// Position at which the spring is relaxed, rad or m.
     pub(crate) rest: f64,
+    /// Whether a drive acts on it.
     pub(crate) is_driven: bool,
 }
 
-impl Joint {
-    pub(crate) fn new(name: String, kind: Kind, line: u32) -> Self {
+impl DescriptionJoint {
+    /// A joint about or along z of the link, driven unless it is free, without limits and losses.
+    pub(crate) fn new(name: String, kind: DescriptionJointKind, line: u32) -> Self {
         Self {
             name,
             line,
@@ -107,51 +129,64 @@ impl Joint {
             armature: 0.0,
             stiffness: 0.0,
             rest: 0.0,
-            is_driven: kind != Kind::Free,
+            is_driven: kind != DescriptionJointKind::Free,
         }
     }
 }
 
-/// What a closure holds together.
+/// Which parts of two frames a closure makes equal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Holds {
+pub(crate) enum ClosureConstraint {
     /// The origins of two frames.
     Origins,
     /// The origins and the x axes: a hinge about x.
     Axes,
-    /// All of both frames.
+    /// Origins and all axes: a rigid connection.
     Frames,
 }
 
-/// Two places of links that coincide.
-pub(crate) struct Closure {
+/// A loop closure: two frames of links that coincide fully or in part.
+pub(crate) struct DescriptionClosure {
+    /// Name in the description, or made from the names of both ends.
     pub(crate) name: String,
+    /// Line in the description.
     pub(crate) line: u32,
     /// Link (none is the world) and a frame in it.
-    pub(crate) ends: [(Option<usize>, Placed); 2],
-    pub(crate) holds: Holds,
+    pub(crate) ends: [(Option<usize>, DescriptionPose); 2],
+    /// Which parts of the frames coincide.
+    pub(crate) constraint: ClosureConstraint,
 }
 
 /// One joint follows another: `q = ratio*(q of the other) + offset`.
-pub(crate) struct Coupling {
+pub(crate) struct DescriptionCoupling {
+    /// Line in the description.
     pub(crate) line: u32,
+    /// Name of the joint that follows.
     pub(crate) joint: String,
-    /// None holds the joint at `offset`.
-    pub(crate) of: Option<String>,
+    /// Name of the joint that it follows; none fixes it at `offset`.
+    pub(crate) leader: Option<String>,
+    /// Factor of the leader's coordinate.
     pub(crate) ratio: f64,
+    /// Constant part, rad or m.
     pub(crate) offset: f64,
 }
 
 /// A drive along the straight line between two points of links.
 pub(crate) struct StraightDrive {
+    /// Name of the actuator.
     pub(crate) name: String,
-    /// What the format calls the line itself.
+    /// Name of the tendon.
     pub(crate) tendon: String,
+    /// Line in the description.
     pub(crate) line: u32,
-    /// Link (none is the world) and a point in its frame; a force that pushes moves the second from the first.
+    /// Link (none is the world) and a point in its frame, m. A positive force pushes the points apart.
     pub(crate) ends: [(Option<usize>, Vector3<f64>); 2],
+    /// Limits of the force, N.
     pub(crate) force: Option<[f64; 2]>,
+    /// Viscous friction, N s/m.
     pub(crate) damping: f64,
+    /// Coulomb friction, N.
     pub(crate) friction: f64,
+    /// Inertia reflected to the length of the line, kg.
     pub(crate) armature: f64,
 }

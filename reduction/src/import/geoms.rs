@@ -1,21 +1,26 @@
-//! Mass and inertia of simple shapes of one density, about their own centres.
+//! Mass and inertia of homogeneous simple shapes about their own centres. Kinds, sizes and their order are those of
+//! MuJoCo.
 
 use std::f64::consts::PI;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::description::Inertial;
-use super::placed::Placed;
+use super::description::DescriptionInertia;
+use super::placed::DescriptionPose;
 
-/// A shape: volume, and the moments of inertia for a mass of one.
-pub(crate) struct Shape {
+/// A shape: its volume, and its moments of inertia per mass.
+pub(crate) struct GeomShape {
+    /// Volume, m^3.
     volume: f64,
+    /// Principal moments about the centre for a mass of 1 kg, kg m^2.
     moments: [f64; 3],
 }
 
-impl Shape {
-    /// A shape as MuJoCo names and sizes it; `half` is half the length where both ends are given. None has no mass (a plane).
+impl GeomShape {
+    /// A shape by MuJoCo's kind and sizes, m; `half` is half the length if both ends are given (`fromto`). None for
+    /// kinds without mass, such as planes.
     pub(crate) fn new(kind: &str, size: &[f64], half: Option<f64>) -> Result<Option<Self>, String> {
+        // A size of the list, which must be positive.
         let at = |k: usize| {
             size.get(k)
                 .copied()
@@ -24,6 +29,7 @@ impl Shape {
         };
         let shape = match kind {
             "plane" | "hfield" => return Ok(None),
+            // Solid shapes, with the z axis along the length.
             "sphere" => {
                 let r = at(0)?;
                 Self {
@@ -39,6 +45,7 @@ impl Shape {
                 }
             }
             "box" => {
+                // With `fromto` the first size is both half widths.
                 let [a, b, c] = match half {
                     Some(half) => [at(0)?, at(0)?, half],
                     None => [at(0)?, at(1)?, at(2)?],
@@ -49,6 +56,7 @@ impl Shape {
                 }
             }
             "cylinder" => {
+                // Radius and half length.
                 let (r, h) = (at(0)?, half.map_or_else(|| at(1), Ok)?);
                 let across = r * r / 4.0 + h * h / 3.0;
                 Self {
@@ -58,9 +66,10 @@ impl Shape {
             }
             "capsule" => {
                 let (r, h) = (at(0)?, half.map_or_else(|| at(1), Ok)?);
+                // Volumes of the cylinder and of both caps, a sphere together.
                 let (middle, caps) = (2.0 * PI * r * r * h, 4.0 / 3.0 * PI * r.powi(3));
                 let volume = middle + caps;
-                // Each cap's centre lies 3/8 r beyond the end of the cylinder.
+                // The centre of each cap is 3/8 r beyond the end of the cylinder.
                 let of_caps = 0.4 * r * r + h * h + 0.75 * h * r;
                 let across = (middle * (r * r / 4.0 + h * h / 3.0) + caps * of_caps) / volume;
                 let along = (middle * r * r / 2.0 + caps * 0.4 * r * r) / volume;
@@ -71,7 +80,7 @@ impl Shape {
             }
             other => {
                 return Err(format!(
-                    "mass and inertia of a {other} are not worked out here: give the body an <inertial>, as MuJoCo writes it \
+                    "mass and inertia of a {other} are not computed here; give the body an <inertial>, as MuJoCo writes it \
                      (mj_saveLastXML)"
                 ));
             }
@@ -79,11 +88,11 @@ impl Shape {
         Ok(Some(shape))
     }
 
-    /// The shape with a mass, or else a density.
-    pub(crate) fn inertial(&self, mass: Option<f64>, density: f64, at: Placed) -> Inertial {
+    /// Mass and inertia of the shape at a pose, from a mass in kg or else from a density in kg/m^3.
+    pub(crate) fn inertial(&self, mass: Option<f64>, density: f64, at: DescriptionPose) -> DescriptionInertia {
         let mass = mass.unwrap_or(density * self.volume);
         let moments = Vector3::from(self.moments) * mass;
-        Inertial {
+        DescriptionInertia {
             mass,
             at,
             inertia: Matrix3::from_diagonal(&moments),
@@ -91,23 +100,25 @@ impl Shape {
     }
 }
 
-/// Several bodies as one.
-pub(crate) fn together(parts: &[Inertial]) -> Inertial {
+/// Mass and inertia of several rigidly connected bodies, about their common centre of mass, in the axes of the frame.
+pub(crate) fn combined_inertia(parts: &[DescriptionInertia]) -> DescriptionInertia {
     let mass: f64 = parts.iter().map(|part| part.mass).sum();
     if mass <= 0.0 {
-        return Inertial::default();
+        return DescriptionInertia::default();
     }
+    // The common centre of mass.
     let moment: Vector3<f64> = parts.iter().map(|part| part.mass * part.at.p).sum();
     let centre = moment / mass;
     let mut inertia = Matrix3::zeros();
     for part in parts {
+        // Rotate into the axes of the frame, then shift to the common centre (Steiner).
         let c = part.at.p - centre;
         inertia += part.at.r * part.inertia * part.at.r.transpose()
             + part.mass * (Matrix3::identity() * c.norm_squared() - c * c.transpose());
     }
-    Inertial {
+    DescriptionInertia {
         mass,
-        at: Placed {
+        at: DescriptionPose {
             p: centre,
             r: Matrix3::identity(),
         },

@@ -1,4 +1,4 @@
-//! Reads MJCF, MuJoCo's format: bodies with joints, default classes, equalities and what acts on joints.
+//! Reads MJCF, the format of MuJoCo: bodies with joints, default classes, equalities, actuators, and forces at joints.
 //!
 //! Source of names and defaults: MuJoCo's XML reference (mujoco.readthedocs.io/en/stable/XMLreference.html).
 
@@ -7,13 +7,15 @@ use std::f64::consts::PI;
 use nalgebra::{Matrix3, Vector3};
 use roxmltree::{Document, Node};
 
-use super::description::{Description, Inertial, Joint, Kind, Link};
+use super::description::{
+    DescriptionInertia, DescriptionJoint, DescriptionJointKind, DescriptionLink, RobotDescription,
+};
 use super::geoms;
-use super::mjcf_defaults::Defaults;
-use super::placed::{Placed, about, of_quaternion};
-use super::xml::{at, children, exactly, line, numbers, symmetric, vector, word};
+use super::mjcf_defaults::MjcfDefaults;
+use super::placed::{DescriptionPose, rotation_about, rotation_from_quaternion};
+use super::xml::{children, exact_numbers, line, located_message, numbers, required_attribute, symmetric, vector};
 
-/// Sections that say nothing of how a robot moves.
+/// Sections without effect on the dynamics, or read elsewhere; they are skipped without a remark.
 const NO_DYNAMICS: [&str; 12] = [
     "asset",
     "visual",
@@ -29,120 +31,135 @@ const NO_DYNAMICS: [&str; 12] = [
     "option",
 ];
 
-/// What the file says of itself.
-struct Compiler {
-    /// Angles are in degrees.
+/// Settings of `<compiler>`, with MuJoCo's defaults.
+struct MjcfCompiler {
+    /// Whether angles are in degrees.
     is_degree: bool,
-    /// Sequence of turns of Euler angles; capitals turn about fixed axes.
+    /// Sequence of rotations of Euler angles; capitals rotate about fixed axes.
     euler: String,
-    /// Ranges count where `limited` is not said.
+    /// Whether a range is a limit if `limited` is not specified.
     has_auto_limits: bool,
-    /// Inertia comes from shapes: always, never, or where there is no other.
+    /// Whether inertia is computed from shapes: always, never, or (none) if there is no `<inertial>`.
     from_geoms: Option<bool>,
+    /// Lower bound of each mass, kg.
     least_mass: f64,
+    /// Lower bound of each principal moment, kg m^2.
     least_inertia: f64,
-    /// Moments that no body has become their mean.
+    /// Whether impossible principal moments are replaced by their mean.
     balances_inertia: bool,
-    /// Groups of shapes that weigh something.
+    /// First and last group of shapes that have mass.
     groups: [f64; 2],
-    /// What all bodies together weigh, if they are made lighter or heavier for that.
+    /// Total mass to which all bodies are scaled, kg.
     total_mass: Option<f64>,
 }
 
-pub(super) struct Reader<'a, 'i> {
-    compiler: Compiler,
-    defaults: Defaults<'a, 'i>,
-    pub(super) out: Description,
-    /// Places of the bodies at the pose of the file, in the world.
-    pub(super) world: Vec<Placed>,
-    pub(super) sites: Vec<(String, Option<usize>, Placed)>,
+/// The state of the reader: settings, defaults, and the description so far.
+pub(super) struct MjcfReader<'a, 'i> {
+    /// Settings of the file.
+    compiler: MjcfCompiler,
+    /// Default classes.
+    defaults: MjcfDefaults<'a, 'i>,
+    /// The description.
+    pub(super) out: RobotDescription,
+    /// Poses of the bodies in the world, at the pose of the file.
+    pub(super) world: Vec<DescriptionPose>,
+    /// Sites: name, link (none is the world) and pose in it.
+    pub(super) sites: Vec<(String, Option<usize>, DescriptionPose)>,
 }
 
-/// Where elements of a body stand.
+/// The surroundings of an element.
 #[derive(Clone, Copy)]
-struct Inside<'a> {
+struct MjcfContext<'a> {
+    /// Index of the body; none is the world.
     link: Option<usize>,
+    /// Default class (`childclass`) of the elements inside.
     class: Option<&'a str>,
 }
 
-/// Reads a description, or says in one line what is wrong and where.
-pub(crate) fn read(document: &Document) -> Result<Description, String> {
+/// Reads a description; fails with one line that states the fault and its place.
+pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
     let root = document.root_element();
-    let mut reader = Reader {
+    let mut reader = MjcfReader {
         compiler: compiler(&root)?,
-        defaults: Defaults::read(&root)?,
-        out: Description {
+        defaults: MjcfDefaults::read(&root)?,
+        out: RobotDescription {
             name: root.attribute("model").unwrap_or("robot").to_owned(),
             format: "MJCF",
             gravity: Some(Vector3::new(0.0, 0.0, -9.81)),
-            ..Description::default()
+            ..RobotDescription::default()
         },
         world: Vec::new(),
         sites: Vec::new(),
     };
+    // Options: gravity, and forces that the model does not have.
     for option in children(&root, "option") {
         if let Some(text) = option.attribute("gravity") {
-            reader.out.gravity = Some(vector(exactly(&option, "gravity", text)?));
+            reader.out.gravity = Some(vector(exact_numbers(&option, "gravity", text)?));
         }
+        // A flag of the file can disable gravity without a change of the vector.
         let is_off = |flag: Node| flag.attribute("gravity") == Some("disable");
         if children(&option, "flag").any(is_off) {
-            let says = "its flag switches gravity off; bodies have their weight here";
-            reader.out.remarks.push(at(&option, says));
+            let says = "its flag disables gravity; the model has gravity";
+            reader.out.remarks.push(located_message(&option, says));
         }
+        // Forces of the surrounding fluid are not part of a model.
         for key in ["density", "viscosity"] {
             let text = option.attribute(key);
             if text.is_some_and(|text| text.trim().parse() != Ok(0.0)) {
-                let says = format!("`{key}`: forces of a fluid are left out");
-                reader.out.remarks.push(at(&option, &says));
+                let says = format!("`{key}`: fluid forces are left out");
+                reader.out.remarks.push(located_message(&option, &says));
             }
         }
     }
+    // Elements that MuJoCo expands when it reads the file; only their result could be imported.
     for node in root.descendants() {
         let tag = node.tag_name().name();
         if tag == "include" {
-            return Err(at(
+            return Err(located_message(
                 &node,
-                "included files are read where the description is read from a file",
+                "included files can only be read if the description is given as a file",
             ));
         }
         if ["attach", "replicate", "composite", "flexcomp"].contains(&tag) {
-            return Err(at(
+            return Err(located_message(
                 &node,
-                "this is not expanded here; MuJoCo writes one whole file of it (mj_saveLastXML)",
+                "this element is not expanded here; save the complete model with MuJoCo (mj_saveLastXML) and import that file",
             ));
         }
     }
+    // The tree of bodies with their joints and inertias.
     for body in children(&root, "worldbody") {
-        let inside = Inside {
+        let inside = MjcfContext {
             link: None,
             class: None,
         };
-        reader.inside(&body, inside, Placed::identity())?;
+        reader.read_children(&body, inside, DescriptionPose::identity())?;
     }
+    // Then everything that refers to bodies and joints by name.
     reader.scale_to_total();
     for equalities in children(&root, "equality") {
         for node in equalities.children().filter(Node::is_element) {
-            reader.equality(&node)?;
+            reader.read_equality(&node)?;
         }
     }
-    reader.actuators(&root)?;
-    reader.keyframe(&root)?;
+    reader.read_actuators(&root)?;
+    reader.read_keyframe(&root)?;
+    // A remark for each section that is neither read nor known to have no effect.
     for node in root.children().filter(Node::is_element) {
         let tag = node.tag_name().name();
-        if !NO_DYNAMICS.contains(&tag)
-            && !["worldbody", "equality", "actuator", "tendon"].contains(&tag)
-        {
+        if !NO_DYNAMICS.contains(&tag) && !["worldbody", "equality", "actuator", "tendon"].contains(&tag) {
             reader
                 .out
                 .remarks
-                .push(at(&node, "this section is not read"));
+                .push(located_message(&node, "this section is not read"));
         }
     }
     Ok(reader.out)
 }
 
-fn compiler(root: &Node) -> Result<Compiler, String> {
-    let mut out = Compiler {
+/// Reads all `<compiler>` elements; later ones replace earlier settings.
+fn compiler(root: &Node) -> Result<MjcfCompiler, String> {
+    let mut out = MjcfCompiler {
         is_degree: true,
         euler: "xyz".to_owned(),
         has_auto_limits: true,
@@ -158,11 +175,12 @@ fn compiler(root: &Node) -> Result<Compiler, String> {
             out.is_degree = angle != "radian";
         }
         if let Some(sequence) = node.attribute("eulerseq") {
+            // Capitals rotate about fixed axes; the two kinds cannot be mixed.
             let is_fine = sequence.len() == 3
                 && sequence.chars().all(|c| "xyzXYZ".contains(c))
                 && (sequence == sequence.to_lowercase() || sequence == sequence.to_uppercase());
             if !is_fine {
-                return Err(at(&node, "expected three of x, y and z in `eulerseq`"));
+                return Err(located_message(&node, "expected three of x, y and z in `eulerseq`"));
             }
             sequence.clone_into(&mut out.euler);
         }
@@ -179,30 +197,32 @@ fn compiler(root: &Node) -> Result<Compiler, String> {
             ("boundinertia", &mut out.least_inertia),
         ] {
             if let Some(text) = node.attribute(key) {
-                [*value] = exactly(&node, key, text)?;
+                [*value] = exact_numbers(&node, key, text)?;
             }
         }
+        // Poses relative to the world have another meaning, so the file cannot be read.
         if node.attribute("coordinate") == Some("global") {
-            return Err(at(
+            return Err(located_message(
                 &node,
-                "global coordinates left MuJoCo with version 2.3.3; write the file anew with an older one",
+                "global coordinates were removed from MuJoCo in version 2.3.3; convert the file with an older version",
             ));
         }
         if let Some(balance) = node.attribute("balanceinertia") {
             out.balances_inertia = balance == "true";
         }
         if let Some(text) = node.attribute("inertiagrouprange") {
-            out.groups = exactly(&node, "inertiagrouprange", text)?;
+            out.groups = exact_numbers(&node, "inertiagrouprange", text)?;
         }
         if let Some(text) = node.attribute("settotalmass") {
-            let [total] = exactly(&node, "settotalmass", text)?;
+            let [total] = exact_numbers(&node, "settotalmass", text)?;
+            // The default of MuJoCo is -1, which means "no scaling".
             out.total_mass = (total > 0.0).then_some(total);
         }
     }
     Ok(out)
 }
 
-impl<'a, 'i> Reader<'a, 'i> {
+impl<'a, 'i> MjcfReader<'a, 'i> {
     /// An angle of the file in rad.
     fn angle(&self, value: f64) -> f64 {
         if self.compiler.is_degree {
@@ -212,15 +232,12 @@ impl<'a, 'i> Reader<'a, 'i> {
         }
     }
 
-    pub(super) fn text(
-        &self,
-        node: &Node<'a, 'i>,
-        class: Option<&str>,
-        key: &str,
-    ) -> Result<Option<&'a str>, String> {
+    /// An attribute of an element, its own or that of its default class.
+    pub(super) fn text(&self, node: &Node<'a, 'i>, class: Option<&str>, key: &str) -> Result<Option<&'a str>, String> {
         self.defaults.attribute(node, class, key)
     }
 
+    /// An attribute of exactly `N` numbers, its own or that of its default class.
     pub(super) fn numbers<const N: usize>(
         &self,
         node: &Node<'a, 'i>,
@@ -228,45 +245,42 @@ impl<'a, 'i> Reader<'a, 'i> {
         key: &str,
     ) -> Result<Option<[f64; N]>, String> {
         let text = self.text(node, class, key)?;
-        text.map(|text| exactly(node, key, text)).transpose()
+        text.map(|text| exact_numbers(node, key, text)).transpose()
     }
 
-    /// The first number of an attribute; further ones are said.
-    fn first(
-        &mut self,
-        node: &Node<'a, 'i>,
-        class: Option<&str>,
-        key: &str,
-    ) -> Result<f64, String> {
+    /// The first number of an attribute, zero without it. Nonzero further ones are reported.
+    fn first(&mut self, node: &Node<'a, 'i>, class: Option<&str>, key: &str) -> Result<f64, String> {
         let Some(text) = self.text(node, class, key)? else {
             return Ok(0.0);
         };
         let all = numbers(node, key, text)?;
         if all.iter().skip(1).any(|x| *x != 0.0) {
-            self.out.remarks.push(at(
+            self.out.remarks.push(located_message(
                 node,
-                &format!("of `{key}` the first number counts; further ones are not read"),
+                &format!("only the first number of `{key}` is read"),
             ));
         }
         Ok(all.first().copied().unwrap_or(0.0))
     }
 
-    /// Position and orientation of an element.
-    fn placed(&self, node: &Node<'a, 'i>, class: Option<&str>) -> Result<Placed, String> {
-        let mut out = Placed::identity();
+    /// Position and orientation of an element, from any of the ways in which MJCF specifies an orientation.
+    fn read_placement(&self, node: &Node<'a, 'i>, class: Option<&str>) -> Result<DescriptionPose, String> {
+        // The position; then whichever orientation is given.
+        let mut out = DescriptionPose::identity();
         if let Some(pos) = self.numbers(node, class, "pos")? {
             out.p = vector(pos);
         }
-        let fault = |key: &str| at(node, &format!("`{key}` has no direction"));
+        let fault = |key: &str| located_message(node, &format!("`{key}` has no direction"));
         if let Some(quat) = self.numbers(node, class, "quat")? {
-            out.r = of_quaternion(quat).ok_or_else(|| fault("quat"))?;
+            out.r = rotation_from_quaternion(quat).ok_or_else(|| fault("quat"))?;
         }
         if let Some([x, y, z, angle]) = self.numbers(node, class, "axisangle")? {
             let axis = Vector3::new(x, y, z)
                 .try_normalize(1e-12)
                 .ok_or_else(|| fault("axisangle"))?;
-            out.r = about(&axis, self.angle(angle));
+            out.r = rotation_about(&axis, self.angle(angle));
         }
+        // The x axis is kept; the y axis is made perpendicular to it.
         if let Some([a, b, c, d, e, f]) = self.numbers(node, class, "xyaxes")? {
             let x = Vector3::new(a, b, c)
                 .try_normalize(1e-12)
@@ -277,27 +291,29 @@ impl<'a, 'i> Reader<'a, 'i> {
                 .ok_or_else(|| fault("xyaxes"))?;
             out.r = Matrix3::from_columns(&[x, y, x.cross(&y)]);
         }
+        // The smallest rotation that turns the z axis into the given direction; half a turn about x for the opposite
+        // one.
         if let Some(z) = self.numbers(node, class, "zaxis")? {
-            let z = vector(z)
-                .try_normalize(1e-12)
-                .ok_or_else(|| fault("zaxis"))?;
+            let z = vector(z).try_normalize(1e-12).ok_or_else(|| fault("zaxis"))?;
             let axis = Vector3::z().cross(&z);
             let angle = axis.norm().atan2(z.z);
             let axis = axis.try_normalize(1e-12).unwrap_or_else(Vector3::x);
-            out.r = about(&axis, angle);
+            out.r = rotation_about(&axis, angle);
         }
         if let Some(angles) = self.numbers::<3>(node, class, "euler")? {
             out.r = Matrix3::identity();
+            // One rotation after the other, in the sequence of the file.
             for (letter, angle) in self.compiler.euler.chars().zip(angles) {
                 let axis = match letter.to_ascii_lowercase() {
                     'x' => Vector3::x(),
                     'y' => Vector3::y(),
                     _ => Vector3::z(),
                 };
-                let turn = about(&axis, self.angle(angle));
+                let turn = rotation_about(&axis, self.angle(angle));
                 out.r = if letter.is_ascii_lowercase() {
                     out.r * turn
                 } else {
+                    // Rotations about fixed axes multiply from the left.
                     turn * out.r
                 };
             }
@@ -305,136 +321,143 @@ impl<'a, 'i> Reader<'a, 'i> {
         Ok(out)
     }
 
-    /// Reads what stands in a body, in a frame of it at `at`.
-    fn inside(
+    /// Reads the elements inside a body, which are given in a frame at `place` in the body.
+    fn read_children(
         &mut self,
         node: &Node<'a, 'i>,
-        inside: Inside<'a>,
-        place: Placed,
+        inside: MjcfContext<'a>,
+        place: DescriptionPose,
     ) -> Result<(), String> {
         for child in node.children().filter(Node::is_element) {
+            // A default class is valid for all elements inside.
             let class = child.attribute("childclass").or(inside.class);
             match child.tag_name().name() {
-                "body" => self.body(&child, Inside { class, ..inside }, place)?,
+                "body" => self.read_body(&child, MjcfContext { class, ..inside }, place)?,
+                // A frame has no body; its pose is applied to the elements inside.
                 "frame" => {
-                    let place = place.then(&self.placed(&child, class)?);
-                    self.inside(&child, Inside { class, ..inside }, place)?;
+                    let place = place.compose(&self.read_placement(&child, class)?);
+                    self.read_children(&child, MjcfContext { class, ..inside }, place)?;
                 }
                 "site" => {
                     if let Some(name) = child.attribute("name") {
-                        let at = place.then(&self.placed(&child, class)?);
+                        let at = place.compose(&self.read_placement(&child, class)?);
                         self.sites.push((name.to_owned(), inside.link, at));
                     }
                 }
                 "joint" | "freejoint" if inside.link.is_none() => {
-                    return Err(at(&child, "the world has no joint"));
+                    return Err(located_message(&child, "the world cannot have a joint"));
                 }
-                "joint" => self.joint(&child, inside, place)?,
-                "freejoint" => self.free(&child, inside)?,
+                "joint" => self.read_joint(&child, inside, place)?,
+                "freejoint" => self.read_free_joint(&child, inside)?,
                 _ => {}
             }
         }
         Ok(())
     }
 
-    fn body(
+    /// Reads a body with its joints, its inertia and its child bodies.
+    fn read_body(
         &mut self,
         node: &Node<'a, 'i>,
-        around: Inside<'a>,
-        place: Placed,
+        around: MjcfContext<'a>,
+        place: DescriptionPose,
     ) -> Result<(), String> {
-        let placed = place.then(&self.placed(node, None)?);
+        // Bodies have no default class of their own, so the pose is that of the element.
+        let placed = place.compose(&self.read_placement(node, None)?);
         let own = self.out.links.len();
+        // Bodies without a name are numbered.
         let name = node
             .attribute("name")
             .map_or_else(|| format!("body{}", own + 1), str::to_owned);
         if self.out.links.iter().any(|link| link.name == name) {
-            return Err(at(node, &format!("two bodies are called `{name}`")));
+            return Err(located_message(
+                node,
+                &format!("two bodies have the name `{name}`; rename one"),
+            ));
         }
-        let parent = around
-            .link
-            .map_or(Placed::identity(), |link| self.world[link]);
-        self.world.push(parent.then(&placed));
+        let parent = around.link.map_or(DescriptionPose::identity(), |link| self.world[link]);
+        // Equalities between bodies need the poses in the world.
+        self.world.push(parent.compose(&placed));
         let inertial = self.inertial(node, around.class)?;
+        // Properties of simulation and control are reported, since the model lacks them.
         if node.attribute("mocap") == Some("true") {
-            self.out.remarks.push(at(
+            self.out.remarks.push(located_message(
                 node,
-                "a body that is moved from outside; here it stands still",
+                "this mocap body is moved from outside; it is fixed in the model",
             ));
         }
-        if node
-            .attribute("gravcomp")
-            .is_some_and(|text| text.trim() != "0")
-        {
-            self.out.remarks.push(at(
+        if node.attribute("gravcomp").is_some_and(|text| text.trim() != "0") {
+            self.out.remarks.push(located_message(
                 node,
-                "`gravcomp` is no mechanics of the body and is left out: weight counts in full",
+                "`gravcomp` is left out: it is a controller and not a property of the body, so the model has the full weight",
             ));
         }
-        self.out.links.push(Link {
+        self.out.links.push(DescriptionLink {
             name,
             parent: around.link,
             at: placed,
             joints: Vec::new(),
             inertial,
         });
-        let inside = Inside {
+        // Child bodies follow the body in the list, so that parents stand before children.
+        let inside = MjcfContext {
             link: Some(own),
             class: around.class,
         };
-        self.inside(node, inside, Placed::identity())
+        self.read_children(node, inside, DescriptionPose::identity())
     }
 
-    fn inertial(
-        &mut self,
-        node: &Node<'a, 'i>,
-        class: Option<&'a str>,
-    ) -> Result<Inertial, String> {
-        let given = node
-            .children()
-            .find(|child| child.tag_name().name() == "inertial");
+    /// Mass and inertia of a body: its `<inertial>`, or its shapes, with the bounds of the file.
+    fn inertial(&mut self, node: &Node<'a, 'i>, class: Option<&'a str>) -> Result<DescriptionInertia, String> {
+        let given = node.children().find(|child| child.tag_name().name() == "inertial");
+        // The given inertia counts, unless the file demands that of the shapes.
         let mut found = match (given, self.compiler.from_geoms) {
             (Some(given), None | Some(false)) => {
-                let mut placed = self.placed(&given, None)?;
-                let [mass] = exactly(&given, "mass", &word(&given, "mass")?)?;
+                let mut placed = self.read_placement(&given, None)?;
+                let [mass] = exact_numbers(&given, "mass", &required_attribute(&given, "mass")?)?;
+                // A full matrix is given in the axes of the body, a diagonal one in those of the element.
                 let inertia = if let Some(full) = given.attribute("fullinertia") {
                     if given.attribute("diaginertia").is_some() {
-                        return Err(at(
+                        return Err(located_message(
                             &given,
                             "expected `fullinertia` or `diaginertia`, not both",
                         ));
                     }
                     placed.r = Matrix3::identity();
-                    symmetric(exactly(&given, "fullinertia", full)?)
+                    symmetric(exact_numbers(&given, "fullinertia", full)?)
                 } else if let Some(text) = given.attribute("diaginertia") {
-                    Matrix3::from_diagonal(&vector(exactly(&given, "diaginertia", text)?))
+                    Matrix3::from_diagonal(&vector(exact_numbers(&given, "diaginertia", text)?))
                 } else {
-                    return Err(at(&given, "it needs `diaginertia` or `fullinertia`"));
+                    return Err(located_message(&given, "it needs `diaginertia` or `fullinertia`"));
                 };
-                Inertial {
+                DescriptionInertia {
                     mass,
                     at: placed,
                     inertia,
                 }
             }
-            (_, Some(false)) => Inertial::default(),
-            _ => self.of_geoms(node, class)?,
+            (_, Some(false)) => DescriptionInertia::default(),
+            // No `<inertial>`, or `inertiafromgeom` is true.
+            _ => self.inertia_from_geoms(node, class)?,
         };
+        // Lower bounds of the compiler settings.
         found.mass = found.mass.max(self.compiler.least_mass);
-        found.inertia = self.possible(found.inertia);
+        found.inertia = self.bounded_inertia(found.inertia);
         Ok(found)
     }
 
-    /// An inertia with the bounds that the file asks for, on principal moments, as MuJoCo takes them.
-    fn possible(&self, inertia: Matrix3<f64>) -> Matrix3<f64> {
+    /// An inertia with the bounds of the file, applied to the principal moments as in MuJoCo.
+    fn bounded_inertia(&self, inertia: Matrix3<f64>) -> Matrix3<f64> {
         let mut moments = inertia.symmetric_eigen();
         let given = moments.eigenvalues;
         let least = self.compiler.least_inertia;
         moments.eigenvalues = given.map(|moment| moment.max(least));
         let all = moments.eigenvalues;
+        // The sum of two principal moments cannot be less than the third.
         if self.compiler.balances_inertia && 2.0 * all.max() > all.sum() {
             moments.eigenvalues.fill(all.mean());
         }
+        // An unchanged matrix is returned as it is, without rounding errors.
         if moments.eigenvalues == given {
             inertia
         } else {
@@ -442,7 +465,7 @@ impl<'a, 'i> Reader<'a, 'i> {
         }
     }
 
-    /// Makes all bodies lighter or heavier by one factor, where the file says what they weigh together.
+    /// Scales all masses and inertias by one factor, if the file specifies the total mass.
     fn scale_to_total(&mut self) {
         let masses = self.out.links.iter().map(|link| link.inertial.mass);
         let (sum, Some(total)) = (masses.sum::<f64>(), self.compiler.total_mass) else {
@@ -457,161 +480,179 @@ impl<'a, 'i> Reader<'a, 'i> {
         }
     }
 
-    /// Mass and inertia of the shapes of a body, also of those in its frames.
-    fn of_geoms(
+    /// Mass and inertia of the shapes of a body, including those in its `<frame>` elements.
+    fn inertia_from_geoms(
         &mut self,
         node: &Node<'a, 'i>,
         class: Option<&'a str>,
-    ) -> Result<Inertial, String> {
+    ) -> Result<DescriptionInertia, String> {
+        // All shapes of the body itself, but not those of its child bodies.
         let mut shapes = Vec::new();
-        let mut waiting = vec![(*node, class, Placed::identity())];
+        let mut waiting = vec![(*node, class, DescriptionPose::identity())];
         while let Some((node, class, place)) = waiting.pop() {
             for child in node.children().filter(Node::is_element) {
                 let class = child.attribute("childclass").or(class);
                 match child.tag_name().name() {
                     "frame" => {
-                        waiting.push((child, class, place.then(&self.placed(&child, class)?)));
+                        waiting.push((child, class, place.compose(&self.read_placement(&child, class)?)));
                     }
-                    "geom" => shapes.extend(self.geom(&child, class, place)?),
+                    "geom" => shapes.extend(self.geom_inertia(&child, class, place)?),
                     _ => {}
                 }
             }
         }
-        Ok(geoms::together(&shapes))
+        Ok(geoms::combined_inertia(&shapes))
     }
 
-    fn geom(
+    /// Mass and inertia of one shape; none if it has no mass or is outside of the groups.
+    fn geom_inertia(
         &mut self,
         node: &Node<'a, 'i>,
         class: Option<&'a str>,
-        place: Placed,
-    ) -> Result<Option<Inertial>, String> {
+        place: DescriptionPose,
+    ) -> Result<Option<DescriptionInertia>, String> {
         let mass = self.numbers::<1>(node, class, "mass")?.map(|[mass]| mass);
+        // Without a mass MuJoCo computes it from the density, by default that of water.
         let [density] = self.numbers(node, class, "density")?.unwrap_or([1000.0]);
         if mass == Some(0.0) || (mass.is_none() && density == 0.0) {
             return Ok(None);
         }
+        // Often shapes for the picture only are in another group and have no mass.
         let [group] = self.numbers(node, class, "group")?.unwrap_or([0.0]);
         let [first, last] = self.compiler.groups;
         if !(first..=last).contains(&group) {
             return Ok(None);
         }
         if self.text(node, class, "shellinertia")? == Some("true") {
-            return Err(at(
+            return Err(located_message(
                 node,
-                "mass and inertia of a hollow shape are not worked out here: give the body an <inertial>, as MuJoCo writes it \
+                "mass and inertia of a hollow shape are not computed here; give the body an <inertial>, as MuJoCo writes it \
                  (mj_saveLastXML)",
             ));
         }
+        // A shape with a mesh has the type of a mesh, if no other is given.
         let usual = match self.text(node, class, "mesh")? {
             Some(_) => "mesh",
             None => "sphere",
         };
         let kind = self.text(node, class, "type")?.unwrap_or(usual);
-        let mut placed = self.placed(node, class)?;
+        let mut placed = self.read_placement(node, class)?;
         let size = match self.text(node, class, "size")? {
             Some(text) => numbers(node, "size", text)?,
             None => Vec::new(),
         };
+        // `fromto` gives both ends of the axis of a shape; its z axis points along it.
         let mut half = None;
         if let Some([a, b, c, d, e, f]) = self.numbers(node, class, "fromto")? {
             let (from, to) = (Vector3::new(a, b, c), Vector3::new(d, e, f));
             placed.p = 0.5 * (from + to);
             let z = (to - from)
                 .try_normalize(1e-12)
-                .ok_or_else(|| at(node, "`fromto` has no length"))?;
+                .ok_or_else(|| located_message(node, "`fromto` has no length"))?;
             half = Some(0.5 * (to - from).norm());
             let axis = Vector3::z().cross(&z);
             let angle = axis.norm().atan2(z.z);
-            placed.r = about(&axis.try_normalize(1e-12).unwrap_or_else(Vector3::x), angle);
+            placed.r = rotation_about(&axis.try_normalize(1e-12).unwrap_or_else(Vector3::x), angle);
         }
-        let shape = geoms::Shape::new(kind, &size, half).map_err(|fault| at(node, &fault))?;
-        Ok(shape.map(|shape| shape.inertial(mass, density, place.then(&placed))))
+        let shape = geoms::GeomShape::new(kind, &size, half).map_err(|fault| located_message(node, &fault))?;
+        Ok(shape.map(|shape| shape.inertial(mass, density, place.compose(&placed))))
     }
 
-    fn free(&mut self, node: &Node<'a, 'i>, inside: Inside<'a>) -> Result<(), String> {
+    /// Reads a free joint, which only a body of the world may have.
+    fn read_free_joint(&mut self, node: &Node<'a, 'i>, inside: MjcfContext<'a>) -> Result<(), String> {
         let name = node.attribute("name").unwrap_or("root").to_owned();
         let Some(link) = inside.link else {
             return Ok(());
         };
         if self.out.links[link].parent.is_some() {
-            return Err(at(node, "a free joint belongs to a body of the world"));
+            return Err(located_message(
+                node,
+                "a free joint is possible for a child of the world only",
+            ));
         }
         self.out.links[link]
             .joints
-            .push(Joint::new(name, Kind::Free, line(node)));
+            .push(DescriptionJoint::new(name, DescriptionJointKind::Free, line(node)));
         Ok(())
     }
 
-    fn joint(
+    /// Reads a joint with its zero, limits and losses. It gets a drive only from an actuator.
+    fn read_joint(
         &mut self,
         node: &Node<'a, 'i>,
-        inside: Inside<'a>,
-        place: Placed,
+        inside: MjcfContext<'a>,
+        place: DescriptionPose,
     ) -> Result<(), String> {
         let (Some(link), class) = (inside.link, inside.class) else {
             return Ok(());
         };
         let kind = match self.text(node, class, "type")?.unwrap_or("hinge") {
-            "hinge" => Kind::Turn,
-            "slide" => Kind::Slide,
-            "ball" => Kind::Ball,
-            "free" => return self.free(node, inside),
-            other => return Err(at(node, &format!("no joint is of the type `{other}`"))),
+            "hinge" => DescriptionJointKind::Revolute,
+            "slide" => DescriptionJointKind::Prismatic,
+            "ball" => DescriptionJointKind::Ball,
+            "free" => return self.read_free_joint(node, inside),
+            other => {
+                return Err(located_message(
+                    node,
+                    &format!("there is no joint type `{other}`; expected hinge, slide, ball or free"),
+                ));
+            }
         };
         let n = self.out.links[link].joints.len();
+        // Joints without a name are named after their body, with a number from the second on.
         let name = node.attribute("name").map_or_else(
             || {
-                let suffix = if n == 0 {
-                    String::new()
-                } else {
-                    format!("{}", n + 1)
-                };
+                let suffix = if n == 0 { String::new() } else { format!("{}", n + 1) };
                 format!("{}_joint{suffix}", self.out.links[link].name)
             },
             str::to_owned,
         );
-        let mut joint = Joint::new(name, kind, line(node));
+        let mut joint = DescriptionJoint::new(name, kind, line(node));
         joint.is_driven = false;
         if let Some(pos) = self.numbers(node, class, "pos")? {
             joint.anchor = vector(pos);
         }
+        // Anchor and axis are given in the axes of the enclosing frame.
         joint.anchor = place.p + place.r * joint.anchor;
         if let Some(axis) = self.numbers(node, class, "axis")? {
             joint.axis = vector(axis);
         }
         joint.axis = place.r * joint.axis;
         if joint.axis.norm() == 0.0 {
-            return Err(at(node, "the axis has no direction"));
+            return Err(located_message(node, "the axis has no direction"));
         }
+        // Angles have the unit of the file, lengths are in m.
         let in_unit = |reader: &Self, value: f64| {
-            if kind == Kind::Slide {
+            if kind == DescriptionJointKind::Prismatic {
                 value
             } else {
                 reader.angle(value)
             }
         };
-        if matches!(kind, Kind::Turn | Kind::Slide) {
+        if matches!(kind, DescriptionJointKind::Revolute | DescriptionJointKind::Prismatic) {
             let zero = self.first(node, class, "ref")?;
             joint.zero = in_unit(self, zero);
         }
+        // A range counts if `limited` is true, or if it is not specified and `autolimits` is true.
         let limited = self.text(node, class, "limited")?.unwrap_or("auto");
         if let Some(range) = self.numbers::<2>(node, class, "range")? {
             let counts = limited == "true" || (limited == "auto" && self.compiler.has_auto_limits);
-            if counts && kind == Kind::Ball {
-                self.out.remarks.push(at(
+            if counts && kind == DescriptionJointKind::Ball {
+                self.out.remarks.push(located_message(
                     node,
-                    "the range of a ball joint is a cone, which models do not have",
+                    "the range of a ball joint is left out: models have no limits of this kind",
                 ));
             } else if counts {
                 joint.range = Some(range.map(|x| in_unit(self, x)));
             }
         }
+        // Limits of the sum of all actuators at the joint.
         if let Some(range) = self.numbers::<2>(node, class, "actuatorfrcrange")?
             && self.text(node, class, "actuatorfrclimited")? != Some("false")
         {
             joint.force = Some(range);
         }
+        // Passive forces at the joint.
         joint.damping = self.first(node, class, "damping")?;
         joint.friction = self.first(node, class, "frictionloss")?;
         joint.armature = self.first(node, class, "armature")?;

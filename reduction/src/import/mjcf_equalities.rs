@@ -1,14 +1,18 @@
-//! What MJCF ties together: bodies by `connect` and `weld`, joints by `joint` and by fixed tendons of constant length.
+//! Reads the equalities of MJCF: `connect` and `weld` become loop closures; `joint`, and fixed tendons of constant
+//! length, become couplings.
 
 use nalgebra::{Matrix3, Vector3};
 use roxmltree::Node;
 
-use super::description::{Closure, Coupling, Holds};
-use super::mjcf::Reader;
-use super::placed::{Placed, of_quaternion};
-use super::xml::{at, children, exactly, line, number, numbers, vector, word};
+use super::description::{ClosureConstraint, DescriptionClosure, DescriptionCoupling};
+use super::mjcf::MjcfReader;
+use super::placed::{DescriptionPose, rotation_from_quaternion};
+use super::xml::{
+    children, exact_numbers, line, located_message, number_attribute, numbers, required_attribute, vector,
+};
 
-impl<'a, 'i> Reader<'a, 'i> {
+impl<'a, 'i> MjcfReader<'a, 'i> {
+    /// The index of a body by name; none is the world.
     fn link(&self, node: &Node, name: &str) -> Result<Option<usize>, String> {
         if name == "world" {
             return Ok(None);
@@ -16,160 +20,168 @@ impl<'a, 'i> Reader<'a, 'i> {
         let found = self.out.links.iter().position(|link| link.name == name);
         found
             .map(Some)
-            .ok_or_else(|| at(node, &format!("no body is called `{name}`")))
+            .ok_or_else(|| located_message(node, &format!("there is no body `{name}`")))
     }
 
-    pub(super) fn site(&self, node: &Node, name: &str) -> Result<(Option<usize>, Placed), String> {
+    /// Link and pose of a site by name.
+    pub(super) fn site(&self, node: &Node, name: &str) -> Result<(Option<usize>, DescriptionPose), String> {
         let found = self.sites.iter().find(|(site, _, _)| site == name);
         found
             .map(|(_, link, placed)| (*link, *placed))
-            .ok_or_else(|| at(node, &format!("no site is called `{name}`")))
+            .ok_or_else(|| located_message(node, &format!("there is no site `{name}`")))
     }
 
-    pub(super) fn equality(&mut self, node: &Node<'a, 'i>) -> Result<(), String> {
+    /// Reads one equality; inactive ones are left out with a remark.
+    pub(super) fn read_equality(&mut self, node: &Node<'a, 'i>) -> Result<(), String> {
         if self.text(node, None, "active")? == Some("false") {
             self.out
                 .remarks
-                .push(at(node, "this equality is not active and is left out"));
+                .push(located_message(node, "this equality is not active and is left out"));
             return Ok(());
         }
         let tag = node.tag_name().name();
-        let name = node.attribute("name").map_or_else(
-            || format!("{tag}_{}", self.out.closures.len() + 1),
-            str::to_owned,
-        );
+        // Equalities without a name are numbered.
+        let name = node
+            .attribute("name")
+            .map_or_else(|| format!("{tag}_{}", self.out.closures.len() + 1), str::to_owned);
         match tag {
             "connect" | "weld" => {
                 let holds = if tag == "connect" {
-                    Holds::Origins
+                    ClosureConstraint::Origins
                 } else {
-                    Holds::Frames
+                    ClosureConstraint::Frames
                 };
+                // The ends are given by two sites, or by two bodies with an anchor.
                 let ends = if node.attribute("site1").is_some() {
-                    let [one, other] = [word(node, "site1")?, word(node, "site2")?];
+                    let [one, other] = [required_attribute(node, "site1")?, required_attribute(node, "site2")?];
                     [self.site(node, &one)?, self.site(node, &other)?]
                 } else {
-                    self.bodies(node, tag)?
+                    self.body_ends(node, tag)?
                 };
-                self.out.closures.push(Closure {
+                self.out.closures.push(DescriptionClosure {
                     name,
                     line: line(node),
                     ends,
-                    holds,
+                    constraint: holds,
                 });
             }
-            "joint" => self.coupling(node)?,
-            "tendon" => self.tied(node)?,
+            "joint" => self.read_joint_equality(node)?,
+            "tendon" => self.read_tendon_equality(node)?,
             other => {
-                return Err(at(
+                return Err(located_message(
                     node,
-                    &format!(
-                        "models do not have the equality `{other}`; they have connect, weld, joint and tendon"
-                    ),
+                    &format!("the equality `{other}` is not supported; supported are connect, weld, joint and tendon"),
                 ));
             }
         }
         Ok(())
     }
 
-    /// The two ends of a closure between bodies: the second follows from the pose of the file.
-    fn bodies(
-        &self,
-        node: &Node<'a, 'i>,
-        tag: &str,
-    ) -> Result<[(Option<usize>, Placed); 2], String> {
-        let one = self.link(node, &word(node, "body1")?)?;
+    /// The two ends of a closure between bodies; the second end is determined by the pose of the file.
+    fn body_ends(&self, node: &Node<'a, 'i>, tag: &str) -> Result<[(Option<usize>, DescriptionPose); 2], String> {
+        let one = self.link(node, &required_attribute(node, "body1")?)?;
         let other = self.link(node, node.attribute("body2").unwrap_or("world"))?;
-        let in_world =
-            |link: Option<usize>| link.map_or(Placed::identity(), |link| self.world[link]);
+        // Poses of both bodies, as the file gives them, determine the second end.
+        let in_world = |link: Option<usize>| link.map_or(DescriptionPose::identity(), |link| self.world[link]);
         let anchor = match node.attribute("anchor") {
-            Some(text) => vector(exactly(node, "anchor", text)?),
+            Some(text) => vector(exact_numbers(node, "anchor", text)?),
             None if tag == "weld" => Vector3::zeros(),
-            None => return Err(at(node, "it needs `anchor`")),
+            None => return Err(located_message(node, "it needs `anchor`")),
         };
         if tag == "weld" {
-            // The anchor is a point of the second body; where it is not given, its origin.
+            // The anchor is a point of the second body, by default its origin.
             let pose: Option<[f64; 7]> = match node.attribute("relpose") {
-                Some(text) => Some(exactly(node, "relpose", text)?),
+                Some(text) => Some(exact_numbers(node, "relpose", text)?),
                 None => None,
             };
+            // A zero quaternion means the relative pose of the file.
             let relative = match pose {
-                Some([x, y, z, q @ ..]) if q.iter().any(|x| x.abs() > 0.0) => Placed {
+                Some([x, y, z, q @ ..]) if q.iter().any(|x| x.abs() > 0.0) => DescriptionPose {
                     p: Vector3::new(x, y, z),
-                    r: of_quaternion(q).ok_or_else(|| at(node, "`relpose` has no direction"))?,
+                    r: rotation_from_quaternion(q)
+                        .ok_or_else(|| located_message(node, "`relpose` has no direction"))?,
                 },
-                _ => in_world(one).inverse().then(&in_world(other)),
+                _ => in_world(one).inverse().compose(&in_world(other)),
             };
-            let shift = Placed {
+            // The weld connects both bodies at the anchor.
+            let shift = DescriptionPose {
                 p: anchor,
                 r: Matrix3::identity(),
             };
-            return Ok([(one, relative.then(&shift)), (other, shift)]);
+            return Ok([(one, relative.compose(&shift)), (other, shift)]);
         }
-        let first = Placed {
+        // For `connect` the anchor is a point of the first body.
+        let first = DescriptionPose {
             p: anchor,
             r: Matrix3::identity(),
         };
-        let second = in_world(other).inverse().then(&in_world(one)).then(&first);
+        let second = in_world(other).inverse().compose(&in_world(one)).compose(&first);
         Ok([(one, first), (other, second)])
     }
 
-    fn coupling(&mut self, node: &Node<'a, 'i>) -> Result<(), String> {
-        let joint = word(node, "joint1")?;
+    /// Reads an equality of two joints, or of one joint that is fixed. `polycoef` refers to deviations from the pose of
+    /// the file.
+    fn read_joint_equality(&mut self, node: &Node<'a, 'i>) -> Result<(), String> {
+        let joint = required_attribute(node, "joint1")?;
         let of = node.attribute("joint2").map(str::to_owned);
         let given = match self.text(node, None, "polycoef")? {
             Some(text) => numbers(node, "polycoef", text)?,
             None => vec![0.0, 1.0],
         };
+        // Missing coefficients are zero.
         let coefficient = |k: usize| given.get(k).copied().unwrap_or(0.0);
-        let zero = |name: &str| self.zero(node, name);
+        let zero = |name: &str| self.joint_zero(node, name);
         if of.is_some() && (2..5).any(|k| coefficient(k) != 0.0) {
-            return Err(at(
+            return Err(located_message(
                 node,
-                "a coupling by a polynomial of higher degree; models have constant ratios",
+                "a coupling by a polynomial of higher degree is not supported; models have constant ratios only",
             ));
         }
+        // q1 - zero1 = c0 + c1*(q2 - zero2), solved for q1.
         let ratio = if of.is_some() { coefficient(1) } else { 0.0 };
         let reference = of.as_deref().map_or(Ok(0.0), zero)?;
         let offset = zero(&joint)? + coefficient(0) - ratio * reference;
-        self.out.couplings.push(Coupling {
+        self.out.couplings.push(DescriptionCoupling {
             line: line(node),
             joint,
-            of,
+            leader: of,
             ratio,
             offset,
         });
         Ok(())
     }
 
-    /// The value of a joint at the pose of the file.
-    fn zero(&self, node: &Node, name: &str) -> Result<f64, String> {
+    /// The value of a joint at the pose of the file, rad or m.
+    fn joint_zero(&self, node: &Node, name: &str) -> Result<f64, String> {
         let mut joints = self.out.links.iter().flat_map(|link| &link.joints);
         joints
             .find(|joint| joint.name == name)
             .map(|joint| joint.zero)
-            .ok_or_else(|| at(node, &format!("no joint is called `{name}`")))
+            .ok_or_else(|| located_message(node, &format!("there is no joint `{name}`")))
     }
 
-    /// A fixed tendon of constant length, or two that follow each other: a coupling, if two joints are concerned.
-    fn tied(&mut self, node: &Node<'a, 'i>) -> Result<(), String> {
+    /// Reads a fixed tendon of constant length, or two tendons that follow each other, as a coupling. At most two
+    /// joints may be involved.
+    fn read_tendon_equality(&mut self, node: &Node<'a, 'i>) -> Result<(), String> {
         let given = match self.text(node, None, "polycoef")? {
             Some(text) => numbers(node, "polycoef", text)?,
             None => vec![0.0, 1.0],
         };
         let coefficient = |k: usize| given.get(k).copied().unwrap_or(0.0);
-        let mut terms = on_tendon(node, &word(node, "tendon1")?)?;
+        // The condition as a sum over joints: length of the first tendon minus a multiple of the second one's.
+        let mut terms = tendon_joints(node, &required_attribute(node, "tendon1")?)?;
         if let Some(other) = node.attribute("tendon2") {
             if (2..5).any(|k| coefficient(k) != 0.0) {
-                return Err(at(
+                return Err(located_message(
                     node,
-                    "a coupling by a polynomial of higher degree; models have constant ratios",
+                    "a coupling by a polynomial of higher degree is not supported; models have constant ratios only",
                 ));
             }
-            for (joint, length) in on_tendon(node, other)? {
+            for (joint, length) in tendon_joints(node, other)? {
                 terms.push((joint, -coefficient(1) * length));
             }
         }
+        // Add up the lengths per joint; both tendons may contain the same joint.
         let mut sums: Vec<(String, f64)> = Vec::new();
         for (joint, length) in terms {
             match sums.iter_mut().find(|(known, _)| *known == joint) {
@@ -177,27 +189,30 @@ impl<'a, 'i> Reader<'a, 'i> {
                 None => sums.push((joint, length)),
             }
         }
+        // A joint that cancels out is not coupled.
         sums.retain(|(_, length)| *length != 0.0);
+        // One joint is fixed; of two joints the second follows the first.
         let (one, of) = match sums.as_slice() {
             [one] => (one, None),
             [of, one] => (one, Some(of)),
             _ => {
-                return Err(at(
+                return Err(located_message(
                     node,
                     &format!(
-                        "it ties {} joints to each other; models have couplings of two",
+                        "it couples {} joints; models have couplings of two joints only",
                         sums.len()
                     ),
                 ));
             }
         };
+        // Solve the condition for the follower.
         let ratio = of.map_or(0.0, |(_, length)| -length / one.1);
-        let reference = of.map_or(Ok(0.0), |(of, _)| self.zero(node, of))?;
-        let offset = self.zero(node, &one.0)? + coefficient(0) / one.1 - ratio * reference;
-        self.out.couplings.push(Coupling {
+        let reference = of.map_or(Ok(0.0), |(of, _)| self.joint_zero(node, of))?;
+        let offset = self.joint_zero(node, &one.0)? + coefficient(0) / one.1 - ratio * reference;
+        self.out.couplings.push(DescriptionCoupling {
             line: line(node),
             joint: one.0.clone(),
-            of: of.map(|(of, _)| of.clone()),
+            leader: of.map(|(of, _)| of.clone()),
             ratio,
             offset,
         });
@@ -205,21 +220,22 @@ impl<'a, 'i> Reader<'a, 'i> {
     }
 }
 
-/// Joints with the lengths that a turn or a slide of each adds to a fixed tendon.
-fn on_tendon(node: &Node<'_, '_>, name: &str) -> Result<Vec<(String, f64)>, String> {
+/// Joints of a fixed tendon with their coefficients: change of length per rad or per m.
+fn tendon_joints(node: &Node<'_, '_>, name: &str) -> Result<Vec<(String, f64)>, String> {
+    // The tendon by its name.
     let root = node.document().root_element();
     let tendon = children(&root, "tendon")
         .flat_map(|section| section.children().collect::<Vec<_>>())
         .find(|tendon| tendon.attribute("name") == Some(name))
-        .ok_or_else(|| at(node, &format!("no tendon is called `{name}`")))?;
+        .ok_or_else(|| located_message(node, &format!("there is no tendon `{name}`")))?;
     if tendon.tag_name().name() != "fixed" {
-        return Err(at(
+        return Err(located_message(
             node,
-            &format!("`{name}` runs through space; models keep the length of fixed tendons only"),
+            &format!("`{name}` is a spatial tendon; a constant length is supported for fixed tendons only"),
         ));
     }
     let joints = children(&tendon, "joint");
     joints
-        .map(|joint| Ok((word(&joint, "joint")?, number(&joint, "coef")?)))
+        .map(|joint| Ok((required_attribute(&joint, "joint")?, number_attribute(&joint, "coef")?)))
         .collect()
 }

@@ -1,29 +1,32 @@
-//! Puts the files that an MJCF includes in the place of its `<include>`.
+//! Expands the `<include>` elements of an MJCF: its text goes in, the text with the contents of all included files
+//! comes out.
 //!
-//! Source: MuJoCo's XML reference, "include": the children of the other file's root, each file once, with names relative to
-//! the folder of the main file.
+//! Source: MuJoCo's XML reference, "include": the children of the other file's root, each file once, with names
+//! relative to the folder of the main file.
 
 use roxmltree::Document;
 
-use super::xml::{at, word};
+use super::xml::{located_message, required_attribute};
 
-/// Files that include each other are followed this far.
+/// Largest depth of nested includes.
 const DEEPEST: usize = 20;
 
-/// The text of an MJCF with all files that it includes, each as one line, so that lines of messages are those of the file
-/// itself. `read` gives the text of a file by its name.
+/// The text of an MJCF with all included files, each on one line, so that line numbers in messages are those of the
+/// file itself. `read` gives the text of a file by its name.
 ///
-/// Text that is no XML, or no MJCF, stays as it is: reading it says what is wrong.
-pub fn expand(text: &str, read: &dyn Fn(&str) -> Result<String, String>) -> Result<String, String> {
-    expanded(text, read, &mut Vec::new(), 0)
+/// Text that is not XML or not MJCF is returned unchanged; the import reports its fault.
+pub fn expand_includes(text: &str, read: &dyn Fn(&str) -> Result<String, String>) -> Result<String, String> {
+    expand_file(text, read, &mut Vec::new(), 0)
 }
 
-fn expanded(
+/// Expands one file. `seen` are the names of the files included so far, `depth` is the level of nesting.
+fn expand_file(
     text: &str,
     read: &dyn Fn(&str) -> Result<String, String>,
     seen: &mut Vec<String>,
     depth: usize,
 ) -> Result<String, String> {
+    // Faults of the main file are reported by the import.
     let Ok(document) = Document::parse(text) else {
         return Ok(text.to_owned());
     };
@@ -31,31 +34,30 @@ fn expanded(
     if depth == 0 && root.tag_name().name() != "mujoco" {
         return Ok(text.to_owned());
     }
+    // The text between includes stays as it is.
     let mut out = String::new();
     let mut from = 0;
     for node in root.descendants() {
         if node.tag_name().name() != "include" {
             continue;
         }
-        let name = word(&node, "file")?;
+        let name = required_attribute(&node, "file")?;
         if depth == DEEPEST || seen.contains(&name) {
-            return Err(at(
+            return Err(located_message(
                 &node,
-                &format!("`{name}` is included twice; MuJoCo takes a file once"),
+                &format!("`{name}` is included twice; MuJoCo permits each file once"),
             ));
         }
+        // Read the other file and expand its own includes.
         seen.push(name.clone());
-        let other = read(&name).map_err(|fault| at(&node, &fault))?;
-        let whole = expanded(&other, read, seen, depth + 1)
-            .map_err(|fault| at(&node, &format!("in `{name}`: {fault}")))?;
-        let inner = Document::parse(&whole).map_err(|fault| {
-            at(
-                &node,
-                &format!("`{name}` is no XML that can be read ({fault})"),
-            )
-        })?;
+        let other = read(&name).map_err(|fault| located_message(&node, &fault))?;
+        let whole = expand_file(&other, read, seen, depth + 1)
+            .map_err(|fault| located_message(&node, &format!("in `{name}`: {fault}")))?;
+        let inner = Document::parse(&whole)
+            .map_err(|fault| located_message(&node, &format!("`{name}` is not readable XML ({fault})")))?;
         let children = inner.root_element().children();
         let range = node.range();
+        // The children of its root, without line breaks.
         out.push_str(&text[from..range.start]);
         for child in children.filter(roxmltree::Node::is_element) {
             out.push_str(&whole[child.range()].replace(['\n', '\r'], " "));

@@ -1,9 +1,9 @@
-//! Robot descriptions of other programs as a starting point: URDF, MJCF or SDF goes in, the text of a model file comes out,
-//! with what was left out or rounded.
+//! Converts robot descriptions of other programs: the text of a URDF, MJCF or SDF goes in, the text of a model file
+//! comes out, with remarks on what was left out or rounded.
 //!
-//! `urdf`, `mjcf` and `sdf` read a format each into a `description`; `welds` cuts loops where they are simplest, `couplings`
-//! says what follows what, `model_text` makes frames, bodies and forces of it, and `closing` finds out which coordinates the
-//! loops settle, on the frames in numbers (`chain`).
+//! `urdf`, `mjcf` and `sdf` each read one format into a `description`. `welds` cuts loops at the joints where they are
+//! simplest, `couplings` resolves which joints follow others, `model_text` writes frames, bodies and forces. `closing`
+//! determines which coordinates are passive (determined by loop closure), on the numeric kinematics of `chain`.
 
 mod chain;
 mod closing;
@@ -23,20 +23,20 @@ mod urdf;
 mod welds;
 mod xml;
 
-pub use mjcf_include::expand as expand_includes;
+pub use mjcf_include::expand_includes;
 
 use std::fmt;
 
-use modelmill_boundary::files::Memory;
+use modelmill_boundary::files::MemoryFiles;
 use modelmill_boundary::text::Message;
 use roxmltree::Document;
 
 /// A model file made from a robot description.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Imported {
+pub struct DescriptionImport {
     /// The text of the model file.
     pub model: String,
-    /// What was left out, rounded or made up; one sentence each.
+    /// What was left out, rounded or assumed; one sentence each.
     pub remarks: Vec<Message>,
     /// Joints of the description, with the coordinates of the model that move them.
     pub joints: Vec<ImportedJoint>,
@@ -45,9 +45,9 @@ pub struct Imported {
 /// A joint of the description in the model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImportedJoint {
-    /// As the description has it.
+    /// Its name in the description.
     pub name: String,
-    /// One for joints that turn or slide, three angles for ball joints, position and quaternion for free ones.
+    /// One for revolute and prismatic joints, three angles for ball joints, position and quaternion for free ones.
     pub coordinates: Vec<String>,
     /// A joint of one coordinate is `ratio*coordinate + offset`.
     pub ratio: f64,
@@ -57,21 +57,22 @@ pub struct ImportedJoint {
     pub axes: String,
 }
 
-/// What a description does not say.
+/// Settings that a description does not contain.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Options<'a> {
-    /// The root of a URDF hangs on nothing, rather than on the world.
+    /// Whether the root of a URDF is free (floating base) instead of fixed to the world.
     pub floating: bool,
-    /// Angles within 1e-4 of multiples of a twelfth of pi are taken for these.
+    /// Whether angles within 1e-4 rad of a multiple of pi/12 are rounded to it.
     pub round_angles: bool,
-    /// Text of a file with closures and drives beside a URDF, as the collection example-parallel-robots has it.
+    /// Text of a `robot.yaml` with closures and drives of a URDF, in the format of the collection
+    /// example-parallel-robots.
     pub closures: Option<&'a str>,
-    /// Joints by name with the values, rad or m in the description's own zero, from which loops are closed; others are at the
-    /// pose of the description. They say in which of their assemblies loops are meant.
+    /// Joints by name with the values, rad or m from the description's own zero, from which loops are closed; others
+    /// start at the pose of the description. They select one of several assembly modes.
     pub pose: &'a [(String, f64)],
 }
 
-/// Why a robot description makes no model.
+/// Why a robot description cannot be converted: one sentence with the place.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ImportError(String);
 
@@ -83,65 +84,64 @@ impl fmt::Display for ImportError {
 
 impl std::error::Error for ImportError {}
 
-/// The longest text that is looked at, bytes.
+/// Longest text that is read, bytes.
 pub const LARGEST_DESCRIPTION: usize = 16 << 20;
 
-/// Makes a model file of a robot description; its root element says the format.
+/// Converts a robot description into a model file. The root element determines the format.
 ///
-/// Fails when the text is none of URDF, MJCF and SDF, or holds what models cannot say; the message names element and line.
-pub fn import(text: &str, options: &Options) -> Result<Imported, ImportError> {
+/// Fails if the text is not URDF, MJCF or SDF, or contains something that models cannot express; the message names
+/// element and line.
+pub fn import(text: &str, options: &Options) -> Result<DescriptionImport, ImportError> {
     if text.len() > LARGEST_DESCRIPTION {
-        return Err(ImportError(
-            "this file is too large for a robot description".to_owned(),
-        ));
+        return Err(ImportError("this file is too large for a robot description".to_owned()));
     }
+    // A frequent mistake is a file with macros or the YAML next to the description.
     let document = Document::parse(text).map_err(|error| {
         let expected = if text.trim_start().starts_with('<') {
             "XML with macros (xacro) expanded"
         } else {
-            "XML; of a robot with a `robot.yaml` the URDF is given, and the file beside it is found"
+            "XML (if the robot has a `robot.yaml`, give the URDF; the yaml next to it is found automatically)"
         };
         ImportError(format!(
-            "this is no URDF, MJCF or SDF that can be read ({error}); expected {expected}"
+            "this is not a readable URDF, MJCF or SDF file ({error}); expected {expected}"
         ))
     })?;
     let read = match document.root_element().tag_name().name() {
         "robot" => urdf::read(&document, options.closures, options.floating),
         "mujoco" => mjcf::read(&document),
         "sdf" => sdf::read(&document),
-        other => Err(xml::at(
+        other => Err(xml::located_message(
             &document.root_element(),
             &format!("expected <robot> (URDF), <mujoco> (MJCF) or <sdf>, found <{other}>"),
         )),
     };
     let mut description = read.map_err(ImportError)?;
+    // Values of the options replace those of the description, such as a keyframe of MJCF.
     for (name, value) in options.pose {
         let mut joints = description.links.iter().flat_map(|link| &link.joints);
         if !joints.any(|joint| joint.name == *name) {
             return Err(ImportError(format!(
-                "no joint is called `{name}`, for which a value is given"
+                "a value is given for the joint `{name}`, which does not exist"
             )));
         }
         description.pose.retain(|(known, _)| known != name);
         description.pose.push((name.clone(), *value));
     }
     welds::cut_at_joints(&mut description);
+    // Options for URDF only would have no effect on other formats.
     let is_urdf = description.format == "URDF";
     if !is_urdf && (options.floating || options.closures.is_some()) {
         return Err(ImportError(format!(
-            "a free root and a file of closures are for URDF; {} says both itself",
+            "a floating root and a file of closures are for URDF only; {} files contain both themselves",
             description.format
         )));
     }
-    let imported = model_text::model(description, options).map_err(ImportError)?;
-    match modelmill_spec::load(
-        "the model made from it",
-        &imported.model,
-        &Memory::default(),
-    ) {
+    // The result is loaded like any model file, so that faults of the description appear here and not later.
+    let imported = model_text::model_text(description, options).map_err(ImportError)?;
+    match modelmill_spec::load("the model made from it", &imported.model, &MemoryFiles::default()) {
         Ok(_) => Ok(imported),
         Err(failure) => Err(ImportError(format!(
-            "this description makes no sound model:\n{}",
+            "the model file made from this description is not valid:\n{}",
             failure.render(false)
         ))),
     }

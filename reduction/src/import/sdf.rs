@@ -1,195 +1,210 @@
-//! Reads SDF: links and joints with poses that refer to each other, as a tree with closures.
+//! Reads SDF: links and joints with poses relative to each other become a tree of links with loop closures.
 //!
 //! Source of names, defaults and frames: the specification (sdformat.org/spec) and its tutorial "Pose Frame Semantics".
 
 use nalgebra::{Matrix3, Vector3};
 use roxmltree::{Document, Node};
 
-use super::description::{Closure, Coupling, Description, Holds, Inertial, Joint, Kind, Link};
-use super::placed::{Placed, of_quaternion, rotation};
-use super::xml::{at, child, children, exactly, line, required, symmetric, vector, word};
+use super::description::{
+    ClosureConstraint, DescriptionClosure, DescriptionCoupling, DescriptionInertia, DescriptionJoint,
+    DescriptionJointKind, DescriptionLink, RobotDescription,
+};
+use super::placed::{DescriptionPose, rotation, rotation_from_quaternion};
+use super::xml::{
+    child, children, exact_numbers, line, located_message, required_attribute, required_child, symmetric, vector,
+};
 
-/// Values beyond this stand for "no limit".
+/// Values beyond this mean "no limit".
 const NO_LIMIT: f64 = 1e15;
-/// Poses that refer to each other are followed this far.
+/// Largest number of poses that refer to each other in sequence; more is a cycle.
 const LONGEST_CHAIN: usize = 1000;
 
 /// A frame that poses may refer to.
-struct Frame<'a, 'i> {
+struct SdfFrame<'a, 'i> {
+    /// Name of the link, joint or frame.
     name: String,
+    /// Its element.
     node: Node<'a, 'i>,
-    /// What the pose is relative to unless the file says otherwise.
+    /// Name of the frame to which the pose is relative by default.
     usually: String,
 }
 
 /// A joint between two links.
-struct Between {
+struct SdfJoint {
+    /// Index of the parent link; none is the world.
     parent: Option<usize>,
+    /// Index of the child link; none is the world.
     child: Option<usize>,
-    joints: Vec<Joint>,
-    /// Of the joint, in the model.
-    place: Placed,
+    /// Joints in sequence; empty for a fixed joint.
+    joints: Vec<DescriptionJoint>,
+    /// Pose of the joint in the model.
+    place: DescriptionPose,
+    /// Name of the joint.
     name: String,
+    /// Line in the file.
     line: u32,
+    /// Type in the file, such as `revolute`.
     kind: String,
 }
 
-/// Reads a description, or says in one line what is wrong and where.
-pub(crate) fn read(document: &Document) -> Result<Description, String> {
+/// Reads a description; fails with one line that states the fault and its place.
+pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
     let root = document.root_element();
+    // The version decides in which axes joint axes are given.
     let version: f64 = root
         .attribute("version")
         .and_then(|text| text.trim().parse().ok())
         .unwrap_or(1.7);
+    // The model is in the file directly, or in a world.
     let world = child(&root, "world");
-    let mut models =
-        children(&root, "model").chain(world.iter().flat_map(|world| children(world, "model")));
+    let mut models = children(&root, "model").chain(world.iter().flat_map(|world| children(world, "model")));
     let model = models
         .next()
-        .ok_or_else(|| at(&root, "it needs a <model>"))?;
+        .ok_or_else(|| located_message(&root, "it needs a <model>"))?;
     if let Some(other) = models.next() {
-        return Err(at(
+        return Err(located_message(
             &other,
-            "a second model in one file; keep the one that is wanted",
+            "the file has a second model; keep only the one to import",
         ));
     }
-    let mut out = Description {
+    let mut out = RobotDescription {
         name: model.attribute("name").unwrap_or("robot").to_owned(),
         format: "SDF",
-        ..Description::default()
+        ..RobotDescription::default()
     };
+    // Only a world specifies gravity.
     if let Some(node) = world.and_then(|world| child(&world, "gravity")) {
-        out.gravity = Some(vector(exactly(
-            &node,
-            "gravity",
-            node.text().unwrap_or(""),
-        )?));
+        out.gravity = Some(vector(exact_numbers(&node, "gravity", node.text().unwrap_or(""))?));
     }
+    // Models inside a model would need names with their scope.
     if let Some(inner) = model
         .children()
         .find(|node| ["model", "include"].contains(&node.tag_name().name()))
     {
-        return Err(at(
+        return Err(located_message(
             &inner,
-            "models inside of models are not expanded here; `gz sdf -p` prints one flat model",
+            "nested models are not expanded here; `gz sdf -p` prints one flat model",
         ));
     }
     if text_of(&model, "static").is_some_and(|text| ["true", "1"].contains(&text)) {
-        return Err(at(&model, "it is static: nothing moves"));
+        return Err(located_message(&model, "the model is static, so nothing moves"));
     }
-    let frames = frames(&model)?;
+    // Poses of all links in the model, through the frames to which they refer.
+    let frames = model_frames(&model)?;
     let links: Vec<Node> = children(&model, "link").collect();
     let mut places = Vec::new();
     for node in &links {
-        places.push(in_model(&frames, &word(node, "name")?, node, 0)?);
+        places.push(pose_in_model(&frames, &required_attribute(node, "name")?, node, 0)?);
     }
     let mut joints = Vec::new();
     for node in children(&model, "joint") {
         joints.push(joint(&node, &links, &frames, version, &mut out)?);
     }
+    // Pose of the model in the world.
     let own = match child(&model, "pose") {
         Some(pose) => pose_of(&pose)?,
-        None => Placed::identity(),
+        None => DescriptionPose::identity(),
     };
+    // The canonical link, by default the first one.
     let base = model
         .attribute("canonical_link")
-        .and_then(|name| {
-            links
-                .iter()
-                .position(|node| node.attribute("name") == Some(name))
-        })
+        .and_then(|name| links.iter().position(|node| node.attribute("name") == Some(name)))
         .unwrap_or(0);
     tree(&mut out, &links, &places, &joints, &own, base)?;
     Ok(out)
 }
 
+/// The trimmed text of a child element.
 fn text_of<'a>(node: &Node<'a, '_>, tag: &str) -> Option<&'a str> {
     child(node, tag).and_then(|node| node.text()).map(str::trim)
 }
 
+/// The number in a child element; none without that element.
 fn number_of(node: &Node, tag: &str) -> Result<Option<f64>, String> {
     let Some(inner) = child(node, tag) else {
         return Ok(None);
     };
-    exactly(&inner, tag, inner.text().unwrap_or("")).map(|[x]| Some(x))
+    exact_numbers(&inner, tag, inner.text().unwrap_or("")).map(|[x]| Some(x))
 }
 
-/// All frames of a model by name.
-fn frames<'a, 'i>(model: &Node<'a, 'i>) -> Result<Vec<Frame<'a, 'i>>, String> {
-    let mut out: Vec<Frame> = Vec::new();
+/// All frames of a model: links, joints and explicit frames.
+fn model_frames<'a, 'i>(model: &Node<'a, 'i>) -> Result<Vec<SdfFrame<'a, 'i>>, String> {
+    let mut out: Vec<SdfFrame> = Vec::new();
     for node in model.children().filter(Node::is_element) {
+        // Frame for poses without `relative_to`: the child link for joints, else the model or the attached frame.
         let usually = match node.tag_name().name() {
             "link" => "__model__".to_owned(),
             "joint" => text_of(&node, "child").unwrap_or("__model__").to_owned(),
-            "frame" => node
-                .attribute("attached_to")
-                .unwrap_or("__model__")
-                .to_owned(),
+            "frame" => node.attribute("attached_to").unwrap_or("__model__").to_owned(),
             _ => continue,
         };
-        let name = word(&node, "name")?;
+        let name = required_attribute(&node, "name")?;
+        // Old files use the same name for a link and a joint, so only elements of the same kind are compared.
         if out
             .iter()
             .any(|frame| frame.name == name && frame.node.tag_name() == node.tag_name())
         {
-            return Err(at(&node, "this name is there twice"));
+            return Err(located_message(&node, "this name occurs twice; rename one"));
         }
-        out.push(Frame {
-            name,
-            node,
-            usually,
-        });
+        out.push(SdfFrame { name, node, usually });
     }
     Ok(out)
 }
 
-/// Where a frame is in the model.
-fn in_model(frames: &[Frame], name: &str, from: &Node, depth: usize) -> Result<Placed, String> {
+/// The pose of a frame in the model, through all frames to which it is relative. `from` is the element for messages.
+fn pose_in_model(frames: &[SdfFrame], name: &str, from: &Node, depth: usize) -> Result<DescriptionPose, String> {
+    // The recursion ends at the frame of the model.
     if name == "__model__" || name.is_empty() || name == "world" {
-        return Ok(Placed::identity());
+        return Ok(DescriptionPose::identity());
     }
     if depth > LONGEST_CHAIN {
-        return Err(at(from, "its pose refers to itself by way of others"));
+        return Err(located_message(
+            from,
+            "its pose is relative to itself through other frames",
+        ));
     }
     let frame = frames
         .iter()
         .find(|frame| frame.name == name)
-        .ok_or_else(|| at(from, &format!("no frame is called `{name}`")))?;
+        .ok_or_else(|| located_message(from, &format!("there is no frame `{name}`")))?;
+    // `frame` is the older name of the attribute `relative_to`.
     let pose = child(&frame.node, "pose");
     let relative = pose
         .and_then(|pose| pose.attribute("relative_to").or(pose.attribute("frame")))
         .filter(|name| !name.is_empty())
         .unwrap_or(&frame.usually);
-    let placed = pose.map_or(Ok(Placed::identity()), |pose| pose_of(&pose))?;
-    Ok(in_model(frames, relative, &frame.node, depth + 1)?.then(&placed))
+    let placed = pose.map_or(Ok(DescriptionPose::identity()), |pose| pose_of(&pose))?;
+    Ok(pose_in_model(frames, relative, &frame.node, depth + 1)?.compose(&placed))
 }
 
-/// The numbers of a `<pose>`.
-fn pose_of(node: &Node) -> Result<Placed, String> {
+/// The pose in a `<pose>` element, with roll, pitch and yaw or a quaternion.
+fn pose_of(node: &Node) -> Result<DescriptionPose, String> {
     let text = node.text().unwrap_or("").trim();
     if text.is_empty() {
-        return Ok(Placed::identity());
+        return Ok(DescriptionPose::identity());
     }
     if node.attribute("rotation_format") == Some("quat_xyzw") {
-        let [px, py, pz, x, y, z, w] = exactly(node, "pose", text)?;
-        return Ok(Placed {
+        let [px, py, pz, x, y, z, w] = exact_numbers(node, "pose", text)?;
+        return Ok(DescriptionPose {
             p: Vector3::new(px, py, pz),
-            r: of_quaternion([w, x, y, z]).ok_or_else(|| at(node, "the quaternion is zero"))?,
+            r: rotation_from_quaternion([w, x, y, z]).ok_or_else(|| located_message(node, "the quaternion is zero"))?,
         });
     }
-    let [px, py, pz, angles @ ..] = exactly::<6>(node, "pose", text)?;
+    // Otherwise roll, pitch and yaw, in rad unless stated.
+    let [px, py, pz, angles @ ..] = exact_numbers::<6>(node, "pose", text)?;
     let is_degree = node.attribute("degrees") == Some("true");
-    Ok(Placed {
+    Ok(DescriptionPose {
         p: Vector3::new(px, py, pz),
         r: rotation(angles.map(|angle: f64| if is_degree { angle.to_radians() } else { angle })),
     })
 }
 
-fn inertial(node: &Node) -> Result<Inertial, String> {
+/// Mass and inertia of a link; 1 kg and 1 kg m^2 without `<inertial>`, as in the format.
+fn inertial(node: &Node) -> Result<DescriptionInertia, String> {
     let given = child(node, "inertial");
-    let mut out = Inertial {
+    let mut out = DescriptionInertia {
         mass: 1.0,
-        at: Placed::identity(),
+        at: DescriptionPose::identity(),
         inertia: Matrix3::identity(),
     };
     let Some(given) = given else {
@@ -198,30 +213,25 @@ fn inertial(node: &Node) -> Result<Inertial, String> {
     if let Some(auto) = given.attribute("auto")
         && auto == "true"
     {
-        return Err(at(
+        return Err(located_message(
             &given,
-            "mass and inertia from shapes are not worked out here; write them into the file",
+            "mass and inertia from shapes are not computed here; write them into the file",
         ));
     }
+    // Missing entries keep the defaults of the format.
     out.mass = number_of(&given, "mass")?.unwrap_or(1.0);
     if let Some(pose) = child(&given, "pose") {
-        if pose
-            .attribute("relative_to")
-            .is_some_and(|name| !name.is_empty())
-        {
-            return Err(at(
+        if pose.attribute("relative_to").is_some_and(|name| !name.is_empty()) {
+            return Err(located_message(
                 &pose,
-                "the pose of an inertial is that in its link; delete `relative_to`",
+                "the pose of an <inertial> is always relative to its link; delete `relative_to`",
             ));
         }
         out.at = pose_of(&pose)?;
     }
     if let Some(inertia) = child(&given, "inertia") {
         let mut entries = [1.0, 1.0, 1.0, 0.0, 0.0, 0.0];
-        for (entry, key) in entries
-            .iter_mut()
-            .zip(["ixx", "iyy", "izz", "ixy", "ixz", "iyz"])
-        {
+        for (entry, key) in entries.iter_mut().zip(["ixx", "iyy", "izz", "ixy", "ixz", "iyz"]) {
             *entry = number_of(&inertia, key)?.unwrap_or(*entry);
         }
         out.inertia = symmetric(entries);
@@ -229,81 +239,92 @@ fn inertial(node: &Node) -> Result<Inertial, String> {
     Ok(out)
 }
 
+/// Reads a `<joint>`: its links, its pose in the model, and its one or two axes. Screws become a rotation and a coupled
+/// translation.
 fn joint(
     node: &Node,
     links: &[Node],
-    frames: &[Frame],
+    frames: &[SdfFrame],
     version: f64,
-    out: &mut Description,
-) -> Result<Between, String> {
-    let name = word(node, "name")?;
+    out: &mut RobotDescription,
+) -> Result<SdfJoint, String> {
+    let name = required_attribute(node, "name")?;
     let end = |tag: &str| -> Result<Option<usize>, String> {
-        let inner = required(node, tag)?;
+        let inner = required_child(node, tag)?;
         let mut name = inner.text().unwrap_or("").trim().to_owned();
-        // A frame stands for the link that it is attached to.
+        // A frame as parent or child means the link to which it is attached.
         for _ in 0..LONGEST_CHAIN {
             if name == "world" {
                 return Ok(None);
             }
-            if let Some(k) = links
-                .iter()
-                .position(|link| link.attribute("name") == Some(&name))
-            {
+            if let Some(k) = links.iter().position(|link| link.attribute("name") == Some(&name)) {
                 return Ok(Some(k));
             }
             let frame = frames
                 .iter()
                 .find(|frame| frame.name == name)
-                .ok_or_else(|| at(&inner, &format!("no link is called `{name}`")))?;
+                .ok_or_else(|| located_message(&inner, &format!("there is no link `{name}`")))?;
             if frame.usually == "__model__" {
                 return Ok(links.first().map(|_| 0));
             }
             name.clone_from(&frame.usually);
         }
-        Err(at(
+        Err(located_message(
             &inner,
-            "its frame is attached to itself by way of others",
+            "its frame is attached to itself through other frames",
         ))
     };
-    let kind = word(node, "type")?;
-    let wanted: &[(&str, Kind)] = match kind.as_str() {
+    // Each degree of freedom becomes a joint, with the element that describes its axis.
+    let kind = required_attribute(node, "type")?;
+    let wanted: &[(&str, DescriptionJointKind)] = match kind.as_str() {
         "fixed" => &[],
-        "revolute" | "continuous" => &[("axis", Kind::Turn)],
-        "prismatic" => &[("axis", Kind::Slide)],
-        "ball" => &[("", Kind::Ball)],
-        "universal" | "revolute2" => &[("axis", Kind::Turn), ("axis2", Kind::Turn)],
-        "screw" => &[("axis", Kind::Turn), ("axis", Kind::Slide)],
+        "revolute" | "continuous" => &[("axis", DescriptionJointKind::Revolute)],
+        "prismatic" => &[("axis", DescriptionJointKind::Prismatic)],
+        "ball" => &[("", DescriptionJointKind::Ball)],
+        "universal" | "revolute2" => &[
+            ("axis", DescriptionJointKind::Revolute),
+            ("axis2", DescriptionJointKind::Revolute),
+        ],
+        "screw" => &[
+            ("axis", DescriptionJointKind::Revolute),
+            ("axis", DescriptionJointKind::Prismatic),
+        ],
         other => {
-            return Err(at(
+            return Err(located_message(
                 node,
                 &format!(
-                    "models have no joint of the type {other}; write it as several of revolute, prismatic, screw, ball and fixed"
+                    "the joint type {other} is not supported; write it as several joints of the types revolute, prismatic, screw, ball \
+                     or fixed"
                 ),
             ));
         }
     };
-    let place = in_model(frames, &name_in(frames, node, &name)?, node, 0)?;
+    // Pose of the joint at zero, and the links at both ends.
+    let place = pose_in_model(frames, &name_in(frames, node, &name)?, node, 0)?;
     let (parent, child_link) = (end("parent")?, end("child")?);
     let mut joints = Vec::new();
     for (k, (tag, kind)) in wanted.iter().enumerate() {
+        // The second joint of a pair needs another name.
         let suffix = if k == 0 { "" } else { "_2" };
-        let mut joint = Joint::new(format!("{name}{suffix}"), *kind, line(node));
+        let mut joint = DescriptionJoint::new(format!("{name}{suffix}"), *kind, line(node));
         if let Some(axis) = child(node, tag) {
             read_axis(&mut joint, &axis, frames, version, &place, out)?;
-        } else if *kind != Kind::Ball {
-            return Err(at(node, &format!("it needs <{tag}>")));
+        } else if *kind != DescriptionJointKind::Ball {
+            return Err(located_message(node, &format!("it needs <{tag}>")));
         }
         joints.push(joint);
     }
+    // A screw has one degree of freedom: both joints are coupled.
     if let [turn, slide] = joints.as_mut_slice()
         && kind == "screw"
     {
-        out.couplings.push(screw(node, turn, slide)?);
+        out.couplings.push(screw_coupling(node, turn, slide)?);
     }
+    // Sensors and settings of the solver have no effect on the model.
     if let Some(physics) = child(node, "sensor").or(child(node, "physics")) {
-        out.remarks.push(at(&physics, "not read"));
+        out.remarks.push(located_message(&physics, "this element is not read"));
     }
-    Ok(Between {
+    Ok(SdfJoint {
         parent,
         child: child_link,
         joints,
@@ -314,89 +335,94 @@ fn joint(
     })
 }
 
-/// A screw: limits and losses are those of its turn, and what slides follows.
-fn screw(node: &Node, turn: &Joint, slide: &mut Joint) -> Result<Coupling, String> {
+/// The coupling of a screw: the translation follows the rotation, which keeps the limits and losses.
+fn screw_coupling(
+    node: &Node,
+    turn: &DescriptionJoint,
+    slide: &mut DescriptionJoint,
+) -> Result<DescriptionCoupling, String> {
     let pitch = number_of(node, "screw_thread_pitch")?.ok_or_else(|| {
-        at(
+        located_message(
             node,
-            "it needs <screw_thread_pitch>, in metres for each turn; the older <thread_pitch> had several meanings",
+            "it needs <screw_thread_pitch>, in metres per revolution; the older <thread_pitch> is ambiguous",
         )
     })?;
-    let mut bare = Joint::new(slide.name.clone(), Kind::Slide, slide.line);
+    // The translation keeps only axis and anchor; limits and losses are not counted twice.
+    let mut bare = DescriptionJoint::new(slide.name.clone(), DescriptionJointKind::Prismatic, slide.line);
     (bare.axis, bare.anchor) = (slide.axis, slide.anchor);
     bare.is_driven = false;
     *slide = bare;
-    Ok(Coupling {
+    Ok(DescriptionCoupling {
         line: line(node),
         joint: slide.name.clone(),
-        of: Some(turn.name.clone()),
+        leader: Some(turn.name.clone()),
         ratio: pitch / std::f64::consts::TAU,
         offset: 0.0,
     })
 }
 
-/// The name under which a joint's own frame is found; links and joints may share names in old files.
-fn name_in(frames: &[Frame], node: &Node, name: &str) -> Result<String, String> {
+/// The name of a joint's frame. Fails if a link or frame has the same name, which old files permit.
+fn name_in(frames: &[SdfFrame], node: &Node, name: &str) -> Result<String, String> {
     if frames.iter().filter(|frame| frame.name == name).count() > 1 {
-        return Err(at(
+        return Err(located_message(
             node,
-            "a joint and a link or frame have this name, so that poses cannot tell them apart; rename one",
+            "a joint and a link or frame have the same name, so poses that refer to it are ambiguous; rename one",
         ));
     }
     Ok(name.to_owned())
 }
 
-/// Axis (in the axes of the model), limits and losses of one degree of freedom.
+/// Reads the axis (in the axes of the model), limits, losses and `<mimic>` of one degree of freedom.
 fn read_axis(
-    joint: &mut Joint,
+    joint: &mut DescriptionJoint,
     node: &Node,
-    frames: &[Frame],
+    frames: &[SdfFrame],
     version: f64,
-    place: &Placed,
-    out: &mut Description,
+    place: &DescriptionPose,
+    out: &mut RobotDescription,
 ) -> Result<(), String> {
     let (xyz, turned) = match child(node, "xyz") {
         Some(xyz) => {
-            let given = xyz
-                .attribute("expressed_in")
-                .filter(|name| !name.is_empty());
+            // The axis is given in the axes of the joint, or of a named frame.
+            let given = xyz.attribute("expressed_in").filter(|name| !name.is_empty());
             let turned = match given {
-                Some(name) => in_model(frames, name, node, 0)?.r,
+                Some(name) => pose_in_model(frames, name, node, 0)?.r,
                 None => place.r,
             };
-            (
-                vector(exactly(&xyz, "xyz", xyz.text().unwrap_or(""))?),
-                turned,
-            )
+            (vector(exact_numbers(&xyz, "xyz", xyz.text().unwrap_or(""))?), turned)
         }
         None => (Vector3::z(), place.r),
     };
+    // Old versions give axes in the frame of the model.
     let in_model_frame = match text_of(node, "use_parent_model_frame") {
         Some(text) => ["1", "true"].contains(&text),
         None => version < 1.45,
     };
     joint.axis = if in_model_frame { xyz } else { turned * xyz };
     if joint.axis.norm() == 0.0 {
-        return Err(at(node, "the axis has no direction"));
+        return Err(located_message(node, "the axis has no direction"));
     }
     if let Some(limit) = child(node, "limit") {
+        // Limits; very large numbers mean that there is none.
         let low = number_of(&limit, "lower")?.filter(|x| *x > -NO_LIMIT);
         let high = number_of(&limit, "upper")?.filter(|x| *x < NO_LIMIT);
         if let (Some(low), Some(high)) = (low, high) {
             joint.range = (low < high).then_some([low, high]);
         }
         joint.rate = number_of(&limit, "velocity")?.filter(|x| *x > 0.0 && *x < NO_LIMIT);
+        // An effort of zero marks a joint without a drive.
         let force = number_of(&limit, "effort")?.filter(|x| *x >= 0.0 && *x < NO_LIMIT);
         joint.is_driven = force != Some(0.0);
         joint.force = force.filter(|x| *x > 0.0).map(|x| [-x, x]);
     }
+    // Losses and springs.
     if let Some(dynamics) = child(node, "dynamics") {
         joint.damping = number_of(&dynamics, "damping")?.unwrap_or(0.0);
         joint.friction = number_of(&dynamics, "friction")?.unwrap_or(0.0);
         joint.stiffness = number_of(&dynamics, "spring_stiffness")?.unwrap_or(0.0);
         joint.rest = number_of(&dynamics, "spring_reference")?.unwrap_or(0.0);
     }
-    // Drake's elements stand in the joint, not in the axis.
+    // Drake's extension: rotor inertia and gear ratio are children of the joint, not of the axis.
     if let Some(parent) = node.parent()
         && let Some(rotor) = number_of(&parent, "rotor_inertia")?
     {
@@ -404,16 +430,17 @@ fn read_axis(
         joint.armature = rotor * gear * gear;
     }
     if let Some(mimic) = child(node, "mimic") {
-        let mut of = word(&mimic, "joint")?;
+        // A coupling to another joint; the joint of a second axis has the suffix `_2`.
+        let mut of = required_attribute(&mimic, "joint")?;
         if mimic.attribute("axis") == Some("axis2") {
             of.push_str("_2");
         }
         let ratio = number_of(&mimic, "multiplier")?.unwrap_or(1.0);
         let reference = number_of(&mimic, "reference")?.unwrap_or(0.0);
-        out.couplings.push(Coupling {
+        out.couplings.push(DescriptionCoupling {
             line: line(&mimic),
             joint: joint.name.clone(),
-            of: Some(of),
+            leader: Some(of),
             ratio,
             offset: number_of(&mimic, "offset")?.unwrap_or(0.0) - ratio * reference,
         });
@@ -421,20 +448,21 @@ fn read_axis(
     Ok(())
 }
 
-/// Makes a tree of links and joints: what closes a ring becomes a closure, ball joints first.
+/// Builds a tree from links and joints. Joints that close a loop become closures, preferably ball joints.
 #[allow(
     clippy::too_many_lines,
     reason = "tree first, then what closes rings, on the same tables"
 )]
 fn tree(
-    out: &mut Description,
+    out: &mut RobotDescription,
     nodes: &[Node],
-    places: &[Placed],
-    joints: &[Between],
-    own: &Placed,
+    places: &[DescriptionPose],
+    joints: &[SdfJoint],
+    own: &DescriptionPose,
     base: usize,
 ) -> Result<(), String> {
-    // Which joints belong to the tree: the world is the last part.
+    // Spanning tree by merging groups of connected links; the world is the last entry. Ball joints come last, so that
+    // they are cut.
     let n = nodes.len();
     let part = |link: Option<usize>| link.unwrap_or(n);
     let mut group: Vec<usize> = (0..=n).collect();
@@ -443,6 +471,7 @@ fn tree(
     let mut in_tree = vec![false; joints.len()];
     for k in order {
         let [one, other] = [part(joints[k].parent), part(joints[k].child)].map(|p| group[p]);
+        // A joint between two groups connects them; a joint inside of a group would close a loop.
         if one != other {
             in_tree[k] = true;
             for member in &mut group {
@@ -452,7 +481,8 @@ fn tree(
             }
         }
     }
-    // Links in the order in which they are reached: from the world, then from the base, then from what is left.
+    // Links in the order in which they are reached: from the world, then from the base link, then from the remaining
+    // links. The last two get a free joint.
     let mut index: Vec<Option<usize>> = vec![None; n];
     let starts = [None, Some(base)].into_iter().chain((0..n).map(Some));
     for start in starts {
@@ -465,58 +495,60 @@ fn tree(
             } else {
                 format!("_{}", nodes[link].attribute("name").unwrap_or_default())
             };
+            // A link that no joint connects to the world is a free body.
             index[link] = Some(out.links.len());
-            out.links.push(Link {
-                name: word(&nodes[link], "name")?,
+            out.links.push(DescriptionLink {
+                name: required_attribute(&nodes[link], "name")?,
                 parent: None,
-                at: own.then(&places[link]),
-                joints: vec![Joint::new(
+                at: own.compose(&places[link]),
+                joints: vec![DescriptionJoint::new(
                     format!("base{suffix}"),
-                    Kind::Free,
+                    DescriptionJointKind::Free,
                     line(&nodes[link]),
                 )],
                 inertial: inertial(&nodes[link])?,
             });
         }
+        // Follow the joints of the tree from this link.
         let mut waiting = vec![start];
         while let Some(here) = waiting.pop() {
             for (between, _) in joints.iter().zip(&in_tree).filter(|(_, is)| **is) {
+                // The tree can pass a joint in either direction.
                 let is_forward = between.parent == here;
-                let there = if is_forward {
-                    between.child
-                } else {
-                    between.parent
-                };
+                let there = if is_forward { between.child } else { between.parent };
                 if !(is_forward || between.child == here) {
                     continue;
                 }
                 let Some(link) = there.filter(|link| index[*link].is_none()) else {
                     continue;
                 };
+                // A joint that is passed from child to parent has the opposite axis, and its parts in reverse order.
                 let carrier = here.map_or_else(|| own.inverse(), |link| places[link]);
                 let to_link = places[link].inverse();
                 let mut moving = between.joints.clone();
                 for joint in &mut moving {
-                    joint.anchor = to_link.then(&between.place).p;
+                    // The anchor and the axis in the axes of the link that the joint moves.
+                    joint.anchor = to_link.compose(&between.place).p;
                     joint.axis = to_link.r * joint.axis;
                     if !is_forward {
                         joint.axis = -joint.axis;
                     }
                 }
                 if !is_forward {
-                    if moving.iter().any(|joint| joint.kind == Kind::Ball) {
+                    if moving.iter().any(|joint| joint.kind == DescriptionJointKind::Ball) {
                         out.remarks.push(format!(
-                            "line {}: the ball joint `{}` is passed from child to parent: its angles are those of the parent",
+                            "line {}: the tree passes the ball joint `{}` from child to parent; its angles are those of the parent relative to \
+                             the child",
                             between.line, between.name
                         ));
                     }
                     moving.reverse();
                 }
                 index[link] = Some(out.links.len());
-                out.links.push(Link {
-                    name: word(&nodes[link], "name")?,
+                out.links.push(DescriptionLink {
+                    name: required_attribute(&nodes[link], "name")?,
                     parent: here.and_then(|link| index[link]),
-                    at: carrier.inverse().then(&places[link]),
+                    at: carrier.inverse().compose(&places[link]),
                     joints: moving,
                     inertial: inertial(&nodes[link])?,
                 });
@@ -524,36 +556,36 @@ fn tree(
             }
         }
     }
-    for between in joints
-        .iter()
-        .zip(&in_tree)
-        .filter(|(_, is)| !**is)
-        .map(|(b, _)| b)
-    {
+    // Joints outside of the tree close loops.
+    for between in joints.iter().zip(&in_tree).filter(|(_, is)| !**is).map(|(b, _)| b) {
+        // The conditions of the closure.
         let holds = match between.kind.as_str() {
-            "ball" => Holds::Origins,
-            "revolute" | "continuous" => Holds::Axes,
-            "fixed" => Holds::Frames,
+            "ball" => ClosureConstraint::Origins,
+            "revolute" | "continuous" => ClosureConstraint::Axes,
+            "fixed" => ClosureConstraint::Frames,
             other => {
                 return Err(format!(
-                    "line {}: the joint `{}` closes a loop and is {other}; loops are closed by ball, revolute and fixed joints",
+                    "line {}: the joint `{}` closes a loop and is {other}; loops can be closed by ball, revolute and fixed joints only",
                     between.line, between.name
                 ));
             }
         };
+        // A hinge has its axis along x of the closure's frame.
         let mut place = between.place;
-        if let (Holds::Axes, Some(joint)) = (holds, between.joints.first()) {
+        if let (ClosureConstraint::Axes, Some(joint)) = (holds, between.joints.first()) {
             let turned = nalgebra::Rotation3::rotation_between(&Vector3::x(), &joint.axis);
-            // Against x it is half a turn about any axis across.
+            // For the direction -x it is half a turn about any perpendicular axis.
             place.r = turned.map_or_else(
                 || Matrix3::from_diagonal(&Vector3::new(-1.0, -1.0, 1.0)),
                 nalgebra::Rotation3::into_inner,
             );
         }
+        // The same pose as seen from the links at both ends.
         let end = |link: Option<usize>| match link {
-            Some(link) => (index[link], places[link].inverse().then(&place)),
-            None => (None, own.then(&place)),
+            Some(link) => (index[link], places[link].inverse().compose(&place)),
+            None => (None, own.compose(&place)),
         };
+        // A cut joint has no coordinate, so nothing can act on it.
         for joint in &between.joints {
             if joint.damping != 0.0 || joint.friction != 0.0 || joint.stiffness != 0.0 {
                 out.remarks.push(format!(
@@ -562,11 +594,11 @@ fn tree(
                 ));
             }
         }
-        out.closures.push(Closure {
+        out.closures.push(DescriptionClosure {
             name: between.name.clone(),
             line: between.line,
             ends: [end(between.parent), end(between.child)],
-            holds,
+            constraint: holds,
         });
     }
     Ok(())

@@ -1,106 +1,120 @@
-//! Reads URDF: links and joints with the defaults of the format, mimic joints, and closures of a file beside it.
+//! Reads URDF: links and joints with the defaults of the format, mimic joints, and loop closures of a `robot.yaml`.
 //!
 //! Source of names and defaults: the URDF specification of ROS (wiki.ros.org/urdf/XML).
 
 use nalgebra::Vector3;
 use roxmltree::{Document, Node};
 
-use super::closures_file::{self, Becomes, Closures};
-use super::description::{Closure, Coupling, Description, Holds, Inertial, Joint, Kind, Link};
-use super::placed::Placed;
-use super::xml::{at, child, children, line, number, required, symmetric, three, vector, word};
+use super::closures_file::{self, ClosureFile, JointReplacement};
+use super::description::{
+    ClosureConstraint, DescriptionClosure, DescriptionCoupling, DescriptionInertia, DescriptionJoint,
+    DescriptionJointKind, DescriptionLink, RobotDescription,
+};
+use super::placed::DescriptionPose;
+use super::xml::{
+    child, children, line, located_message, number_attribute, required_attribute, required_child, symmetric,
+    three_numbers, vector,
+};
 
-/// A joint between two links, as the file has it.
-struct Between {
+/// A joint between two links, as the file describes it.
+struct UrdfJoint {
+    /// Name of the parent link.
     parent: String,
+    /// Name of the child link.
     child: String,
-    origin: Placed,
-    /// One after the other; none is fixed.
-    joints: Vec<Joint>,
+    /// Pose of the joint, and of the child at zero, in the parent.
+    origin: DescriptionPose,
+    /// Joints in sequence; empty for a fixed joint.
+    joints: Vec<DescriptionJoint>,
+    /// Name of the joint.
     name: String,
+    /// Line in the file.
     line: u32,
 }
 
-/// Reads a description, or says in one line what is wrong and where. `closures` is the text of a `robot.yaml`.
+/// Reads a description; fails with one line that states the fault and its place. `closures` is the text of a
+/// `robot.yaml`.
 #[allow(clippy::too_many_lines, reason = "elements in their order")]
-pub(crate) fn read(
-    document: &Document,
-    closures: Option<&str>,
-    is_floating: bool,
-) -> Result<Description, String> {
+pub(crate) fn read(document: &Document, closures: Option<&str>, is_floating: bool) -> Result<RobotDescription, String> {
     let robot = document.root_element();
-    let mut out = Description {
+    let mut out = RobotDescription {
         name: robot.attribute("name").unwrap_or("robot").to_owned(),
         format: "URDF",
-        ..Description::default()
+        ..RobotDescription::default()
     };
+    // Read all elements first; the tree is built from their names.
     let links: Vec<Node> = children(&robot, "link").collect();
     let mut joints = Vec::new();
     for node in children(&robot, "joint") {
         joints.push(joint(&node, &mut out)?);
     }
+    // A file of closures can change the kinds of joints.
     let closures = closures.map(closures_file::read).transpose()?;
     if let Some(file) = &closures {
         out.remarks.extend(file.remarks.iter().cloned());
-        replace(&mut joints, &file.joints)?;
+        replace_joints(&mut joints, &file.joints)?;
     }
-    follow_fixed(&mut out, &joints);
+    resolve_fixed_couplings(&mut out, &joints);
+    // Transmissions have no effect on a model, but other tools scale forces by their reduction.
     for node in children(&robot, "transmission") {
         for reduction in node.descendants().filter(|node| {
             node.tag_name().name() == "mechanicalReduction"
-                && node
-                    .text()
-                    .is_some_and(|text| text.trim().parse() != Ok(1.0))
+                && node.text().is_some_and(|text| text.trim().parse() != Ok(1.0))
         }) {
             out.remarks.push(format!(
-                "line {}: the reduction {} of the transmission `{}` is not read: forces are those at the joints",
+                "line {}: the reduction {} of the transmission `{}` is ignored; forces of the model are those at the joints",
                 line(&reduction),
                 reduction.text().unwrap_or_default().trim(),
                 node.attribute("name").unwrap_or_default()
             ));
         }
     }
-    if let Some(node) = robot
-        .children()
-        .find(|node| node.tag_name().name() == "loop_joint")
-    {
-        return Err(at(
+    if let Some(node) = robot.children().find(|node| node.tag_name().name() == "loop_joint") {
+        return Err(located_message(
             &node,
-            "a proposal for closed chains that was never settled; write the closure into a robot.yaml beside the file",
+            "<loop_joint> is not part of the URDF standard; write the closure into a robot.yaml next to the file",
         ));
     }
+    // A tree needs unique names, one root, and one parent for each other link.
     check_names(&links, &joints)?;
-    let root = root(&links, &joints)?;
+    let root = root_link(&links, &joints)?;
+    // Breadth first from the root, so that parents stand before their children.
     let mut order = vec![(root, None)];
     let mut k = 0;
     while k < order.len() {
         let (node, between): (Node, Option<usize>) = order[k];
-        let name = word(&node, "name")?;
-        let mut link = Link {
+        let name = required_attribute(&node, "name")?;
+        let mut link = DescriptionLink {
             name: name.clone(),
             parent: None,
-            at: Placed::identity(),
+            at: DescriptionPose::identity(),
             joints: Vec::new(),
             inertial: inertial(&node)?,
         };
+        // A link gets pose and joints of the joint through which it is reached.
         if let Some(j) = between {
             let joint = &joints[j];
             link.parent = out.links.iter().position(|link| link.name == joint.parent);
             link.at = joint.origin;
             link.joints.clone_from(&joint.joints);
-            if joint.joints.iter().any(|j| j.kind == Kind::Free)
-                && joint.parent != word(&root, "name")?
+            if joint.joints.iter().any(|j| j.kind == DescriptionJointKind::Free)
+                && joint.parent != required_attribute(&root, "name")?
             {
                 return Err(format!(
-                    "line {}: the joint `{}` is floating on a link that is not the root; a free body hangs on nothing",
+                    "line {}: the joint `{}` is floating, but its parent link is not the root; only children of the root can be free bodies",
                     joint.line, joint.name
                 ));
             }
+        // The root of a floating robot gets a free joint.
         } else if is_floating {
-            link.joints
-                .push(Joint::new("root_joint".to_owned(), Kind::Free, line(&node)));
+            link.joints.push(DescriptionJoint::new(
+                "root_joint".to_owned(),
+                DescriptionJointKind::Free,
+                line(&node),
+            ));
         }
         out.links.push(link);
+        // Children of this link follow in the order of their joints.
         for (j, joint) in joints.iter().enumerate() {
             if joint.parent != name {
                 continue;
@@ -110,7 +124,7 @@ pub(crate) fn read(
                 .any(|(node, _)| node.attribute("name") == Some(joint.child.as_str()))
             {
                 return Err(format!(
-                    "line {}: the link `{}` hangs on two joints; URDF describes trees only",
+                    "line {}: the link `{}` is the child of two joints; URDF describes trees only",
                     joint.line, joint.child
                 ));
             }
@@ -123,46 +137,47 @@ pub(crate) fn read(
         }
         k += 1;
     }
+    // Links that were not reached.
     if let Some(node) = links.iter().find(|node| {
         out.links
             .iter()
             .all(|link| Some(link.name.as_str()) != node.attribute("name"))
     }) {
-        return Err(at(
+        return Err(located_message(
             node,
-            "it is in a ring of joints that the root does not reach",
+            "it is part of a loop of joints that is not connected to the root",
         ));
     }
     if let Some(file) = closures {
-        close(&mut out, &joints, file)?;
+        add_closures(&mut out, &joints, file)?;
     }
     Ok(out)
 }
 
-/// Puts in the place of joints what the file of closures says that they are.
-fn replace(joints: &mut [Between], by: &[(String, Becomes)]) -> Result<(), String> {
+/// Replaces joints by the kinds that the file of closures gives for them. Damping and friction of the URDF stay.
+fn replace_joints(joints: &mut [UrdfJoint], by: &[(String, JointReplacement)]) -> Result<(), String> {
     for (name, becomes) in by {
         let found = joints.iter_mut().find(|joint| &joint.name == name);
-        let Some(Between { joints, line, .. }) = found else {
+        let Some(UrdfJoint { joints, line, .. }) = found else {
             return Err(format!(
-                "the file of closures says what `{name}` is, which is no joint"
+                "the file of closures gives a type for the joint `{name}`, which does not exist"
             ));
         };
+        // The new joints keep the losses of the old one.
         let old = std::mem::take(joints);
-        let new = |name: String, kind: Kind| {
-            let mut joint = Joint::new(name, kind, *line);
-            (joint.damping, joint.friction) = old
-                .first()
-                .map_or((0.0, 0.0), |old| (old.damping, old.friction));
+        let new = |name: String, kind: DescriptionJointKind| {
+            let mut joint = DescriptionJoint::new(name, kind, *line);
+            (joint.damping, joint.friction) = old.first().map_or((0.0, 0.0), |old| (old.damping, old.friction));
             joint
         };
         match becomes {
-            Becomes::Fixed => {}
-            Becomes::Ball => joints.push(new(name.clone(), Kind::Ball)),
-            Becomes::Cross(axes) => {
+            JointReplacement::Fixed => {}
+            JointReplacement::Ball => joints.push(new(name.clone(), DescriptionJointKind::Ball)),
+            JointReplacement::Cross(axes) => {
+                // A universal joint is a sequence of hinges about the axes of the frame.
                 for letter in axes {
                     let own = format!("{name}_{}", letter.to_ascii_uppercase());
-                    let mut joint = new(own, Kind::Turn);
+                    let mut joint = new(own, DescriptionJointKind::Revolute);
                     joint.axis = Vector3::zeros();
                     joint.axis[usize::from(*letter as u8 - b'x')] = 1.0;
                     joints.push(joint);
@@ -173,24 +188,26 @@ fn replace(joints: &mut [Between], by: &[(String, Becomes)]) -> Result<(), Strin
     Ok(())
 }
 
-/// A joint that is fixed follows nothing, and what follows a fixed one is held.
-fn follow_fixed(out: &mut Description, joints: &[Between]) {
+/// Removes couplings of fixed joints, and fixes joints that follow a fixed one.
+fn resolve_fixed_couplings(out: &mut RobotDescription, joints: &[UrdfJoint]) {
     let is_fixed = |name: &str| {
         let mut joints = joints.iter();
         joints.any(|joint| joint.name == name && joint.joints.is_empty())
     };
     let remarks = &mut out.remarks;
     out.couplings.retain_mut(|coupling| {
-        if let Some(of) = coupling.of.take_if(|of| is_fixed(of)) {
+        // The leader does not move, so the follower does not move either.
+        if let Some(of) = coupling.leader.take_if(|of| is_fixed(of)) {
             remarks.push(format!(
-                "line {}: `{}` follows `{of}`, which is fixed: it is held at {}",
+                "line {}: `{}` follows `{of}`, which is fixed; it is fixed at {}",
                 coupling.line, coupling.joint, coupling.offset
             ));
         }
+        // A fixed joint needs no coupling.
         let moves = !is_fixed(&coupling.joint);
         if !moves {
             remarks.push(format!(
-                "line {}: `{}` is fixed and follows nothing; its <mimic> is left out",
+                "line {}: `{}` is fixed; its <mimic> is left out",
                 coupling.line, coupling.joint
             ));
         }
@@ -198,31 +215,29 @@ fn follow_fixed(out: &mut Description, joints: &[Between]) {
     });
 }
 
-fn check_names(links: &[Node], joints: &[Between]) -> Result<(), String> {
+/// Checks that names of links and joints are unique, and that joints connect links that exist.
+fn check_names(links: &[Node], joints: &[UrdfJoint]) -> Result<(), String> {
     for (i, node) in links.iter().enumerate() {
-        let name = word(node, "name")?;
+        let name = required_attribute(node, "name")?;
         if links[..i]
             .iter()
             .any(|other| other.attribute("name") == Some(name.as_str()))
         {
-            return Err(at(
+            return Err(located_message(
                 node,
-                &format!("two links are called `{name}`; rename one"),
+                &format!("two links have the name `{name}`; rename one"),
             ));
         }
     }
     for (i, joint) in joints.iter().enumerate() {
         if joints[..i].iter().any(|other| other.name == joint.name) {
             return Err(format!(
-                "line {}: two joints are called `{}`; rename one",
+                "line {}: two joints have the name `{}`; rename one",
                 joint.line, joint.name
             ));
         }
         for end in [&joint.parent, &joint.child] {
-            if links
-                .iter()
-                .all(|node| node.attribute("name") != Some(end.as_str()))
-            {
+            if links.iter().all(|node| node.attribute("name") != Some(end.as_str())) {
                 return Err(format!(
                     "line {}: the joint `{}` names the link `{end}`, which does not exist",
                     joint.line, joint.name
@@ -233,8 +248,9 @@ fn check_names(links: &[Node], joints: &[Between]) -> Result<(), String> {
     Ok(())
 }
 
-/// The link that no joint moves; all others must hang on it.
-fn root<'a, 'i>(links: &[Node<'a, 'i>], joints: &[Between]) -> Result<Node<'a, 'i>, String> {
+/// The link that is no joint's child. Fails if there is none or more than one.
+fn root_link<'a, 'i>(links: &[Node<'a, 'i>], joints: &[UrdfJoint]) -> Result<Node<'a, 'i>, String> {
+    // A link is a child if a joint names it as such.
     let is_child = |node: &&Node| {
         joints
             .iter()
@@ -243,76 +259,81 @@ fn root<'a, 'i>(links: &[Node<'a, 'i>], joints: &[Between]) -> Result<Node<'a, '
     let mut roots = links.iter().filter(|node| !is_child(node));
     match (roots.next(), roots.next()) {
         (Some(root), None) => Ok(*root),
-        (None, _) => Err("no link is the root: every link hangs on another".to_owned()),
-        (Some(one), Some(two)) => Err(at(
+        (None, _) => Err("there is no root link: every link is the child of a joint".to_owned()),
+        (Some(one), Some(two)) => Err(located_message(
             two,
             &format!(
-                "this link and `{}` hang on nothing; join them to one robot",
+                "this link and `{}` are both without a parent; connect them to one robot",
                 one.attribute("name").unwrap_or_default()
             ),
         )),
     }
 }
 
-fn inertial(node: &Node) -> Result<Inertial, String> {
+/// The `<inertial>` of a link; zero mass without one.
+fn inertial(node: &Node) -> Result<DescriptionInertia, String> {
     let Some(inertial) = child(node, "inertial") else {
-        return Ok(Inertial::default());
+        return Ok(DescriptionInertia::default());
     };
-    let mass = number(&required(&inertial, "mass")?, "value")?;
-    let inertia = required(&inertial, "inertia")?;
+    // Mass and inertia are required in an `<inertial>`.
+    let mass = number_attribute(&required_child(&inertial, "mass")?, "value")?;
+    let inertia = required_child(&inertial, "inertia")?;
+    // The six independent entries of the symmetric matrix.
     let mut entries = [0.0; 6];
-    for (entry, key) in entries
-        .iter_mut()
-        .zip(["ixx", "iyy", "izz", "ixy", "ixz", "iyz"])
-    {
-        *entry = number(&inertia, key)?;
+    for (entry, key) in entries.iter_mut().zip(["ixx", "iyy", "izz", "ixy", "ixz", "iyz"]) {
+        *entry = number_attribute(&inertia, key)?;
     }
-    Ok(Inertial {
+    Ok(DescriptionInertia {
         mass,
         at: origin(&inertial)?,
         inertia: symmetric(entries),
     })
 }
 
-fn joint(node: &Node, out: &mut Description) -> Result<Between, String> {
-    let name = word(node, "name")?;
-    let kind = match word(node, "type")?.as_str() {
+/// Reads a `<joint>` with its limits, losses and `<mimic>`, which goes into the couplings of `out`.
+fn joint(node: &Node, out: &mut RobotDescription) -> Result<UrdfJoint, String> {
+    let name = required_attribute(node, "name")?;
+    let kind = match required_attribute(node, "type")?.as_str() {
         "fixed" => None,
-        "revolute" | "continuous" => Some(Kind::Turn),
-        "prismatic" => Some(Kind::Slide),
-        "floating" => Some(Kind::Free),
-        "spherical" | "ball" => Some(Kind::Ball),
+        "revolute" | "continuous" => Some(DescriptionJointKind::Revolute),
+        "prismatic" => Some(DescriptionJointKind::Prismatic),
+        "floating" => Some(DescriptionJointKind::Free),
+        "spherical" | "ball" => Some(DescriptionJointKind::Ball),
         other => {
-            return Err(at(
+            return Err(located_message(
                 node,
                 &format!(
-                    "this joint is {other}; models have revolute, continuous, prismatic, floating and fixed joints: write it \
-                     as several of these"
+                    "the joint type {other} is not supported; write it as several joints of the types revolute, continuous, \
+                     prismatic, floating or fixed"
                 ),
             ));
         }
     };
+    // Missing elements and attributes are not faults; the format gives defaults.
     let (limit, dynamics) = (child(node, "limit"), child(node, "dynamics"));
     let given = |of: Option<Node>, key: &str| match of {
-        Some(node) if node.has_attribute(key) => number(&node, key).map(Some),
+        Some(node) if node.has_attribute(key) => number_attribute(&node, key).map(Some),
         _ => Ok(None),
     };
     let mut moving = None;
     if let Some(kind) = kind {
-        let mut joint = Joint::new(name.clone(), kind, line(node));
+        let mut joint = DescriptionJoint::new(name.clone(), kind, line(node));
+        // The default axis is x.
         joint.axis = match child(node, "axis") {
-            Some(axis) => vector(three(&axis, "xyz")?),
+            Some(axis) => vector(three_numbers(&axis, "xyz")?),
             None => vector([1.0, 0.0, 0.0]),
         };
-        if joint.axis.norm() == 0.0 && matches!(kind, Kind::Turn | Kind::Slide) {
-            return Err(at(node, "the axis has no direction"));
+        if joint.axis.norm() == 0.0 && matches!(kind, DescriptionJointKind::Revolute | DescriptionJointKind::Prismatic)
+        {
+            return Err(located_message(node, "the axis has no direction"));
         }
         let (lower, upper) = (given(limit, "lower")?, given(limit, "upper")?);
-        if word(node, "type")? != "continuous" && (lower.is_some() || upper.is_some()) {
-            // An absent bound is zero, says the format.
+        if required_attribute(node, "type")? != "continuous" && (lower.is_some() || upper.is_some()) {
+            // The format defines zero as the default of each bound.
             let range = [lower.unwrap_or(0.0), upper.unwrap_or(0.0)];
             joint.range = (range[0] < range[1]).then_some(range);
         }
+        // Zero counts as "no limit".
         joint.rate = given(limit, "velocity")?.filter(|rate| *rate > 0.0);
         joint.force = given(limit, "effort")?
             .filter(|force| *force > 0.0)
@@ -321,18 +342,19 @@ fn joint(node: &Node, out: &mut Description) -> Result<Between, String> {
         joint.friction = given(dynamics, "friction")?.unwrap_or(0.0);
         moving = Some(joint);
     }
+    // The joint follows another one.
     if let Some(mimic) = child(node, "mimic") {
-        out.couplings.push(Coupling {
+        out.couplings.push(DescriptionCoupling {
             line: line(&mimic),
             joint: name.clone(),
-            of: Some(word(&mimic, "joint")?),
+            leader: Some(required_attribute(&mimic, "joint")?),
             ratio: given(Some(mimic), "multiplier")?.unwrap_or(1.0),
             offset: given(Some(mimic), "offset")?.unwrap_or(0.0),
         });
     }
-    Ok(Between {
-        parent: word(&required(node, "parent")?, "link")?,
-        child: word(&required(node, "child")?, "link")?,
+    Ok(UrdfJoint {
+        parent: required_attribute(&required_child(node, "parent")?, "link")?,
+        child: required_attribute(&required_child(node, "child")?, "link")?,
         origin: origin(node)?,
         joints: moving.into_iter().collect(),
         name,
@@ -340,55 +362,60 @@ fn joint(node: &Node, out: &mut Description) -> Result<Between, String> {
     })
 }
 
-/// The `<origin>` of an element; without one it is where the element is.
-fn origin(of: &Node) -> Result<Placed, String> {
+/// The pose `<origin>` of an element; the identity without one.
+fn origin(of: &Node) -> Result<DescriptionPose, String> {
     let Some(node) = child(of, "origin") else {
-        return Ok(Placed::identity());
+        return Ok(DescriptionPose::identity());
     };
+    // Both attributes are optional.
     let or_zeros = |key: &str| {
         if node.has_attribute(key) {
-            three(&node, key)
+            three_numbers(&node, key)
         } else {
             Ok([0.0; 3])
         }
     };
-    Ok(Placed::of(or_zeros("xyz")?, or_zeros("rpy")?))
+    Ok(DescriptionPose::from_xyz_rpy(or_zeros("xyz")?, or_zeros("rpy")?))
 }
 
-/// Puts in what a file of closures says: frames that coincide and joints that are driven.
-fn close(out: &mut Description, joints: &[Between], file: Closures) -> Result<(), String> {
+/// Adds the contents of a file of closures: frames that coincide and joints that are driven.
+fn add_closures(out: &mut RobotDescription, joints: &[UrdfJoint], file: ClosureFile) -> Result<(), String> {
+    // The file names links, or joints in the place of their child links.
     let place = |name: &str| -> Result<Option<usize>, String> {
         let joint = joints.iter().find(|joint| joint.name == name);
         let link = joint.map_or(name, |joint| joint.child.as_str());
         let index = out.links.iter().position(|link_| link_.name == link);
-        index.map(Some).ok_or_else(|| {
-            format!("the file of closures names `{name}`, which is neither a link nor a joint")
-        })
+        index
+            .map(Some)
+            .ok_or_else(|| format!("the file of closures names `{name}`, which is neither a link nor a joint"))
     };
     for closure in file.pairs {
+        // The frames of both links coincide, or their origins only.
         let [one, other] = &closure.ends;
-        let ends = [place(one)?, place(other)?].map(|link| (link, Placed::identity()));
-        out.closures.push(Closure {
+        let ends = [place(one)?, place(other)?].map(|link| (link, DescriptionPose::identity()));
+        out.closures.push(DescriptionClosure {
             name: format!("{one}_{other}"),
             line: closure.line,
             ends,
-            holds: if closure.is_full {
-                Holds::Frames
+            constraint: if closure.is_full {
+                ClosureConstraint::Frames
             } else {
-                Holds::Origins
+                ClosureConstraint::Origins
             },
         });
     }
+    // Drives must be joints that move.
     for name in &file.drives {
         if joints
             .iter()
             .all(|joint| &joint.name != name || joint.joints.is_empty())
         {
             return Err(format!(
-                "the file of closures drives `{name}`, which is no joint that moves"
+                "the file of closures lists the drive `{name}`, which is not a movable joint"
             ));
         }
     }
+    // A list of drives is complete: other joints are passive.
     if !file.drives.is_empty() {
         for joint in out.links.iter_mut().flat_map(|link| &mut link.joints) {
             joint.is_driven &= file.drives.contains(&joint.name);

@@ -1,76 +1,83 @@
-//! Loops that hold all of two frames are cut where they are simplest.
+//! Replaces rigid loop closures (welds) by simpler ones. A description with welds goes in; loops cut at undriven joints
+//! come out.
 //!
-//! A weld says six things, and three points that coincide say them in nine equations. Where the loop has a ball joint or a
-//! hinge that nothing drives, it can just as well be cut there: what lies between weld and joint hangs on the other side, the
-//! weld is a fixed place, and what closes the loop is one point, or two on an axis. The angles of that joint are no
-//! coordinates any more.
+//! A weld has six conditions, and three coincident points express them in nine equations. If the loop has an undriven
+//! ball joint or hinge, the loop can be cut there instead: the links between weld and joint are attached to the other
+//! side, the weld becomes a fixed connection, and one point closes the loop, or two points on an axis. The angles of
+//! that joint are then no coordinates.
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::description::{Closure, Description, Holds, Joint, Kind, Link};
-use super::placed::Placed;
+use super::description::{
+    ClosureConstraint, DescriptionClosure, DescriptionJoint, DescriptionJointKind, DescriptionLink, RobotDescription,
+};
+use super::placed::DescriptionPose;
 
-/// Axes meet where they come this near to each other, m.
-const MEET: f64 = 1e-9;
-/// Axes whose volume is below this do not turn about all directions.
-const FLAT: f64 = 1e-6;
+/// Axes closer to each other than this intersect, m.
+const MEETING_DISTANCE: f64 = 1e-9;
+/// Three unit axes with a triple product below this are coplanar, so they are no ball joint.
+const COPLANAR_VOLUME: f64 = 1e-6;
 
 /// A joint at which a loop can be cut.
-struct Cut {
-    /// From the welded link upwards to the one that hangs on the joint.
-    turned: Vec<usize>,
-    /// Links that weigh nothing between the parts of the joint.
-    within: Vec<usize>,
-    /// The place of the joint in the link that hangs on it, its axis along x.
-    at: Placed,
-    holds: Holds,
+struct LoopCut {
+    /// Links whose parent changes: from the welded link up to the child of the joint.
+    inverted_links: Vec<usize>,
+    /// Massless links between the hinges that form a ball joint.
+    massless_links: Vec<usize>,
+    /// Pose of the joint in its child link, with the axis along x.
+    at: DescriptionPose,
+    /// The closure that replaces the weld.
+    constraint: ClosureConstraint,
 }
 
-impl Cut {
-    /// Points before axes, and then as little as can be hung anew.
+impl LoopCut {
+    /// Order of preference: one point before an axis, then few inverted links.
     fn rank(&self) -> (bool, usize) {
-        (self.holds != Holds::Origins, self.turned.len())
+        (self.constraint != ClosureConstraint::Origins, self.inverted_links.len())
     }
 }
 
-/// Cuts welds at joints, where there are such.
-pub(crate) fn cut_at_joints(description: &mut Description) {
+/// Replaces each weld by a cut at a joint of its loop, if there is a suitable one.
+pub(crate) fn cut_at_joints(description: &mut RobotDescription) {
     for k in 0..description.closures.len() {
+        // Express the ends in links that move.
         let closure = &mut description.closures[k];
         for (link, placed) in &mut closure.ends {
-            // A link that is fixed to its parent is a place in it.
+            // A frame of a link that is fixed to its parent is a frame of the parent.
             while let Some(own) = *link
                 && description.links[own].joints.is_empty()
             {
-                *placed = description.links[own].at.then(placed);
+                *placed = description.links[own].at.compose(placed);
                 *link = description.links[own].parent;
             }
         }
-        if closure.holds != Holds::Frames {
+        if closure.constraint != ClosureConstraint::Frames {
             continue;
         }
+        // The best cut on each side of the weld, then the better of both.
         let ends = closure.ends.map(|(link, _)| link);
         let cuts = [1, 0].map(|end| {
-            let best = cuts(description, ends[end], ends[1 - end])
+            let best = possible_cuts(description, ends[end], ends[1 - end])
                 .into_iter()
-                .min_by_key(Cut::rank);
+                .min_by_key(LoopCut::rank);
             best.map(|cut| (end, cut))
         });
         if let Some((end, cut)) = cuts.into_iter().flatten().min_by_key(|(_, cut)| cut.rank()) {
-            apply(description, k, end, &cut);
+            apply_cut(description, k, end, &cut);
         }
     }
-    sort(description);
+    sort_links(description);
 }
 
-/// A link and those that carry it.
-fn ancestors(links: &[Link], link: Option<usize>) -> Vec<usize> {
+/// A link and its ancestors, from the link upwards.
+fn ancestors(links: &[DescriptionLink], link: Option<usize>) -> Vec<usize> {
     std::iter::successors(link, |link| links[*link].parent).collect()
 }
 
-/// The joints at which what hangs between them and one end of a weld can go to the other end.
-fn cuts(description: &Description, end: Option<usize>, other: Option<usize>) -> Vec<Cut> {
+/// The joints between one end of a weld and the common ancestor at which the loop can be cut.
+fn possible_cuts(description: &RobotDescription, end: Option<usize>, other: Option<usize>) -> Vec<LoopCut> {
     let links = &description.links;
+    // Joints above the common ancestor are not in the loop.
     let shared = ancestors(links, other);
     let mut turned = Vec::new();
     let mut found = Vec::new();
@@ -78,14 +85,15 @@ fn cuts(description: &Description, end: Option<usize>, other: Option<usize>) -> 
         if shared.contains(&link) {
             break;
         }
+        // With a cut below this link, it and the links before it are attached to the other side.
         turned.push(link);
-        found.extend(cut(description, &turned));
-        // Only what has one axis can be hung the other way round.
+        found.extend(cut_below(description, &turned));
+        // Only links with at most one axis can be inverted.
         let joints = &links[link].joints;
         if joints.len() > 1
             || joints
                 .iter()
-                .any(|j| matches!(j.kind, Kind::Ball | Kind::Free))
+                .any(|j| matches!(j.kind, DescriptionJointKind::Ball | DescriptionJointKind::Free))
         {
             break;
         }
@@ -93,25 +101,20 @@ fn cuts(description: &Description, end: Option<usize>, other: Option<usize>) -> 
     found
 }
 
-/// The cut between the last of some links and what carries it.
-fn cut(description: &Description, turned: &[usize]) -> Option<Cut> {
+/// The cut between the last link of `turned` and its parent, if its joints are undriven, uncoupled and without losses.
+fn cut_below(description: &RobotDescription, turned: &[usize]) -> Option<LoopCut> {
     let links = &description.links;
-    let may_go = |joint: &Joint| {
+    let may_go = |joint: &DescriptionJoint| {
         let mut couplings = description.couplings.iter();
-        let is_coupled =
-            couplings.any(|c| c.joint == joint.name || c.of.as_ref() == Some(&joint.name));
-        let acts = [
-            joint.damping,
-            joint.friction,
-            joint.armature,
-            joint.stiffness,
-        ];
+        // The joint loses its coordinate, so that nothing may refer to it or act on it.
+        let is_coupled = couplings.any(|c| c.joint == joint.name || c.leader.as_ref() == Some(&joint.name));
+        let acts = [joint.damping, joint.friction, joint.armature, joint.stiffness];
         !joint.is_driven && !is_coupled && acts.iter().all(|x| x.abs() <= 0.0)
     };
-    // Joints upwards, each with its place in the link that hangs on them while all stand at their zero.
-    let mut found: Vec<(Kind, Placed)> = Vec::new();
+    // Joints upwards, each with its pose in the last link of `turned` while all joints are at zero.
+    let mut found: Vec<(DescriptionJointKind, DescriptionPose)> = Vec::new();
     let mut within = Vec::new();
-    let mut seen = Placed::identity();
+    let mut seen = DescriptionPose::identity();
     let own = *turned.last()?;
     let mut here = own;
     loop {
@@ -119,23 +122,27 @@ fn cut(description: &Description, turned: &[usize]) -> Option<Cut> {
         if link.joints.is_empty() || !link.joints.iter().all(may_go) {
             break;
         }
+        // The last joint of a link is nearest to it.
         for joint in link.joints.iter().rev() {
-            let at = Placed {
+            let at = DescriptionPose {
                 p: joint.anchor,
-                r: along_x(&joint.axis)?,
+                r: axes_along(&joint.axis)?,
             };
-            found.push((joint.kind, seen.then(&at)));
+            found.push((joint.kind, seen.compose(&at)));
         }
+        // A ball joint: one point closes the loop.
         if is_ball(&found) {
-            return Some(Cut {
-                turned: turned.to_vec(),
-                within,
+            return Some(LoopCut {
+                inverted_links: turned.to_vec(),
+                massless_links: within,
                 at: found[0].1,
-                holds: Holds::Origins,
+                constraint: ClosureConstraint::Origins,
             });
         }
         let parent = link.parent?;
+        // Otherwise go on through a link without mass.
         let inertial = &links[parent].inertial;
+        // Hinges of one ball joint are separated by links without mass, other children and closures.
         let is_bare = inertial.mass == 0.0
             && inertial.inertia.amax() == 0.0
             && links.iter().filter(|l| l.parent == Some(parent)).count() == 1
@@ -146,77 +153,80 @@ fn cut(description: &Description, turned: &[usize]) -> Option<Cut> {
         if !is_bare || found.len() >= 3 {
             break;
         }
-        seen = seen.then(&link.at.inverse());
+        // The pose of the parent in the last link of `turned`.
+        seen = seen.compose(&link.at.inverse());
         here = parent;
         within.push(here);
     }
-    // One hinge by itself, if no ball joint is there.
+    // If there is no ball joint, a single hinge.
     let (kind, at) = found.first()?;
-    (*kind == Kind::Turn && links[own].joints.len() == 1).then(|| Cut {
-        turned: turned.to_vec(),
-        within: Vec::new(),
+    (*kind == DescriptionJointKind::Revolute && links[own].joints.len() == 1).then(|| LoopCut {
+        inverted_links: turned.to_vec(),
+        massless_links: Vec::new(),
         at: *at,
-        holds: Holds::Axes,
+        constraint: ClosureConstraint::Axes,
     })
 }
 
-/// Whether joints are one ball joint together.
-fn is_ball(found: &[(Kind, Placed)]) -> bool {
+/// Whether joints form a ball joint: one ball, or three hinges with intersecting axes that are not coplanar.
+fn is_ball(found: &[(DescriptionJointKind, DescriptionPose)]) -> bool {
     match found {
-        [(Kind::Ball, _)] => true,
-        [(Kind::Turn, a), (Kind::Turn, b), (Kind::Turn, c)] => {
-            let meet = |x: &Placed| (x.p - a.p).amax() < MEET;
+        [(DescriptionJointKind::Ball, _)] => true,
+        [
+            (DescriptionJointKind::Revolute, a),
+            (DescriptionJointKind::Revolute, b),
+            (DescriptionJointKind::Revolute, c),
+        ] => {
+            // All axes pass through one point and span space.
+            let meet = |x: &DescriptionPose| (x.p - a.p).amax() < MEETING_DISTANCE;
             let axes = Matrix3::from_columns(&[a.r.column(0), b.r.column(0), c.r.column(0)]);
-            meet(b) && meet(c) && axes.determinant().abs() > FLAT
+            meet(b) && meet(c) && axes.determinant().abs() > COPLANAR_VOLUME
         }
         _ => false,
     }
 }
 
-/// Axes of which x points along a direction.
-fn along_x(direction: &Vector3<f64>) -> Option<Matrix3<f64>> {
+/// A right-handed rotation matrix with x along a direction; none for a zero vector.
+fn axes_along(direction: &Vector3<f64>) -> Option<Matrix3<f64>> {
     let x = direction.try_normalize(0.0)?;
+    // The coordinate axis farthest from x, made perpendicular to it.
     let mut away = Vector3::zeros();
     away[x.iamin()] = 1.0;
     let y = (away - x * x.dot(&away)).normalize();
     Some(Matrix3::from_columns(&[x, y, x.cross(&y)]))
 }
 
-/// Hangs what lies between weld and joint on the other end of the weld, and makes the joint the closure.
-fn apply(description: &mut Description, closure: usize, end: usize, cut: &Cut) {
+/// Attaches the links between weld and joint to the other end of the weld, and makes the joint the closure.
+fn apply_cut(description: &mut RobotDescription, closure: usize, end: usize, cut: &LoopCut) {
+    // The two frames that the weld connects.
     let (other, there) = description.closures[closure].ends[1 - end];
     let (_, here) = description.closures[closure].ends[end];
-    let own = cut.turned[cut.turned.len() - 1];
-    // Where the joint is in what carries it.
-    let parts: Vec<usize> = [own]
-        .into_iter()
-        .chain(cut.within.iter().copied())
-        .collect();
+    let own = cut.inverted_links[cut.inverted_links.len() - 1];
+    // Pose of the joint in its parent, past the massless links; all its joints are removed.
+    let parts: Vec<usize> = [own].into_iter().chain(cut.massless_links.iter().copied()).collect();
     let mut carrier = None;
     let mut in_carrier = cut.at;
     let mut names = Vec::new();
     for part in parts {
         let link = &mut description.links[part];
-        in_carrier = link.at.then(&in_carrier);
+        in_carrier = link.at.compose(&in_carrier);
         carrier = link.parent;
         let joints = std::mem::take(&mut link.joints);
-        names.extend(
-            joints
-                .into_iter()
-                .rev()
-                .map(|joint| format!("`{}`", joint.name)),
-        );
+        names.extend(joints.into_iter().rev().map(|joint| format!("`{}`", joint.name)));
     }
     names.reverse();
-    let (mut parent, mut at, mut joints) = (other, there.then(&here.inverse()), Vec::new());
-    for link in &cut.turned {
+    // Invert the chain: each link gets the inverse pose, and the joint of the link above it with the opposite axis.
+    let (mut parent, mut at, mut joints) = (other, there.compose(&here.inverse()), Vec::new());
+    for link in &cut.inverted_links {
         let now = &mut description.links[*link];
+        // What the link had before belongs to the next link in the inverted chain.
         let before = std::mem::replace(&mut now.at, at);
         let reversed = std::mem::replace(&mut now.joints, joints);
         now.parent = parent;
+        // The joint in the axes of the link that was its parent.
         joints = reversed
             .into_iter()
-            .map(|joint| Joint {
+            .map(|joint| DescriptionJoint {
                 anchor: before.p + before.r * joint.anchor,
                 axis: -(before.r * joint.axis),
                 ..joint
@@ -225,22 +235,26 @@ fn apply(description: &mut Description, closure: usize, end: usize, cut: &Cut) {
         parent = Some(*link);
         at = before.inverse();
     }
-    let Closure {
-        line, ends, holds, ..
+    // The closure is now at the joint.
+    let DescriptionClosure {
+        line,
+        ends,
+        constraint: holds,
+        ..
     } = &mut description.closures[closure];
-    *holds = cut.holds;
+    *holds = cut.constraint;
     *ends = [(carrier, in_carrier), (Some(own), cut.at)];
     let says = format!(
-        "line {line}: the loop is cut at {}, which {} no coordinate of {} own here",
+        "line {line}: the loop is cut at {}, which {} no {} in the model",
         names.join(", "),
         if names.len() == 1 { "has" } else { "have" },
-        if names.len() == 1 { "its" } else { "their" },
+        if names.len() == 1 { "coordinate" } else { "coordinates" },
     );
     description.remarks.push(says);
 }
 
-/// Puts parents before their children again, in the order in which they stood otherwise.
-fn sort(description: &mut Description) {
+/// Sorts links so that parents stand before their children, with as few changes of the order as possible.
+fn sort_links(description: &mut RobotDescription) {
     let mut order: Vec<usize> = Vec::new();
     while order.len() < description.links.len() {
         for (k, link) in description.links.iter().enumerate() {
@@ -249,18 +263,19 @@ fn sort(description: &mut Description) {
             }
         }
     }
+    // Replace all indices of links by the new ones.
     let place = |link: usize| order.iter().position(|k| *k == link).unwrap_or(link);
     for closure in &mut description.closures {
         for (link, _) in &mut closure.ends {
             *link = link.map(place);
         }
     }
-    for line in &mut description.lines {
+    for line in &mut description.straight_drives {
         for (link, _) in &mut line.ends {
             *link = link.map(place);
         }
     }
-    let mut links: Vec<(usize, Link)> = description.links.drain(..).enumerate().collect();
+    let mut links: Vec<(usize, DescriptionLink)> = description.links.drain(..).enumerate().collect();
     for (_, link) in &mut links {
         link.parent = link.parent.map(place);
     }

@@ -1,12 +1,12 @@
 //! What is not exact is found and sized: each number here is worked out by hand.
 
-use modelmill_boundary::files::Memory;
-use modelmill_reduction::{Finding, Reduction, plan, plan_for, reduce, sampled_forces};
+use modelmill_boundary::files::MemoryFiles;
+use modelmill_reduction::{PlanarReduction, ReductionFinding, default_plan, plan, reduce, sampled_forces};
 use modelmill_rig::Rig;
 
 fn rig(text: &str) -> Rig {
     let text = format!("schema = 1\nname = \"test\"\ngravity = [0, -9.81, 0]\n{text}");
-    modelmill_rig::load("test.toml", &text, &Memory::default())
+    modelmill_rig::load("test.toml", &text, &MemoryFiles::default())
         .unwrap_or_else(|f| panic!("{f}"))
         .rig
 }
@@ -58,12 +58,12 @@ lumped_mass = [{ name = "rod", groups = ["rod"], at = ["near", "far"] }]
 drive = [{ name = "ram", contact_on_axis = true }]
 "#;
 
-fn reduced() -> Reduction {
+fn reduced() -> PlanarReduction {
     let plan = plan("plan.toml", PLAN).unwrap_or_else(|failure| panic!("{failure}"));
     reduce(&machine(), &plan).unwrap_or_else(|failure| panic!("{failure}"))
 }
 
-fn finding(reduction: &Reduction, about: &str, says: &str) -> Finding {
+fn finding(reduction: &PlanarReduction, about: &str, says: &str) -> ReductionFinding {
     let found = reduction
         .report
         .findings
@@ -75,10 +75,7 @@ fn finding(reduction: &Reduction, about: &str, says: &str) -> Finding {
 }
 
 fn close(found: f64, expected: f64) {
-    assert!(
-        (found - expected).abs() < 1e-9,
-        "{found} instead of {expected}"
-    );
+    assert!((found - expected).abs() < 1e-9, "{found} instead of {expected}");
 }
 
 #[test]
@@ -96,7 +93,7 @@ fn sizes_are_those_worked_out_by_hand() {
     close(one.sizes[2].value, 0.0);
     close(finding(&reduction, "m", "one and two").sizes[0].value, 0.1);
     // A rod halved into its ends has three times its inertia, and here it is felt: the arm turns.
-    let rod = finding(&reduction, "rod", "residuals are felt");
+    let rod = finding(&reduction, "rod", "residuals have an effect");
     close(rod.sizes[0].value, 0.0);
     close(rod.sizes[1].value, 0.0);
     close(rod.sizes[2].value, 0.6 * 0.25 - 0.05);
@@ -116,20 +113,14 @@ fn sizes_are_those_worked_out_by_hand() {
         text.contains("Fs = { nominal = 4.0 }") && text.contains("constants = { vs = 0.1 }"),
         "{text}"
     );
-    assert!(
-        text.contains("m = { nominal = 2.3, unit = \"kg\""),
-        "{text}"
-    );
+    assert!(text.contains("m = { nominal = 2.3, unit = \"kg\""), "{text}");
 }
 
 /// Poses at which a reduction is checked are the same every time.
 #[test]
 fn a_reduction_is_the_same_every_time() {
     assert_eq!(reduced(), reduced());
-    let (one, two) = (
-        sampled_forces(&machine(), 20, 0.2),
-        sampled_forces(&machine(), 20, 0.2),
-    );
+    let (one, two) = (sampled_forces(&machine(), 20, 0.2), sampled_forces(&machine(), 20, 0.2));
     assert_eq!(one.expect("forces"), two.expect("forces"));
 }
 
@@ -152,43 +143,33 @@ fn a_rig_without_a_plan() {
         coordinate = [{ name = "phi", joint = "shaft" }]
         drive = [{ name = "motor", joint = "shaft" }]
     "#);
-    let plan = plan_for(&rig).unwrap_or_else(|says| panic!("{says:?}"));
+    let plan = default_plan(&rig).unwrap_or_else(|says| panic!("{says:?}"));
     let reduction = reduce(plan.rig(&rig), &plan).unwrap_or_else(|failure| panic!("{failure}"));
-    let mechanism = modelmill_spec::load("model.toml", &reduction.model, &Memory::default())
+    let mechanism = modelmill_spec::load("model.toml", &reduction.model, &MemoryFiles::default())
         .expect("a model")
         .mechanism;
     assert_eq!((mechanism.parts.len(), mechanism.loops.len()), (3, 1));
     let derivation = modelmill_codegen::derive(&mechanism).expect("a derivation");
     let sampled = sampled_forces(&rig, 40, 0.3).expect("forces");
-    let column = |of: fn(&modelmill_rig::State) -> f64| -> Vec<f64> {
-        sampled.iter().map(|(s, _)| of(s)).collect()
-    };
-    let (q, qd, qdd) = (
-        column(|s| s.q[0]),
-        column(|s| s.qd[0]),
-        column(|s| s.qdd[0]),
-    );
-    let states = modelmill_codegen::States {
+    let column = |of: fn(&modelmill_rig::RigState) -> f64| -> Vec<f64> { sampled.iter().map(|(s, _)| of(s)).collect() };
+    let (q, qd, qdd) = (column(|s| s.q[0]), column(|s| s.qd[0]), column(|s| s.qdd[0]));
+    let states = modelmill_codegen::MotionStates {
         q: vec![&q],
         qd: vec![&qd],
         qdd: vec![&qdd],
         load: Vec::new(),
     };
-    let evaluator = modelmill_codegen::Evaluator::new(&derivation);
+    let evaluator = modelmill_codegen::ModelEvaluator::new(&derivation);
     let found = evaluator
         .inverse_dynamics(&states, &derivation.nominal_base_values())
         .expect("forces");
     for (x, (_, y)) in found[0].iter().zip(&sampled) {
-        assert!(
-            (x - y[0]).abs() < 1e-8 * y[0].abs().max(1.0),
-            "{x} instead of {}",
-            y[0]
-        );
+        assert!((x - y[0]).abs() < 1e-8 * y[0].abs().max(1.0), "{x} instead of {}", y[0]);
     }
 
-    let says = plan_for(&machine()).expect_err("a weld").in_library_words();
+    let says = default_plan(&machine()).expect_err("a weld").in_library_words();
     assert!(
-        says.contains("`weld` is no revolute joint") && says.contains("option `plan`"),
+        says.contains("`weld` is not a revolute joint") && says.contains("option `plan`"),
         "{says}"
     );
 }

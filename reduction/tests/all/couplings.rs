@@ -1,6 +1,6 @@
 //! Joints of descriptions that follow others by any ratio, and screws.
 
-use modelmill_boundary::files::Disk;
+use modelmill_boundary::files::DiskFiles;
 use modelmill_reduction::{ImportOptions, import};
 use modelmill_spec::Mechanism;
 
@@ -9,7 +9,7 @@ const BODY: &str = "<inertial><mass value='1'/><origin xyz='0.1 0 0'/>\
 
 fn imported(text: &str) -> (String, Mechanism) {
     let found = import(text, &ImportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
-    let loaded = modelmill_spec::load("robot.toml", &found.model, &Disk::default())
+    let loaded = modelmill_spec::load("robot.toml", &found.model, &DiskFiles::default())
         .unwrap_or_else(|failure| panic!("{failure}\n{}", found.model));
     (found.model, loaded.mechanism)
 }
@@ -62,8 +62,5 @@ fn a_screw_of_sdf_turns_and_slides() {
     let h = 0.005 / std::f64::consts::TAU;
     check(&mechanism, "spindle_2", "spindle", h, 0.0);
     let refused = import(&sdf(""), &ImportOptions::default()).expect_err("no pitch");
-    assert!(
-        refused.to_string().contains("screw_thread_pitch"),
-        "{refused}"
-    );
+    assert!(refused.to_string().contains("screw_thread_pitch"), "{refused}");
 }

@@ -16,13 +16,7 @@ fn messages() {
         .rig;
     let mut names: Vec<String> = std::fs::read_dir(here("tests/faulty"))
         .expect("fixtures")
-        .map(|entry| {
-            entry
-                .expect("a file")
-                .file_name()
-                .to_string_lossy()
-                .into_owned()
-        })
+        .map(|entry| entry.expect("a file").file_name().to_string_lossy().into_owned())
         .collect();
     names.sort();
     assert!(names.len() >= 15);
@@ -39,9 +33,5 @@ fn messages() {
 #[test]
 fn a_plan_that_cannot_be_read() {
     let failure = plan_file(Path::new("no/such/plan.toml")).expect_err("no file");
-    assert!(
-        failure
-            .render(false)
-            .contains("cannot read `no/such/plan.toml`")
-    );
+    assert!(failure.render(false).contains("cannot read `no/such/plan.toml`"));
 }

@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use modelmill_boundary::files::Memory;
-use modelmill_codegen::{Derivation, Evaluator, States};
-use modelmill_reduction::{Reduction, plan_file, reduce};
-use modelmill_rig::{Rig, State, Tracker, forces};
+use modelmill_boundary::files::MemoryFiles;
+use modelmill_codegen::{Derivation, ModelEvaluator, MotionStates};
+use modelmill_reduction::{PlanarReduction, plan_file, reduce};
+use modelmill_rig::{Rig, RigState, RigTracker, forces};
 
 fn workspace(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path)
@@ -18,23 +18,20 @@ fn rig() -> Rig {
         .rig
 }
 
-fn reduced() -> Reduction {
-    let plan = plan_file(&workspace("model-spec/rigs/spidermill-plan.toml"))
-        .unwrap_or_else(|f| panic!("{f}"));
+fn reduced() -> PlanarReduction {
+    let plan = plan_file(&workspace("model-spec/rigs/spidermill-plan.toml")).unwrap_or_else(|f| panic!("{f}"));
     reduce(&rig(), &plan).unwrap_or_else(|failure| panic!("{failure}"))
 }
 
 fn derived(text: &str) -> Derivation {
-    let loaded = modelmill_spec::load("model.toml", text, &Memory::default());
+    let loaded = modelmill_spec::load("model.toml", text, &MemoryFiles::default());
     let loaded = loaded.unwrap_or_else(|failure| panic!("{failure}"));
     assert_eq!(loaded.render(false), "", "no warnings");
     modelmill_codegen::derive(&loaded.mechanism).expect("a derivation")
 }
 
 fn bundled() -> Derivation {
-    derived(
-        &std::fs::read_to_string(workspace("model-spec/models/spidermill.toml")).expect("a model"),
-    )
+    derived(&std::fs::read_to_string(workspace("model-spec/models/spidermill.toml")).expect("a model"))
 }
 
 #[test]
@@ -71,11 +68,7 @@ fn the_base_parameters_are_those_of_the_bundled_model() {
         base.map(|base| (base.name, base.expression)).collect()
     };
     assert_eq!(expressions(&ours), expressions(&theirs));
-    for (x, y) in ours
-        .nominal_base_values()
-        .iter()
-        .zip(theirs.nominal_base_values())
-    {
+    for (x, y) in ours.nominal_base_values().iter().zip(theirs.nominal_base_values()) {
         assert!((x - y).abs() < 1e-9 * y.abs(), "{x} {y}");
     }
 }
@@ -100,24 +93,20 @@ fn rods_and_coupled_drives_go_over() {
         rig.effects
             .push(effect.unwrap_or_else(|faults| panic!("{}", faults[0])));
     }
-    let plan = plan_file(&workspace("model-spec/rigs/spidermill-plan.toml"))
-        .unwrap_or_else(|f| panic!("{f}"));
+    let plan = plan_file(&workspace("model-spec/rigs/spidermill-plan.toml")).unwrap_or_else(|f| panic!("{f}"));
     let reduced = reduce(&rig, &plan).unwrap_or_else(|failure| panic!("{failure}"));
     holds_the_forces(&rig, &reduced);
 }
 
-fn holds_the_forces(rig: &Rig, reduced: &Reduction) {
+fn holds_the_forces(rig: &Rig, reduced: &PlanarReduction) {
     let derivation = derived(&reduced.model);
-    let mut tracker = Tracker::new(rig).expect("a pose");
+    let mut tracker = RigTracker::new(rig).expect("a pose");
     let mut columns = vec![Vec::new(); 6];
     let mut expected = vec![Vec::new(); 2];
     for i in 0..60 {
         let wave = |k: f64| (k * f64::from(i)).sin();
-        let state = State {
-            q: vec![
-                1.8 + 0.2 * wave(0.7),
-                1.341_592_653_589_793 + 0.2 * wave(1.1),
-            ],
+        let state = RigState {
+            q: vec![1.8 + 0.2 * wave(0.7), 1.341_592_653_589_793 + 0.2 * wave(1.1)],
             qd: vec![wave(1.9), wave(2.3)],
             qdd: vec![5.0 * wave(2.9), 5.0 * wave(3.1)],
         };
@@ -130,22 +119,18 @@ fn holds_the_forces(rig: &Rig, reduced: &Reduction) {
         }
     }
     let slices = |range: std::ops::Range<usize>| columns[range].iter().map(Vec::as_slice).collect();
-    let states = States {
+    let states = MotionStates {
         q: slices(0..2),
         qd: slices(2..4),
         qdd: slices(4..6),
         load: Vec::new(),
     };
     let values = derivation.nominal_base_values();
-    let found = Evaluator::new(&derivation)
+    let found = ModelEvaluator::new(&derivation)
         .inverse_dynamics(&states, &values)
         .expect("forces");
     for (found, expected) in found.iter().zip(&expected) {
-        let error: f64 = found
-            .iter()
-            .zip(expected)
-            .map(|(x, y)| (x - y).powi(2))
-            .sum();
+        let error: f64 = found.iter().zip(expected).map(|(x, y)| (x - y).powi(2)).sum();
         let norm: f64 = expected.iter().map(|y| y * y).sum();
         let relative = (error / norm).sqrt();
         println!("reduced model against rig: {relative:.1e}");
@@ -162,9 +147,7 @@ fn the_report_names_every_approximation() {
             .findings
             .iter()
             .find(|f| f.about == about && f.says.contains(says));
-        found
-            .unwrap_or_else(|| panic!("nothing about {about} {says}"))
-            .clone()
+        found.unwrap_or_else(|| panic!("nothing about {about} {says}")).clone()
     };
     // Step 1: the end effector is mounted beside the plane, as the paper says.
     let platform = finding("G4", "not halved");
@@ -173,29 +156,22 @@ fn the_report_names_every_approximation() {
         finding("G8", "perpendicular")
             .sizes
             .iter()
-            .all(|size| !size.is_felt())
+            .all(|size| !size.is_significant())
     );
     // Step 2: eq. (1) holds for the cranks, not for the coupling, which only translates.
-    assert!(
-        finding("S1", "50.9597")
-            .sizes
-            .iter()
-            .all(|size| !size.is_felt())
-    );
+    assert!(finding("S1", "50.9597").sizes.iter().all(|size| !size.is_significant()));
     let elbow = finding("elbow_left", "only translates");
-    assert!(
-        !elbow.sizes[0].is_felt() && (elbow.sizes[1].value - 0.018_f64.hypot(0.062)).abs() < 1e-9
-    );
+    assert!(!elbow.sizes[0].is_significant() && (elbow.sizes[1].value - 0.018_f64.hypot(0.062)).abs() < 1e-9);
     // A point mass has no inertia about itself.
     assert!((elbow.sizes[2].value - 0.12).abs() < 1e-9);
     // Step 3: both sides are alike.
-    assert!(!finding("m1", "S1 and S7").sizes[0].is_felt());
+    assert!(!finding("m1", "S1 and S7").sizes[0].is_significant());
     // Step 4: the spindles push where they did.
     assert!(
         finding("spindle_left", "same points")
             .sizes
             .iter()
-            .all(|size| !size.is_felt())
+            .all(|size| !size.is_significant())
     );
     let steps: Vec<u8> = report.findings.iter().map(|finding| finding.step).collect();
     assert!((1..=4).all(|step| steps.contains(&step)));

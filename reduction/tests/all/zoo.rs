@@ -6,9 +6,9 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use modelmill_boundary::files::Memory;
-use modelmill_codegen::{Derivation, Evaluator, States};
-use modelmill_reduction::{ImportOptions, Imported, ImportedJoint, import};
+use modelmill_boundary::files::MemoryFiles;
+use modelmill_codegen::{Derivation, ModelEvaluator, MotionStates};
+use modelmill_reduction::{DescriptionImport, ImportOptions, ImportedJoint, import};
 use modelmill_spec::DriveKind;
 use nalgebra::{DMatrix, Matrix3, Quaternion, UnitQuaternion, Vector3};
 
@@ -60,27 +60,16 @@ fn reference(folder: &Path) -> Reference {
         .map(|s| s.trim().to_owned())
         .collect();
     let rows = lines
-        .map(|line| {
-            line.split(',')
-                .map(|x| x.trim().parse().expect("a number"))
-                .collect()
-        })
+        .map(|line| line.split(',').map(|x| x.trim().parse().expect("a number")).collect())
         .collect();
-    Reference {
-        manifest,
-        names,
-        rows,
-    }
+    Reference { manifest, names, rows }
 }
 
 /// Values of joints that turn or slide at the pose from which the reference reached its states; it tells which assembly of
 /// the loops is meant.
 fn reference_pose(manifest: &serde_json::Value) -> Vec<(String, f64)> {
     let values: Vec<f64> = match manifest["reference_configuration"].as_array() {
-        Some(values) => values
-            .iter()
-            .filter_map(serde_json::Value::as_f64)
-            .collect(),
+        Some(values) => values.iter().filter_map(serde_json::Value::as_f64).collect(),
         None => return Vec::new(),
     };
     let names = manifest["coordinates"].as_array().expect("coordinates");
@@ -103,15 +92,12 @@ fn reference_pose(manifest: &serde_json::Value) -> Vec<(String, f64)> {
 }
 
 /// The import of a robot as its manifest says.
-fn imported(folder: &Path, reference: &Reference) -> Result<Imported, String> {
+fn imported(folder: &Path, reference: &Reference) -> Result<DescriptionImport, String> {
     let manifest = &reference.manifest;
     let file = manifest["file"].as_str().expect("a file");
     let closures = folder.join("robot.yaml");
     let closures = closures.exists().then(|| read(&closures));
-    let is_urdf = manifest["format"]
-        .as_str()
-        .expect("a format")
-        .starts_with("URDF");
+    let is_urdf = manifest["format"].as_str().expect("a format").starts_with("URDF");
     let pose = reference_pose(manifest);
     let options = ImportOptions {
         pose: &pose,
@@ -192,23 +178,18 @@ fn coordinates_of(joint: &ImportedJoint, reference: &Reference) -> Vec<[Vec<f64>
         3 => {
             let axes: Vec<char> = joint.axes.chars().collect();
             let quaternion = all("q", &["qw", "qx", "qy", "qz"]);
-            let (w, a) = (
-                all("qd", &["wx", "wy", "wz"]),
-                all("qdd", &["wx", "wy", "wz"]),
-            );
+            let (w, a) = (all("qd", &["wx", "wy", "wz"]), all("qdd", &["wx", "wy", "wz"]));
             let mut out = vec![[vec![0.0; n], vec![0.0; n], vec![0.0; n]]; 3];
             for i in 0..n {
                 let [qw, qx, qy, qz] = [0, 1, 2, 3].map(|k| quaternion[k][i]);
                 let r = UnitQuaternion::from_quaternion(Quaternion::new(qw, qx, qy, qz));
                 let q = angles(&axes, r.to_rotation_matrix().matrix());
                 let columns = twist_columns(&axes, q);
-                let inverse = Matrix3::from_columns(&columns)
-                    .try_inverse()
-                    .expect("regular");
+                let inverse = Matrix3::from_columns(&columns).try_inverse().expect("regular");
                 let rates = inverse * Vector3::new(w[0][i], w[1][i], w[2][i]);
                 let [c1, c2, c3] = columns;
-                let change = c1.cross(&(c2 * rates[1] + c3 * rates[2])) * rates[0]
-                    + c2.cross(&(c3 * rates[2])) * rates[1];
+                let change =
+                    c1.cross(&(c2 * rates[1] + c3 * rates[2])) * rates[0] + c2.cross(&(c3 * rates[2])) * rates[1];
                 let accelerations = inverse * (Vector3::new(a[0][i], a[1][i], a[2][i]) - change);
                 for k in 0..3 {
                     out[k][0][i] = q[k];
@@ -238,11 +219,7 @@ fn coordinates_of(joint: &ImportedJoint, reference: &Reference) -> Vec<[Vec<f64>
 /// A coordinate of the tree in the reference: its name, and its rate by rates of coordinates of the model, state by state.
 type TreeRate = (String, Vec<(String, Vec<f64>)>);
 
-fn tree_rates(
-    imported: &Imported,
-    motion: &dyn Fn(&str) -> [Vec<f64>; 3],
-    n: usize,
-) -> Vec<TreeRate> {
+fn tree_rates(imported: &DescriptionImport, motion: &dyn Fn(&str) -> [Vec<f64>; 3], n: usize) -> Vec<TreeRate> {
     let mut out = Vec::new();
     for joint in &imported.joints {
         match joint.coordinates.len() {
@@ -253,9 +230,8 @@ fn tree_rates(
             3 => {
                 let axes: Vec<char> = joint.axes.chars().collect();
                 let [a, b, c] = [0, 1, 2].map(|k| motion(&joint.coordinates[k])[0].clone());
-                let columns: Vec<[Vector3<f64>; 3]> = (0..n)
-                    .map(|i| twist_columns(&axes, [a[i], b[i], c[i]]))
-                    .collect();
+                let columns: Vec<[Vector3<f64>; 3]> =
+                    (0..n).map(|i| twist_columns(&axes, [a[i], b[i], c[i]])).collect();
                 for (k, part) in ["wx", "wy", "wz"].iter().enumerate() {
                     let by = (0..3)
                         .map(|j| {
@@ -267,10 +243,7 @@ fn tree_rates(
                 }
             }
             _ => {
-                for (part, slot) in ["vx", "vy", "vz", "wx", "wy", "wz"]
-                    .iter()
-                    .zip([0, 1, 2, 4, 5, 6])
-                {
+                for (part, slot) in ["vx", "vy", "vz", "wx", "wy", "wz"].iter().zip([0, 1, 2, 4, 5, 6]) {
                     let by = vec![(joint.coordinates[slot].clone(), vec![1.0; n])];
                     out.push((format!("{}.{part}", joint.name), by));
                 }
@@ -288,18 +261,14 @@ fn tree_rates(
 )]
 fn deviations(
     derivation: &Derivation,
-    imported: &Imported,
+    imported: &DescriptionImport,
     reference: &Reference,
 ) -> Result<[f64; 2], String> {
     let mechanism = &derivation.mechanism;
     let n = reference.rows.len();
     let mut motions: Vec<(String, [Vec<f64>; 3])> = Vec::new();
     for joint in &imported.joints {
-        for (name, motion) in joint
-            .coordinates
-            .iter()
-            .zip(coordinates_of(joint, reference))
-        {
+        for (name, motion) in joint.coordinates.iter().zip(coordinates_of(joint, reference)) {
             if motions.iter().all(|(known, _)| known != name) {
                 motions.push((name.clone(), motion));
             }
@@ -326,7 +295,7 @@ fn deviations(
         .map(|coordinate| coordinate.name.as_str())
         .collect();
     let moved: Vec<[Vec<f64>; 3]> = active.iter().map(|name| motion(name)).collect();
-    let evaluator = Evaluator::new(derivation);
+    let evaluator = ModelEvaluator::new(derivation);
     // Each state of a mechanism with loops is reached in steps from the nominal pose, and left again: which way loops are
     // assembled follows from where they come from.
     let m = active.len();
@@ -361,7 +330,7 @@ fn deviations(
     }
     let length = 2 * steps + m + 1;
     let slices = |k: usize| path.iter().map(|m| m[k].as_slice()).collect();
-    let states = States {
+    let states = MotionStates {
         q: slices(0),
         qd: slices(1),
         qdd: slices(2),
@@ -381,17 +350,14 @@ fn deviations(
     let of_passive = if passive.is_empty() {
         Vec::new()
     } else {
-        evaluator.passive(&states).map_err(place)?
+        evaluator.passive_motion(&states).map_err(place)?
     };
     let here = |i: usize| i * length + steps;
     let rate = |name: &str, i: usize, j: usize| -> f64 {
         if let Some(k) = active.iter().position(|known| *known == name) {
             return f64::from(u8::from(k == j));
         }
-        let k = passive
-            .iter()
-            .position(|known| *known == name)
-            .expect("a coordinate");
+        let k = passive.iter().position(|known| *known == name).expect("a coordinate");
         of_passive[passive.len() + k][here(i) + 1 + j]
     };
     let rates = tree_rates(imported, &motion, n);
@@ -399,10 +365,7 @@ fn deviations(
     for (row, (_, by)) in rates.iter().enumerate() {
         for i in 0..n {
             for j in 0..m {
-                map[i][(row, j)] = by
-                    .iter()
-                    .map(|(name, factor)| factor[i] * rate(name, i, j))
-                    .sum();
+                map[i][(row, j)] = by.iter().map(|(name, factor)| factor[i] * rate(name, i, j)).sum();
             }
         }
     }
@@ -462,20 +425,11 @@ fn given_forces(reference: &Reference) -> Vec<(String, Vec<f64>)> {
         let names = reference.names.iter();
         let names = names.filter_map(|column| column.strip_prefix(prefix));
         names
-            .map(|name| {
-                (
-                    name.to_owned(),
-                    reference.column(&format!("{prefix}{name}")),
-                )
-            })
+            .map(|name| (name.to_owned(), reference.column(&format!("{prefix}{name}"))))
             .collect()
     };
     let projected = with("f:");
-    if projected.is_empty() {
-        with("tau:")
-    } else {
-        projected
-    }
+    if projected.is_empty() { with("tau:") } else { projected }
 }
 
 /// Imports and derives a robot, prints its row of the table, and holds forces and rank against the reference.
@@ -487,10 +441,10 @@ fn check(name: &str) {
         Err(error) => panic!("{name}: not imported: {error}"),
     };
     let start = Instant::now();
-    let loaded = modelmill_spec::load("model.toml", &rigid(&imported.model), &Memory::default())
+    let loaded = modelmill_spec::load("model.toml", &rigid(&imported.model), &MemoryFiles::default())
         .unwrap_or_else(|failure| panic!("{name}: {failure}"));
     // Ranks of the reference are those of the file's values.
-    let derivation = match modelmill_codegen::derive(&loaded.mechanism.at_values()) {
+    let derivation = match modelmill_codegen::derive(&loaded.mechanism.with_numeric_constants()) {
         Ok(derivation) => derivation,
         Err(error) => panic!("{name}: imported, not derived: {error}"),
     };
@@ -513,11 +467,7 @@ fn check(name: &str) {
     println!(
         "TABLE {name}: forces {forces:.1e}, rates {slip:.1e}, rank {rank} (reference {}{}), {seconds:.1} s",
         wanted["rank"],
-        if wanted["clear"] == true {
-            ""
-        } else {
-            ", not clear"
-        }
+        if wanted["clear"] == true { "" } else { ", not clear" }
     );
     // Where the printed digits contradict each other, loops close to that only, in the reference too.
     let open = reference.manifest["checks"]["closure_position_max"].as_f64();

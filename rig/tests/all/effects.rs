@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use crate::common::{close, force, rig, states};
-use modelmill_rig::{Law, Rig, Samples, State, Tracker, Trajectory, forces_along, simulate};
+use modelmill_rig::{CoordinateSamples, Rig, RigLaw, RigState, RigTracker, Trajectory, forces_along, simulate};
 
 /// A cart of 2 kg on an upright rail: its load is `2*(qdd + 9.81)`.
 fn cart() -> Rig {
@@ -16,12 +16,12 @@ fn cart() -> Rig {
     "#)
 }
 
-fn load(state: &State) -> f64 {
+fn load(state: &RigState) -> f64 {
     2.0 * (state.qdd[0] + 9.81)
 }
 
 /// What an effect adds, at a drive and, where it may act there too, in the drive's joint.
-fn check(kind: &str, values: &[(&str, f64)], adds: impl Fn(&State) -> f64) {
+fn check(kind: &str, values: &[(&str, f64)], adds: impl Fn(&RigState) -> f64) {
     for place in ["screw", "z", "rail"] {
         let mut rig = cart();
         let effect = match rig.effect(kind, &[place], values) {
@@ -32,25 +32,17 @@ fn check(kind: &str, values: &[(&str, f64)], adds: impl Fn(&State) -> f64) {
             }
         };
         rig.effects.push(effect);
-        let mut tracker = Tracker::new(&rig).expect("a pose");
+        let mut tracker = RigTracker::new(&rig).expect("a pose");
         for state in states(1, 25) {
-            close(
-                force(&rig, &mut tracker, &state)[0],
-                load(&state) + adds(&state),
-                1e-12,
-            );
+            close(force(&rig, &mut tracker, &state)[0], load(&state) + adds(&state), 1e-12);
         }
         // At standstill dry friction is zero and nothing divides by the rate.
-        let rest = State {
+        let rest = RigState {
             q: vec![0.3],
             qd: vec![0.0],
             qdd: vec![0.0],
         };
-        close(
-            force(&rig, &mut tracker, &rest)[0],
-            load(&rest) + adds(&rest),
-            1e-12,
-        );
+        close(force(&rig, &mut tracker, &rest)[0], load(&rest) + adds(&rest), 1e-12);
     }
 }
 
@@ -71,51 +63,34 @@ fn laws_at_a_drive_and_in_its_joint() {
     check("quadratic_friction", &[("Fq", 3.0)], |s| {
         3.0 * s.qd[0].powi(2) * sign(s.qd[0])
     });
-    check(
-        "directional_viscous_friction",
-        &[("Fvp", 3.0), ("Fvn", 5.0)],
-        |s| s.qd[0] * if s.qd[0] > 0.0 { 3.0 } else { 5.0 },
-    );
-    check(
-        "directional_coulomb_friction",
-        &[("Fcp", 3.0), ("Fcn", 5.0)],
-        |s| {
-            if s.qd[0] == 0.0 {
-                -1.0
-            } else if s.qd[0] > 0.0 {
-                3.0
-            } else {
-                -5.0
-            }
-        },
-    );
-    check("load_friction", &[("mu", 0.1)], |s| {
-        0.1 * load(s).abs() * sign(s.qd[0])
+    check("directional_viscous_friction", &[("Fvp", 3.0), ("Fvn", 5.0)], |s| {
+        s.qd[0] * if s.qd[0] > 0.0 { 3.0 } else { 5.0 }
     });
+    check("directional_coulomb_friction", &[("Fcp", 3.0), ("Fcn", 5.0)], |s| {
+        if s.qd[0] == 0.0 {
+            -1.0
+        } else if s.qd[0] > 0.0 {
+            3.0
+        } else {
+            -5.0
+        }
+    });
+    check("load_friction", &[("mu", 0.1)], |s| 0.1 * load(s).abs() * sign(s.qd[0]));
     check("drive_inertia", &[("Ia", 3.0)], |s| 3.0 * s.qdd[0]);
     check("force_offset", &[("F0", -3.0)], |_| -3.0);
-    check("spring", &[("k", 30.0), ("rest", 0.2)], |s| {
-        30.0 * (s.q[0] - 0.2)
+    check("spring", &[("k", 30.0), ("rest", 0.2)], |s| 30.0 * (s.q[0] - 0.2));
+    check("force_ripple", &[("As", 3.0), ("Ac", 2.0), ("pitch", 0.01)], |s| {
+        let phase = 2.0 * PI * s.q[0] / 0.01;
+        3.0 * phase.sin() + 2.0 * phase.cos()
     });
-    check(
-        "force_ripple",
-        &[("As", 3.0), ("Ac", 2.0), ("pitch", 0.01)],
-        |s| {
-            let phase = 2.0 * PI * s.q[0] / 0.01;
-            3.0 * phase.sin() + 2.0 * phase.cos()
-        },
-    );
 }
 
 #[test]
 fn every_kind_has_values_and_a_law() {
-    for kind in Law::KINDS {
-        assert!(
-            Law::values(kind).is_some_and(|values| !values.is_empty()),
-            "{kind}"
-        );
+    for kind in RigLaw::KINDS {
+        assert!(RigLaw::values(kind).is_some_and(|values| !values.is_empty()), "{kind}");
     }
-    assert!(Law::values("magic").is_none());
+    assert!(RigLaw::values("magic").is_none());
 }
 
 /// The wrist of the TX40: each motor feels the other's rotor and their common seals.
@@ -132,7 +107,7 @@ fn coupled_drives_feel_each_other() {
         effect = [{ kind = "coupled_drive", at = ["f", "g"], values = { Ia = 0.4, Fv = 7.0, Fs = 2.0 } }]
     "#;
     let rig = rig(text);
-    let mut tracker = Tracker::new(&rig).expect("a pose");
+    let mut tracker = RigTracker::new(&rig).expect("a pose");
     for state in states(2, 20) {
         let together = 2.0 * sign(state.qd[0] + state.qd[1]);
         let found = force(&rig, &mut tracker, &state);
@@ -170,8 +145,8 @@ fn friction_in_a_passive_joint() {
             .expect("an effect"),
     );
     let mut trackers = [
-        Tracker::new(&plain).expect("a pose"),
-        Tracker::new(&worn).expect("a pose"),
+        RigTracker::new(&plain).expect("a pose"),
+        RigTracker::new(&worn).expect("a pose"),
     ];
     for state in states(1, 20) {
         let q = state.q[0];
@@ -197,13 +172,7 @@ fn bar() -> Rig {
     "#)
 }
 
-fn check_bar(
-    kind: &str,
-    at: &[&str],
-    values: &[(&str, f64)],
-    mass_at_end: f64,
-    torque: impl Fn(f64, f64) -> f64,
-) {
+fn check_bar(kind: &str, at: &[&str], values: &[(&str, f64)], mass_at_end: f64, torque: impl Fn(f64, f64) -> f64) {
     let mut rig = bar();
     if mass_at_end > 0.0 {
         rig.effects.push(
@@ -211,9 +180,8 @@ fn check_bar(
                 .expect("a mass"),
         );
     }
-    rig.effects
-        .push(rig.effect(kind, at, values).expect("an effect"));
-    let mut tracker = Tracker::new(&rig).expect("a pose");
+    rig.effects.push(rig.effect(kind, at, values).expect("an effect"));
+    let mut tracker = RigTracker::new(&rig).expect("a pose");
     for state in states(1, 20) {
         close(
             force(&rig, &mut tracker, &state)[0],
@@ -247,20 +215,15 @@ fn rods_as_effects_are_rods_as_bodies() {
     let mut plain = crate::common::load("spidermill-full");
     for drive in ["spindle_left", "spindle_right"] {
         let values = [("m", 8.0), ("c", 0.45), ("I", 8.0 * 0.81 / 12.0)];
-        plain.effects.push(
-            plain
-                .effect("rod_inertia", &[drive], &values)
-                .expect("a rod"),
-        );
+        plain
+            .effects
+            .push(plain.effect("rod_inertia", &[drive], &values).expect("a rod"));
     }
     let run = crate::common::shortened(&crate::common::bundled("with-rods-fit"), 300);
     let trajectory = crate::common::trajectory(&run, &["theta1", "theta2"]);
     let along = |rig: &Rig| {
         let instants = forces_along(rig, &trajectory, trajectory.time(), || {}).expect("forces");
-        let forces: Vec<f64> = instants
-            .into_iter()
-            .flat_map(|instant| instant.forces)
-            .collect();
+        let forces: Vec<f64> = instants.into_iter().flat_map(|instant| instant.forces).collect();
         forces
     };
     let error = crate::common::relative_rms(&along(&plain), &along(&whole));
@@ -271,12 +234,10 @@ fn rods_as_effects_are_rods_as_bodies() {
 #[test]
 fn a_delay_shifts_the_forces_alone() {
     let mut rig = cart();
-    rig.effects.push(
-        rig.effect("time_delay", &["force"], &[("T", 0.02)])
-            .expect("an effect"),
-    );
+    rig.effects
+        .push(rig.effect("time_delay", &["force"], &[("T", 0.02)]).expect("an effect"));
     let time: Vec<f64> = (0..200).map(|i| f64::from(i) * 0.005).collect();
-    let z = |t: f64| State {
+    let z = |t: f64| RigState {
         q: vec![(3.0 * t).sin()],
         qd: vec![3.0 * (3.0 * t).cos()],
         qdd: vec![-9.0 * (3.0 * t).sin()],
@@ -303,27 +264,13 @@ fn faulty_effects_are_named() {
     };
     assert!(says("magic", &["motor"], &[]).contains("`viscous_friction`"));
     assert!(says("viscous_friction", &["motor"], &[]).contains("lacks the value `Fv`"));
-    assert!(
-        says("viscous_friction", &["end"], &[("Fv", 1.0)])
-            .contains("known are `motor`, `q`, `hinge`")
-    );
+    assert!(says("viscous_friction", &["end"], &[("Fv", 1.0)]).contains("known are `motor`, `q`, `hinge`"));
     assert!(says("viscous_friction", &["motor"], &[("Fv", f64::NAN)]).contains("finite"));
-    assert!(
-        says("stribeck_friction", &["motor"], &[("Fs", 1.0), ("vs", 0.0)]).contains("above zero")
-    );
-    assert!(
-        says("viscous_friction", &["motor"], &[("Fv", 1.0), ("fv", 1.0)]).contains("no value `fv`")
-    );
+    assert!(says("stribeck_friction", &["motor"], &[("Fs", 1.0), ("vs", 0.0)]).contains("above zero"));
+    assert!(says("viscous_friction", &["motor"], &[("Fv", 1.0), ("fv", 1.0)]).contains("no value `fv`"));
     assert!(says("coupled_drive", &["motor"], &[]).contains("two drives"));
-    assert!(
-        says(
-            "rod_inertia",
-            &["motor"],
-            &[("m", 1.0), ("c", 0.1), ("I", 0.1)]
-        )
-        .contains("linear drive")
-    );
-    assert!(says("load_friction", &["hinge"], &[("mu", 0.1)]).contains("whose load is known"));
+    assert!(says("rod_inertia", &["motor"], &[("m", 1.0), ("c", 0.1), ("I", 0.1)]).contains("linear drive"));
+    assert!(says("load_friction", &["hinge"], &[("mu", 0.1)]).contains("its load is known"));
     assert!(says("point_mass", &[], &[("m", 0.1)]).contains("a point of a body"));
     let two = says("force_ripple", &["nowhere"], &[("pitch", -1.0)]);
     assert_eq!(two.lines().count(), 2, "{two}");
@@ -334,17 +281,9 @@ fn faulty_effects_are_named() {
 fn missing_derivatives_are_found() {
     let time: Vec<f64> = (0..500).map(|i| f64::from(i) * 0.004).collect();
     let q: Vec<f64> = time.iter().map(|t| 0.3 * (2.0 * t).sin()).collect();
-    let samples = vec![Samples {
-        q,
-        qd: None,
-        qdd: None,
-    }];
+    let samples = vec![CoordinateSamples { q, qd: None, qdd: None }];
     let trajectory = Trajectory::new(time.clone(), samples).expect("a trajectory");
     for instant in forces_along(&cart(), &trajectory, &time, || {}).expect("forces") {
-        close(
-            instant.forces[0],
-            2.0 * (9.81 - 4.0 * instant.state.q[0]),
-            1e-5,
-        );
+        close(instant.forces[0], 2.0 * (9.81 - 4.0 * instant.state.q[0]), 1e-5);
     }
 }

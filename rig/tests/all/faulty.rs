@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use modelmill_boundary::files::{Disk, Files, Memory};
-use modelmill_rig::{Tracker, load};
+use modelmill_boundary::files::{DiskFiles, FileSource, MemoryFiles};
+use modelmill_rig::{RigTracker, load};
 
 fn folder() -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/faulty")
@@ -12,20 +12,19 @@ fn folder() -> std::path::PathBuf {
 /// Reads a fixture under the path that messages should show, and stands the rig up if it can be read.
 fn message(name: &str) -> String {
     let text = std::fs::read_to_string(folder().join(name)).expect("a fixture");
-    let paths = Disk::default().list(&folder()).expect("fixtures");
+    let paths = DiskFiles::default().list(&folder()).expect("fixtures");
     let files = paths.iter().filter(|path| path.is_file());
-    let files = files.fold(Memory::default(), |files, path| {
+    let files = files.fold(MemoryFiles::default(), |files, path| {
         let name = path.file_name().expect("a name");
-        files.with(name, std::fs::read(path).expect("a fixture"))
+        files.with_file(name, std::fs::read(path).expect("a fixture"))
     });
     match load(name, &text, &files) {
-        Ok(loaded) => match Tracker::new(&loaded.rig) {
+        Ok(loaded) => match RigTracker::new(&loaded.rig) {
             Ok(_) => panic!("{name} has no fault"),
             Err(error) => format!("{error}\n"),
         },
         Err(failure) => {
-            let named =
-                |found: &modelmill_spec::Diagnostic| found.span.is_some() || name == "empty.toml";
+            let named = |found: &modelmill_spec::Diagnostic| found.span.is_some() || name == "empty.toml";
             assert!(
                 failure.diagnostics.iter().all(named),
                 "{name}: a finding without its place"
@@ -39,13 +38,7 @@ fn message(name: &str) -> String {
 fn messages() {
     let mut names: Vec<String> = std::fs::read_dir(folder())
         .expect("fixtures")
-        .map(|entry| {
-            entry
-                .expect("a file")
-                .file_name()
-                .to_string_lossy()
-                .into_owned()
-        })
+        .map(|entry| entry.expect("a file").file_name().to_string_lossy().into_owned())
         .filter(|name| Path::new(name).extension().is_some_and(|end| end == "toml"))
         .collect();
     names.sort();
@@ -60,25 +53,15 @@ fn messages() {
 #[test]
 fn a_file_that_cannot_be_read() {
     let failure = modelmill_rig::load_file(Path::new("no/such/rig.toml")).expect_err("no file");
-    assert!(
-        failure
-            .render(false)
-            .contains("cannot read `no/such/rig.toml`")
-    );
+    assert!(failure.render(false).contains("cannot read `no/such/rig.toml`"));
 }
 
 #[test]
 fn a_file_of_megabytes_and_one_of_nonsense() {
-    let none = &Memory::default();
+    let none = &MemoryFiles::default();
     let huge = load("rig.toml", &"x".repeat(5 << 20), none).expect_err("too large");
     assert!(huge.render(false).contains("too large"));
-    for text in [
-        "\u{0}\u{1}",
-        "= = =",
-        "schema = 1\nname = 1",
-        "[[[[",
-        "name = \"\\q\"",
-    ] {
+    for text in ["\u{0}\u{1}", "= = =", "schema = 1\nname = 1", "[[[[", "name = \"\\q\""] {
         assert!(load("rig.toml", text, none).is_err(), "{text:?}");
     }
 }
@@ -86,10 +69,9 @@ fn a_file_of_megabytes_and_one_of_nonsense() {
 /// Files that someone is still writing: cut anywhere, or with a line left out, they give an answer and no panic.
 #[test]
 fn unfinished_files_give_an_answer() {
-    let path =
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("../model-spec/rigs/spidermill-full.toml");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../model-spec/rigs/spidermill-full.toml");
     let text = std::fs::read_to_string(path).expect("a rig");
-    let none = &Memory::default();
+    let none = &MemoryFiles::default();
     let mut sound = 0;
     let lines: Vec<&str> = text.lines().collect();
     let without = (0..lines.len())
@@ -101,7 +83,7 @@ fn unfinished_files_give_an_answer() {
     for unfinished in without.chain(cut) {
         match load("rig.toml", &unfinished, none) {
             // A comment that is missing does no harm; a joint that is missing may leave a body free.
-            Ok(loaded) => sound += usize::from(Tracker::new(&loaded.rig).is_ok()),
+            Ok(loaded) => sound += usize::from(RigTracker::new(&loaded.rig).is_ok()),
             Err(failure) => assert!(!failure.render(false).is_empty()),
         }
     }

@@ -1,7 +1,7 @@
 //! Small machines against formulas that were derived by hand with Lagrange's equations.
 
 use crate::common::{close, force, rig, states};
-use modelmill_rig::{Rig, State, Tracker, energy, forces};
+use modelmill_rig::{Rig, RigState, RigTracker, energy, forces};
 
 const G: f64 = 9.81;
 
@@ -37,7 +37,7 @@ fn a_pendulum() {
         coordinate = [{ name = "q", joint = "hinge" }]
         drive = [{ name = "motor", joint = "hinge" }]
     "#);
-    let mut tracker = Tracker::new(&rig).expect("a pose");
+    let mut tracker = RigTracker::new(&rig).expect("a pose");
     for state in states(1, 30) {
         let (q, qdd) = (state.q[0], state.qdd[0]);
         let inertia = 0.1 + 2.0 * (0.25 + 0.01);
@@ -49,7 +49,7 @@ fn a_pendulum() {
 #[test]
 fn a_slider_crank() {
     let rig = slider_crank();
-    let mut tracker = Tracker::new(&rig).expect("a pose");
+    let mut tracker = RigTracker::new(&rig).expect("a pose");
     let (r, l): (f64, f64) = (0.3, 0.8);
     for state in states(1, 30) {
         let (q, qd, qdd) = (3.0 * state.q[0], state.qd[0], state.qdd[0]);
@@ -59,16 +59,12 @@ fn a_slider_crank() {
         let bend = -r * c - r * r * (c * c - s * s) / root - (r * r * s * c).powi(2) / root.powi(3);
         let slider = 3.0 * (slope * qdd + bend * qd * qd) * slope;
         let pin = 0.7 * (r * r * qdd + G * r * c);
-        let state = State {
+        let state = RigState {
             q: vec![q],
             qd: vec![qd],
             qdd: vec![qdd],
         };
-        close(
-            force(&rig, &mut tracker, &state)[0],
-            0.2 * qdd + slider + pin,
-            1e-10,
-        );
+        close(force(&rig, &mut tracker, &state)[0], 0.2 * qdd + slider + pin, 1e-10);
     }
 }
 
@@ -88,7 +84,7 @@ fn a_head_that_pans_and_tilts() {
         coordinate = [{ name = "a", joint = "pan" }, { name = "b", joint = "tilt" }]
         drive = [{ name = "pan_motor", joint = "pan" }, { name = "tilt_motor", joint = "tilt" }]
     "#);
-    let mut tracker = Tracker::new(&rig).expect("a pose");
+    let mut tracker = RigTracker::new(&rig).expect("a pose");
     for state in states(2, 30) {
         let b = state.q[1];
         let (ad, bd, add, bdd) = (state.qd[0], state.qd[1], state.qdd[0], state.qdd[1]);
@@ -128,9 +124,9 @@ fn a_cylindrical_joint_has_two_freedoms() {
             { name = "pull", linear = { from = "wall", to = "side" } },
         ]
     "#);
-    let mut tracker = Tracker::new(&rig).expect("a pose");
+    let mut tracker = RigTracker::new(&rig).expect("a pose");
     // Sinking by 2 m/s^2 without turning; the rope's length follows from rope^2 = 1 + (2 - height)^2, angle 0.
-    let state = State {
+    let state = RigState {
         q: vec![2.0, 1.0],
         qd: vec![0.0, 0.0],
         qdd: vec![2.0, 0.0],
@@ -146,15 +142,9 @@ fn a_cylindrical_joint_has_two_freedoms() {
 fn power_balances_energy() {
     let mut rig = crate::common::load("spidermill-with-rods");
     let motion = |t: f64| {
-        let wave = |a: f64, w: f64| {
-            [
-                a * (w * t).sin(),
-                a * w * (w * t).cos(),
-                -a * w * w * (w * t).sin(),
-            ]
-        };
+        let wave = |a: f64, w: f64| [a * (w * t).sin(), a * w * (w * t).cos(), -a * w * w * (w * t).sin()];
         let [one, two] = [wave(0.2, 3.0), wave(-0.15, 4.0)];
-        State {
+        RigState {
             q: vec![1.8 + one[0], 1.341_592_653_589_793 + two[0]],
             qd: vec![one[1], two[1]],
             qdd: vec![one[2], two[2]],
@@ -163,33 +153,24 @@ fn power_balances_energy() {
     for (kind, at, values) in [
         ("point_mass", "R3m", vec![("m", 5.0)]),
         ("gravity_tilt", "base", vec![("tz", 0.05)]),
-        (
-            "rod_inertia",
-            "spindle_left",
-            vec![("m", 4.0), ("c", 0.3), ("I", 0.2)],
-        ),
+        ("rod_inertia", "spindle_left", vec![("m", 4.0), ("c", 0.3), ("I", 0.2)]),
         ("viscous_friction", "spindle_right", vec![("Fv", 900.0)]),
-        (
-            "viscous_friction",
-            "coupler_left_beside",
-            vec![("Fv", 30.0)],
-        ),
+        ("viscous_friction", "coupler_left_beside", vec![("Fv", 30.0)]),
     ] {
         let effect = rig.effect(kind, &[at], &values).expect("an effect");
         rig.effects.push(effect);
     }
-    let mut tracker = Tracker::new(&rig).expect("a pose");
+    let mut tracker = RigTracker::new(&rig).expect("a pose");
     let h = 1e-3;
     let mut largest: f64 = 0.0;
     for t in [0.1, 0.45, 0.7, 1.3] {
         let mut at = |t: f64| tracker.follow(&motion(t)).expect("inside the workspace");
         let energies = [-2.0, -1.0, 1.0, 2.0].map(|k| energy(&rig, &at(t + k * h)));
-        let growth =
-            (energies[0] - 8.0 * energies[1] + 8.0 * energies[2] - energies[3]) / (12.0 * h);
+        let growth = (energies[0] - 8.0 * energies[1] + 8.0 * energies[2] - energies[3]) / (12.0 * h);
         let now = at(t);
         let mut balance = -growth;
         for (force, place) in forces(&rig, &now).expect("forces").iter().zip([0, 1]) {
-            let rate = modelmill_rig::measured(&rig, modelmill_rig::Place::Drive(place), &now)
+            let rate = modelmill_rig::place_motion(&rig, modelmill_rig::RigPlace::Drive(place), &now)
                 .expect("a drive")
                 .rate;
             balance += force * rate;
@@ -198,15 +179,12 @@ fn power_balances_energy() {
         for (effect, coefficient) in [(3, 900.0), (4, 30.0)] {
             let place = rig.effects[effect].places[0];
             balance -= coefficient
-                * modelmill_rig::measured(&rig, place, &now)
+                * modelmill_rig::place_motion(&rig, place, &now)
                     .expect("a place")
                     .rate
                     .powi(2);
         }
-        assert!(
-            balance.abs() < 1e-6 * largest,
-            "{balance} of {largest} at {t}"
-        );
+        assert!(balance.abs() < 1e-6 * largest, "{balance} of {largest} at {t}");
     }
 }
 
@@ -215,16 +193,13 @@ fn power_balances_energy() {
 #[test]
 fn the_past_of_a_tracker_does_not_show() {
     let rig = crate::common::load("spidermill-with-rods");
-    let fresh = Tracker::new(&rig).expect("a pose");
+    let fresh = RigTracker::new(&rig).expect("a pose");
     let mut used = fresh.clone();
     for (i, draw) in states(2, 40).into_iter().enumerate() {
         // Jumps across the workspace, and between them steps as small as those of a recording.
         let reach = if i % 4 == 0 { 0.6 } else { 0.004 };
-        let state = State {
-            q: vec![
-                1.8 + reach * draw.q[0],
-                1.341_592_653_589_793 + reach * draw.q[1],
-            ],
+        let state = RigState {
+            q: vec![1.8 + reach * draw.q[0], 1.341_592_653_589_793 + reach * draw.q[1]],
             ..draw
         };
         let kept = force(&rig, &mut used, &state);

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use modelmill_rig::{Plant, PlantError, Rig, State, Tracker, energy, forces, load_file};
+use modelmill_rig::{PlantError, Rig, RigPlant, RigState, RigTracker, energy, forces, load_file};
 
 fn rig(name: &str) -> Rig {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../model-spec/rigs");
@@ -16,24 +16,18 @@ fn rig(name: &str) -> Rig {
 fn accelerations_are_those_whose_forces_were_given() {
     // With rods and dry friction: forces depend on rates and accelerations in many ways.
     let rig = rig("spidermill-worn");
-    for (k, qdd) in [[0.0, 0.0], [3.0, -1.0], [-7.0, 12.0]]
-        .into_iter()
-        .enumerate()
-    {
-        let state = State {
+    for (k, qdd) in [[0.0, 0.0], [3.0, -1.0], [-7.0, 12.0]].into_iter().enumerate() {
+        let state = RigState {
             q: vec![1.8 + 0.05 * k as f64, 1.34],
             qd: vec![0.4, -0.3],
             qdd: qdd.to_vec(),
         };
-        let motion = Tracker::new(&rig).unwrap().follow(&state).unwrap();
+        let motion = RigTracker::new(&rig).unwrap().follow(&state).unwrap();
         let given = forces(&rig, &motion).unwrap();
-        let mut plant = Plant::new(&rig, &state.q, &state.qd).unwrap();
+        let mut plant = RigPlant::new(&rig, &state.q, &state.qd).unwrap();
         let found = plant.accelerations(&given).unwrap();
         for (found, expected) in found.iter().zip(qdd) {
-            assert!(
-                (found - expected).abs() < 1e-8,
-                "{found} instead of {expected}"
-            );
+            assert!((found - expected).abs() < 1e-8, "{found} instead of {expected}");
         }
     }
 }
@@ -43,8 +37,8 @@ fn accelerations_are_those_whose_forces_were_given() {
 fn what_moves_by_itself_keeps_its_energy() {
     let rig = rig("spidermill-full");
     let drift = |dt: f64| {
-        let mut plant = Plant::new(&rig, &[1.8, 1.341_593], &[0.3, -0.2]).unwrap();
-        let of = |plant: &mut Plant<'_>| energy(&rig, &plant.motion(&[0.0, 0.0]).unwrap());
+        let mut plant = RigPlant::new(&rig, &[1.8, 1.341_593], &[0.3, -0.2]).unwrap();
+        let of = |plant: &mut RigPlant<'_>| energy(&rig, &plant.motion(&[0.0, 0.0]).unwrap());
         let before = of(&mut plant);
         let mut t = 0.0;
         while t < 0.1 - 1e-9 {
@@ -62,13 +56,10 @@ fn what_moves_by_itself_keeps_its_energy() {
 #[test]
 fn forces_of_another_number_are_refused() {
     let rig = rig("spidermill-full");
-    let mut plant = Plant::new(&rig, &[1.8, 1.341_593], &[0.0, 0.0]).unwrap();
-    let fault = PlantError::Count {
-        found: 1,
-        expected: 2,
-    };
+    let mut plant = RigPlant::new(&rig, &[1.8, 1.341_593], &[0.0, 0.0]).unwrap();
+    let fault = PlantError::Count { found: 1, expected: 2 };
     assert_eq!(plant.step(&[0.0], 0.01), Err(fault.clone()));
-    assert_eq!(Plant::new(&rig, &[1.8], &[0.0, 0.0]).err(), Some(fault));
-    let far = Plant::new(&rig, &[1.8, 5.0], &[0.0, 0.0]).err();
+    assert_eq!(RigPlant::new(&rig, &[1.8], &[0.0, 0.0]).err(), Some(fault));
+    let far = RigPlant::new(&rig, &[1.8, 5.0], &[0.0, 0.0]).err();
     assert!(matches!(far, Some(PlantError::Pose(_))), "{far:?}");
 }

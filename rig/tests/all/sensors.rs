@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use crate::common::{close, column, rig};
-use modelmill_rig::{Rig, Run, State, Trajectory, simulate};
+use modelmill_rig::{Rig, RigRecording, RigState, Trajectory, simulate};
 
 fn pendulum(sensors: &str) -> Rig {
     rig(&format!(
@@ -20,7 +20,7 @@ fn pendulum(sensors: &str) -> Rig {
 
 fn swing(n: u32) -> Trajectory {
     let time = (0..n).map(|i| f64::from(i) * 0.004).collect();
-    Trajectory::from_function(time, |t| State {
+    Trajectory::from_function(time, |t| RigState {
         q: vec![0.6 * (2.0 * t).sin()],
         qd: vec![1.2 * (2.0 * t).cos()],
         qdd: vec![-2.4 * (2.0 * t).sin()],
@@ -28,7 +28,7 @@ fn swing(n: u32) -> Trajectory {
     .expect("a trajectory")
 }
 
-fn run(rig: &Rig, trajectory: &Trajectory, seed: Option<u64>) -> Run {
+fn run(rig: &Rig, trajectory: &Trajectory, seed: Option<u64>) -> RigRecording {
     simulate(rig, trajectory, seed, || {}).expect("a run")
 }
 
@@ -67,7 +67,7 @@ fn noise_is_seeded_and_has_its_deviation() {
         run(&rig, &swing(4000), Some(4)),
     );
     assert_eq!(one, again);
-    let errors = |made: &Run| -> Vec<f64> {
+    let errors = |made: &RigRecording| -> Vec<f64> {
         let ideal = column(&ideal.columns, "motor");
         column(&made.columns, "motor")
             .iter()
@@ -77,26 +77,18 @@ fn noise_is_seeded_and_has_its_deviation() {
     };
     let (first, second) = (errors(&one), errors(&other));
     for errors in [&first, &second] {
-        assert!(
-            (deviation(errors) / 1.5 - 1.0).abs() < 0.05,
-            "{}",
-            deviation(errors)
-        );
+        assert!((deviation(errors) / 1.5 - 1.0).abs() < 0.05, "{}", deviation(errors));
     }
     let product: f64 = first.iter().zip(&second).map(|(x, y)| x * y).sum::<f64>() / 4000.0;
-    assert!(
-        product.abs() < 0.1 * 2.25,
-        "different seeds are independent: {product}"
-    );
+    assert!(product.abs() < 0.1 * 2.25, "different seeds are independent: {product}");
     // Exact positions stay exact: noise of one channel does not leak into another.
     assert_eq!(column(&one.columns, "q"), column(&ideal.columns, "q"));
 }
 
 #[test]
 fn currents_are_quantised() {
-    let rig = pendulum(
-        "force_sensor = [{ of = [\"motor\"], current = { force_per_ampere = 0.5, resolution = 0.25 } }]",
-    );
+    let rig =
+        pendulum("force_sensor = [{ of = [\"motor\"], current = { force_per_ampere = 0.5, resolution = 0.25 } }]");
     let made = run(&rig, &swing(500), None);
     let exact = run(&pendulum(""), &swing(500), None);
     for (read, exact) in column(&made.columns, "motor")
@@ -110,37 +102,21 @@ fn currents_are_quantised() {
 
 #[test]
 fn samples_come_at_their_rate_and_sensors_lag() {
-    let rig = pendulum(
-        "sampling = { rate = 100.0, derivatives = true }\nencoder = [{ of = [\"q\"], delay = 0.015 }]",
-    );
+    let rig = pendulum("sampling = { rate = 100.0, derivatives = true }\nencoder = [{ of = [\"q\"], delay = 0.015 }]");
     let made = run(&rig, &swing(1000), None);
     let t = column(&made.columns, "t");
     assert_eq!(t.len(), 398, "0.02 s to 3.99 s");
     assert!(
-        made.notes
-            .iter()
-            .any(|note| note.contains("first 2 samples")),
+        made.notes.iter().any(|note| note.contains("first 2 samples")),
         "{:?}",
         made.notes
     );
     for (i, t) in t.iter().enumerate() {
         close(*t, 0.02 + 0.01 * i as f64, 1e-12);
-        close(
-            column(&made.columns, "q")[i],
-            0.6 * (2.0 * (t - 0.015)).sin(),
-            1e-9,
-        );
-        close(
-            column(&made.columns, "q_d")[i],
-            1.2 * (2.0 * (t - 0.015)).cos(),
-            1e-6,
-        );
+        close(column(&made.columns, "q")[i], 0.6 * (2.0 * (t - 0.015)).sin(), 1e-9);
+        close(column(&made.columns, "q_d")[i], 1.2 * (2.0 * (t - 0.015)).cos(), 1e-6);
         let (q, qdd) = (0.6 * (2.0 * t).sin(), -2.4 * (2.0 * t).sin());
-        close(
-            column(&made.columns, "motor")[i],
-            0.6 * qdd + 9.81 * q.cos(),
-            1e-6,
-        );
+        close(column(&made.columns, "motor")[i], 0.6 * qdd + 9.81 * q.cos(), 1e-6);
     }
 }
 
@@ -151,11 +127,9 @@ fn runs_that_cannot_be_are_refused() {
             .expect_err("a fault")
             .to_string()
     };
-    assert!(
-        says("encoder = [{ of = [\"q\"], delay = 9 }]", &swing(100)).contains("shorten the delay")
-    );
+    assert!(says("encoder = [{ of = [\"q\"], delay = 9 }]", &swing(100)).contains("shorten the delay"));
     assert!(says("sampling = { rate = 1e12 }", &swing(100)).contains("lower the rate"));
-    let two = Trajectory::from_function(vec![0.0], |_| State {
+    let two = Trajectory::from_function(vec![0.0], |_| RigState {
         q: vec![0.0; 2],
         qd: vec![0.0; 2],
         qdd: vec![0.0; 2],

@@ -44,11 +44,7 @@ fn the_groups_reduce_to_table_1() {
     let rig = load("spidermill-full");
     let sums = |names: &[&str]| {
         let mut sums = [0.0; 4];
-        for body in rig
-            .bodies
-            .iter()
-            .filter(|body| names.contains(&body.name.as_str()))
-        {
+        for body in rig.bodies.iter().filter(|body| names.contains(&body.name.as_str())) {
             let (m, c) = (body.mass, body.centre);
             let second = body.inertia[(2, 2)] + m * (c.x * c.x + c.y * c.y);
             for (sum, part) in sums.iter_mut().zip([m, m * c.x, m * c.y, second]) {
@@ -56,12 +52,7 @@ fn the_groups_reduce_to_table_1() {
             }
         }
         let centre = sums[1] / sums[0];
-        [
-            sums[0],
-            centre,
-            sums[2] / sums[0],
-            sums[3] - sums[0] * centre * centre,
-        ]
+        [sums[0], centre, sums[2] / sums[0], sums[3] - sums[0] * centre * centre]
     };
     let close = |found: [f64; 4], expected: [f64; 4]| {
         for (x, y) in found.iter().zip(expected) {
@@ -75,11 +66,7 @@ fn the_groups_reduce_to_table_1() {
         close(sums(&couplers), [14.5773, 0.515, 0.0, 1.6173]);
     }
     for (name, mass) in [("G2", 7.9538), ("G6", 7.9538), ("G4", 12.4560)] {
-        let body = rig
-            .bodies
-            .iter()
-            .find(|body| body.name == name)
-            .expect(name);
+        let body = rig.bodies.iter().find(|body| body.name == name).expect(name);
         assert!((body.mass - mass).abs() < 1e-12, "{name}");
     }
     assert_eq!(rig.bodies.len(), 11);
@@ -111,6 +98,6 @@ fn a_run_has_the_columns_of_a_recording() {
     );
     assert_eq!(
         made.columns[1].1[7].to_bits(),
-        trajectory.at(short.time()[7]).q[0].to_bits()
+        trajectory.state_at(short.time()[7]).q[0].to_bits()
     );
 }

@@ -1,37 +1,38 @@
-//! What a window says of a change of the parameters against a reference, a row at a time.
+//! Test of a window for a change of the parameters against a reference, one row per step.
 //!
-//! Rows of the reference know the parameters p, those of the window p + d. Turning the rows of the window into the triangle
-//! of both takes p out of them; what is left of them speaks of the change d alone, with what either side does not know
-//! of p allowed for. A change of parameter j alone then explains `(m_j' z)^2 / m_j' m_j` of the squares, with the columns
-//! m of what is left and its values z.
+//! Rows of the reference have the parameters p, those of the window p + d. Rotating the rows of the window into the
+//! common R factor eliminates p from them. The remaining rows depend on the change d alone and account for the
+//! uncertainty of p on both sides. A change of parameter j alone then explains `(m_j' z)^2 / m_j' m_j` of their
+//! squares, with the columns m of the remaining rows and their values z.
 
-use super::estimator::{Estimator, rotation, turn};
+use super::estimator::{RecursiveEstimator, givens_rotation, rotate_rows};
 use crate::Real;
 
-/// The elimination in the making; each call of [`Self::advance`] does one row of `NB`.
+/// State of the elimination; each call of [`Self::advance`] processes one row of `NB`.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Comparison<T, const NB: usize> {
-    /// The triangle of both in p, its part in d, and its values.
+pub(super) struct WindowComparison<T, const NB: usize> {
+    /// The common R factor in p, its columns in d, and its right-hand side.
     both: [[T; NB]; NB],
     change: [[T; NB]; NB],
     values: [T; NB],
-    /// Rows of the window; those before `next` are what is left of them.
+    /// Rows of the window; rows before `next` are those that remain after the elimination of p.
     window: [[T; NB]; NB],
     window_values: [T; NB],
+    /// First row that is not processed yet; `NB` if there is none.
     next: usize,
 }
 
-/// A change of one parameter alone, in units of whitened rows.
+/// Score of a change of one parameter alone, in units of whitened rows.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Single<T> {
-    /// Information of the window on the change.
+pub(super) struct ChangeScore<T> {
+    /// Information of the window on the change: one over its variance.
     pub(super) information: T,
-    /// The change times that.
+    /// Estimated change times its information.
     pub(super) score: T,
 }
 
-impl<T: Real> Single<T> {
-    /// Squares that the change explains; 0 where nothing is known of it.
+impl<T: Real> ChangeScore<T> {
+    /// Squares that the change explains; 0 without information.
     pub(super) fn gain(&self) -> T {
         let zero = T::from_f64(0.0);
         if self.information > zero {
@@ -42,9 +43,9 @@ impl<T: Real> Single<T> {
     }
 }
 
-impl<T: Real, const NB: usize> Comparison<T, NB> {
-    /// There is nothing to compare.
-    pub(super) fn idle() -> Self {
+impl<T: Real, const NB: usize> WindowComparison<T, NB> {
+    /// A comparison with nothing to do.
+    pub(super) fn new_idle() -> Self {
         let zero = T::from_f64(0.0);
         let zeros = [[zero; NB]; NB];
         Self {
@@ -57,8 +58,8 @@ impl<T: Real, const NB: usize> Comparison<T, NB> {
         }
     }
 
-    /// Begins with a window and a reference as they are now.
-    pub(super) fn start(&mut self, reference: &Estimator<T, NB>, window: &Estimator<T, NB>) {
+    /// Starts with copies of a window and a reference.
+    pub(super) fn start(&mut self, reference: &RecursiveEstimator<T, NB>, window: &RecursiveEstimator<T, NB>) {
         self.both = reference.rows;
         self.values = reference.values;
         self.change = [[T::from_f64(0.0); NB]; NB];
@@ -67,7 +68,7 @@ impl<T: Real, const NB: usize> Comparison<T, NB> {
         self.next = 0;
     }
 
-    /// Does one row; true where it was the last.
+    /// Processes one row; true if it was the last.
     pub(super) fn advance(&mut self) -> bool {
         let place = self.next;
         let rows = self.window.get_mut(place);
@@ -77,13 +78,13 @@ impl<T: Real, const NB: usize> Comparison<T, NB> {
         let (mut common, mut own) = (*row, *row);
         let triangle = self.both.iter_mut().zip(&mut self.change);
         let triangle = triangle.zip(&mut self.values).enumerate();
-        // Above the row's place the window has zeros.
+        // Entries of the window before the diagonal are zero.
         for (k, ((both, change), both_value)) in triangle.skip(place) {
-            let Some((c, s)) = rotation(both, &common, k) else {
+            let Some((c, s)) = givens_rotation(both, &common, k) else {
                 continue;
             };
-            turn(c, s, both, &mut common, k);
-            turn(c, s, change, &mut own, 0);
+            rotate_rows(c, s, both, &mut common, k);
+            rotate_rows(c, s, change, &mut own, 0);
             (*both_value, *value) = (c * *both_value + s * *value, c * *value - s * *both_value);
         }
         *row = own;
@@ -91,17 +92,17 @@ impl<T: Real, const NB: usize> Comparison<T, NB> {
         self.next == NB
     }
 
-    /// Whether a comparison is in the making.
+    /// Whether rows are still to be processed.
     pub(super) fn is_busy(&self) -> bool {
         self.next < NB
     }
 
-    /// What is left of the window: a change of each parameter alone.
+    /// Score of a change of each parameter alone, from the remaining rows of the window.
     ///
-    /// `alone` is the information of the window: what is no more than rounding beside it is none.
-    pub(super) fn singles(&self, alone: &[T; NB]) -> [Single<T>; NB] {
+    /// `alone` is the information of the window; a share of it within rounding counts as none.
+    pub(super) fn single_changes(&self, alone: &[T; NB]) -> [ChangeScore<T>; NB] {
         let zero = T::from_f64(0.0);
-        let mut singles = [Single {
+        let mut singles = [ChangeScore {
             information: zero,
             score: zero,
         }; NB];
@@ -113,7 +114,7 @@ impl<T: Real, const NB: usize> Comparison<T, NB> {
         }
         let rounding = T::epsilon().sqrt();
         for (single, alone) in singles.iter_mut().zip(alone) {
-            // What is no number is not more either.
+            // Written so that NaN counts as unknown.
             let is_known = single.information > rounding * *alone;
             if !is_known {
                 (single.information, single.score) = (zero, zero);
@@ -122,8 +123,8 @@ impl<T: Real, const NB: usize> Comparison<T, NB> {
         singles
     }
 
-    /// The same for a further change besides that of parameter `first`.
-    pub(super) fn besides(&self, first: usize, singles: &[Single<T>; NB]) -> [Single<T>; NB] {
+    /// The same for a second change in addition to that of parameter `first`.
+    pub(super) fn second_changes(&self, first: usize, singles: &[ChangeScore<T>; NB]) -> [ChangeScore<T>; NB] {
         let zero = T::from_f64(0.0);
         let mut common = [zero; NB];
         for row in &self.window {
@@ -139,7 +140,7 @@ impl<T: Real, const NB: usize> Comparison<T, NB> {
         for ((single, shared), k) in rest.iter_mut().zip(&common).zip(0..) {
             let share = *shared / known.information;
             let information = single.information - share * *shared;
-            // Of what all but coincides with the first nothing can be said.
+            // A change that nearly coincides with the first cannot be distinguished from it.
             let is_apart = k != first && information > T::from_f64(1e-3) * single.information;
             if is_apart {
                 single.score = single.score - share * known.score;
@@ -152,7 +153,7 @@ impl<T: Real, const NB: usize> Comparison<T, NB> {
     }
 
     /// Squares that changes of all parameters together explain.
-    pub(super) fn all(&self) -> T {
+    pub(super) fn total_gain(&self) -> T {
         let squares = self.window_values.iter();
         squares.fold(T::from_f64(0.0), |sum, z| sum + *z * *z)
     }

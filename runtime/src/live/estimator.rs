@@ -1,49 +1,51 @@
-//! Recursive least squares with forgetting, as the triangle of a QR factorisation.
+//! Recursive least squares with forgetting, in the form of the R factor of a QR factorisation.
 //!
-//! Rows are turned into the triangle by rotations (W. Givens 1958; G. Golub, C. Van Loan, Matrix Computations, 6.5). The
-//! triangle is a square root of the information matrix, so that it needs half the digits, and forgetting cannot blow it up
-//! where nothing moves: information of a direction that is not excited fades to zero, and a prior takes its place.
+//! Rotations eliminate each new row against the R factor (W. Givens 1958; G. Golub, C. Van Loan, Matrix Computations,
+//! 6.5). The R factor is a square root of the information matrix, so it needs half the digits. Forgetting cannot make
+//! it grow where nothing moves: the information of a direction that is not excited fades to zero, and a prior takes its
+//! place.
 
 use crate::Real;
 
-/// What is smaller than this has faded and becomes zero, so that no step is slow by numbers below the smallest normal one.
+/// Entries smaller than this become zero, so that no step is slowed down by subnormal numbers.
 const FADED: f64 = 1e-30;
 
 /// Recursive estimator of `NB` parameters with forgetting.
 ///
 /// ```
-/// use modelmill_runtime::live::{Estimator, Prior};
+/// use modelmill_runtime::live::{EstimatorPrior, RecursiveEstimator};
 ///
-/// let mut estimator = Estimator::<f64, 2>::new();
+/// let mut estimator = RecursiveEstimator::<f64, 2>::new();
 /// for (row, value) in [([1.0, 0.0], 3.0), ([1.0, 1.0], 5.0), ([1.0, 2.0], 7.0)] {
 ///     estimator.forget(0.9);
 ///     assert!(estimator.add(row, value));
 /// }
-/// let values = estimator.solve(&Prior::none());
+/// let values = estimator.solve(&EstimatorPrior::uninformative());
 /// assert!((values[0] - 3.0).abs() < 1e-12 && (values[1] - 2.0).abs() < 1e-12);
 /// ```
 #[derive(Clone, Copy, Debug)]
-pub struct Estimator<T, const NB: usize> {
-    /// The upper triangle; below its diagonal stand zeros.
+pub struct RecursiveEstimator<T, const NB: usize> {
+    /// The R factor, upper triangular; entries below its diagonal are zero.
     pub(super) rows: [[T; NB]; NB],
-    /// The right side of each of its rows.
+    /// The right-hand side of each of its rows.
     pub(super) values: [T; NB],
+    /// Sum of squared residuals, faded as the rows are.
     squares: T,
 }
 
-/// What is known of parameters besides the rows: each within a deviation of its own.
+/// Prior knowledge of the parameters: expected values with standard deviations.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Prior<T, const NB: usize> {
+pub struct EstimatorPrior<T, const NB: usize> {
     /// Expected values.
     pub values: [T; NB],
-    /// One over the deviation of each, as a share of the deviation of a row; 0 where nothing is known.
+    /// One over the standard deviation of each, relative to the standard deviation of a row; 0 where nothing is known.
     pub weights: [T; NB],
 }
 
-impl<T: Real, const NB: usize> Prior<T, NB> {
-    /// Nothing is known.
+impl<T: Real, const NB: usize> EstimatorPrior<T, NB> {
+    /// A prior without any information.
     #[must_use]
-    pub fn none() -> Self {
+    pub fn uninformative() -> Self {
         let zeros = [T::from_f64(0.0); NB];
         Self {
             values: zeros,
@@ -52,14 +54,14 @@ impl<T: Real, const NB: usize> Prior<T, NB> {
     }
 }
 
-impl<T: Real, const NB: usize> Default for Estimator<T, NB> {
+impl<T: Real, const NB: usize> Default for RecursiveEstimator<T, NB> {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl<T: Real, const NB: usize> Estimator<T, NB> {
-    /// Knows nothing yet.
+impl<T: Real, const NB: usize> RecursiveEstimator<T, NB> {
+    /// An estimator without any information.
     #[must_use]
     pub fn new() -> Self {
         let zero = T::from_f64(0.0);
@@ -70,13 +72,13 @@ impl<T: Real, const NB: usize> Estimator<T, NB> {
         }
     }
 
-    /// Lets all information fade to this share of itself, between 0 and 1: `exp(-dt/tau)` for a memory of `tau` seconds.
+    /// Multiplies all information by this share, between 0 and 1: `exp(-dt/tau)` for a memory of `tau` seconds.
     pub fn forget(&mut self, share: T) {
-        self.scale(share.sqrt());
+        self.scale_information(share.sqrt());
     }
 
-    /// [`Self::forget`] by the root of the share.
-    pub(super) fn scale(&mut self, root: T) {
+    /// [`Self::forget`] with the root of the share, which multiplies the rows.
+    pub(super) fn scale_information(&mut self, root: T) {
         let faded = T::from_f64(FADED);
         let fade = |x: &mut T| {
             let y = *x * root;
@@ -89,9 +91,10 @@ impl<T: Real, const NB: usize> Estimator<T, NB> {
         self.squares = self.squares * root * root;
     }
 
-    /// Takes a row of the regressor and what was measured for it, both divided by the deviation of the measurement.
+    /// Adds a row of the regressor and the value measured for it, both divided by the standard deviation of the
+    /// measurement.
     ///
-    /// Returns `false`, and takes nothing, where one of the numbers is none.
+    /// Returns `false`, and adds nothing, if one of the numbers is not finite.
     #[must_use = "a row that was not taken is missing"]
     pub fn add(&mut self, mut row: [T; NB], mut value: T) -> bool {
         if !(value.is_finite() && row.iter().all(|x| x.is_finite())) {
@@ -99,21 +102,21 @@ impl<T: Real, const NB: usize> Estimator<T, NB> {
         }
         let triangle = self.rows.iter_mut().zip(&mut self.values);
         for (k, (own, own_value)) in triangle.enumerate() {
-            let Some((c, s)) = rotation(own, &row, k) else {
+            let Some((c, s)) = givens_rotation(own, &row, k) else {
                 continue;
             };
-            turn(c, s, own, &mut row, k);
+            rotate_rows(c, s, own, &mut row, k);
             (*own_value, value) = (c * *own_value + s * value, c * value - s * *own_value);
         }
         self.squares = self.squares + value * value;
         true
     }
 
-    /// The parameters that explain all rows best, with a prior, which does not fade.
+    /// The parameters that explain all rows best, with a prior that does not fade.
     ///
-    /// A parameter of which neither knows anything is 0. Takes a copy of the triangle and `NB` rows more.
+    /// A parameter without any information is 0. Works on a copy of the R factor and adds `NB` rows to it.
     #[must_use]
-    pub fn solve(&self, prior: &Prior<T, NB>) -> [T; NB] {
+    pub fn solve(&self, prior: &EstimatorPrior<T, NB>) -> [T; NB] {
         let zero = T::from_f64(0.0);
         let mut all = *self;
         for (k, (value, weight)) in prior.values.iter().zip(&prior.weights).enumerate() {
@@ -124,7 +127,7 @@ impl<T: Real, const NB: usize> Estimator<T, NB> {
             if let Some(entry) = row.get_mut(k) {
                 *entry = *weight;
             }
-            // A prior that is no number says nothing.
+            // A prior that is not finite is ignored.
             _ = all.add(row, *weight * *value);
         }
         let mut solution = [zero; NB];
@@ -139,13 +142,13 @@ impl<T: Real, const NB: usize> Estimator<T, NB> {
         solution
     }
 
-    /// Sum of the squares that the rows leave of the measured values, faded as they are.
+    /// Sum of squared residuals of the rows, faded as they are.
     #[must_use]
     pub fn sum_of_squares(&self) -> T {
         self.squares
     }
 
-    /// The diagonal of the information matrix: how much is known of each parameter, all others given.
+    /// The diagonal of the information matrix: information on each parameter, all others given.
     #[must_use]
     pub fn information(&self) -> [T; NB] {
         let mut sums = [T::from_f64(0.0); NB];
@@ -158,27 +161,17 @@ impl<T: Real, const NB: usize> Estimator<T, NB> {
     }
 }
 
-/// Cosine and sine of the rotation that turns entry `k` of a row into the triangle's own; none where it is zero already.
-pub(super) fn rotation<T: Real, const N: usize>(
-    own: &[T; N],
-    row: &[T; N],
-    k: usize,
-) -> Option<(T, T)> {
+/// Cosine and sine of the rotation that eliminates entry `k` of a row with that of the R factor; `None` if it is zero.
+pub(super) fn givens_rotation<T: Real, const N: usize>(own: &[T; N], row: &[T; N], k: usize) -> Option<(T, T)> {
     let (a, b) = (*own.get(k)?, *row.get(k)?);
     let length = (a * a + b * b).sqrt();
-    // Squares of what is very small are zero.
+    // The squares of very small numbers underflow to zero.
     (b != T::from_f64(0.0) && length > T::from_f64(0.0)).then(|| (a / length, b / length))
 }
 
-/// Turns two rows into each other, from entry `from` on.
+/// Rotates two rows in their plane, from entry `from` on.
 #[inline]
-pub(super) fn turn<T: Real, const N: usize>(
-    c: T,
-    s: T,
-    own: &mut [T; N],
-    row: &mut [T; N],
-    from: usize,
-) {
+pub(super) fn rotate_rows<T: Real, const N: usize>(c: T, s: T, own: &mut [T; N], row: &mut [T; N], from: usize) {
     let (Some(own), Some(row)) = (own.get_mut(from..), row.get_mut(from..)) else {
         return;
     };
@@ -196,20 +189,13 @@ mod tests {
 
     /// Rows and values from a seed.
     fn sample(random: &mut Random) -> ([f64; N], f64) {
-        let row = core::array::from_fn(|_| random.between(-1.0, 1.0));
-        let noise = random.between(-0.3, 0.3);
-        (
-            row,
-            row[0] - 2.0 * row[1] + 0.5 * row[2] + 3.0 * row[3] + noise,
-        )
+        let row = core::array::from_fn(|_| random.uniform(-1.0, 1.0));
+        let noise = random.uniform(-0.3, 0.3);
+        (row, row[0] - 2.0 * row[1] + 0.5 * row[2] + 3.0 * row[3] + noise)
     }
 
     /// The normal equations of weighted rows and a prior, by the elimination of the runtime.
-    fn batch(
-        rows: &[([f64; N], f64)],
-        weight: impl Fn(usize) -> f64,
-        prior: &Prior<f64, N>,
-    ) -> [f64; N] {
+    fn batch(rows: &[([f64; N], f64)], weight: impl Fn(usize) -> f64, prior: &EstimatorPrior<f64, N>) -> [f64; N] {
         let (mut matrix, mut right) = ([[0.0; N]; N], [0.0; N]);
         for (age, (row, value)) in rows.iter().rev().enumerate() {
             for i in 0..N {
@@ -227,11 +213,11 @@ mod tests {
         right
     }
 
-    fn check(share: f64, prior: &Prior<f64, N>) {
+    fn check(share: f64, prior: &EstimatorPrior<f64, N>) {
         extern crate std;
         let mut random = Random::new(3);
         let mut rows = std::vec::Vec::new();
-        let mut estimator = Estimator::<f64, N>::new();
+        let mut estimator = RecursiveEstimator::<f64, N>::new();
         for _ in 0..400 {
             let (row, value) = sample(&mut random);
             rows.push((row, value));
@@ -244,7 +230,7 @@ mod tests {
         for (a, b) in found.iter().zip(&expected) {
             assert!((a - b).abs() < 1e-9, "{found:?} {expected:?}");
         }
-        let solution = estimator.solve(&Prior::none());
+        let solution = estimator.solve(&EstimatorPrior::uninformative());
         let left: f64 = rows.iter().rev().enumerate().fold(0.0, |sum, (i, (h, y))| {
             let e = y - h.iter().zip(&solution).map(|(a, b)| a * b).sum::<f64>();
             sum + age(i) * e * e
@@ -254,19 +240,19 @@ mod tests {
 
     #[test]
     fn without_forgetting_it_is_least_squares_of_all_rows() {
-        check(1.0, &Prior::none());
+        check(1.0, &EstimatorPrior::uninformative());
     }
 
     #[test]
     fn with_forgetting_it_is_least_squares_of_rows_that_fade() {
-        check(0.97, &Prior::none());
+        check(0.97, &EstimatorPrior::uninformative());
     }
 
     #[test]
     fn a_prior_does_not_fade() {
         check(
             0.9,
-            &Prior {
+            &EstimatorPrior {
                 values: [1.0, 2.0, 3.0, 4.0],
                 weights: [0.0, 2.0, 0.1, 5.0],
             },
@@ -276,7 +262,7 @@ mod tests {
     #[test]
     fn a_direction_that_rests_keeps_its_value_and_nothing_winds_up() {
         let mut random = Random::new(5);
-        let mut estimator = Estimator::<f32, N>::new();
+        let mut estimator = RecursiveEstimator::<f32, N>::new();
         for step in 0..2_000_000 {
             let (mut row, mut value) = sample(&mut random);
             if step >= 1000 {
@@ -288,11 +274,11 @@ mod tests {
             let taken = estimator.add(row.map(|x| x as f32), value as f32);
             assert!(taken);
             if step == 3000 {
-                assert!((estimator.solve(&Prior::none())[3] - 3.0).abs() < 0.3);
+                assert!((estimator.solve(&EstimatorPrior::uninformative())[3] - 3.0).abs() < 0.3);
             }
         }
         // At last it has faded altogether, and what is expected takes its place.
-        let prior = Prior {
+        let prior = EstimatorPrior {
             values: [0.0, 0.0, 0.0, 7.0],
             weights: [0.0, 0.0, 0.0, 1e-3],
         };
@@ -303,10 +289,10 @@ mod tests {
 
     #[test]
     fn what_is_no_number_is_not_taken() {
-        let mut estimator = Estimator::<f64, 2>::new();
+        let mut estimator = RecursiveEstimator::<f64, 2>::new();
         assert!(!estimator.add([1.0, f64::NAN], 1.0));
         assert!(!estimator.add([1.0, 1.0], f64::INFINITY));
-        let nothing = estimator.solve(&Prior::none()).map(f64::to_bits);
+        let nothing = estimator.solve(&EstimatorPrior::uninformative()).map(f64::to_bits);
         assert_eq!(nothing, [0.0_f64.to_bits(); 2]);
     }
 }

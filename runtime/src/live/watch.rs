@@ -1,65 +1,74 @@
 //! The watch: samples in, a verdict out.
 //!
-//! Decision: names come from samples after the alarm only, because a change that covers part of a window looks like
-//! a change of other parameters.
+//! Decision: the parameter is identified from samples after the alarm only, because a change that covers part of a
+//! window looks like a change of other parameters.
 
-use super::averages::{Averages, Row};
-use super::comparison::{Comparison, Single};
-use super::estimator::{Estimator, Prior};
-use super::options::{Options, Plan};
-use super::scatter::Scatter;
+use super::averages::{DriveAverages, WatchRow};
+use super::comparison::{ChangeScore, WindowComparison};
+use super::estimator::{EstimatorPrior, RecursiveEstimator};
+use super::options::{Options, WatchSchedule};
+use super::scatter::WindowScatter;
 use crate::Real;
 
-/// A change that another one explains this many times less likely (as twice the logarithm) is no rival: 1 to 10000.
-const RIVALRY: f64 = 18.42;
-/// How much of a window's usual information the reference has in [`Watch::estimate`].
-const PULL: f64 = 0.01;
-/// The same of the reference on its own column, while it learns the noise.
+/// A change that explains the data this much worse (twice the log likelihood ratio) is no rival: odds of 1 to 10000.
+const RIVAL_LOG_RATIO: f64 = 18.42;
+/// Information of the reference in [`ParameterWatch::estimate`], as a share of the usual information of a window.
+const REFERENCE_WEIGHT: f64 = 0.01;
+/// Ridge of the reference: a share of its own information on each parameter.
 const RIDGE: f64 = 1e-6;
 
-/// What a watch says after a sample.
+/// State of a watch after a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Verdict<T, const NB: usize> {
+pub enum WatchVerdict<T, const NB: usize> {
     /// It still learns noise and scatter.
     Learning,
-    /// Nothing has changed by more than windows differ anyway.
+    /// No change exceeds the usual differences between windows.
     Quiet,
-    /// Something has changed; stays until [`Watch::accept`], and is refined while the window shows the change. At first
-    /// the window holds samples from before too, and another parameter may seem to have changed: see [`Change::is_told`].
-    Changed(Change<T, NB>),
+    /// A parameter has changed. This state remains until [`ParameterWatch::accept`] and is refined while the window
+    /// shows the change. At first the window also contains samples from before, and another parameter may seem to have
+    /// changed: see [`WatchChange::is_identified`].
+    Changed(WatchChange<T, NB>),
 }
 
 /// A change, as that of one parameter alone.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Change<T, const NB: usize> {
+pub struct WatchChange<T, const NB: usize> {
     /// The parameter whose change alone explains most, in the order of the columns of `H_min`.
     pub parameter: usize,
-    /// By how much it changed, in its unit; too little while the window still holds samples from before.
-    pub by: T,
-    /// Standard deviation of that.
+    /// By how much it changed, in its unit; too small while the window still contains samples from before.
+    pub amount: T,
+    /// Standard deviation of `amount`, in its unit.
     pub deviation: T,
-    /// Square of the change in deviations, as windows scatter.
+    /// Square of the change over its variance, which includes the scatter of windows.
     pub gain: T,
-    /// Share of all that the window holds against the reference, noise included, that this change alone explains.
+    /// Share of the differences between window and reference, noise included, that this change alone explains, 0 to 1.
     pub share: T,
     /// A second parameter that changed too: together they explain more than the first alone, and more than chance.
-    pub besides: Option<usize>,
-    /// Parameters whose change alone would explain nearly as much along this motion: it may as well be one of these.
+    pub second_change: Option<usize>,
+    /// Parameters whose change alone would explain nearly as much along this motion: each may be the one that changed.
     pub rivals: [bool; NB],
-    /// Whether the same parameter has come out for as long as a window, of samples from after the alarm alone.
+    /// Whether the same parameter has changed most for the length of a window, in samples from after the alarm only.
     pub steady: bool,
 }
 
-impl<T, const NB: usize> Change<T, NB> {
-    /// Whether the parameter is the one: it comes out steadily, and no other one's change explains nearly as much.
+impl<T, const NB: usize> WatchChange<T, NB> {
+    /// Whether the parameter is identified: `steady`, and no change of another one explains nearly as much.
+    #[must_use]
+    pub fn is_identified(&self) -> bool {
+        self.steady && !self.rivals.contains(&true)
+    }
+
+    /// The name of [`WatchChange::is_identified`] in earlier versions.
+    #[deprecated(note = "renamed to `is_identified`")]
     #[must_use]
     pub fn is_told(&self) -> bool {
-        self.steady && !self.rivals.contains(&true)
+        self.is_identified()
     }
 }
 
+/// Stages of a watch, in this order; [`ParameterWatch::accept`] returns to `Scatter`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Stage {
+enum WatchStage {
     Noise,
     Scatter,
     Watching,
@@ -67,55 +76,55 @@ enum Stage {
 
 /// A watch over `NB` base parameters by the forces of `NQ` drives.
 ///
-/// It has room for some `5 NB^2` numbers.
+/// It consists of about `5 NB^2` numbers.
 #[derive(Clone, Copy, Debug)]
-pub struct Watch<T, const NB: usize, const NQ: usize> {
+pub struct ParameterWatch<T, const NB: usize, const NQ: usize> {
     nominal: [T; NB],
-    plan: Plan<T>,
-    stage: Stage,
-    drives: [Averages<T, NB>; NQ],
-    /// Blocks that wait to be turned into the triangles, a few drives in each step.
-    waiting: [Option<Row<T, NB>>; NQ],
+    plan: WatchSchedule<T>,
+    stage: WatchStage,
+    drives: [DriveAverages<T, NB>; NQ],
+    /// Blocks to be added to the estimators, a few drives in each step; whitened once the noise is known.
+    waiting: [Option<WatchRow<T, NB>>; NQ],
     next: usize,
-    window: Estimator<T, NB>,
-    reference: Estimator<T, NB>,
-    comparison: Comparison<T, NB>,
-    scatter: Scatter<T, NB>,
-    /// Nominal values plus this is the reference, while noise is learned.
+    window: RecursiveEstimator<T, NB>,
+    reference: RecursiveEstimator<T, NB>,
+    comparison: WindowComparison<T, NB>,
+    scatter: WindowScatter<T, NB>,
+    /// Reference minus nominal values, while the noise is learned.
     correction: [T; NB],
-    /// Samples in this block.
+    /// Samples of the current block so far.
     samples: u32,
-    /// Blocks since the last comparison, with any drive in them: a window that stands is compared once.
+    /// Blocks with at least one drive since the last comparison, so that an unchanged window is compared only once.
     since: u32,
-    /// Blocks in this stage: of each drive, and with any drive in them.
+    /// Blocks of each drive in total, and blocks with at least one drive in this stage.
     counted: [u32; NQ],
     blocks: u32,
     watched: [bool; NQ],
     left_out: u64,
-    verdict: Verdict<T, NB>,
-    /// In how many comparisons the parameter of the verdict came out, one after the other.
+    verdict: WatchVerdict<T, NB>,
+    /// Number of successive comparisons in which the parameter of the verdict changed most.
     same: u32,
 }
 
-impl<T: Real, const NB: usize, const NQ: usize> Watch<T, NB, NQ> {
-    /// A watch that begins to learn; `nominal` are base parameters near the true ones, such as those that are in use.
+impl<T: Real, const NB: usize, const NQ: usize> ParameterWatch<T, NB, NQ> {
+    /// A watch that starts to learn; `nominal` are base parameters near the true ones, such as those in use.
     ///
-    /// Options that make no sense are taken for the nearest that do.
+    /// Options out of range are replaced by the nearest ones that are possible.
     #[must_use]
     pub fn new(nominal: &[T; NB], options: &Options) -> Self {
-        let plan = Plan::new(options, NB);
+        let plan = WatchSchedule::new(options, NB);
         let zero = T::from_f64(0.0);
         Self {
             nominal: *nominal,
             plan,
-            stage: Stage::Noise,
-            drives: [Averages::new(); NQ],
+            stage: WatchStage::Noise,
+            drives: [DriveAverages::new(); NQ],
             waiting: [None; NQ],
             next: NQ,
-            window: Estimator::new(),
-            reference: Estimator::new(),
-            comparison: Comparison::idle(),
-            scatter: Scatter::new(plan.per_comparison),
+            window: RecursiveEstimator::new(),
+            reference: RecursiveEstimator::new(),
+            comparison: WindowComparison::new_idle(),
+            scatter: WindowScatter::new(plan.per_comparison),
             correction: [zero; NB],
             samples: 0,
             since: 0,
@@ -123,65 +132,67 @@ impl<T: Real, const NB: usize, const NQ: usize> Watch<T, NB, NQ> {
             blocks: 0,
             watched: [true; NQ],
             left_out: 0,
-            verdict: Verdict::Learning,
+            verdict: WatchVerdict::Learning,
             same: 0,
         }
     }
 
-    /// Takes a sample: the rows of `H_min`, one per drive, and the forces that the drives had at that time.
+    /// Adds a sample: the rows of `H_min`, one per drive, and the forces of the drives at that time.
     ///
-    /// A force that is no number (`NAN`) leaves its drive's block out, and so do rows; for drives that stand still, where
-    /// friction may be anything, and for forces that are not measured.
-    pub fn step(&mut self, rows: &[[T; NB]; NQ], forces: &[T; NQ]) -> &Verdict<T, NB> {
+    /// A force of `NAN` excludes the drive's block, as do rows with `NAN`. Use it for drives at standstill, where
+    /// friction is not determined, and for forces that are not measured.
+    pub fn step(&mut self, rows: &[[T; NB]; NQ], forces: &[T; NQ]) -> &WatchVerdict<T, NB> {
         for ((drive, row), force) in self.drives.iter_mut().zip(rows).zip(forces) {
-            drive.take(row, *force);
+            drive.add_sample(row, *force);
         }
-        // As many per step as are done before the block ends.
-        self.turn_in(NQ.div_ceil(self.plan.block as usize));
+        // So many per step that all are added before the block ends.
+        self.update_estimators(NQ.div_ceil(self.plan.block as usize));
         if self.comparison.is_busy() && self.comparison.advance() {
-            self.conclude();
+            self.finish_comparison();
         }
         self.samples += 1;
         if self.samples >= self.plan.block {
             self.samples = 0;
-            self.turn_in(NQ);
+            self.update_estimators(NQ);
             self.end_block();
         }
         &self.verdict
     }
 
-    /// What was said last.
-    pub fn verdict(&self) -> &Verdict<T, NB> {
+    /// The verdict after the last sample.
+    pub fn verdict(&self) -> &WatchVerdict<T, NB> {
         &self.verdict
     }
 
-    /// Takes what is now as right: the reference is learned anew, noise and scatter stay known.
+    /// Accepts the present state as correct: the reference is learned again, while noise and scatter stay known.
     pub fn accept(&mut self) {
-        if self.stage == Stage::Noise {
+        if self.stage == WatchStage::Noise {
             return;
         }
-        self.stage = Stage::Scatter;
+        self.stage = WatchStage::Scatter;
         self.blocks = 0;
-        self.window = Estimator::new();
-        self.reference = Estimator::new();
-        self.comparison = Comparison::idle();
-        self.verdict = Verdict::Learning;
+        self.window = RecursiveEstimator::new();
+        self.reference = RecursiveEstimator::new();
+        self.comparison = WindowComparison::new_idle();
+        self.verdict = WatchVerdict::Learning;
     }
 
-    /// Base parameters as the window has them now; where it says nothing, those of the reference.
+    /// Base parameters estimated from the window; where it has no information, those of the reference.
     ///
-    /// Takes two copies of a triangle and `2 NB` rotations of rows: not for every cycle.
+    /// Works on two copies of an R factor and takes `2 NB` rotations of rows, so it is not meant for every cycle.
     #[must_use]
     pub fn estimate(&self) -> [T; NB] {
         let reference = self.reference.information();
         let ridge = |share: T| reference.map(|x| (share * x).sqrt());
-        let values = self.reference.solve(&Prior {
+        // First the reference alone, as differences from the nominal values.
+        let values = self.reference.solve(&EstimatorPrior {
             values: [T::from_f64(0.0); NB],
             weights: ridge(T::from_f64(RIDGE)),
         });
-        let mut estimate = self.window.solve(&Prior {
+        // The reference is then a weak prior for the window.
+        let mut estimate = self.window.solve(&EstimatorPrior {
             values,
-            weights: ridge(T::from_f64(PULL) / self.plan.windows),
+            weights: ridge(T::from_f64(REFERENCE_WEIGHT) / self.plan.windows),
         });
         for (sum, nominal) in estimate.iter_mut().zip(&self.nominal) {
             *sum = *sum + *nominal;
@@ -189,55 +200,55 @@ impl<T: Real, const NB: usize, const NQ: usize> Watch<T, NB, NQ> {
         estimate
     }
 
-    /// Drives that are watched. Those that were hardly measured while the watch learned have no noise to hold a change
-    /// against; they are left out until a new watch is made.
-    pub fn watched(&self) -> [bool; NQ] {
+    /// Drives that are watched. A drive that was rarely measured while the watch learned has no known noise; it is
+    /// excluded until a new watch is made.
+    pub fn watched_drives(&self) -> [bool; NQ] {
         self.watched
     }
 
-    /// Blocks of a drive that were left out because something in them was no number.
-    pub fn left_out(&self) -> u64 {
+    /// Number of blocks of a drive that were excluded because a number in them was NaN or too large.
+    pub fn n_skipped_blocks(&self) -> u64 {
         self.left_out
     }
 
-    /// Turns the blocks of so many drives that wait into the triangles.
-    fn turn_in(&mut self, most: usize) {
-        let changed = matches!(self.verdict, Verdict::Changed(_));
+    /// Adds the waiting blocks of at most so many drives to the estimators.
+    fn update_estimators(&mut self, most: usize) {
+        let changed = matches!(self.verdict, WatchVerdict::Changed(_));
         for waiting in self.waiting.iter_mut().skip(self.next).take(most) {
             self.next += 1;
             let Some(block) = waiting.take() else {
                 continue;
             };
-            // Blocks are finite.
+            // `add` can only reject numbers that are not finite, and blocks are finite.
             _ = self.window.add(block.row, block.value);
-            // What has changed is no reference.
+            // After a change the reference stays as it was.
             if !changed {
                 _ = self.reference.add(block.row, block.value);
             }
         }
     }
 
-    /// Takes the means of the block that ends, and looks whether it is time for a comparison or for the next stage.
+    /// Ends a block: takes its means, and checks whether the next comparison or stage is due.
     fn end_block(&mut self) {
-        self.look();
+        self.advance_stage();
         let share = self.plan.per_sample;
         let means = {
             let nominal = &self.nominal;
             let mut drives = self.drives.iter_mut();
-            [(); NQ].map(|()| drives.next().and_then(|drive| drive.end(share, nominal)))
+            [(); NQ].map(|()| drives.next().and_then(|drive| drive.end_block(share, nominal)))
         };
         let n_counted = means.iter().flatten().count();
         self.left_out += (NQ - n_counted) as u64;
-        // Time stands still where nothing is measured.
+        // Nothing is forgotten while nothing is measured.
         if n_counted == 0 {
             return;
         }
         self.blocks = self.blocks.saturating_add(1);
         self.since = self.since.saturating_add(1);
-        self.window.scale(self.plan.window_root);
-        let changed = matches!(self.verdict, Verdict::Changed(_));
-        if !changed && self.stage != Stage::Noise {
-            self.reference.scale(self.plan.memory_root);
+        self.window.scale_information(self.plan.window_root);
+        let changed = matches!(self.verdict, WatchVerdict::Changed(_));
+        if !changed && self.stage != WatchStage::Noise {
+            self.reference.scale_information(self.plan.memory_root);
         }
         let drives = self.drives.iter_mut().zip(&mut self.waiting);
         let drives = drives.zip(&mut self.counted).zip(&self.watched).zip(means);
@@ -246,20 +257,20 @@ impl<T: Real, const NB: usize, const NQ: usize> Watch<T, NB, NQ> {
                 continue;
             };
             *counted = counted.saturating_add(1);
-            *waiting = if self.stage == Stage::Noise {
-                // The first half is for the fit alone.
+            *waiting = if self.stage == WatchStage::Noise {
+                // Residuals count from the second half on; the first half only fits the parameters.
                 if *counted > self.plan.noise / 2 {
-                    drive.learn(mean.residual(&self.correction));
+                    drive.add_residual(mean.residual(&self.correction));
                 }
                 Some(mean)
             } else {
-                drive.whitened(&mean)
+                drive.whiten(&mean)
             };
         }
         self.next = 0;
     }
 
-    /// Whether the noise is known: of all drives, or after twice the time of those that were measured.
+    /// Whether the noise of all drives is known; after twice the time, that of at least one.
     fn has_noise(&self) -> bool {
         let mut known = self.counted.iter().map(|n| *n >= self.plan.noise);
         if self.blocks >= self.plan.noise.saturating_mul(2) {
@@ -269,27 +280,22 @@ impl<T: Real, const NB: usize, const NQ: usize> Watch<T, NB, NQ> {
         }
     }
 
-    /// Goes on to the next stage, or begins a comparison, where it is time for it.
-    fn look(&mut self) {
+    /// Enters the next stage, or starts a comparison, if it is due.
+    fn advance_stage(&mut self) {
         match self.stage {
-            Stage::Noise if self.has_noise() => {
-                for ((drive, counted), watched) in self
-                    .drives
-                    .iter_mut()
-                    .zip(&self.counted)
-                    .zip(&mut self.watched)
-                {
+            WatchStage::Noise if self.has_noise() => {
+                for ((drive, counted), watched) in self.drives.iter_mut().zip(&self.counted).zip(&mut self.watched) {
                     *watched = *counted >= self.plan.noise;
-                    drive.settle();
+                    drive.update_noise_model();
                 }
-                self.window = Estimator::new();
-                self.reference = Estimator::new();
+                self.window = RecursiveEstimator::new();
+                self.reference = RecursiveEstimator::new();
                 self.blocks = 0;
-                self.stage = Stage::Scatter;
+                self.stage = WatchStage::Scatter;
             }
-            Stage::Scatter if self.blocks >= self.plan.scatter => {
-                self.stage = Stage::Watching;
-                self.verdict = Verdict::Quiet;
+            WatchStage::Scatter if self.blocks >= self.plan.scatter => {
+                self.stage = WatchStage::Watching;
+                self.verdict = WatchVerdict::Quiet;
             }
             _ => {}
         }
@@ -297,9 +303,10 @@ impl<T: Real, const NB: usize, const NQ: usize> Watch<T, NB, NQ> {
             return;
         }
         self.since = 0;
-        if self.stage == Stage::Noise {
+        if self.stage == WatchStage::Noise {
+            // While the noise is learned, the reference is fitted instead of compared.
             let information = self.reference.information();
-            self.correction = self.reference.solve(&Prior {
+            self.correction = self.reference.solve(&EstimatorPrior {
                 values: [T::from_f64(0.0); NB],
                 weights: information.map(|x| (T::from_f64(RIDGE) * x).sqrt()),
             });
@@ -308,64 +315,60 @@ impl<T: Real, const NB: usize, const NQ: usize> Watch<T, NB, NQ> {
         }
     }
 
-    /// Judges what a comparison has found.
-    fn conclude(&mut self) {
-        let singles = self.comparison.singles(&self.window.information());
+    /// Updates the verdict with the result of a comparison.
+    fn finish_comparison(&mut self) {
+        let singles = self.comparison.single_changes(&self.window.information());
         let found = match self.stage {
-            Stage::Watching => self.judge(&singles),
+            WatchStage::Watching => self.detect_change(&singles),
             _ => None,
         };
         match (&self.verdict, found) {
-            (Verdict::Changed(before), Some(mut change)) => {
+            (WatchVerdict::Changed(before), Some(mut change)) => {
                 let is_same = change.parameter == before.parameter;
-                self.same = if is_same {
-                    self.same.saturating_add(1)
-                } else {
-                    0
-                };
+                self.same = if is_same { self.same.saturating_add(1) } else { 0 };
                 change.steady = self.same >= self.plan.steady;
-                self.verdict = Verdict::Changed(change);
+                self.verdict = WatchVerdict::Changed(change);
             }
-            (Verdict::Changed(_), None) => self.same = 0,
+            (WatchVerdict::Changed(_), None) => self.same = 0,
             (_, Some(change)) => {
-                self.verdict = Verdict::Changed(change);
-                // A change that holds for part of a window only looks like one of other parameters.
-                self.window = Estimator::new();
+                self.verdict = WatchVerdict::Changed(change);
+                // A change during part of a window looks like one of other parameters, so the window starts again.
+                self.window = RecursiveEstimator::new();
                 self.same = 0;
             }
-            (_, None) => self.scatter.take(&singles, self.plan.scatter_share),
+            (_, None) => self.scatter.add_window(&singles, self.plan.scatter_share),
         }
     }
 
-    /// The parameter whose change alone explains most, among those that changed by more than chance; none if none did.
-    fn judge(&self, singles: &[Single<T>; NB]) -> Option<Change<T, NB>> {
-        let (parameter, single) = self.largest(singles)?;
+    /// The parameter whose change alone explains most, among those above their threshold; `None` if there is none.
+    fn detect_change(&self, singles: &[ChangeScore<T>; NB]) -> Option<WatchChange<T, NB>> {
+        let (parameter, single) = self.largest_change(singles)?;
         let gain = single.gain();
-        let measure = self.scatter.measure(parameter, single.information);
-        let near = gain - T::from_f64(RIVALRY) * measure.dispersion;
+        let measure = self.scatter.estimate(parameter, single.information);
+        let near = gain - T::from_f64(RIVAL_LOG_RATIO) * measure.dispersion;
         let mut rivals = [false; NB];
         for ((k, rival), other) in rivals.iter_mut().enumerate().zip(singles) {
             *rival = k != parameter && other.information > T::from_f64(0.0) && other.gain() > near;
         }
-        let rest = self.comparison.besides(parameter, singles);
-        Some(Change {
+        let rest = self.comparison.second_changes(parameter, singles);
+        Some(WatchChange {
             parameter,
-            by: single.score / single.information,
+            amount: single.score / single.information,
             deviation: (measure.dispersion / single.information).sqrt(),
             gain: gain / measure.dispersion,
-            share: gain / self.comparison.all(),
-            besides: self.largest(&rest).map(|(second, _)| second),
+            share: gain / self.comparison.total_gain(),
+            second_change: self.largest_change(&rest).map(|(second, _)| second),
             rivals,
             steady: false,
         })
     }
 
-    /// The largest gain of those that exceed what chance reaches.
-    fn largest(&self, singles: &[Single<T>; NB]) -> Option<(usize, Single<T>)> {
-        let mut found: Option<(usize, Single<T>)> = None;
+    /// The largest gain above the threshold of its parameter.
+    fn largest_change(&self, singles: &[ChangeScore<T>; NB]) -> Option<(usize, ChangeScore<T>)> {
+        let mut found: Option<(usize, ChangeScore<T>)> = None;
         for (k, single) in singles.iter().enumerate() {
             let (gain, best) = (single.gain(), found.map(|(_, best)| best.gain()));
-            let measure = self.scatter.measure(k, single.information);
+            let measure = self.scatter.estimate(k, single.information);
             if best.is_none_or(|best| gain > best) && measure.is_exceeded(gain, self.plan.limit) {
                 found = Some((k, *single));
             }

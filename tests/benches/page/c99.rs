@@ -4,7 +4,8 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use modelmill_codegen::{Derivation, LANGUAGES, Source};
+use modelmill_codegen::Derivation;
+use modelmill_emit::{EmissionRequest, LANGUAGES};
 
 use crate::models::{Motion, STATES};
 
@@ -22,7 +23,7 @@ pub(crate) fn compiled(
     std::fs::create_dir_all(&folder).map_err(fault)?;
     let language = LANGUAGES.iter().find(|l| l.name() == "c99");
     let language = language.ok_or("there is no language c99")?;
-    let files = language.write(&Source {
+    let files = language.emit_files(&EmissionRequest {
         derivation,
         dynamics: None,
         reactions: None,

@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 
 use modelmill_spec::{
-    Axis, CoordinateIdx, DriveKind, Exact, FrameIdx, Inertial, LumpedMass, Mechanism, Part, Step,
-    Symbol,
+    CoordinateIdx, DriveKind, ExactExpression, FrameAxis, FrameIdx, FrameStep, LumpedMass, Mechanism, ModelPart,
+    ModelSymbol, PartInertia,
 };
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
@@ -71,29 +71,23 @@ impl Body {
 
 impl Chain {
     /// The chain of a mechanism with given values of its parameters; the reason why there is none.
-    pub(crate) fn from_mechanism(
-        mechanism: &Mechanism,
-        parameters: &[f64],
-    ) -> Result<Self, String> {
+    pub(crate) fn from_mechanism(mechanism: &Mechanism, parameters: &[f64]) -> Result<Self, String> {
         if !mechanism.loops.is_empty() || mechanism.coordinates.iter().any(|c| c.passive) {
             return Err("it has loops".to_owned());
         }
         let drives = mechanism.drives.iter().map(|d| &d.kind);
-        if drives
-            .clone()
-            .any(|kind| !matches!(kind, DriveKind::Joint(_)))
-        {
+        if drives.clone().any(|kind| !matches!(kind, DriveKind::Joint(_))) {
             return Err("a drive acts between points".to_owned());
         }
         if mechanism.effects.iter().any(|e| e.mechanics.is_some()) {
             return Err("its effects have mechanics of their own".to_owned());
         }
-        let value = |symbol: Symbol| match symbol {
-            Symbol::Coordinate(_) => 0.0,
-            Symbol::Parameter(i) => parameters[i.0],
+        let value = |symbol: ModelSymbol| match symbol {
+            ModelSymbol::Coordinate(_) => 0.0,
+            ModelSymbol::Parameter(i) => parameters[i.0],
             other => mechanism.symbol_nominal(other),
         };
-        let number = |e: &Exact| e.evaluate(&value);
+        let number = |e: &ExactExpression| e.evaluate(&value);
         let mut joints: Vec<Joint> = Vec::new();
         // The last joint on the way to each frame, and the frame on it.
         let mut frames: Vec<(Option<usize>, Placement)> = vec![(None, Placement::none())];
@@ -194,22 +188,22 @@ fn snapped(x: f64) -> f64 {
 type Elementary = (usize, bool, f64, Option<CoordinateIdx>);
 
 fn elementary(
-    step: &Step,
+    step: &FrameStep,
     mechanism: &Mechanism,
-    value: &dyn Fn(Symbol) -> f64,
+    value: &dyn Fn(ModelSymbol) -> f64,
 ) -> Result<Elementary, String> {
     let with = |i: usize| {
-        move |symbol: Symbol| match symbol {
-            Symbol::Coordinate(c) => f64::from(u8::from(c.0 == i)),
+        move |symbol: ModelSymbol| match symbol {
+            ModelSymbol::Coordinate(c) => f64::from(u8::from(c.0 == i)),
             other => value(other),
         }
     };
-    let evaluate = |value: &dyn Fn(Symbol) -> f64| match step {
-        Step::Rotate(_, angle) => angle.evaluate(value),
-        Step::Translate(_, length) => length.evaluate(value),
-        Step::Free(_) => f64::NAN,
+    let evaluate = |value: &dyn Fn(ModelSymbol) -> f64| match step {
+        FrameStep::Rotate(_, angle) => angle.evaluate(value),
+        FrameStep::Translate(_, length) => length.evaluate(value),
+        FrameStep::Free(_) => f64::NAN,
     };
-    if let Step::Free(_) = step {
+    if let FrameStep::Free(_) = step {
         return Err("a free body has no joint".to_owned());
     }
     let offset = evaluate(value);
@@ -225,27 +219,27 @@ fn elementary(
         moved = Some(CoordinateIdx(i));
     }
     let (axis, slides) = match step {
-        Step::Rotate(axis, _) => (axis, false),
-        Step::Translate(axis, _) => (axis, true),
-        Step::Free(_) => unreachable!("refused above"),
+        FrameStep::Rotate(axis, _) => (axis, false),
+        FrameStep::Translate(axis, _) => (axis, true),
+        FrameStep::Free(_) => unreachable!("refused above"),
     };
     let axis = match axis {
-        Axis::X => 0,
-        Axis::Y => 1,
-        Axis::Z => 2,
+        FrameAxis::X => 0,
+        FrameAxis::Y => 1,
+        FrameAxis::Z => 2,
     };
     Ok((axis, slides, offset, moved))
 }
 
-fn symmetric(entries: &[Exact; 6], number: &dyn Fn(&Exact) -> f64) -> Matrix3<f64> {
+fn symmetric(entries: &[ExactExpression; 6], number: &dyn Fn(&ExactExpression) -> f64) -> Matrix3<f64> {
     let [xx, xy, xz, yy, yz, zz] = std::array::from_fn(|i| number(&entries[i]));
     Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
 }
 
-fn part(part: &Part, number: &dyn Fn(&Exact) -> f64) -> Body {
-    let vector = |v: &[Exact; 3]| Vector3::from_fn(|i, _| number(&v[i]));
+fn part(part: &ModelPart, number: &dyn Fn(&ExactExpression) -> f64) -> Body {
+    let vector = |v: &[ExactExpression; 3]| Vector3::from_fn(|i, _| number(&v[i]));
     match &part.inertial {
-        Inertial::Linear {
+        PartInertia::Linear {
             mass,
             first_moment,
             inertia,
@@ -254,11 +248,7 @@ fn part(part: &Part, number: &dyn Fn(&Exact) -> f64) -> Body {
             moment: vector(first_moment),
             inertia: symmetric(inertia, number),
         },
-        Inertial::AboutCentre {
-            mass,
-            centre,
-            inertia,
-        } => {
+        PartInertia::AboutCentre { mass, centre, inertia } => {
             let about_centre = Body {
                 mass: number(mass),
                 moment: Vector3::zeros(),
@@ -272,13 +262,13 @@ fn part(part: &Part, number: &dyn Fn(&Exact) -> f64) -> Body {
     }
 }
 
-fn lumped_mass(mass: &LumpedMass, number: &dyn Fn(&Exact) -> f64) -> Result<Body, String> {
-    let vector = |v: &[Exact; 3]| Vector3::from_fn(|i, _| number(&v[i]));
+fn lumped_mass(mass: &LumpedMass, number: &dyn Fn(&ExactExpression) -> f64) -> Result<Body, String> {
+    let vector = |v: &[ExactExpression; 3]| Vector3::from_fn(|i, _| number(&v[i]));
     let (position, other) = (vector(&mass.force_at), vector(&mass.moment_at));
     if position != other {
         return Err("forces and moments see a mass at different places".to_owned());
     }
-    let ratio = |n: &num_rational::BigRational| Exact::Rational(n.clone()).evaluate(&|_| 0.0);
+    let ratio = |n: &num_rational::BigRational| ExactExpression::Rational(n.clone()).evaluate(&|_| 0.0);
     let point = Body {
         mass: number(&mass.mass) * ratio(&mass.share),
         ..Body::default()

@@ -13,9 +13,7 @@ pub(crate) fn described() -> Vec<(&'static str, String)> {
     };
     let flags = of("flags").unwrap_or_default();
     let has = |flag: &str| flags.split(' ').any(|f| f == flag);
-    let sets = [
-        "sse2", "avx", "avx2", "fma", "avx512f", "avx512dq", "avx512vl",
-    ];
+    let sets = ["sse2", "avx", "avx2", "fma", "avx512f", "avx512dq", "avx512vl"];
     let sets: Vec<&str> = sets.into_iter().filter(|s| has(s)).collect();
     let numbers = ["cpu family", "model"].map(|key| of(key).unwrap_or_default());
     let processor = match of("model name") {

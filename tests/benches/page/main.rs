@@ -59,10 +59,7 @@ pub(crate) struct Figures {
 }
 
 fn main() -> ExitCode {
-    let arguments: Vec<String> = std::env::args()
-        .skip(1)
-        .filter(|a| a != "--bench")
-        .collect();
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
     let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let done = match words.as_slice() {
         ["--measure", name, part] => measure(name, part),
@@ -92,10 +89,9 @@ fn generate(name: &str) -> Result<(), String> {
     let start = run::processor_time();
     let loaded = modelmill_spec::load_file(&file).map_err(|failure| failure.render(false))?;
     let read = run::processor_time();
-    let derivation =
-        modelmill_codegen::derive(&loaded.mechanism).map_err(|error| error.to_string())?;
+    let derivation = modelmill_codegen::derive(&loaded.mechanism).map_err(|error| error.to_string())?;
     let derived = run::processor_time();
-    black_box(modelmill_codegen::emit(&derivation).module());
+    black_box(modelmill_emit::emit(&derivation).module());
     let emitted = run::processor_time();
     for (stage, ns) in [
         ("load", read - start),
@@ -110,9 +106,7 @@ fn generate(name: &str) -> Result<(), String> {
 
 fn compare(names: &[&str]) -> Result<(), String> {
     if models::MODELS != bundled() {
-        return Err(
-            "the bundled models are others than those of benches/page/models.rs".to_owned(),
-        );
+        return Err("the bundled models are others than those of benches/page/models.rs".to_owned());
     }
     if let Some(unknown) = names.iter().find(|n| !models::MODELS.contains(n)) {
         let known = models::MODELS.join(", ");
@@ -151,9 +145,7 @@ fn compare(names: &[&str]) -> Result<(), String> {
 /// Keeps the least of each figure.
 fn keep_best(best: &mut BTreeMap<String, f64>, prefix: &str, found: BTreeMap<String, f64>) {
     for (name, value) in found {
-        let known = best
-            .entry(format!("{prefix}{name}"))
-            .or_insert(f64::INFINITY);
+        let known = best.entry(format!("{prefix}{name}")).or_insert(f64::INFINITY);
         *known = known.min(value);
     }
 }
@@ -235,11 +227,7 @@ fn in_c99(name: &str, derivation: &Derivation) -> Result<(PathBuf, PathBuf), Str
 fn peers_chain(name: &str, derivation: &Derivation) -> Result<String, String> {
     let mechanism: &Mechanism = &derivation.mechanism;
     let mut stream = Stream::new(7);
-    let mut parameters: Vec<f64> = mechanism
-        .parameters
-        .iter()
-        .map(|_| stream.between(0.2, 1.0))
-        .collect();
+    let mut parameters: Vec<f64> = mechanism.parameters.iter().map(|_| stream.between(0.2, 1.0)).collect();
     for term in mechanism.effects.iter().flat_map(|e| &e.terms) {
         parameters[term.parameter.0] = 0.0;
     }

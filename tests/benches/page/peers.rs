@@ -46,8 +46,7 @@ fn text(path: &Path) -> String {
 impl Peers {
     /// Looks for the peers and compiles what does not depend on the model.
     pub(crate) fn find() -> Self {
-        let python =
-            std::env::var("MODELMILL_PEERS_PYTHON").unwrap_or_else(|_| "python3".to_owned());
+        let python = std::env::var("MODELMILL_PEERS_PYTHON").unwrap_or_else(|_| "python3".to_owned());
         let mut peers = Self {
             folder: Path::new(env!("CARGO_TARGET_TMPDIR")).join("peers"),
             python,
@@ -62,18 +61,12 @@ impl Peers {
             return peers;
         }
         let Some(compiler) = output("g++", &["--version"]) else {
-            peers
-                .missing
-                .push("all peers: `g++` is not installed".to_owned());
+            peers.missing.push("all peers: `g++` is not installed".to_owned());
             return peers;
         };
         let first = compiler.lines().next().unwrap_or_default().to_owned();
         peers.versions.push(("g++".to_owned(), first));
-        for (name, module) in [
-            ("CasADi", "casadi"),
-            ("wrenfold", "wrenfold"),
-            ("sympy", "sympy"),
-        ] {
+        for (name, module) in [("CasADi", "casadi"), ("wrenfold", "wrenfold"), ("sympy", "sympy")] {
             let script = format!("import {module}");
             if output(&peers.python, &["-c", &script]).is_none() {
                 peers.missing.push(format!("{name}: not installed"));
@@ -118,8 +111,7 @@ impl Peers {
         timed.extend([text(&sources().join("rnea.cpp")), library.clone()]);
         eprintln!("compiling Pinocchio's programs, which takes minutes at the first time");
         self.pinocchio = self.compiled("pinocchio", "-O3", &timed);
-        let script =
-            "import casadi, pathlib; print(pathlib.Path(casadi.__file__).resolve().parent)";
+        let script = "import casadi, pathlib; print(pathlib.Path(casadi.__file__).resolve().parent)";
         if let Some(casadi) = output(&self.python, &["-c", script]) {
             // Only the code that it writes is timed.
             arguments.extend([
@@ -172,8 +164,7 @@ impl Peers {
             }
             Err(error) => error.to_string(),
         };
-        self.missing
-            .push(format!("{name}: does not compile: {reason}"));
+        self.missing.push(format!("{name}: does not compile: {reason}"));
         None
     }
 
@@ -195,8 +186,7 @@ impl Peers {
         let mut generated: BTreeMap<&str, f64> = BTreeMap::new();
         let start = self.folder.join(format!("{model} "));
         let old = |name: &str| std::fs::read(format!("{}{name}.cpp", start.display())).ok();
-        let before: BTreeMap<&str, Option<Vec<u8>>> =
-            GENERATORS.iter().map(|name| (*name, old(name))).collect();
+        let before: BTreeMap<&str, Option<Vec<u8>>> = GENERATORS.iter().map(|name| (*name, old(name))).collect();
         let script = text(&sources().join("generated.py"));
         let (from, to) = (text(&file), text(&start));
         let arguments = [&script[..], &from, &to];
@@ -223,9 +213,7 @@ impl Peers {
             // Code that has not changed is not compiled again.
             let code = PathBuf::from(format!("{}{name}.cpp", start.display()));
             let program = format!("{model} {name}");
-            let same = before
-                .get(name)
-                .is_some_and(|old| *old == std::fs::read(&code).ok());
+            let same = before.get(name).is_some_and(|old| *old == std::fs::read(&code).ok());
             let kept = self.folder.join(&program);
             let program = if same && kept.exists() {
                 Some(kept)

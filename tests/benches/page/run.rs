@@ -10,9 +10,7 @@ pub(crate) fn core() -> Option<&'static str> {
     static CORE: OnceLock<Option<String>> = OnceLock::new();
     let found = CORE.get_or_init(|| {
         let wanted = std::env::var("MODELMILL_CORE").unwrap_or_else(|_| "0".to_owned());
-        let works = Command::new("taskset")
-            .args(["-c", &wanted, "true"])
-            .status();
+        let works = Command::new("taskset").args(["-c", &wanted, "true"]).status();
         works.is_ok_and(|status| status.success()).then_some(wanted)
     });
     found.as_deref()

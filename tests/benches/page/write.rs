@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use modelmill_codegen::{Method, OperationCount, PassCount, Program, Stage};
+use modelmill_codegen::{OperationCount, PassCount, ProgramStage, ReductionMethod, StraightLineProgram};
 use modelmill_tests::counts::{HEADINGS, best_known, row, text};
 use modelmill_tests::fixtures::derived;
 
@@ -29,14 +29,12 @@ pub(crate) struct Passes {
 
 /// Counts pass by pass, of all models or of those that are named.
 pub(crate) fn passes(names: &[&str]) -> Result<Vec<Passes>, String> {
-    let chosen = BY_PASS
-        .into_iter()
-        .filter(|m| names.is_empty() || names.contains(m));
+    let chosen = BY_PASS.into_iter().filter(|m| names.is_empty() || names.contains(m));
     chosen
         .map(|name| {
             let derivation = derived(name);
             let fault = |error: modelmill_codegen::DeriveError| format!("{name}: {error}");
-            let count = |program: &Program| program.count(Stage::State);
+            let count = |program: &StraightLineProgram| program.count_operations(ProgramStage::State);
             Ok(Passes {
                 name,
                 counts: derivation.operations_by_pass().map_err(fault)?,
@@ -47,12 +45,7 @@ pub(crate) fn passes(names: &[&str]) -> Result<Vec<Passes>, String> {
 }
 
 /// The whole page.
-pub(crate) fn page(
-    all: &[Figures],
-    passes: &[Passes],
-    peers: &Peers,
-    machine: &[(&str, String)],
-) -> String {
+pub(crate) fn page(all: &[Figures], passes: &[Passes], peers: &Peers, machine: &[(&str, String)]) -> String {
     let mut page = "# Benchmarks\n\n\
         Written by `cargo bench -p modelmill-tests --bench page`; not edited by hand.\n\
         Every number comes from one run on one machine, but the best known counts of others, which are from the literature.\n\n"
@@ -85,11 +78,7 @@ fn times(ratio: Option<f64>) -> String {
     ratio.map_or_else(
         || "-".to_owned(),
         |r| {
-            if r < 10.0 {
-                format!("{r:.2}")
-            } else {
-                format!("{r:.1}")
-            }
+            if r < 10.0 { format!("{r:.2}") } else { format!("{r:.1}") }
         },
     )
 }
@@ -114,11 +103,7 @@ impl Figures {
         if value.is_some() || self.no_chain.is_some() {
             return times(value);
         }
-        let word = if peers.installed(who) {
-            "none"
-        } else {
-            "not installed"
-        };
+        let word = if peers.installed(who) { "none" } else { "not installed" };
         word.to_owned()
     }
 }
@@ -130,25 +115,17 @@ fn headline(page: &mut String, all: &[Figures]) {
     };
     let f = "inverse dynamics";
     let mut lines = Vec::new();
-    if let (Some(forces), Some(columns)) = (
-        panda.time("one state", f),
-        panda.time("one state", "regressor"),
-    ) {
+    if let (Some(forces), Some(columns)) = (panda.time("one state", f), panda.time("one state", "regressor")) {
         lines.push(format!(
             "inverse dynamics in {forces:.0} ns per state, base regressor in {columns:.0} ns"
         ));
     }
-    if let (Some(a), Some(b)) = (
-        panda.longer("Pinocchio", f),
-        panda.longer("Pinocchio", "regressor"),
-    ) {
+    if let (Some(a), Some(b)) = (panda.longer("Pinocchio", f), panda.longer("Pinocchio", "regressor")) {
         lines.push(format!(
             "{a:.1} times faster than Pinocchio's RNEA, {b:.1} times faster than its joint torque regressor"
         ));
     }
-    let generated = GENERATORS
-        .iter()
-        .filter_map(|g| Some((*g, panda.longer(g, f)?)));
+    let generated = GENERATORS.iter().filter_map(|g| Some((*g, panda.longer(g, f)?)));
     if let Some((name, r)) = generated.min_by(|a, b| a.1.total_cmp(&b.1)) {
         lines.push(format!(
             "the fastest generated peer ({name}) takes {r:.2} times as long"
@@ -176,9 +153,7 @@ fn headline(page: &mut String, all: &[Figures]) {
         for line in lines {
             _ = writeln!(page, "- {line}");
         }
-        page.push_str(
-            "\n![Nanoseconds per state of the Panda: modelmill and its peers](pictures/benchmarks.svg)\n\n",
-        );
+        page.push_str("\n![Nanoseconds per state of the Panda: modelmill and its peers](pictures/benchmarks.svg)\n\n");
     }
 }
 
@@ -218,11 +193,7 @@ fn method(page: &mut String, peers: &Peers, machine: &[(&str, String)]) {
 
 fn operations(page: &mut String, all: &[Figures]) {
     page.push_str("## Operations\n\n");
-    table(
-        page,
-        &HEADINGS,
-        all.iter().map(|f| row(&f.name, &f.derivation)),
-    );
+    table(page, &HEADINGS, all.iter().map(|f| row(&f.name, &f.derivation)));
 }
 
 fn by_pass(page: &mut String, passes: &[Passes]) {
@@ -238,13 +209,7 @@ fn by_pass(page: &mut String, passes: &[Passes]) {
         let mut rows: Vec<Vec<String>> = model
             .counts
             .iter()
-            .map(|c| {
-                vec![
-                    c.pass.to_owned(),
-                    text(&c.inverse_dynamics),
-                    text(&c.regressor),
-                ]
-            })
+            .map(|c| vec![c.pass.to_owned(), text(&c.inverse_dynamics), text(&c.regressor)])
             .collect();
         let [a, b] = best_known(model.name);
         if a.or(b).is_some() {
@@ -265,14 +230,7 @@ fn generation(page: &mut String, all: &[Figures], peers: &Peers) {
         "## Generation\n\n\
          Milliseconds from the model file to the source of inverse dynamics, regressor and base parameters, and how many times longer peers take for inverse dynamics alone, without compiling.\n\n",
     );
-    let mut headings = vec![
-        "model",
-        "read",
-        "derive and reduce",
-        "emit",
-        "all",
-        "reduction",
-    ];
+    let mut headings = vec!["model", "read", "derive and reduce", "emit", "all", "reduction"];
     headings.extend(GENERATORS);
     let rows = all.iter().map(|f| {
         let of = |stage: &str| {
@@ -280,16 +238,10 @@ fn generation(page: &mut String, all: &[Figures], peers: &Peers) {
             ms.map_or_else(|| "-".to_owned(), |ms| format!("{ms:.1}"))
         };
         let reduction = match f.derivation.reduction.method {
-            Method::Exact { .. } => "exact",
+            ReductionMethod::Exact { .. } => "exact",
             _ => "numeric",
         };
-        let mut cells = vec![
-            f.name.clone(),
-            of("load"),
-            of("derive"),
-            of("emit"),
-            of("all"),
-        ];
+        let mut cells = vec![f.name.clone(), of("load"), of("derive"), of("emit"), of("all")];
         cells.push(reduction.to_owned());
         cells.extend(GENERATORS.iter().map(|g| {
             let took = f.peers_generation.get(g).copied();
@@ -309,12 +261,10 @@ fn run_time(page: &mut String, all: &[Figures], peers: &Peers) {
     let rows = |function: &'static str, who: Vec<&'static str>| {
         all.iter().map(move |f| {
             let mut cells = vec![f.name.clone()];
-            cells.extend(
-                ["one state", "scalar", "blocks", "blocks, 256 bits"].map(|who| {
-                    let ns = f.time(who, function);
-                    ns.map_or_else(|| "-".to_owned(), |ns| format!("{ns:.1}"))
-                }),
-            );
+            cells.extend(["one state", "scalar", "blocks", "blocks, 256 bits"].map(|who| {
+                let ns = f.time(who, function);
+                ns.map_or_else(|| "-".to_owned(), |ns| format!("{ns:.1}"))
+            }));
             cells.push(times(f.faster("blocks", "scalar", function)));
             cells.push(times(f.faster("blocks, 256 bits", "scalar", function)));
             cells.push(times(f.longer(C99, function)));
@@ -345,10 +295,6 @@ fn run_time(page: &mut String, all: &[Figures], peers: &Peers) {
         .filter_map(|f| Some(format!("`{}` ({})", f.name, f.no_chain.as_ref()?)))
         .collect();
     if !reasons.is_empty() {
-        _ = writeln!(
-            page,
-            "No chain of bodies for the peers: {}.",
-            reasons.join(", ")
-        );
+        _ = writeln!(page, "No chain of bodies for the peers: {}.", reasons.join(", "));
     }
 }

@@ -1,8 +1,8 @@
 //! Mechanisms taken off their base: everything that stood on it hangs on a body that nothing holds.
 
 use modelmill_spec::{
-    Convention, Coordinate, CoordinateIdx, Drive, DriveKind, Frame, FrameIdx, FreeBody, Mechanism,
-    Motion, Step, TwistAxes,
+    CoordinateIdx, CoordinateMotion, DriveKind, FrameConvention, FrameIdx, FrameStep, FreeBody, JointCoordinate,
+    Mechanism, ModelDrive, ModelFrame, TwistAxes,
 };
 
 /// The mechanism with a free body between base and all else, which carries what the base did.
@@ -12,18 +12,18 @@ use modelmill_spec::{
 pub fn hung_free(mut mechanism: Mechanism, linear: TwistAxes, angular: TwistAxes) -> Mechanism {
     let n = mechanism.coordinates.len();
     let names = ["bx", "by", "bz", "bqw", "bqx", "bqy", "bqz"];
-    let motions = [Motion::Prismatic; 3].into_iter().chain([
-        Motion::QuaternionScalar,
-        Motion::Quaternion,
-        Motion::Quaternion,
-        Motion::Quaternion,
+    let motions = [CoordinateMotion::Prismatic; 3].into_iter().chain([
+        CoordinateMotion::QuaternionScalar,
+        CoordinateMotion::Quaternion,
+        CoordinateMotion::Quaternion,
+        CoordinateMotion::Quaternion,
     ]);
     for (name, motion) in names.into_iter().zip(motions) {
-        mechanism.coordinates.push(Coordinate {
+        mechanism.coordinates.push(JointCoordinate {
             name: name.to_owned(),
             motion,
             passive: false,
-            nominal: f64::from(u8::from(motion == Motion::QuaternionScalar)),
+            nominal: f64::from(u8::from(motion == CoordinateMotion::QuaternionScalar)),
         });
     }
     let at = |k: usize| CoordinateIdx(n + k);
@@ -34,7 +34,7 @@ pub fn hung_free(mut mechanism: Mechanism, linear: TwistAxes, angular: TwistAxes
         angular,
     };
     for k in [0, 1, 2, 4, 5, 6] {
-        mechanism.drives.push(Drive {
+        mechanism.drives.push(ModelDrive {
             name: format!("on_{}", names[k]),
             kind: DriveKind::Joint(at(k)),
             is_driven: false,
@@ -44,11 +44,11 @@ pub fn hung_free(mut mechanism: Mechanism, linear: TwistAxes, angular: TwistAxes
     for frame in &mut mechanism.frames[1..] {
         frame.parent = FrameIdx(frame.parent.0 + 1);
     }
-    let free = Frame {
+    let free = ModelFrame {
         name: "floating".to_owned(),
         parent: FrameIdx(0),
-        steps: vec![Step::Free(body)],
-        convention: Convention::Transform("free".to_owned()),
+        steps: vec![FrameStep::Free(body)],
+        convention: FrameConvention::Transform("free".to_owned()),
     };
     mechanism.frames.insert(1, free);
     let up = |frame: &mut FrameIdx| *frame = FrameIdx(frame.0 + 1);
@@ -56,23 +56,11 @@ pub fn hung_free(mut mechanism: Mechanism, linear: TwistAxes, angular: TwistAxes
     let bodies = effects.map(|effect| &mut effect.bodies);
     for bodies in bodies {
         bodies.parts.iter_mut().for_each(|part| up(&mut part.frame));
-        bodies
-            .lumped_masses
-            .iter_mut()
-            .for_each(|mass| up(&mut mass.frame));
+        bodies.lumped_masses.iter_mut().for_each(|mass| up(&mut mass.frame));
     }
-    mechanism
-        .points
-        .iter_mut()
-        .for_each(|point| up(&mut point.frame));
-    mechanism
-        .parts
-        .iter_mut()
-        .for_each(|part| up(&mut part.frame));
-    mechanism
-        .lumped_masses
-        .iter_mut()
-        .for_each(|mass| up(&mut mass.frame));
+    mechanism.points.iter_mut().for_each(|point| up(&mut point.frame));
+    mechanism.parts.iter_mut().for_each(|part| up(&mut part.frame));
+    mechanism.lumped_masses.iter_mut().for_each(|mass| up(&mut mass.frame));
     mechanism.name = format!("free_{}", mechanism.name);
     mechanism
 }

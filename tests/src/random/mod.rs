@@ -9,10 +9,10 @@ pub use planar_loop::{planar_loop, regularity_at};
 pub use tree::tree;
 
 use modelmill_spec::{
-    Axis, Bodies, Constant, ConstantIdx, Convention, Coordinate, CoordinateIdx, Drive, DriveIdx,
-    DriveKind, Effect, EffectTerm, Exact, Frame, FrameIdx, Function, Inertial, Length, Limits,
-    LumpedMass, Mechanism, Motion, Parameter, ParameterIdx, Part, Place, PlaceQuantity, Point,
-    PointIdx, Recording, Step, Symbol,
+    ConstantIdx, CoordinateIdx, CoordinateMotion, DriveIdx, DriveKind, DynamicParameter, EffectBodies, EffectPlace,
+    EffectTerm, ExactExpression, ExactFunction, ExactLength, FrameAxis, FrameConvention, FrameIdx, FramePoint,
+    FrameStep, JointCoordinate, LumpedMass, Mechanism, ModelConstant, ModelDrive, ModelEffect, ModelFrame, ModelPart,
+    ModelSymbol, MotionLimits, ParameterIdx, PartInertia, PlaceQuantity, PointIdx, RecordingColumns,
 };
 use nalgebra::{Matrix3, Vector3};
 use num_rational::BigRational;
@@ -39,10 +39,10 @@ struct Draft {
     mechanism: Mechanism,
 }
 
-const ZERO: fn() -> Exact = || number(0);
+const ZERO: fn() -> ExactExpression = || number(0);
 
-fn number(value: i64) -> Exact {
-    Exact::Rational(BigRational::from_integer(value.into()))
+fn number(value: i64) -> ExactExpression {
+    ExactExpression::Rational(BigRational::from_integer(value.into()))
 }
 
 fn ratio(numerator: i64, denominator: i64) -> BigRational {
@@ -56,11 +56,11 @@ fn small(n: usize) -> i64 {
 
 impl Draft {
     fn new(kind: &str, seed: u64, matter: Matter) -> Self {
-        let base = Frame {
+        let base = ModelFrame {
             name: "base".to_owned(),
             parent: FrameIdx(0),
             steps: Vec::new(),
-            convention: Convention::Base,
+            convention: FrameConvention::Base,
         };
         Self {
             stream: Stream::new(seed),
@@ -84,8 +84,8 @@ impl Draft {
                 force_delay: 0.0,
                 identified_base: Vec::new(),
                 retain: Vec::new(),
-                limits: Limits::default(),
-                recording: Recording::default(),
+                limits: MotionLimits::default(),
+                recording: RecordingColumns::default(),
                 is_at_values: false,
             },
         }
@@ -94,7 +94,7 @@ impl Draft {
     fn constant(&mut self, prefix: &str, value: f64, unit: &str) -> ConstantIdx {
         let i = self.mechanism.constants.len();
         let value = self.value(value, unit);
-        self.mechanism.constants.push(Constant {
+        self.mechanism.constants.push(ModelConstant {
             name: format!("{prefix}{i}"),
             value,
             unit: unit.to_owned(),
@@ -112,9 +112,7 @@ impl Draft {
         }
         let gap = *self.stream.pick(&GAPS);
         let others = self.mechanism.constants.iter();
-        let others: Vec<f64> = (others.filter(|c| c.unit == unit))
-            .map(|c| c.value)
-            .collect();
+        let others: Vec<f64> = (others.filter(|c| c.unit == unit)).map(|c| c.value).collect();
         match self.stream.below(10) {
             0..4 if !others.is_empty() => {
                 let other = *self.stream.pick(&others);
@@ -126,14 +124,14 @@ impl Draft {
         }
     }
 
-    fn length(&mut self, low: f64, high: f64) -> Exact {
+    fn length(&mut self, low: f64, high: f64) -> ExactExpression {
         let value = self.stream.either_side(low, high);
-        Exact::Symbol(Symbol::Constant(self.constant("l", value, "m")))
+        ExactExpression::Symbol(ModelSymbol::Constant(self.constant("l", value, "m")))
     }
 
     fn parameter(&mut self, prefix: &str, nominal: f64) -> ParameterIdx {
         let i = self.mechanism.parameters.len();
-        self.mechanism.parameters.push(Parameter {
+        self.mechanism.parameters.push(DynamicParameter {
             name: format!("{prefix}{i}"),
             nominal,
             unit: "1".to_owned(),
@@ -142,18 +140,18 @@ impl Draft {
         ParameterIdx(i)
     }
 
-    fn symbol(&mut self, prefix: &str, nominal: f64) -> Exact {
-        Exact::Symbol(Symbol::Parameter(self.parameter(prefix, nominal)))
+    fn symbol(&mut self, prefix: &str, nominal: f64) -> ExactExpression {
+        ExactExpression::Symbol(ModelSymbol::Parameter(self.parameter(prefix, nominal)))
     }
 
-    fn coordinate(&mut self, motion: Motion) -> CoordinateIdx {
+    fn coordinate(&mut self, motion: CoordinateMotion) -> CoordinateIdx {
         let i = self.mechanism.coordinates.len();
         let nominal = if motion.is_angle() {
             self.stream.between(-3.0, 3.0)
         } else {
             self.stream.between(0.2, 1.2)
         };
-        self.mechanism.coordinates.push(Coordinate {
+        self.mechanism.coordinates.push(JointCoordinate {
             name: format!("q{i}"),
             motion,
             passive: false,
@@ -162,20 +160,20 @@ impl Draft {
         CoordinateIdx(i)
     }
 
-    fn frame(&mut self, parent: FrameIdx, steps: Vec<Step>) -> FrameIdx {
+    fn frame(&mut self, parent: FrameIdx, steps: Vec<FrameStep>) -> FrameIdx {
         let i = self.mechanism.frames.len();
-        self.mechanism.frames.push(Frame {
+        self.mechanism.frames.push(ModelFrame {
             name: format!("frame{i}"),
             parent,
             steps,
-            convention: Convention::Transform("random".to_owned()),
+            convention: FrameConvention::Transform("random".to_owned()),
         });
         FrameIdx(i)
     }
 
-    fn point(&mut self, frame: FrameIdx, at: [Exact; 3]) -> PointIdx {
+    fn point(&mut self, frame: FrameIdx, at: [ExactExpression; 3]) -> PointIdx {
         let i = self.mechanism.points.len();
-        self.mechanism.points.push(Point {
+        self.mechanism.points.push(FramePoint {
             name: format!("point{i}"),
             frame,
             at,
@@ -184,7 +182,7 @@ impl Draft {
     }
 
     /// A point at random symbolic components in some of the three directions.
-    fn place(&mut self, planar: bool) -> [Exact; 3] {
+    fn place(&mut self, planar: bool) -> [ExactExpression; 3] {
         std::array::from_fn(|i| {
             if (planar && i == 2) || self.stream.chance(0.3) {
                 ZERO()
@@ -207,13 +205,13 @@ impl Draft {
             if along {
                 let value = self.stream.either_side(3.0, 10.0);
                 let symbol = self.constant("g", value, "m/s^2");
-                self.mechanism.gravity[i] = Exact::Symbol(Symbol::Constant(symbol));
+                self.mechanism.gravity[i] = ExactExpression::Symbol(ModelSymbol::Constant(symbol));
             }
         }
     }
 
     /// A body with all its linear parameters (those that matter in the plane) and values of a real body.
-    fn whole_body(&mut self, planar: bool) -> Inertial {
+    fn whole_body(&mut self, planar: bool) -> PartInertia {
         let mut mass = 0.0;
         let mut moment = Vector3::zeros();
         let mut inertia = Matrix3::zeros();
@@ -228,11 +226,7 @@ impl Draft {
             inertia += m * (at.norm_squared() * Matrix3::identity() - at * at.transpose());
         }
         let mut entry = |name: &str, value: f64, matters: bool| {
-            if matters {
-                self.symbol(name, value)
-            } else {
-                ZERO()
-            }
+            if matters { self.symbol(name, value) } else { ZERO() }
         };
         let inertia = [
             entry("XX", inertia[(0, 0)], !planar),
@@ -247,7 +241,7 @@ impl Draft {
             entry("MY", moment[1], true),
             entry("MZ", moment[2], !planar),
         ];
-        Inertial::Linear {
+        PartInertia::Linear {
             mass: entry("M", mass, true),
             first_moment,
             inertia,
@@ -255,7 +249,7 @@ impl Draft {
     }
 
     /// A body whose entries may be missing, or that is given by its centre of mass.
-    fn any_body(&mut self, planar: bool) -> Inertial {
+    fn any_body(&mut self, planar: bool) -> PartInertia {
         if self.stream.chance(0.3) {
             let mass = {
                 let value = self.stream.between(0.5, 4.0);
@@ -278,18 +272,12 @@ impl Draft {
                     self.symbol("I", value)
                 }
             });
-            return Inertial::AboutCentre {
-                mass,
-                centre,
-                inertia,
-            };
+            return PartInertia::AboutCentre { mass, centre, inertia };
         }
         let mut inertial = self.whole_body(planar);
         if self.stream.chance(0.4)
-            && let Inertial::Linear {
-                first_moment,
-                inertia,
-                ..
+            && let PartInertia::Linear {
+                first_moment, inertia, ..
             } = &mut inertial
         {
             for entry in first_moment.iter_mut().chain(inertia) {
@@ -314,7 +302,7 @@ impl Draft {
             } else {
                 self.any_body(planar)
             };
-            self.mechanism.parts.push(Part {
+            self.mechanism.parts.push(ModelPart {
                 name: format!("part{frame}"),
                 frame: FrameIdx(frame),
                 inertial,
@@ -324,11 +312,7 @@ impl Draft {
             let inertial = self.whole_body(planar);
             let frame = FrameIdx(self.mechanism.frames.len() - 1);
             let name = "part".to_owned();
-            self.mechanism.parts.push(Part {
-                name,
-                frame,
-                inertial,
-            });
+            self.mechanism.parts.push(ModelPart { name, frame, inertial });
         }
     }
 
@@ -378,7 +362,7 @@ impl Draft {
                 DriveKind::Joint(*coordinate)
             };
             let name = format!("drive{}", self.mechanism.drives.len());
-            self.mechanism.drives.push(Drive {
+            self.mechanism.drives.push(ModelDrive {
                 name,
                 kind,
                 is_driven: true,
@@ -407,16 +391,11 @@ impl Draft {
                 let point = self.point(frame, at);
                 let value = self.stream.between(0.2, 1.0);
                 let parameter = self.parameter("dm", value);
-                self.effect(
-                    "point_mass",
-                    vec![Place::Point(point)],
-                    parameter,
-                    number(1),
-                );
+                self.effect("point_mass", vec![EffectPlace::Point(point)], parameter, number(1));
                 continue;
             }
-            let symbol = |quantity| Exact::Symbol(Symbol::Place(quantity));
-            let sign = Exact::Apply(Function::Sign, Box::new(symbol(PlaceQuantity::Rate)));
+            let symbol = |quantity| ExactExpression::Symbol(ModelSymbol::Place(quantity));
+            let sign = ExactExpression::Apply(ExactFunction::Sign, Box::new(symbol(PlaceQuantity::Rate)));
             let on_drive = self.stream.chance(0.6);
             let choices = [
                 ("viscous_friction", symbol(PlaceQuantity::Rate)),
@@ -425,7 +404,7 @@ impl Draft {
                 ("force_offset", number(1)),
                 if on_drive {
                     // A coordinate carries no load of its own.
-                    let friction = Exact::Product(vec![symbol(PlaceQuantity::Load), sign]);
+                    let friction = ExactExpression::Product(vec![symbol(PlaceQuantity::Load), sign]);
                     ("load_friction", friction)
                 } else {
                     ("spring", symbol(PlaceQuantity::Coordinate))
@@ -433,13 +412,13 @@ impl Draft {
             ];
             let (kind, expression) = self.stream.pick(&choices).clone();
             let count = 1 + self.stream.below(2);
-            let mut places: Vec<Place> = Vec::new();
+            let mut places: Vec<EffectPlace> = Vec::new();
             for _ in 0..count {
                 let place = if on_drive {
-                    Place::Drive(DriveIdx(self.stream.below(self.mechanism.drives.len())))
+                    EffectPlace::Drive(DriveIdx(self.stream.below(self.mechanism.drives.len())))
                 } else {
                     let i = self.stream.below(self.mechanism.coordinates.len());
-                    Place::Coordinate(CoordinateIdx(i))
+                    EffectPlace::Coordinate(CoordinateIdx(i))
                 };
                 if !places.contains(&place) {
                     places.push(place);
@@ -451,14 +430,8 @@ impl Draft {
         }
     }
 
-    fn effect(
-        &mut self,
-        kind: &str,
-        places: Vec<Place>,
-        parameter: ParameterIdx,
-        expression: Exact,
-    ) {
-        self.mechanism.effects.push(Effect {
+    fn effect(&mut self, kind: &str, places: Vec<EffectPlace>, parameter: ParameterIdx, expression: ExactExpression) {
+        self.mechanism.effects.push(ModelEffect {
             kind: kind.to_owned(),
             places,
             other: None,
@@ -469,16 +442,16 @@ impl Draft {
                 expression,
             }],
             constants: Vec::new(),
-            bodies: Bodies::default(),
+            bodies: EffectBodies::default(),
         });
     }
 }
 
 /// Moves along an axis by an offset and a coordinate.
-fn slide(axis: Axis, offset: Exact, coordinate: CoordinateIdx) -> Step {
-    Step::Translate(
+fn slide(axis: FrameAxis, offset: ExactExpression, coordinate: CoordinateIdx) -> FrameStep {
+    FrameStep::Translate(
         axis,
-        Length {
+        ExactLength {
             offset,
             coordinates: vec![(coordinate, ratio(1, 1))],
         },
@@ -486,10 +459,10 @@ fn slide(axis: Axis, offset: Exact, coordinate: CoordinateIdx) -> Step {
 }
 
 /// Moves along an axis by an offset.
-fn shift(axis: Axis, offset: Exact) -> Step {
-    Step::Translate(
+fn shift(axis: FrameAxis, offset: ExactExpression) -> FrameStep {
+    FrameStep::Translate(
         axis,
-        Length {
+        ExactLength {
             offset,
             coordinates: Vec::new(),
         },

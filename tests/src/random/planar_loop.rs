@@ -1,7 +1,8 @@
 //! Random planar mechanisms of one loop.
 
 use modelmill_spec::{
-    Angle, Axis, CoordinateIdx, Exact, FrameIdx, Loop, Mechanism, Motion, PointIdx, Step, Symbol,
+    CoordinateIdx, CoordinateMotion, ExactAngle, ExactExpression, FrameAxis, FrameIdx, FrameStep, KinematicLoop,
+    Mechanism, ModelSymbol, PointIdx,
 };
 
 use super::{Draft, Matter, ZERO, number, ratio, shift, slide};
@@ -31,15 +32,12 @@ fn draw(seed: u64, matter: Matter) -> Option<Mechanism> {
     let mut joints = Vec::new();
     let left = draft.chain(FrameIdx(0), n_left, &mut joints);
     // The right chain hangs on a base frame whose place follows when all else is known.
-    let (x, y) = (
-        draft.constant("bx", 0.0, "m"),
-        draft.constant("by", 0.0, "m"),
-    );
-    let symbol = |i| Exact::Symbol(Symbol::Constant(i));
-    let base_steps = vec![shift(Axis::X, symbol(x)), shift(Axis::Y, symbol(y))];
+    let (x, y) = (draft.constant("bx", 0.0, "m"), draft.constant("by", 0.0, "m"));
+    let symbol = |i| ExactExpression::Symbol(ModelSymbol::Constant(i));
+    let base_steps = vec![shift(FrameAxis::X, symbol(x)), shift(FrameAxis::Y, symbol(y))];
     let base = draft.frame(FrameIdx(0), base_steps);
     let right = draft.chain(base, n - n_left, &mut joints);
-    draft.mechanism.loops.push(Loop {
+    draft.mechanism.loops.push(KinematicLoop {
         name: "closure".to_owned(),
         joins: [left, right],
     });
@@ -112,50 +110,41 @@ pub fn regularity_at(mechanism: &Mechanism, coordinates: &[f64]) -> f64 {
 
 impl Draft {
     /// A chain of `n` joints on `base`; returns its tip.
-    fn chain(
-        &mut self,
-        base: FrameIdx,
-        n: usize,
-        joints: &mut Vec<(CoordinateIdx, FrameIdx)>,
-    ) -> PointIdx {
+    fn chain(&mut self, base: FrameIdx, n: usize, joints: &mut Vec<(CoordinateIdx, FrameIdx)>) -> PointIdx {
         let mut frame = base;
         for i in 0..n {
             let motion = if self.stream.chance(0.75) {
-                Motion::Revolute
+                CoordinateMotion::Revolute
             } else {
-                Motion::Prismatic
+                CoordinateMotion::Prismatic
             };
             let coordinate = self.coordinate(motion);
-            let offset = if i == 0 {
-                ZERO()
-            } else {
-                self.length(0.3, 0.9)
-            };
-            let mut steps = vec![shift(Axis::X, offset)];
+            let offset = if i == 0 { ZERO() } else { self.length(0.3, 0.9) };
+            let mut steps = vec![shift(FrameAxis::X, offset)];
             if motion.is_angle() {
-                steps.push(Step::Rotate(
-                    Axis::Z,
-                    Angle {
+                steps.push(FrameStep::Rotate(
+                    FrameAxis::Z,
+                    ExactAngle {
                         pi: ratio(0, 1),
-                        terms: vec![(Symbol::Coordinate(coordinate), 1)],
+                        terms: vec![(ModelSymbol::Coordinate(coordinate), 1)],
                     },
                 ));
             } else {
                 let angle = if self.stream.chance(0.5) {
                     let value = self.stream.either_side(0.3, 1.3);
                     let constant = self.constant("a", value, "rad");
-                    Angle {
+                    ExactAngle {
                         pi: ratio(0, 1),
-                        terms: vec![(Symbol::Constant(constant), 1)],
+                        terms: vec![(ModelSymbol::Constant(constant), 1)],
                     }
                 } else {
-                    Angle {
+                    ExactAngle {
                         pi: ratio(1, 2),
                         terms: Vec::new(),
                     }
                 };
-                steps.push(Step::Rotate(Axis::Z, angle));
-                let axis = *self.stream.pick(&[Axis::X, Axis::Y]);
+                steps.push(FrameStep::Rotate(FrameAxis::Z, angle));
+                let axis = *self.stream.pick(&[FrameAxis::X, FrameAxis::Y]);
                 steps.push(slide(axis, number(0), coordinate));
             }
             frame = self.frame(frame, steps);

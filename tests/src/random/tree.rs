@@ -1,6 +1,8 @@
 //! Random spatial trees of revolute and prismatic joints.
 
-use modelmill_spec::{Angle, Axis, CoordinateIdx, FrameIdx, Mechanism, Motion, Step, Symbol};
+use modelmill_spec::{
+    CoordinateIdx, CoordinateMotion, ExactAngle, FrameAxis, FrameIdx, FrameStep, Mechanism, ModelSymbol,
+};
 
 use super::{Draft, Matter, ZERO, ratio, shift, slide, small};
 
@@ -43,27 +45,27 @@ fn draw(seed: u64, matter: Matter) -> Option<Mechanism> {
     Some(draft.mechanism)
 }
 
-const AXES: [Axis; 3] = [Axis::X, Axis::Y, Axis::Z];
+const AXES: [FrameAxis; 3] = [FrameAxis::X, FrameAxis::Y, FrameAxis::Z];
 
 impl Draft {
     /// A fixed angle; `symbolic` allows a constant of the model.
-    fn twist(&mut self, symbolic: bool) -> Angle {
+    fn twist(&mut self, symbolic: bool) -> ExactAngle {
         let quarters = small(self.stream.below(4));
         let choice = self.stream.below(20);
         if symbolic && choice < 5 {
             let value = self.stream.either_side(0.2, 1.4);
             let constant = self.constant("a", value, "rad");
-            Angle {
+            ExactAngle {
                 pi: ratio(0, 1),
-                terms: vec![(Symbol::Constant(constant), 1)],
+                terms: vec![(ModelSymbol::Constant(constant), 1)],
             }
         } else if choice < 7 {
-            Angle {
+            ExactAngle {
                 pi: ratio(small(self.stream.below(24)), 12),
                 terms: Vec::new(),
             }
         } else {
-            Angle {
+            ExactAngle {
                 pi: ratio(quarters, 2),
                 terms: Vec::new(),
             }
@@ -73,9 +75,9 @@ impl Draft {
     /// A frame with one joint: by modified Denavit-Hartenberg or by steps about and along any axes.
     fn joint(&mut self, parent: FrameIdx, symbolic: bool) -> (CoordinateIdx, FrameIdx) {
         let motion = if self.stream.chance(0.7) {
-            Motion::Revolute
+            CoordinateMotion::Revolute
         } else {
-            Motion::Prismatic
+            CoordinateMotion::Prismatic
         };
         let coordinate = self.coordinate(motion);
         let twist = self.twist(symbolic);
@@ -88,26 +90,26 @@ impl Draft {
         });
         let [a, d] = offsets;
         let general = self.stream.chance(0.3);
-        let mut axis = |fixed: Axis| {
-            if general {
-                *self.stream.pick(&AXES)
-            } else {
-                fixed
-            }
+        let mut axis = |fixed: FrameAxis| {
+            if general { *self.stream.pick(&AXES) } else { fixed }
         };
-        let (about, along, joint, last) =
-            (axis(Axis::X), axis(Axis::X), axis(Axis::Z), axis(Axis::Z));
-        let turn = Angle {
+        let (about, along, joint, last) = (
+            axis(FrameAxis::X),
+            axis(FrameAxis::X),
+            axis(FrameAxis::Z),
+            axis(FrameAxis::Z),
+        );
+        let turn = ExactAngle {
             pi: ratio(0, 1),
-            terms: vec![(Symbol::Coordinate(coordinate), 1)],
+            terms: vec![(ModelSymbol::Coordinate(coordinate), 1)],
         };
-        let mut steps = vec![Step::Rotate(about, twist), shift(along, a)];
+        let mut steps = vec![FrameStep::Rotate(about, twist), shift(along, a)];
         if motion.is_angle() {
-            steps.push(Step::Rotate(joint, turn));
+            steps.push(FrameStep::Rotate(joint, turn));
             steps.push(shift(last, d));
         } else {
             steps.push(slide(joint, d, coordinate));
-            steps.push(Step::Rotate(last, self.twist(false)));
+            steps.push(FrameStep::Rotate(last, self.twist(false)));
         }
         (coordinate, self.frame(parent, steps))
     }

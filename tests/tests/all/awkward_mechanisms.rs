@@ -2,8 +2,8 @@
 
 use std::fmt::Write;
 
-use modelmill_boundary::files::Memory;
-use modelmill_codegen::{DeriveError, Evaluator, Method, PassivePosition, States};
+use modelmill_boundary::files::MemoryFiles;
+use modelmill_codegen::{DeriveError, ModelEvaluator, MotionStates, PassivePosition, ReductionMethod};
 use modelmill_spec::{DriveKind, FrameIdx, Mechanism, PointIdx};
 use modelmill_tests::fixtures::{derive, fixtures, model};
 use modelmill_tests::laws::Case;
@@ -42,7 +42,7 @@ fn exact(name: &str, reach: f64, rank: usize) -> Case {
     assert_eq!(case.derivation.reduction.retained.len(), rank, "{name}");
     assert!(matches!(
         case.derivation.reduction.method,
-        Method::Exact { .. }
+        ReductionMethod::Exact { .. }
     ));
     case
 }
@@ -91,7 +91,7 @@ fn what_no_rational_function_can_say_is_said_in_numbers() {
         assert_eq!(case.derivation.reduction.retained.len(), 6);
         assert!(matches!(
             case.derivation.reduction.method,
-            Method::Numeric { .. }
+            ReductionMethod::Numeric { .. }
         ));
     }
 }
@@ -121,15 +121,15 @@ fn parallelograms_that_others_drive_or_stand_beside() {
     ] {
         let case = exact(name, 0.2, rank);
         // Far beyond the pose where the parallelogram is flat and might turn into the crossed linkage.
-        let evaluator = Evaluator::new(&case.derivation);
+        let evaluator = ModelEvaluator::new(&case.derivation);
         let still = vec![vec![0.0; 5]; poses.len()];
-        let states = States {
+        let states = MotionStates {
             q: poses.iter().map(Vec::as_slice).collect(),
             qd: still.iter().map(Vec::as_slice).collect(),
             qdd: still.iter().map(Vec::as_slice).collect(),
             load: Vec::new(),
         };
-        let passive = evaluator.passive(&states).unwrap();
+        let passive = evaluator.passive_motion(&states).unwrap();
         for (k, q) in poses[0].iter().enumerate() {
             let pairs = passive[..if name == "desk_lamp" { 4 } else { 2 }].chunks(2);
             for pair in pairs {
@@ -181,7 +181,7 @@ fn large_multiples_and_many_roots_come_to_an_end() {
         derive(&model("two_link")).reduction.retained.len() + 1
     );
     let roots = derive(&awkward("many_roots"));
-    assert!(matches!(roots.reduction.method, Method::Numeric { .. }));
+    assert!(matches!(roots.reduction.method, ReductionMethod::Numeric { .. }));
 }
 
 /// Four-bars beside each other, each with a crank of its own, or in a row, each cranked by the rocker of the one before.
@@ -247,7 +247,7 @@ fn four_bars(n: usize, in_a_row: bool) -> Mechanism {
         }
     }
     text = text + &constants + &coordinates + &rest;
-    match modelmill_spec::load("four_bars.toml", &text, &Memory::default()) {
+    match modelmill_spec::load("four_bars.toml", &text, &MemoryFiles::default()) {
         Ok(loaded) => loaded.mechanism,
         Err(failure) => panic!("{}", failure.render(false)),
     }
@@ -257,8 +257,7 @@ fn four_bars(n: usize, in_a_row: bool) -> Mechanism {
 fn assembled(a: f64, b: f64, c: f64, d: f64, crank: f64) -> (f64, f64) {
     let (x, y) = (d - a * crank.cos(), -a * crank.sin());
     let diagonal = x.hypot(y);
-    let coupler =
-        y.atan2(x) + ((b * b + diagonal * diagonal - c * c) / (2.0 * b * diagonal)).acos();
+    let coupler = y.atan2(x) + ((b * b + diagonal * diagonal - c * c) / (2.0 * b * diagonal)).acos();
     let (ex, ey) = (
         a * crank.cos() + b * coupler.cos() - d,
         a * crank.sin() + b * coupler.sin(),
@@ -315,14 +314,11 @@ fn a_power_of_a_sum_of_parameters_is_refused_before_it_fills_the_memory() {
         "#,
         names.join("+")
     );
-    let loaded = modelmill_spec::load("sums.toml", &text, &Memory::default()).unwrap();
+    let loaded = modelmill_spec::load("sums.toml", &text, &MemoryFiles::default()).unwrap();
     let error = modelmill_codegen::derive(&loaded.mechanism)
         .err()
         .expect("no derivation");
-    assert!(
-        error.to_string().contains("more than 2000 products"),
-        "{error}"
-    );
+    assert!(error.to_string().contains("more than 2000 products"), "{error}");
 }
 
 #[test]
@@ -341,11 +337,6 @@ fn a_drive_that_nothing_moves_is_refused() {
         from: PointIdx(mechanism.points.len() - 1),
         to: PointIdx(ends[1]),
     };
-    let error = modelmill_codegen::derive(&mechanism)
-        .err()
-        .expect("no derivation");
-    assert!(
-        error.to_string().contains("that every drive moves"),
-        "{error}"
-    );
+    let error = modelmill_codegen::derive(&mechanism).err().expect("no derivation");
+    assert!(error.to_string().contains("that every drive moves"), "{error}");
 }

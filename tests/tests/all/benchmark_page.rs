@@ -11,8 +11,7 @@ use modelmill_tests::fixtures::derived;
 #[test]
 fn the_page_of_benchmarks_has_the_operations_that_are_counted_now() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/guide/src/benchmarks.md");
-    let page = std::fs::read_to_string(&file)
-        .unwrap_or_else(|error| panic!("{}: {error}", file.display()));
+    let page = std::fs::read_to_string(&file).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
     let models = counts::bundled();
     if std::env::var_os("MODELMILL_WRITE_COUNTS").is_some() {
         let rows = models.iter().map(|name| counts::row(name, &derived(name)));
@@ -45,9 +44,7 @@ fn the_page_of_benchmarks_has_the_operations_that_are_counted_now() {
 fn with_rows(page: &str, rows: impl Iterator<Item = Vec<String>>) -> String {
     let head = format!("| {} |\n", HEADINGS.join(" | "));
     let (before, rest) = page.split_once(&head).expect("the table of operations");
-    let (table, after) = rest
-        .split_once("\n\n")
-        .expect("something follows the table");
+    let (table, after) = rest.split_once("\n\n").expect("something follows the table");
     let alignment = table.lines().next().expect("a line below the headings");
     let rows: Vec<String> = rows.map(|row| format!("| {} |", row.join(" | "))).collect();
     format!("{before}{head}{alignment}\n{}\n\n{after}", rows.join("\n"))

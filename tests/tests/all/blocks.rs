@@ -1,12 +1,12 @@
 //! The regressor block by block: the same numbers as all at once, in order, up to the first state without an answer.
 
-use modelmill_codegen::{Evaluator, PoseFault};
+use modelmill_codegen::{ModelEvaluator, PoseFault};
 use modelmill_tests::fixtures::derived;
 use modelmill_tests::sample::Sample;
 use modelmill_tests::stream::Stream;
 
 /// All rows that are shown, and how it ended.
-fn shown(evaluator: &Evaluator<'_>, sample: &Sample) -> (Vec<Vec<f64>>, Result<(), PoseFault>) {
+fn shown(evaluator: &ModelEvaluator<'_>, sample: &Sample) -> (Vec<Vec<f64>>, Result<(), PoseFault>) {
     let mut columns: Vec<Vec<f64>> = Vec::new();
     let end = evaluator.regressor_blocks::<PoseFault>(&sample.states(), |len, block| {
         columns.resize(block.len(), Vec::new());
@@ -23,7 +23,7 @@ fn shown(evaluator: &Evaluator<'_>, sample: &Sample) -> (Vec<Vec<f64>>, Result<(
 fn blocks_hold_what_the_regressor_holds() {
     for name in ["five_bar-tied", "four_bar", "panda", "spidermill", "emps"] {
         let derivation = derived(name);
-        let evaluator = Evaluator::new(&derivation);
+        let evaluator = ModelEvaluator::new(&derivation);
         let mut sample = Sample::random(&derivation.mechanism, 150, 0.2, &mut Stream::new(3));
         let matrix = evaluator.regressor(&sample.states()).unwrap();
         let (columns, end) = shown(&evaluator, &sample);
@@ -47,7 +47,7 @@ fn blocks_hold_what_the_regressor_holds() {
 fn some_columns_are_what_they_are_among_all() {
     for name in ["five_bar-tied", "panda", "spidermill"] {
         let derivation = derived(name);
-        let evaluator = Evaluator::new(&derivation);
+        let evaluator = ModelEvaluator::new(&derivation);
         let sample = Sample::random(&derivation.mechanism, 70, 0.2, &mut Stream::new(3));
         let matrix = evaluator.regressor(&sample.states()).unwrap();
         let n = matrix.ncols();
@@ -55,21 +55,17 @@ fn some_columns_are_what_they_are_among_all() {
         for wanted in [vec![0], vec![n - 1], (0..n).step_by(3).collect()] {
             let mut before = 0;
             let is_wanted = |k: usize| wanted.contains(&k);
-            let end = evaluator.regressor_blocks_of::<PoseFault>(
-                &sample.states(),
-                &is_wanted,
-                |len, block| {
-                    for (k, values) in block.iter().enumerate() {
-                        for (i, value) in values.iter().enumerate() {
-                            let entry = matrix[((before + i) * drives + k / n, k % n)];
-                            let expected = if is_wanted(k % n) { entry } else { 0.0 };
-                            assert_eq!(value.to_bits(), expected.to_bits(), "{name} {wanted:?}");
-                        }
+            let end = evaluator.regressor_column_blocks::<PoseFault>(&sample.states(), &is_wanted, |len, block| {
+                for (k, values) in block.iter().enumerate() {
+                    for (i, value) in values.iter().enumerate() {
+                        let entry = matrix[((before + i) * drives + k / n, k % n)];
+                        let expected = if is_wanted(k % n) { entry } else { 0.0 };
+                        assert_eq!(value.to_bits(), expected.to_bits(), "{name} {wanted:?}");
                     }
-                    before += len;
-                    Ok(())
-                },
-            );
+                }
+                before += len;
+                Ok(())
+            });
             assert_eq!((end, before), (Ok(()), 70));
         }
     }
@@ -79,7 +75,7 @@ fn some_columns_are_what_they_are_among_all() {
 #[test]
 fn large_angles_are_turned_back() {
     let derivation = derived("panda");
-    let evaluator = Evaluator::new(&derivation);
+    let evaluator = ModelEvaluator::new(&derivation);
     let sample = Sample::random(&derivation.mechanism, 70, 0.5, &mut Stream::new(4));
     let matrix = evaluator.regressor(&sample.states()).unwrap();
     for (turns, tolerance) in [(10.0, 1e-12), (2e5, 1e-8), (1e7, 1e-6)] {

@@ -1,6 +1,6 @@
 //! Coordinates that follow others, by gears, screws and differentials: laws that know nothing of how they are eliminated.
 
-use modelmill_codegen::Method;
+use modelmill_codegen::ReductionMethod;
 use modelmill_spec::Mechanism;
 use modelmill_tests::fixtures::fixtures;
 use modelmill_tests::laws::Case;
@@ -26,7 +26,7 @@ fn check(name: &str) {
 #[track_caller]
 fn check_forces(name: &str, case: &Case) {
     let method = &case.derivation.reduction.method;
-    assert!(matches!(method, Method::Exact { .. }), "{name}: {method:?}");
+    assert!(matches!(method, ReductionMethod::Exact { .. }), "{name}: {method:?}");
     for law in [
         case.reduction_keeps_the_forces(),
         case.forces_satisfy_dalembert(40),

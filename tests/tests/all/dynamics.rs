@@ -2,7 +2,7 @@
 //! motions, emitted code against the evaluator.
 
 use crate::random_models;
-use modelmill_codegen::{Derivation, Evaluator};
+use modelmill_codegen::{Derivation, ModelEvaluator};
 use modelmill_runtime::{PoseError, Real};
 use modelmill_tests::base_parameters::{base, nominal};
 use modelmill_tests::equation_of_motion::terms;
@@ -31,20 +31,12 @@ fn check(matter: Matter, n: u64, law: impl Fn(&Case) -> Result<f64, String>) {
 
 #[test]
 fn terms_add_up_to_the_inverse_dynamics_of_anything() {
-    check(
-        Matter::Anything,
-        60,
-        Case::equation_of_motion_is_the_inverse_dynamics,
-    );
+    check(Matter::Anything, 60, Case::equation_of_motion_is_the_inverse_dynamics);
 }
 
 #[test]
 fn terms_add_up_to_the_inverse_dynamics_of_bodies() {
-    check(
-        Matter::Physical,
-        40,
-        Case::equation_of_motion_is_the_inverse_dynamics,
-    );
+    check(Matter::Physical, 40, Case::equation_of_motion_is_the_inverse_dynamics);
 }
 
 #[test]
@@ -70,7 +62,7 @@ fn case(name: &str) -> Case {
         0.25
     };
     let sample = Sample::random(&derivation.mechanism, 20, reach, &mut Stream::new(5))
-        .reachable(&Evaluator::new(&derivation));
+        .reachable(&ModelEvaluator::new(&derivation));
     Case { derivation, sample }
 }
 
@@ -118,7 +110,7 @@ fn check_energy(name: &str, force: f64, duration: f64, steps: u32) {
     let mechanism = &derivation.mechanism;
     assert!(mechanism.effects.is_empty(), "{name} dissipates");
     let dynamics = derivation.dynamics().expect("affine in the accelerations");
-    let evaluator = Evaluator::new(&derivation);
+    let evaluator = ModelEvaluator::new(&derivation);
     let p_min = base(&derivation, &nominal(mechanism));
     let active: Vec<usize> = (0..mechanism.coordinates.len())
         .filter(|i| !mechanism.coordinates[*i].passive)
@@ -139,7 +131,7 @@ fn check_energy(name: &str, force: f64, duration: f64, steps: u32) {
         let accelerations = evaluator
             .forward_dynamics(&dynamics, &states, &p_min, &given)
             .expect("a regular pose");
-        let drives = evaluator.drives(&states).expect("a regular pose");
+        let drives = evaluator.drive_motion(&states).expect("a regular pose");
         let power: f64 = (0..n).map(|d| forces[d][0] * drives[n + d][0]).sum();
         let rates = (n..2 * n).map(|i| x[i]);
         let rest = accelerations.iter().map(|a| a[0]).chain([power]);
@@ -231,22 +223,16 @@ fn largest(values: &[f64]) -> f64 {
 fn condition(derivation: &Derivation, one: &Sample) -> f64 {
     let dynamics = derivation.dynamics().expect("affine in the accelerations");
     let p_min = base(derivation, &nominal(&derivation.mechanism));
-    let found = terms(&Evaluator::new(derivation), &dynamics, one, &p_min).expect("a state");
+    let found = terms(&ModelEvaluator::new(derivation), &dynamics, one, &p_min).expect("a state");
     let values = found.mass.clone().singular_values();
     let rest = found.coriolis.amax() + found.gravity.amax() + found.effects.amax();
     (values.max() + rest) / values.min().max(1e-300)
 }
 
-fn compare(
-    derivation: &Derivation,
-    one: &Sample,
-    mass: &[f64],
-    rest: &[Vec<f64>; 3],
-    bias: &[f64],
-) {
+fn compare(derivation: &Derivation, one: &Sample, mass: &[f64], rest: &[Vec<f64>; 3], bias: &[f64]) {
     let dynamics = derivation.dynamics().expect("affine in the accelerations");
     let p_min = base(derivation, &nominal(&derivation.mechanism));
-    let expected = terms(&Evaluator::new(derivation), &dynamics, one, &p_min).expect("a state");
+    let expected = terms(&ModelEvaluator::new(derivation), &dynamics, one, &p_min).expect("a state");
     let close = |what: &str, a: &[f64], b: &[f64]| {
         let scale = largest(a);
         for (x, y) in a.iter().zip(b) {
@@ -255,22 +241,13 @@ fn compare(
     };
     close("mass matrix", expected.mass.transpose().as_slice(), mass);
     let parts = [&expected.coriolis, &expected.gravity, &expected.effects];
-    for ((what, a), b) in ["coriolis", "gravity", "effects"]
-        .iter()
-        .zip(parts)
-        .zip(rest)
-    {
+    for ((what, a), b) in ["coriolis", "gravity", "effects"].iter().zip(parts).zip(rest) {
         close(what, a.as_slice(), b);
     }
-    let sum: Vec<f64> = (0..bias.len())
-        .map(|a| rest.iter().map(|r| r[a]).sum())
-        .collect();
+    let sum: Vec<f64> = (0..bias.len()).map(|a| rest.iter().map(|r| r[a]).sum()).collect();
     let scale = rest.iter().map(|r| largest(r)).sum::<f64>();
     for (x, y) in bias.iter().zip(&sum) {
-        assert!(
-            (x - y).abs() <= 1e-11 * scale,
-            "bias: {bias:?} beside {sum:?}"
-        );
+        assert!((x - y).abs() <= 1e-11 * scale, "bias: {bias:?} beside {sum:?}");
     }
 }
 

@@ -2,9 +2,9 @@
 
 use std::f64::consts::PI;
 
-use modelmill_boundary::files::Disk;
-use modelmill_codegen::{Evaluator, Method, States};
-use modelmill_rig::{Rig, State, Tracker, forces};
+use modelmill_boundary::files::DiskFiles;
+use modelmill_codegen::{ModelEvaluator, MotionStates, ReductionMethod};
+use modelmill_rig::{Rig, RigState, RigTracker, forces};
 use modelmill_spec::Mechanism;
 use modelmill_tests::fixtures::{derive, fixtures, model_file};
 use modelmill_tests::laws::Case;
@@ -20,7 +20,7 @@ fn spidermill_rig() -> Rig {
 fn with(model: &str, more: &str) -> Mechanism {
     let path = model_file(model);
     let text = std::fs::read_to_string(&path).expect("a model") + "\n" + more;
-    modelmill_spec::load(&path.to_string_lossy(), &text, &Disk::default())
+    modelmill_spec::load(&path.to_string_lossy(), &text, &DiskFiles::default())
         .unwrap_or_else(|failure| panic!("{failure}"))
         .mechanism
 }
@@ -43,15 +43,12 @@ fn effect(kind: &str, at: &[&str], values: &[(&str, f64)], constants: &[(&str, f
 }
 
 /// A motion of the SpiderMill within its limits, with both directions and standstill.
-fn motion(n: i32) -> Vec<State> {
+fn motion(n: i32) -> Vec<RigState> {
     (0..n)
         .map(|i| {
             let wave = |k: f64| (k * f64::from(i)).sin();
-            State {
-                q: vec![
-                    1.8 + 0.2 * wave(0.7),
-                    1.341_592_653_589_793 + 0.2 * wave(1.1),
-                ],
+            RigState {
+                q: vec![1.8 + 0.2 * wave(0.7), 1.341_592_653_589_793 + 0.2 * wave(1.1)],
                 qd: vec![wave(1.9), wave(2.3)],
                 qdd: vec![5.0 * wave(2.9), 5.0 * wave(3.1)],
             }
@@ -59,8 +56,8 @@ fn motion(n: i32) -> Vec<State> {
         .collect()
 }
 
-fn rig_forces(rig: &Rig, states: &[State]) -> Vec<Vec<f64>> {
-    let mut tracker = Tracker::new(rig).expect("a pose");
+fn rig_forces(rig: &Rig, states: &[RigState]) -> Vec<Vec<f64>> {
+    let mut tracker = RigTracker::new(rig).expect("a pose");
     let mut columns = vec![Vec::new(); rig.drives.len()];
     for state in states {
         let found = forces(rig, &tracker.follow(state).expect("a pose")).expect("forces");
@@ -76,26 +73,24 @@ fn slices(columns: &[Vec<f64>]) -> Vec<&[f64]> {
 }
 
 /// Forces of the model by its reduced regressor, with nominal values.
-fn model_forces(mechanism: &Mechanism, states: &[State], load: &[Vec<f64>]) -> Vec<Vec<f64>> {
+fn model_forces(mechanism: &Mechanism, states: &[RigState], load: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let n = states[0].q.len();
-    let column = |of: fn(&State) -> &Vec<f64>| -> Vec<Vec<f64>> {
+    let column = |of: fn(&RigState) -> &Vec<f64>| -> Vec<Vec<f64>> {
         (0..n)
             .map(|i| states.iter().map(|state| of(state)[i]).collect())
             .collect()
     };
     let (q, qd, qdd) = (column(|s| &s.q), column(|s| &s.qd), column(|s| &s.qdd));
     let derivation = derive(mechanism);
-    let evaluator = Evaluator::new(&derivation);
-    let states = States {
+    let evaluator = ModelEvaluator::new(&derivation);
+    let states = MotionStates {
         q: slices(&q),
         qd: slices(&qd),
         qdd: slices(&qdd),
         load: slices(load),
     };
     let values = derivation.nominal_base_values();
-    let inverse = evaluator
-        .inverse_dynamics(&states, &values)
-        .expect("forces");
+    let inverse = evaluator.inverse_dynamics(&states, &values).expect("forces");
     // tau = H p with the exact reduction says the same.
     let regressor = evaluator.regressor(&states).expect("a regressor");
     let product = regressor * nalgebra::DVector::from_vec(values);
@@ -172,12 +167,7 @@ fn laws_at_drives() {
     same("drive_inertia", both, &[("Ia", 3.0)], &[]);
     same("force_offset", left, &[("F0", -14.0)], &[]);
     same("spring", left, &[("k", 300.0)], &[("rest", 0.9)]);
-    same(
-        "force_ripple",
-        left,
-        &[("As", 5.0), ("Ac", -3.0)],
-        &[("pitch", 0.02)],
-    );
+    same("force_ripple", left, &[("As", 5.0), ("Ac", -3.0)], &[("pitch", 0.02)]);
     let coupled = [("Ia", 2.0), ("Fv", 20.0), ("Fs", 15.0)];
     same("coupled_drive", both, &coupled, &[]);
     // A cable that is a spring, and a speed that is never reached.
@@ -229,11 +219,7 @@ fn the_mass_of_a_rod_on_the_base_has_no_effect() {
     let plain = derive(&with("spidermill", ""));
     let more = effect("rod_inertia", &["spindle_left", "spindle_right"], &[], &[]);
     let rods = derive(&with("spidermill", &more));
-    let base: Vec<String> = rods
-        .base_parameters()
-        .into_iter()
-        .map(|base| base.expression)
-        .collect();
+    let base: Vec<String> = rods.base_parameters().into_iter().map(|base| base.expression).collect();
     assert_eq!(base.len(), plain.base_parameters().len() + 2);
     for moment in ["Jr", "Sr"] {
         let name = format!("{moment}_spindle_left_spindle_right");
@@ -274,15 +260,8 @@ fn a_tilt_about_several_axes() {
         tilt(&mut rig, &[(symbol, *angle)]);
     }
     let expected = rig_forces(&rig, &states);
-    let mechanism = with(
-        "spidermill",
-        &effect("gravity_tilt", &["base"], &[], &angles),
-    );
-    agree(
-        &model_forces(&mechanism, &states, &[]),
-        &expected,
-        "three tilts",
-    );
+    let mechanism = with("spidermill", &effect("gravity_tilt", &["base"], &[], &angles));
+    agree(&model_forces(&mechanism, &states, &[]), &expected, "three tilts");
 }
 
 /// One crank differs from the other, with which it shares its parameters.
@@ -303,15 +282,8 @@ fn an_untied_part() {
     crank.centre = centre;
     let expected = rig_forces(&rig, &states);
     let values = [("dm", m), ("dmx", m * c), ("dJzz", own + m * c * c)];
-    let mechanism = with(
-        "spidermill",
-        &effect("untied_part", &["crank_left"], &values, &[]),
-    );
-    agree(
-        &model_forces(&mechanism, &states, &[]),
-        &expected,
-        "untied_part",
-    );
+    let mechanism = with("spidermill", &effect("untied_part", &["crank_left"], &values, &[]));
+    agree(&model_forces(&mechanism, &states, &[]), &expected, "untied_part");
     assert!((plain[0][3] - expected[0][3]).abs() > 1.0);
 }
 
@@ -326,23 +298,14 @@ fn the_placement_of_m4_mends_the_paper() {
     let mended = with("spidermill-paper", placed);
     agree(&model_forces(&mended, &states, &[]), &consistent, "m4");
     assert!((paper[0][3] - consistent[0][3]).abs() > 1.0);
-    assert_eq!(
-        mended.parameters.len(),
-        8,
-        "the effect has no parameter of its own"
-    );
+    assert_eq!(mended.parameters.len(), 8, "the effect has no parameter of its own");
 }
 
 /// The same correction with a mass of its own, against a rig whose lumped mass is misplaced as much.
 #[test]
 fn a_placement_with_a_mass_of_its_own() {
     let states = motion(40);
-    let more = effect(
-        "lumped_mass_placement",
-        &["R3m", "R3m_right"],
-        &[("m", 12.456)],
-        &[],
-    );
+    let more = effect("lumped_mass_placement", &["R3m", "R3m_right"], &[("m", 12.456)], &[]);
     let consistent = model_forces(&with("spidermill", ""), &states, &[]);
     let mended = model_forces(&with("spidermill-paper", &more), &states, &[]);
     agree(&mended, &consistent, "a mass of its own");
@@ -363,7 +326,7 @@ fn a_rod_in_space_obeys_dalembert() {
     }
     let reduction = &case.derivation.reduction;
     // Roots do not stand in the way.
-    assert!(matches!(reduction.method, Method::Exact { .. }));
+    assert!(matches!(reduction.method, ReductionMethod::Exact { .. }));
     assert!(reduction.without_effect.is_empty());
 }
 
@@ -395,7 +358,7 @@ fn what_pulls_two_points_together_obeys_virtual_power() {
             figure.unwrap_or_else(|breach| panic!("{model}: {breach}"));
         }
         let reduction = &case.derivation.reduction;
-        assert!(matches!(reduction.method, Method::Exact { .. }), "{model}");
+        assert!(matches!(reduction.method, ReductionMethod::Exact { .. }), "{model}");
         // Nothing else pulls along that line.
         let more = reduction.retained.len() - plain.reduction.retained.len();
         assert_eq!(more, 3, "{model}");
@@ -408,16 +371,13 @@ fn an_element_needs_two_bodies() {
     let path = model_file("spidermill");
     let text = std::fs::read_to_string(&path).expect("a model");
     for (at, says) in [
-        (
-            &["R2m", "A_left"][..],
-            "lies in the same frame as the first one",
-        ),
+        (&["R2m", "A_left"][..], "lies in the same frame as the first one"),
         (&["R2m"][..], "takes two places"),
         (&["R2m", "spindle_left"][..], "cannot act here"),
     ] {
         let more = effect("two_point_element", at, &[], &[]);
         let file = path.to_string_lossy();
-        let failure = modelmill_spec::load(&file, &format!("{text}\n{more}"), &Disk::default());
+        let failure = modelmill_spec::load(&file, &format!("{text}\n{more}"), &DiskFiles::default());
         let told = failure.map(|_| ()).expect_err("a refusal").to_string();
         assert!(told.contains(says), "{told}");
     }

@@ -1,7 +1,7 @@
 //! The emitted code: every model's module against the block evaluator, and both SpiderMill models against the tables.
 
 use crate::{fixture_models, random_models};
-use modelmill_codegen::{Derivation, Evaluator, PoseReason, States};
+use modelmill_codegen::{Derivation, ModelEvaluator, MotionStates, PoseReason};
 use modelmill_generated as generated;
 use modelmill_runtime::{PoseError, Real};
 use modelmill_tests::base_parameters;
@@ -28,9 +28,7 @@ struct Outputs {
 
 fn transposed(rows: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let n = rows.first().map_or(0, Vec::len);
-    (0..n)
-        .map(|k| rows.iter().map(|row| row[k]).collect())
-        .collect()
+    (0..n).map(|k| rows.iter().map(|row| row[k]).collect()).collect()
 }
 
 fn state_of<T: Real, const N: usize>(columns: &[Vec<f64>], i: usize) -> [T; N] {
@@ -89,14 +87,8 @@ macro_rules! run {
 fn difference(expected: &[f64], found: &[f64], floor: f64) -> f64 {
     assert_eq!(expected.len(), found.len());
     let scale = expected.iter().fold(floor, |m, x| m.max(x.abs()));
-    let differences = expected
-        .iter()
-        .zip(found)
-        .map(|(a, b)| (a - b).abs() / scale);
-    differences.fold(
-        0.0,
-        |m: f64, x| if x.is_nan() { f64::INFINITY } else { m.max(x) },
-    )
+    let differences = expected.iter().zip(found).map(|(a, b)| (a - b).abs() / scale);
+    differences.fold(0.0, |m: f64, x| if x.is_nan() { f64::INFINITY } else { m.max(x) })
 }
 
 fn check_columns(what: &str, expected: &[Vec<f64>], found: &[Vec<f64>], tolerance: f64) {
@@ -108,27 +100,19 @@ fn check_columns(what: &str, expected: &[Vec<f64>], found: &[Vec<f64>], toleranc
 }
 
 fn columns(matrix: &DMatrix<f64>) -> Vec<Vec<f64>> {
-    matrix
-        .column_iter()
-        .map(|c| c.iter().copied().collect())
-        .collect()
+    matrix.column_iter().map(|c| c.iter().copied().collect()).collect()
 }
 
 /// States near the nominal pose, where loops can be closed also in single precision.
 fn sample_of(derivation: &Derivation) -> Sample {
     let mechanism = &derivation.mechanism;
-    let reach = if mechanism.loops.is_empty() {
-        3.0
-    } else {
-        0.25
-    };
-    Sample::random(mechanism, 50, reach, &mut Stream::new(21))
-        .reachable(&Evaluator::new(derivation))
+    let reach = if mechanism.loops.is_empty() { 3.0 } else { 0.25 };
+    Sample::random(mechanism, 50, reach, &mut Stream::new(21)).reachable(&ModelEvaluator::new(derivation))
 }
 
 /// Compares a module's outputs with the evaluator's, column by column relative to the column's largest entry.
 fn check(derivation: &Derivation, sample: &Sample, found: &Outputs, tolerance: f64) {
-    let evaluator = Evaluator::new(derivation);
+    let evaluator = ModelEvaluator::new(derivation);
     let states = sample.states();
     assert!(sample.len() > 30, "too few states");
     let reduction = &derivation.reduction;
@@ -139,18 +123,15 @@ fn check(derivation: &Derivation, sample: &Sample, found: &Outputs, tolerance: f
         .collect();
     assert_eq!(retained, found.retained);
     let base = base_parameters::base(derivation, &base_parameters::nominal(&derivation.mechanism));
-    assert!(
-        difference(&base, &found.base, 0.0) < tolerance,
-        "base parameters"
-    );
+    assert!(difference(&base, &found.base, 0.0) < tolerance, "base parameters");
     let reachable = "the states are reachable";
     let h_min = evaluator.regressor(&states).expect(reachable);
     check_columns("H_min", &columns(&h_min), &columns(&found.h_min), tolerance);
     let forces = evaluator.inverse_dynamics(&states, &base).expect(reachable);
     check_columns("forces", &forces, &found.forces, tolerance);
-    let drives = evaluator.drives(&states).expect(reachable);
+    let drives = evaluator.drive_motion(&states).expect(reachable);
     check_columns("drives", &drives, &found.drives, tolerance);
-    let passive = evaluator.passive(&states).expect(reachable);
+    let passive = evaluator.passive_motion(&states).expect(reachable);
     check_columns("passive coordinates", &passive, &found.passive, tolerance);
 }
 
@@ -277,17 +258,13 @@ fn check_table(name: &str, table: &str, run: impl Fn(&Sample) -> Outputs) {
     let (n_drives, reduction) = (mechanism.drives.len(), &derivation.reduction);
     let mut compared = 0;
     for (k, product) in reduction.products.iter().enumerate() {
-        let combination: Vec<(usize, f64)> =
-            if let Some(own) = reduction.retained.iter().position(|r| *r == k) {
-                vec![(own, 1.0)]
-            } else {
-                let line = reduction.dependencies.iter().find(|line| line.product == k);
-                let equals = &line.expect("retained or dependent").equals;
-                equals
-                    .iter()
-                    .map(|(r, f)| (*r, f.value_f64(&constants)))
-                    .collect()
-            };
+        let combination: Vec<(usize, f64)> = if let Some(own) = reduction.retained.iter().position(|r| *r == k) {
+            vec![(own, 1.0)]
+        } else {
+            let line = reduction.dependencies.iter().find(|line| line.product == k);
+            let equals = &line.expect("retained or dependent").equals;
+            equals.iter().map(|(r, f)| (*r, f.value_f64(&constants))).collect()
+        };
         for (d, drive) in mechanism.drives.iter().enumerate() {
             let column: Vec<f64> = (0..table.n_rows())
                 .map(|i| {
@@ -295,17 +272,11 @@ fn check_table(name: &str, table: &str, run: impl Fn(&Sample) -> Outputs) {
                     combination.iter().map(|(r, f)| f * row[*r]).sum()
                 })
                 .collect();
-            close(
-                &format!("H[{};{}]", drive.name, product.text(mechanism)),
-                &column,
-            );
+            close(&format!("H[{};{}]", drive.name, product.text(mechanism)), &column);
             compared += 1;
         }
     }
-    assert_eq!(
-        compared,
-        table.names().iter().filter(|n| n.starts_with("H[")).count()
-    );
+    assert_eq!(compared, table.names().iter().filter(|n| n.starts_with("H[")).count());
     for (drive, forces) in mechanism.drives.iter().zip(&found.forces) {
         close(&drive.name, forces);
     }
@@ -353,11 +324,9 @@ fn another_geometry_needs_no_new_code() {
             other => panic!("a new constant {other}"),
         })
         .collect();
-    let evaluator = Evaluator::with_constants(&derivation, constants);
+    let evaluator = ModelEvaluator::with_constants(&derivation, constants);
     let sample = sample_of(&derivation);
-    let expected = evaluator
-        .regressor(&sample.states())
-        .expect("reachable states");
+    let expected = evaluator.regressor(&sample.states()).expect("reachable states");
     let model = Model::new(&geometry);
     for i in 0..sample.len() {
         let state = State {
@@ -378,7 +347,7 @@ fn poses_without_an_answer_are_errors_in_both() {
     use generated::spidermill::{Geometry, Model, State};
     use std::f64::consts::PI;
     let derivation = derived("spidermill");
-    let evaluator = Evaluator::new(&derivation);
+    let evaluator = ModelEvaluator::new(&derivation);
     let model = Model::new(&Geometry::<f64>::default());
     // The elbows too far apart, and the left crank in line with its spindle.
     let stretched = [PI, 0.0];
@@ -394,7 +363,7 @@ fn poses_without_an_answer_are_errors_in_both() {
         };
         assert_eq!(model.regressor(&state), Err(error));
         let [q1, q2] = [[q[0]], [q[1]]];
-        let states = States {
+        let states = MotionStates {
             q: vec![&q1, &q2],
             qd: vec![&[0.1], &[0.2]],
             qdd: vec![&[0.3], &[0.4]],

@@ -3,8 +3,8 @@
 //!
 //! The tables come from `fixtures/reference/make_pinocchio_floating.py`, made by Pinocchio 4.1.
 
-use modelmill_codegen::{Derivation, Evaluator};
-use modelmill_spec::{Mechanism, Step, TwistAxes};
+use modelmill_codegen::{Derivation, ModelEvaluator};
+use modelmill_spec::{FrameStep, Mechanism, TwistAxes};
 use modelmill_tests::base_parameters::{base, nominal, products};
 use modelmill_tests::fixtures::{Table, derive, derived, model};
 use modelmill_tests::laws::{Case, motion};
@@ -26,7 +26,7 @@ const TWISTS: [(&str, TwistAxes, TwistAxes); 3] = [
 fn free_body(mechanism: &Mechanism) -> modelmill_spec::FreeBody {
     let mut steps = mechanism.frames.iter().flat_map(|frame| &frame.steps);
     let free = steps.find_map(|step| match step {
-        Step::Free(body) => Some(*body),
+        FrameStep::Free(body) => Some(*body),
         _ => None,
     });
     free.expect("a floating model")
@@ -34,12 +34,8 @@ fn free_body(mechanism: &Mechanism) -> modelmill_spec::FreeBody {
 
 fn with_twist(name: &str, linear: TwistAxes, angular: TwistAxes) -> Derivation {
     let mut mechanism = model(name);
-    for step in mechanism
-        .frames
-        .iter_mut()
-        .flat_map(|frame| &mut frame.steps)
-    {
-        if let Step::Free(body) = step {
+    for step in mechanism.frames.iter_mut().flat_map(|frame| &mut frame.steps) {
+        if let FrameStep::Free(body) = step {
             (body.linear, body.angular) = (linear, angular);
         }
     }
@@ -69,14 +65,10 @@ fn check(name: &str, twist: &str, linear: TwistAxes, angular: TwistAxes) {
     let table = Table::reference(&format!("pinocchio-{name}-{twist}"));
     let masses = Table::reference(&format!("pinocchio-{name}-{twist}-mass"));
     let values = Table::reference(&format!("pinocchio-{name}-parameters"));
-    let parameters: Vec<f64> = mechanism
-        .parameters
-        .iter()
-        .map(|p| values.column(&p.name)[0])
-        .collect();
+    let parameters: Vec<f64> = mechanism.parameters.iter().map(|p| values.column(&p.name)[0]).collect();
     assert_eq!(parameters.len(), values.names().len());
     let sample = Sample::from_table(mechanism, &table);
-    let (states, evaluator) = (sample.states(), Evaluator::new(&derivation));
+    let (states, evaluator) = (sample.states(), ModelEvaluator::new(&derivation));
     let p_min = base(&derivation, &parameters);
     let h = evaluator.full_regressor(&states).expect("a pose");
     let by_products = h * DVector::from_vec(products(&derivation, &parameters));
@@ -84,11 +76,7 @@ fn check(name: &str, twist: &str, linear: TwistAxes, angular: TwistAxes) {
     let by_columns = h_min * DVector::from_vec(p_min.clone());
     let by_base = evaluator.inverse_dynamics(&states, &p_min).expect("a pose");
     let n_drives = mechanism.drives.len();
-    let forces: Vec<&[f64]> = mechanism
-        .drives
-        .iter()
-        .map(|d| table.column(&d.name))
-        .collect();
+    let forces: Vec<&[f64]> = mechanism.drives.iter().map(|d| table.column(&d.name)).collect();
     for (d, expected) in forces.iter().enumerate() {
         let scale = largest(expected.iter().copied());
         for (i, x) in expected.iter().enumerate() {
@@ -105,9 +93,7 @@ fn check(name: &str, twist: &str, linear: TwistAxes, angular: TwistAxes) {
     let accelerations = evaluator
         .forward_dynamics(&dynamics, &states, &p_min, &forces)
         .expect("a regular mass matrix");
-    let found = evaluator
-        .mass_matrix(&dynamics, &states, &p_min)
-        .expect("a pose");
+    let found = evaluator.mass_matrix(&dynamics, &states, &p_min).expect("a pose");
     let n = mechanism.coordinates.len();
     // Light hands amplify what forces lack in digits.
     let scale = 1e3 * largest(sample.qdd.iter().flatten().copied());
@@ -123,23 +109,13 @@ fn check(name: &str, twist: &str, linear: TwistAxes, angular: TwistAxes) {
         modelmill_spec::DriveKind::Linear { .. } => unreachable!("all are joints"),
     };
     let n_masses = masses.n_rows() / n_drives;
-    let scale = largest(
-        mechanism
-            .drives
-            .iter()
-            .flat_map(|d| masses.column(&d.name).to_vec()),
-    );
+    let scale = largest(mechanism.drives.iter().flat_map(|d| masses.column(&d.name).to_vec()));
     for state in 0..n_masses {
         for a in 0..n_drives {
             for b in 0..n_drives {
                 let expected = masses.column(&mechanism.drives[b].name)[state * n_drives + a];
                 let entry = found[of_drive(a) * n + of_drive(b)][state];
-                assert_near(
-                    entry,
-                    expected,
-                    scale,
-                    &format!("{name}, {twist}, M {a}, {b}"),
-                );
+                assert_near(entry, expected, scale, &format!("{name}, {twist}, M {a}, {b}"));
             }
         }
         // The scalar part stands for itself.
@@ -162,12 +138,7 @@ fn check(name: &str, twist: &str, linear: TwistAxes, angular: TwistAxes) {
             let expected = columns.column(&mechanism.parameters[parameter].name);
             let scale = largest(expected.iter().copied()).max(1e-3);
             for (row, x) in expected.iter().enumerate() {
-                assert_near(
-                    h[(row, k)],
-                    *x,
-                    scale,
-                    &format!("{name}, {twist}, H {row}, {k}"),
-                );
+                assert_near(h[(row, k)], *x, scale, &format!("{name}, {twist}, H {row}, {k}"));
             }
         }
     }
@@ -199,14 +170,9 @@ fn the_drone_agrees_with_pinocchio() {
 fn all_ten_of_a_free_body_and_seven_of_each_joint_are_known() {
     for (name, joints) in [("drone", 4), ("quadruped", 12), ("humanoid", 30)] {
         let derivation = derived(name);
-        assert_eq!(
-            derivation.base_parameters().len(),
-            10 + 7 * joints,
-            "{name}"
-        );
+        assert_eq!(derivation.base_parameters().len(), 10 + 7 * joints, "{name}");
         let case = Case::near_nominal(&derivation.mechanism, 60, 1.0);
-        case.and_then(|case| case.exact_rank_is_numeric_rank())
-            .expect(name);
+        case.and_then(|case| case.exact_rank_is_numeric_rank()).expect(name);
     }
 }
 
@@ -218,11 +184,7 @@ fn random_cases() -> impl Iterator<Item = Case> {
             Matter::Anything
         };
         let (_, linear, angular) = TWISTS[usize::try_from(seed % 3).expect("below 3")];
-        [
-            random::tree(seed, matter),
-            random::planar_loop(seed, matter),
-        ]
-        .map(|mechanism| {
+        [random::tree(seed, matter), random::planar_loop(seed, matter)].map(|mechanism| {
             let free = hung_free(mechanism, linear, angular);
             Case::near_nominal(&free, 80, 0.4).expect("a floating mechanism")
         })
@@ -232,10 +194,8 @@ fn random_cases() -> impl Iterator<Item = Case> {
 #[test]
 fn random_mechanisms_off_their_base_keep_the_laws() {
     for case in random_cases() {
-        case.forces_satisfy_dalembert(4)
-            .expect("d'Alembert's principle");
-        case.reduction_keeps_the_forces()
-            .expect("H p_g = H_min p_min");
+        case.forces_satisfy_dalembert(4).expect("d'Alembert's principle");
+        case.reduction_keeps_the_forces().expect("H p_g = H_min p_min");
         case.exact_rank_is_numeric_rank().expect("a rank");
     }
 }
@@ -257,7 +217,7 @@ fn power_of_the_wrench_is_the_rate_of_energy() {
         let mechanism = &derivation.mechanism;
         let body = free_body(mechanism);
         let parameters = nominal(mechanism);
-        let evaluator = Evaluator::new(&derivation);
+        let evaluator = ModelEvaluator::new(&derivation);
         let numbers = Numbers::new(mechanism, parameters.clone());
         let p_min = base(&derivation, &parameters);
         let mut stream = Stream::new(5);
@@ -268,10 +228,8 @@ fn power_of_the_wrench_is_the_rate_of_energy() {
                 let later = along(&one, &body, t);
                 numbers.energy(&motion(&evaluator, mechanism, &later))
             };
-            let forces = evaluator
-                .inverse_dynamics(&one.states(), &p_min)
-                .expect("a pose");
-            let rates = evaluator.drives(&one.states()).expect("a pose");
+            let forces = evaluator.inverse_dynamics(&one.states(), &p_min).expect("a pose");
+            let rates = evaluator.drive_motion(&one.states()).expect("a pose");
             let n = forces.len();
             let power: f64 = (0..n).map(|d| forces[d][0] * rates[n + d][0]).sum();
             let size: f64 = (0..n).map(|d| (forces[d][0] * rates[n + d][0]).abs()).sum();
@@ -293,9 +251,7 @@ fn along(one: &Sample, body: &modelmill_spec::FreeBody, t: f64) -> Sample {
     }
     let [w, x, y, z] = body.quaternion.map(|i| one.q[i.0][0]);
     let turn = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
-    let vector = |all: &[modelmill_spec::CoordinateIdx], of: &[Vec<f64>]| {
-        Vector3::from_fn(|k, _| of[all[k].0][0])
-    };
+    let vector = |all: &[modelmill_spec::CoordinateIdx], of: &[Vec<f64>]| Vector3::from_fn(|k, _| of[all[k].0][0]);
     let [omega, alpha] = [&one.qd, &one.qdd].map(|of| {
         let given = vector(&body.quaternion[1..], of);
         match body.angular {

@@ -1,7 +1,7 @@
 //! Spatial loops: the laws of mechanics on parallel robots and arms with linkages, against code that shares nothing with
 //! the mill; closed forms where each leg allows them.
 
-use modelmill_codegen::{Evaluator, Method, PassivePosition};
+use modelmill_codegen::{ModelEvaluator, PassivePosition, ReductionMethod};
 use modelmill_tests::fixtures::{derived, model};
 use modelmill_tests::laws::{ACCURACY, Case};
 
@@ -12,15 +12,12 @@ fn check(name: &str, reach: f64) {
     let case = Case::near_nominal(&model(name), 160, reach).unwrap();
     let reduction = &case.derivation.reduction;
     assert!(
-        matches!(reduction.method, Method::Exact { .. }),
+        matches!(reduction.method, ReductionMethod::Exact { .. }),
         "{name}: {:?}",
         reduction.method
     );
     assert!(
-        matches!(
-            case.derivation.programs.passive_position,
-            PassivePosition::Closed
-        ),
+        matches!(case.derivation.programs.passive_position, PassivePosition::Closed),
         "{name} has no closed form"
     );
     laws(&case);
@@ -72,8 +69,7 @@ fn rods_as_two_masses_leave_three_parameters_of_a_delta() {
 #[test]
 fn a_pair_of_thin_rods_is_one_of_twice_the_mass_that_turns_with_its_spacing_in_the_constants() {
     // Each rod of a pair moves as the other, so that the pair has no more base parameters than one thin rod.
-    let [pair, one] =
-        ["delta-pairs", "delta-thin_rods"].map(|n| derived(n).reduction.retained.len());
+    let [pair, one] = ["delta-pairs", "delta-thin_rods"].map(|n| derived(n).reduction.retained.len());
     assert_eq!(pair, one);
 }
 
@@ -93,13 +89,13 @@ fn arms_with_linkages() {
 #[test]
 fn a_pose_is_never_no_number() {
     let derivation = derived("gough_stewart_tied");
-    let evaluator = Evaluator::new(&derivation);
+    let evaluator = ModelEvaluator::new(&derivation);
     let mechanism = &derivation.mechanism;
     let mut stream = modelmill_tests::stream::Stream::new(5);
     let sample = modelmill_tests::sample::Sample::random(mechanism, 500, 6.0, &mut stream);
     let mut found = 0;
     for i in 0..sample.len() {
-        if let Ok(passive) = evaluator.passive(&sample.only(i).states()) {
+        if let Ok(passive) = evaluator.passive_motion(&sample.only(i).states()) {
             assert!(passive.iter().flatten().all(|x| x.is_finite()));
             found += 1;
         }
@@ -123,7 +119,7 @@ fn drives_may_be_independent_instead_of_the_platform() {
     ] {
         let case = Case::near_nominal(&model(name), 160, 0.05).unwrap();
         let reduction = &case.derivation.reduction;
-        assert!(matches!(reduction.method, Method::Exact { .. }), "{name}");
+        assert!(matches!(reduction.method, ReductionMethod::Exact { .. }), "{name}");
         laws(&case);
         // Which coordinates are independent changes neither the products nor their dependences.
         let other = derived(same);
@@ -139,7 +135,7 @@ fn platforms_of_three_freedoms() {
     for name in ["three_rrs", "three_prs"] {
         let case = Case::near_nominal(&model(name), 160, 0.1).unwrap();
         let method = &case.derivation.reduction.method;
-        assert!(matches!(method, Method::Exact { .. }), "{name}: {method:?}");
+        assert!(matches!(method, ReductionMethod::Exact { .. }), "{name}: {method:?}");
         for error in [case.forces_satisfy_dalembert(10), case.loops_stay_closed()] {
             assert!(error.unwrap() < 100.0 * ACCURACY);
         }
@@ -152,6 +148,6 @@ fn platforms_of_three_freedoms() {
 fn equations_that_follow_from_others_are_left_out() {
     let case = Case::near_nominal(&model("spherical_wrist"), 160, 0.2).unwrap();
     let method = &case.derivation.reduction.method;
-    assert!(matches!(method, Method::Exact { .. }), "{method:?}");
+    assert!(matches!(method, ReductionMethod::Exact { .. }), "{method:?}");
     laws(&case);
 }

@@ -1,4 +1,4 @@
-//! The mill against laws, published tables and other programs' numbers.
+//! The mill against laws, published tables and other programs' numbers; and what the workspace holds itself to.
 
 /// Modules of random mechanisms, see `build.rs`.
 #[macro_use]
@@ -16,18 +16,22 @@ mod fixture_models {
 mod awkward_mechanisms;
 mod benchmark_page;
 mod blocks;
+mod build_graph;
 mod couplings;
 mod dynamics;
 mod effects;
 mod emitted;
 mod floating;
+mod flow;
 mod loops_in_space;
 mod many_states;
 mod many_twists;
+mod names;
 mod near_coincidence;
 mod no_numbers;
 mod on_request;
 mod operation_counts;
+mod packages;
 mod pinocchio;
 mod poses;
 mod published_groupings;

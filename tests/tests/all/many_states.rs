@@ -20,8 +20,8 @@ macro_rules! check {
         let derivation = derived($name);
         let sample = Sample::random(&derivation.mechanism, 203, 0.2, &mut Stream::new(11));
         let column = |c: &Vec<f64>| c.iter().map(|x| *x as $float).collect::<Vec<$float>>();
-        let [q, qd, qdd] = [&sample.q, &sample.qd, &sample.qdd]
-            .map(|columns| columns.iter().map(column).collect::<Vec<_>>());
+        let [q, qd, qdd] =
+            [&sample.q, &sample.qd, &sample.qdd].map(|columns| columns.iter().map(column).collect::<Vec<_>>());
         let geometry = $model::Geometry::<$float>::default();
         let base = $model::base_parameters(&geometry, &$model::Parameters::default()).unwrap();
         let dynamics = $model::InverseDynamics::new(&geometry, &base);
@@ -32,9 +32,7 @@ macro_rules! check {
             qdd: std::array::from_fn(|k| qdd[k][i]),
         };
         // Up to the first state that has no answer.
-        let n = (0..203)
-            .take_while(|i| dynamics.forces(&state(*i)).is_ok())
-            .count();
+        let n = (0..203).take_while(|i| dynamics.forces(&state(*i)).is_ok()).count();
         assert!(n > 10, "{n}");
         let upto = |n: usize| $model::States {
             q: std::array::from_fn(|k| &q[k][..n]),
@@ -50,30 +48,20 @@ macro_rules! check {
             dynamics.forces_of_many(&upto(n), &mut columns).unwrap();
             let mut columns = in_parallel.iter_mut();
             let mut columns = std::array::from_fn(|_| &mut columns.next().unwrap()[..]);
-            dynamics
-                .forces_of_many_in_parallel(&upto(n), &mut columns)
-                .unwrap();
+            dynamics.forces_of_many_in_parallel(&upto(n), &mut columns).unwrap();
         }
         assert_eq!(forces, in_parallel);
         model.regressor_of_many(&upto(n), &mut regressor).unwrap();
         let [mut found, mut expected] = [Vec::new(), Vec::new()];
         let [mut found_h, mut expected_h] = [Vec::new(), Vec::new()];
         for i in 0..n {
-            let (one, h) = (
-                dynamics.forces(&state(i)).unwrap(),
-                model.regressor(&state(i)).unwrap(),
-            );
+            let (one, h) = (dynamics.forces(&state(i)).unwrap(), model.regressor(&state(i)).unwrap());
             expected.extend(one.map(f64::from));
             found.extend(forces.iter().map(|f| f64::from(f[i])));
             expected_h.extend(h.as_flattened().iter().map(|x| f64::from(*x)));
-            found_h.extend(
-                (0..$model::N_DRIVES * $model::N_BASE).map(|k| f64::from(regressor[k * n + i])),
-            );
+            found_h.extend((0..$model::N_DRIVES * $model::N_BASE).map(|k| f64::from(regressor[k * n + i])));
         }
-        for error in [
-            difference(&found, &expected),
-            difference(&found_h, &expected_h),
-        ] {
+        for error in [difference(&found, &expected), difference(&found_h, &expected_h)] {
             assert!(error < $tolerance, "{}: {error}", $name);
         }
         if n < 203 {
@@ -81,9 +69,7 @@ macro_rules! check {
             let mut forces = vec![vec![0.0 as $float; 203]; $model::N_DRIVES];
             let mut columns = forces.iter_mut();
             let mut columns = std::array::from_fn(|_| &mut columns.next().unwrap()[..]);
-            let fault = dynamics
-                .forces_of_many(&upto(203), &mut columns)
-                .unwrap_err();
+            let fault = dynamics.forces_of_many(&upto(203), &mut columns).unwrap_err();
             assert_eq!(fault, BlockError::At { sample: n, reason });
         }
     }};
@@ -128,12 +114,7 @@ fn forces_with(n: usize, at: usize, q: f64) -> (Result<(), BlockError>, Vec<Vec<
 
 #[test]
 fn what_is_no_number_is_found_where_it_stands() {
-    for (at, odd) in [
-        (0, f64::NAN),
-        (7, f64::INFINITY),
-        (8, -1e200),
-        (20, f64::NAN),
-    ] {
+    for (at, odd) in [(0, f64::NAN), (7, f64::INFINITY), (8, -1e200), (20, f64::NAN)] {
         let (result, forces) = forces_with(21, at, odd);
         let reason = PoseError::NotFinite("q3");
         assert_eq!(result, Err(BlockError::At { sample: at, reason }));
@@ -145,7 +126,7 @@ fn what_is_no_number_is_found_where_it_stands() {
         let text = result.unwrap_err().to_string();
         assert_eq!(
             text,
-            format!("at sample {at}: `q3` is no number, or too large to compute with")
+            format!("at sample {at}: `q3` is NaN, infinite or too large to compute with")
         );
     }
 }
@@ -228,9 +209,6 @@ fn the_array_that_is_too_short_is_named() {
             found: 8,
             expected: 9,
         };
-        assert_eq!(
-            model.regressor_of_many(&states, &mut columns),
-            Err(expected)
-        );
+        assert_eq!(model.regressor_of_many(&states, &mut columns), Err(expected));
     }
 }

@@ -3,8 +3,8 @@
 
 use std::fmt::Write;
 
-use modelmill_boundary::files::Memory;
-use modelmill_codegen::Method;
+use modelmill_boundary::files::MemoryFiles;
+use modelmill_codegen::ReductionMethod;
 use modelmill_spec::Mechanism;
 use modelmill_tests::laws::{ACCURACY, Case};
 
@@ -32,15 +32,11 @@ fn twisted(n: usize) -> Mechanism {
         };
         writeln!(text, "[[frame]]\nname = \"l{i}\"\non = \"{on}\"").unwrap();
         writeln!(text, "modified_dh = {{ {own}theta = \"q{i}\" }}").unwrap();
-        writeln!(
-            text,
-            "[[part]]\non = \"l{i}\"\nlinear = {{ all = \"_{i}\" }}"
-        )
-        .unwrap();
+        writeln!(text, "[[part]]\non = \"l{i}\"\nlinear = {{ all = \"_{i}\" }}").unwrap();
         writeln!(text, "[[drive]]\nname = \"t{i}\"\njoint = \"q{i}\"").unwrap();
         on = format!("l{i}");
     }
-    let loaded = modelmill_spec::load("twisted.toml", &text, &Memory::default());
+    let loaded = modelmill_spec::load("twisted.toml", &text, &MemoryFiles::default());
     let mut mechanism = match loaded {
         Ok(loaded) => loaded.mechanism,
         Err(failure) => panic!("{}", failure.render(false)),
@@ -58,16 +54,13 @@ fn check(n: usize) {
     let case = Case::new(&twisted(n), 40, 1.0).unwrap();
     let reduction = &case.derivation.reduction;
     assert!(
-        matches!(reduction.method, Method::Exact { .. }),
+        matches!(reduction.method, ReductionMethod::Exact { .. }),
         "{n}: {:?}",
         reduction.method
     );
     assert_eq!(reduction.retained.len(), 7 * n - 6, "{n}");
     case.exact_rank_is_numeric_rank().unwrap();
-    for error in [
-        case.reduction_keeps_the_forces(),
-        case.forces_satisfy_dalembert(5),
-    ] {
+    for error in [case.reduction_keeps_the_forces(), case.forces_satisfy_dalembert(5)] {
         let error = error.unwrap();
         assert!(error < 100.0 * ACCURACY, "{n}: {error:.1e}");
     }
@@ -85,7 +78,7 @@ fn arms_of_many_symbolic_twists_are_reduced_exactly() {
 fn long_arms_are_grouped_link_by_link() {
     let case = Case::new(&twisted(18), 12, 0.5).unwrap();
     let reduction = &case.derivation.reduction;
-    assert!(matches!(reduction.method, Method::Exact { .. }));
+    assert!(matches!(reduction.method, ReductionMethod::Exact { .. }));
     assert_eq!(reduction.retained.len(), 7 * 18 - 6);
     let sums = case.derivation.base_sums();
     assert!(!sums.is_empty());
@@ -97,6 +90,6 @@ fn long_arms_are_grouped_link_by_link() {
     }
     case.reduction_keeps_the_forces().unwrap();
     case.forces_satisfy_dalembert_to(1e-9, 4).unwrap();
-    let module = modelmill_codegen::emit(&case.derivation).module();
+    let module = modelmill_emit::emit(&case.derivation).module();
     assert!(module.len() < 600_000, "{} bytes", module.len());
 }

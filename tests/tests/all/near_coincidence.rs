@@ -46,11 +46,7 @@ fn all(trees: std::ops::Range<u64>, loops: std::ops::Range<u64>) {
         outcome.look_at(Case::new(&random::tree(seed, Matter::Special), 8, 3.0));
     }
     for seed in loops {
-        outcome.look_at(Case::new(
-            &random::planar_loop(seed, Matter::Special),
-            8,
-            0.3,
-        ));
+        outcome.look_at(Case::new(&random::planar_loop(seed, Matter::Special), 8, 0.3));
     }
     println!("{outcome:#?}");
     assert!(outcome.wrong.is_empty(), "{:#?}", outcome.wrong);

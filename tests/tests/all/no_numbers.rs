@@ -1,6 +1,7 @@
 //! Values that are no finite numbers, and values that lead to such, are errors of the derivation that say which.
 
-use modelmill_codegen::{derive, emit};
+use modelmill_codegen::derive;
+use modelmill_emit::emit;
 use modelmill_spec::Mechanism;
 use modelmill_tests::fixtures::model;
 
@@ -18,10 +19,7 @@ fn refused(change: impl FnOnce(&mut Mechanism)) -> String {
 fn values_that_are_no_numbers_are_named() {
     for value in [f64::NAN, f64::INFINITY] {
         let says = refused(|m| m.constants[0].value = value);
-        assert!(
-            says.starts_with(&format!("the value of `L`, {value}, is no")),
-            "{says}"
-        );
+        assert!(says.starts_with(&format!("the value of `L`, {value}, is no")), "{says}");
         let says = refused(|m| m.parameters[0].nominal = value);
         assert!(says.starts_with("the value of `ZZ1`"), "{says}");
         let says = refused(|m| m.coordinates[1].nominal = value);
@@ -37,10 +35,7 @@ fn a_base_parameter_that_a_constant_divides_by_zero_is_named() {
         m.retain = vec![vec![(mass, 1)]];
         m.constants[0].value = 0.0;
     });
-    assert!(
-        says.contains("M2 + 1/L*MX1") || says.contains("M2 + MX1/L"),
-        "{says}"
-    );
+    assert!(says.contains("M2 + 1/L*MX1") || says.contains("M2 + MX1/L"), "{says}");
     assert!(says.contains("denominator"), "{says}");
 }
 

@@ -1,6 +1,6 @@
 //! What is emitted on request: reactions against the evaluator, and self-tests, which must see what is wrong.
 
-use modelmill_codegen::Evaluator;
+use modelmill_codegen::ModelEvaluator;
 use modelmill_runtime::{SelfTestError, Wrench};
 use modelmill_spec::Mechanism;
 use modelmill_tests::fixtures::{derive, model};
@@ -21,25 +21,16 @@ macro_rules! check_reactions {
         let mechanism: Mechanism = $mechanism;
         let derivation = derive(&mechanism);
         let reactions = derivation.reactions().expect("loops can be solved");
-        let evaluator = Evaluator::new(&derivation);
-        let sample =
-            Sample::random(&mechanism, 12, $reach, &mut Stream::new(3)).reachable(&evaluator);
+        let evaluator = ModelEvaluator::new(&derivation);
+        let sample = Sample::random(&mechanism, 12, $reach, &mut Stream::new(3)).reachable(&evaluator);
         assert!(sample.len() > 5, "too few states");
-        let emitted = module::Reactions::<f64>::new(
-            &module::Geometry::default(),
-            &module::Parameters::default(),
-        );
+        let emitted = module::Reactions::<f64>::new(&module::Geometry::default(), &module::Parameters::default());
         let names: Vec<&str> = reactions.joints.iter().map(|j| j.name.as_str()).collect();
         assert_eq!(names, module::JOINTS.map(|joint| joint.name));
         let names: Vec<&str> = reactions.loops.iter().map(|l| l.name.as_str()).collect();
         assert_eq!(names, module::LOOPS.map(|closed| closed.name));
-        let expected = evaluator
-            .reactions(&reactions, &sample.states())
-            .expect("reachable");
-        let scale = expected
-            .iter()
-            .flatten()
-            .fold(1e-9, |m: f64, x| m.max(x.abs()));
+        let expected = evaluator.reactions(&reactions, &sample.states()).expect("reachable");
+        let scale = expected.iter().flatten().fold(1e-9, |m: f64, x| m.max(x.abs()));
         for i in 0..sample.len() {
             let state = module::State {
                 q: std::array::from_fn(|k| sample.q[k][i]),
@@ -173,10 +164,7 @@ fn base_parameters_pass_their_own_tests_for_other_geometry() {
     };
     let error = five_bar::self_test(&unreachable).expect_err("no loop closes");
     println!("{error}");
-    assert!(
-        matches!(error, SelfTestError::TooFewStates { .. }),
-        "{error}"
-    );
+    assert!(matches!(error, SelfTestError::TooFewStates { .. }), "{error}");
 }
 
 #[test]

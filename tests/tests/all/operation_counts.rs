@@ -1,14 +1,14 @@
 //! Operations per call of the straight-line programs, beside the lowest counts that other tools reach; and that fewer
 //! operations give the same values.
 
-use modelmill_codegen::{Evaluator, OperationCount, Program, Stage};
+use modelmill_codegen::{ModelEvaluator, OperationCount, ProgramStage, StraightLineProgram};
 use modelmill_tests::base_parameters::{base, products};
 use modelmill_tests::fixtures::derived;
 use modelmill_tests::sample::Sample;
 use modelmill_tests::stream::Stream;
 
-fn count(program: &Program) -> OperationCount {
-    program.count(Stage::State)
+fn count(program: &StraightLineProgram) -> OperationCount {
+    program.count_operations(ProgramStage::State)
 }
 
 /// Additions and multiplications per call of inverse dynamics and base regressor, at most what has been reached.
@@ -19,26 +19,16 @@ fn count(program: &Program) -> OperationCount {
 fn check(name: &str, inverse_dynamics: usize, regressor: usize) {
     let programs = derived(name).programs;
     for (what, program, reached) in [
-        (
-            "inverse dynamics",
-            &programs.inverse_dynamics,
-            inverse_dynamics,
-        ),
+        ("inverse dynamics", &programs.inverse_dynamics, inverse_dynamics),
         ("regressor", &programs.regressor, regressor),
     ] {
         let found = count(program);
-        println!(
-            "{name}, {what}: {} + {} beside {reached}",
-            found.add, found.mul
-        );
+        println!("{name}, {what}: {} + {} beside {reached}", found.add, found.mul);
         assert!(
             found.add + found.mul <= reached,
             "{name}, {what}: {found:?}, reached before {reached}"
         );
-        assert_eq!(
-            found.div, 0,
-            "{name}, {what}: an open chain divides by nothing"
-        );
+        assert_eq!(found.div, 0, "{name}, {what}: an open chain divides by nothing");
     }
 }
 
@@ -77,22 +67,15 @@ fn symmetric_five_bar_is_at_most_what_was_reached() {
 fn check_values(name: &str) {
     let derivation = derived(name);
     let mechanism = &derivation.mechanism;
-    let evaluator = Evaluator::new(&derivation);
-    let reach = if mechanism.loops.is_empty() {
-        3.0
-    } else {
-        0.25
-    };
+    let evaluator = ModelEvaluator::new(&derivation);
+    let reach = if mechanism.loops.is_empty() { 3.0 } else { 0.25 };
     let mut stream = Stream::new(99);
     let sample = Sample::random(mechanism, 100, reach, &mut stream).reachable(&evaluator);
     assert!(sample.len() > 50, "{name}: too few states");
     let parameters: Vec<f64> = (0..mechanism.parameters.len())
         .map(|_| stream.between(-1.0, 1.0))
         .collect();
-    let (p_g, p_min) = (
-        products(&derivation, &parameters),
-        base(&derivation, &parameters),
-    );
+    let (p_g, p_min) = (products(&derivation, &parameters), base(&derivation, &parameters));
     let states = sample.states();
     let reachable = "the states are reachable";
     let plain = evaluator.full_regressor(&states).expect(reachable);
@@ -102,17 +85,10 @@ fn check_values(name: &str) {
         let error = (a - b).amax() / a.amax().max(1e-9);
         assert!(error < 1e-12, "{name}, column {k}: error {error:.1e}");
     }
-    let forces = evaluator
-        .inverse_dynamics(&states, &p_min)
-        .expect(reachable);
+    let forces = evaluator.inverse_dynamics(&states, &p_min).expect(reachable);
     let n_drives = mechanism.drives.len();
     for row in 0..plain.nrows() {
-        let terms: Vec<f64> = plain
-            .row(row)
-            .iter()
-            .zip(&p_g)
-            .map(|(a, b)| a * b)
-            .collect();
+        let terms: Vec<f64> = plain.row(row).iter().zip(&p_g).map(|(a, b)| a * b).collect();
         let scale = terms.iter().map(|t| t.abs()).sum::<f64>().max(1e-9);
         let error = (forces[row % n_drives][row / n_drives] - terms.iter().sum::<f64>()).abs();
         assert!(

@@ -3,7 +3,7 @@
 //! The tables come from `fixtures/reference/make_pinocchio_tables.py`; they cover modified and standard
 //! Denavit-Hartenberg frames and frames by roll, pitch and yaw.
 
-use modelmill_codegen::Evaluator;
+use modelmill_codegen::ModelEvaluator;
 use modelmill_tests::base_parameters;
 use modelmill_tests::fixtures::{Table, derived};
 use modelmill_tests::sample::Sample;
@@ -16,23 +16,14 @@ fn check(name: &str) {
     let mechanism = &derivation.mechanism;
     let table = Table::reference(&format!("pinocchio-{name}"));
     let values = Table::reference(&format!("pinocchio-{name}-parameters"));
-    let parameters: Vec<f64> = mechanism
-        .parameters
-        .iter()
-        .map(|p| values.column(&p.name)[0])
-        .collect();
+    let parameters: Vec<f64> = mechanism.parameters.iter().map(|p| values.column(&p.name)[0]).collect();
     assert_eq!(parameters.len(), values.names().len());
     let sample = Sample::from_table(mechanism, &table);
-    let evaluator = Evaluator::new(&derivation);
-    let h = evaluator
-        .full_regressor(&sample.states())
-        .expect("an open chain");
+    let evaluator = ModelEvaluator::new(&derivation);
+    let h = evaluator.full_regressor(&sample.states()).expect("an open chain");
     let by_products = h * DVector::from_vec(base_parameters::products(&derivation, &parameters));
     let by_base = evaluator
-        .inverse_dynamics(
-            &sample.states(),
-            &base_parameters::base(&derivation, &parameters),
-        )
+        .inverse_dynamics(&sample.states(), &base_parameters::base(&derivation, &parameters))
         .expect("an open chain");
     let n_drives = mechanism.drives.len();
     for (d, drive) in mechanism.drives.iter().enumerate() {

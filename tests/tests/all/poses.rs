@@ -4,7 +4,7 @@
 use std::f64::consts::FRAC_PI_2;
 
 use crate::fixture_models as fixtures;
-use modelmill_codegen::{Derivation, Evaluator, PoseFault, PoseReason, States};
+use modelmill_codegen::{Derivation, ModelEvaluator, MotionStates, PoseFault, PoseReason};
 use modelmill_generated::{spidermill, three_rrr};
 use modelmill_runtime::{Loops, PoseError};
 use modelmill_tests::base_parameters;
@@ -27,7 +27,7 @@ fn at_rest(q: &[Vec<f64>]) -> Sample {
 /// Passive coordinates of the evaluator: one vector per coordinate.
 fn passive_of(derivation: &Derivation, q: &[Vec<f64>]) -> Result<Vec<Vec<f64>>, PoseFault> {
     let sample = at_rest(q);
-    let mut all = Evaluator::new(derivation).passive(&sample.states())?;
+    let mut all = ModelEvaluator::new(derivation).passive_motion(&sample.states())?;
     all.truncate(all.len() / 3);
     Ok(all)
 }
@@ -55,9 +55,7 @@ fn check_slider(one: &[Vec<f64>], other: &[Vec<f64>], unit: f64, tolerance: f64)
 }
 
 fn columns<const N: usize>(rows: &[[f64; N]]) -> Vec<Vec<f64>> {
-    (0..N)
-        .map(|k| rows.iter().map(|r| r[k]).collect())
-        .collect()
+    (0..N).map(|k| rows.iter().map(|r| r[k]).collect()).collect()
 }
 
 #[test]
@@ -71,11 +69,7 @@ fn lengths_in_any_unit_make_the_same_poses() {
         ($model:ident) => {{
             let model = fixtures::$model::Model::<f64>::default();
             let rows = cranks.iter().map(|q| model.passive_position(&[*q]));
-            columns(
-                &rows
-                    .collect::<Result<Vec<_>, _>>()
-                    .expect("the crank turns"),
-            )
+            columns(&rows.collect::<Result<Vec<_>, _>>().expect("the crank turns"))
         }};
     }
     let (one, emitted_one) = (evaluated(1.0), emitted!(spatial_slider));
@@ -100,19 +94,14 @@ fn a_length_that_drives_may_be_in_any_unit() {
         found.map(|p| p.map_or(f64::NAN, |p| p[0])).collect()
     };
     let one = cranks(1.0, &|q| emitted_passive!(fixtures::spatial_press, [q]));
-    let large = cranks(1024.0, &|q| {
-        emitted_passive!(fixtures::spatial_press_large, [q])
-    });
+    let large = cranks(1024.0, &|q| emitted_passive!(fixtures::spatial_press_large, [q]));
     let mm = cranks(1e3, &|q| emitted_passive!(fixtures::spatial_press_mm, [q]));
     // The slider's end is within its way: the crank stands across there.
     let reached = one.iter().filter(|x| x.is_finite()).count();
     assert!((10..20).contains(&reached), "{one:?}");
     for ((a, b), c) in one.iter().zip(large).zip(mm) {
         assert_eq!(a.to_bits(), b.to_bits());
-        assert!(
-            (a - c).abs() < 1e-12 || (a.is_nan() && c.is_nan()),
-            "{a} {c}"
-        );
+        assert!((a - c).abs() < 1e-12 || (a.is_nan() && c.is_nan()), "{a} {c}");
     }
 }
 
@@ -157,11 +146,7 @@ macro_rules! same_rule {
 #[test]
 fn emitted_code_and_evaluator_find_and_refuse_the_same_poses() {
     same_rule!("three_rrr", three_rrr::Model::<f64>::default(), 0.6);
-    same_rule!(
-        "spatial_press",
-        fixtures::spatial_press::Model::<f64>::default(),
-        0.6
-    );
+    same_rule!("spatial_press", fixtures::spatial_press::Model::<f64>::default(), 0.6);
 }
 
 #[test]
@@ -215,10 +200,7 @@ fn a_pose_is_followed_from_the_last_one() {
         qd: [0.0; 3],
         qdd: [0.0; 3],
     };
-    assert_eq!(
-        model.regressor_near(&state, &mut guess),
-        Err(PoseError::OutOfReach)
-    );
+    assert_eq!(model.regressor_near(&state, &mut guess), Err(PoseError::OutOfReach));
     assert_eq!(guess.map(f64::to_bits), expected.map(f64::to_bits));
     assert_eq!(PASSIVE.len(), guess.len());
 }
@@ -231,21 +213,15 @@ fn a_crank_may_turn_many_times() {
     let (once, often) = (once.expect("within reach"), often.expect("within reach"));
     assert!((once[2] - often[2]).abs() < 1e-12, "{once:?} {often:?}");
     // The coupler's joint turns back with each turn of the crank.
-    assert!(
-        (once[0] - often[0] - turns).abs() < 1e-9,
-        "{once:?} {often:?}"
-    );
+    assert!((once[0] - often[0] - turns).abs() < 1e-9, "{once:?} {often:?}");
 }
 
 /// The fault of the evaluator's regressor at some states of `SpiderMill`, given by their crank angles.
-fn spidermill_fault(
-    poses: &[[f64; 2]],
-    spoil: impl Fn(&mut Sample),
-) -> Option<(usize, PoseReason)> {
+fn spidermill_fault(poses: &[[f64; 2]], spoil: impl Fn(&mut Sample)) -> Option<(usize, PoseReason)> {
     let derivation = derived("spidermill");
     let mut sample = at_rest(&columns(poses));
     spoil(&mut sample);
-    let found = Evaluator::new(&derivation).regressor(&sample.states());
+    let found = ModelEvaluator::new(&derivation).regressor(&sample.states());
     found.err().map(|fault| (fault.sample, fault.reason))
 }
 
@@ -291,7 +267,7 @@ fn newtons_method_reports_the_earliest_fault() {
         poses[far_at] = far;
         let mut sample = at_rest(&columns(&poses));
         sample.qdd[2][nan_at] = f64::INFINITY;
-        let fault = Evaluator::new(&derivation).regressor(&sample.states());
+        let fault = ModelEvaluator::new(&derivation).regressor(&sample.states());
         let fault = fault.expect_err("two states are at fault");
         let reason = if far_at < nan_at {
             PoseReason::OutOfReach
@@ -314,17 +290,16 @@ fn inputs_that_are_no_numbers_are_named() {
         qd: [0.1, 0.2],
         qdd: [0.3, 0.4],
     };
-    let forces =
-        |geometry: &Geometry<f64>, base: &[f64; spidermill::N_BASE], state: &State<f64>| {
-            let found = InverseDynamics::new(geometry, base).forces(state);
-            let of_model = Model::new(geometry);
-            if found != Err(PoseError::NotFinite("p2_min")) {
-                assert_eq!(of_model.regressor(state).err(), found.err());
-                assert_eq!(of_model.drives(state).err(), found.err());
-                assert_eq!(of_model.passive(state).err(), found.err());
-            }
-            found.map(|_| ())
-        };
+    let forces = |geometry: &Geometry<f64>, base: &[f64; spidermill::N_BASE], state: &State<f64>| {
+        let found = InverseDynamics::new(geometry, base).forces(state);
+        let of_model = Model::new(geometry);
+        if found != Err(PoseError::NotFinite("p2_min")) {
+            assert_eq!(of_model.regressor(state).err(), found.err());
+            assert_eq!(of_model.drives(state).err(), found.err());
+            assert_eq!(of_model.passive(state).err(), found.err());
+        }
+        found.map(|_| ())
+    };
     assert_eq!(forces(&geometry, &base, &fine), Ok(()));
     for no_number in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -1e61] {
         let [mut q, mut qd, mut qdd] = [fine; 3];
@@ -352,7 +327,7 @@ fn inputs_that_are_no_numbers_are_named() {
     let derivation = derived("spidermill");
     let sample = at_rest(&columns(&[[1.8, 1.35]]));
     let fault = |constants: Vec<f64>, base: &[f64]| {
-        let evaluator = Evaluator::with_constants(&derivation, constants);
+        let evaluator = ModelEvaluator::with_constants(&derivation, constants);
         let fault = evaluator.inverse_dynamics(&sample.states(), base);
         fault.map_err(|f| f.to_string()).err()
     };
@@ -375,8 +350,8 @@ fn an_effect_that_takes_signs_names_what_is_no_number() {
     let n_active = derivation.coordinates().0.len();
     let mut sample = at_rest(&vec![vec![0.1; 5]; n_active]);
     sample.qd[0][2] = f64::NAN;
-    let states: States<'_> = sample.states();
-    let fault = Evaluator::new(&derivation).regressor(&states);
+    let states: MotionStates<'_> = sample.states();
+    let fault = ModelEvaluator::new(&derivation).regressor(&states);
     let fault = fault.expect_err("a rate is no number");
     assert_eq!(fault.sample, 2);
     assert!(matches!(fault.reason, PoseReason::NotFinite { input } if input.ends_with("_d")));
@@ -384,9 +359,7 @@ fn an_effect_that_takes_signs_names_what_is_no_number() {
 
 #[test]
 fn terms_without_a_finite_value_are_errors() {
-    use fixtures::undefined_effects::{
-        Geometry, InverseDynamics, Model, Parameters, State, base_parameters,
-    };
+    use fixtures::undefined_effects::{Geometry, InverseDynamics, Model, Parameters, State, base_parameters};
     let derivation = derived("undefined_effects");
     let geometry = Geometry::<f64>::default();
     let model = Model::new(&geometry);
@@ -404,15 +377,11 @@ fn terms_without_a_finite_value_are_errors() {
             qd: [0.1, 0.2],
             qdd: [0.3, 0.4],
         };
-        let expected = if is_fine {
-            None
-        } else {
-            Some(PoseError::Undefined)
-        };
+        let expected = if is_fine { None } else { Some(PoseError::Undefined) };
         assert_eq!(model.regressor(&state).err(), expected, "{q:?}");
         assert_eq!(dynamics.forces(&state).err(), expected, "{q:?}");
         let sample = at_rest(&columns(&[q]));
-        let found = Evaluator::new(&derivation).regressor(&sample.states());
+        let found = ModelEvaluator::new(&derivation).regressor(&sample.states());
         assert_eq!(
             found.err().map(|fault| fault.reason),
             expected.map(PoseReason::from),
@@ -482,8 +451,8 @@ fn geometry_at_run_time_may_be_of_any_size() {
         gough_stewart_tied,
         0.02,
         [
-            bx1, by1, bx2, by2, bx3, by3, bx4, by4, bx5, by5, bx6, by6, ax1, ay1, ax2, ay2, ax3,
-            ay3, ax4, ay4, ax5, ay5, ax6, ay6, g
+            bx1, by1, bx2, by2, bx3, by3, bx4, by4, bx5, by5, bx6, by6, ax1, ay1, ax2, ay2, ax3, ay3, ax4, ay4, ax5,
+            ay5, ax6, ay6, g
         ]
     );
 }

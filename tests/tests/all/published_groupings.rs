@@ -15,8 +15,7 @@ fn check(name: &str) {
 /// Compares a model with the published map of another that should have the same.
 #[track_caller]
 fn check_model(name: &str, map: &str) {
-    let text = std::fs::read_to_string(fixtures().join(format!("published/{map}.txt")))
-        .expect("a published map");
+    let text = std::fs::read_to_string(fixtures().join(format!("published/{map}.txt"))).expect("a published map");
     let mut mechanism = model(name);
     let published = Map::parse(&text, &mechanism);
     let own_choice = Map::of_mill(&derive(&mechanism));

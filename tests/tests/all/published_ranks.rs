@@ -1,6 +1,6 @@
 //! Numbers of base parameters that the literature prints, and those that independent programs agree on.
 
-use modelmill_codegen::Evaluator;
+use modelmill_codegen::ModelEvaluator;
 use modelmill_tests::fixtures::{derive, model};
 use modelmill_tests::rank::rank_of_products;
 use modelmill_tests::sample::Sample;
@@ -12,12 +12,11 @@ fn check(name: &str, published: usize) {
     let mechanism = model(name);
     let derivation = derive(&mechanism);
     assert_eq!(derivation.reduction.retained.len(), published, "{name}");
-    let evaluator = Evaluator::new(&derivation);
+    let evaluator = ModelEvaluator::new(&derivation);
     let products = derivation.reduction.products.len();
     let reach = if mechanism.loops.is_empty() { 3.0 } else { 0.3 };
     let n = 60 + 4 * products / mechanism.drives.len();
-    let sample = Sample::random(&mechanism, n, reach, &mut Stream::new(published as u64))
-        .reachable(&evaluator);
+    let sample = Sample::random(&mechanism, n, reach, &mut Stream::new(published as u64)).reachable(&evaluator);
     assert!(
         sample.len() * mechanism.drives.len() > 2 * products,
         "{name}: too few states"

@@ -57,12 +57,7 @@ fn check(cases: &[&Cases], law: impl Fn(&Case) -> Result<f64, String>) {
 }
 
 fn everything() -> [&'static Cases; 4] {
-    [
-        &TREES_OF_ANYTHING,
-        &LOOPS_OF_ANYTHING,
-        &PHYSICAL_TREES,
-        &PHYSICAL_LOOPS,
-    ]
+    [&TREES_OF_ANYTHING, &LOOPS_OF_ANYTHING, &PHYSICAL_TREES, &PHYSICAL_LOOPS]
 }
 
 #[test]
@@ -82,18 +77,12 @@ fn forces_satisfy_dalemberts_principle() {
 
 #[test]
 fn loops_stay_closed_with_their_rates_and_accelerations() {
-    check(
-        &[&LOOPS_OF_ANYTHING, &PHYSICAL_LOOPS],
-        Case::loops_stay_closed,
-    );
+    check(&[&LOOPS_OF_ANYTHING, &PHYSICAL_LOOPS], Case::loops_stay_closed);
 }
 
 #[test]
 fn power_of_the_drives_is_the_rate_of_energy() {
-    check(
-        &[&PHYSICAL_TREES, &PHYSICAL_LOOPS],
-        Case::power_is_the_rate_of_energy,
-    );
+    check(&[&PHYSICAL_TREES, &PHYSICAL_LOOPS], Case::power_is_the_rate_of_energy);
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! What joints transmit: against bodies by themselves, on bundled models and on random mechanisms, and in emitted code.
 
-use modelmill_codegen::Evaluator;
+use modelmill_codegen::ModelEvaluator;
 use modelmill_tests::fixtures::{derived, model};
 use modelmill_tests::free_bodies::Found;
 use modelmill_tests::laws::Case;
@@ -79,22 +79,13 @@ fn planar_loops_determine_what_lies_in_their_plane() {
         ("three_rrr", 7, 2),
     ] {
         let [told, left_out] = check_model(name, 0.2);
-        assert_eq!(
-            [told, left_out],
-            [3 * joints + 2 * loops, 3 * joints + loops],
-            "{name}"
-        );
+        assert_eq!([told, left_out], [3 * joints + 2 * loops, 3 * joints + loops], "{name}");
     }
 }
 
 #[test]
 fn linkages_and_slides() {
-    for name in [
-        "three_rpr",
-        "slider_crank",
-        "arm_parallelogram",
-        "arm_four_bar",
-    ] {
+    for name in ["three_rpr", "slider_crank", "arm_parallelogram", "arm_four_bar"] {
         let [told, left_out] = check_model(name, 0.2);
         assert!(told > 0 && left_out > 0, "{name}");
     }
@@ -130,23 +121,17 @@ fn a_bearing_by_hand() {
     let names: Vec<&str> = reactions.joints.iter().map(|j| j.name.as_str()).collect();
     assert_eq!(names.len(), 2, "{names:?}");
     let mechanism = &derivation.mechanism;
-    let evaluator = Evaluator::new(&derivation);
-    let at_rest = modelmill_codegen::States {
+    let evaluator = ModelEvaluator::new(&derivation);
+    let at_rest = modelmill_codegen::MotionStates {
         q: vec![&[0.0], &[0.0]],
         qd: vec![&[0.0], &[0.0]],
         qdd: vec![&[0.0], &[0.0]],
         load: Vec::new(),
     };
     let values = evaluator.reactions(&reactions, &at_rest).unwrap();
-    let numbers = modelmill_tests::mechanics::Numbers::new(
-        mechanism,
-        modelmill_tests::base_parameters::nominal(mechanism),
-    );
-    let mass: f64 = numbers
-        .bodies()
-        .iter()
-        .map(|(_, inertia)| inertia[(3, 3)])
-        .sum();
+    let numbers =
+        modelmill_tests::mechanics::Numbers::new(mechanism, modelmill_tests::base_parameters::nominal(mechanism));
+    let mass: f64 = numbers.bodies().iter().map(|(_, inertia)| inertia[(3, 3)]).sum();
     let weight = numbers.gravity() * -mass;
     for k in 0..3 {
         let place = reactions.joints[0].force[k].unwrap();

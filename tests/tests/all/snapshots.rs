@@ -2,7 +2,7 @@
 //!
 //! Their truth is shown elsewhere: `emitted`, `spidermill`, `published_groupings`, `operation_counts`.
 
-use modelmill_codegen::review::{Format, page};
+use modelmill_codegen::review::{PageFormat, page};
 use modelmill_tests::fixtures::derived;
 
 /// Models whose code is too long for anyone to look through; their pages are looked at.
@@ -18,9 +18,9 @@ macro_rules! snapshots {
             settings.set_prepend_module_to_snapshot(false);
             settings.set_omit_expression(true);
             settings.bind(|| {
-                insta::assert_snapshot!(concat!($file, ".page"), page(&derivation, Format::Markdown, None));
+                insta::assert_snapshot!(concat!($file, ".page"), page(&derivation, PageFormat::Markdown, None));
                 if !LONG.contains(&$file) {
-                    insta::assert_snapshot!(concat!($file, ".rs"), modelmill_codegen::emit(&derivation).file());
+                    insta::assert_snapshot!(concat!($file, ".rs"), modelmill_emit::emit(&derivation).file());
                 }
             });
         }

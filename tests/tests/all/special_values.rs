@@ -1,6 +1,6 @@
 //! Values of a model's constants at which fewer columns are independent than for constants in general.
 
-use modelmill_codegen::Evaluator;
+use modelmill_codegen::ModelEvaluator;
 use modelmill_spec::Mechanism;
 use modelmill_tests::fixtures::{derive, model};
 use modelmill_tests::laws::Case;
@@ -17,7 +17,7 @@ fn with_value(mut mechanism: Mechanism, constant: &str, value: f64) -> Mechanism
 /// Exact rank for constants in general and numeric rank at the file's values.
 fn ranks(mechanism: &Mechanism) -> (usize, usize) {
     let derivation = derive(mechanism);
-    let evaluator = Evaluator::new(&derivation);
+    let evaluator = ModelEvaluator::new(&derivation);
     let reach = if mechanism.loops.is_empty() { 3.0 } else { 0.3 };
     let sample = Sample::random(mechanism, 200, reach, &mut Stream::new(8)).reachable(&evaluator);
     let numeric = rank_of_products(&evaluator, &sample).expect("reachable states");
@@ -27,7 +27,7 @@ fn ranks(mechanism: &Mechanism) -> (usize, usize) {
 
 /// Base parameters for the file's values alone.
 fn rank_at_values(mechanism: &Mechanism) -> usize {
-    derive(&mechanism.at_values()).reduction.retained.len()
+    derive(&mechanism.with_numeric_constants()).reduction.retained.len()
 }
 
 #[test]
@@ -49,7 +49,7 @@ fn the_exact_rank_for_the_files_values_alone_is_the_numeric_one() {
 #[test]
 fn numbers_in_place_of_constants_change_no_force() {
     for name in ["two_link", "tx40", "four_bar", "spidermill", "three_rrr"] {
-        let mechanism = model(name).at_values();
+        let mechanism = model(name).with_numeric_constants();
         assert!(mechanism.constants.is_empty(), "{name}");
         let case = Case::near_nominal(&mechanism, 20, 0.2).unwrap();
         case.forces_satisfy_dalembert(10).unwrap();

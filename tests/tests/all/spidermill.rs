@@ -2,14 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use modelmill_codegen::{Derivation, Evaluator};
+use modelmill_codegen::{Derivation, ModelEvaluator};
 use modelmill_tests::base_parameters;
 use modelmill_tests::fixtures::{Table, derived, fixtures};
 use modelmill_tests::published::{Fraction, Map};
 use modelmill_tests::sample::Sample;
 
 fn products(derivation: &Derivation) -> Vec<String> {
-    let text = |m: &modelmill_codegen::Monomial| m.text(&derivation.mechanism);
+    let text = |m: &modelmill_codegen::ParameterMonomial| m.text(&derivation.mechanism);
     derivation.reduction.products.iter().map(text).collect()
 }
 
@@ -19,8 +19,7 @@ fn the_papers_model_has_the_eleven_products_of_eq_5_in_its_order() {
     assert_eq!(
         products(&derivation),
         [
-            "m1*dc1", "m1*dc1^2", "m2", "m3", "m3*dc3", "m3*dc3^2", "m4", "m4*dc3", "m4*dc3^2",
-            "Ic12", "Ic32"
+            "m1*dc1", "m1*dc1^2", "m2", "m3", "m3*dc3", "m3*dc3^2", "m4", "m4*dc3", "m4*dc3^2", "Ic12", "Ic32"
         ]
     );
     let without: Vec<String> = derivation
@@ -35,8 +34,7 @@ fn the_papers_model_has_the_eleven_products_of_eq_5_in_its_order() {
 #[test]
 fn the_papers_model_has_the_five_expressions_of_eq_16_term_by_term() {
     let derivation = derived("spidermill-paper");
-    let text = std::fs::read_to_string(fixtures().join("published/spidermill-paper.txt"))
-        .expect("eq. (16)");
+    let text = std::fs::read_to_string(fixtures().join("published/spidermill-paper.txt")).expect("eq. (16)");
     let published = Map::parse(&text, &derivation.mechanism);
     let mill = Map::of_mill(&derivation);
     mill.assert_equals(&published);
@@ -87,7 +85,7 @@ fn check_table(name: &str, table: &str) {
     let derivation = derived(name);
     let mechanism = &derivation.mechanism;
     let table = Table::reference(table);
-    let evaluator = Evaluator::new(&derivation);
+    let evaluator = ModelEvaluator::new(&derivation);
     let sample = Sample::from_table(mechanism, &table);
     let close = |what: &str, expected: &[f64], found: &dyn Fn(usize) -> f64| {
         let scale = expected.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
@@ -101,21 +99,17 @@ fn check_table(name: &str, table: &str) {
             );
         }
     };
-    let passive = evaluator.passive(&sample.states()).expect("all in reach");
+    let passive = evaluator.passive_motion(&sample.states()).expect("all in reach");
     for (k, angle) in ["gamma1", "gamma2"].into_iter().enumerate() {
         close(angle, table.column(angle), &|i| passive[k][i]);
     }
-    let h = evaluator
-        .full_regressor(&sample.states())
-        .expect("all in reach");
+    let h = evaluator.full_regressor(&sample.states()).expect("all in reach");
     let n_drives = mechanism.drives.len();
     let mut compared = 0;
     for (d, drive) in mechanism.drives.iter().enumerate() {
         for (k, product) in products(&derivation).iter().enumerate() {
             let column = format!("H[{};{product}]", drive.name);
-            close(&column, table.column(&column), &|i| {
-                h[(i * n_drives + d, k)]
-            });
+            close(&column, table.column(&column), &|i| h[(i * n_drives + d, k)]);
             compared += 1;
         }
     }

@@ -2,8 +2,8 @@
 //! gives: `fixtures/judged/judge.py`, which shares neither files nor code with the mill. It describes each mechanism
 //! once, moves its bodies in floating point, and writes the model file as a user would, from the format's description.
 
-use modelmill_codegen::Method;
-use modelmill_codegen::review::{Format, page};
+use modelmill_codegen::ReductionMethod;
+use modelmill_codegen::review::{PageFormat, page};
 use modelmill_spec::Mechanism;
 use modelmill_tests::fixtures::{derive, fixtures};
 use modelmill_tests::laws::{ACCURACY, Case};
@@ -22,7 +22,7 @@ fn check(name: &str, rank: usize) {
     let reduction = derive(&judged(name)).reduction;
     assert_eq!(reduction.retained.len(), rank, "{name}");
     assert!(
-        matches!(reduction.method, Method::Exact { .. }),
+        matches!(reduction.method, ReductionMethod::Exact { .. }),
         "{name}: {:?}",
         reduction.method
     );
@@ -86,7 +86,7 @@ fn numeric_reductions_have_the_rank_of_the_judge() {
     ] {
         let reduction = derive(&judged(name)).reduction;
         assert_eq!(reduction.retained.len(), rank, "{name}");
-        let Method::Numeric {
+        let ReductionMethod::Numeric {
             least_kept,
             most_dropped,
             residual,
@@ -105,7 +105,7 @@ fn numeric_reductions_have_the_rank_of_the_judge() {
 #[test]
 fn halves_of_a_kite_are_mirrored_by_relations() {
     let derivation = derive(&judged("kite_sprung"));
-    let page = page(&derivation, Format::Text, None);
+    let page = page(&derivation, PageFormat::Text, None);
     for relation in ["c = -a", "d_ = -b"] {
         assert!(page.contains(relation), "{page}");
     }

@@ -1,61 +1,65 @@
-//! `tour`: the whole story on bundled recordings: derive, compare, see where it fails, learn what is missing, add it, watch
-//! the error fall; then the same for the paper's own treatment. Everything it uses and makes goes into one folder, so that
-//! each command can be repeated by hand.
+//! `tour`: all main steps on bundled recordings: derive, compare, find the missing effect, add it, identify again; then
+//! a diagnosis of the model as published in the paper. Its models, recordings and pages are written into one folder, so
+//! that each command can be repeated by hand.
 
 mod story;
 
 use std::path::{Path, PathBuf};
 
-use modelmill::compare::Compared;
-use modelmill::diagnose::{Findings, Held, Question, words};
+use modelmill::compare::ModelComparison;
+use modelmill::diagnose::{DiagnosisFindings, DiagnosisOptions, FixedParameters, words};
 use modelmill::print::{StepSpelling, edit};
-use modelmill::recording::{Reading, Recording};
+use modelmill::recording::{PreparedRecording, RecordingOptions};
 use modelmill::report::page;
 use modelmill::{Host, Model, along, bundled};
-use modelmill_recordings::{PLAIN, Runs, WITH_RODS};
+use modelmill_recordings::{BundledRuns, PLAIN, WITH_RODS};
 
 use crate::args::TourArgs;
-use crate::failure::{Failure, Outcome};
-use crate::flags::{CommandLineSpelling, quoted};
+use crate::failure::{CommandFailure, CommandOutcome};
+use crate::flags::{CommandLineSpelling, quote_word};
 use crate::output;
 use crate::terminal;
 
-use story::Story;
+use story::TourText;
 
 /// The page of the robot with rods.
 const RODS_PAGE: &str = "report.html";
 /// The page of the paper's treatment.
 const PAPER_PAGE: &str = "report-paper.html";
-/// The model with what was found.
+/// File of the model with the effects that were found.
 const EDITED: &str = "spidermill-completed.toml";
 
-/// Tells the story and writes its files.
-pub(crate) fn run(host: &Host, args: &TourArgs) -> Outcome {
+/// Prints the tour and writes its files.
+pub(crate) fn run(host: &Host, args: &TourArgs) -> CommandOutcome {
     let folder = args
         .out
         .clone()
         .unwrap_or_else(|| std::env::temp_dir().join("modelmill-tour"));
     output::make_folder(&folder)?;
-    let place = Place::unpack(&folder)?;
-    let mut story = Story::new(terminal::style());
+    let place = TourFolder::unpack(&folder)?;
+    let mut story = TourText::new(terminal::style());
 
+    // Steps 1 to 5: the recording has rods, the model does not.
     let model = place.model(host, "spidermill.toml")?;
     let runs = place.read(&model, &WITH_RODS)?;
     story.derive(&place.name("spidermill.toml"), &model);
-    let seen = Seen::new(&model, &runs[1])?;
+    let seen = TourComparison::new(&model, &runs[1])?;
     story.compare(&place, &model, &seen);
 
     let flags = place.flags(&WITH_RODS);
-    let rods = diagnose(&model, &runs, Held::Known)?;
+    // Base parameters are estimated, as a user would do with an unknown machine.
+    let rods = diagnose(&model, &runs, FixedParameters::Known)?;
     story.diagnose(&place, &rods);
     let edited = place.add(&rods, &flags)?;
     story.add(&place, edited.as_ref());
     story.ladder(&rods);
     place.write(RODS_PAGE, &page(&rods, &flags)?)?;
 
+    // Step 6: the model as published, on a recording without rods.
     let model = place.model(host, "spidermill-paper.toml")?;
     let runs = place.read(&model, &PLAIN)?;
-    let paper = diagnose(&model, &runs, Held::All)?;
+    // Base parameters are fixed: estimated ones would absorb most of the error.
+    let paper = diagnose(&model, &runs, FixedParameters::All)?;
     story.paper(&place, &paper);
     place.write(PAPER_PAGE, &page(&paper, &place.flags(&PLAIN))?)?;
 
@@ -63,25 +67,33 @@ pub(crate) fn run(host: &Host, args: &TourArgs) -> Outcome {
     terminal::print(story.text.trim_start())
 }
 
-fn diagnose(model: &Model, [fit, check]: &[Recording; 2], held: Held) -> Outcome<Findings> {
-    let question = Question {
-        held,
-        again_with_nominal: false,
+/// Diagnoses the first recording as fit and the second as validation run.
+fn diagnose(
+    model: &Model,
+    [fit, check]: &[PreparedRecording; 2],
+    fixed: FixedParameters,
+) -> CommandOutcome<DiagnosisFindings> {
+    let question = DiagnosisOptions {
+        fixed,
+        // The second diagnosis would double the time of the tour.
+        repeat_with_nominal: false,
     };
     Ok(model.diagnose(&[fit], &[check], &question)?)
 }
 
-/// The folder of the tour.
-struct Place {
+/// The folder of the tour, with its models and recordings.
+struct TourFolder {
+    /// Its path.
     folder: PathBuf,
 }
 
-impl Place {
+impl TourFolder {
     /// Writes models and recordings of the program into a folder.
-    fn unpack(folder: &Path) -> Outcome<Self> {
+    fn unpack(folder: &Path) -> CommandOutcome<Self> {
         let place = Self {
             folder: folder.to_owned(),
         };
+        // All bundled models, because some of them include others.
         for (name, text) in bundled::MODELS {
             place.write(name, text)?;
         }
@@ -93,17 +105,18 @@ impl Place {
         Ok(place)
     }
 
-    fn write(&self, name: &str, text: &str) -> Outcome {
+    /// Writes a file of the folder.
+    fn write(&self, name: &str, text: &str) -> CommandOutcome {
         output::write(&self.folder.join(name), text)
     }
 
-    /// A file of the folder as a command has it.
+    /// A file of the folder as an argument of a command, quoted.
     fn name(&self, file: &str) -> String {
-        quoted(&self.folder.join(file).display().to_string())
+        quote_word(&self.folder.join(file).display().to_string())
     }
 
-    /// Recordings as a command has them.
-    fn recordings(&self, runs: &Runs) -> String {
+    /// Recordings as flags of a command.
+    fn recordings(&self, runs: &BundledRuns) -> String {
         format!(
             "--data {} --check {}",
             self.name(file_name(runs.fit.0)),
@@ -111,43 +124,46 @@ impl Place {
         )
     }
 
+    /// Path of a file of the folder.
     fn path(&self, name: &str) -> PathBuf {
         self.folder.join(file_name(name))
     }
 
-    fn model(&self, host: &Host, name: &str) -> Outcome<Model> {
+    /// Reads and derives a model of the folder.
+    fn model(&self, host: &Host, name: &str) -> CommandOutcome<Model> {
         Ok(host.model(self.path(name))?)
     }
 
-    fn read(&self, model: &Model, runs: &Runs) -> Outcome<[Recording; 2]> {
-        let read = |name: &str| model.recording(self.path(name), &Reading::default());
+    /// Reads the fit run and the validation run, in this order.
+    fn read(&self, model: &Model, runs: &BundledRuns) -> CommandOutcome<[PreparedRecording; 2]> {
+        let read = |name: &str| model.recording(self.path(name), &RecordingOptions::default());
         Ok([read(runs.fit.0)?, read(runs.check.0)?])
     }
 
-    /// How the command line asks for the same.
-    fn flags(&self, runs: &Runs) -> CommandLineSpelling {
+    /// The spelling of commands that use the same recordings.
+    fn flags(&self, runs: &BundledRuns) -> CommandLineSpelling {
         let [fit, check] = [runs.fit.0, runs.check.0].map(|name| self.path(name));
-        CommandLineSpelling::new(&[fit], &[check], &Reading::default())
+        CommandLineSpelling::new(&[fit], &[check], &RecordingOptions::default())
     }
 
-    /// Writes the model with what was found beside the one it came from; the commands for it, and the difference.
+    /// Writes the model with the effects that were found. Returns the commands that do the same, and the difference of
+    /// the files.
     fn add(
         &self,
-        findings: &Findings,
+        findings: &DiagnosisFindings,
         flags: &CommandLineSpelling,
-    ) -> Outcome<Option<(Vec<String>, String)>> {
+    ) -> CommandOutcome<Option<(Vec<String>, String)>> {
         let Some(edited) = &findings.edited else {
             return Ok(None);
         };
         self.write(EDITED, &edited.text)?;
         let model = &findings.before.model;
         let commands = findings.entries.iter();
-        let commands = commands
-            .map(|entry| flags.spell_effect(model, entry))
-            .collect();
+        let commands = commands.map(|entry| flags.spell_effect(model, entry)).collect();
+        // File names of the difference, as `diff` prints them.
         let names = ["spidermill.toml", EDITED];
         let difference = edit::difference(model.text(), &edited.text, names);
-        let coloured = edit::coloured(&difference, terminal::style());
+        let coloured = edit::colour_diff(&difference, terminal::style());
         Ok(Some((commands, coloured)))
     }
 }
@@ -157,22 +173,28 @@ fn file_name(name: &str) -> &str {
     name.rsplit('/').next().unwrap_or(name)
 }
 
-/// The model with nominal parameters held against a recording.
-struct Seen {
-    compared: Compared,
+/// The model with nominal parameters compared with a recording.
+struct TourComparison {
+    /// Error figures, and where the error is largest.
+    compared: ModelComparison,
+    /// Times of the samples, s.
     time: Vec<f64>,
+    /// Measured forces, N, `[drive][sample]`.
     measured: Vec<Vec<f64>>,
+    /// Measured minus calculated forces, N, `[drive][sample]`.
     errors: Vec<Vec<f64>>,
 }
 
-impl Seen {
-    fn new(model: &Model, recording: &Recording) -> Outcome<Self> {
+impl TourComparison {
+    /// Computes forces and errors along the first segment. Fails if the recording has no samples.
+    fn new(model: &Model, recording: &PreparedRecording) -> CommandOutcome<Self> {
         let one = recording
-            .stretches
+            .segments
             .first()
-            .ok_or_else(|| Failure::Input("the bundled recording has no sample".to_owned()))?;
-        let measured = along::measured(one)?;
-        let forces = along::decimated(along::forces(model, one, &model.nominal)?, one)?;
+            .ok_or_else(|| CommandFailure::Input("the bundled recording has no samples".to_owned()))?;
+        let measured = along::measured_forces(one)?;
+        // Samples of forces and measurements must agree, so both are decimated alike.
+        let forces = along::filter_and_decimate(along::forces(model, one, &model.nominal)?, one)?;
         let errors = measured
             .iter()
             .zip(&forces)
@@ -188,6 +210,6 @@ impl Seen {
 }
 
 /// The verdict of a diagnosis in words.
-fn verdict(findings: &Findings) -> String {
-    words::verdict(&findings.diagnosis, findings.channels(), findings.judged)
+fn verdict(findings: &DiagnosisFindings) -> String {
+    words::verdict(&findings.diagnosis, findings.channels(), findings.validation)
 }

@@ -1,41 +1,45 @@
-//! The words of the tour: paragraphs, tables and figures in the order in which they are told.
+//! Text of the tour: paragraphs, tables and figures in the order in which they are printed.
 
 use modelmill::Model;
-use modelmill::diagnose::{Findings, Rung, words};
+use modelmill::diagnose::{DiagnosisFindings, SelectionStep, words};
 use modelmill::print::tables;
-use modelmill::text::Style;
-use modelmill::text::table::{Align, count, percent, table};
+use modelmill::text::TerminalStyle;
+use modelmill::text::table::{ColumnAlignment, count, percent, table};
 
-use super::{EDITED, PAPER_PAGE, PLAIN, Place, RODS_PAGE, Seen, WITH_RODS, verdict};
-use crate::terminal::plot::{Curve, bar, time_axis};
+use super::{EDITED, PAPER_PAGE, PLAIN, RODS_PAGE, TourComparison, TourFolder, WITH_RODS, verdict};
+use crate::terminal::plot::{TerminalCurve, bar, time_axis};
 
-/// Width of a paragraph.
+/// Width of a paragraph, letters.
 const WIDTH: usize = 76;
-/// Width of the longest bar.
+/// Width of the longest bar, letters.
 const BAR: usize = 30;
-/// Candidates that are named beside those that were found.
+/// Rejected candidates that are listed after those that were found.
 const OTHERS: usize = 5;
 
 /// The text as it grows.
-pub(super) struct Story {
+pub(super) struct TourText {
+    /// All that was printed so far.
     pub(super) text: String,
-    style: Style,
+    /// Colours, or none if the output is no terminal.
+    style: TerminalStyle,
 }
 
-impl Story {
+impl TourText {
     /// An empty story.
-    pub(super) fn new(style: Style) -> Self {
+    pub(super) fn new(style: TerminalStyle) -> Self {
         Self {
             text: String::new(),
             style,
         }
     }
 
+    /// A line without trailing blanks.
     fn line(&mut self, line: &str) {
         self.text.push_str(line.trim_end());
         self.text.push('\n');
     }
 
+    /// Several lines.
     fn lines(&mut self, lines: &[String]) {
         for line in lines {
             self.line(line);
@@ -51,7 +55,7 @@ impl Story {
     }
 
     /// A paragraph, wrapped.
-    fn say(&mut self, text: &str) {
+    fn paragraph(&mut self, text: &str) {
         self.lines(&words::lines(text, WIDTH));
         self.line("");
     }
@@ -63,15 +67,16 @@ impl Story {
         self.line("");
     }
 
-    /// What the mill makes of the model file.
+    /// The derivation: from a model file to base parameters.
     pub(super) fn derive(&mut self, name: &str, model: &Model) {
-        self.heading("1  Derive: from a model file to what can be known");
+        self.heading("1  Derive: which parameters can be identified?");
         let mechanism = &model.derivation.mechanism;
         let reduction = &model.derivation.reduction;
-        self.say(&format!(
-            "A parallel robot carries a platform on two cranks, each pushed by a ball screw. Its model file has {}, {} and {}. \
-             The forces of the screws are linear in {} of masses, lengths and inertias, but many say the same thing. These {} are \
-             all that any measurement can tell, found exactly and in symbols:",
+        self.paragraph(&format!(
+            "In this planar parallel robot two cranks, each driven by a ball screw, carry a platform through two couplers. Its \
+             model file has {}, {} and {}. The forces of the screws are linear in {} of masses, lengths and inertias, but the \
+             columns of many products are linearly dependent. Only {} combinations can be identified from measurements. They are \
+             found symbolically, in exact arithmetic:",
             count(mechanism.parts.len(), "body", "bodies"),
             count(mechanism.loops.len(), "loop", "loops"),
             count(mechanism.drives.len(), "drive", "drives"),
@@ -83,24 +88,27 @@ impl Story {
         self.command(&format!("equations {name}"));
     }
 
-    /// How far the model is off, and where.
-    pub(super) fn compare(&mut self, place: &Place, model: &Model, seen: &Seen) {
-        self.heading("2  Compare: where does the model fail?");
-        self.say(&format!(
-            "Another house's multibody code simulated the whole robot, eleven groups of bodies, and something besides that the \
-             model file does not know of. Held against that recording, with the masses of the drawings, the model misses the \
-             forces by {}. First the force of one screw, then what the model misses:",
+    /// The error of the model with nominal values, and where it is largest.
+    pub(super) fn compare(&mut self, place: &TourFolder, model: &Model, seen: &TourComparison) {
+        self.heading("2  Compare: where is the error large?");
+        self.paragraph(&format!(
+            "A third-party multibody program simulated the complete robot (eleven groups of bodies) to make this recording. The \
+             simulation contains one effect that the model file lacks. With the nominal parameters of the model file the error \
+             is {} of the force (nrms: rms of the error divided by rms of the measured force). First the force of one ball screw, \
+             then the error, on its own scale:",
             percent(seen.compared.figures.nrms)
         ));
+        // The curves of the first drive are an example; the table below lists where all errors are largest.
         let drive = model.drives().first().cloned().unwrap_or_default();
         if let (Some(measured), Some(error)) = (seen.measured.first(), seen.errors.first()) {
+            // Measured force and error have separate scales, because the error is much smaller.
             for (title, values, height) in [
                 (format!("{drive}, measured, N"), measured, 5),
-                (format!("{drive}, measured less model, N"), error, 5),
+                (format!("{drive}, measured minus model, N"), error, 5),
             ] {
                 let title = self.style.dim(&title);
                 self.line(&format!("{:>9}  {title}", ""));
-                let curve = Curve {
+                let curve = TerminalCurve {
                     values,
                     height,
                     limit: None,
@@ -110,10 +118,10 @@ impl Story {
             self.line(&time_axis(&seen.time));
             self.line("");
         }
-        self.line("Where the error lives:");
+        self.line("Where the error is largest:");
         self.lines(&tables::places(&seen.compared.places));
         self.line("");
-        self.say("True, but it does not say what is missing. This is as far as other tools go; the thinking is left to you.");
+        self.paragraph("This shows where the error is large, not its cause. The next step finds the cause.");
         self.command(&format!(
             "compare {} --data {}",
             place.name("spidermill.toml"),
@@ -121,44 +129,50 @@ impl Story {
         ));
     }
 
-    /// What is missing, and what else was tried.
-    pub(super) fn diagnose(&mut self, place: &Place, findings: &Findings) {
-        self.heading("3  Diagnose: what is missing?");
+    /// The missing effect, and the best rejected candidates.
+    pub(super) fn diagnose(&mut self, place: &TourFolder, findings: &DiagnosisFindings) {
+        self.heading("3  Diagnose: which effect is missing?");
         let all = &findings.diagnosis.candidates;
-        self.say(&format!(
-            "modelmill writes down every effect of its library at every place of this mechanism, {} in all: friction of many \
-             kinds, springs, inertias, offsets, delays, rods. It fits them beside the model on one run, and believes only what \
-             also lowers the error on another, which it did not fit.",
+        self.paragraph(&format!(
+            "modelmill tries every effect of its library at every place of this mechanism, {} in all: friction of many kinds, \
+             springs, inertias, offsets, delays, rods. It fits sets of them, each together with the base parameters, to one run. \
+             It accepts an effect only if the error also falls on a validation run, which is not used for the fit. The base \
+             parameters are estimated here, so the first error below is smaller than that with nominal values.",
             count(all.len(), "candidate", "candidates")
         ));
-        self.say(&verdict(findings));
-        let shown = all.iter().filter(|c| c.refused.is_none());
-        let others = all.iter().filter(|c| c.refused.is_some()).take(OTHERS);
+        self.paragraph(&verdict(findings));
+        // Effects that were found come first, then the best of the rejected ones.
+        let shown = all.iter().filter(|c| c.rejection_reason.is_none());
+        let others = all.iter().filter(|c| c.rejection_reason.is_some()).take(OTHERS);
+        let has_effects = !findings.diagnosis.effects.is_empty();
         let rows: Vec<Vec<String>> = shown
             .chain(others)
             .map(|c| {
                 vec![
                     words::effect(&c.effect),
                     format!("{:.0} %", 100.0 * c.explained),
-                    c.refused.clone().unwrap_or_else(|| "found".to_owned()),
+                    (c.rejection_reason.as_deref())
+                        .map_or("found", |why| words::refusal(why, has_effects))
+                        .to_owned(),
                 ]
             })
             .collect();
         let columns = [
-            ("candidate", Align::Left),
-            ("explains alone", Align::Right),
-            ("verdict", Align::Left),
+            ("candidate", ColumnAlignment::Left),
+            ("alone it would explain", ColumnAlignment::Right),
+            ("result", ColumnAlignment::Left),
         ];
         self.lines(&table(2, &columns, &rows));
         self.line("");
+        // Each effect is described in the words of its kind, with the effects that explain the data equally well.
         for found in &findings.diagnosis.effects {
             let kinds = &findings.before.model.loaded.kinds;
             if let Some(kind) = kinds.iter().find(|k| k.name == found.effect.kind) {
-                self.say(&format!("{}: {}", words::effect(&found.effect), kind.says));
+                self.paragraph(&format!("{}: {}", words::effect(&found.effect), kind.says));
             }
             if !found.indistinguishable_from.is_empty() {
-                self.say(&format!(
-                    "This recording cannot tell it from {}.",
+                self.paragraph(&format!(
+                    "With this recording it is not distinguishable from {}.",
                     words::effects(&found.indistinguishable_from)
                 ));
             }
@@ -170,21 +184,23 @@ impl Story {
         ));
     }
 
-    /// What changes in the model file.
-    pub(super) fn add(&mut self, place: &Place, edited: Option<&(Vec<String>, String)>) {
-        self.heading("4  Add: the model file learns it");
+    /// The change of the model file.
+    pub(super) fn add(&mut self, place: &TourFolder, edited: Option<&(Vec<String>, String)>) {
+        self.heading("4  Add: write the effect into the model file");
         let Some((commands, difference)) = edited else {
-            self.say("Nothing was found that could be added.");
+            self.paragraph("No effect was found, so nothing is added.");
             return;
         };
-        self.say(&format!(
-            "An effect is some lines of the model file, with the estimates for nominal values. Comments and layout stay. Here \
-             the result is written to {}:",
+        self.paragraph(&format!(
+            "A few lines in the model file describe the effect. The estimates of its parameters become their nominal values: Jr \
+             and Sr are the moment of inertia and the first moment of mass of a rod about its pivot, the same for both screws. \
+             Comments and layout of the file do not change. The tour writes the result to {}:",
             place.name(EDITED)
         ));
         let lines: Vec<String> = difference.lines().map(|line| format!("  {line}")).collect();
         self.lines(&lines);
         self.line("");
+        // The commands that write the same lines.
         for command in commands {
             let line = self.style.cyan(&format!("  $ {command}"));
             self.line(&line);
@@ -192,32 +208,36 @@ impl Story {
         self.line("");
     }
 
-    /// Errors step by step, and the parameters in the end.
-    pub(super) fn ladder(&mut self, findings: &Findings) {
-        self.heading("5  Identify again, and watch the error fall");
+    /// Errors after each added effect, and the identified parameters.
+    pub(super) fn ladder(&mut self, findings: &DiagnosisFindings) {
+        self.heading("5  Identify again: the error falls");
         let diagnosis = &findings.diagnosis;
-        self.bars(&diagnosis.ladder, diagnosis.noise_floor);
+        self.bars(&diagnosis.steps, diagnosis.noise_floor);
         if let Ok(after) = &findings.after
             && let Some(result) = &after.identified
         {
-            self.line("The parameters of the completed model, from the data alone:");
+            self.line("Base parameters of the completed model, identified from the recording:");
             self.lines(&tables::expressions(2, &after.model));
             self.line("");
             self.lines(&tables::parameters(&result.fit.parameters));
             self.line("");
         }
-        self.say(
-            "What was hidden: each screw is a rod of 8 kg and 0.9 m that swings about its base. Its moment of inertia is \
-             8 * 0.9^2 / 3 = 2.16 kg m^2, its first moment 8 * 0.9 / 2 = 3.6 kg m. Compare with Jr and Sr above.",
+        self.paragraph(
+            "The simulation contained this effect: each screw is a uniform rod (mass 8 kg, length 0.9 m) that rotates about its \
+             base pivot. About this pivot its moment of inertia is 8 * 0.9^2 / 3 = 2.16 kg m^2, and its first moment of mass is \
+             8 * 0.9 / 2 = 3.6 kg m. The estimates of Jr and Sr agree with these values.",
         );
     }
 
-    /// Errors on the check as bars over decades, down to the noise.
-    fn bars(&mut self, ladder: &[Rung], noise: f64) {
+    /// Errors on the validation run as logarithmic bars, down to the noise floor.
+    fn bars(&mut self, ladder: &[SelectionStep], noise: f64) {
         let largest = ladder.iter().map(|rung| rung.check).fold(noise, f64::max);
+        // The axis includes the noise floor, if it is above zero.
         let least = ladder.iter().map(|rung| rung.check);
         let least = least.chain([noise]).filter(|e| *e > 0.0);
+        // The axis begins below the smallest error, so that its bar has a length.
         let least = least.fold(f64::INFINITY, f64::min) / 3.0;
+        // Length of a bar on the logarithmic axis, between 0 and 1.
         let share = |error: f64| {
             if error > 0.0 && largest > least {
                 (error / least).ln() / (largest / least).ln()
@@ -225,10 +245,11 @@ impl Story {
                 0.0
             }
         };
-        let name = "the noise in the forces".to_owned();
+        let name = words::floor_label(noise).to_owned();
         let rungs = ladder.iter().map(|rung| (words::rung(rung), rung.check));
         for (name, error) in rungs.chain([(name, noise)]) {
             let bar = bar(share(error), 1.0, BAR);
+            // Green: within 30 % of the noise floor, so nothing is left to explain.
             let bar = if error > noise * 1.3 {
                 self.style.red(&bar)
             } else {
@@ -236,6 +257,7 @@ impl Story {
             };
             let lines = words::lines(&name, 34);
             for (k, line) in lines.iter().enumerate() {
+                // Only the last line of a long name has the figure and the bar.
                 if k + 1 < lines.len() {
                     self.line(&format!("  {line}"));
                 } else {
@@ -244,26 +266,27 @@ impl Story {
             }
         }
         self.line("");
-        self.say(
-            "Error relative to the force on the check run, which was not fitted; bars are decades.",
-        );
+        self.paragraph("Error relative to the force (nrms) on the validation run. The lengths of the bars are on a logarithmic scale.");
     }
 
-    /// The treatment of the paper.
-    pub(super) fn paper(&mut self, place: &Place, findings: &Findings) {
-        self.heading("6  The same question to a published model");
-        self.say(
-            "The paper that describes this robot lets the platform's mass m4 act at the joint in the balance of forces, and at \
-             the middle of the coupler in the balance of moments. Its parameters come from drawings, and its authors saw an \
-             error that they could not name. On a simulation of the robot exactly as the paper has it, with all parameters held:",
+    /// The diagnosis of the model as published.
+    pub(super) fn paper(&mut self, place: &TourFolder, findings: &DiagnosisFindings) {
+        self.heading("6  Diagnose a published model");
+        self.paragraph(
+            "The paper that describes this robot reports an error of its model. It names two causes: mainly the positions of the \
+             point masses that replace the coupling elements and the platform, and to a lesser extent the contact points of the \
+             screws on the cranks. In its equations each coupler carries half of the platform's mass m4: in the force balance at \
+             the joint between the couplers, but in the moment balance at the coupler's centre. The diagnosis uses a recording \
+             from a simulation of the same robot. It does not estimate base parameters, but fixes them at their nominal values \
+             (`--held`):",
         );
-        self.say(&verdict(findings));
+        self.paragraph(&verdict(findings));
         let diagnosis = &findings.diagnosis;
-        self.bars(&diagnosis.ladder, diagnosis.noise_floor);
+        self.bars(&diagnosis.steps, diagnosis.noise_floor);
         for found in &diagnosis.effects {
             let kinds = &findings.before.model.loaded.kinds;
             if let Some(kind) = kinds.iter().find(|k| k.name == found.effect.kind) {
-                self.say(&format!("{}: {}", words::effect(&found.effect), kind.says));
+                self.paragraph(&format!("{}: {}", words::effect(&found.effect), kind.says));
             }
         }
         self.command(&format!(
@@ -273,18 +296,18 @@ impl Story {
         ));
     }
 
-    /// Where to look on.
-    pub(super) fn pages(&mut self, place: &Place) {
-        self.heading("7  The pages");
-        self.say(
-            "All of this, with curves that can be zoomed, error maps, every candidate, parameters and equations, is on two pages \
-             that need no network. Open them in a browser:",
+    /// The files of the pages, and the command for a mechanism of the user.
+    pub(super) fn pages(&mut self, place: &TourFolder) {
+        self.heading("7  Open the reports");
+        self.paragraph(
+            "Two pages contain all results: curves that can be zoomed, error maps, all candidates, parameters and equations. They \
+             need no network. Open them in a browser:",
         );
         for page in [RODS_PAGE, PAPER_PAGE] {
             self.line(&format!("  {}", place.name(page)));
         }
         self.line("");
-        self.say("For a mechanism of yours:");
+        self.paragraph("For your own mechanism:");
         self.command("report MODEL --data RUN --check OTHER_RUN --out DIR");
     }
 }

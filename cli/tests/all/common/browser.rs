@@ -23,18 +23,14 @@ pub(crate) fn found() -> Option<PathBuf> {
     let own = std::env::var_os("MODELMILL_BROWSER").map(PathBuf::from);
     let browser = own
         .into_iter()
-        .chain(
-            std::env::split_paths(&folders).flat_map(|folder| names.map(|name| folder.join(name))),
-        )
+        .chain(std::env::split_paths(&folders).flat_map(|folder| names.map(|name| folder.join(name))))
         .find(|path| path.is_file());
     if browser.is_none() {
         assert!(
             std::env::var_os("MODELMILL_BROWSER_REQUIRED").is_none(),
             "a browser is required and there is none"
         );
-        eprintln!(
-            "The page is not opened: there is no chromium or chrome on the path, nor one in MODELMILL_BROWSER."
-        );
+        eprintln!("The page is not opened: there is no chromium or chrome on the path, nor one in MODELMILL_BROWSER.");
     }
     browser
 }
@@ -104,14 +100,10 @@ impl Browser {
             message["sessionId"] = json!(session);
         }
         let text = format!("{message}\0");
-        self.to
-            .write_all(text.as_bytes())
-            .expect("the browser listens");
+        self.to.write_all(text.as_bytes()).expect("the browser listens");
         loop {
             let mut bytes = Vec::new();
-            self.from
-                .read_until(0, &mut bytes)
-                .expect("the browser answers");
+            self.from.read_until(0, &mut bytes).expect("the browser answers");
             assert!(bytes.pop().is_some(), "the browser ended");
             let answer: Value = serde_json::from_slice(&bytes).expect("JSON");
             if answer["id"] == self.asked {
@@ -134,11 +126,7 @@ impl Browser {
 
     /// Opens a window with a page.
     pub(crate) fn open(&mut self, link: &str) -> Window {
-        let target = self.ask(
-            None,
-            "Target.createTarget",
-            &json!({ "url": "about:blank" }),
-        );
+        let target = self.ask(None, "Target.createTarget", &json!({ "url": "about:blank" }));
         let attach = json!({ "targetId": target["targetId"], "flatten": true });
         let attached = self.ask(None, "Target.attachToTarget", &attach);
         let session = attached["sessionId"].as_str().expect("a session");
@@ -164,8 +152,7 @@ impl Browser {
 
     /// Shows a window at a width, on a screen that is light or dark or on paper.
     pub(crate) fn show(&mut self, window: &Window, width: u32, medium: Medium) {
-        let size =
-            json!({ "width": width, "height": 900, "deviceScaleFactor": 1, "mobile": false });
+        let size = json!({ "width": width, "height": 900, "deviceScaleFactor": 1, "mobile": false });
         self.ask(Some(window), "Emulation.setDeviceMetricsOverride", &size);
         let (media, scheme) = match medium {
             Medium::Light => ("screen", "light"),
@@ -206,7 +193,8 @@ impl Browser {
     #[track_caller]
     pub(crate) fn run(&mut self, window: &Window, script: &str) -> Value {
         let expression = format!("(async () => {{ {script} }})()");
-        let asked = json!({ "expression": expression, "awaitPromise": true, "returnByValue": true, "userGesture": true });
+        let asked =
+            json!({ "expression": expression, "awaitPromise": true, "returnByValue": true, "userGesture": true });
         let answer = self.ask(Some(window), "Runtime.evaluate", &asked);
         let fault = &answer["exceptionDetails"];
         assert!(fault.is_null(), "{script}\n{fault:#}");

@@ -7,10 +7,7 @@ const VOID: [&str; 5] = ["meta", "link", "br", "hr", "img"];
 /// Panics with what is wrong.
 #[track_caller]
 pub(crate) fn check(page: &str) {
-    assert!(
-        page.starts_with("<!DOCTYPE html>\n<html lang="),
-        "no doctype"
-    );
+    assert!(page.starts_with("<!DOCTYPE html>\n<html lang="), "no doctype");
     let mut open: Vec<String> = Vec::new();
     let mut ids = BTreeSet::new();
     let mut targets = Vec::new();
@@ -34,10 +31,7 @@ pub(crate) fn check(page: &str) {
             );
             continue;
         }
-        let name: String = tag
-            .chars()
-            .take_while(char::is_ascii_alphanumeric)
-            .collect();
+        let name: String = tag.chars().take_while(char::is_ascii_alphanumeric).collect();
         assert!(!name.is_empty(), "`<` that begins no tag: {}", excerpt(tag));
         for (key, value) in attributes(&tag[name.len()..]) {
             match key {
@@ -49,9 +43,7 @@ pub(crate) fn check(page: &str) {
             }
         }
         if name == "script" || name == "style" {
-            let end = rest
-                .find(&format!("</{name}>"))
-                .expect("an end of the script");
+            let end = rest.find(&format!("</{name}>")).expect("an end of the script");
             let body = &rest[..end];
             for word in ["@import", "url(", "fetch(", "XMLHttpRequest", "import("] {
                 assert!(!body.contains(word), "{name} uses {word}");
@@ -81,8 +73,7 @@ fn end_of_tag(text: &str) -> usize {
         quoted ^= *c == '"';
         *c == '>' && !quoted
     });
-    end.unwrap_or_else(|| panic!("a tag without end: {}", excerpt(text)))
-        .0
+    end.unwrap_or_else(|| panic!("a tag without end: {}", excerpt(text))).0
 }
 
 /// `key="value"` pairs; a key alone has no value.
@@ -90,9 +81,7 @@ fn attributes(text: &str) -> Vec<(&str, &str)> {
     let mut found = Vec::new();
     let mut rest = text.trim_start().trim_end_matches('/');
     while !rest.trim().is_empty() {
-        let end = rest
-            .find(|c: char| c == '=' || c.is_whitespace())
-            .unwrap_or(rest.len());
+        let end = rest.find(|c: char| c == '=' || c.is_whitespace()).unwrap_or(rest.len());
         let key = &rest[..end];
         rest = &rest[end..];
         if let Some(value) = rest.strip_prefix("=\"") {
@@ -100,11 +89,7 @@ fn attributes(text: &str) -> Vec<(&str, &str)> {
             found.push((key, &value[..end]));
             rest = &value[end + 1..];
         } else {
-            assert!(
-                !rest.starts_with('='),
-                "a value without quotes: {}",
-                excerpt(text)
-            );
+            assert!(!rest.starts_with('='), "a value without quotes: {}", excerpt(text));
             found.push((key, ""));
         }
         rest = rest.trim_start();

@@ -56,11 +56,7 @@ pub(crate) struct Ran {
 
 /// Runs the program to its end.
 pub(crate) fn ran(args: &[&str]) -> Ran {
-    let Output {
-        status,
-        stdout,
-        stderr,
-    } = modelmill(args).output().expect("the program starts");
+    let Output { status, stdout, stderr } = modelmill(args).output().expect("the program starts");
     Ran {
         status: status.code().expect("no signal ended the program"),
         out: String::from_utf8(stdout).expect("UTF-8 on standard output"),

@@ -93,8 +93,7 @@ impl Workbench {
     /// Status and text of a bare request.
     pub(crate) fn request(&self, head: &str, headers: &[String], body: &str) -> (u16, String) {
         let mut stream = TcpStream::connect(("127.0.0.1", self.port)).expect("it listens");
-        let mut text =
-            format!("{head} HTTP/1.1\r\nConnection: close\r\nContent-Type: application/json\r\n");
+        let mut text = format!("{head} HTTP/1.1\r\nConnection: close\r\nContent-Type: application/json\r\n");
         let _ = write!(text, "Content-Length: {}\r\n", body.len());
         for header in headers {
             text.push_str(header);

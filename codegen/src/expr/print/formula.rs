@@ -1,29 +1,40 @@
 //! The tree that is printed: sums of terms, fractions, powers and functions, as a person would write them.
+//!
+//! Expressions and exact numbers go in through the constructors. Renderings as text, LaTeX and MathML read the tree.
 
 use num_bigint::BigInt;
 
 use super::simplify;
-use super::symbol::Symbol;
+use super::symbol::FormulaSymbol;
 
-/// Terms of a sum beyond which nobody looks for what they have in common.
+/// Largest number of terms of a sum in which like terms are collected. The search is quadratic, so longer sums are
+/// printed without it.
 const MOST_COMPARED: usize = 100;
 use crate::expr::Rational;
 
 /// A function by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
-pub enum Function {
+pub enum FormulaFunction {
+    /// Sine.
     Sin,
+    /// Cosine.
     Cos,
+    /// Square root.
     Sqrt,
+    /// Sign: -1, 0 or 1.
     Sign,
+    /// Absolute value.
     Abs,
+    /// Hyperbolic tangent.
     Tanh,
+    /// Exponential.
     Exp,
+    /// Angle of the point with the second operand as abscissa and the first as ordinate.
     Atan2,
 }
 
-impl Function {
+impl FormulaFunction {
     /// Its name in text.
     pub fn name(self) -> &'static str {
         match self {
@@ -39,7 +50,7 @@ impl Function {
     }
 }
 
-impl From<crate::expr::Unary> for Function {
+impl From<crate::expr::Unary> for FormulaFunction {
     fn from(unary: crate::expr::Unary) -> Self {
         use crate::expr::Unary;
         match unary {
@@ -54,33 +65,33 @@ impl From<crate::expr::Unary> for Function {
     }
 }
 
-/// A formula to be printed. The constructors keep it tidy: no term of zero, no factor of one, no sum in a sum.
+/// A formula to be printed. The constructors keep it in normal form: no zero term, no factor 1, no sum in a sum.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Formula {
-    /// A rational number.
+pub enum PrintedFormula {
+    /// A rational number of any sign.
     Number(Rational),
     /// A name.
-    Symbol(Symbol),
+    Symbol(FormulaSymbol),
     /// A name with a formula as its index: `h` with `m1*dc1`.
-    Indexed(Symbol, Box<Formula>),
-    /// A sum of two or more.
-    Sum(Vec<Formula>),
-    /// A number times a product over a product.
+    Indexed(FormulaSymbol, Box<PrintedFormula>),
+    /// A sum of two or more terms.
+    Sum(Vec<PrintedFormula>),
+    /// A number times a product, divided by a product.
     Term {
         /// The number, not zero.
         factor: Rational,
         /// Factors above the line.
-        above: Vec<Formula>,
+        above: Vec<PrintedFormula>,
         /// Factors below the line.
-        below: Vec<Formula>,
+        below: Vec<PrintedFormula>,
     },
     /// A power with an exponent of at least two.
-    Power(Box<Formula>, u32),
+    Power(Box<PrintedFormula>, u32),
     /// A function of one or two operands.
-    Apply(Function, Vec<Formula>),
+    Apply(FormulaFunction, Vec<PrintedFormula>),
 }
 
-impl Formula {
+impl PrintedFormula {
     /// An integer.
     pub fn integer(value: i64) -> Self {
         Self::Number(Rational::integer(value))
@@ -88,7 +99,7 @@ impl Formula {
 
     /// A name.
     pub fn name(name: impl Into<String>) -> Self {
-        Self::Symbol(Symbol::new(name))
+        Self::Symbol(FormulaSymbol::new(name))
     }
 
     /// Whether it is the number 0.
@@ -112,6 +123,7 @@ impl Formula {
 
     /// A sum; its first positive term comes first.
     pub fn sum(terms: impl IntoIterator<Item = Self>) -> Self {
+        // Sums in sums are opened, and zero terms are dropped.
         let mut flat = Vec::new();
         for term in terms {
             match term {
@@ -121,11 +133,13 @@ impl Formula {
             }
         }
         if flat.len() <= MOST_COMPARED {
-            flat = simplify::gathered(flat);
+            flat = simplify::collect_like_terms(flat);
         }
+        // A sum should not begin with a minus sign where a positive term exists.
         if let Some(first) = flat.iter().position(|term| !term.is_negative()) {
             flat[..=first].rotate_right(1);
         }
+        // Sums of no term or one term are simpler formulas.
         match flat.len() {
             0 => Self::integer(0),
             1 => flat.remove(0),
@@ -143,22 +157,25 @@ impl Formula {
         Self::term(Rational::ONE, [above], [below])
     }
 
-    /// A number times a product over a product; nothing below must be zero.
+    /// A number times a product, divided by a product; no factor below the line may be zero.
     pub fn term(
         factor: Rational,
         above: impl IntoIterator<Item = Self>,
         below: impl IntoIterator<Item = Self>,
     ) -> Self {
         let mut number = factor;
+        // Factors that move to the numerator and to the denominator.
         let (mut up, mut down) = (Vec::new(), Vec::new());
         for one in above {
-            Self::gather(one, &mut number, &mut up, &mut down);
+            Self::gather_factor(one, &mut number, &mut up, &mut down);
         }
+        // Factors below the line invert: what a denominator divides by stands above.
         let mut inverse = Rational::ONE;
         for one in below {
-            Self::gather(one, &mut inverse, &mut down, &mut up);
+            Self::gather_factor(one, &mut inverse, &mut down, &mut up);
         }
         number = &number * &inverse.recip();
+        // Squares of roots of numbers become numbers.
         number = &number * &simplify::without_squared_roots(&mut up);
         number = &number * &simplify::without_squared_roots(&mut down).recip();
         for one in up.iter_mut().chain(&mut down) {
@@ -166,23 +183,25 @@ impl Formula {
             if let Self::Sum(terms) = one
                 && terms.iter().all(Self::is_negative)
             {
-                let turned = std::mem::take(terms).into_iter().map(Self::negated);
+                let turned = std::mem::take(terms).into_iter().map(Self::negate);
                 *terms = turned.collect();
                 number = -&number;
             }
         }
+        // A product with a factor zero is zero, and one without factors is its number.
         if number.is_zero() {
             return Self::Number(number);
         }
         if up.is_empty() && down.is_empty() {
             return Self::Number(number);
         }
+        // A product of one factor and no denominator needs no term of its own, or a simpler form.
         if down.is_empty() && up.len() == 1 {
             match (up.remove(0), number == Rational::MINUS_ONE) {
                 (only, false) if number.is_one() => return only,
                 // The sign of a sum goes to its terms: `b - a` rather than `-(a - b)`.
                 (Self::Sum(terms), true) => {
-                    return Self::sum(terms.into_iter().map(Self::negated));
+                    return Self::sum(terms.into_iter().map(Self::negate));
                 }
                 (only, _) => up.push(only),
             }
@@ -194,7 +213,8 @@ impl Formula {
         }
     }
 
-    fn gather(one: Self, number: &mut Rational, above: &mut Vec<Self>, below: &mut Vec<Self>) {
+    /// Distributes one factor: numbers go into `number`, and the parts of a term to the lists above and below the line.
+    fn gather_factor(one: Self, number: &mut Rational, above: &mut Vec<Self>, below: &mut Vec<Self>) {
         match one {
             Self::Number(n) => *number = &*number * &n,
             Self::Term {
@@ -204,19 +224,20 @@ impl Formula {
             } => {
                 *number = &*number * &factor;
                 for one in up {
-                    Self::multiply(above, one);
+                    Self::multiply_factor(above, one);
                 }
                 for one in down {
-                    Self::multiply(below, one);
+                    Self::multiply_factor(below, one);
                 }
             }
-            other => Self::multiply(above, other),
+            other => Self::multiply_factor(above, other),
         }
     }
 
     /// Appends a factor, as a power where it is there already.
-    fn multiply(factors: &mut Vec<Self>, factor: Self) {
+    fn multiply_factor(factors: &mut Vec<Self>, factor: Self) {
         let (base, n) = factor.into_power();
+        // Whether a factor of the list has the same base.
         let same = |there: &&mut Self| match there {
             Self::Power(inner, _) => **inner == base,
             other => **other == base,
@@ -232,6 +253,7 @@ impl Formula {
         });
     }
 
+    /// A formula as base and exponent; the exponent is 1 where there is no power.
     fn into_power(self) -> (Self, u32) {
         match self {
             Self::Power(base, n) => (*base, n),
@@ -243,26 +265,19 @@ impl Formula {
     #[must_use]
     pub fn power(self, n: i32) -> Self {
         let magnitude = match (self, n.unsigned_abs()) {
+            // Powers of numbers are computed, and powers of powers and of products are merged.
             (_, 0) => return Self::integer(1),
             (base, 1) => base,
             (Self::Number(value), m) => Self::Number(value.pow(i32::try_from(m).unwrap_or(1))),
             (Self::Power(base, k), m) => Self::Power(base, k * m),
-            (
-                Self::Term {
-                    factor,
-                    above,
-                    below,
-                },
-                m,
-            ) => {
+            (Self::Term { factor, above, below }, m) => {
                 let exponent = i32::try_from(m).unwrap_or(1);
-                let raise = |x: Vec<Self>| -> Vec<Self> {
-                    x.into_iter().map(|one| one.power(exponent)).collect()
-                };
+                let raise = |x: Vec<Self>| -> Vec<Self> { x.into_iter().map(|one| one.power(exponent)).collect() };
                 Self::term(factor.pow(exponent), raise(above), raise(below))
             }
             (base, m) => Self::Power(Box::new(base), m),
         };
+        // Negative exponents become denominators.
         if n < 0 {
             Self::quotient(Self::integer(1), magnitude)
         } else {
@@ -272,18 +287,19 @@ impl Formula {
 
     /// The formula with its sign changed.
     #[must_use]
-    pub fn negated(self) -> Self {
+    pub fn negate(self) -> Self {
         Self::product(Rational::MINUS_ONE, [self])
     }
 
     /// A function of one operand.
-    pub fn apply(function: Function, operand: Self) -> Self {
+    pub fn apply(function: FormulaFunction, operand: Self) -> Self {
         Self::Apply(function, vec![operand])
     }
 }
 
-/// Numerator and denominator of the magnitude of a number, as decimal digits; long finite decimals have no denominator.
+/// Numerator and denominator of the magnitude of a number, as decimal digits. Long finite decimals have no denominator.
 pub(super) fn digits(value: &Rational) -> (String, Option<String>) {
+    // Numbers with long denominators are printed as decimals where that is exact.
     if let Some(decimal) = decimal(&value.abs()) {
         return (decimal, None);
     }
@@ -294,9 +310,10 @@ pub(super) fn digits(value: &Rational) -> (String, Option<String>) {
     }
 }
 
-/// A positive number as a decimal, if it is finite and its denominator has three digits or more: nobody would have
-/// written it as a quotient.
+/// A positive number as a decimal, if it is finite and its denominator has three digits or more: such a number is
+/// easier to read as a decimal than as a quotient.
 fn decimal(value: &Rational) -> Option<String> {
+    // Longer decimals are no easier to read than the quotient.
     const MOST_DIGITS: usize = 40;
     let big = value.to_big();
     if *big.denom() < BigInt::from(100) {
@@ -304,6 +321,7 @@ fn decimal(value: &Rational) -> Option<String> {
     }
     let ten = BigInt::from(10);
     let (mut scaled, mut places) = (big.clone(), 0);
+    // Powers of ten are multiplied in until the number is an integer.
     while !scaled.is_integer() {
         places += 1;
         if places > MOST_DIGITS {
@@ -311,6 +329,7 @@ fn decimal(value: &Rational) -> Option<String> {
         }
         scaled *= &ten;
     }
+    // Leading zeros fill up numbers below 1.
     let digits = format!("{:0>width$}", scaled.to_integer(), width = places + 1);
     let (whole, fraction) = digits.split_at(digits.len() - places);
     Some(format!("{whole}.{fraction}"))

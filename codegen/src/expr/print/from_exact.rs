@@ -1,75 +1,87 @@
 //! Formulas of the exact expressions that a model file is written in.
+//!
+//! An exact expression of a mechanism goes in; a formula with the names of the file comes out.
 
-use modelmill_spec::{Angle, Exact, Function as FileFunction, Length, Mechanism, PlaceQuantity};
+use modelmill_spec::{
+    ExactAngle, ExactExpression, ExactFunction as FileFunction, ExactLength, Mechanism, PlaceQuantity,
+};
 
-use super::formula::{Formula, Function};
-use super::symbol::Symbol;
+use super::formula::{FormulaFunction, PrintedFormula};
+use super::symbol::FormulaSymbol;
 use crate::expr::Rational;
 
 /// The formula of an exact expression.
-pub fn exact(mechanism: &Mechanism, expression: &Exact) -> Formula {
-    exact_at(mechanism, expression, ["x", "other"])
+// Outside of effects the names of places do not occur.
+pub fn exact_formula(mechanism: &Mechanism, expression: &ExactExpression) -> PrintedFormula {
+    exact_formula_at(mechanism, expression, ["x", "other"])
 }
 
 /// The formula of an exact expression that acts at the first of two places: `x`, `x_d`, `x_dd` and `load` are the
 /// quantities of a place `x`.
-pub fn exact_at(mechanism: &Mechanism, expression: &Exact, places: [&str; 2]) -> Formula {
-    let of = |inner: &Exact| exact_at(mechanism, inner, places);
+pub fn exact_formula_at(mechanism: &Mechanism, expression: &ExactExpression, places: [&str; 2]) -> PrintedFormula {
+    // Formula of an operand.
+    let of = |inner: &ExactExpression| exact_formula_at(mechanism, inner, places);
     match expression {
-        Exact::Rational(value) => Formula::Number(Rational::from(value.clone())),
-        Exact::Pi => Formula::name("pi"),
-        Exact::Symbol(symbol) => Formula::Symbol(name(mechanism, *symbol, places)),
-        Exact::Sum(terms) => Formula::sum(terms.iter().map(of)),
-        Exact::Product(factors) => Formula::product(Rational::ONE, factors.iter().map(of)),
-        Exact::Quotient(above, below) => Formula::quotient(of(above), of(below)),
-        Exact::Negative(inner) => of(inner).negated(),
-        Exact::Power(base, n) => of(base).power(*n),
-        Exact::Apply(function, inner) => {
+        ExactExpression::Rational(value) => PrintedFormula::Number(Rational::from(value.clone())),
+        ExactExpression::Pi => PrintedFormula::name("pi"),
+        ExactExpression::Symbol(symbol) => PrintedFormula::Symbol(symbol_name(mechanism, *symbol, places)),
+        ExactExpression::Sum(terms) => PrintedFormula::sum(terms.iter().map(of)),
+        ExactExpression::Product(factors) => PrintedFormula::product(Rational::ONE, factors.iter().map(of)),
+        ExactExpression::Quotient(above, below) => PrintedFormula::quotient(of(above), of(below)),
+        ExactExpression::Negative(inner) => of(inner).negate(),
+        ExactExpression::Power(base, n) => of(base).power(*n),
+        // Both crates have an enumeration of functions.
+        ExactExpression::Apply(function, inner) => {
             let function = match function {
-                FileFunction::Sin => Function::Sin,
-                FileFunction::Cos => Function::Cos,
-                FileFunction::Sqrt => Function::Sqrt,
-                FileFunction::Abs => Function::Abs,
-                FileFunction::Sign => Function::Sign,
-                FileFunction::Tanh => Function::Tanh,
-                FileFunction::Exp => Function::Exp,
+                FileFunction::Sin => FormulaFunction::Sin,
+                FileFunction::Cos => FormulaFunction::Cos,
+                FileFunction::Sqrt => FormulaFunction::Sqrt,
+                FileFunction::Abs => FormulaFunction::Abs,
+                FileFunction::Sign => FormulaFunction::Sign,
+                FileFunction::Tanh => FormulaFunction::Tanh,
+                FileFunction::Exp => FormulaFunction::Exp,
             };
-            Formula::apply(function, of(inner))
+            PrintedFormula::apply(function, of(inner))
         }
     }
 }
 
 /// The formula of an angle.
-pub fn angle(mechanism: &Mechanism, angle: &Angle) -> Formula {
-    let turns = Formula::product(Rational::from(angle.pi.clone()), [Formula::name("pi")]);
+pub fn angle_formula(mechanism: &Mechanism, angle: &ExactAngle) -> PrintedFormula {
+    // The constant part, as a multiple of pi.
+    let turns = PrintedFormula::product(Rational::from(angle.pi.clone()), [PrintedFormula::name("pi")]);
+    // Coordinates and constants with their integer factors.
     let terms = angle.terms.iter().map(|(symbol, n)| {
-        let symbol = Formula::Symbol(name(mechanism, *symbol, ["x", "other"]));
-        Formula::product(Rational::integer(i64::from(*n)), [symbol])
+        let symbol = PrintedFormula::Symbol(symbol_name(mechanism, *symbol, ["x", "other"]));
+        PrintedFormula::product(Rational::integer(i64::from(*n)), [symbol])
     });
-    Formula::sum(terms.chain([turns]))
+    PrintedFormula::sum(terms.chain([turns]))
 }
 
 /// The formula of a length.
-pub fn length(mechanism: &Mechanism, length: &Length) -> Formula {
+pub fn length_formula(mechanism: &Mechanism, length: &ExactLength) -> PrintedFormula {
+    // Prismatic coordinates with their factors.
     let slides = length.coordinates.iter().map(|(i, k)| {
-        let name = Formula::name(&*mechanism.coordinates[i.0].name);
-        Formula::product(Rational::from(k.clone()), [name])
+        let name = PrintedFormula::name(&*mechanism.coordinates[i.0].name);
+        PrintedFormula::product(Rational::from(k.clone()), [name])
     });
-    Formula::sum([exact(mechanism, &length.offset)].into_iter().chain(slides))
+    PrintedFormula::sum([exact_formula(mechanism, &length.offset)].into_iter().chain(slides))
 }
 
-fn name(mechanism: &Mechanism, symbol: modelmill_spec::Symbol, [x, other]: [&str; 2]) -> Symbol {
-    use modelmill_spec::Symbol as Named;
+/// The printed name of a symbol of the model file; `x` and `other` name the quantities of an effect's two places.
+fn symbol_name(mechanism: &Mechanism, symbol: modelmill_spec::ModelSymbol, [x, other]: [&str; 2]) -> FormulaSymbol {
+    use modelmill_spec::ModelSymbol as Named;
+    // Rates and accelerations of places get the suffixes `_d` and `_dd`.
     match symbol {
-        Named::Constant(i) => Symbol::new(&*mechanism.constants[i.0].name),
-        Named::Parameter(i) => Symbol::new(&*mechanism.parameters[i.0].name),
-        Named::Coordinate(i) => Symbol::new(&*mechanism.coordinates[i.0].name),
-        Named::Place(PlaceQuantity::Coordinate) => Symbol::new(x),
-        Named::Place(PlaceQuantity::Rate) => Symbol::derived(x, 1),
-        Named::Place(PlaceQuantity::Acceleration) => Symbol::derived(x, 2),
-        Named::Place(PlaceQuantity::Load) => Symbol::new("load"),
-        Named::Place(PlaceQuantity::OtherCoordinate) => Symbol::new(other),
-        Named::Place(PlaceQuantity::OtherRate) => Symbol::derived(other, 1),
-        Named::Place(PlaceQuantity::OtherAcceleration) => Symbol::derived(other, 2),
+        Named::Constant(i) => FormulaSymbol::new(&*mechanism.constants[i.0].name),
+        Named::Parameter(i) => FormulaSymbol::new(&*mechanism.parameters[i.0].name),
+        Named::Coordinate(i) => FormulaSymbol::new(&*mechanism.coordinates[i.0].name),
+        Named::Place(PlaceQuantity::Coordinate) => FormulaSymbol::new(x),
+        Named::Place(PlaceQuantity::Rate) => FormulaSymbol::time_derivative(x, 1),
+        Named::Place(PlaceQuantity::Acceleration) => FormulaSymbol::time_derivative(x, 2),
+        Named::Place(PlaceQuantity::Load) => FormulaSymbol::new("load"),
+        Named::Place(PlaceQuantity::OtherCoordinate) => FormulaSymbol::new(other),
+        Named::Place(PlaceQuantity::OtherRate) => FormulaSymbol::time_derivative(other, 1),
+        Named::Place(PlaceQuantity::OtherAcceleration) => FormulaSymbol::time_derivative(other, 2),
     }
 }

@@ -1,54 +1,57 @@
 //! Formulas of the expressions in a graph.
+//!
+//! The graph shares subexpressions, but a formula is a tree, so shared subexpressions are repeated.
 
 use modelmill_spec::Mechanism;
 
-use super::formula::{Formula, Function};
-use super::symbol::Symbol;
-use crate::expr::{AngleSum, Atom, ExprId, Graph, Node, Rational};
+use super::formula::{FormulaFunction, PrintedFormula};
+use super::symbol::FormulaSymbol;
+use crate::expr::{Atom, AtomAngleSum, ExprId, Graph, Node, Rational};
 
 /// The name of an atom: as in the model file, `theta1_d` and `theta1_dd` for rate and acceleration.
-pub fn atom(mechanism: &Mechanism, atom: Atom) -> Symbol {
+pub fn atom(mechanism: &Mechanism, atom: Atom) -> FormulaSymbol {
     match atom {
-        Atom::Constant(i) => Symbol::new(&*mechanism.constants[i].name),
-        Atom::Parameter(i) => Symbol::new(&*mechanism.parameters[i].name),
-        Atom::Base(k) => Symbol::new(format!("p{}_min", k + 1)),
-        Atom::Coordinate(i) => Symbol::new(&*mechanism.coordinates[i].name),
-        Atom::Rate(i) => Symbol::derived(&*mechanism.coordinates[i].name, 1),
-        Atom::Acceleration(i) => Symbol::derived(&*mechanism.coordinates[i].name, 2),
-        Atom::Pi => Symbol::new("pi"),
-        Atom::Load(d) => Symbol::new(format!("load_{}", mechanism.drives[d].name)),
-        Atom::Shared(k) => Symbol::new(format!("pose_{}", k + 1)),
+        Atom::Constant(i) => FormulaSymbol::new(&*mechanism.constants[i].name),
+        Atom::Parameter(i) => FormulaSymbol::new(&*mechanism.parameters[i].name),
+        Atom::Base(k) => FormulaSymbol::new(format!("p{}_min", k + 1)),
+        Atom::Coordinate(i) => FormulaSymbol::new(&*mechanism.coordinates[i].name),
+        Atom::Rate(i) => FormulaSymbol::time_derivative(&*mechanism.coordinates[i].name, 1),
+        Atom::Acceleration(i) => FormulaSymbol::time_derivative(&*mechanism.coordinates[i].name, 2),
+        Atom::Pi => FormulaSymbol::new("pi"),
+        Atom::Load(d) => FormulaSymbol::new(format!("load_{}", mechanism.drives[d].name)),
+        Atom::Shared(k) => FormulaSymbol::new(format!("pose_{}", k + 1)),
     }
 }
 
-/// The formula of an expression, written out as a tree: ask [`tree_size`] first where it may be large.
-pub fn formula(graph: &Graph, mechanism: &Mechanism, id: ExprId) -> Formula {
+/// The formula of an expression, written out as a tree. Check [`tree_size`] first where the tree may be large.
+pub fn formula(graph: &Graph, mechanism: &Mechanism, id: ExprId) -> PrintedFormula {
+    // Formula of an operand.
     let of = |id: ExprId| formula(graph, mechanism, id);
     match graph.node(id) {
-        Node::Rational(value) => Formula::Number(value.clone()),
-        Node::Atom(a) => Formula::Symbol(atom(mechanism, *a)),
-        Node::Sin(angle) => Formula::apply(Function::Sin, angle_sum(mechanism, angle)),
-        Node::Cos(angle) => Formula::apply(Function::Cos, angle_sum(mechanism, angle)),
-        Node::Sum(terms) => Formula::sum(
+        Node::Rational(value) => PrintedFormula::Number(value.clone()),
+        Node::Atom(a) => PrintedFormula::Symbol(atom(mechanism, *a)),
+        Node::Sin(angle) => PrintedFormula::apply(FormulaFunction::Sin, angle_sum_formula(mechanism, angle)),
+        Node::Cos(angle) => PrintedFormula::apply(FormulaFunction::Cos, angle_sum_formula(mechanism, angle)),
+        // Every term with its rational factor.
+        Node::Sum(terms) => PrintedFormula::sum(
             terms
                 .iter()
-                .map(|(term, k)| Formula::product(k.clone(), [of(*term)])),
+                .map(|(term, k)| PrintedFormula::product(k.clone(), [of(*term)])),
         ),
         Node::Product(factors) => {
+            // Factors are printed in the order that a person would write, not in the order of their ids.
             let mut factors = factors.clone();
-            factors.sort_by_key(|(id, _)| rank(graph, *id));
-            let product = Formula::product(
-                Rational::ONE,
-                factors.iter().map(|(base, n)| of(*base).power(*n)),
-            );
-            in_order(product)
+            factors.sort_by_key(|(id, _)| factor_rank(graph, *id));
+            let product = PrintedFormula::product(Rational::ONE, factors.iter().map(|(base, n)| of(*base).power(*n)));
+            order_factors(product)
         }
-        Node::Unary(function, inner) => Formula::apply((*function).into(), of(*inner)),
+        Node::Unary(function, inner) => PrintedFormula::apply((*function).into(), of(*inner)),
     }
 }
 
-/// How many nodes the expression has when it is written out, counted no further than `limit`.
+/// Number of nodes of the expression when it is written out as a tree, counted up to `limit`.
 pub fn tree_size(graph: &Graph, id: ExprId, limit: usize) -> usize {
+    // Nodes that are waiting to be counted; shared nodes are counted as often as they occur.
     let mut size = 0;
     let mut left = vec![id];
     while let Some(next) = left.pop() {
@@ -61,18 +64,19 @@ pub fn tree_size(graph: &Graph, id: ExprId, limit: usize) -> usize {
     size
 }
 
-/// A sum of angles.
-pub(crate) fn angle_sum(mechanism: &Mechanism, angle: &AngleSum) -> Formula {
-    Formula::sum(angle.terms().iter().map(|(a, n)| {
-        Formula::product(
+/// The formula of a sum of angles, without its constant part.
+pub(crate) fn angle_sum_formula(mechanism: &Mechanism, angle: &AtomAngleSum) -> PrintedFormula {
+    // Each atom with its integer factor.
+    PrintedFormula::sum(angle.terms().iter().map(|(a, n)| {
+        PrintedFormula::product(
             Rational::integer(i64::from(*n)),
-            [Formula::Symbol(atom(mechanism, *a))],
+            [PrintedFormula::Symbol(atom(mechanism, *a))],
         )
     }))
 }
 
-/// Place of a factor in a product: known quantities first, then what moves, then functions and parentheses.
-fn rank(graph: &Graph, id: ExprId) -> usize {
+/// Rank of a factor in a product: constants and parameters first, then variables, then functions and parentheses.
+fn factor_rank(graph: &Graph, id: ExprId) -> usize {
     match graph.node(id) {
         Node::Rational(_) => 0,
         Node::Atom(Atom::Constant(_)) => 1,
@@ -85,28 +89,25 @@ fn rank(graph: &Graph, id: ExprId) -> usize {
 }
 
 /// Orders the factors that came out of nested products: names, functions, parentheses.
-fn in_order(product: Formula) -> Formula {
-    fn rank(factor: &Formula) -> usize {
+fn order_factors(product: PrintedFormula) -> PrintedFormula {
+    // Names come before functions, functions before parentheses.
+    fn printed_rank(factor: &PrintedFormula) -> usize {
         match factor {
-            Formula::Apply(..) => 1,
-            Formula::Sum(_) => 2,
-            Formula::Power(base, _) => rank(base),
+            PrintedFormula::Apply(..) => 1,
+            PrintedFormula::Sum(_) => 2,
+            PrintedFormula::Power(base, _) => printed_rank(base),
             _ => 0,
         }
     }
     match product {
-        Formula::Term {
+        PrintedFormula::Term {
             factor,
             mut above,
             mut below,
         } => {
-            above.sort_by_key(rank);
-            below.sort_by_key(rank);
-            Formula::Term {
-                factor,
-                above,
-                below,
-            }
+            above.sort_by_key(printed_rank);
+            below.sort_by_key(printed_rank);
+            PrintedFormula::Term { factor, above, below }
         }
         other => other,
     }

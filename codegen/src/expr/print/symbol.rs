@@ -1,15 +1,15 @@
-//! Names as they are typeset: `theta1` as a Greek letter with an index, `dc1` as d with the index c1.
+//! Names as they are typeset: `theta1` as a Greek letter with index 1, `dc1` as d with the index c1.
 
 /// A name with the number of its time derivatives.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Symbol {
+pub struct FormulaSymbol {
     /// Identifier, as in the model file.
     pub name: String,
-    /// How often it is derived by time: 0, 1 or 2.
+    /// Number of time derivatives: 0, 1 or 2.
     pub order: u8,
 }
 
-impl Symbol {
+impl FormulaSymbol {
     /// A name without derivatives.
     pub fn new(name: impl Into<String>) -> Self {
         Self {
@@ -19,7 +19,7 @@ impl Symbol {
     }
 
     /// A time derivative of a name.
-    pub fn derived(name: impl Into<String>, order: u8) -> Self {
+    pub fn time_derivative(name: impl Into<String>, order: u8) -> Self {
         Self {
             name: name.into(),
             order,
@@ -36,24 +36,27 @@ impl Symbol {
     }
 }
 
-/// A stretch of a typeset name.
+/// A part of a typeset name in one style.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum Glyphs {
-    /// A Greek letter: LaTeX command and character.
+pub(crate) enum GlyphRun {
+    /// A Greek letter: LaTeX command without backslash, and character.
     Greek(&'static str, char),
-    /// A letter, or letters and digits of an index.
+    /// A single letter, or letters and digits of an index, in italics.
     Italic(String),
-    /// A word that is read as one.
+    /// A word of several letters, upright.
     Word(String),
 }
 
 /// A letter or word with an index of several parts.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Typeset {
-    pub(crate) base: Glyphs,
-    pub(crate) index: Vec<Vec<Glyphs>>,
+pub(crate) struct TypesetName {
+    /// The letter or word itself.
+    pub(crate) base: GlyphRun,
+    /// Parts of the index, each as runs of one style.
+    pub(crate) index: Vec<Vec<GlyphRun>>,
 }
 
+/// Names of Greek letters that are recognised.
 const GREEK: [(&str, char); 29] = [
     ("alpha", 'α'),
     ("beta", 'β'),
@@ -86,47 +89,45 @@ const GREEK: [(&str, char); 29] = [
     ("Omega", 'Ω'),
 ];
 
-fn greek(word: &str) -> Option<Glyphs> {
+/// The Greek letter of this name, if there is one.
+fn greek(word: &str) -> Option<GlyphRun> {
     GREEK
         .iter()
         .find(|(name, _)| *name == word)
-        .map(|(name, letter)| Glyphs::Greek(name, *letter))
+        .map(|(name, letter)| GlyphRun::Greek(name, *letter))
 }
 
-/// Letters in a row up to this number are a letter with an index; more are a word, and so are as many small ones, such
-/// as `rod`, `len` or `off`, which hold no capital that could be the symbol.
+/// More letters than these in a row are a word; so are exactly this many small letters, such as `rod`, `len` or `off`,
+/// in which no capital letter could be the symbol.
 const LONGEST_SYMBOL: usize = 3;
 
 /// Splits an identifier into its letter and its index.
-pub(crate) fn typeset(name: &str) -> Typeset {
+pub(crate) fn typeset(name: &str) -> TypesetName {
+    // The part before the first underscore has the letter; the parts after it are parts of the index.
     let (head, tail) = name.split_once('_').unwrap_or((name, ""));
-    let letters_end = head
-        .find(|c: char| !c.is_alphabetic())
-        .unwrap_or(head.len());
+    let letters_end = head.find(|c: char| !c.is_alphabetic()).unwrap_or(head.len());
     let (letters, digits) = head.split_at(letters_end);
-    let mut index: Vec<Vec<Glyphs>> = Vec::new();
+    let mut index: Vec<Vec<GlyphRun>> = Vec::new();
+    // A Greek letter, a word, or a letter whose other letters begin the index.
     let upper = letters.len() > 1 && letters.chars().all(char::is_uppercase);
     let (base, rest) = if let Some(letter) = greek(letters) {
         (letter, "")
     } else if upper || is_word(letters) {
-        (Glyphs::Word(letters.to_owned()), "")
+        (GlyphRun::Word(letters.to_owned()), "")
     } else {
         let first = letters.chars().next().map_or(0, char::len_utf8);
         let (first, rest) = letters.split_at(first);
-        (Glyphs::Italic(first.to_owned()), rest)
+        (GlyphRun::Italic(first.to_owned()), rest)
     };
     let first_part = format!("{rest}{digits}");
     if !first_part.is_empty() {
-        index.push(vec![Glyphs::Italic(first_part)]);
+        index.push(vec![GlyphRun::Italic(first_part)]);
     }
-    index.extend(
-        tail.split('_')
-            .filter(|part| !part.is_empty())
-            .map(index_part),
-    );
-    Typeset { base, index }
+    index.extend(tail.split('_').filter(|part| !part.is_empty()).map(index_part));
+    TypesetName { base, index }
 }
 
+/// Whether a run of letters is read as a word.
 fn is_word(letters: &str) -> bool {
     match letters.chars().count() {
         LONGEST_SYMBOL => letters.chars().all(char::is_lowercase),
@@ -134,20 +135,19 @@ fn is_word(letters: &str) -> bool {
     }
 }
 
-fn index_part(part: &str) -> Vec<Glyphs> {
-    let end = part
-        .find(|c: char| !c.is_alphabetic())
-        .unwrap_or(part.len());
+/// The style runs of one part of an index: a Greek letter with digits, a word, or italics.
+fn index_part(part: &str) -> Vec<GlyphRun> {
+    let end = part.find(|c: char| !c.is_alphabetic()).unwrap_or(part.len());
     let (letters, digits) = part.split_at(end);
     if let Some(letter) = greek(letters) {
         let mut glyphs = vec![letter];
         if !digits.is_empty() {
-            glyphs.push(Glyphs::Italic(digits.to_owned()));
+            glyphs.push(GlyphRun::Italic(digits.to_owned()));
         }
         return glyphs;
     }
     if letters.chars().count() >= LONGEST_SYMBOL {
-        return vec![Glyphs::Word(part.to_owned())];
+        return vec![GlyphRun::Word(part.to_owned())];
     }
-    vec![Glyphs::Italic(part.to_owned())]
+    vec![GlyphRun::Italic(part.to_owned())]
 }

@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use modelmill_algebra::field::Stream;
+use modelmill_algebra::field::RandomStream;
 use modelmill_spec::Mechanism;
 use proptest::prelude::*;
 
 use super::parse::parse;
-use super::{Formula, Function, Symbol, atom, formula};
-use crate::expr::{AngleSum, Atom, ExprId, FieldPoint, Graph, Rational, Tape, Unary};
+use super::{FormulaFunction, FormulaSymbol, PrintedFormula, atom, formula};
+use crate::expr::{Atom, AtomAngleSum, EvaluationTape, ExprId, FieldPoint, Graph, Rational, Unary};
 
 /// How to build an expression.
 #[derive(Clone, Debug)]
@@ -24,9 +24,7 @@ enum Recipe {
 
 impl Recipe {
     fn build(&self, graph: &mut Graph) -> ExprId {
-        let angle = |terms: &[(usize, i32)]| {
-            AngleSum::new(terms.iter().map(|(i, n)| (Atom::Coordinate(*i), *n)))
-        };
+        let angle = |terms: &[(usize, i32)]| AtomAngleSum::new(terms.iter().map(|(i, n)| (Atom::Coordinate(*i), *n)));
         match self {
             Self::Number(n, d) => graph.rational(Rational::new(*n, *d)),
             Self::Atom(a) => graph.atom(*a),
@@ -103,16 +101,13 @@ fn point(mechanism: &Mechanism) -> (BTreeMap<String, Atom>, FieldPoint) {
     }
     atoms.extend((0..mechanism.drives.len()).map(Atom::Load));
     atoms.extend((0..3).map(Atom::Base));
-    let mut stream = Stream::new(7);
+    let mut stream = RandomStream::new(7);
     let mut at = FieldPoint::default();
     for a in &atoms {
-        at.values.insert(*a, stream.element());
-        at.angles.insert(*a, stream.circle());
+        at.values.insert(*a, stream.next_element());
+        at.angles.insert(*a, stream.next_circle_point());
     }
-    let names = atoms
-        .into_iter()
-        .map(|a| (atom(mechanism, a).text(), a))
-        .collect();
+    let names = atoms.into_iter().map(|a| (atom(mechanism, a).text(), a)).collect();
     (names, at)
 }
 
@@ -146,9 +141,7 @@ pub(crate) fn markup_is_balanced(markup: &str) -> bool {
                     return false;
                 }
             }
-            None if tag.ends_with('/')
-                || tag.starts_with('!')
-                || ["meta", "link", "br"].contains(&name) => {}
+            None if tag.ends_with('/') || tag.starts_with('!') || ["meta", "link", "br"].contains(&name) => {}
             None => open.push(name),
         }
     }
@@ -165,7 +158,7 @@ proptest! {
         let printed = formula(&graph, &mechanism, id);
         let (names, at) = point(&mechanism);
         let text = printed.text();
-        if let Some(value) = Tape::new(&graph, &[id]).evaluate(&at) {
+        if let Some(value) = EvaluationTape::new(&graph, &[id]).evaluate(&at) {
             prop_assert_eq!(parse(&text).value(&at, &names), Some(value[0]), "{}", text);
         }
         prop_assert!(!text.contains("+ -") && !text.contains("- -"), "{}", text);
@@ -174,16 +167,16 @@ proptest! {
         prop_assert!(latex_is_balanced(&latex), "{}", latex);
         let mathml = printed.mathml();
         prop_assert!(markup_is_balanced(&mathml), "{}", mathml);
-        // Parted, it says the same; only what was too wide is written with other signs.
-        let stretches = printed.mathml_stretches();
-        for stretch in &stretches {
-            prop_assert!(markup_is_balanced(stretch), "{}", stretch);
+        // In segments the text is the same; only parts that were too wide are written with other signs.
+        let segments = printed.mathml_segments();
+        for segment in &segments {
+            prop_assert!(markup_is_balanced(segment), "{}", segment);
         }
-        prop_assert_eq!(words(&stretches.concat()), words(&mathml), "{}", text);
+        prop_assert_eq!(words(&segments.concat()), words(&mathml), "{}", text);
     }
 }
 
-/// What markup shows, without the signs that tell a fraction or a root on the line.
+/// The visible text of markup, without the signs of fractions and roots on the line.
 fn words(markup: &str) -> String {
     let mut shown: String = markup
         .split('<')
@@ -199,30 +192,26 @@ fn words(markup: &str) -> String {
 #[test]
 fn long_formulas_can_be_parted_within_parentheses_fractions_and_roots() {
     let sum = |letter: &str| {
-        let terms = (1..9).map(|k| {
-            Formula::product(
-                Rational::integer(1),
-                [name(&format!("{letter}{k}")), name("d1")],
-            )
-        });
-        Formula::sum(terms)
+        let terms =
+            (1..9).map(|k| PrintedFormula::product(Rational::integer(1), [name(&format!("{letter}{k}")), name("d1")]));
+        PrintedFormula::sum(terms)
     };
-    let quotient = Formula::quotient(sum("m"), sum("k"));
-    let root = Formula::apply(Function::Sqrt, sum("x"));
-    let all = Formula::product(Rational::integer(3), [sum("a"), root, quotient]);
-    let stretches = all.mathml_stretches();
-    assert!(stretches.len() >= 4 * 7, "{}", stretches.len());
-    for stretch in &stretches {
-        assert!(markup_is_balanced(stretch), "{stretch}");
-        assert!(words(stretch).chars().count() < 40, "{stretch}");
+    let quotient = PrintedFormula::quotient(sum("m"), sum("k"));
+    let root = PrintedFormula::apply(FormulaFunction::Sqrt, sum("x"));
+    let all = PrintedFormula::product(Rational::integer(3), [sum("a"), root, quotient]);
+    let segments = all.mathml_segments();
+    assert!(segments.len() >= 4 * 7, "{}", segments.len());
+    for segment in &segments {
+        assert!(markup_is_balanced(segment), "{segment}");
+        assert!(words(segment).chars().count() < 40, "{segment}");
     }
 }
 
-fn name(name: &str) -> Formula {
-    Formula::name(name)
+fn name(name: &str) -> PrintedFormula {
+    PrintedFormula::name(name)
 }
 
-fn check(formula: &Formula, text: &str, latex: &str) {
+fn check(formula: &PrintedFormula, text: &str, latex: &str) {
     assert_eq!(formula.text(), text);
     assert_eq!(formula.latex(), latex);
 }
@@ -246,44 +235,43 @@ fn names_are_typeset_as_engineers_write_them() {
         ("len_a", "\\mathrm{len}_{a}"),
         ("Fvp", "F_{vp}"),
     ] {
-        assert_eq!(Symbol::new(plain).latex(), latex, "{plain}");
+        assert_eq!(FormulaSymbol::new(plain).latex(), latex, "{plain}");
     }
-    assert_eq!(Symbol::derived("theta1", 2).text(), "theta1_dd");
-    assert_eq!(Symbol::derived("theta1", 2).latex(), "\\ddot{\\theta}_{1}");
+    assert_eq!(FormulaSymbol::time_derivative("theta1", 2).text(), "theta1_dd");
+    assert_eq!(
+        FormulaSymbol::time_derivative("theta1", 2).latex(),
+        "\\ddot{\\theta}_{1}"
+    );
 }
 
 #[test]
 fn signs_fractions_and_powers_are_tidy() {
     let half = Rational::new(1, 2);
-    let term = Formula::term(
-        half.clone(),
-        [name("d1"), name("m4"), name("dc3")],
-        [name("d3")],
-    );
+    let term = PrintedFormula::term(half.clone(), [name("d1"), name("m4"), name("dc3")], [name("d3")]);
     check(
-        &Formula::sum([name("m3").negated(), term]),
+        &PrintedFormula::sum([name("m3").negate(), term]),
         "1/2*d1*m4*dc3/d3 - m3",
         "\\frac{d_{1} \\, m_{4} \\, d_{c3}}{2 \\, d_{3}} - m_{3}",
     );
-    let sum = Formula::sum([name("a"), name("b").negated()]);
+    let sum = PrintedFormula::sum([name("a"), name("b").negate()]);
     check(
-        &Formula::product(Rational::integer(-2), [sum.clone(), name("c")]),
+        &PrintedFormula::product(Rational::integer(-2), [sum.clone(), name("c")]),
         "-2*(a - b)*c",
         "-2 \\, \\left(a - b\\right) \\, c",
     );
-    check(&sum.clone().negated(), "b - a", "b - a");
+    check(&sum.clone().negate(), "b - a", "b - a");
     check(
-        &Formula::term(half, [], [name("x").power(2)]),
+        &PrintedFormula::term(half, [], [name("x").power(2)]),
         "1/(2*x^2)",
         "\\frac{1}{2 \\, x^{2}}",
     );
     check(
-        &Formula::apply(Function::Sin, name("q1")).power(2),
+        &PrintedFormula::apply(FormulaFunction::Sin, name("q1")).power(2),
         "sin(q1)^2",
         "\\sin^{2}{q_{1}}",
     );
     check(
-        &Formula::quotient(name("a"), sum).power(-1),
+        &PrintedFormula::quotient(name("a"), sum).power(-1),
         "(a - b)/a",
         "\\frac{a - b}{a}",
     );

@@ -1,57 +1,67 @@
-//! Formulas as plain infix text that can be read again.
+//! Formulas as plain infix text, in a form that can be parsed again.
+//!
+//! The inverse is `parse`, with which tests check that a text has the value of its formula.
 
 use std::fmt::{self, Write};
 
-use super::formula::{Formula, digits};
+use super::formula::{PrintedFormula, digits};
 use crate::expr::Rational;
 
-/// How tightly the surroundings bind.
+/// How strongly the surroundings bind, which decides whether parentheses are needed.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Level {
+enum TextPrecedence {
+    /// A sum, or no surroundings.
     Sum,
+    /// A factor of a product.
     Factor,
+    /// The base of a power.
     Power,
 }
 
-impl Formula {
+impl PrintedFormula {
     /// As infix text: `m1*dc1 + d1*m2 + 1/2*d1*m4*dc3/d3`.
     pub fn text(&self) -> String {
         self.to_string()
     }
 }
 
-impl fmt::Display for Formula {
+impl fmt::Display for PrintedFormula {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write_at(f, self, Level::Sum)
+        write_at(f, self, TextPrecedence::Sum)
     }
 }
 
-fn write_at(f: &mut dyn Write, formula: &Formula, level: Level) -> fmt::Result {
+/// Writes a formula where the surroundings have some precedence, in parentheses if it binds less.
+fn write_at(f: &mut dyn Write, formula: &PrintedFormula, level: TextPrecedence) -> fmt::Result {
+    // Negative numbers and fractions need parentheses in products.
     let enclosed = match formula {
-        Formula::Sum(_) => level > Level::Sum,
-        Formula::Number(n) => level > Level::Sum && (n.is_negative() || !n.is_integer()),
-        Formula::Term { factor, .. } => {
-            level > Level::Factor || (level > Level::Sum && factor.is_negative())
+        PrintedFormula::Sum(_) => level > TextPrecedence::Sum,
+        PrintedFormula::Number(n) => level > TextPrecedence::Sum && (n.is_negative() || !n.is_integer()),
+        PrintedFormula::Term { factor, .. } => {
+            level > TextPrecedence::Factor || (level > TextPrecedence::Sum && factor.is_negative())
         }
-        Formula::Power(..) => level > Level::Factor,
-        Formula::Symbol(_) | Formula::Indexed(..) | Formula::Apply(..) => false,
+        PrintedFormula::Power(..) => level > TextPrecedence::Factor,
+        PrintedFormula::Symbol(_) | PrintedFormula::Indexed(..) | PrintedFormula::Apply(..) => false,
     };
+    // Parentheses around everything that follows.
     if enclosed {
         f.write_char('(')?;
     }
     match formula {
-        Formula::Number(n) => {
+        PrintedFormula::Number(n) => {
             if n.is_negative() {
                 f.write_char('-')?;
             }
             number(f, n)?;
         }
-        Formula::Symbol(symbol) => f.write_str(&symbol.text())?,
-        Formula::Indexed(symbol, index) => match index.as_ref() {
-            Formula::Symbol(inner) => write!(f, "{}_{}", symbol.text(), inner.text())?,
+        PrintedFormula::Symbol(symbol) => f.write_str(&symbol.text())?,
+        // An index that is a single name is joined to it by an underscore.
+        PrintedFormula::Indexed(symbol, index) => match index.as_ref() {
+            PrintedFormula::Symbol(inner) => write!(f, "{}_{}", symbol.text(), inner.text())?,
             index => write!(f, "{}[{index}]", symbol.text())?,
         },
-        Formula::Sum(terms) => {
+        PrintedFormula::Sum(terms) => {
+            // Each term's sign is written here, so only its magnitude follows.
             for (i, term) in terms.iter().enumerate() {
                 match (i, term.is_negative()) {
                     (0, true) => f.write_str("-")?,
@@ -62,23 +72,24 @@ fn write_at(f: &mut dyn Write, formula: &Formula, level: Level) -> fmt::Result {
                 magnitude(f, term)?;
             }
         }
-        Formula::Term { .. } => {
+        PrintedFormula::Term { .. } => {
             if formula.is_negative() {
                 f.write_char('-')?;
             }
             magnitude(f, formula)?;
         }
-        Formula::Power(base, n) => {
-            write_at(f, base, Level::Power)?;
+        // The base is enclosed unless it is a name or a function.
+        PrintedFormula::Power(base, n) => {
+            write_at(f, base, TextPrecedence::Power)?;
             write!(f, "^{n}")?;
         }
-        Formula::Apply(function, operands) => {
+        PrintedFormula::Apply(function, operands) => {
             write!(f, "{}(", function.name())?;
             for (i, operand) in operands.iter().enumerate() {
                 if i > 0 {
                     f.write_str(", ")?;
                 }
-                write_at(f, operand, Level::Sum)?;
+                write_at(f, operand, TextPrecedence::Sum)?;
             }
             f.write_char(')')?;
         }
@@ -91,6 +102,7 @@ fn write_at(f: &mut dyn Write, formula: &Formula, level: Level) -> fmt::Result {
 
 /// Writes the magnitude of a number.
 fn number(f: &mut dyn Write, value: &Rational) -> fmt::Result {
+    // A fraction of integers, or a decimal.
     match digits(value) {
         (n, Some(d)) => write!(f, "{n}/{d}"),
         (n, None) => f.write_str(&n),
@@ -98,26 +110,25 @@ fn number(f: &mut dyn Write, value: &Rational) -> fmt::Result {
 }
 
 /// Writes a term of a sum without its sign.
-fn magnitude(f: &mut dyn Write, formula: &Formula) -> fmt::Result {
+fn magnitude(f: &mut dyn Write, formula: &PrintedFormula) -> fmt::Result {
     match formula {
-        Formula::Number(n) => number(f, n),
-        Formula::Term {
-            factor,
-            above,
-            below,
-        } => term(f, factor, above, below),
-        other => write_at(f, other, Level::Sum),
+        PrintedFormula::Number(n) => number(f, n),
+        PrintedFormula::Term { factor, above, below } => term(f, factor, above, below),
+        other => write_at(f, other, TextPrecedence::Sum),
     }
 }
 
-fn term(f: &mut dyn Write, factor: &Rational, above: &[Formula], below: &[Formula]) -> fmt::Result {
+/// Writes a number times factors, divided by factors, without the sign of the number.
+fn term(f: &mut dyn Write, factor: &Rational, above: &[PrintedFormula], below: &[PrintedFormula]) -> fmt::Result {
     let (n, d) = digits(factor);
+    // Factors below the line, with the denominator of the number if nothing stands above.
     let mut divisors = Vec::new();
     if above.is_empty() {
         // 1/2/x is written 1/(2*x).
         f.write_str(&n)?;
         divisors.extend(d);
     } else {
+        // The number comes first, except for the factor 1.
         match d {
             Some(d) => write!(f, "{n}/{d}*")?,
             None if n != "1" => write!(f, "{n}*")?,
@@ -127,15 +138,17 @@ fn term(f: &mut dyn Write, factor: &Rational, above: &[Formula], below: &[Formul
             if i > 0 {
                 f.write_char('*')?;
             }
-            write_at(f, one, Level::Factor)?;
+            write_at(f, one, TextPrecedence::Factor)?;
         }
     }
+    // Several divisors are enclosed: a/(b*c).
     let several = divisors.len() + below.len() > 1;
     for one in below {
         let mut text = String::new();
-        write_at(&mut text, one, Level::Factor)?;
+        write_at(&mut text, one, TextPrecedence::Factor)?;
         divisors.push(text);
     }
+    // No divisor, one divisor, or several in parentheses.
     match (divisors.is_empty(), several) {
         (true, _) => Ok(()),
         (false, false) => write!(f, "/{}", divisors[0]),

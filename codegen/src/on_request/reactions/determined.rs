@@ -1,37 +1,38 @@
-//! Which components of reactions equations of motion determine.
+//! Which components of reactions are determined by the equations of motion.
 //!
-//! Forces at the cuts that no virtual motion feels, the null space of the transposed Jacobian of all closing equations,
-//! may have any size. A component is determined if none of them reaches it.
+//! Forces at the cuts that do no work in any virtual motion may have any size. They are the null space of the
+//! transposed Jacobian of all closure equations. A component is determined if it depends on none of them.
 //!
-//! Decision: all unknowns of a cut are carried as symbols first. The pin of a planar loop may carry moments that
-//! the point in the model cannot; they count as unknown too. The null space is that of the file's geometry, but
-//! lengths across the plane of a loop are drawn at random, so that a length of zero hides nothing.
+//! Decision: all unknowns of a cut are kept as symbols first. The pin of a planar loop may transmit moments that the
+//! point in the model cannot; they are unknowns too. The null space is that of the file's geometry, but lengths across
+//! the plane of a loop are random, so that a length of zero hides nothing.
 
-use modelmill_algebra::field::Stream;
+use modelmill_algebra::field::RandomStream;
 use modelmill_spec::Mechanism;
 use nalgebra::DMatrix;
 
-use super::loads::Cut;
-use crate::expr::{Atom, ExprId, F64, Graph, Tape};
-use crate::loops::numeric_poses::{NumericLoops, symmetric};
-use crate::regressor::Equations;
+use super::loads::CutLoop;
+use crate::expr::{Atom, EvaluationTape, ExprId, FloatDomain, Graph};
+use crate::loops::numeric_poses::{NumericLoops, uniform_symmetric};
+use crate::regressor::UnreducedEquations;
 
-/// Poses that are looked at, and how far they reach, in rad or relative to the size of the loops.
+/// Number of random poses.
 const POSES: usize = 4;
+/// Distance of these poses from the nominal one, in rad or relative to the size of the loops.
 const REACH: f64 = 0.05;
-/// What counts as nothing beside the largest of its kind.
-const NOTHING: f64 = 1e-7;
+/// Part of the largest value of its kind below which a value counts as zero.
+const ZERO_TOLERANCE: f64 = 1e-7;
 
-/// For every component whether it is determined.
+/// For every component, whether it is determined.
 ///
-/// The null space is that of the file's geometry at poses around the nominal one. Forces across the plane of a planar loop
-/// belong to it in every geometry, and so do moments that a pin there could transmit; what these reach is found with
-/// lengths drawn at random, so that no length that happens to be zero hides it.
-pub(super) fn determined(
+/// The null space is that of the file's geometry at poses near the nominal one. Forces across the plane of a planar
+/// loop belong to it in every geometry, and so do moments that a pin there could transmit. Components that depend on
+/// these are found with random lengths, so that a length of zero does not hide the dependence.
+pub(super) fn determined_components(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    equations: &Equations,
-    cuts: &[Cut],
+    equations: &UnreducedEquations,
+    cuts: &[CutLoop],
     components: &[ExprId],
 ) -> Vec<bool> {
     let mut determined = vec![true; components.len()];
@@ -39,47 +40,51 @@ pub(super) fn determined(
     if unknowns.is_empty() {
         return determined;
     }
-    let tape = Tape::new(graph, components);
-    // What a unit of one unknown number adds to each component: without inertia there is nothing else.
+    let tape = EvaluationTape::new(graph, components);
+    // The contribution of one unit of an unknown to each component; without parameters there is no other contribution.
     let reach = |of: Atom, value: &dyn Fn(Atom) -> f64| {
         let atom = |atom: Atom| match atom {
             Atom::Base(_) => f64::from(u8::from(atom == of)),
             Atom::Parameter(_) | Atom::Rate(_) | Atom::Acceleration(_) | Atom::Load(_) => 0.0,
             other => value(other),
         };
-        tape.evaluate(&F64(atom))
+        tape.evaluate(&FloatDomain(atom))
     };
-    let mut stream = Stream::new(17);
-    for free in free_anywhere(cuts) {
+    let mut stream = RandomStream::new(17);
+    // First the unknowns that no geometry determines, at random constants and coordinates.
+    for free in unconstrained_unknowns(cuts) {
         for _ in 0..POSES {
-            let seed = stream.bits();
+            // The same seed for all atoms of a pose, so that each keeps its value.
+            let seed = stream.next_bits();
             let drawn = |atom: Atom| match atom {
                 Atom::Pi => std::f64::consts::PI,
-                Atom::Constant(i) => 0.5 + symmetric(&mut Stream::new(seed ^ (2 * i as u64 + 1))),
-                Atom::Coordinate(i) => 0.5 + symmetric(&mut Stream::new(seed ^ (2 * i as u64 + 2))),
+                Atom::Constant(i) => 0.5 + uniform_symmetric(&mut RandomStream::new(seed ^ (2 * i as u64 + 1))),
+                Atom::Coordinate(i) => 0.5 + uniform_symmetric(&mut RandomStream::new(seed ^ (2 * i as u64 + 2))),
                 _ => 0.0,
             };
             let Some(found) = reach(free, &drawn) else {
                 continue;
             };
             for (determined, x) in determined.iter_mut().zip(found) {
-                *determined &= x.abs() <= NOTHING;
+                *determined &= x.abs() <= ZERO_TOLERANCE;
             }
         }
     }
 
+    // Then the null space at the file's geometry.
     let gaps: Vec<ExprId> = cuts.iter().flat_map(|cut| cut.gap).collect();
     let n = mechanism.coordinates.len();
     let slopes: Vec<ExprId> = (0..n)
         .flat_map(|i| graph.differentiate(&gaps, Atom::Coordinate(i)))
         .collect();
-    let jacobian = Tape::new(graph, &slopes);
+    let jacobian = EvaluationTape::new(graph, &slopes);
     let loops = NumericLoops::new(graph, mechanism, &equations.projection.loops.residual);
     let mut poses: Vec<Vec<f64>> = (0..POSES)
-        .filter_map(|_| loops.random(REACH, &mut stream))
+        .filter_map(|_| loops.random_pose(REACH, &mut stream))
         .collect();
+    // Without a random pose the nominal one has to do.
     if poses.is_empty() {
-        poses.push(loops.as_written());
+        poses.push(loops.declared_nominal_pose());
     }
     for q in poses {
         let at = |atom: Atom| match atom {
@@ -88,27 +93,30 @@ pub(super) fn determined(
             Atom::Coordinate(i) => q[i],
             _ => 0.0,
         };
+        // Contribution of every unknown to every component at this pose.
         let found: Option<Vec<Vec<f64>>> = unknowns.iter().map(|of| reach(*of, &at)).collect();
-        let (Some(found), Some(slopes)) = (found, jacobian.evaluate(&F64(at))) else {
+        let (Some(found), Some(slopes)) = (found, jacobian.evaluate(&FloatDomain(at))) else {
             continue;
         };
+        // Columns are scaled to the unit of their coordinate, so that lengths and angles compare.
         let mut scaled = DMatrix::from_column_slice(gaps.len(), n, &slopes);
         for (i, mut column) in scaled.column_iter_mut().enumerate() {
-            column *= loops.unit(i);
+            column *= loops.coordinate_unit(i);
         }
         let reaching = DMatrix::from_fn(components.len(), unknowns.len(), |r, c| found[c][r]);
+        // A component that changes along a vector of the null space is not determined.
         for null in null_space(&scaled) {
             let moved = &reaching * &null;
             for (r, determined) in determined.iter_mut().enumerate() {
-                *determined &= moved[r].abs() <= NOTHING * reaching.row(r).amax();
+                *determined &= moved[r].abs() <= ZERO_TOLERANCE * reaching.row(r).amax();
             }
         }
     }
     determined
 }
 
-/// Unknown numbers that no virtual motion feels in any geometry.
-fn free_anywhere(cuts: &[Cut]) -> Vec<Atom> {
+/// Unknowns that do no work in any virtual motion, in any geometry.
+fn unconstrained_unknowns(cuts: &[CutLoop]) -> Vec<Atom> {
     let mut free = Vec::new();
     for cut in cuts {
         let across = cut.gap.iter().zip(cut.force);
@@ -118,16 +126,16 @@ fn free_anywhere(cuts: &[Cut]) -> Vec<Atom> {
     free
 }
 
-/// Combinations of rows that vanish, each of length 1.
+/// Combinations of rows that are zero, each of length 1.
 fn null_space(rows: &DMatrix<f64>) -> Vec<nalgebra::DVector<f64>> {
     let (n, m) = rows.shape();
-    // As many columns as rows at least, or the decomposition would leave out a part of the space.
+    // With fewer columns than rows the decomposition would leave out a part of the null space.
     let padded = rows.clone().resize(n, m.max(n), 0.0);
     let svd = padded.svd(true, false);
     let Some(u) = svd.u else { return Vec::new() };
     let largest = svd.singular_values.amax();
     (0..n)
-        .filter(|k| svd.singular_values[*k] <= NOTHING * largest)
+        .filter(|k| svd.singular_values[*k] <= ZERO_TOLERANCE * largest)
         .map(|k| u.column(k).into_owned())
         .collect()
 }

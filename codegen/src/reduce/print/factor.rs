@@ -1,52 +1,61 @@
-//! Factors of polynomials in the constants as far as trial division finds them: a number, a monomial, linear factors
-//! with small coefficients. What is left over stays a sum; the product is always the polynomial itself.
+//! Factors of polynomials in the constants that trial division finds: a number, a monomial, and linear factors with
+//! small coefficients. The rest stays a sum, so that the product always equals the polynomial.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::super::rational_function::{Polynomial, Powers, Variable};
-use super::{content, ordered};
+use super::super::rational_function::{FactorVariable, PowerProduct, TrigonometricPolynomial};
+use super::{content, ordered_terms};
 use crate::expr::Rational;
 
 /// A product that equals a polynomial.
-pub(super) struct Factored {
+pub(super) struct FactoredPolynomial {
+    /// Rational factor with the sign of the leading term.
     pub(super) number: Rational,
-    pub(super) monomial: Powers,
+    /// Common powers of all terms.
+    pub(super) monomial: PowerProduct,
     /// Polynomials of several terms with their exponents.
-    pub(super) factors: Vec<(Polynomial, u32)>,
+    pub(super) factors: Vec<(TrigonometricPolynomial, u32)>,
 }
 
-/// Beyond these the search is not cheap and the result is not readable anyway.
+/// Most terms of a polynomial whose factors are searched; beyond this the search is slow and the result is not
+/// readable.
 const MOST_TERMS: usize = 60;
+/// Most variables of such a polynomial.
 const MOST_VARIABLES: usize = 7;
 
-pub(super) fn factor(p: &Polynomial) -> Factored {
+/// Factors a polynomial. The zero polynomial has the number 0 and no factors.
+pub(super) fn factor_polynomial(p: &TrigonometricPolynomial) -> FactoredPolynomial {
     let mut number = content(p);
-    let Some((_, leading)) = ordered(p).into_iter().next() else {
-        return Factored {
+    let Some((_, leading)) = ordered_terms(p).into_iter().next() else {
+        return FactoredPolynomial {
             number: Rational::ZERO,
-            monomial: Powers::new(),
+            monomial: PowerProduct::new(),
             factors: Vec::new(),
         };
     };
+    // The leading term of the remaining polynomial is positive.
     if leading.is_negative() {
         number = -&number;
     }
+    // Number and common powers are divided out first.
     let monomial = common_powers(p);
     let inverse = number.recip();
-    let mut rest: Polynomial = p
+    let mut rest: TrigonometricPolynomial = p
         .iter()
         .map(|(powers, k)| {
             let left = divide_powers(powers, &monomial).expect("a common power divides");
             (left, k * &inverse)
         })
         .collect();
-    let mut factors: Vec<(Polynomial, u32)> = Vec::new();
-    let names: BTreeSet<Variable> = rest.keys().flatten().map(|(v, _)| *v).collect();
+    // Each candidate is divided out as often as possible.
+    let mut factors: Vec<(TrigonometricPolynomial, u32)> = Vec::new();
+    // Variables that the remaining polynomial contains.
+    let names: BTreeSet<FactorVariable> = rest.keys().flatten().map(|(v, _)| *v).collect();
     if rest.len() <= MOST_TERMS && names.len() <= MOST_VARIABLES {
-        for divisor in candidates(&names.into_iter().collect::<Vec<_>>()) {
+        for divisor in linear_form_candidates(&names.into_iter().collect::<Vec<_>>()) {
             let mut n = 0;
             while rest.len() > 1 {
-                let Some(quotient) = divide(&rest, &divisor) else {
+                let Some(quotient) = exact_quotient(&rest, &divisor) else {
                     break;
                 };
                 rest = quotient;
@@ -58,18 +67,19 @@ pub(super) fn factor(p: &Polynomial) -> Factored {
         }
     }
     // Division by primitive factors leaves a primitive rest: 1, -1 or a sum.
-    match (rest.len(), rest.get(&Powers::new())) {
+    match (rest.len(), rest.get(&PowerProduct::new())) {
         (1, Some(unit)) => number = &number * unit,
         _ => factors.push((rest, 1)),
     }
-    Factored {
+    FactoredPolynomial {
         number,
         monomial,
         factors,
     }
 }
 
-fn common_powers(p: &Polynomial) -> Powers {
+/// The powers that all terms have in common.
+fn common_powers(p: &TrigonometricPolynomial) -> PowerProduct {
     p.keys()
         .map(|powers| powers.iter().copied().collect::<BTreeMap<_, _>>())
         .reduce(|a, b| {
@@ -82,8 +92,10 @@ fn common_powers(p: &Polynomial) -> Powers {
         .collect()
 }
 
-fn divide_powers(powers: &Powers, by: &Powers) -> Option<Powers> {
-    let mut left: BTreeMap<Variable, u32> = powers.iter().copied().collect();
+/// The quotient of two monomials, if it is a monomial.
+fn divide_powers(powers: &PowerProduct, by: &PowerProduct) -> Option<PowerProduct> {
+    // Exponents that remain.
+    let mut left: BTreeMap<FactorVariable, u32> = powers.iter().copied().collect();
     for (v, n) in by {
         let there = left.get_mut(v)?;
         *there = there.checked_sub(*n)?;
@@ -91,17 +103,19 @@ fn divide_powers(powers: &Powers, by: &Powers) -> Option<Powers> {
     Some(left.into_iter().filter(|(_, n)| *n > 0).collect())
 }
 
-fn multiply_powers(a: &Powers, b: &Powers) -> Powers {
-    let mut total: BTreeMap<Variable, u32> = a.iter().copied().collect();
+/// The product of two monomials.
+fn multiply_powers(a: &PowerProduct, b: &PowerProduct) -> PowerProduct {
+    let mut total: BTreeMap<FactorVariable, u32> = a.iter().copied().collect();
     for (v, n) in b {
         *total.entry(*v).or_insert(0) += n;
     }
     total.into_iter().collect()
 }
 
-/// Linear forms worth trying: `a u + b v` with coefficients up to 2, and `u + v + w` with any signs.
-fn candidates(variables: &[Variable]) -> Vec<Polynomial> {
-    let linear = |terms: &[(Variable, i64)]| -> Polynomial {
+/// Candidates for linear factors: `a u + b v` with coefficients up to 2, and `u + v + w` with all signs.
+fn linear_form_candidates(variables: &[FactorVariable]) -> Vec<TrigonometricPolynomial> {
+    // A linear form from variables and coefficients.
+    let linear = |terms: &[(FactorVariable, i64)]| -> TrigonometricPolynomial {
         terms
             .iter()
             .map(|(v, k)| (vec![(*v, 1)], Rational::integer(*k)))
@@ -123,22 +137,24 @@ fn candidates(variables: &[Variable]) -> Vec<Polynomial> {
     found
 }
 
-/// The leading term in the lexicographic order of variables, an order that products respect.
-fn leading(p: &Polynomial) -> Option<(&Powers, &Rational)> {
-    p.iter()
-        .max_by(|(a, _), (b, _)| super::compare_powers(b, a))
+/// The leading term in the lexicographic order of variables, which is compatible with products.
+fn leading_term(p: &TrigonometricPolynomial) -> Option<(&PowerProduct, &Rational)> {
+    p.iter().max_by(|(a, _), (b, _)| super::compare_powers(b, a))
 }
 
-/// The exact quotient, if there is one.
-fn divide(p: &Polynomial, by: &Polynomial) -> Option<Polynomial> {
-    let (lead, k) = leading(by)?;
+/// The quotient of two polynomials, if the division has no remainder.
+fn exact_quotient(p: &TrigonometricPolynomial, by: &TrigonometricPolynomial) -> Option<TrigonometricPolynomial> {
+    // Polynomial long division by leading terms.
+    let (lead, k) = leading_term(by)?;
     let inverse = k.recip();
     let mut rest = p.clone();
-    let mut quotient = Polynomial::new();
-    while let Some((powers, value)) = leading(&rest) {
+    let mut quotient = TrigonometricPolynomial::new();
+    // The leading term of the rest must be divisible by that of the divisor.
+    while let Some((powers, value)) = leading_term(&rest) {
         let step = divide_powers(powers, lead)?;
         let value = value * &inverse;
         for (other, k) in by {
+            // The divisor times the step is subtracted from the rest.
             let at = multiply_powers(&step, other);
             let there = rest.remove(&at).unwrap_or(Rational::ZERO);
             let left = &there - &(&value * k);
@@ -151,18 +167,23 @@ fn divide(p: &Polynomial, by: &Polynomial) -> Option<Polynomial> {
     Some(quotient)
 }
 
-/// `number * (sum of linear)^2`, which consists of `terms` of a polynomial.
-pub(super) struct Square {
+/// `number * (sum of linear)^2`, and the terms of a polynomial that it consists of.
+pub(super) struct SumSquare {
+    /// Rational factor.
     pub(super) number: Rational,
-    pub(super) linear: Vec<(Variable, Rational)>,
-    pub(super) terms: Vec<Powers>,
+    /// Variables with their coefficients; the first one is 1.
+    pub(super) linear: Vec<(FactorVariable, Rational)>,
+    /// Terms of the polynomial that the square stands for.
+    pub(super) terms: Vec<PowerProduct>,
 }
 
-/// Squares of sums of several variables that a polynomial contains term by term.
-pub(super) fn squares(p: &Polynomial) -> Vec<Square> {
-    let coefficient = |powers: &Powers| p.get(powers).cloned().unwrap_or(Rational::ZERO);
-    let cross = |u: Variable, v: Variable| coefficient(&vec![(u.min(v), 1), (u.max(v), 1)]);
-    let mut variables: Vec<Variable> = p
+/// Squares of sums of several variables that a polynomial contains with all their terms.
+pub(super) fn find_squares(p: &TrigonometricPolynomial) -> Vec<SumSquare> {
+    let coefficient = |powers: &PowerProduct| p.get(powers).cloned().unwrap_or(Rational::ZERO);
+    // Coefficient of a mixed term.
+    let cross = |u: FactorVariable, v: FactorVariable| coefficient(&vec![(u.min(v), 1), (u.max(v), 1)]);
+    // Variables with a pure square are candidates.
+    let mut variables: Vec<FactorVariable> = p
         .keys()
         .filter_map(|powers| match powers.as_slice() {
             [(v, 2)] => Some(*v),
@@ -172,8 +193,11 @@ pub(super) fn squares(p: &Polynomial) -> Vec<Square> {
     variables.sort();
     let mut found = Vec::new();
     while !variables.is_empty() {
+        // The first variable fixes the coefficients of all others by its mixed terms.
         let first = variables.remove(0);
+        // The number in front of the square.
         let number = coefficient(&vec![(first, 2)]);
+        // A mixed term has twice the product of the coefficients.
         let half = (&number * &Rational::integer(2)).recip();
         let mut linear = vec![(first, Rational::ONE)];
         for v in &variables {
@@ -182,6 +206,7 @@ pub(super) fn squares(p: &Polynomial) -> Vec<Square> {
                 linear.push((*v, k));
             }
         }
+        // All squares and mixed terms must match.
         let whole = linear.iter().enumerate().all(|(i, (u, k))| {
             coefficient(&vec![(*u, 2)]) == &number * &(k * k)
                 && linear[i + 1..]
@@ -191,7 +216,9 @@ pub(super) fn squares(p: &Polynomial) -> Vec<Square> {
         if linear.len() < 2 || !whole {
             continue;
         }
+        // A variable belongs to one square only.
         variables.retain(|v| linear.iter().all(|(u, _)| u != v));
+        // Terms that the square replaces.
         let mut terms = Vec::new();
         for (i, (u, _)) in linear.iter().enumerate() {
             terms.push(vec![(*u, 2)]);
@@ -199,11 +226,7 @@ pub(super) fn squares(p: &Polynomial) -> Vec<Square> {
                 terms.push(vec![(*u.min(v), 1), (*u.max(v), 1)]);
             }
         }
-        found.push(Square {
-            number,
-            linear,
-            terms,
-        });
+        found.push(SumSquare { number, linear, terms });
     }
     found
 }

@@ -1,4 +1,4 @@
-//! Printing of the factors of eq. (6): expanded for scripts, factored for people.
+//! Printing of the factors of eq. (6): expanded for scripts, factored for readers.
 
 mod factor;
 
@@ -7,75 +7,80 @@ use std::collections::BTreeMap;
 
 use modelmill_spec::Mechanism;
 
-use super::rational_function::{Polynomial, Powers, RationalFunction, Variable};
+use super::rational_function::{FactorVariable, PowerProduct, RationalFunction, TrigonometricPolynomial};
 use crate::expr::Rational;
-use crate::expr::print::{Formula, Function};
+use crate::expr::print::{FormulaFunction, PrintedFormula};
 
-impl Variable {
-    /// As it is printed: the constant's name, or its sine or cosine.
-    pub fn formula(self, mechanism: &Mechanism) -> Formula {
-        let name = |i: usize| Formula::name(&*mechanism.constants[i].name);
+impl FactorVariable {
+    /// The variable as it is printed: the name of a constant, its sine or cosine, or a root.
+    pub fn formula(self, mechanism: &Mechanism) -> PrintedFormula {
+        let name = |i: usize| PrintedFormula::name(&*mechanism.constants[i].name);
         match self {
             Self::Constant(i) => name(i),
-            Self::Cos(i) => Formula::apply(Function::Cos, name(i)),
-            Self::Sin(i) => Formula::apply(Function::Sin, name(i)),
-            Self::Root(n) => Formula::apply(Function::Sqrt, Formula::integer(n)),
+            Self::Cos(i) => PrintedFormula::apply(FormulaFunction::Cos, name(i)),
+            Self::Sin(i) => PrintedFormula::apply(FormulaFunction::Sin, name(i)),
+            Self::Root(n) => PrintedFormula::apply(FormulaFunction::Sqrt, PrintedFormula::integer(n)),
         }
     }
 }
 
 impl RationalFunction {
-    /// As a sum of plain terms, each times `factors`: what a script reads.
-    pub fn expanded_times(&self, mechanism: &Mechanism, factors: &[Formula]) -> Vec<Formula> {
+    /// The terms of the expanded numerator, each divided by the denominator and multiplied by `factors`: the form that
+    /// a script reads.
+    pub fn expanded_terms(&self, mechanism: &Mechanism, factors: &[PrintedFormula]) -> Vec<PrintedFormula> {
+        // A denominator of one term is divided factor by factor, any other one as a whole.
         let below = match self.denominator.first_key_value() {
             Some((powers, k)) if self.denominator.len() == 1 => {
-                let mut below = variables(powers, mechanism);
-                below.push(Formula::Number(k.clone()));
+                let mut below = power_factors(powers, mechanism);
+                below.push(PrintedFormula::Number(k.clone()));
                 below
             }
-            _ => vec![expanded(&self.denominator, mechanism)],
+            _ => vec![expand_polynomial(&self.denominator, mechanism)],
         };
-        ordered(&self.numerator)
+        ordered_terms(&self.numerator)
             .into_iter()
             .map(|(powers, k)| {
-                let above = variables(powers, mechanism)
+                // Each term keeps the whole denominator, so that terms can be read alone.
+                let above = power_factors(powers, mechanism)
                     .into_iter()
                     .chain(factors.iter().cloned());
-                Formula::term(k.clone(), above, below.clone())
+                PrintedFormula::term(k.clone(), above, below.clone())
             })
             .collect()
     }
 
-    /// As a sum of plain terms.
-    pub fn expanded(&self, mechanism: &Mechanism) -> Formula {
-        Formula::sum(self.expanded_times(mechanism, &[]))
+    /// The function as a sum of expanded terms.
+    pub fn expanded_formula(&self, mechanism: &Mechanism) -> PrintedFormula {
+        PrintedFormula::sum(self.expanded_terms(mechanism, &[]))
     }
 
-    /// Factored as far as is cheap: numbers and powers outside, linear factors, sums of squares.
-    pub fn formula(&self, mechanism: &Mechanism) -> Formula {
-        let (number, above) = factored(&self.numerator, mechanism);
-        let (divisor, below) = factored(&self.denominator, mechanism);
+    /// The function factored as far as is cheap: numbers and powers in front, linear factors, sums of squares.
+    pub fn formula(&self, mechanism: &Mechanism) -> PrintedFormula {
+        // Numerator and denominator are factored separately.
+        let (number, above) = polynomial_factors(&self.numerator, mechanism);
+        let (divisor, below) = polynomial_factors(&self.denominator, mechanism);
         if number.is_zero() {
-            return Formula::Number(number);
+            return PrintedFormula::Number(number);
         }
-        Formula::term(&number * &divisor.recip(), above, below)
+        PrintedFormula::term(&number * &divisor.recip(), above, below)
     }
 
     /// The number in front and the function without it, so that equal functions up to a number can be recognised.
+    #[cfg(any(test, feature = "review"))]
+    /// The rational factor and the function without it, so that functions that differ by a number only are equal.
     pub(crate) fn split_number(&self) -> (Rational, Self) {
-        let Some((_, leading)) = ordered(&self.numerator).into_iter().next() else {
+        let Some((_, leading)) = ordered_terms(&self.numerator).into_iter().next() else {
             return (Rational::ZERO, Self::constant(Rational::ONE));
         };
+        // The number has the sign of the leading term.
         let mut content = content(&self.numerator);
         if leading.is_negative() {
             content = -&content;
         }
-        // The denominator's number goes along.
-        let below = self
-            .denominator
-            .values()
-            .fold(Rational::ZERO, |c, k| c.content_with(k));
-        let scaled = |p: &Polynomial, by: &Rational| -> Polynomial {
+        // The number of the denominator belongs to the factor as well.
+        let below = self.denominator.values().fold(Rational::ZERO, |c, k| c.content_with(k));
+        // A polynomial divided by a number.
+        let scaled = |p: &TrigonometricPolynomial, by: &Rational| -> TrigonometricPolynomial {
             let inverse = by.recip();
             p.iter().map(|(v, k)| (v.clone(), k * &inverse)).collect()
         };
@@ -87,13 +92,13 @@ impl RationalFunction {
     }
 }
 
-/// The largest number that divides all coefficients.
-fn content(p: &Polynomial) -> Rational {
+/// The greatest common divisor of all coefficients.
+fn content(p: &TrigonometricPolynomial) -> Rational {
     p.values().fold(Rational::ZERO, |c, k| c.content_with(k))
 }
 
-/// Powers as factors.
-fn variables(powers: &Powers, mechanism: &Mechanism) -> Vec<Formula> {
+/// A monomial as a list of powers.
+fn power_factors(powers: &PowerProduct, mechanism: &Mechanism) -> Vec<PrintedFormula> {
     powers
         .iter()
         .map(|(v, n)| {
@@ -103,15 +108,17 @@ fn variables(powers: &Powers, mechanism: &Mechanism) -> Vec<Formula> {
         .collect()
 }
 
-/// Terms as people order them: higher degrees first, then higher powers of the constants that are declared first.
-fn ordered(p: &Polynomial) -> Vec<(&Powers, &Rational)> {
-    let degree = |powers: &Powers| powers.iter().map(|(_, n)| *n).sum::<u32>();
+/// Terms in the usual order: higher degrees first, then higher powers of the constants that are declared first.
+fn ordered_terms(p: &TrigonometricPolynomial) -> Vec<(&PowerProduct, &Rational)> {
+    // Sum of the exponents.
+    let degree = |powers: &PowerProduct| powers.iter().map(|(_, n)| *n).sum::<u32>();
     let mut terms: Vec<_> = p.iter().collect();
     terms.sort_by(|(a, _), (b, _)| degree(b).cmp(&degree(a)).then_with(|| compare_powers(a, b)));
     terms
 }
 
-fn compare_powers(a: &Powers, b: &Powers) -> Ordering {
+/// Order of two monomials by their variables and powers; a monomial that continues comes before one that ends.
+fn compare_powers(a: &PowerProduct, b: &PowerProduct) -> Ordering {
     let (mut a, mut b) = (a.iter().peekable(), b.iter().peekable());
     loop {
         match (a.peek(), b.peek()) {
@@ -119,6 +126,7 @@ fn compare_powers(a: &Powers, b: &Powers) -> Ordering {
             (None, Some(_)) => return Ordering::Greater,
             (Some(_), None) => return Ordering::Less,
             (Some(&&(v, n)), Some(&&(w, m))) => {
+                // Variables in the order of declaration, then higher powers first.
                 let order = v.cmp(&w).then(Reverse(n).cmp(&Reverse(m)));
                 if order != Ordering::Equal {
                     return order;
@@ -130,50 +138,56 @@ fn compare_powers(a: &Powers, b: &Powers) -> Ordering {
     }
 }
 
-fn expanded(p: &Polynomial, mechanism: &Mechanism) -> Formula {
-    Formula::sum(
-        ordered(p)
+/// A polynomial as a sum of terms in the usual order.
+fn expand_polynomial(p: &TrigonometricPolynomial, mechanism: &Mechanism) -> PrintedFormula {
+    PrintedFormula::sum(
+        ordered_terms(p)
             .into_iter()
-            .map(|(powers, k)| Formula::product(k.clone(), variables(powers, mechanism))),
+            .map(|(powers, k)| PrintedFormula::product(k.clone(), power_factors(powers, mechanism))),
     )
 }
 
-/// A number and the factors of a polynomial.
-fn factored(p: &Polynomial, mechanism: &Mechanism) -> (Rational, Vec<Formula>) {
-    let factor::Factored {
+/// The rational factor of a polynomial and its other factors.
+fn polynomial_factors(p: &TrigonometricPolynomial, mechanism: &Mechanism) -> (Rational, Vec<PrintedFormula>) {
+    let factor::FactoredPolynomial {
         number,
         monomial,
         factors,
-    } = factor::factor(p);
-    let mut formulas = variables(&monomial, mechanism);
+    } = factor::factor_polynomial(p);
+    // Monomial first, then the polynomials.
+    let mut formulas = power_factors(&monomial, mechanism);
     for (base, n) in factors {
         let n = i32::try_from(n).unwrap_or(i32::MAX);
-        formulas.push(with_squares(&base, mechanism).power(n));
+        formulas.push(gather_squares(&base, mechanism).power(n));
     }
     (number, formulas)
 }
 
-/// A sum whose quadratic terms are gathered to squares where they are some: `(r2 + r3)^2 + d3^2`.
-fn with_squares(p: &Polynomial, mechanism: &Mechanism) -> Formula {
+/// A sum whose quadratic terms are written as squares where they form some: `(r2 + r3)^2 + d3^2`.
+fn gather_squares(p: &TrigonometricPolynomial, mechanism: &Mechanism) -> PrintedFormula {
+    // Terms that belong to no square.
     let mut rest = p.clone();
-    let mut squares: BTreeMap<Variable, Formula> = BTreeMap::new();
-    for square in factor::squares(p) {
+    let mut squares: BTreeMap<FactorVariable, PrintedFormula> = BTreeMap::new();
+    // Each square takes its terms out of the sum.
+    for square in factor::find_squares(p) {
+        // Squares are ordered by their first variable.
         let first = square.linear[0].0;
-        let sum = Formula::sum(
+        let sum = PrintedFormula::sum(
             square
                 .linear
                 .iter()
-                .map(|(v, k)| Formula::product(k.clone(), [v.formula(mechanism)])),
+                .map(|(v, k)| PrintedFormula::product(k.clone(), [v.formula(mechanism)])),
         );
-        squares.insert(first, Formula::product(square.number, [sum.power(2)]));
+        squares.insert(first, PrintedFormula::product(square.number, [sum.power(2)]));
         for used in &square.terms {
             rest.remove(used);
         }
     }
-    let terms = ordered(&rest)
+    // Squares first, then all other terms.
+    let terms = ordered_terms(&rest)
         .into_iter()
-        .map(|(powers, k)| Formula::product(k.clone(), variables(powers, mechanism)));
-    Formula::sum(squares.into_values().chain(terms))
+        .map(|(powers, k)| PrintedFormula::product(k.clone(), power_factors(powers, mechanism)));
+    PrintedFormula::sum(squares.into_values().chain(terms))
 }
 
 #[cfg(test)]

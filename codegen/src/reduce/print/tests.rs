@@ -1,27 +1,25 @@
-//! Factored text read again equals the function; what people expect to see factored is.
+//! Factored text, parsed again, equals the function, and expected factors are found.
 
 use std::collections::BTreeMap;
 
-use modelmill_algebra::field::{Element, Stream};
+use modelmill_algebra::field::{FieldElement, RandomStream};
 
 use proptest::prelude::*;
 
-use super::super::rational_function::{Polynomial, Powers, RationalFunction, Variable};
+use super::super::rational_function::{FactorVariable, PowerProduct, RationalFunction, TrigonometricPolynomial};
 use crate::expr::print::parse::parse;
 use crate::expr::{Atom, FieldPoint, Rational};
 use crate::review::tests::model;
 
-fn multiply(a: &Polynomial, b: &Polynomial) -> Polynomial {
-    let mut product: BTreeMap<Powers, Rational> = BTreeMap::new();
+fn multiply(a: &TrigonometricPolynomial, b: &TrigonometricPolynomial) -> TrigonometricPolynomial {
+    let mut product: BTreeMap<PowerProduct, Rational> = BTreeMap::new();
     for (p, k) in a {
         for (q, l) in b {
-            let mut powers: BTreeMap<Variable, u32> = p.iter().copied().collect();
+            let mut powers: BTreeMap<FactorVariable, u32> = p.iter().copied().collect();
             for (v, n) in q {
                 *powers.entry(*v).or_insert(0) += n;
             }
-            let slot = product
-                .entry(powers.into_iter().collect())
-                .or_insert(Rational::ZERO);
+            let slot = product.entry(powers.into_iter().collect()).or_insert(Rational::ZERO);
             *slot = &*slot + &(k * l);
         }
     }
@@ -30,39 +28,36 @@ fn multiply(a: &Polynomial, b: &Polynomial) -> Polynomial {
 }
 
 /// `sum of k * product of constants`, the constants by position in the model file.
-fn polynomial(terms: &[(i64, &[usize])]) -> Polynomial {
-    let mut sum = Polynomial::new();
+fn polynomial(terms: &[(i64, &[usize])]) -> TrigonometricPolynomial {
+    let mut sum = TrigonometricPolynomial::new();
     for (k, factors) in terms {
-        let mut powers: BTreeMap<Variable, u32> = BTreeMap::new();
+        let mut powers: BTreeMap<FactorVariable, u32> = BTreeMap::new();
         for i in *factors {
-            *powers.entry(Variable::Constant(*i)).or_insert(0) += 1;
+            *powers.entry(FactorVariable::Constant(*i)).or_insert(0) += 1;
         }
         sum.insert(powers.into_iter().collect(), Rational::integer(*k));
     }
     sum
 }
 
-fn linear() -> impl Strategy<Value = Polynomial> {
+fn linear() -> impl Strategy<Value = TrigonometricPolynomial> {
     prop::collection::vec((0..5usize, -3..4i64), 1..4).prop_map(|terms| {
-        let mut sum = Polynomial::new();
+        let mut sum = TrigonometricPolynomial::new();
         for (i, k) in terms {
             if k != 0 {
-                sum.insert(vec![(Variable::Constant(i), 1)], Rational::integer(k));
+                sum.insert(vec![(FactorVariable::Constant(i), 1)], Rational::integer(k));
             }
         }
         sum
     })
 }
 
-fn product() -> impl Strategy<Value = Polynomial> {
-    prop::collection::vec(linear(), 1..4).prop_map(|factors| {
-        factors
-            .iter()
-            .fold(polynomial(&[(1, &[])]), |p, f| multiply(&p, f))
-    })
+fn product() -> impl Strategy<Value = TrigonometricPolynomial> {
+    prop::collection::vec(linear(), 1..4)
+        .prop_map(|factors| factors.iter().fold(polynomial(&[(1, &[])]), |p, f| multiply(&p, f)))
 }
 
-fn sum_of_products() -> impl Strategy<Value = Polynomial> {
+fn sum_of_products() -> impl Strategy<Value = TrigonometricPolynomial> {
     (product(), product(), any::<bool>()).prop_map(|(a, b, both)| {
         let mut sum = a;
         if both {
@@ -87,28 +82,28 @@ proptest! {
         prop_assume!(!denominator.is_empty());
         let mechanism = model("spidermill-paper");
         let function = RationalFunction::new(numerator, denominator);
-        let mut stream = Stream::new(3);
-        let mut at = FieldPoint::<Element>::default();
+        let mut stream = RandomStream::new(3);
+        let mut at = FieldPoint::<FieldElement>::default();
         let mut names = BTreeMap::new();
         for (i, c) in mechanism.constants.iter().enumerate() {
-            at.values.insert(Atom::Constant(i), stream.element());
+            at.values.insert(Atom::Constant(i), stream.next_element());
             names.insert(c.name.clone(), Atom::Constant(i));
         }
         let expected = function.value(&at);
-        for printed in [function.formula(&mechanism), function.expanded(&mechanism)] {
+        for printed in [function.formula(&mechanism), function.expanded_formula(&mechanism)] {
             let text = printed.text();
             prop_assert_eq!(parse(&text).value(&at, &names), expected, "{}", text);
         }
         if !function.is_zero() {
             let (number, rest) = function.split_number();
-            let number = Element::from_rational(&number).expect("a small number");
+            let number = FieldElement::from_rational(&number).expect("a small number");
             prop_assert_eq!(rest.value(&at).map(|v| v * number), expected);
         }
     }
 }
 
 /// Constants of the model are d1, d3, b, dA, Bx, ... in this order.
-fn check(numerator: &Polynomial, denominator: &Polynomial, expected: &str) {
+fn check(numerator: &TrigonometricPolynomial, denominator: &TrigonometricPolynomial, expected: &str) {
     let mechanism = model("spidermill-paper");
     let function = RationalFunction::new(numerator.clone(), denominator.clone());
     assert_eq!(function.formula(&mechanism).text(), expected);
@@ -121,21 +116,13 @@ fn numbers_and_powers_stand_outside() {
         &polynomial(&[(6, &[2])]),
         "1/3*d1*d3*(d1 + 2*d3)/b",
     );
-    check(
-        &polynomial(&[(-1, &[0])]),
-        &polynomial(&[(2, &[1])]),
-        "-1/2*d1/d3",
-    );
+    check(&polynomial(&[(-1, &[0])]), &polynomial(&[(2, &[1])]), "-1/2*d1/d3");
 }
 
 #[test]
 fn squares_and_their_differences_are_seen() {
     let one = polynomial(&[(1, &[])]);
-    check(
-        &polynomial(&[(1, &[0, 0]), (-1, &[1, 1])]),
-        &one,
-        "(d1 + d3)*(d1 - d3)",
-    );
+    check(&polynomial(&[(1, &[0, 0]), (-1, &[1, 1])]), &one, "(d1 + d3)*(d1 - d3)");
     check(
         &polynomial(&[(1, &[0, 0]), (2, &[0, 1]), (1, &[1, 1])]),
         &one,
@@ -147,28 +134,28 @@ fn squares_and_their_differences_are_seen() {
         &one,
         "(d1 + d3)^2 + b^2",
     );
-    check(
-        &polynomial(&[(1, &[0, 0]), (1, &[1, 1])]),
-        &one,
-        "d1^2 + d3^2",
-    );
+    check(&polynomial(&[(1, &[0, 0]), (1, &[1, 1])]), &one, "d1^2 + d3^2");
 }
 
 /// The same at random points, with fewer terms where even powers of a cosine make up one of the sine.
 #[test]
 fn even_powers_of_cosines_become_sines_where_that_is_shorter() {
-    let (length, cosine, sine) = (Variable::Constant(0), Variable::Cos(1), Variable::Sin(1));
+    let (length, cosine, sine) = (
+        FactorVariable::Constant(0),
+        FactorVariable::Cos(1),
+        FactorVariable::Sin(1),
+    );
     let one = Rational::ONE;
-    let numerator = Polynomial::from([
+    let numerator = TrigonometricPolynomial::from([
         (vec![(length, 2)], one.clone()),
         (vec![(length, 2), (cosine, 2)], -&one),
     ]);
-    let quartic = Polynomial::from([
+    let quartic = TrigonometricPolynomial::from([
         (vec![], one.clone()),
         (vec![(cosine, 2)], Rational::integer(-2)),
         (vec![(cosine, 4)], one.clone()),
     ]);
-    let kept = Polynomial::from([(vec![(cosine, 2)], one.clone()), (vec![(sine, 1)], one)]);
+    let kept = TrigonometricPolynomial::from([(vec![(cosine, 2)], one.clone()), (vec![(sine, 1)], one)]);
     for (p, n_terms, power_of_sine) in [(numerator, 1, 2), (quartic, 1, 4), (kept, 2, 1)] {
         let written = RationalFunction {
             numerator: p.clone(),
@@ -178,12 +165,12 @@ fn even_powers_of_cosines_become_sines_where_that_is_shorter() {
         assert_eq!(found.numerator.len(), n_terms);
         let sines = found.numerator.keys().flatten().filter(|(v, _)| *v == sine);
         assert_eq!(sines.map(|(_, n)| *n).max(), Some(power_of_sine));
-        let mut stream = Stream::new(7);
+        let mut stream = RandomStream::new(7);
         for _ in 0..4 {
-            let mut point = FieldPoint::<Element>::default();
+            let mut point = FieldPoint::<FieldElement>::default();
             for i in 0..2 {
-                point.values.insert(Atom::Constant(i), stream.element());
-                point.angles.insert(Atom::Constant(i), stream.circle());
+                point.values.insert(Atom::Constant(i), stream.next_element());
+                point.angles.insert(Atom::Constant(i), stream.next_circle_point());
             }
             assert_eq!(found.value(&point), written.value(&point));
         }

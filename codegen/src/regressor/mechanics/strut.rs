@@ -1,62 +1,68 @@
-//! Passive elements along the line between two points: what one that pulls its points together needs as generalised forces.
+//! Struts: passive elements along the line between two points, and the generalised forces of one that pulls its points
+//! together.
 //!
-//! With the points `a` and `b`, `d = b - a` and `l = |d|`, the pull `F0 + k l + Fv l'` needs `(F0 + k l + Fv l') dl/dq`
-//! (virtual power), where `l dl/dq = d . dd/dq` and `l l' = d . d'`.
+//! With the points `a` and `b`, `d = b - a` and `l = |d|`, the pull `F0 + k l + Fv l'` contributes `(F0 + k l + Fv l')
+//! dl/dq` by virtual power, where `l dl/dq = d . dd/dq` and `l l' = d . d'`.
 
-use modelmill_spec::{Effect, Mechanism, Place, PointIdx};
+use modelmill_spec::{EffectPlace, Mechanism, ModelEffect, PointIdx};
 
 use crate::DeriveError;
-use crate::expr::vector::Vector;
+use crate::expr::vector::SymbolicVector;
 use crate::expr::{Atom, ExprId, Graph, Unary};
-use crate::loops::stretch::position_in_base;
-use crate::tree::Tree;
+use crate::loops::segment::position_in_base;
+use crate::tree::KinematicTree;
 
 /// The line between the points of an effect.
-struct Line {
+struct StrutLine {
+    /// The two points.
     ends: [PointIdx; 2],
-    /// From the first point to the second.
-    across: Vector,
+    /// Vector from the first point to the second, in the axes of the base, m.
+    across: SymbolicVector,
+    /// Its length, m.
     length: ExprId,
 }
 
-/// Model files are checked for other places; a mechanism made by a program has no element there.
-fn line(
+/// The line of an effect. The model file is checked for two points; a mechanism built by a program may have none, and
+/// then has no element.
+fn strut_line(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    tree: &Tree,
-    effect: &Effect,
-) -> Result<Option<Line>, DeriveError> {
-    let [Place::Point(from), Place::Point(to)] = effect.places[..] else {
+    tree: &KinematicTree,
+    effect: &ModelEffect,
+) -> Result<Option<StrutLine>, DeriveError> {
+    let [EffectPlace::Point(from), EffectPlace::Point(to)] = effect.places[..] else {
         return Ok(None);
     };
     let a = position_in_base(graph, mechanism, tree, from.0)?;
     let b = position_in_base(graph, mechanism, tree, to.0)?;
     let across = graph.sub_vectors(&b, &a);
+    // The length as a root.
     let square = graph.dot(&across, &across);
     let length = graph.unary(Unary::Sqrt, square);
-    Ok(Some(Line {
+    Ok(Some(StrutLine {
         ends: [from, to],
         across,
         length,
     }))
 }
 
-/// Generalised forces for `F0`, `k` and `Fv` of one each.
+/// Generalised forces `[0][t][c]` for `F0`, `k` and `Fv` of one each, on every coordinate c.
 pub(super) fn generalised_forces(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    tree: &Tree,
-    effect: &Effect,
+    tree: &KinematicTree,
+    effect: &ModelEffect,
 ) -> Result<Vec<Vec<Vec<ExprId>>>, DeriveError> {
-    let Some(line) = line(graph, mechanism, tree, effect)? else {
+    let Some(line) = strut_line(graph, mechanism, tree, effect)? else {
         return Ok(Vec::new());
     };
     let per_length = graph.pow(line.length, -1);
-    let rate = rate(graph, &line);
+    let rate = distance_rate(graph, &line);
     let per_rate = graph.mul(rate, per_length);
     let mut forces = vec![Vec::new(); 3];
     for coordinate in 0..mechanism.coordinates.len() {
         let slopes = graph.differentiate(&line.across, Atom::Coordinate(coordinate));
+        // l dl/dq
         let stretched = graph.dot(&[slopes[0], slopes[1], slopes[2]], &line.across);
         forces[0].push(graph.mul(stretched, per_length));
         forces[1].push(stretched);
@@ -65,22 +71,22 @@ pub(super) fn generalised_forces(
     Ok(vec![forces])
 }
 
-/// Forces at both ends that hold an element with given parameters.
+/// Forces at both ends that balance an element with given parameters, N.
 pub(super) fn point_forces(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    tree: &Tree,
-    effect: &Effect,
+    tree: &KinematicTree,
+    effect: &ModelEffect,
     values: &[ExprId],
-) -> Result<Vec<(PointIdx, Vector)>, DeriveError> {
-    let Some(line) = line(graph, mechanism, tree, effect)? else {
+) -> Result<Vec<(PointIdx, SymbolicVector)>, DeriveError> {
+    let Some(line) = strut_line(graph, mechanism, tree, effect)? else {
         return Ok(Vec::new());
     };
-    let [constant, stiffness, damping] =
-        [0, 1, 2].map(|k| values.get(k).copied().unwrap_or(Graph::ZERO));
-    let rate = rate(graph, &line);
+    let [constant, stiffness, damping] = [0, 1, 2].map(|k| values.get(k).copied().unwrap_or(Graph::ZERO));
+    let rate = distance_rate(graph, &line);
     let by_distance = graph.mul(stiffness, line.length);
     let by_rate = graph.mul(damping, rate);
+    // F0 + k l + Fv l'
     let pull = graph.add(constant, by_distance);
     let pull = graph.add(pull, by_rate);
     let per_length = graph.pow(line.length, -1);
@@ -90,8 +96,8 @@ pub(super) fn point_forces(
     Ok(line.ends.into_iter().zip([at_first, at_second]).collect())
 }
 
-/// The rate of the distance.
-fn rate(graph: &mut Graph, line: &Line) -> ExprId {
+/// The rate of the distance, m/s.
+fn distance_rate(graph: &mut Graph, line: &StrutLine) -> ExprId {
     let across = graph.time_derivative(&line.across);
     let along = graph.dot(&line.across, &[across[0], across[1], across[2]]);
     let per_length = graph.pow(line.length, -1);

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Makes report.png: the whole robot with things hidden in it is simulated, and the model without them is held against it.
+# Makes report.png: simulates the complete robot with effects that the model lacks, and reports on the model without them.
 set -euo pipefail
 cd "$(dirname "$0")/../../../.."
 run() { cargo run --quiet --release -- "$@"; }

@@ -1,24 +1,27 @@
-//! Units of the parameters and constants of laws, from the dimensions of what they multiply.
+//! Units of the parameters and constants of laws, derived from the variables that they multiply.
 
-use super::features::{Factor, Product, Site};
-use super::shapes::Variable;
+use super::features::{LawFactor, LawProduct, LawSite};
+use super::shapes::LawVariable;
 
 /// A unit as powers of N, m, rad and s.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct Unit([i32; 4]);
+struct LawUnit([i32; 4]);
 
+/// Names of the base units, in the order of the powers.
 const NAMES: [&str; 4] = ["N", "m", "rad", "s"];
 
-impl Unit {
-    fn over(mut self, other: Self, times: i32) -> Self {
+impl LawUnit {
+    /// Divides by another unit, raised to the power `times`.
+    fn divide_by(mut self, other: Self, times: i32) -> Self {
         for (own, other) in self.0.iter_mut().zip(other.0) {
             *own -= times * other;
         }
         self
     }
 
-    /// As model files write it: `N s/(m rad)`.
-    fn text(self) -> String {
+    /// The unit as model files write it, for example `N s/(m rad)`; "1" without unit.
+    fn format_unit(self) -> String {
+        // Units with positive powers, then those with negative ones.
         let side = |sign: i32| -> Vec<String> {
             let powers = NAMES.iter().zip(self.0.map(|power| sign * power));
             powers
@@ -29,6 +32,7 @@ impl Unit {
                 })
                 .collect()
         };
+        // Numerator and denominator.
         let (above, below) = (side(1), side(-1));
         let above = if above.is_empty() {
             "1".to_owned()
@@ -43,93 +47,92 @@ impl Unit {
     }
 }
 
-/// Unit of what a place carries.
-fn force(is_angle: bool) -> Unit {
-    Unit([1, i32::from(is_angle), 0, 0])
+/// Unit of the force at a place: N, or N m if it is revolute.
+fn force_unit(is_angle: bool) -> LawUnit {
+    LawUnit([1, i32::from(is_angle), 0, 0])
 }
 
-fn unit_of(variable: Variable, own_is_angle: bool, other_is_angle: bool) -> Unit {
-    let along = |is_angle: bool, over_time: i32| {
-        Unit([0, i32::from(!is_angle), i32::from(is_angle), -over_time])
-    };
+/// Unit of a variable of a place or of another place.
+fn unit_of(variable: LawVariable, own_is_angle: bool, other_is_angle: bool) -> LawUnit {
+    // m or rad, divided by a power of s.
+    let along = |is_angle: bool, over_time: i32| LawUnit([0, i32::from(!is_angle), i32::from(is_angle), -over_time]);
     match variable {
-        Variable::Position => along(own_is_angle, 0),
-        Variable::Rate => along(own_is_angle, 1),
-        Variable::Acceleration => along(own_is_angle, 2),
-        Variable::Load => force(own_is_angle),
-        Variable::OtherPosition => along(other_is_angle, 0),
-        Variable::OtherRate => along(other_is_angle, 1),
+        LawVariable::Position => along(own_is_angle, 0),
+        LawVariable::Rate => along(own_is_angle, 1),
+        LawVariable::Acceleration => along(own_is_angle, 2),
+        LawVariable::Load => force_unit(own_is_angle),
+        LawVariable::OtherPosition => along(other_is_angle, 0),
+        LawVariable::OtherRate => along(other_is_angle, 1),
     }
 }
 
-impl Product {
-    /// Unit of the parameter that it is multiplied by to be a force or torque at a place.
-    pub fn unit(&self, site: &Site, sites: &[Site]) -> String {
+impl LawProduct {
+    /// Unit of its parameter, such that the product is a force or torque at the place.
+    pub fn unit(&self, site: &LawSite, sites: &[LawSite]) -> String {
+        // Whether the other place is revolute.
         let other = self.other.is_some_and(|other| sites[other].is_angle);
-        let unit = self
-            .factors
-            .iter()
-            .fold(force(site.is_angle), |unit, factor| {
-                let variable = unit_of(factor.variable, site.is_angle, other);
-                unit.over(variable, factor.shape.exponent())
-            });
-        unit.text()
+        // Start from the unit of the force and divide by that of every factor.
+        let unit = self.factors.iter().fold(force_unit(site.is_angle), |unit, factor| {
+            let variable = unit_of(factor.variable, site.is_angle, other);
+            unit.divide_by(variable, factor.shape.unit_exponent())
+        });
+        unit.format_unit()
     }
 }
 
-impl Factor {
-    /// Unit of the constants that bend it, which is that of its variable.
+impl LawFactor {
+    /// Unit of its constants, which is that of its variable.
     pub fn unit(&self, own_is_angle: bool, other_is_angle: bool) -> String {
-        unit_of(self.variable, own_is_angle, other_is_angle).text()
+        unit_of(self.variable, own_is_angle, other_is_angle).format_unit()
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::shapes::Shape;
+    use super::super::shapes::LawShape;
     use super::*;
 
     #[test]
     fn units_follow_from_what_is_multiplied() {
-        use Variable::{Acceleration, Load, OtherPosition, Position, Rate};
-        let site = |is_angle| Site {
+        use LawVariable::{Acceleration, Load, OtherPosition, Position, Rate};
+        let site = |is_angle| LawSite {
             is_angle,
-            ..Site::default()
+            ..LawSite::default()
         };
         let sites = [site(false), site(true)];
-        let unit = |at: usize, other: Option<usize>, factors: &[(Variable, Shape)]| {
-            let factor = |(variable, shape): &(Variable, Shape)| Factor {
+        let unit = |at: usize, other: Option<usize>, factors: &[(LawVariable, LawShape)]| {
+            let factor = |(variable, shape): &(LawVariable, LawShape)| LawFactor {
                 variable: *variable,
                 shape: *shape,
             };
             let factors = factors.iter().map(factor).collect();
-            Product { other, factors }.unit(&sites[at], &sites)
+            LawProduct { other, factors }.unit(&sites[at], &sites)
         };
         assert_eq!(
             unit(
                 0,
                 Some(1),
-                &[(OtherPosition, Shape::LINEAR), (Rate, Shape::LINEAR)]
+                &[(OtherPosition, LawShape::LINEAR), (Rate, LawShape::LINEAR)]
             ),
             "N s/(m rad)"
         );
         assert_eq!(
-            unit(1, None, &[(Rate, Shape::whole(2, true))]),
+            unit(1, None, &[(Rate, LawShape::integer_power(2, true))]),
             "N m s^2/rad^2"
         );
-        assert_eq!(unit(0, None, &[(Load, Shape::whole(2, false))]), "1/N");
+        assert_eq!(unit(0, None, &[(Load, LawShape::integer_power(2, false))]), "1/N");
         assert_eq!(
-            unit(1, None, &[(Load, Shape::MAGNITUDE), (Rate, Shape::SIGN)]),
+            unit(1, None, &[(Load, LawShape::MAGNITUDE), (Rate, LawShape::SIGN)]),
             "1"
         );
         assert_eq!(
             unit(
                 1,
                 None,
-                &[(Position, Shape::LINEAR), (Acceleration, Shape::LINEAR)]
+                &[(Position, LawShape::LINEAR), (Acceleration, LawShape::LINEAR)]
             ),
             "N m s^2/rad^2"
         );
-        assert_eq!(unit(0, None, &[(Position, Shape::whole(3, true))]), "N/m^3");
+        assert_eq!(unit(0, None, &[(Position, LawShape::integer_power(3, true))]), "N/m^3");
     }
 }

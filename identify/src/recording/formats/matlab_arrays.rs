@@ -1,85 +1,94 @@
-//! The arrays of a MATLAB file of format 5: what each is called, how large it is, and its numbers one array at a time.
+//! The arrays of a MATLAB file of format 5: names and sizes of all of them, and the numbers of one array at a time.
 //!
-//! After a header of 128 bytes, whose last two tell the byte order, a file is a row of elements. Each has a tag of its
-//! type and its length and is padded to eight bytes; one that is compressed holds another one (MathWorks, "MAT-File
-//! Format", R2023b, "Level 5 MAT-Files"). Nothing is unpacked further than it is looked at: a few bytes of a compressed
-//! array may stand for thousands of millions of numbers.
+//! A header of 128 bytes states the byte order at its end. Then elements follow. Each has a tag with its type and its
+//! length, and is padded to eight bytes. A compressed element contains another one (MathWorks, "MAT-File Format",
+//! R2023b, "Level 5 MAT-Files"). Elements are decompressed only as far as they are read, because a few bytes may
+//! expand to billions of numbers.
 
 use std::io::{self, Read, Seek, SeekFrom};
 
 use flate2::read::ZlibDecoder;
 
-/// Bytes before the first element.
+/// Bytes of the header.
 const HEADER: u64 = 128;
-/// Types of elements that hold others.
+/// Type of an element: an array.
 const MATRIX: u32 = 14;
+/// Type of an element: a compressed element.
 const COMPRESSED: u32 = 15;
-/// The most sides of an array that are looked at.
+/// Most dimensions of an array.
 const MOST_SIDES: u32 = 64;
-/// The longest name that is read; MATLAB's own end at 63 letters.
+/// Longest name in bytes; MATLAB's own names have at most 63 letters.
 const LONGEST_NAME: u32 = 4096;
-/// Bytes of numbers that are read at once; a multiple of all their lengths.
+/// Bytes of numbers that are read at once; a multiple of all sizes of numbers.
 const CHUNK: usize = 1 << 16;
 
 /// A numeric array of a file.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Array {
-    /// What the file calls it.
+pub(super) struct MatlabArray {
+    /// Name of the variable.
     pub(super) name: String,
-    /// Rows, columns and whatever further sides it has.
+    /// Rows, columns and further dimensions.
     pub(super) size: Vec<usize>,
-    /// Whether its numbers are as many as its size says.
-    pub(super) is_sound: bool,
-    /// Whether its numbers have imaginary parts, which stand behind the real ones.
+    /// Whether the number of values agrees with the size.
+    pub(super) is_consistent: bool,
+    /// Whether there are imaginary parts, which follow the real ones.
     pub(super) is_complex: bool,
-    /// Where its element begins in the file, and how long that is.
+    /// Position of its element in the file, in bytes.
     at: u64,
+    /// Length of its element in bytes.
     length: u64,
+    /// Whether its element is compressed.
     is_compressed: bool,
 }
 
-/// A file whose elements are known.
-pub(super) struct Arrays<R> {
+/// An open file whose arrays are known.
+pub(super) struct MatlabArrayFile<R> {
+    /// The file.
     stream: R,
+    /// Whether the lowest byte of a number comes first.
     is_little: bool,
-    /// The numeric arrays in the file's order.
-    pub(super) found: Vec<Array>,
+    /// The numeric arrays in the order of the file.
+    pub(super) arrays: Vec<MatlabArray>,
 }
 
-impl<R: Read + Seek> Arrays<R> {
-    /// Looks through a file; fails when it breaks off or is no such file.
+impl<R: Read + Seek> MatlabArrayFile<R> {
+    /// Reads the list of arrays. Fails when the file is truncated or has another format.
     pub(super) fn new(mut stream: R) -> io::Result<Self> {
         let end = stream.seek(SeekFrom::End(0))?;
         if end < HEADER {
-            return Err(broken_off());
+            return Err(truncated_error());
         }
+        // Version and byte order are the last four bytes of the header.
         stream.seek(SeekFrom::Start(HEADER - 4))?;
         let mut version = [0; 4];
         stream.read_exact(&mut version)?;
         let is_little = match version {
             [0, 1, b'I', b'M'] => true,
             [1, 0, b'M', b'I'] => false,
-            _ => return Err(io::Error::other("its header is that of no such file")),
+            _ => return Err(io::Error::other("its header is not that of a MATLAB file")),
         };
+        // Visit all elements; only arrays are read further.
         let mut arrays = Vec::new();
         let mut at = HEADER;
         while at + 8 <= end {
             stream.seek(SeekFrom::Start(at))?;
-            let tag = Element::new(&mut stream, is_little).tag()?;
+            let tag = MatlabElementReader::new(&mut stream, is_little).read_tag()?;
             let is_compressed = tag.kind == COMPRESSED;
             let length = u64::from(tag.length);
             at += 8;
             if length > end - at {
-                return Err(broken_off());
+                return Err(truncated_error());
             }
             if is_compressed || tag.kind == MATRIX {
-                let place = Place {
+                let place = MatlabElementPlace {
                     at,
                     length,
                     is_compressed,
                 };
-                arrays.extend(place.open(&mut stream, is_little, |element| element.array(&place))?);
+                // A compressed element whose contents are not an array gives nothing.
+                arrays.extend(place.open(&mut stream, is_little, |element| element.read_array(&place))?);
             }
+            // Compressed elements have no padding.
             at += if is_compressed {
                 length
             } else {
@@ -87,89 +96,100 @@ impl<R: Read + Seek> Arrays<R> {
             };
         }
         if at != end {
-            return Err(broken_off());
+            return Err(truncated_error());
         }
         Ok(Self {
             stream,
             is_little,
-            found: arrays,
+            arrays,
         })
     }
 
-    /// The numbers of an array that is sound, column by column.
-    pub(super) fn numbers(&mut self, array: &Array) -> io::Result<Vec<f64>> {
-        let place = Place {
+    /// The numbers of a consistent array, column by column.
+    pub(super) fn read_numbers(&mut self, array: &MatlabArray) -> io::Result<Vec<f64>> {
+        let place = MatlabElementPlace {
             at: array.at,
             length: array.length,
             is_compressed: array.is_compressed,
         };
+        // The description is read again, up to the numbers.
         place.open(&mut self.stream, self.is_little, |element| {
-            element.array(&place)?;
-            let tag = element.data.ok_or_else(broken_off)?;
-            element.numbers(&tag)
+            element.read_array(&place)?;
+            let tag = element.data.ok_or_else(truncated_error)?;
+            element.read_numbers(&tag)
         })
     }
 }
 
-/// Where an element stands.
-struct Place {
+/// The position of an element.
+struct MatlabElementPlace {
+    /// First byte behind its tag.
     at: u64,
+    /// Length in bytes.
     length: u64,
+    /// Whether it is compressed.
     is_compressed: bool,
 }
 
-impl Place {
-    /// Reads an element from its inside on, unpacked.
+impl MatlabElementPlace {
+    /// Calls `read` with the decompressed contents of the element.
     fn open<T>(
         &self,
         stream: &mut (impl Read + Seek),
         is_little: bool,
-        read: impl FnOnce(&mut Element<'_>) -> io::Result<T>,
+        read: impl FnOnce(&mut MatlabElementReader<'_>) -> io::Result<T>,
     ) -> io::Result<T> {
         stream.seek(SeekFrom::Start(self.at))?;
         let mut inside = stream.take(self.length);
         if !self.is_compressed {
-            return read(&mut Element::new(&mut inside, is_little));
+            return read(&mut MatlabElementReader::new(&mut inside, is_little));
         }
         let mut unpacked = ZlibDecoder::new(inside);
-        let mut element = Element::new(&mut unpacked, is_little);
-        // The tag of the one element within.
-        if element.tag()?.kind != MATRIX {
-            element.is_other = true;
+        let mut element = MatlabElementReader::new(&mut unpacked, is_little);
+        // The contents start with the tag of the element inside.
+        if element.read_tag()?.kind != MATRIX {
+            element.is_not_array = true;
         }
         read(&mut element)
     }
 }
 
-/// Bytes of an element, read in order.
-struct Element<'a> {
+/// Reads the bytes of an element in order.
+struct MatlabElementReader<'a> {
+    /// The decompressed bytes.
     stream: &'a mut dyn Read,
+    /// Whether the lowest byte of a number comes first.
     is_little: bool,
-    /// Whether it is known to be no array.
-    is_other: bool,
-    /// The tag of the real numbers, once the stream stands before them.
-    data: Option<Tag>,
+    /// Whether the element is known not to be an array.
+    is_not_array: bool,
+    /// The tag of the real numbers, once the stream is behind it.
+    data: Option<MatlabTag>,
 }
 
-/// Type and length of an element, and the bytes that fill it up behind.
+/// Type and length of an element, and the number of padding bytes behind it.
 #[derive(Clone, Copy)]
-struct Tag {
+struct MatlabTag {
+    /// Type.
     kind: u32,
+    /// Length in bytes.
     length: u32,
+    /// Padding in bytes.
     padding: u32,
 }
 
-impl<'a> Element<'a> {
+impl<'a> MatlabElementReader<'a> {
+    /// Starts reading at the contents of an element.
     fn new(stream: &'a mut dyn Read, is_little: bool) -> Self {
         Self {
             stream,
             is_little,
-            is_other: false,
+            is_not_array: false,
             data: None,
         }
     }
 
-    fn word(&mut self) -> io::Result<u32> {
+    /// The next number of four bytes.
+    fn read_word(&mut self) -> io::Result<u32> {
         let mut bytes = [0; 4];
         self.stream.read_exact(&mut bytes)?;
         Ok(if self.is_little {
@@ -179,13 +199,13 @@ impl<'a> Element<'a> {
         })
     }
 
-    /// A tag; short elements of up to four bytes have both in one word.
-    fn tag(&mut self) -> io::Result<Tag> {
-        let first = self.word()?;
+    /// Reads a tag; elements of up to four bytes have type and length in one word.
+    fn read_tag(&mut self) -> io::Result<MatlabTag> {
+        let first = self.read_word()?;
         if first >> 16 == 0 {
-            let length = self.word()?;
+            let length = self.read_word()?;
             let padding = length.wrapping_neg() % 8;
-            return Ok(Tag {
+            return Ok(MatlabTag {
                 kind: first,
                 length,
                 padding,
@@ -195,15 +215,15 @@ impl<'a> Element<'a> {
         let padding = 4_u32
             .checked_sub(length)
             .ok_or_else(|| io::Error::other("a short element is too long"))?;
-        Ok(Tag {
+        Ok(MatlabTag {
             kind: first & 0xffff,
             length,
             padding,
         })
     }
 
-    /// The bytes of an element that has at most so many.
-    fn bytes(&mut self, tag: Tag, most: u32) -> io::Result<Vec<u8>> {
+    /// The bytes of an element; fails when it has more than `most`.
+    fn read_bytes(&mut self, tag: MatlabTag, most: u32) -> io::Result<Vec<u8>> {
         if tag.length > most {
             return Err(io::Error::other("a name or a size is too long"));
         }
@@ -213,24 +233,26 @@ impl<'a> Element<'a> {
         Ok(bytes)
     }
 
-    /// What an array says of itself, up to its numbers; none of what is not numeric, such as texts and structures.
-    fn array(&mut self, place: &Place) -> io::Result<Option<Array>> {
-        if self.is_other {
+    /// Reads the description of an array up to its numbers; `None` if it is not numeric, such as texts and
+    /// structures.
+    fn read_array(&mut self, place: &MatlabElementPlace) -> io::Result<Option<MatlabArray>> {
+        if self.is_not_array {
             return Ok(None);
         }
-        let flags = self.tag()?;
+        // Flags with the class, then the dimensions, the name, and the tag of the numbers.
+        let flags = self.read_tag()?;
         if flags.length != 8 {
             return Err(io::Error::other("an array has no class"));
         }
-        let class = self.word()?;
-        self.word()?;
-        // Classes of numbers go from `double` to `uint64`.
+        let class = self.read_word()?;
+        self.read_word()?;
+        // Numeric classes are 6 (`double`) to 15 (`uint64`).
         if !(6..=15).contains(&(class & 0xff)) {
             return Ok(None);
         }
         let is_complex = class & 0x0800 != 0;
-        let sides = self.tag()?;
-        let sides = self.bytes(sides, 4 * MOST_SIDES)?;
+        let sides = self.read_tag()?;
+        let sides = self.read_bytes(sides, 4 * MOST_SIDES)?;
         let size = sides.chunks_exact(4).map(|side| {
             let bytes = [side[0], side[1], side[2], side[3]];
             let side = if self.is_little {
@@ -241,17 +263,16 @@ impl<'a> Element<'a> {
             usize::try_from(side).map_err(|_| io::Error::other("an array has a negative size"))
         });
         let size = size.collect::<io::Result<Vec<usize>>>()?;
-        let name = self.tag()?;
-        let name = self.bytes(name, LONGEST_NAME)?;
-        let data = self.tag()?;
+        let name = self.read_tag()?;
+        let name = self.read_bytes(name, LONGEST_NAME)?;
+        let data = self.read_tag()?;
         self.data = Some(data);
-        let numbers = size
-            .iter()
-            .try_fold(1, |n: usize, side| n.checked_mul(*side));
-        let bytes = numbers.and_then(|n| n.checked_mul(width(data.kind)?));
-        Ok(Some(Array {
+        // A product that overflows cannot agree with the length.
+        let numbers = size.iter().try_fold(1, |n: usize, side| n.checked_mul(*side));
+        let bytes = numbers.and_then(|n| n.checked_mul(number_width(data.kind)?));
+        Ok(Some(MatlabArray {
             name: String::from_utf8_lossy(&name).into_owned(),
-            is_sound: bytes == Some(data.length as usize),
+            is_consistent: bytes == Some(data.length as usize),
             is_complex,
             size,
             at: place.at,
@@ -260,27 +281,28 @@ impl<'a> Element<'a> {
         }))
     }
 
-    /// The numbers of an element, whatever type they are kept as.
-    fn numbers(&mut self, tag: &Tag) -> io::Result<Vec<f64>> {
-        let width = width(tag.kind).ok_or_else(|| io::Error::other("it holds no numbers"))?;
+    /// Reads the numbers of an element, converted from any type.
+    fn read_numbers(&mut self, tag: &MatlabTag) -> io::Result<Vec<f64>> {
+        let width = number_width(tag.kind).ok_or_else(|| io::Error::other("it contains no numbers"))?;
         let mut numbers = Vec::new();
         let mut left = tag.length as usize;
         let mut chunk = vec![0; CHUNK.min(left)];
+        // Numbers are read in parts, so that memory grows with the bytes that exist.
         while left > 0 {
             let chunk = &mut chunk[..CHUNK.min(left)];
             self.stream.read_exact(chunk)?;
             if !self.is_little {
                 chunk.chunks_exact_mut(width).for_each(<[u8]>::reverse);
             }
-            push(tag.kind, chunk, &mut numbers);
+            push_numbers(tag.kind, chunk, &mut numbers);
             left -= chunk.len();
         }
         Ok(numbers)
     }
 }
 
-/// Bytes of a number of this type; none of types that are no numbers.
-fn width(kind: u32) -> Option<usize> {
+/// Bytes of a number of a type; `None` if the type is not numeric.
+fn number_width(kind: u32) -> Option<usize> {
     match kind {
         1 | 2 => Some(1),
         3 | 4 => Some(2),
@@ -290,8 +312,9 @@ fn width(kind: u32) -> Option<usize> {
     }
 }
 
-/// Adds numbers of a type from their bytes, the least first.
-fn push(kind: u32, bytes: &[u8], numbers: &mut Vec<f64>) {
+/// Appends numbers of a type from their bytes, the lowest byte first.
+fn push_numbers(kind: u32, bytes: &[u8], numbers: &mut Vec<f64>) {
+    // Converts all numbers of one Rust type.
     macro_rules! of {
         ($number:ty, $float:expr) => {{
             let (all, _) = bytes.as_chunks::<{ size_of::<$number>() }>();
@@ -312,6 +335,7 @@ fn push(kind: u32, bytes: &[u8], numbers: &mut Vec<f64>) {
     }
 }
 
-fn broken_off() -> io::Error {
-    io::Error::other("it breaks off within a variable")
+/// The error of a file that ends too early.
+fn truncated_error() -> io::Error {
+    io::Error::other("it ends within a variable")
 }

@@ -1,102 +1,128 @@
-//! The formats of recordings: one list, and a reader for each that hands samples to the intake.
+//! The formats of recordings: one list, and for each a reader that passes samples to the intake.
 //!
-//! To add one, write its [`Format`] in a file of its own and put it into [`FORMATS`].
+//! To add one, implement [`RecordingFormat`] in a file of its own and add it to [`FORMATS`].
 
+#[cfg(feature = "logs")]
 mod bag;
 mod csv;
+#[cfg(not(all(feature = "parquet", feature = "hdf5", feature = "logs")))]
+mod disabled;
+#[cfg(feature = "hdf5")]
 mod hdf5;
 mod matlab;
 mod matlab_arrays;
+#[cfg(feature = "logs")]
 mod mcap;
 mod packing;
+#[cfg(feature = "parquet")]
 mod parquet;
+#[cfg(feature = "parquet")]
 mod parquet_pages;
+#[cfg(feature = "logs")]
 mod rosbag;
+#[cfg(feature = "logs")]
 mod sqlite;
 
 use std::fs::File;
 use std::io::{Cursor, Read, Seek};
 
-use crate::recording::error::Fault;
+use crate::recording::error::RecordingFault;
 use crate::recording::tables::TableInfo;
-use crate::recording::{ReadOptions, Recording};
+use crate::recording::{ReadOptions, SignalRecording};
 
-/// All formats, in the order in which they are asked whether a file is theirs; text comes last and takes what is left.
-pub(crate) const FORMATS: [&dyn Format; 8] = [
-    &parquet::Parquet,
-    &matlab::Matlab5,
-    &hdf5::Hdf5,
-    &mcap::Mcap,
-    &rosbag::Rosbag2,
-    &packing::Packed(packing::Packing::Gzip),
-    &packing::Packed(packing::Packing::Zstd),
-    &csv::Csv,
+/// All formats, in the order in which their signatures are compared. Text is last and accepts everything.
+pub(crate) const FORMATS: [&dyn RecordingFormat; 8] = [
+    #[cfg(feature = "parquet")]
+    &parquet::ParquetFormat,
+    #[cfg(not(feature = "parquet"))]
+    &disabled::PARQUET,
+    &matlab::Matlab5Format,
+    #[cfg(feature = "hdf5")]
+    &hdf5::Hdf5Format,
+    #[cfg(not(feature = "hdf5"))]
+    &disabled::HDF5,
+    #[cfg(feature = "logs")]
+    &mcap::McapFormat,
+    #[cfg(not(feature = "logs"))]
+    &disabled::MCAP,
+    #[cfg(feature = "logs")]
+    &rosbag::Rosbag2Format,
+    #[cfg(not(feature = "logs"))]
+    &disabled::ROSBAG2,
+    &packing::CompressedFormat(packing::CompressionMethod::Gzip),
+    &packing::CompressedFormat(packing::CompressionMethod::Zstd),
+    &csv::CsvFormat,
 ];
 
-/// As many bytes from the beginning of a file as tell its format.
-pub(crate) const TELLING_BYTES: usize = 32;
+/// Number of bytes at the start of a file that identify its format.
+pub(crate) const SIGNATURE_BYTES: usize = 32;
 
-/// How files of one kind are known and read.
-pub(crate) trait Format: Sync {
-    /// What follows the name of a recording that came without a file, so that one sees what it is taken for.
+/// A format of files: how it is recognised and read.
+pub(crate) trait RecordingFormat: Sync {
+    /// Suffix of the name of a recording without a file, which states the format in messages.
     fn suffix(&self) -> &'static str {
         ""
     }
 
-    /// Endings of the names of such files.
+    /// Usual extensions of such files, without the point.
     fn extensions(&self) -> &'static [&'static str] {
         &[]
     }
 
-    /// Whether samples are rows of a table rather than lines of a text.
+    /// Whether samples are rows of a table; otherwise they are lines of text.
     fn is_table(&self) -> bool {
         true
     }
 
-    /// Whether a file of another format is in it.
-    fn is_packed(&self) -> bool {
+    /// Whether the contents are a file of another format.
+    fn is_compressed(&self) -> bool {
         false
     }
 
-    /// Whether a file that begins with these bytes, [`TELLING_BYTES`] of them if it has as many, is of this kind.
-    fn begins(&self, first: &[u8]) -> bool;
+    /// Whether a file that begins with these bytes has this format. There are [`SIGNATURE_BYTES`] of them, or fewer
+    /// if the file is shorter.
+    fn has_signature(&self, first: &[u8]) -> bool;
 
-    /// Reads a recording; `file` is what messages call it.
-    fn read(&self, input: Input<'_>, file: &str, options: &ReadOptions)
-    -> Result<Recording, Fault>;
+    /// Reads a recording; `file` is its name in messages.
+    fn read(
+        &self,
+        input: RecordingInput<'_>,
+        file: &str,
+        options: &ReadOptions,
+    ) -> Result<SignalRecording, RecordingFault>;
 
-    /// Names of the columns as the file has them.
-    fn names(&self, input: Input<'_>) -> Result<Vec<String>, Fault>;
+    /// Names of the columns as in the file.
+    fn names(&self, input: RecordingInput<'_>) -> Result<Vec<String>, RecordingFault>;
 
-    /// What it holds, table by table.
-    fn tables(&self, input: Input<'_>) -> Result<Vec<TableInfo>, Fault>;
+    /// The tables or topics of the file.
+    fn tables(&self, input: RecordingInput<'_>) -> Result<Vec<TableInfo>, RecordingFault>;
 }
 
-/// The format of what begins with these bytes.
-pub(crate) fn format_of(first: &[u8]) -> &'static dyn Format {
+/// The format of a file that begins with these bytes.
+pub(crate) fn format_of(first: &[u8]) -> &'static dyn RecordingFormat {
     FORMATS
         .into_iter()
-        .find(|format| format.begins(first))
-        .unwrap_or(&csv::Csv)
+        .find(|format| format.has_signature(first))
+        .unwrap_or(&csv::CsvFormat)
 }
 
-/// Where a format reads from.
-pub(crate) enum Input<'a> {
-    /// A file, at its beginning.
+/// The source that a format reads from.
+pub(crate) enum RecordingInput<'a> {
+    /// A file, positioned at its start.
     File(File),
-    /// What is in memory.
+    /// Bytes in memory.
     Bytes(&'a [u8]),
-    /// What can be looked at once only, such as a pipe.
+    /// A stream that can be read only once, such as a pipe.
     Stream(Box<dyn Read + 'a>),
 }
 
-/// A stream that can be looked at anywhere.
+/// A stream with random access.
 pub(crate) trait ReadSeek: Read + Seek {}
 
 impl<T: Read + Seek> ReadSeek for T {}
 
-impl<'a> Input<'a> {
-    /// For those who read from the beginning to the end.
+impl<'a> RecordingInput<'a> {
+    /// The source as a stream from start to end.
     pub(crate) fn stream(self) -> Box<dyn Read + 'a> {
         match self {
             Self::File(file) => Box::new(file),
@@ -105,29 +131,28 @@ impl<'a> Input<'a> {
         }
     }
 
-    /// For those who go to and fro; what can be looked at once only is taken into memory.
-    pub(crate) fn seekable(self) -> Result<Box<dyn ReadSeek + 'a>, Fault> {
+    /// The source with random access; a stream is read into memory.
+    pub(crate) fn seekable(self) -> Result<Box<dyn ReadSeek + 'a>, RecordingFault> {
         Ok(match self {
             Self::File(file) => Box::new(file),
             Self::Bytes(bytes) => Box::new(Cursor::new(bytes)),
-            Self::Stream(stream) => Box::new(Cursor::new(all_of(stream)?)),
+            Self::Stream(stream) => Box::new(Cursor::new(read_all(stream)?)),
         })
     }
 }
 
-/// The most bytes that are kept of what can be looked at once only.
+/// Most bytes of a stream that are kept in memory.
 pub(crate) const LONGEST_STREAM: u64 = 3 << 27;
 
-/// All bytes of a stream, which must have an end.
-pub(crate) fn all_of(stream: impl Read) -> Result<Vec<u8>, Fault> {
-    let unreadable = |reason: String| Fault::Unreadable { reason };
+/// All bytes of a stream. Fails when there are more than [`LONGEST_STREAM`].
+pub(crate) fn read_all(stream: impl Read) -> Result<Vec<u8>, RecordingFault> {
+    let unreadable = |reason: String| RecordingFault::Unreadable { reason };
+    // One byte more than allowed shows that the stream is too long.
     let mut bytes = Vec::new();
     let read = stream.take(LONGEST_STREAM + 1).read_to_end(&mut bytes);
     read.map_err(|error| unreadable(error.to_string()))?;
     if bytes.len() as u64 > LONGEST_STREAM {
-        return Err(unreadable(format!(
-            "it holds more than {LONGEST_STREAM} bytes"
-        )));
+        return Err(unreadable(format!("it has more than {LONGEST_STREAM} bytes")));
     }
     Ok(bytes)
 }

@@ -1,6 +1,6 @@
-//! What is packed: gzip, zstd, brotli and lz4 go in, bytes come out, never more than were asked for.
+//! Decompression of gzip, zstd, brotli and lz4. Compressed bytes go in, bytes come out, never more than requested.
 //!
-//! A file that is packed as a whole, such as `run.csv.gz`, is read as what is in it.
+//! A compressed file, such as `run.csv.gz`, is read as the file in it.
 
 use std::cell::Cell;
 use std::io::{self, BufRead, BufReader, Read};
@@ -10,76 +10,94 @@ use flate2::read::MultiGzDecoder;
 use ruzstd::decoding::errors::{FrameDecoderError, ReadFrameHeaderError};
 use ruzstd::decoding::{BlockDecodingStrategy, FrameDecoder};
 
-use crate::recording::error::Fault;
-use crate::recording::formats::{Format, Input, TELLING_BYTES, TableInfo, format_of};
-use crate::recording::{ReadOptions, Recording};
+use crate::recording::error::RecordingFault;
+use crate::recording::formats::{RecordingFormat, RecordingInput, SIGNATURE_BYTES, TableInfo, format_of};
+use crate::recording::{ReadOptions, SignalRecording};
 
-/// The longest stretch of bytes that zstd may look back over; its own program allows as much.
+/// Largest window of zstd in bytes; its own program allows the same.
 const LONGEST_WINDOW: u64 = 128 << 20;
-/// Up to here what is packed may grow as it likes, and beyond it so many times.
-const HARMLESS: u64 = 64 << 20;
+/// Decompressed sizes up to this limit are not checked, in bytes.
+const UNCHECKED_GROWTH: u64 = 64 << 20;
+/// Largest ratio of the decompressed size to the compressed one beyond that.
 const MOST_GROWTH: u64 = 200;
 
-/// Fails when a file grows as no recording does.
+/// Fails when the decompressed size is too large for a recording. Both sizes are in bytes.
 pub(super) fn check_growth(packed: u64, unpacked: u64) -> io::Result<()> {
-    if unpacked > HARMLESS.max(MOST_GROWTH.saturating_mul(packed)) {
+    if unpacked > UNCHECKED_GROWTH.max(MOST_GROWTH.saturating_mul(packed)) {
         return Err(io::Error::other(
-            "it unpacks to more than two hundred times its size, as no recording does",
+            "it decompresses to more than two hundred times its size, as no recording does",
         ));
     }
     Ok(())
 }
 
-/// The ways in which bytes are packed.
+/// Methods of compression.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Packing {
+pub(super) enum CompressionMethod {
+    /// gzip, possibly with several members.
     Gzip,
+    /// Zstandard, possibly with several frames.
     Zstd,
+    /// Brotli, in Parquet files.
+    #[cfg(feature = "parquet")]
     Brotli,
+    /// LZ4 frames, in MCAP files.
+    #[cfg(any(feature = "parquet", feature = "logs"))]
     Lz4,
 }
 
-impl Packing {
-    /// The bytes of a stream, unpacked.
-    pub(super) fn reader<'a>(self, packed: impl Read + 'a) -> Box<dyn Read + 'a> {
+impl CompressionMethod {
+    /// A reader of the decompressed bytes of a stream.
+    pub(super) fn decompressing_reader<'a>(self, packed: impl Read + 'a) -> Box<dyn Read + 'a> {
         match self {
             Self::Gzip => Box::new(MultiGzDecoder::new(packed)),
-            Self::Zstd => Box::new(Zstd::new(packed)),
+            Self::Zstd => Box::new(ZstdReader::new(packed)),
+            #[cfg(feature = "parquet")]
             Self::Brotli => Box::new(brotli_decompressor::Decompressor::new(packed, 1 << 16)),
+            #[cfg(any(feature = "parquet", feature = "logs"))]
             Self::Lz4 => Box::new(lz4_flex::frame::FrameDecoder::new(packed)),
         }
     }
 
-    /// Bytes unpacked; fails when they are more than `most`.
-    pub(super) fn unpacked(self, packed: &[u8], most: u64) -> io::Result<Vec<u8>> {
+    /// Decompresses bytes; fails when the result is longer than `most` bytes.
+    #[cfg(any(feature = "parquet", feature = "logs"))]
+    pub(super) fn decompress(self, packed: &[u8], most: u64) -> io::Result<Vec<u8>> {
         let mut bytes = Vec::new();
-        self.reader(packed)
+        // One byte more than allowed shows that the result is too long.
+        self.decompressing_reader(packed)
             .take(most.saturating_add(1))
             .read_to_end(&mut bytes)?;
         if bytes.len() as u64 > most {
-            return Err(io::Error::other("it unpacks to more than the file says"));
+            return Err(io::Error::other("it decompresses to more than the file declares"));
         }
         Ok(bytes)
     }
 
+    /// Description of such a file, for messages.
     fn name(self) -> &'static str {
         match self {
-            Self::Gzip => "a file packed by gzip",
-            Self::Zstd => "a file packed by zstd",
-            Self::Brotli => "a file packed by brotli",
-            Self::Lz4 => "a file packed by lz4",
+            Self::Gzip => "a file compressed by gzip",
+            Self::Zstd => "a file compressed by zstd",
+            #[cfg(feature = "parquet")]
+            Self::Brotli => "a file compressed by brotli",
+            #[cfg(any(feature = "parquet", feature = "logs"))]
+            Self::Lz4 => "a file compressed by lz4",
         }
     }
 }
 
-/// Frames of zstd, one behind the other, as its program writes them.
-struct Zstd<R> {
+/// A reader of zstd frames, which may follow each other, as in files of its own program.
+struct ZstdReader<R> {
+    /// The compressed stream.
     packed: BufReader<R>,
+    /// The decoder of the current frame.
     decoder: FrameDecoder,
+    /// Whether a frame is being decoded.
     is_in_frame: bool,
 }
 
-impl<R: Read> Zstd<R> {
+impl<R: Read> ZstdReader<R> {
+    /// Wraps a compressed stream.
     fn new(packed: R) -> Self {
         let mut decoder = FrameDecoder::new();
         decoder.set_max_window_size(LONGEST_WINDOW);
@@ -90,7 +108,7 @@ impl<R: Read> Zstd<R> {
         }
     }
 
-    /// Goes to the next frame that holds something; false where there is none.
+    /// Moves to the next frame with data; false at the end of the stream.
     fn next_frame(&mut self) -> io::Result<bool> {
         loop {
             if self.packed.fill_buf()?.is_empty() {
@@ -98,10 +116,8 @@ impl<R: Read> Zstd<R> {
             }
             match self.decoder.init(&mut self.packed) {
                 Ok(()) => return Ok(true),
-                Err(FrameDecoderError::ReadFrameHeaderError(ReadFrameHeaderError::SkipFrame {
-                    length,
-                    ..
-                })) => {
+                // Skippable frames contain data of other programs.
+                Err(FrameDecoderError::ReadFrameHeaderError(ReadFrameHeaderError::SkipFrame { length, .. })) => {
                     let mut passed = (&mut self.packed).take(u64::from(length));
                     io::copy(&mut passed, &mut io::sink())?;
                 }
@@ -110,27 +126,28 @@ impl<R: Read> Zstd<R> {
         }
     }
 
+    /// Compares the checksum of a frame, if it has one.
     fn check_sum(&self) -> io::Result<()> {
         let said = self.decoder.get_checksum_from_data();
         if said.is_some() && said != self.decoder.get_calculated_checksum() {
-            return Err(io::Error::other(
-                "a sum over its bytes is not the one it says",
-            ));
+            return Err(io::Error::other("its checksum is wrong"));
         }
         Ok(())
     }
 }
 
-impl<R: Read> Read for Zstd<R> {
+impl<R: Read> Read for ZstdReader<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         if buffer.is_empty() {
             return Ok(0);
         }
+        // Read frames until there are bytes or the stream ends.
         loop {
             if !self.is_in_frame && !self.next_frame()? {
                 return Ok(0);
             }
             self.is_in_frame = true;
+            // Decode one block at a time, so that little memory is needed.
             while self.decoder.can_collect() == 0 && !self.decoder.is_finished() {
                 let one = BlockDecodingStrategy::UptoBlocks(1);
                 let decoded = self.decoder.decode_blocks(&mut self.packed, one);
@@ -140,27 +157,32 @@ impl<R: Read> Read for Zstd<R> {
             if n > 0 {
                 return Ok(n);
             }
+            // The frame is complete.
             self.check_sum()?;
             self.is_in_frame = false;
         }
     }
 }
 
-/// A stream that is not allowed to grow without bounds.
-struct Bounded<R> {
+/// A reader that fails when its stream grows too much.
+struct BoundedReader<R> {
+    /// The decompressed stream.
     unpacked: R,
+    /// Bytes that were read from it so far.
     so_far: u64,
-    /// Bytes that it was made of.
+    /// Compressed bytes that were read so far.
     packed: Rc<Cell<u64>>,
 }
 
-/// A stream whose bytes are counted.
-struct Counted<R> {
+/// A reader that counts its bytes.
+struct CountingReader<R> {
+    /// The original stream.
     stream: R,
+    /// Number of bytes so far, shared with the user.
     count: Rc<Cell<u64>>,
 }
 
-impl<R: Read> Read for Counted<R> {
+impl<R: Read> Read for CountingReader<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let n = self.stream.read(buffer)?;
         self.count.set(self.count.get() + n as u64);
@@ -168,7 +190,7 @@ impl<R: Read> Read for Counted<R> {
     }
 }
 
-impl<R: Read> Read for Bounded<R> {
+impl<R: Read> Read for BoundedReader<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let n = self.unpacked.read(buffer)?;
         self.so_far += n as u64;
@@ -177,56 +199,62 @@ impl<R: Read> Read for Bounded<R> {
     }
 }
 
-/// A file that is packed as a whole.
-pub(super) struct Packed(pub(super) Packing);
+/// A compressed file with one of these methods.
+pub(super) struct CompressedFormat(pub(super) CompressionMethod);
 
-impl Packed {
-    /// What reads the inside says that it cannot go on; here it is clear why.
-    fn fault(&self, fault: Fault) -> Fault {
+impl CompressedFormat {
+    /// Replaces an error of reading the contents by one that names the compression as its cause.
+    fn explain_fault(&self, fault: RecordingFault) -> RecordingFault {
         match fault {
-            Fault::Unreadable { reason } => self.not_unpacked(&reason),
+            RecordingFault::Unreadable { reason } => self.decompression_fault(&reason),
             other => other,
         }
     }
 
-    fn not_unpacked(&self, reason: &str) -> Fault {
-        Fault::Format {
+    /// The fault of a file that cannot be decompressed.
+    fn decompression_fault(&self, reason: &str) -> RecordingFault {
+        RecordingFault::Format {
             format: self.0.name(),
-            says: format!("it cannot be unpacked: {reason}; is it complete?"),
+            message: format!("it cannot be decompressed: {reason}; is it complete?"),
         }
     }
 
-    /// What is in the file, by its first bytes, and all of them.
-    fn inside<'a>(&self, input: Input<'a>) -> Result<(&'static dyn Format, Input<'a>), Fault> {
+    /// The format of the contents, recognised by their first bytes, and the contents from the start.
+    ///
+    /// Fails when the contents are compressed again.
+    fn open_content<'a>(
+        &self,
+        input: RecordingInput<'a>,
+    ) -> Result<(&'static dyn RecordingFormat, RecordingInput<'a>), RecordingFault> {
+        // Count compressed bytes below the decoder, and compare them above it.
         let packed = Rc::new(Cell::new(0));
-        let mut stream = Bounded {
-            unpacked: self.0.reader(Counted {
+        let mut stream = BoundedReader {
+            unpacked: self.0.decompressing_reader(CountingReader {
                 stream: BufReader::with_capacity(1 << 16, input.stream()),
                 count: packed.clone(),
             }),
             so_far: 0,
             packed,
         };
+        // Read the first bytes to recognise the format, and put them back in front.
         let mut first = Vec::new();
-        let head = (&mut stream)
-            .take(TELLING_BYTES as u64)
-            .read_to_end(&mut first);
-        head.map_err(|error| self.not_unpacked(&error.to_string()))?;
+        let head = (&mut stream).take(SIGNATURE_BYTES as u64).read_to_end(&mut first);
+        head.map_err(|error| self.decompression_fault(&error.to_string()))?;
         let format = format_of(&first);
-        if format.is_packed() {
-            return Err(Fault::Format {
+        if format.is_compressed() {
+            return Err(RecordingFault::Format {
                 format: self.0.name(),
-                says: "what is in it is packed again; unpack it once".to_owned(),
+                message: "its content is compressed again; decompress it once".to_owned(),
             });
         }
         Ok((
             format,
-            Input::Stream(Box::new(io::Cursor::new(first).chain(stream))),
+            RecordingInput::Stream(Box::new(io::Cursor::new(first).chain(stream))),
         ))
     }
 }
 
-impl Format for Packed {
+impl RecordingFormat for CompressedFormat {
     fn extensions(&self) -> &'static [&'static str] {
         &["gz", "zst"]
     }
@@ -235,42 +263,46 @@ impl Format for Packed {
         false
     }
 
-    fn is_packed(&self) -> bool {
+    fn is_compressed(&self) -> bool {
         true
     }
 
-    fn begins(&self, first: &[u8]) -> bool {
+    fn has_signature(&self, first: &[u8]) -> bool {
         match self.0 {
-            Packing::Gzip => first.starts_with(&[0x1F, 0x8B]),
-            Packing::Zstd => {
-                // A frame, or one to be passed over in front of it.
+            CompressionMethod::Gzip => first.starts_with(&[0x1F, 0x8B]),
+            CompressionMethod::Zstd => {
+                // A frame, or a skippable frame before it.
                 first.starts_with(&[0x28, 0xB5, 0x2F, 0xFD])
                     || (first.len() > 3 && first[0] >> 4 == 5 && first[1..4] == [0x2A, 0x4D, 0x18])
             }
-            Packing::Brotli | Packing::Lz4 => false,
+            // Only pages of Parquet and chunks of MCAP are compressed in these ways.
+            #[cfg(feature = "parquet")]
+            CompressionMethod::Brotli => false,
+            #[cfg(any(feature = "parquet", feature = "logs"))]
+            CompressionMethod::Lz4 => false,
         }
     }
 
     fn read(
         &self,
-        input: Input<'_>,
+        input: RecordingInput<'_>,
         file: &str,
         options: &ReadOptions,
-    ) -> Result<Recording, Fault> {
-        let (format, inside) = self.inside(input)?;
+    ) -> Result<SignalRecording, RecordingFault> {
+        let (format, inside) = self.open_content(input)?;
         let found = format.read(inside, file, options);
-        found.map_err(|fault| self.fault(fault))
+        found.map_err(|fault| self.explain_fault(fault))
     }
 
-    fn names(&self, input: Input<'_>) -> Result<Vec<String>, Fault> {
-        let (format, inside) = self.inside(input)?;
+    fn names(&self, input: RecordingInput<'_>) -> Result<Vec<String>, RecordingFault> {
+        let (format, inside) = self.open_content(input)?;
         let found = format.names(inside);
-        found.map_err(|fault| self.fault(fault))
+        found.map_err(|fault| self.explain_fault(fault))
     }
 
-    fn tables(&self, input: Input<'_>) -> Result<Vec<TableInfo>, Fault> {
-        let (format, inside) = self.inside(input)?;
+    fn tables(&self, input: RecordingInput<'_>) -> Result<Vec<TableInfo>, RecordingFault> {
+        let (format, inside) = self.open_content(input)?;
         let found = format.tables(inside);
-        found.map_err(|fault| self.fault(fault))
+        found.map_err(|fault| self.explain_fault(fault))
     }
 }

@@ -1,6 +1,6 @@
-//! Recordings as Parquet files: the flat columns of numbers and times, read in batches of samples.
+//! Recordings as Parquet files: columns of numbers and times that are not repeated, read in batches of samples.
 //!
-//! Time stamps and times of day become seconds from the first one on, exactly, before they are rounded to a float.
+//! Time stamps and times of day become seconds since the first one, exactly, before they are rounded to a float.
 
 use std::io;
 use std::sync::Arc;
@@ -11,33 +11,31 @@ use parquet::column::reader::{ColumnReader, ColumnReaderImpl, get_column_reader}
 use parquet::data_type::DataType;
 use parquet::errors::ParquetError;
 use parquet::file::metadata::RowGroupMetaData;
-use parquet::file::reader::{
-    ChunkReader, FileReader, Length, RowGroupReader, SerializedFileReader,
-};
+use parquet::file::reader::{ChunkReader, FileReader, Length, RowGroupReader, SerializedFileReader};
 use parquet::file::serialized_reader::SerializedPageReader;
 use parquet::schema::types::{ColumnDescPtr, ColumnDescriptor};
 
-use crate::recording::column::Field;
-use crate::recording::error::Fault;
-use crate::recording::formats::packing::Packing;
-use crate::recording::formats::parquet_pages::{self, Growth, UnpackedPages};
-use crate::recording::formats::{Format, Input, TableInfo, all_of};
-use crate::recording::intake::{Flow, Intake};
-use crate::recording::notes::Note;
-use crate::recording::tables::{ColumnInfo, found_time};
-use crate::recording::{ReadOptions, Recording};
+use crate::recording::column::SampleField;
+use crate::recording::error::RecordingFault;
+use crate::recording::formats::packing::CompressionMethod;
+use crate::recording::formats::parquet_pages::{self, PageGrowth, UnpackedPages};
+use crate::recording::formats::{RecordingFormat, RecordingInput, TableInfo, read_all};
+use crate::recording::intake::{IntakeFlow, SampleIntake};
+use crate::recording::notes::RecordingNote;
+use crate::recording::tables::{ColumnInfo, find_time_range};
+use crate::recording::{ReadOptions, SignalRecording};
 
-/// Samples that are read at once.
+/// Most samples that are read at once.
 const BATCH: usize = 8192;
-/// Fields that are kept at once.
+/// Most fields of all columns that are kept at once.
 const FIELDS: usize = 1 << 22;
-/// Bytes of pages that may be in memory at once.
+/// Most bytes of pages that may be in memory at once.
 const MOST_UNPACKED: u64 = 256 << 20;
 
-/// Apache Parquet.
-pub(crate) struct Parquet;
+/// The format of Apache Parquet.
+pub(crate) struct ParquetFormat;
 
-impl Format for Parquet {
+impl RecordingFormat for ParquetFormat {
     fn suffix(&self) -> &'static str {
         " (Parquet)"
     }
@@ -46,71 +44,78 @@ impl Format for Parquet {
         &["parquet", "pq"]
     }
 
-    fn begins(&self, first: &[u8]) -> bool {
+    fn has_signature(&self, first: &[u8]) -> bool {
         first.starts_with(b"PAR1")
     }
 
     fn read(
         &self,
-        input: Input<'_>,
+        input: RecordingInput<'_>,
         file: &str,
         options: &ReadOptions,
-    ) -> Result<Recording, Fault> {
+    ) -> Result<SignalRecording, RecordingFault> {
+        // A file on disk is read in parts; bytes and streams are in memory.
         match input {
-            Input::File(stream) => read(stream, file, options),
-            Input::Bytes(bytes) => read(Bytes::copy_from_slice(bytes), file, options),
-            Input::Stream(stream) => read(Bytes::from(all_of(stream)?), file, options),
+            RecordingInput::File(stream) => read(stream, file, options),
+            RecordingInput::Bytes(bytes) => read(Bytes::copy_from_slice(bytes), file, options),
+            RecordingInput::Stream(stream) => read(Bytes::from(read_all(stream)?), file, options),
         }
     }
 
-    fn names(&self, input: Input<'_>) -> Result<Vec<String>, Fault> {
+    fn names(&self, input: RecordingInput<'_>) -> Result<Vec<String>, RecordingFault> {
         match input {
-            Input::File(stream) => names_of(stream),
-            Input::Bytes(bytes) => names_of(Bytes::copy_from_slice(bytes)),
-            Input::Stream(stream) => names_of(Bytes::from(all_of(stream)?)),
+            RecordingInput::File(stream) => names_of(stream),
+            RecordingInput::Bytes(bytes) => names_of(Bytes::copy_from_slice(bytes)),
+            RecordingInput::Stream(stream) => names_of(Bytes::from(read_all(stream)?)),
         }
     }
 
-    fn tables(&self, input: Input<'_>) -> Result<Vec<TableInfo>, Fault> {
+    fn tables(&self, input: RecordingInput<'_>) -> Result<Vec<TableInfo>, RecordingFault> {
         match input {
-            Input::File(stream) => tables_of(Shared(Arc::new(stream))),
-            Input::Bytes(bytes) => tables_of(Shared(Arc::new(Bytes::copy_from_slice(bytes)))),
-            Input::Stream(stream) => tables_of(Shared(Arc::new(Bytes::from(all_of(stream)?)))),
+            RecordingInput::File(stream) => tables_of(SharedChunkReader(Arc::new(stream))),
+            RecordingInput::Bytes(bytes) => tables_of(SharedChunkReader(Arc::new(Bytes::copy_from_slice(bytes)))),
+            RecordingInput::Stream(stream) => tables_of(SharedChunkReader(Arc::new(Bytes::from(read_all(stream)?)))),
         }
     }
 }
 
+/// Reads the columns that are needed.
 fn read(
     stream: impl ChunkReader + 'static,
     file: &str,
     options: &ReadOptions,
-) -> Result<Recording, Fault> {
+) -> Result<SignalRecording, RecordingFault> {
+    // The stream is shared between the checks of pages and the reader.
     let bytes = Arc::new(stream);
-    let reader = SerializedFileReader::new(Shared(bytes.clone())).map_err(fault)?;
+    let reader = SerializedFileReader::new(SharedChunkReader(bytes.clone())).map_err(parquet_fault)?;
     let schema = reader.metadata().file_metadata().schema_descr_ptr();
     let width = schema.num_columns();
-    let mut intake = Intake::new(names(&reader), options)?;
-    let mut kinds: Vec<Kind> = (0..width)
-        .map(|i| Kind::in_column(&schema.column(i)))
+    let mut intake = SampleIntake::new(names(&reader), options)?;
+    // The meaning of the numbers in each column.
+    let mut kinds: Vec<ParquetValueKind> = (0..width)
+        .map(|i| ParquetValueKind::from_column(&schema.column(i)))
         .collect();
+    // Columns of time stamps are reported, because their values change.
     for (i, kind) in kinds.iter().enumerate() {
-        if intake.reads(i) && matches!(kind, Kind::Ticks { .. }) {
-            intake.note(Note::info(format!(
-                "`{}` of {file} holds time stamps: it counts in seconds from the first one on.",
+        if intake.is_place_needed(i) && matches!(kind, ParquetValueKind::Ticks { .. }) {
+            intake.note(RecordingNote::info(format!(
+                "`{}` of {file} has time stamps: it is read as seconds since the first one.",
                 schema.column(i).path().string()
             )));
         }
     }
-    let is_read = |i: usize| intake.reads(i) && !matches!(kinds[i], Kind::Unusable);
+    // Columns without numbers are not read, but reported as text if they are needed.
+    let is_read = |i: usize| intake.is_place_needed(i) && !matches!(kinds[i], ParquetValueKind::Unusable);
     let wanted: Vec<bool> = (0..width).map(is_read).collect();
-    // As many samples at once as keep the fields of all columns few.
+    // The size of a batch keeps the number of fields in memory small.
     let n_read = wanted.iter().filter(|is_read| **is_read).count();
     let most = (FIELDS / n_read.max(1)).clamp(1, BATCH);
-    let mut sample = vec![Field::Number(0.0); width];
+    let mut sample = vec![SampleField::Number(0.0); width];
     let mut row = 0;
+    // Each group of rows is checked before anything in it is decompressed.
     for group in 0..reader.num_row_groups() {
         check_pages(bytes.as_ref(), reader.metadata().row_group(group), &wanted)?;
-        let group = reader.get_row_group(group).map_err(fault)?;
+        let group = reader.get_row_group(group).map_err(parquet_fault)?;
         let mut columns = Vec::new();
         for i in 0..width {
             columns.push(if wanted[i] {
@@ -119,31 +124,34 @@ fn read(
                 None
             });
         }
+        // Read a batch of every needed column, then pass its samples to the intake.
         let mut left = usize::try_from(group.metadata().num_rows()).unwrap_or(0);
         while left > 0 {
             let n = left.min(most);
-            let mut fields: Vec<Vec<Field>> = Vec::with_capacity(width);
+            let mut fields: Vec<Vec<SampleField>> = Vec::with_capacity(width);
             for (column, kind) in columns.iter_mut().zip(&mut kinds) {
                 fields.push(match column {
-                    Some(column) => batch(column, kind, n)?,
+                    Some(column) => read_batch(column, kind, n)?,
                     None => Vec::new(),
                 });
             }
             for k in 0..n {
                 row += 1;
+                // Fields of columns that are not read are zeros if they are not needed, otherwise text.
                 for (i, field) in sample.iter_mut().enumerate() {
                     *field = match fields[i].get(k) {
                         Some(field) => *field,
-                        // A column that nobody reads, or that holds no numbers.
-                        None if columns[i].is_none() && !intake.reads(i) => Field::Number(0.0),
-                        None => Field::Text,
+                        // A column that is not needed.
+                        None if columns[i].is_none() && !intake.is_place_needed(i) => SampleField::Number(0.0),
+                        None => SampleField::Text,
                     };
                 }
+                // The text of a field for messages.
                 let text = |i: usize| match sample[i] {
-                    Field::Text => "a value of another type".to_owned(),
+                    SampleField::Text => "a value of another type".to_owned(),
                     _ => "null or NaN".to_owned(),
                 };
-                if intake.take(row, &sample, &text)? == Flow::Stop {
+                if intake.take_sample(row, &sample, &text)? == IntakeFlow::Stop {
                     return intake.finish(file);
                 }
             }
@@ -153,91 +161,83 @@ fn read(
     intake.finish(file)
 }
 
-/// What reads a column of a row group. Pages that the library has no pure decoder for are read as if they were not packed,
-/// and unpacked on their way.
+/// The reader of a column of a row group. For compressions without a decoder in the library, pages are read as if
+/// they were uncompressed, and decompressed afterwards.
 fn column_reader<R: ChunkReader + 'static>(
     bytes: &Arc<R>,
     group: &dyn RowGroupReader,
     i: usize,
     column: &ColumnDescPtr,
-) -> Result<ColumnReader, Fault> {
+) -> Result<ColumnReader, RecordingFault> {
     let chunk = group.metadata().column(i);
+    // The library decodes these two only with C code.
     let packing = match chunk.compression() {
-        Compression::ZSTD(_) => Packing::Zstd,
-        Compression::BROTLI(_) => Packing::Brotli,
-        _ => return group.get_column_reader(i).map_err(fault),
+        Compression::ZSTD(_) => CompressionMethod::Zstd,
+        Compression::BROTLI(_) => CompressionMethod::Brotli,
+        _ => return group.get_column_reader(i).map_err(parquet_fault),
     };
+    // The copy of the metadata declares the pages as uncompressed.
     let as_stored = chunk
         .clone()
         .into_builder()
         .set_compression(Compression::UNCOMPRESSED)
         .build()
-        .map_err(fault)?;
+        .map_err(parquet_fault)?;
     let rows = usize::try_from(group.metadata().num_rows()).unwrap_or(0);
-    let pages = SerializedPageReader::new(bytes.clone(), &as_stored, rows, None).map_err(fault)?;
+    let pages = SerializedPageReader::new(bytes.clone(), &as_stored, rows, None).map_err(parquet_fault)?;
     let pages = UnpackedPages { pages, packing };
     Ok(get_column_reader(column.clone(), Box::new(pages)))
 }
 
-/// Fails when pages of a row group would take more memory than there may be, before any is unpacked.
-fn check_pages<R: ChunkReader>(
-    bytes: &R,
-    group: &RowGroupMetaData,
-    wanted: &[bool],
-) -> Result<(), Fault> {
-    let refused = |error: io::Error| fault(ParquetError::General(error.to_string()));
+/// Fails when the pages of a row group would need too much memory. Nothing is decompressed for this, except gzip.
+fn check_pages<R: ChunkReader>(bytes: &R, group: &RowGroupMetaData, wanted: &[bool]) -> Result<(), RecordingFault> {
+    let refused = |error: io::Error| parquet_fault(ParquetError::General(error.to_string()));
     let mut sum = 0;
-    for (column, _) in group
-        .columns()
-        .iter()
-        .zip(wanted)
-        .filter(|(_, is_wanted)| **is_wanted)
-    {
+    // The largest pages of all needed columns are added.
+    for (column, _) in group.columns().iter().zip(wanted).filter(|(_, is_wanted)| **is_wanted) {
+        // The compression decides whether the declared size can be trusted.
         let growth = match column.compression() {
-            Compression::GZIP(_) => Growth::Gzip,
-            Compression::LZ4 => Growth::OldLz4,
-            _ => Growth::AsSaid,
+            Compression::GZIP(_) => PageGrowth::Gzip,
+            Compression::LZ4 => PageGrowth::OldLz4,
+            _ => PageGrowth::Declared,
         };
+        // A dictionary page comes before the data pages.
         let start = column
             .dictionary_page_offset()
             .unwrap_or_else(|| column.data_page_offset());
-        let (start, length) = (
-            u64::try_from(start),
-            u64::try_from(column.compressed_size()),
-        );
+        let (start, length) = (u64::try_from(start), u64::try_from(column.compressed_size()));
         let (Ok(start), Ok(length)) = (start, length) else {
             return Err(refused(io::Error::other("a column has a negative place")));
         };
-        let stream = bytes.get_read(start).map_err(fault)?;
-        sum += parquet_pages::largest(stream, length, growth).map_err(refused)?;
+        let stream = bytes.get_read(start).map_err(parquet_fault)?;
+        sum += parquet_pages::largest_page(stream, length, growth).map_err(refused)?;
     }
-    // One page of every column is in memory at once.
+    // One page of each column is in memory at the same time.
     if sum > MOST_UNPACKED {
-        return Err(refused(io::Error::other(
-            "its pages would take too much memory",
-        )));
+        return Err(refused(io::Error::other("its pages would take too much memory")));
     }
     Ok(())
 }
 
-/// A file of which the pages are looked at before they are read.
-struct Shared<R>(Arc<R>);
+/// A stream that is shared by the checks of pages and the reader.
+struct SharedChunkReader<R>(Arc<R>);
 
-impl<R> Clone for Shared<R> {
+impl<R> Clone for SharedChunkReader<R> {
     fn clone(&self) -> Self {
         Self(self.0.clone())
     }
 }
 
-impl<R: Length> Length for Shared<R> {
+impl<R: Length> Length for SharedChunkReader<R> {
     fn len(&self) -> u64 {
         self.0.len()
     }
 }
 
-impl<R: ChunkReader> ChunkReader for Shared<R> {
+impl<R: ChunkReader> ChunkReader for SharedChunkReader<R> {
     type T = R::T;
 
+    // All methods are those of the stream.
     fn get_read(&self, start: u64) -> parquet::errors::Result<R::T> {
         self.0.get_read(start)
     }
@@ -247,9 +247,9 @@ impl<R: ChunkReader> ChunkReader for Shared<R> {
     }
 }
 
-/// The one table of a file.
-fn tables_of(stream: Shared<impl ChunkReader + 'static>) -> Result<Vec<TableInfo>, Fault> {
-    let reader = SerializedFileReader::new(stream.clone()).map_err(fault)?;
+/// The single table of a file.
+fn tables_of(stream: SharedChunkReader<impl ChunkReader + 'static>) -> Result<Vec<TableInfo>, RecordingFault> {
+    let reader = SerializedFileReader::new(stream.clone()).map_err(parquet_fault)?;
     let schema = reader.metadata().file_metadata().schema_descr_ptr();
     let info = |column: &ColumnDescPtr| ColumnInfo {
         name: column.path().string(),
@@ -262,67 +262,70 @@ fn tables_of(stream: Shared<impl ChunkReader + 'static>) -> Result<Vec<TableInfo
         kind: String::new(),
         columns: schema.columns().iter().map(info).collect(),
         samples: usize::try_from(rows).unwrap_or(0),
-        time: found_time(&names, |name| {
-            read(stream, "", &ReadOptions::only(name)).ok()
-        }),
+        // The time column is read completely for its range.
+        time: find_time_range(&names, |name| read(stream, "", &ReadOptions::single_column(name)).ok()),
         remark: None,
     }])
 }
 
-/// Type of a column, in the words of the others.
+/// Type of a column, in the words that other formats use.
 fn kind_of(column: &ColumnDescriptor) -> String {
-    let kind = match (Kind::in_column(column), column.physical_type()) {
-        (Kind::Ticks { .. }, _) | (_, Type::INT96) => "time",
-        (Kind::Decimal(_), _) => "decimal",
-        (Kind::Unusable, _) => "no number",
-        (Kind::Unsigned, Type::INT32) => "uint32",
-        (Kind::Unsigned, _) => "uint64",
-        (Kind::Numbers, Type::BOOLEAN) => "bool",
-        (Kind::Numbers, Type::INT32) => "int32",
-        (Kind::Numbers, Type::INT64) => "int64",
-        (Kind::Numbers, Type::FLOAT) => "float32",
-        (Kind::Numbers, _) => "float64",
+    let kind = match (ParquetValueKind::from_column(column), column.physical_type()) {
+        (ParquetValueKind::Ticks { .. }, _) | (_, Type::INT96) => "time",
+        (ParquetValueKind::Decimal(_), _) => "decimal",
+        (ParquetValueKind::Unusable, _) => "no number",
+        (ParquetValueKind::Unsigned, Type::INT32) => "uint32",
+        (ParquetValueKind::Unsigned, _) => "uint64",
+        (ParquetValueKind::Numbers, Type::BOOLEAN) => "bool",
+        (ParquetValueKind::Numbers, Type::INT32) => "int32",
+        (ParquetValueKind::Numbers, Type::INT64) => "int64",
+        (ParquetValueKind::Numbers, Type::FLOAT) => "float32",
+        (ParquetValueKind::Numbers, _) => "float64",
     };
     kind.to_owned()
 }
 
-/// Names of the columns; those of nested ones hold points.
-fn names_of(stream: impl ChunkReader + 'static) -> Result<Vec<String>, Fault> {
-    Ok(names(&SerializedFileReader::new(stream).map_err(fault)?))
+/// Names of the columns; names of nested ones contain points.
+fn names_of(stream: impl ChunkReader + 'static) -> Result<Vec<String>, RecordingFault> {
+    Ok(names(&SerializedFileReader::new(stream).map_err(parquet_fault)?))
 }
 
+/// Names of the columns of an open file, by their paths.
 fn names<R: ChunkReader + 'static>(reader: &SerializedFileReader<R>) -> Vec<String> {
     let schema = reader.metadata().file_metadata().schema_descr();
     let columns = schema.columns().iter();
     columns.map(|column| column.path().string()).collect()
 }
 
-/// What the numbers of a column mean.
-enum Kind {
+/// The meaning of the numbers of a column.
+enum ParquetValueKind {
+    /// Numbers without a conversion.
     Numbers,
-    /// Whole numbers without a sign, in all bits of what they are stored in.
+    /// Integers without a sign, which use all bits of their type.
     Unsigned,
-    /// Whole numbers of this many to the second; the first one is zero once it is known.
+    /// Times as integers; the first one becomes zero.
     Ticks {
+        /// Ticks per second.
         per_second: f64,
+        /// The first value, once it has been read.
         first: Option<i64>,
     },
-    /// Whole numbers with so many decimals.
+    /// Integers with this many decimal places.
     Decimal(i32),
+    /// Texts, lists, and anything else that is not a number.
     Unusable,
 }
 
-impl Kind {
-    fn in_column(column: &ColumnDescriptor) -> Self {
+impl ParquetValueKind {
+    /// The meaning from the types in the schema; the logical type takes precedence over the older converted type.
+    fn from_column(column: &ColumnDescriptor) -> Self {
         let ticks = |per_second| Self::Ticks {
             per_second,
             first: None,
         };
-        // Texts are no numbers, and a few bytes may stand for very long ones.
-        let is_text = matches!(
-            column.physical_type(),
-            Type::BYTE_ARRAY | Type::FIXED_LEN_BYTE_ARRAY
-        );
+        // Texts are not numbers, and a few bytes of a dictionary may expand to very long ones.
+        let is_text = matches!(column.physical_type(), Type::BYTE_ARRAY | Type::FIXED_LEN_BYTE_ARRAY);
+        // Repeated fields have no value per sample.
         if column.max_rep_level() > 0 || is_text {
             return Self::Unusable;
         }
@@ -337,36 +340,35 @@ impl Kind {
             ConvertedType::TIMESTAMP_MILLIS | ConvertedType::TIME_MILLIS => ticks(1e3),
             ConvertedType::TIMESTAMP_MICROS | ConvertedType::TIME_MICROS => ticks(1e6),
             ConvertedType::DECIMAL => Self::Decimal(column.type_scale()),
-            ConvertedType::UINT_8
-            | ConvertedType::UINT_16
-            | ConvertedType::UINT_32
-            | ConvertedType::UINT_64 => Self::Unsigned,
+            ConvertedType::UINT_8 | ConvertedType::UINT_16 | ConvertedType::UINT_32 | ConvertedType::UINT_64 => {
+                Self::Unsigned
+            }
             _ => Self::Numbers,
         }
     }
 
-    /// A whole number in seconds or with its decimals.
-    fn whole(&mut self, value: i64) -> f64 {
+    /// Converts an integer: ticks to seconds, decimals to their value.
+    fn convert_integer(&mut self, value: i64) -> f64 {
         match self {
-            // Differences of ticks within a recording are far below 2^53, where floats are exact.
-            Self::Ticks { per_second, first } => {
-                value.wrapping_sub(*first.get_or_insert(value)) as f64 / *per_second
-            }
+            // Differences of ticks in a recording are far below 2^53, so that floats are exact.
+            Self::Ticks { per_second, first } => value.wrapping_sub(*first.get_or_insert(value)) as f64 / *per_second,
             Self::Decimal(scale) => value as f64 / 10.0_f64.powi(*scale),
             Self::Unsigned => value.cast_unsigned() as f64,
             Self::Numbers | Self::Unusable => value as f64,
         }
     }
 
-    /// The same of a number that is stored in four bytes.
-    fn short(&mut self, value: i32) -> f64 {
+    /// Converts an integer of four bytes.
+    fn convert_short_integer(&mut self, value: i32) -> f64 {
         match self {
+            // The sign bit belongs to the value, so it must be removed before the conversion.
             Self::Unsigned => f64::from(value.cast_unsigned()),
-            _ => self.whole(i64::from(value)),
+            _ => self.convert_integer(i64::from(value)),
         }
     }
 }
 
+/// Ticks per second of a unit.
 fn per_second(unit: TimeUnit) -> f64 {
     match unit {
         TimeUnit::MILLIS => 1e3,
@@ -375,90 +377,100 @@ fn per_second(unit: TimeUnit) -> f64 {
     }
 }
 
-/// The next `n` fields of a column.
-fn batch(column: &mut ColumnReader, kind: &mut Kind, n: usize) -> Result<Vec<Field>, Fault> {
+/// Reads the next `n` fields of a column.
+fn read_batch(
+    column: &mut ColumnReader,
+    kind: &mut ParquetValueKind,
+    n: usize,
+) -> Result<Vec<SampleField>, RecordingFault> {
     match column {
-        ColumnReader::BoolColumnReader(reader) => values(reader, n, |value| {
-            Field::Number(f64::from(u8::from(*value)))
+        ColumnReader::BoolColumnReader(reader) => {
+            read_values(reader, n, |value| SampleField::Number(f64::from(u8::from(*value))))
+        }
+        ColumnReader::Int32ColumnReader(reader) => read_values(reader, n, |value| {
+            SampleField::finite(kind.convert_short_integer(*value))
         }),
-        ColumnReader::Int32ColumnReader(reader) => {
-            values(reader, n, |value| Field::finite(kind.short(*value)))
-        }
         ColumnReader::Int64ColumnReader(reader) => {
-            values(reader, n, |value| Field::finite(kind.whole(*value)))
+            read_values(reader, n, |value| SampleField::finite(kind.convert_integer(*value)))
         }
+        // Times of 12 bytes are converted to nanoseconds.
         ColumnReader::Int96ColumnReader(reader) => {
-            let mut ticks = Kind::Ticks {
+            let mut ticks = ParquetValueKind::Ticks {
                 per_second: 1e9,
                 first: match kind {
-                    Kind::Ticks { first, .. } => *first,
+                    ParquetValueKind::Ticks { first, .. } => *first,
                     _ => None,
                 },
             };
-            let fields = values(reader, n, |value| {
-                Field::finite(ticks.whole(value.to_nanos()))
+            let fields = read_values(reader, n, |value| {
+                SampleField::finite(ticks.convert_integer(value.to_nanos()))
             });
+            // The first value must be kept for the next batch.
             *kind = ticks;
             fields
         }
         ColumnReader::FloatColumnReader(reader) => {
-            values(reader, n, |value| Field::finite(f64::from(*value)))
+            read_values(reader, n, |value| SampleField::finite(f64::from(*value)))
         }
-        ColumnReader::DoubleColumnReader(reader) => {
-            values(reader, n, |value| Field::finite(*value))
-        }
-        // Columns of texts are not read.
+        ColumnReader::DoubleColumnReader(reader) => read_values(reader, n, |value| SampleField::finite(*value)),
+        // Columns of texts are never read.
         ColumnReader::ByteArrayColumnReader(_) | ColumnReader::FixedLenByteArrayColumnReader(_) => {
-            Ok(vec![Field::Text; n])
+            Ok(vec![SampleField::Text; n])
         }
     }
 }
 
-/// The next `n` values of a column, those that are null among them.
-fn values<T: DataType>(
+/// Reads the next `n` values of a column, including nulls.
+///
+/// Fails when the column ends before the others.
+fn read_values<T: DataType>(
     reader: &mut ColumnReaderImpl<T>,
     n: usize,
-    mut field: impl FnMut(&T::T) -> Field,
-) -> Result<Vec<Field>, Fault> {
+    mut field: impl FnMut(&T::T) -> SampleField,
+) -> Result<Vec<SampleField>, RecordingFault> {
     let mut fields = Vec::with_capacity(n);
+    // A call may return fewer records than requested.
     while fields.len() < n {
         let (mut levels, mut values) = (Vec::new(), Vec::new());
         let wanted = n - fields.len();
         let (records, n_values, n_levels) = reader
             .read_records(wanted, Some(&mut levels), None, &mut values)
-            .map_err(fault)?;
+            .map_err(parquet_fault)?;
         if records == 0 {
-            return Err(Fault::Format {
+            return Err(RecordingFault::Format {
                 format: "a Parquet file",
-                says: "a column ends before the others do; write the file again".to_owned(),
+                message: "a column ends before the others do; write the file again".to_owned(),
             });
         }
+        // Without nulls there is one value for each record.
         if n_values == records || n_levels == 0 {
             fields.extend(values.iter().map(&mut field));
             continue;
         }
+        // Otherwise the definition levels state which records have a value.
         let most = levels.iter().copied().max().unwrap_or(0);
         let mut values = values.iter();
         fields.extend(levels.iter().map(|level| {
             // Fewer values than levels: the highest level is that of a value, unless all are null.
             if *level == most && n_values > 0 {
-                values.next().map_or(Field::NotFinite, &mut field)
+                values.next().map_or(SampleField::NotFinite, &mut field)
             } else {
-                Field::NotFinite
+                SampleField::NotFinite
             }
         }));
     }
     Ok(fields)
 }
 
-fn fault(error: ParquetError) -> Fault {
+/// The fault of a file that the library cannot read.
+fn parquet_fault(error: ParquetError) -> RecordingFault {
     let says = match error {
         ParquetError::General(says) | ParquetError::NYI(says) | ParquetError::EOF(says) => says,
         other => other.to_string(),
     };
-    Fault::Format {
+    RecordingFault::Format {
         format: "a Parquet file",
-        says: format!(
+        message: format!(
             "it cannot be read: {says}; write it again, uncompressed or compressed by snappy, gzip, zstd, brotli or lz4"
         ),
     }

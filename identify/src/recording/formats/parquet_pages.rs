@@ -1,10 +1,9 @@
-//! Pages of a Parquet file: looked at before they are unpacked, and unpacked where the library has no decoder without C.
+//! Pages of a Parquet file: checked before decompression, and decompressed if the library has no decoder without C.
 //!
-//! Their headers alone say how large they become, and the library that
-//! reads them believes it.
+//! Only their headers state how large they become, and the library relies on that.
 //!
-//! A column's pages stand one behind the other, each with a header in Thrift's compact protocol (apache/parquet-format,
-//! `parquet.thrift`, struct `PageHeader`). Only the few numbers that say a size are taken from it.
+//! The pages of a column follow each other, each with a header in Thrift's compact protocol (apache/parquet-format,
+//! `parquet.thrift`, struct `PageHeader`). Only the few numbers that state a size are read from it.
 
 use std::io::{self, BufReader, Read};
 
@@ -12,70 +11,76 @@ use flate2::read::MultiGzDecoder;
 use parquet::column::page::{Page, PageMetadata, PageReader};
 use parquet::errors::{ParquetError, Result};
 
-use crate::recording::formats::packing::Packing;
+use crate::recording::formats::packing::CompressionMethod;
 
-/// The largest page that is unpacked, bytes; writers make pages of one million.
+/// Largest page after decompression in bytes; writers usually make pages of one million.
 const LARGEST_PAGE: u64 = 128 << 20;
-/// The largest page in the old form of LZ4 as it stands in the file: it may grow 255 times before its size is compared
-/// with the header's.
+/// Largest page in the old form of LZ4, in bytes as stored. It may grow 255 times before its size is compared with
+/// that in the header.
 const LARGEST_OLD_LZ4: u64 = 2 << 20;
-/// Structures within one another in a header; Parquet has four.
+/// Deepest nesting of structures in a header; Parquet has four levels.
 const DEEPEST: usize = 16;
 
-/// How much pages may grow when they are unpacked.
+/// How the size of pages is limited during decompression.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Growth {
-    /// To the size that the header says, which whoever unpacks them holds to.
-    AsSaid,
-    /// To whatever is in it.
+pub(super) enum PageGrowth {
+    /// By the size in the header, which the decoder respects.
+    Declared,
+    /// By nothing but the contents.
     Gzip,
-    /// To whatever is in it, up to 255 times.
+    /// By a factor of 255.
     OldLz4,
 }
 
-/// Looks through the pages of a column that is `length` bytes long; the size of the largest unpacked.
+/// Reads the page headers of a column of `length` bytes; returns the largest size after decompression, in bytes.
 ///
-/// Fails when a page is larger than any that makes sense, or does not keep to its header.
-pub(super) fn largest(stream: impl Read, length: u64, growth: Growth) -> io::Result<u64> {
+/// Fails when a page is too large, or larger than its header states.
+pub(super) fn largest_page(stream: impl Read, length: u64, growth: PageGrowth) -> io::Result<u64> {
     let mut stream = BufReader::with_capacity(1 << 16, stream.take(length)).take(length);
     let mut largest = 0;
     while stream.limit() > 0 {
-        let page = Header::read(&mut stream)?;
+        let page = PageSizes::read(&mut stream)?;
+        // Sizes are checked before the contents are skipped or decompressed.
         if page.packed > stream.limit() {
             return Err(io::Error::other("a page is longer than its column"));
         }
-        // A dictionary's numbers have four bytes at least.
+        // A number of a dictionary has four bytes at least.
         let is_too_large = page.unpacked > LARGEST_PAGE
             || page.words.saturating_mul(4) > page.unpacked
-            || (growth == Growth::OldLz4 && page.packed > LARGEST_OLD_LZ4);
+            || (growth == PageGrowth::OldLz4 && page.packed > LARGEST_OLD_LZ4);
         if is_too_large {
             return Err(io::Error::other("a page would take too much memory"));
         }
         let mut body = (&mut stream).take(page.packed);
-        if growth == Growth::Gzip && page.is_packed {
+        // gzip does not limit its output, so it is decompressed once and counted.
+        if growth == PageGrowth::Gzip && page.is_packed {
             io::copy(&mut (&mut body).take(page.levels), &mut io::sink())?;
             let inside = page.unpacked.saturating_sub(page.levels);
             let mut all = MultiGzDecoder::new(&mut body).take(inside + 1);
             if io::copy(&mut all, &mut io::sink())? > inside {
-                return Err(io::Error::other("a page is larger than its header says"));
+                return Err(io::Error::other("a page is larger than its header states"));
             }
         }
+        // Skip to the next header.
         io::copy(&mut body, &mut io::sink())?;
         largest = largest.max(page.unpacked);
     }
     Ok(largest)
 }
 
-/// The pages of a column, of which the library takes the bytes as they are stored.
+/// The pages of a column, which the library reads as stored and which are decompressed here.
 pub(super) struct UnpackedPages<P> {
+    /// The pages as stored.
     pub(super) pages: P,
-    pub(super) packing: Packing,
+    /// The compression of the column.
+    pub(super) packing: CompressionMethod,
 }
 
 impl<P: PageReader> UnpackedPages<P> {
-    fn unpacked(&self, page: Page) -> Result<Page> {
+    /// Decompresses a page; its other fields stay unchanged.
+    fn decompress_page(&self, page: Page) -> Result<Page> {
         let unpack = |packed: &[u8]| {
-            let unpacked = self.packing.unpacked(packed, LARGEST_PAGE);
+            let unpacked = self.packing.decompress(packed, LARGEST_PAGE);
             unpacked.map_err(|error| ParquetError::General(error.to_string()))
         };
         Ok(match page {
@@ -116,13 +121,11 @@ impl<P: PageReader> UnpackedPages<P> {
                 is_compressed,
                 statistics,
             } => {
-                // Levels stand in front and are never packed.
+                // Levels come first and are never compressed.
                 let levels = u64::from(def_levels_byte_len) + u64::from(rep_levels_byte_len);
                 let levels = usize::try_from(levels).unwrap_or(usize::MAX);
                 let Some((levels, values)) = buf.split_at_checked(levels) else {
-                    return Err(ParquetError::General(
-                        "a page is shorter than its levels".to_owned(),
-                    ));
+                    return Err(ParquetError::General("a page is shorter than its levels".to_owned()));
                 };
                 let buf = if is_compressed && !values.is_empty() {
                     [levels, &unpack(values)?].concat().into()
@@ -156,7 +159,7 @@ impl<P: PageReader> Iterator for UnpackedPages<P> {
 impl<P: PageReader> PageReader for UnpackedPages<P> {
     fn get_next_page(&mut self) -> Result<Option<Page>> {
         let page = self.pages.get_next_page()?;
-        page.map(|page| self.unpacked(page)).transpose()
+        page.map(|page| self.decompress_page(page)).transpose()
     }
 
     fn peek_next_page(&mut self) -> Result<Option<PageMetadata>> {
@@ -168,29 +171,32 @@ impl<P: PageReader> PageReader for UnpackedPages<P> {
     }
 }
 
-/// What a header says of sizes.
+/// The sizes in a page header.
 #[derive(Debug, Default)]
-struct Header {
-    /// Bytes in the file.
+struct PageSizes {
+    /// Bytes as stored.
     packed: u64,
-    /// Bytes in memory.
+    /// Bytes after decompression.
     unpacked: u64,
-    /// Numbers of a dictionary.
+    /// Number of values in a dictionary.
     words: u64,
-    /// Bytes at the beginning that are never packed.
+    /// Bytes of levels at the beginning, which are never compressed.
     levels: u64,
+    /// Whether the values are compressed; the older page header has no such field.
     is_packed: bool,
 }
 
-impl Header {
+impl PageSizes {
+    /// Reads a header; the numbers of fields are those of `parquet.thrift`.
     fn read(stream: &mut impl Read) -> io::Result<Self> {
         let mut page = Self {
             is_packed: true,
             ..Self::default()
         };
         let mut is_negative = false;
-        fields(stream, &mut Vec::new(), &mut |path, value| {
+        read_fields(stream, &mut Vec::new(), &mut |path, value| {
             let size = || value.and_then(|n| u64::try_from(n).ok());
+            // Sizes of the page, number of dictionary values, sizes of levels, flag of compression.
             match path {
                 [2] => page.unpacked = size().unwrap_or(u64::MAX),
                 [3] => page.packed = size().unwrap_or(u64::MAX),
@@ -210,7 +216,7 @@ impl Header {
     }
 }
 
-/// Types of Thrift's compact protocol.
+/// Types of values in Thrift's compact protocol.
 const TRUE: u8 = 1;
 const FALSE: u8 = 2;
 const BYTE: u8 = 3;
@@ -220,9 +226,9 @@ const LIST: u8 = 9;
 const SET: u8 = 10;
 const STRUCT: u8 = 12;
 
-/// Reads a structure; `tell` hears of every whole number by the numbers of its fields, and of truths, of which a false one
-/// has no value.
-fn fields(
+/// Reads a structure. `tell` receives every integer and every boolean with the path of its field numbers; a false
+/// boolean has no value.
+fn read_fields(
     stream: &mut dyn Read,
     path: &mut Vec<i64>,
     tell: &mut dyn FnMut(&[i64], Option<i64>),
@@ -232,33 +238,36 @@ fn fields(
     }
     let mut field = 0_i64;
     loop {
+        // A header byte of zero ends the structure.
         let head = byte(stream)?;
         if head == 0 {
             return Ok(());
         }
+        // The field number is a difference to the last one, or follows as a number.
         field = match head >> 4 {
-            0 => signed(varint(stream)?),
+            0 => decode_zigzag(varint(stream)?),
             step => field.wrapping_add(i64::from(step)),
         };
         path.push(field);
+        // Integers and booleans are passed on, structures are read, all others are skipped.
         match head & 15 {
             TRUE => tell(path, Some(1)),
             FALSE => tell(path, None),
             4..=6 => {
-                let number = signed(varint(stream)?);
+                let number = decode_zigzag(varint(stream)?);
                 tell(path, Some(number));
             }
-            STRUCT => fields(stream, path, tell)?,
-            kind => pass(stream, kind, path)?,
+            STRUCT => read_fields(stream, path, tell)?,
+            kind => skip_value(stream, kind, path)?,
         }
         path.pop();
     }
 }
 
-/// Passes over a value of which nothing is wanted.
-fn pass(stream: &mut dyn Read, kind: u8, path: &mut Vec<i64>) -> io::Result<()> {
+/// Skips a value that is not needed.
+fn skip_value(stream: &mut dyn Read, kind: u8, path: &mut Vec<i64>) -> io::Result<()> {
     match kind {
-        // Within a list a truth takes a byte.
+        // In a list a boolean is one byte.
         TRUE | FALSE | BYTE => skip(stream, 1),
         4..=6 => varint(stream).map(drop),
         DOUBLE => skip(stream, 8),
@@ -266,6 +275,7 @@ fn pass(stream: &mut dyn Read, kind: u8, path: &mut Vec<i64>) -> io::Result<()> 
             let length = varint(stream)?;
             skip(stream, length)
         }
+        // The length of a list is in its first byte, or follows if it is 15 or more.
         LIST | SET if path.len() <= DEEPEST => {
             path.push(0);
             let head = byte(stream)?;
@@ -274,16 +284,17 @@ fn pass(stream: &mut dyn Read, kind: u8, path: &mut Vec<i64>) -> io::Result<()> 
                 n => u64::from(n),
             };
             for _ in 0..n {
-                pass(stream, head & 15, path)?;
+                skip_value(stream, head & 15, path)?;
             }
             path.pop();
             Ok(())
         }
-        STRUCT => fields(stream, path, &mut |_, _| {}),
+        STRUCT => read_fields(stream, path, &mut |_, _| {}),
         _ => Err(io::Error::other("a page's header cannot be read")),
     }
 }
 
+/// Skips `n` bytes; fails when there are fewer.
 fn skip(stream: &mut dyn Read, n: u64) -> io::Result<()> {
     if io::copy(&mut stream.take(n), &mut io::sink())? < n {
         return Err(io::ErrorKind::UnexpectedEof.into());
@@ -291,12 +302,14 @@ fn skip(stream: &mut dyn Read, n: u64) -> io::Result<()> {
     Ok(())
 }
 
+/// The next byte.
 fn byte(stream: &mut dyn Read) -> io::Result<u8> {
     let mut one = [0];
     stream.read_exact(&mut one)?;
     Ok(one[0])
 }
 
+/// The next number of variable length: seven bits per byte, the lowest first.
 fn varint(stream: &mut dyn Read) -> io::Result<u64> {
     let mut value = 0;
     for shift in (0..64).step_by(7) {
@@ -309,8 +322,8 @@ fn varint(stream: &mut dyn Read) -> io::Result<u64> {
     Err(io::Error::other("a number in a page's header has no end"))
 }
 
-/// The sign stands in the last bit.
-fn signed(value: u64) -> i64 {
+/// Decodes a signed number, whose sign is in the lowest bit.
+fn decode_zigzag(value: u64) -> i64 {
     (value >> 1).cast_signed() ^ -(value & 1).cast_signed()
 }
 
@@ -352,41 +365,39 @@ mod tests {
         packed.finish().unwrap()
     }
 
-    fn look(bytes: &[u8], growth: Growth) -> Result<u64, String> {
-        largest(bytes, bytes.len() as u64, growth).map_err(|error| error.to_string())
+    fn look(bytes: &[u8], growth: PageGrowth) -> Result<u64, String> {
+        largest_page(bytes, bytes.len() as u64, growth).map_err(|error| error.to_string())
     }
 
     #[test]
     fn honest_pages_tell_the_largest() {
         let two = [page(5, b"abcde"), page(300, b"xyz")].concat();
-        assert_eq!(look(&two, Growth::AsSaid), Ok(300));
+        assert_eq!(look(&two, PageGrowth::Declared), Ok(300));
         let three = [page(70_000, &gzip(70_000)), page(9, &gzip(9))].concat();
-        assert_eq!(look(&three, Growth::Gzip), Ok(70_000));
+        assert_eq!(look(&three, PageGrowth::Gzip), Ok(70_000));
         // The second form has its levels unpacked in front, and may leave all unpacked.
         let mut second = vec![0x15, 6, 0x15];
         second.extend(whole(6));
         second.push(0x15);
         second.extend(whole(6));
-        second.extend([
-            0x5c, 0x15, 2, 0x15, 0, 0x15, 2, 0x15, 0, 0x15, 4, 0x15, 0, 0x12, 0, 0,
-        ]);
+        second.extend([0x5c, 0x15, 2, 0x15, 0, 0x15, 2, 0x15, 0, 0x15, 4, 0x15, 0, 0x12, 0, 0]);
         second.extend(b"llabcd");
-        assert_eq!(look(&second, Growth::Gzip), Ok(6));
+        assert_eq!(look(&second, PageGrowth::Gzip), Ok(6));
     }
 
     #[test]
     fn pages_that_lie_are_refused() {
-        let huge = look(&page(1 << 30, b"abc"), Growth::AsSaid).unwrap_err();
+        let huge = look(&page(1 << 30, b"abc"), PageGrowth::Declared).unwrap_err();
         assert!(huge.contains("too much memory"), "{huge}");
-        let bomb = look(&page(100, &gzip(1 << 20)), Growth::Gzip).unwrap_err();
+        let bomb = look(&page(100, &gzip(1 << 20)), PageGrowth::Gzip).unwrap_err();
         assert!(bomb.contains("larger than its header"), "{bomb}");
         let cut = page(100, b"abc");
-        assert!(look(&cut[..cut.len() - 1], Growth::AsSaid).is_err());
+        assert!(look(&cut[..cut.len() - 1], PageGrowth::Declared).is_err());
         // A dictionary of more numbers than it has bytes for.
         let mut dictionary = vec![0x15, 4, 0x15, 16, 0x15, 0, 0x4c, 0x15];
         dictionary.extend(whole(1 << 20));
         dictionary.extend([0x15, 0, 0, 0]);
-        assert!(look(&dictionary, Growth::AsSaid).is_err());
-        assert!(look(&[0x1c; 100], Growth::AsSaid).is_err());
+        assert!(look(&dictionary, PageGrowth::Declared).is_err());
+        assert!(look(&[0x1c; 100], PageGrowth::Declared).is_err());
     }
 }

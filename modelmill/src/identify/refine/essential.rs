@@ -1,35 +1,31 @@
-//! Only what the recordings support.
+//! Refinement: estimates only those parameters that the recordings support.
 
-use modelmill_identify::estimate::{EssentialOptions, Estimate, essential};
+use modelmill_identify::estimate::{EssentialOptions, WeightedEstimate, select_essential};
 
-use super::Refined;
+use super::RefinementResult;
 use crate::error::Outcome;
 
-/// Leaves out parameters until all others are needed; those that are left out keep their nominal values.
-pub(super) fn refine(found: &mut Estimate, nominal: &[f64]) -> Outcome<Refined> {
-    let Estimate {
+/// Removes parameters one by one while the residual does not rise significantly; they keep their nominal values.
+/// Values, standard deviations and condition numbers in `found` are replaced.
+pub(super) fn refine(found: &mut WeightedEstimate, nominal: &[f64]) -> Outcome<RefinementResult> {
+    let WeightedEstimate {
         solution,
-        deviations,
-        triangle,
+        uncertainty: deviations,
+        r_factor: triangle,
         ..
     } = found;
-    let kept = essential(
-        triangle,
-        solution,
-        deviations,
-        nominal,
-        &EssentialOptions::default(),
-    )?;
+    let kept = select_essential(triangle, solution, deviations, nominal, &EssentialOptions::default())?;
     solution.values = kept.values;
     solution.classical_std = kept.classical_std;
     solution.condition_number = kept.condition_number;
     solution.scaled_condition_number = kept.scaled_condition_number;
-    // What is left out says so itself.
+    // Removed parameters are listed in the result, so that no direction is undetermined.
     solution.undetermined.clear();
     solution.determined = deviations.std.iter().map(|_| true).collect();
+    // Effective samples follow from the ratio of the two standard deviations.
     deviations.effective_samples = (kept.std.iter().zip(&solution.classical_std))
         .map(|(std, classical)| deviations.samples as f64 * (classical / std).powi(2))
         .collect();
     deviations.std = kept.std;
-    Ok(Refined::Essential(kept.dropped, kept.rise))
+    Ok(RefinementResult::Essential(kept.dropped, kept.residual_rise))
 }

@@ -1,7 +1,7 @@
-//! What is made of reduced rows once least squares has its solution: one list, with a file for each entry.
+//! Refinements of the least-squares solution: one list, with a file for each entry.
 //!
-//! To add one, write its file, put it into [`Refinement`], [`Refined`] and [`refine`], say what it tells in
-//! `print/estimation`, and give the program its option in `args/estimation`.
+//! To add one, write its file, put it into [`EstimateRefinement`], [`RefinementResult`] and [`refine`], print its
+//! result in `print/estimation`, and add its option in `args/estimation` of the program.
 
 mod essential;
 mod physical;
@@ -9,43 +9,45 @@ mod prior;
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
-use modelmill_identify::estimate::{Dropped, Estimate, PhysicalParameters};
+use modelmill_identify::estimate::{DroppedParameter, PhysicalParameters, WeightedEstimate};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 use crate::text::table::count;
 
-/// What is made of the reduced rows.
+/// A refinement of the least-squares solution.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Refinement {
-    /// Nothing: the solution of least squares.
+pub enum EstimateRefinement {
+    /// None: the least-squares solution.
     #[default]
     None,
-    /// Nominal values as soft constraints, with this relative standard deviation of each product of parameters.
+    /// Nominal values as a prior, with this relative standard deviation of each product of parameters.
     Prior(f64),
-    /// Only parameters that bodies can have (positive definite pseudo-inertias), nearest to the nominal ones; also gives
-    /// every physical parameter.
+    /// Only parameters that bodies can have (positive definite pseudo-inertias), nearest to the nominal ones. This
+    /// also gives all physical parameters.
     Physical,
-    /// Base parameters that the recordings do not support are left out, one by one, while none of them is missed.
+    /// Base parameters that the recordings do not support are removed one by one, as long as the residual does not rise
+    /// significantly.
     Essential,
 }
 
-/// What a refinement found beside solution and deviations.
+/// The result of a refinement in addition to solution and deviations.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Refined {
-    /// Nothing.
+pub enum RefinementResult {
+    /// No refinement.
     Nothing,
-    /// Parameters were left out; those by position among the unknown ones, and by how much the residual rose.
-    Essential(Vec<Dropped>, f64),
-    /// Nominal values of this relative standard deviation counted as measurements, as many as said.
+    /// Removed parameters, by index among the unknown ones, and the rise of the residual.
+    Essential(Vec<DroppedParameter>, f64),
+    /// Relative standard deviation of the prior, and the number of base parameters with a prior.
     Prior(f64, usize),
-    /// Physical parameters that bodies can have, beside the residual norm of the solution without that demand.
+    /// Physical parameters that bodies can have, the names of the bodies, and the residual norm without this
+    /// constraint.
     Physical(Box<PhysicalParameters>, Vec<String>, f64),
 }
 
-impl Refined {
-    /// The parameters that were left out, by position among the unknown ones.
-    pub fn left_out(&self) -> impl Iterator<Item = usize> + '_ {
+impl RefinementResult {
+    /// The removed parameters, by index among the unknown ones.
+    pub fn removed_parameters(&self) -> impl Iterator<Item = usize> + '_ {
         let dropped = match self {
             Self::Essential(dropped, _) => dropped.as_slice(),
             _ => &[],
@@ -54,19 +56,21 @@ impl Refined {
     }
 }
 
-/// Refines what least squares found of the base parameters `unknown`, whose nominal values are given.
+/// Refines the least-squares estimate of the base parameters `unknown`, with their nominal values.
+///
+/// Fails without degrees of freedom, and as the refinement does.
 pub(crate) fn refine(
     model: &Model,
-    found: &mut Estimate,
+    found: &mut WeightedEstimate,
     unknown: &[usize],
     nominal: &[f64],
-    refinement: Refinement,
-) -> Outcome<Refined> {
+    refinement: EstimateRefinement,
+) -> Outcome<RefinementResult> {
     let solution = &found.solution;
-    if refinement != Refinement::None && solution.rows <= solution.rank {
+    if refinement != EstimateRefinement::None && solution.rows <= solution.rank {
         return Err(Error::input(message!(
-            "{} for {}: no degree of freedom is left for the residuals, from which {}, {} \
-             and {} learn what the recording is worth; use a longer recording",
+            "{} for {}: the residuals have no degree of freedom, but {}, {} \
+             and {} need them to judge the recording; use a longer recording",
             count(solution.rows, "equation", "equations"),
             count(solution.rank, "base parameter", "base parameters"),
             Remedy::option(OptionName::Prior),
@@ -75,9 +79,9 @@ pub(crate) fn refine(
         )));
     }
     match refinement {
-        Refinement::None => Ok(Refined::Nothing),
-        Refinement::Prior(sigma) => prior::refine(model, found, unknown, nominal, sigma),
-        Refinement::Essential => essential::refine(found, nominal),
-        Refinement::Physical => physical::refine(model, found, unknown),
+        EstimateRefinement::None => Ok(RefinementResult::Nothing),
+        EstimateRefinement::Prior(sigma) => prior::refine(model, found, unknown, nominal, sigma),
+        EstimateRefinement::Essential => essential::refine(found, nominal),
+        EstimateRefinement::Physical => physical::refine(model, found, unknown),
     }
 }

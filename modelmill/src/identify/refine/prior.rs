@@ -1,29 +1,31 @@
-//! Nominal values as soft constraints.
+//! Refinement: nominal values as a prior.
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
-use modelmill_identify::estimate::{Estimate, with_prior};
+use modelmill_identify::estimate::{WeightedEstimate, solve_with_prior};
 
-use super::Refined;
+use super::RefinementResult;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 use crate::text::table::percent;
 
-/// Lets nominal values count as measurements of the relative standard deviation `sigma`.
+/// Adds nominal values as measurements with the relative standard deviation `sigma`, and solves again.
+///
+/// Fails when no base parameter has a nominal value other than 0.
 pub(super) fn refine(
     model: &Model,
-    found: &mut Estimate,
+    found: &mut WeightedEstimate,
     unknown: &[usize],
     nominal: &[f64],
     sigma: f64,
-) -> Outcome<Refined> {
-    let beliefs = model.beliefs(unknown, sigma);
-    if beliefs.is_empty() {
+) -> Outcome<RefinementResult> {
+    let priors = model.parameter_priors(unknown, sigma);
+    if priors.is_empty() {
         let parameters = &model.derivation.mechanism.parameters;
         let prior = Remedy::option(OptionName::Prior);
         return Err(Error::input(message!(
-            "{}: {} takes {} of each nominal value for its uncertainty, but the nominal values of {} are 0 or not \
-             given, which says nothing of their size; write others in [parameters] (`nominal = ...`), or leave {} out",
+            "{}: {} uses {} of each nominal value as its uncertainty, but the nominal values of {} are 0 or not \
+             given, so that no uncertainty follows; set them in [parameters] (`nominal = ...`), or omit {}",
             model.path,
             prior,
             percent(Some(sigma)),
@@ -34,12 +36,7 @@ pub(super) fn refine(
             prior
         )));
     }
-    (found.solution, found.deviations) = with_prior(
-        &found.triangle,
-        &found.solution,
-        &found.deviations,
-        nominal,
-        &beliefs,
-    )?;
-    Ok(Refined::Prior(sigma, beliefs.len()))
+    (found.solution, found.uncertainty) =
+        solve_with_prior(&found.r_factor, &found.solution, &found.uncertainty, nominal, &priors)?;
+    Ok(RefinementResult::Prior(sigma, priors.len()))
 }

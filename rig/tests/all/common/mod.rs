@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use modelmill_boundary::files::Memory;
-use modelmill_rig::{Rig, Samples, State, Tracker, Trajectory, forces};
+use modelmill_boundary::files::MemoryFiles;
+use modelmill_rig::{CoordinateSamples, Rig, RigState, RigTracker, Trajectory, forces};
 
 fn workspace(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path)
@@ -20,7 +20,7 @@ pub(crate) fn load(name: &str) -> Rig {
 /// A rig from its text; `schema` and `name` are added.
 pub(crate) fn rig(text: &str) -> Rig {
     let text = format!("schema = 1\nname = \"test\"\n{text}");
-    modelmill_rig::load("test.toml", &text, &Memory::default())
+    modelmill_rig::load("test.toml", &text, &MemoryFiles::default())
         .unwrap_or_else(|failure| panic!("{failure}"))
         .rig
 }
@@ -33,10 +33,7 @@ pub(crate) fn bundled(name: &str) -> Table {
     let path = workspace("recordings/spidermill-mbs").join(format!("{name}.csv"));
     let mut reader = csv::Reader::from_path(path).expect("a recording");
     let names = reader.headers().expect("a header").clone();
-    let mut table: Table = names
-        .iter()
-        .map(|name| (name.to_owned(), Vec::new()))
-        .collect();
+    let mut table: Table = names.iter().map(|name| (name.to_owned(), Vec::new())).collect();
     for record in reader.records() {
         for ((_, values), field) in table.iter_mut().zip(&record.expect("a record")) {
             values.push(field.parse().expect("a number"));
@@ -62,7 +59,7 @@ pub(crate) fn column<'a>(table: &'a Table, name: &str) -> &'a [f64] {
 /// The trajectory of a recording.
 pub(crate) fn trajectory(table: &Table, coordinates: &[&str]) -> Trajectory {
     let of = |name: String| column(table, &name).to_vec();
-    let samples = coordinates.iter().map(|name| Samples {
+    let samples = coordinates.iter().map(|name| CoordinateSamples {
         q: of((*name).to_owned()),
         qd: Some(of(format!("{name}_d"))),
         qdd: Some(of(format!("{name}_dd"))),
@@ -73,24 +70,18 @@ pub(crate) fn trajectory(table: &Table, coordinates: &[&str]) -> Trajectory {
 /// Root mean square of the difference over that of the expected values.
 pub(crate) fn relative_rms(found: &[f64], expected: &[f64]) -> f64 {
     assert_eq!(found.len(), expected.len());
-    let error: f64 = found
-        .iter()
-        .zip(expected)
-        .map(|(x, y)| (x - y).powi(2))
-        .sum();
+    let error: f64 = found.iter().zip(expected).map(|(x, y)| (x - y).powi(2)).sum();
     (error / expected.iter().map(|y| y * y).sum::<f64>()).sqrt()
 }
 
 /// Forces of the drives in a state.
-pub(crate) fn force(rig: &Rig, tracker: &mut Tracker<'_>, state: &State) -> Vec<f64> {
-    let motion = tracker
-        .follow(state)
-        .unwrap_or_else(|error| panic!("{error}"));
+pub(crate) fn force(rig: &Rig, tracker: &mut RigTracker<'_>, state: &RigState) -> Vec<f64> {
+    let motion = tracker.follow(state).unwrap_or_else(|error| panic!("{error}"));
     forces(rig, &motion).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// States with coordinates between -0.5 and 0.5, rates and accelerations between -2 and 2, always the same.
-pub(crate) fn states(n_coordinates: usize, n: usize) -> Vec<State> {
+pub(crate) fn states(n_coordinates: usize, n: usize) -> Vec<RigState> {
     let mut bits = 1_u32;
     let mut draw = |scale: f64| -> Vec<f64> {
         let mut values = Vec::new();
@@ -101,7 +92,7 @@ pub(crate) fn states(n_coordinates: usize, n: usize) -> Vec<State> {
         values
     };
     (0..n)
-        .map(|_| State {
+        .map(|_| RigState {
             q: draw(1.0),
             qd: draw(4.0),
             qdd: draw(4.0),

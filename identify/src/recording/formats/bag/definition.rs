@@ -1,32 +1,38 @@
 //! Definitions of ROS messages: text of the form `ros2msg` (or `ros1msg`) goes in, a tree of types comes out.
 //!
-//! The definition of a message is followed by those of the messages that it holds, each under a line of `=` and a line
-//! `MSG: package/Name` (MCAP registry of schemas, `ros2msg`).
+//! The definition of a message is followed by the definitions of the messages in it. Each of those follows a line of
+//! `=` and a line `MSG: package/Name` (MCAP registry of schemas, `ros2msg`).
 
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-/// More messages within one another than any definition has.
+/// Deepest nesting of messages; no real definition reaches it.
 const DEEPEST: usize = 32;
 
-/// Type of a field.
+/// Type of a field of a message.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Type {
-    Number(Number),
+pub(super) enum RosFieldType {
+    /// A number.
+    Number(RosNumberType),
+    /// A string.
     Text,
-    /// Seconds and nanoseconds, of which the seconds of a duration have a sign; those of a time in ROS 1 have none.
+    /// Seconds and nanoseconds. The seconds of a duration are signed, those of a time in ROS 1 are not.
     Time {
+        /// Whether the seconds are signed.
         is_signed: bool,
     },
-    Message(Rc<Definition>),
-    /// As many as are given, or as the message says.
-    List(Box<Type>, Option<usize>),
+    /// Another message.
+    Message(Rc<RosMessageDefinition>),
+    /// A list: of fixed length if that is given, otherwise each message states the length.
+    List(Box<RosFieldType>, Option<usize>),
 }
 
 /// Types of numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Number {
+pub(super) enum RosNumberType {
+    /// One byte; zero is false.
     Bool,
+    /// Signed integers and unsigned ones, by their number of bits.
     I8,
     U8,
     I16,
@@ -39,20 +45,24 @@ pub(super) enum Number {
     F64,
 }
 
-/// A message: its fields in their order.
+/// A message type: its fields in order, each with its name.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Definition {
-    pub(super) fields: Vec<(String, Type)>,
+pub(super) struct RosMessageDefinition {
+    /// Names and types.
+    pub(super) fields: Vec<(String, RosFieldType)>,
 }
 
-/// Whose rules hold.
+/// The version of ROS, whose rules for types differ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Ros {
+pub(super) enum RosVersion {
+    /// ROS 1.
     One,
+    /// ROS 2.
     Two,
 }
 
-impl Number {
+impl RosNumberType {
+    // `float` and `double` are the names in IDL.
     const NAMES: [(&'static str, Self); 14] = [
         ("bool", Self::Bool),
         ("boolean", Self::Bool),
@@ -70,9 +80,10 @@ impl Number {
         ("double", Self::F64),
     ];
 
-    fn named(name: &str, ros: Ros) -> Option<Self> {
+    /// The type with a name in a definition; `byte` differs between the versions.
+    fn from_name(name: &str, ros: RosVersion) -> Option<Self> {
         match (name, ros) {
-            ("byte", Ros::One) => return Some(Self::I8),
+            ("byte", RosVersion::One) => return Some(Self::I8),
             ("byte" | "char" | "octet", _) => return Some(Self::U8),
             _ => {}
         }
@@ -80,13 +91,13 @@ impl Number {
         found.map(|(_, number)| *number)
     }
 
-    /// What definitions call it.
+    /// Its usual name in definitions.
     pub(super) fn name(self) -> &'static str {
         let found = Self::NAMES.iter().find(|(_, number)| *number == self);
         found.map_or("", |(name, _)| name)
     }
 
-    /// Bytes that it takes.
+    /// Its size in a message, bytes.
     pub(super) fn size(self) -> usize {
         match self {
             Self::Bool | Self::I8 | Self::U8 => 1,
@@ -97,67 +108,76 @@ impl Number {
     }
 }
 
-/// The definition of the message `name` in `text`, with those that it needs.
+/// Parses the definition of the message `name` in `text`, and those of the messages in it.
 ///
-/// Fails when one of them is missing or cannot be read.
-pub(super) fn read(name: &str, text: &str, ros: Ros) -> Result<Rc<Definition>, String> {
-    let own = plain(name);
+/// Fails when a definition is missing or a line cannot be parsed.
+pub(super) fn parse_definition(name: &str, text: &str, ros: RosVersion) -> Result<Rc<RosMessageDefinition>, String> {
+    let own = short_type_name(name);
     let mut texts = BTreeMap::new();
+    // Split the text at the lines of `=` into one list of lines per type.
     let (mut current, mut lines) = (own.clone(), Vec::new());
     for line in text.lines() {
         let trimmed = line.trim();
         if trimmed.len() >= 3 && trimmed.bytes().all(|byte| byte == b'=') {
-            texts
-                .entry(current)
-                .or_insert_with(|| std::mem::take(&mut lines));
+            texts.entry(current).or_insert_with(|| std::mem::take(&mut lines));
             lines.clear();
             current = String::new();
         } else if let (true, Some(name)) = (current.is_empty(), trimmed.strip_prefix("MSG:")) {
-            current = plain(name.trim());
+            // The line behind the separator has the name of the next type.
+            current = short_type_name(name.trim());
         } else {
             lines.push(trimmed);
         }
     }
     texts.entry(current).or_insert(lines);
-    let mut reader = Reader {
+    let mut reader = RosDefinitionParser {
         texts,
         done: BTreeMap::new(),
         ros,
     };
-    reader.definition(&own, 0)
+    reader.parse_message(&own, 0)
 }
 
-/// `package/Name`, however much stands between.
-fn plain(name: &str) -> String {
+/// The name without `/msg/`, as `package/Name`.
+fn short_type_name(name: &str) -> String {
     name.replace("/msg/", "/")
 }
 
-struct Reader<'a> {
+/// Parses definitions and keeps those that are done.
+struct RosDefinitionParser<'a> {
+    /// Lines of the definitions that are not parsed yet, by type.
     texts: BTreeMap<String, Vec<&'a str>>,
-    done: BTreeMap<String, Rc<Definition>>,
-    ros: Ros,
+    /// Types that are done.
+    done: BTreeMap<String, Rc<RosMessageDefinition>>,
+    /// The version of ROS, for names of types.
+    ros: RosVersion,
 }
 
-impl Reader<'_> {
-    fn definition(&mut self, name: &str, depth: usize) -> Result<Rc<Definition>, String> {
+impl RosDefinitionParser<'_> {
+    /// Parses the definition of one type; `depth` is its nesting.
+    fn parse_message(&mut self, name: &str, depth: usize) -> Result<Rc<RosMessageDefinition>, String> {
         if let Some(done) = self.done.get(name) {
             return Ok(done.clone());
         }
+        // A type that contains itself would recurse without end.
         if depth > DEEPEST {
-            return Err(format!("`{name}` holds itself"));
+            return Err(format!("`{name}` contains itself"));
         }
+        // A type that the file does not define may be a common one.
         let Some(lines) = self.texts.get(name).cloned() else {
-            return match well_known(name) {
+            return match well_known_definition(name) {
                 Some(text) => {
                     let lines = text.lines().collect();
                     self.texts.insert(name.to_owned(), lines);
-                    self.definition(name, depth)
+                    self.parse_message(name, depth)
                 }
                 None => Err(format!("the file does not define `{name}`")),
             };
         };
         let mut fields = Vec::new();
+        // One field per line: type, name, and possibly a default value.
         for line in lines {
+            // Comments start with `#`.
             let line = line.split('#').next().unwrap_or("").trim();
             let Some((kind, rest)) = line.split_once(char::is_whitespace) else {
                 if line.is_empty() {
@@ -169,26 +189,25 @@ impl Reader<'_> {
             let end = rest
                 .find(|c: char| !(c.is_ascii_alphanumeric() || c == '_'))
                 .unwrap_or(rest.len());
-            // A constant takes no room in a message.
+            // A constant is not part of a message.
             if rest[end..].trim_start().starts_with('=') {
                 continue;
             }
             if end == 0 {
                 return Err(format!("the line `{line}` of `{name}` cannot be read"));
             }
-            fields.push((rest[..end].to_owned(), self.kind(kind, name, depth)?));
+            fields.push((rest[..end].to_owned(), self.parse_field_type(kind, name, depth)?));
         }
-        let definition = Rc::new(Definition { fields });
+        let definition = Rc::new(RosMessageDefinition { fields });
         self.done.insert(name.to_owned(), definition.clone());
         Ok(definition)
     }
 
-    fn kind(&mut self, text: &str, within: &str, depth: usize) -> Result<Type, String> {
-        if let Some((of, length)) = text
-            .strip_suffix(']')
-            .and_then(|text| text.rsplit_once('['))
-        {
-            let of = self.kind(of, within, depth)?;
+    /// Parses the type of a field in the message `within`.
+    fn parse_field_type(&mut self, text: &str, within: &str, depth: usize) -> Result<RosFieldType, String> {
+        // `type[]`, `type[n]` and `type[<=n]` are lists; the last one has a variable length.
+        if let Some((of, length)) = text.strip_suffix(']').and_then(|text| text.rsplit_once('[')) {
+            let of = self.parse_field_type(of, within, depth)?;
             let length = match length {
                 "" => None,
                 most if most.starts_with("<=") => None,
@@ -198,22 +217,25 @@ impl Reader<'_> {
                         .map_err(|_| format!("`{text}` in `{within}` has no length"))?,
                 ),
             };
-            return Ok(Type::List(Box::new(of), length));
+            return Ok(RosFieldType::List(Box::new(of), length));
         }
+        // A string may have a bound, as in `string<=10`.
         let bare = text.split("<=").next().unwrap_or(text);
-        if let Some(number) = Number::named(bare, self.ros) {
-            return Ok(Type::Number(number));
+        if let Some(number) = RosNumberType::from_name(bare, self.ros) {
+            return Ok(RosFieldType::Number(number));
         }
+        // Types with a name of their own.
         match (bare, self.ros) {
-            ("string", _) => return Ok(Type::Text),
+            ("string", _) => return Ok(RosFieldType::Text),
             ("wstring", _) => {
-                return Err(format!("`{within}` holds a `wstring`, which is not read"));
+                return Err(format!("`{within}` contains a `wstring`, which is not supported"));
             }
-            ("time", Ros::One) => return Ok(Type::Time { is_signed: false }),
-            ("duration", Ros::One) => return Ok(Type::Time { is_signed: true }),
+            ("time", RosVersion::One) => return Ok(RosFieldType::Time { is_signed: false }),
+            ("duration", RosVersion::One) => return Ok(RosFieldType::Time { is_signed: true }),
             _ => {}
         }
-        let full = match plain(bare) {
+        // Names without a package belong to the package of the message.
+        let full = match short_type_name(bare) {
             header if header == "Header" => "std_msgs/Header".to_owned(),
             full if full.contains('/') => full,
             short => {
@@ -221,24 +243,23 @@ impl Reader<'_> {
                 format!("{package}/{short}")
             }
         };
+        // Times of ROS 2 are messages with a fixed meaning.
         if full == "builtin_interfaces/Time" || full == "builtin_interfaces/Duration" {
-            return Ok(Type::Time { is_signed: true });
+            return Ok(RosFieldType::Time { is_signed: true });
         }
-        Ok(Type::Message(self.definition(&full, depth + 1)?))
+        Ok(RosFieldType::Message(self.parse_message(&full, depth + 1)?))
     }
 }
 
-/// Messages that are everywhere, for files that do not say what is in them, as rosbag2 wrote until 2023.
-fn well_known(name: &str) -> Option<&'static str> {
+/// Definitions of common types, for files without definitions, as rosbag2 wrote them until 2023.
+fn well_known_definition(name: &str) -> Option<&'static str> {
     let found = WELL_KNOWN.iter().find(|(known, _)| *known == name);
     found.map(|(_, text)| *text)
 }
 
+/// Common types and the texts of their definitions.
 const WELL_KNOWN: [(&str, &str); 22] = [
-    (
-        "std_msgs/Header",
-        "builtin_interfaces/Time stamp\nstring frame_id",
-    ),
+    ("std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id"),
     ("std_msgs/Bool", "bool data"),
     ("std_msgs/Int32", "int32 data"),
     ("std_msgs/Int64", "int64 data"),
@@ -255,28 +276,16 @@ const WELL_KNOWN: [(&str, &str); 22] = [
         "std_msgs/MultiArrayLayout",
         "MultiArrayDimension[] dim\nuint32 data_offset",
     ),
-    (
-        "std_msgs/Float32MultiArray",
-        "MultiArrayLayout layout\nfloat32[] data",
-    ),
-    (
-        "std_msgs/Float64MultiArray",
-        "MultiArrayLayout layout\nfloat64[] data",
-    ),
+    ("std_msgs/Float32MultiArray", "MultiArrayLayout layout\nfloat32[] data"),
+    ("std_msgs/Float64MultiArray", "MultiArrayLayout layout\nfloat64[] data"),
     (
         "sensor_msgs/JointState",
         "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort",
     ),
     ("geometry_msgs/Vector3", "float64 x\nfloat64 y\nfloat64 z"),
-    (
-        "geometry_msgs/Quaternion",
-        "float64 x\nfloat64 y\nfloat64 z\nfloat64 w",
-    ),
+    ("geometry_msgs/Quaternion", "float64 x\nfloat64 y\nfloat64 z\nfloat64 w"),
     ("geometry_msgs/Wrench", "Vector3 force\nVector3 torque"),
-    (
-        "geometry_msgs/WrenchStamped",
-        "std_msgs/Header header\nWrench wrench",
-    ),
+    ("geometry_msgs/WrenchStamped", "std_msgs/Header header\nWrench wrench"),
     (
         "sensor_msgs/Imu",
         "std_msgs/Header header\ngeometry_msgs/Quaternion orientation\nfloat64[9] orientation_covariance\n\

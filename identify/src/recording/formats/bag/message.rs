@@ -1,64 +1,67 @@
-//! Messages of ROS: bytes go in, numbers in the order of the definition come out, with the names of their columns.
+//! Messages of ROS: bytes go in; numbers in the order of the definition come out, with the names of their columns.
 //!
-//! ROS 2 writes CDR (OMG, Common Data Representation; DDS-XTypes 1.3, section 7.4): four bytes say the order of bytes,
-//! then every number stands at a multiple of its size. ROS 1 writes the same without gaps.
+//! ROS 2 writes CDR (OMG, Common Data Representation; DDS-XTypes 1.3, section 7.4): four bytes state the byte order,
+//! then every number is aligned to a multiple of its size. ROS 1 writes the same without padding.
 
 use std::rc::Rc;
 
-use super::definition::{Definition, Number, Ros, Type};
+use super::definition::{RosFieldType, RosMessageDefinition, RosNumberType, RosVersion};
 
-/// The longest list of numbers that become columns; what is longer is a picture or a scan.
+/// Longest list of numbers that becomes columns; a longer one is an image or a scan.
 const MOST_ELEMENTS: usize = 256;
-/// The longest list of messages within a message.
+/// Longest list of messages within a message.
 const MOST_MESSAGES: usize = 4096;
-/// What stands for the length of a list that is passed over.
-const LONG: u32 = u32::MAX;
+/// Stands for the length of a list that is skipped.
+const SKIPPED_LENGTH: u32 = u32::MAX;
 
-/// What a message says.
+/// The contents of a message.
 #[derive(Debug, Default)]
-pub(super) struct Content {
-    /// All numbers, in the order of [`Shape::columns`].
+pub(super) struct RosMessageContent {
+    /// All numbers, in the order of [`RosMessageReader::columns`].
     pub(super) numbers: Vec<f64>,
-    /// What tells messages with other columns: lengths of lists, and names in them.
+    /// Identifies messages with the same columns: lengths of lists, and names in them.
     pub(super) shape: Vec<u8>,
-    /// The time that it bears, ns.
+    /// The time in the message, ns.
     pub(super) stamp: Option<i64>,
 }
 
 /// Reads messages of one type.
 #[derive(Debug)]
-pub(super) struct Reader {
-    definition: Rc<Definition>,
-    ros: Ros,
-    /// The field that bears the time of the message.
+pub(super) struct RosMessageReader {
+    /// The type of the messages.
+    definition: Rc<RosMessageDefinition>,
+    /// The version of ROS, which decides the encoding.
+    ros: RosVersion,
+    /// Index of the field with the time of the message.
     stamp: Option<usize>,
 }
 
-impl Reader {
-    pub(super) fn new(definition: Rc<Definition>, ros: Ros) -> Self {
+impl RosMessageReader {
+    /// Finds the field of the time: `stamp`, or a `header` that contains it.
+    pub(super) fn new(definition: Rc<RosMessageDefinition>, ros: RosVersion) -> Self {
         let is_time =
-            |field: &(String, Type)| matches!(field, (name, Type::Time { .. }) if name == "stamp");
+            |field: &(String, RosFieldType)| matches!(field, (name, RosFieldType::Time { .. }) if name == "stamp");
         let stamp = definition.fields.iter().position(|field| match field {
-            (name, Type::Message(header)) if name == "header" => header.fields.iter().any(is_time),
+            (name, RosFieldType::Message(header)) if name == "header" => header.fields.iter().any(is_time),
             other => is_time(other),
         });
-        Self {
-            definition,
-            ros,
-            stamp,
-        }
+        Self { definition, ros, stamp }
     }
 
-    /// Reads a message into `content`, in the place of what it held.
-    pub(super) fn read(&self, bytes: &[u8], content: &mut Content) -> Result<(), String> {
+    /// Reads a message into `content`, whose earlier contents are dropped.
+    ///
+    /// Fails when the bytes do not fit the type.
+    pub(super) fn read(&self, bytes: &[u8], content: &mut RosMessageContent) -> Result<(), String> {
         content.numbers.clear();
         content.shape.clear();
         content.stamp = None;
-        let mut bytes = Bytes::new(bytes, self.ros)?;
+        let mut bytes = RosByteReader::new(bytes, self.ros)?;
+        // A message without fields has no numbers.
         if self.definition.fields.is_empty() {
             return Ok(());
         }
         for (i, (name, kind)) in self.definition.fields.iter().enumerate() {
+            // The field of the time gives no columns, so its numbers are dropped.
             if self.stamp == Some(i) {
                 let numbers = content.numbers.len();
                 bytes.first_time = None;
@@ -72,10 +75,11 @@ impl Reader {
         Ok(())
     }
 
-    /// Names and types of the columns of a message, one for each of its numbers.
+    /// Names and types of the columns of a message, one per number, in the same order as [`Self::read`] gives them.
     pub(super) fn columns(&self, bytes: &[u8]) -> Result<Vec<(String, &'static str)>, String> {
-        let mut bytes = Bytes::new(bytes, self.ros)?;
+        let mut bytes = RosByteReader::new(bytes, self.ros)?;
         let mut fields = Vec::new();
+        // Decode the values with their names, except for the time.
         for (i, (name, kind)) in self.definition.fields.iter().enumerate() {
             let value = value_of(kind, &mut bytes)?;
             if self.stamp != Some(i) {
@@ -83,42 +87,47 @@ impl Reader {
             }
         }
         let mut columns = Vec::new();
-        Value::Message(fields).name(String::new(), &[], &mut columns);
+        RosValue::Message(fields).name(String::new(), &[], &mut columns);
         Ok(columns)
     }
 }
 
-/// Collects the numbers of a value.
+/// Appends the numbers of a value to `content`, and its lengths and names to the shape.
+///
+/// `name` is the name of the field. The order of the numbers must be that of [`value_of`].
 fn numbers_of(
-    kind: &Type,
+    kind: &RosFieldType,
     name: &str,
-    bytes: &mut Bytes<'_>,
-    content: &mut Content,
+    bytes: &mut RosByteReader<'_>,
+    content: &mut RosMessageContent,
 ) -> Result<(), String> {
     match kind {
-        Type::Number(number) => content.numbers.push(bytes.number(*number)?),
-        Type::Text => {
-            let text = bytes.text()?;
+        RosFieldType::Number(number) => content.numbers.push(bytes.read_number(*number)?),
+        RosFieldType::Text => {
+            let text = bytes.read_text()?;
+            // Names identify the columns, so they belong to the shape.
             if name == "name" {
                 content.shape.extend(text);
                 content.shape.push(0);
             }
         }
-        Type::Time { is_signed } => content.numbers.push(bytes.time(*is_signed)?),
-        Type::Message(definition) => {
-            bytes.empty_message(definition)?;
+        RosFieldType::Time { is_signed } => content.numbers.push(bytes.read_time(*is_signed)?),
+        RosFieldType::Message(definition) => {
+            bytes.skip_empty_message(definition)?;
             for (name, kind) in &definition.fields {
                 numbers_of(kind, name, bytes, content)?;
             }
         }
-        Type::List(of, length) => {
-            let length = bytes.length(of, *length)?;
-            let shown = u32::try_from(length).unwrap_or(LONG);
-            if let Some(number) = is_long(of, length) {
-                bytes.pass_over(number, length)?;
-                content.shape.extend(LONG.to_le_bytes());
+        RosFieldType::List(of, length) => {
+            // Long lists of numbers are skipped, and their lengths do not matter.
+            let length = bytes.read_length(of, *length)?;
+            let shown = u32::try_from(length).unwrap_or(SKIPPED_LENGTH);
+            if let Some(number) = long_list_number(of, length) {
+                bytes.skip_numbers(number, length)?;
+                content.shape.extend(SKIPPED_LENGTH.to_le_bytes());
                 return Ok(());
             }
+            // The length of a list decides how many columns there are.
             content.shape.extend(shown.to_le_bytes());
             for _ in 0..length {
                 numbers_of(of, "name", bytes, content)?;
@@ -128,64 +137,69 @@ fn numbers_of(
     Ok(())
 }
 
-/// The type of the numbers of a list that is too long for columns.
-fn is_long(of: &Type, length: usize) -> Option<Number> {
+/// The type of the numbers of a list that is too long for columns; `None` for all other lists.
+fn long_list_number(of: &RosFieldType, length: usize) -> Option<RosNumberType> {
     match of {
-        Type::Number(number) if length > MOST_ELEMENTS => Some(*number),
+        RosFieldType::Number(number) if length > MOST_ELEMENTS => Some(*number),
         _ => None,
     }
 }
 
-/// A value with all that names come from.
-enum Value<'a> {
+/// A value with everything that names of columns depend on.
+enum RosValue<'a> {
+    /// A number, with the name of its type.
     Number(&'static str),
+    /// A text, which may be a name.
     Text(String),
-    Message(Vec<(&'a str, Value<'a>)>),
-    List(Vec<Value<'a>>),
-    PassedOver,
+    /// Names and values of the fields.
+    Message(Vec<(&'a str, RosValue<'a>)>),
+    /// The elements of a list.
+    List(Vec<RosValue<'a>>),
+    /// A list that is too long for columns.
+    Skipped,
 }
 
-fn value_of<'a>(kind: &'a Type, bytes: &mut Bytes<'_>) -> Result<Value<'a>, String> {
+/// Decodes a value for the names of its columns.
+fn value_of<'a>(kind: &'a RosFieldType, bytes: &mut RosByteReader<'_>) -> Result<RosValue<'a>, String> {
     Ok(match kind {
-        Type::Number(number) => {
-            bytes.number(*number)?;
-            Value::Number(number.name())
+        RosFieldType::Number(number) => {
+            bytes.read_number(*number)?;
+            RosValue::Number(number.name())
         }
-        Type::Text => Value::Text(String::from_utf8_lossy(bytes.text()?).into_owned()),
-        Type::Time { is_signed } => {
-            bytes.time(*is_signed)?;
-            Value::Number("time")
+        RosFieldType::Text => RosValue::Text(String::from_utf8_lossy(bytes.read_text()?).into_owned()),
+        RosFieldType::Time { is_signed } => {
+            bytes.read_time(*is_signed)?;
+            RosValue::Number("time")
         }
-        Type::Message(definition) => {
-            bytes.empty_message(definition)?;
+        RosFieldType::Message(definition) => {
+            bytes.skip_empty_message(definition)?;
             let fields = definition.fields.iter();
             let fields = fields.map(|(name, kind)| Ok((name.as_str(), value_of(kind, bytes)?)));
-            Value::Message(fields.collect::<Result<_, String>>()?)
+            RosValue::Message(fields.collect::<Result<_, String>>()?)
         }
-        Type::List(of, length) => {
-            let length = bytes.length(of, *length)?;
-            if let Some(number) = is_long(of, length) {
-                bytes.pass_over(number, length)?;
-                return Ok(Value::PassedOver);
+        RosFieldType::List(of, length) => {
+            let length = bytes.read_length(of, *length)?;
+            if let Some(number) = long_list_number(of, length) {
+                bytes.skip_numbers(number, length)?;
+                return Ok(RosValue::Skipped);
             }
             let values = (0..length).map(|_| value_of(of, bytes));
-            Value::List(values.collect::<Result<_, String>>()?)
+            RosValue::List(values.collect::<Result<_, String>>()?)
         }
     })
 }
 
-impl Value<'_> {
-    /// Names of all numbers in a value. Elements of a list are called by a list of as many texts beside it or around it,
-    /// by their own field `name`, or else by their places.
+impl RosValue<'_> {
+    /// Collects the names of all numbers in a value. Elements of a list are named by a list of as many texts next to
+    /// it or around it, by their own field `name`, or else by their positions.
     fn name(&self, path: String, names: &[Vec<String>], columns: &mut Vec<(String, &'static str)>) {
         match self {
+            // A number ends the path.
             Self::Number(kind) => columns.push((path, kind)),
-            Self::Text(_) | Self::PassedOver => {}
+            Self::Text(_) | Self::Skipped => {}
             Self::Message(fields) => {
-                let mut known: Vec<Vec<String>> = fields
-                    .iter()
-                    .filter_map(|(_, value)| value.texts())
-                    .collect();
+                // Lists of texts in this message may name the elements of its other lists.
+                let mut known: Vec<Vec<String>> = fields.iter().filter_map(|(_, value)| value.list_texts()).collect();
                 known.extend(names.iter().cloned());
                 for (name, value) in fields {
                     let path = if path.is_empty() {
@@ -197,11 +211,10 @@ impl Value<'_> {
                 }
             }
             Self::List(values) => {
-                let own = values
-                    .iter()
-                    .map(Self::own_name)
-                    .collect::<Option<Vec<_>>>();
-                let own = own.filter(|own| are_names(own));
+                // Names of the elements themselves take precedence.
+                let own = values.iter().map(Self::own_name).collect::<Option<Vec<_>>>();
+                let own = own.filter(|own| are_unique_names(own));
+                // Then lists of names of the same length, and at the end positions from 1.
                 let beside = names.iter().find(|names| names.len() == values.len());
                 for (i, value) in values.iter().enumerate() {
                     let path = match own.as_ref().or(beside) {
@@ -214,8 +227,8 @@ impl Value<'_> {
         }
     }
 
-    /// The texts of a list that can be names.
-    fn texts(&self) -> Option<Vec<String>> {
+    /// The texts of a list if they can be names; `None` for other values.
+    fn list_texts(&self) -> Option<Vec<String>> {
         let Self::List(values) = self else {
             return None;
         };
@@ -224,9 +237,10 @@ impl Value<'_> {
             _ => None,
         });
         let texts = texts.collect::<Option<Vec<_>>>()?;
-        are_names(&texts).then_some(texts)
+        are_unique_names(&texts).then_some(texts)
     }
 
+    /// The field `name` of a message, if it is a text.
     fn own_name(&self) -> Option<String> {
         let Self::Message(fields) = self else {
             return None;
@@ -238,37 +252,43 @@ impl Value<'_> {
     }
 }
 
-/// Whether texts tell things apart.
-fn are_names(texts: &[String]) -> bool {
-    !texts.is_empty()
-        && (0..texts.len()).all(|i| !texts[i].is_empty() && !texts[..i].contains(&texts[i]))
+/// Whether texts are not empty and differ from each other.
+fn are_unique_names(texts: &[String]) -> bool {
+    !texts.is_empty() && (0..texts.len()).all(|i| !texts[i].is_empty() && !texts[..i].contains(&texts[i]))
 }
 
-/// The bytes of a message from its beginning on.
-struct Bytes<'a> {
+/// Reads the bytes of a message in order.
+struct RosByteReader<'a> {
+    /// All bytes behind the header of the encoding.
     all: &'a [u8],
+    /// Position of the next byte.
     at: usize,
+    /// Whether the first byte of a number is the highest one.
     is_big: bool,
-    /// The largest multiple that numbers stand at.
+    /// Largest alignment of numbers, in bytes.
     alignment: usize,
-    ros: Ros,
+    /// The version of ROS.
+    ros: RosVersion,
     /// The first time that was read, ns.
     first_time: Option<i64>,
 }
 
-impl<'a> Bytes<'a> {
-    fn new(bytes: &'a [u8], ros: Ros) -> Result<Self, String> {
+impl<'a> RosByteReader<'a> {
+    /// Reads the header of the encoding, which only ROS 2 has.
+    fn new(bytes: &'a [u8], ros: RosVersion) -> Result<Self, String> {
         let (bytes, is_big, alignment) = match (ros, bytes) {
-            (Ros::One, bytes) => (bytes, false, 1),
-            (Ros::Two, [0, form @ (0 | 1), _, _, bytes @ ..]) => (bytes, *form == 0, 8),
-            // The second version of CDR, without tags.
-            (Ros::Two, [0, form @ (6 | 7), _, _, bytes @ ..]) => (bytes, *form == 6, 4),
-            (Ros::Two, [a, b, ..]) => {
+            (RosVersion::One, bytes) => (bytes, false, 1),
+            (RosVersion::Two, [0, form @ (0 | 1), _, _, bytes @ ..]) => (bytes, *form == 0, 8),
+            // The second version of CDR, in its plain form.
+            (RosVersion::Two, [0, form @ (6 | 7), _, _, bytes @ ..]) => (bytes, *form == 6, 4),
+            (RosVersion::Two, [a, b, ..]) => {
                 return Err(format!(
-                    "it is encoded in the form {a:02x}{b:02x} of CDR, which is not read"
+                    "it is encoded in the form {a:02x}{b:02x} of CDR, which is not supported"
                 ));
             }
-            (Ros::Two, _) => return Err("it is shorter than its first four bytes".to_owned()),
+            (RosVersion::Two, _) => {
+                return Err("it is shorter than its first four bytes".to_owned());
+            }
         };
         Ok(Self {
             all: bytes,
@@ -280,18 +300,19 @@ impl<'a> Bytes<'a> {
         })
     }
 
+    /// The next `n` bytes; fails when there are fewer.
     fn take(&mut self, n: usize) -> Result<&'a [u8], String> {
         let end = self.at.checked_add(n).filter(|end| *end <= self.all.len());
         let Some(end) = end else {
-            return Err("it is shorter than its type says".to_owned());
+            return Err("it is shorter than its type requires".to_owned());
         };
         let taken = &self.all[self.at..end];
         self.at = end;
         Ok(taken)
     }
 
-    /// The bytes of a number of `N` bytes, the lowest first.
-    fn of_size<const N: usize>(&mut self) -> Result<[u8; N], String> {
+    /// The next number of `N` bytes after alignment, the lowest byte first.
+    fn read_array<const N: usize>(&mut self) -> Result<[u8; N], String> {
         self.at = self.at.next_multiple_of(N.min(self.alignment));
         let mut bytes = [0; N];
         bytes.copy_from_slice(self.take(N)?);
@@ -301,58 +322,62 @@ impl<'a> Bytes<'a> {
         Ok(bytes)
     }
 
-    fn number(&mut self, number: Number) -> Result<f64, String> {
+    /// The next number as a float; large integers are rounded.
+    fn read_number(&mut self, number: RosNumberType) -> Result<f64, String> {
         Ok(match number {
-            Number::Bool => f64::from(u8::from(self.take(1)?[0] != 0)),
-            Number::U8 => f64::from(self.take(1)?[0]),
-            Number::I8 => f64::from(i8::from_le_bytes(self.of_size()?)),
-            Number::I16 => f64::from(i16::from_le_bytes(self.of_size()?)),
-            Number::U16 => f64::from(u16::from_le_bytes(self.of_size()?)),
-            Number::I32 => f64::from(i32::from_le_bytes(self.of_size()?)),
-            Number::U32 => f64::from(u32::from_le_bytes(self.of_size()?)),
-            Number::I64 => i64::from_le_bytes(self.of_size()?) as f64,
-            Number::U64 => u64::from_le_bytes(self.of_size()?) as f64,
-            Number::F32 => f64::from(f32::from_le_bytes(self.of_size()?)),
-            Number::F64 => f64::from_le_bytes(self.of_size()?),
+            RosNumberType::Bool => f64::from(u8::from(self.take(1)?[0] != 0)),
+            RosNumberType::U8 => f64::from(self.take(1)?[0]),
+            RosNumberType::I8 => f64::from(i8::from_le_bytes(self.read_array()?)),
+            RosNumberType::I16 => f64::from(i16::from_le_bytes(self.read_array()?)),
+            RosNumberType::U16 => f64::from(u16::from_le_bytes(self.read_array()?)),
+            RosNumberType::I32 => f64::from(i32::from_le_bytes(self.read_array()?)),
+            RosNumberType::U32 => f64::from(u32::from_le_bytes(self.read_array()?)),
+            RosNumberType::I64 => i64::from_le_bytes(self.read_array()?) as f64,
+            RosNumberType::U64 => u64::from_le_bytes(self.read_array()?) as f64,
+            RosNumberType::F32 => f64::from(f32::from_le_bytes(self.read_array()?)),
+            RosNumberType::F64 => f64::from_le_bytes(self.read_array()?),
         })
     }
 
-    fn text(&mut self) -> Result<&'a [u8], String> {
-        let length = u32::from_le_bytes(self.of_size()?) as usize;
+    /// The next text: its length, then its bytes.
+    fn read_text(&mut self) -> Result<&'a [u8], String> {
+        let length = u32::from_le_bytes(self.read_array()?) as usize;
         let text = self.take(length)?;
-        // ROS 2 ends a text with a zero.
+        // ROS 2 ends a text with a zero byte.
         Ok(text.strip_suffix(&[0]).unwrap_or(text))
     }
 
-    /// A time in seconds.
-    fn time(&mut self, is_signed: bool) -> Result<f64, String> {
-        let seconds: [u8; 4] = self.of_size()?;
+    /// The next time, s; the first one of a message is remembered in ns.
+    fn read_time(&mut self, is_signed: bool) -> Result<f64, String> {
+        let seconds: [u8; 4] = self.read_array()?;
         let seconds = if is_signed {
             i64::from(i32::from_le_bytes(seconds))
         } else {
             i64::from(u32::from_le_bytes(seconds))
         };
-        let nanoseconds = u32::from_le_bytes(self.of_size()?);
+        let nanoseconds = u32::from_le_bytes(self.read_array()?);
         let time = seconds * 1_000_000_000 + i64::from(nanoseconds);
         self.first_time.get_or_insert(time);
         Ok(time as f64 / 1e9)
     }
 
-    /// A message without fields takes a byte in ROS 2.
-    fn empty_message(&mut self, definition: &Definition) -> Result<(), String> {
-        if definition.fields.is_empty() && self.ros == Ros::Two {
+    /// Skips the byte that a message without fields has in ROS 2.
+    fn skip_empty_message(&mut self, definition: &RosMessageDefinition) -> Result<(), String> {
+        if definition.fields.is_empty() && self.ros == RosVersion::Two {
             self.take(1)?;
         }
         Ok(())
     }
 
-    /// How many elements a list has; never more than there are bytes.
-    fn length(&mut self, of: &Type, fixed: Option<usize>) -> Result<usize, String> {
+    /// The number of elements of a list. Fails when it exceeds the number of bytes, or when there are too many
+    /// messages.
+    fn read_length(&mut self, of: &RosFieldType, fixed: Option<usize>) -> Result<usize, String> {
         let length = match fixed {
             Some(length) => length,
-            None => u32::from_le_bytes(self.of_size()?) as usize,
+            None => u32::from_le_bytes(self.read_array()?) as usize,
         };
-        let is_number = matches!(of, Type::Number(_));
+        // An element has at least one byte, so a longer list is a fault.
+        let is_number = matches!(of, RosFieldType::Number(_));
         if length > self.all.len() - self.at.min(self.all.len()) {
             return Err("a list in it is longer than the message".to_owned());
         }
@@ -362,7 +387,8 @@ impl<'a> Bytes<'a> {
         Ok(length)
     }
 
-    fn pass_over(&mut self, number: Number, length: usize) -> Result<(), String> {
+    /// Skips numbers of a list.
+    fn skip_numbers(&mut self, number: RosNumberType, length: usize) -> Result<(), String> {
         self.at = self.at.next_multiple_of(number.size().min(self.alignment));
         self.take(number.size().saturating_mul(length))?;
         Ok(())

@@ -1,8 +1,8 @@
-//! Logs of robots: messages of several topics go in, one by one; columns go out, joined on time.
+//! Robot logs: messages of several topics go in, one by one. Columns come out, joined on time.
 //!
-//! A number of a message becomes the column `topic.field`, an element of a list `topic.field_1` or, where names stand
-//! beside the list as in `sensor_msgs/JointState`, `topic.position.elbow`. The time of a message is its `header.stamp`, and
-//! that of its arrival where it bears none.
+//! A number of a message becomes the column `topic.field`, an element of a list `topic.field_1`. If the message has a
+//! list of names of the same length, as `sensor_msgs/JointState`, the column is `topic.position.elbow`. The time of a
+//! message is its `header.stamp`, or the time of its arrival if it has none.
 
 mod definition;
 mod message;
@@ -11,130 +11,154 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use indexmap::IndexMap;
 
-use crate::recording::column::Field;
-use crate::recording::error::Fault;
-use crate::recording::intake::{Flow, Intake};
-use crate::recording::join::{Part, joined};
-use crate::recording::notes::Note;
+use crate::recording::column::SampleField;
+use crate::recording::error::RecordingFault;
+use crate::recording::intake::{IntakeFlow, SampleIntake};
+use crate::recording::join::{JoinPart, join_parts};
+use crate::recording::notes::RecordingNote;
 use crate::recording::tables::{ColumnInfo, TableInfo};
-use crate::recording::{ReadOptions, Recording};
-use crate::words::list;
+use crate::recording::{ReadOptions, SignalRecording};
+use crate::words::backquoted_list;
 
-use definition::Ros;
-use message::{Content, Reader};
+use definition::RosVersion;
+use message::{RosMessageContent, RosMessageReader};
 
-/// More forms of messages than any topic has, such as sets of joints that speak on it in turns.
+/// Most forms of messages of a topic, such as sets of joints that are published in turns.
 const MOST_LAYOUTS: usize = 64;
-/// Forms of bytes that are remembered.
+/// Most forms of bytes that are remembered.
 const MOST_SHAPES: usize = 1024;
-/// More columns than any recording has.
+/// Most columns of a topic.
 const MOST_COLUMNS: usize = 1 << 17;
-/// The room of an arrival in numbers, with what is sorted and joined of it.
+/// Memory of an arrival, in numbers, including what is sorted and joined later.
 const ARRIVAL: usize = 8;
-/// Times below this many nanoseconds, 104 days, are exact as seconds; others count from the first one on.
+/// Times below this many nanoseconds, 104 days, are exact as seconds. Larger ones are counted from the first one.
 const EXACT: i64 = 1 << 53;
 
-/// What is taken of a log while its messages go by.
-pub(super) struct Bag<'a> {
-    topics: Vec<Topic>,
-    /// Columns whose numbers are kept.
+/// Collects the columns of a log while its messages are read.
+pub(super) struct BagCollector<'a> {
+    /// Topics in the order of registration.
+    topics: Vec<BagTopic>,
+    /// Whether the numbers of a column are kept, by its name.
     is_kept: &'a dyn Fn(&str) -> bool,
-    kept: usize,
-    most: usize,
-    content: Content,
+    /// Numbers that are kept so far, with those for arrivals.
+    kept_numbers: usize,
+    /// Most numbers that may be kept.
+    max_numbers: usize,
+    /// The last message; kept to use its memory again.
+    content: RosMessageContent,
 }
 
-/// How the messages of a topic are written.
-pub(super) struct Encoding<'a> {
-    /// `cdr`, `ros1`, or what is not read.
+/// The encoding of the messages of a topic.
+pub(super) struct BagEncoding<'a> {
+    /// `cdr` or `ros1`; others are not supported.
     pub(super) messages: &'a str,
-    /// `ros2msg`, `ros1msg`, or what is not read.
+    /// `ros2msg`, `ros1msg` or empty; others are not supported.
     pub(super) definition: &'a str,
+    /// Text of the definition.
     pub(super) text: &'a str,
 }
 
-struct Topic {
+/// A topic with its messages so far.
+struct BagTopic {
+    /// Name without a leading slash.
     name: String,
+    /// Type of its messages.
     kind: String,
-    /// What reads its messages, or why they are left aside.
-    reader: Result<Reader, String>,
+    /// The reader of its messages, or why they are skipped.
+    reader: Result<RosMessageReader, String>,
+    /// All columns that any of its messages has.
     columns: IndexMap<String, TopicColumn>,
-    layouts: Vec<Layout>,
+    /// Forms of its messages.
+    layouts: Vec<BagMessageLayout>,
+    /// Form of each shape of bytes that is remembered.
     shapes: BTreeMap<Vec<u8>, usize>,
-    messages: Vec<Arrival>,
+    /// Messages whose numbers are kept.
+    messages: Vec<MessageArrival>,
+    /// Number of messages.
     count: usize,
 }
 
-/// A form of messages, and what is known of those that have it.
-struct Layout {
-    /// Its columns by their places.
+/// A form of messages: those with the same columns.
+struct BagMessageLayout {
+    /// Indices of its columns.
     places: Vec<usize>,
-    /// Whether numbers of it are kept.
+    /// Whether numbers of any of its columns are kept.
     is_kept: bool,
+    /// Number of messages.
     count: usize,
-    /// First and last time of arrival and in the messages, ns.
+    /// First and last time of arrival, ns.
     log: Option<(i64, i64)>,
+    /// First and last time in the messages, ns.
     stamp: Option<(i64, i64)>,
-    /// Whether all messages bear a time other than zero.
+    /// Whether all messages have a time of their own other than zero.
     has_stamps: bool,
 }
 
+/// A column of a topic.
 struct TopicColumn {
+    /// Type of its numbers.
     kind: &'static str,
+    /// Forms of messages that have the column.
     layouts: BTreeSet<usize>,
+    /// Its numbers, if they are kept.
     values: Option<Vec<f64>>,
 }
 
-/// One message, beside its numbers.
+/// One message, without its numbers.
 #[derive(Clone, Copy)]
-struct Arrival {
+struct MessageArrival {
+    /// Index of its form.
     layout: usize,
-    /// Times of its arrival and in it, ns.
+    /// Time of its arrival, ns.
     log: i64,
+    /// Time in the message, ns.
     stamp: Option<i64>,
 }
 
-/// Columns of a topic that are in the same messages.
-struct Table {
+/// Columns of a topic that occur in the same messages.
+struct BagTable {
+    /// Name of the topic.
     topic: String,
+    /// Names, types, and the numbers if they are kept.
     columns: Vec<(String, &'static str, Option<Vec<f64>>)>,
-    /// Times of the messages whose numbers are kept, ns.
+    /// Times of the messages whose numbers are kept, ns, in the order of arrival.
     time: Vec<i64>,
+    /// Whether the times are those of the messages; otherwise they are those of arrival.
     has_stamps: bool,
+    /// Number of messages.
     samples: usize,
-    /// First and last time, ns.
+    /// First and last time of all messages, ns.
     span: Option<(i64, i64)>,
 }
 
-impl<'a> Bag<'a> {
+impl<'a> BagCollector<'a> {
+    /// Starts a collection; `most` is the largest number of numbers to keep.
     fn new(is_kept: &'a dyn Fn(&str) -> bool, most: usize) -> Self {
         Self {
             topics: Vec::new(),
             is_kept,
-            kept: 0,
-            most,
-            content: Content::default(),
+            kept_numbers: 0,
+            max_numbers: most,
+            content: RosMessageContent::default(),
         }
     }
 
-    /// A topic, to which [`Bag::message`] refers by the number that comes back.
-    pub(super) fn topic(&mut self, name: &str, kind: &str, encoding: &Encoding<'_>) -> usize {
+    /// Registers a topic. The result identifies it in [`Self::take_message`].
+    pub(super) fn register_topic(&mut self, name: &str, kind: &str, encoding: &BagEncoding<'_>) -> usize {
+        // Encoding and definition decide the version of ROS.
         let ros = match (encoding.messages, encoding.definition) {
-            ("cdr", "ros2msg" | "") => Ok(Ros::Two),
-            ("ros1", "ros1msg") => Ok(Ros::One),
-            ("cdr" | "ros1", other) => {
-                Err(format!("its definition is `{other}`, which is not read"))
-            }
-            (other, _) => Err(format!(
-                "its messages are encoded as `{other}`, which is not read"
-            )),
+            ("cdr", "ros2msg" | "") => Ok(RosVersion::Two),
+            ("ros1", "ros1msg") => Ok(RosVersion::One),
+            ("cdr" | "ros1", other) => Err(format!("its definition is `{other}`, which is not supported")),
+            (other, _) => Err(format!("its messages are encoded as `{other}`, which is not supported")),
         };
+        // A topic that cannot be read is kept with the reason and reported only if it is listed.
         let reader = ros.and_then(|ros| {
-            let definition = definition::read(kind, encoding.text, ros)?;
-            Ok(Reader::new(definition, ros))
+            let definition = definition::parse_definition(kind, encoding.text, ros)?;
+            Ok(RosMessageReader::new(definition, ros))
         });
         let name = name.strip_prefix('/').unwrap_or(name);
-        self.topics.push(Topic {
+        self.topics.push(BagTopic {
             name: name.to_owned(),
             kind: kind.to_owned(),
             reader,
@@ -149,51 +173,57 @@ impl<'a> Bag<'a> {
 
     /// Takes a message that arrived at `log`, ns.
     ///
-    /// Fails when it cannot be read although others of its topic could, and when more numbers would be kept than allowed.
-    pub(super) fn message(&mut self, topic: usize, log: i64, bytes: &[u8]) -> Result<(), Fault> {
+    /// Fails when it cannot be read although earlier messages of its topic could be, or when too many numbers would
+    /// be kept.
+    pub(super) fn take_message(&mut self, topic: usize, log: i64, bytes: &[u8]) -> Result<(), RecordingFault> {
         let topic = &mut self.topics[topic];
         topic.count += 1;
         let Ok(reader) = &topic.reader else {
             return Ok(());
         };
+        // Read the numbers, then find the form of the message.
         let layout = reader
             .read(bytes, &mut self.content)
-            .and_then(|()| topic.layout(bytes, &self.content, self.is_kept));
+            .and_then(|()| topic.layout_of_message(bytes, &self.content, self.is_kept));
         let layout = match layout {
             Ok(layout) => layout,
+            // If the first message fails, the complete topic is skipped.
             Err(says) if topic.count == 1 => {
                 topic.reader = Err(format!("its first message cannot be read: {says}"));
                 return Ok(());
             }
             Err(says) => {
-                return Err(Fault::Format {
+                return Err(RecordingFault::Format {
                     format: "a log of ROS messages",
-                    says: format!(
+                    message: format!(
                         "message {} of `{}` cannot be read: {says}; is the file complete, and the definition its own?",
                         topic.count, topic.name
                     ),
                 });
             }
         };
+        // Count the message and extend the time ranges of its form.
         let form = &mut topic.layouts[layout];
         let stamp = self.content.stamp;
         form.count += 1;
-        extend(&mut form.log, log);
-        extend(&mut form.stamp, stamp.unwrap_or(0));
+        extend_span(&mut form.log, log);
+        extend_span(&mut form.stamp, stamp.unwrap_or(0));
         form.has_stamps &= stamp.is_some_and(|stamp| stamp != 0);
         if !form.is_kept {
             return Ok(());
         }
+        // Keep the numbers of needed columns.
         for (place, value) in form.places.iter().zip(&self.content.numbers) {
             if let Some(values) = &mut topic.columns[*place].values {
                 values.push(*value);
-                self.kept += 1;
+                self.kept_numbers += 1;
             }
         }
-        topic.messages.push(Arrival { layout, log, stamp });
-        self.kept += ARRIVAL;
-        if self.kept > self.most {
-            return Err(Fault::TooLarge {
+        topic.messages.push(MessageArrival { layout, log, stamp });
+        self.kept_numbers += ARRIVAL;
+        // The limit includes memory for sorting and joining.
+        if self.kept_numbers > self.max_numbers {
+            return Err(RecordingFault::TooLarge {
                 line: topic.count as u64,
                 samples: topic.count,
                 columns: topic.columns.len(),
@@ -203,27 +233,33 @@ impl<'a> Bag<'a> {
         Ok(())
     }
 
-    fn tables(self) -> Vec<Table> {
-        self.topics.into_iter().flat_map(Topic::tables).collect()
+    /// The tables of all topics.
+    fn tables(self) -> Vec<BagTable> {
+        self.topics.into_iter().flat_map(BagTopic::tables).collect()
     }
 }
 
-impl Topic {
-    /// The form of a message whose numbers and shape are known.
-    fn layout(
+impl BagTopic {
+    /// The form of a message with known numbers and shape; new forms and columns are added.
+    ///
+    /// Fails when columns have equal names, or when there are too many columns or forms.
+    fn layout_of_message(
         &mut self,
         bytes: &[u8],
-        content: &Content,
+        content: &RosMessageContent,
         is_kept: &dyn Fn(&str) -> bool,
     ) -> Result<usize, String> {
+        // Most messages have a shape that is known.
         if let Some(known) = self.shapes.get(&content.shape) {
             return Ok(*known);
         }
+        // Otherwise the names of the columns are decoded from the bytes.
         let reader = self.reader.as_ref().map_err(Clone::clone)?;
         let columns = reader.columns(bytes)?;
         if columns.len() != content.numbers.len() {
-            return Err("its columns cannot be told".to_owned());
+            return Err("its columns cannot be determined".to_owned());
         }
+        // Indices of the columns; new ones are added to the topic.
         let mut places = Vec::with_capacity(columns.len());
         for (name, kind) in columns {
             let name = format!("{}.{name}", self.name);
@@ -245,18 +281,15 @@ impl Topic {
         if self.columns.len() > MOST_COLUMNS {
             return Err("it has more columns than any recording".to_owned());
         }
-        let known = self
-            .layouts
-            .iter()
-            .position(|layout| layout.places == places);
+        // Another shape may have the same columns.
+        let known = self.layouts.iter().position(|layout| layout.places == places);
+        // A new form is registered in all of its columns.
         let layout = known.unwrap_or_else(|| {
             for place in &places {
                 self.columns[*place].layouts.insert(self.layouts.len());
             }
-            self.layouts.push(Layout {
-                is_kept: places
-                    .iter()
-                    .any(|place| self.columns[*place].values.is_some()),
+            self.layouts.push(BagMessageLayout {
+                is_kept: places.iter().any(|place| self.columns[*place].values.is_some()),
                 places,
                 count: 0,
                 log: None,
@@ -268,6 +301,7 @@ impl Topic {
         if self.layouts.len() > MOST_LAYOUTS {
             return Err("names or lengths of lists in it change again and again".to_owned());
         }
+        // Memory of shapes is limited; they are decoded again when needed.
         if self.shapes.len() >= MOST_SHAPES {
             self.shapes.clear();
         }
@@ -275,24 +309,23 @@ impl Topic {
         Ok(layout)
     }
 
-    /// Its columns, those of the same messages together; messages in the order in which they arrived.
-    fn tables(self) -> Vec<Table> {
+    /// Its columns, grouped by the messages in which they occur; messages are in the order of their arrival.
+    fn tables(self) -> Vec<BagTable> {
+        // Columns with the same set of forms belong to one table.
         let mut tables: IndexMap<BTreeSet<usize>, Vec<(String, TopicColumn)>> = IndexMap::new();
         for (name, column) in self.columns {
-            tables
-                .entry(column.layouts.clone())
-                .or_default()
-                .push((name, column));
+            tables.entry(column.layouts.clone()).or_default().push((name, column));
         }
-        // Publishers that know no time leave it at zero.
+        // Publishers without a clock leave the time at zero.
         let has_stamps = self.layouts.iter().all(|layout| layout.has_stamps);
-        let time_of = |one: &Arrival| match one.stamp {
+        let time_of = |one: &MessageArrival| match one.stamp {
             Some(stamp) if has_stamps => stamp,
             _ => one.log,
         };
         let mut all = Vec::new();
         for (layouts, columns) in tables {
-            let messages: Vec<&Arrival> = self
+            // The messages of the table, sorted by arrival.
+            let messages: Vec<&MessageArrival> = self
                 .messages
                 .iter()
                 .filter(|one| layouts.contains(&one.layout))
@@ -301,14 +334,13 @@ impl Topic {
             order.sort_by_key(|k| messages[*k].log);
             let sorted = |values: Vec<f64>| order.iter().map(|k| values[*k]).collect();
             let forms = || layouts.iter().map(|layout| &self.layouts[*layout]);
+            // The time range covers all messages, also those that are not kept.
             let mut span = None;
-            for (first, last) in
-                forms().filter_map(|form| if has_stamps { form.stamp } else { form.log })
-            {
-                extend(&mut span, first);
-                extend(&mut span, last);
+            for (first, last) in forms().filter_map(|form| if has_stamps { form.stamp } else { form.log }) {
+                extend_span(&mut span, first);
+                extend_span(&mut span, last);
             }
-            all.push(Table {
+            all.push(BagTable {
                 samples: forms().map(|form| form.count).sum(),
                 span,
                 topic: self.name.clone(),
@@ -324,22 +356,25 @@ impl Topic {
     }
 }
 
-/// Shows all messages of a log to a [`Bag`].
-pub(super) type Show<'a> = &'a mut dyn FnMut(&mut Bag<'_>) -> Result<(), Fault>;
+/// A function that passes all messages of a log to a collector.
+pub(super) type BagReplay<'a> = &'a mut dyn FnMut(&mut BagCollector<'_>) -> Result<(), RecordingFault>;
 
-/// The recording of a log: the columns that are needed, joined on time.
-pub(super) fn read(show: Show<'_>, file: &str, options: &ReadOptions) -> Result<Recording, Fault> {
-    let is_kept = |name: &str| options.needs(name);
-    let mut bag = Bag::new(&is_kept, options.most_numbers);
+/// Reads a log: the needed columns, joined on time.
+pub(super) fn read(show: BagReplay<'_>, file: &str, options: &ReadOptions) -> Result<SignalRecording, RecordingFault> {
+    // Numbers of needed columns are kept while the messages are read.
+    let is_kept = |name: &str| options.is_column_needed(name);
+    let mut bag = BagCollector::new(&is_kept, options.max_numbers);
     show(&mut bag)?;
     let tables = bag.tables();
-    let mut intake = Intake::new(names_of(&tables), options)?;
+    // The first column is the time; then the columns of all topics follow.
+    let mut intake = SampleIntake::new(names_of(&tables), options)?;
     let mut parts = Vec::new();
     let mut place = 1;
+    // Each table with needed columns becomes a part to be joined.
     for table in tables {
         let mut columns = Vec::new();
         for (_, _, values) in table.columns {
-            if let Some(values) = values.filter(|_| intake.reads(place)) {
+            if let Some(values) = values.filter(|_| intake.is_place_needed(place)) {
                 columns.push((place, values));
             }
             place += 1;
@@ -348,15 +383,17 @@ pub(super) fn read(show: Show<'_>, file: &str, options: &ReadOptions) -> Result<
             parts.push((table.topic, table.has_stamps, table.time, columns));
         }
     }
+    // Topics without times of their own are reported.
     let late: Vec<String> = (parts.iter().filter(|part| !part.1))
         .map(|part| part.0.clone())
         .collect();
     if !late.is_empty() {
-        intake.note(Note::info(format!(
-            "Messages of {} in {file} bear no time of their own: the time is that of their arrival.",
-            list(&late)
+        intake.note(RecordingNote::info(format!(
+            "Messages of {} in {file} have no time of their own: their time is that of arrival.",
+            backquoted_list(&late)
         )));
     }
+    // Large times are counted from the first one, so that seconds are exact.
     let times = || parts.iter().flat_map(|part| &part.2);
     let is_exact = times().all(|t| (-EXACT..EXACT).contains(t));
     let zero = if is_exact {
@@ -364,41 +401,43 @@ pub(super) fn read(show: Show<'_>, file: &str, options: &ReadOptions) -> Result<
     } else {
         times().copied().min().unwrap_or(0)
     };
-    let parts = parts.into_iter().map(|(name, _, time, columns)| Part {
+    let parts = parts.into_iter().map(|(name, _, time, columns)| JoinPart {
         name,
         time: time.iter().map(|t| seconds(t.wrapping_sub(zero))).collect(),
         columns,
     });
-    let Some(together) = joined(parts.collect(), &mut |note| intake.note(note))? else {
-        return Err(Fault::NoSamples);
+    let Some(together) = join_parts(parts.collect(), &mut |note| intake.note(note))? else {
+        return Err(RecordingFault::NoSamples);
     };
-    let mut sample = vec![Field::Number(0.0); intake.width()];
+    // Pass the joined rows to the intake.
+    let mut sample = vec![SampleField::Number(0.0); intake.width()];
     for (k, time) in together.time.iter().enumerate() {
-        sample[0] = Field::finite(*time);
+        sample[0] = SampleField::finite(*time);
         for (place, values) in &together.columns {
-            sample[*place] = Field::finite(values[k]);
+            sample[*place] = SampleField::finite(values[k]);
         }
         let text = |_: usize| "NaN or infinite".to_owned();
-        if intake.take(k as u64 + 1, &sample, &text)? == Flow::Stop {
+        if intake.take_sample(k as u64 + 1, &sample, &text)? == IntakeFlow::Stop {
             break;
         }
     }
     intake.finish(file)
 }
 
-/// Names of the columns of a log, the time in front.
-pub(super) fn names(show: Show<'_>) -> Result<Vec<String>, Fault> {
-    let mut bag = Bag::new(&|_| false, usize::MAX);
+/// Names of the columns of a log, the time first.
+pub(super) fn names(show: BagReplay<'_>) -> Result<Vec<String>, RecordingFault> {
+    let mut bag = BagCollector::new(&|_| false, usize::MAX);
     show(&mut bag)?;
     Ok(names_of(&bag.tables()))
 }
 
-/// The topics of a log.
-pub(super) fn tables(show: Show<'_>) -> Result<Vec<TableInfo>, Fault> {
-    let mut bag = Bag::new(&|_| false, usize::MAX);
+/// The topics of a log; no numbers are kept.
+pub(super) fn tables(show: BagReplay<'_>) -> Result<Vec<TableInfo>, RecordingFault> {
+    let mut bag = BagCollector::new(&|_| false, usize::MAX);
     show(&mut bag)?;
     let mut found = Vec::new();
     for topic in bag.topics {
+        // The part of the description that is the same for all cases.
         let bare = TableInfo {
             name: topic.name.clone(),
             kind: topic.kind.clone(),
@@ -407,35 +446,30 @@ pub(super) fn tables(show: Show<'_>) -> Result<Vec<TableInfo>, Fault> {
             time: None,
             remark: None,
         };
+        // A topic that cannot be read has its reason as a remark.
         if let Err(says) = &topic.reader {
             found.push(TableInfo {
-                remark: Some(format!("left aside: {says}")),
+                remark: Some(format!("skipped: {says}")),
                 ..bare
             });
             continue;
         }
         let tables = topic.tables();
+        // A topic without numbers has no table.
         if tables.is_empty() {
-            let holds = if bare.samples == 0 {
-                "no messages"
-            } else {
-                "no numbers"
-            };
+            let holds = if bare.samples == 0 { "no messages" } else { "no numbers" };
             found.push(TableInfo {
-                remark: Some(format!("it holds {holds}")),
+                remark: Some(format!("it contains {holds}")),
                 ..bare
             });
             continue;
         }
         for table in tables {
-            // As it is read: from the first sample on, unless the numbers are small.
+            // As for reading: times are counted from the first one, unless they are small.
             let span = table.span.map(|(least, most)| {
                 let is_exact = -EXACT < least && most < EXACT;
                 let zero = if is_exact { 0 } else { least };
-                (
-                    seconds(least.wrapping_sub(zero)),
-                    seconds(most.wrapping_sub(zero)),
-                )
+                (seconds(least.wrapping_sub(zero)), seconds(most.wrapping_sub(zero)))
             });
             let columns = table.columns.into_iter().map(|(name, kind, _)| ColumnInfo {
                 name,
@@ -458,18 +492,20 @@ pub(super) fn tables(show: Show<'_>) -> Result<Vec<TableInfo>, Fault> {
     Ok(found)
 }
 
-fn names_of(tables: &[Table]) -> Vec<String> {
+/// Names of the columns of all tables, the time first.
+fn names_of(tables: &[BagTable]) -> Vec<String> {
     let names = tables.iter().flat_map(|table| &table.columns);
     let names = names.map(|(name, _, _)| name.clone());
     std::iter::once("t".to_owned()).chain(names).collect()
 }
 
-/// Widens a span of times to hold another one.
-fn extend(span: &mut Option<(i64, i64)>, time: i64) {
+/// Extends a time range to include another time, ns.
+fn extend_span(span: &mut Option<(i64, i64)>, time: i64) {
     let (first, last) = span.unwrap_or((time, time));
     *span = Some((first.min(time), last.max(time)));
 }
 
+/// Nanoseconds as seconds.
 fn seconds(nanoseconds: i64) -> f64 {
     nanoseconds as f64 / 1e9
 }

@@ -1,0 +1,262 @@
+//! Thresholds of the diagnosis: the numbers that decide what is reported of a recording or a model. Each says what it
+//! bounds, its unit, and how it was chosen. Numbers that only set an accuracy, a grid or the effort of a search stay
+//! where they are used. With all of them together, 200 recordings with white noise and without any effect raised no
+//! alarm (`docs/guide/src/figures.md`).
+
+// --- evidence for a change of the set
+
+/// A change must lower the squared error on its channels by this share where it was not fitted (1). By judgement.
+pub(super) const LEAST_GAIN: f64 = 0.02;
+
+/// If the residual is white noise, the least gain is this many times its variance on data that was not fitted (1). By
+/// judgement. With fit and validation runs used together, such limits lower the detectable size by 15 to 40 %
+/// (CHANGELOG.md).
+pub(super) const NOISE_LEAST_GAIN_VARIANCES: f64 = 8.0;
+
+/// Least t value of the gain over the blocks if the residual is white noise (1): only noise makes blocks differ then.
+/// By judgement.
+pub(super) const NOISE_LEAST_T: f64 = 1.0;
+
+/// A residual is white noise if its effective samples are more than this share of its samples (1). By judgement.
+pub(super) const WHITE_LEAST_EFFECTIVE_SHARE: f64 = 0.5;
+
+/// A residual is white noise only if its squares are below this many times those of the noise between neighbouring
+/// samples (1). By judgement.
+pub(super) const WHITE_MOST_NOISE_RATIO: f64 = 1.5;
+
+/// A gain below this part of the squares that other effects explain (1) may come from the uncertainty of these effects.
+/// By judgement.
+pub(super) const MIN_SHARE_OF_OTHERS: f64 = 1e-4;
+
+/// A gain below this part of a force's squares (1) may come from the smoothing of the positions. By judgement.
+pub(super) const MIN_SHARE_OF_FORCE: f64 = 1e-5;
+
+/// Squared errors below this, relative to the variance of the noise (1), contain nothing to explain. By judgement.
+pub(super) const EXPLICABLE_LEAST_NOISE_RATIO: f64 = 0.8;
+
+/// Least t value of the gain (1): its mean over the blocks, divided by its standard error. By judgement.
+pub(super) const BLOCKS_LEAST_T: f64 = 2.5;
+
+/// From this gain on (1), it is enough that the blocks gain relative to their own error. By judgement.
+pub(super) const LARGE_GAIN: f64 = 0.15;
+
+/// Least t value of the gain of each block relative to its own error (1), if the gain is large. By judgement.
+pub(super) const LEAST_SHARES_T: f64 = 4.0;
+
+// --- possible estimates
+
+/// If an estimate with the wrong sign explains less than this share of the squared error (1), its sign is random. By
+/// judgement.
+pub(super) const RANDOM_SIGN_SHARE: f64 = 0.05;
+
+/// Two effects at a place cancel if their sum has less than this share of the squares of the larger one (1). A quarter
+/// of the squares is half of the amplitude. By judgement.
+pub(super) const CANCELLATION_SHARE: f64 = 0.25;
+
+/// A column of an effect is dependent if less than this share of its squares remains after the projection on the others
+/// (1). By judgement.
+pub(super) const EFFECT_INDEPENDENCE_TOLERANCE: f64 = 1e-6;
+
+/// An estimate is determined if its variance is below this many times what its column alone would give (1). By
+/// judgement.
+pub(super) const ESTIMATE_MOST_VARIANCE_RATIO: f64 = 1e9;
+
+// --- search
+
+/// A rival whose squares are within this factor (1) is tried with finer constants. By judgement.
+pub(super) const RIVAL_MOST_RATIO: f64 = 1.5;
+
+/// The same for a rival whose constant has only been searched on a grid so far (1). By judgement.
+pub(super) const RIVAL_MOST_GRID_RATIO: f64 = 20.0;
+
+/// A rival is tried with finer constants if this factor (1) times what it explains with a constant of the grid would be
+/// enough. By judgement.
+pub(super) const RIVAL_FINER_GAIN_FACTOR: f64 = 2.0;
+
+/// A simpler kind comes before a more general one that contains it, if it reaches this share of the gain (1). By
+/// judgement.
+pub(super) const SIMPLER_KIND_SHARE: f64 = 0.97;
+
+/// Another simple kind comes before a refinement of a member, if it reaches this share of the gain (1). By judgement.
+pub(super) const OTHER_KIND_SHARE: f64 = 0.7;
+
+/// A set with fewer estimated numbers comes before the best one if its criterion (twice the logarithm of the
+/// likelihood) is worse by at most this (1). By judgement.
+pub(super) const SIMPLER_SET_MOST_LOSS: f64 = 2.0;
+
+/// By how much the criterion (twice the logarithm of the likelihood) of another set must be below that of a set that
+/// only grows (1). By judgement.
+pub(super) const OTHER_SET_LEAST_ADVANTAGE: f64 = 20.0;
+
+/// Share of the squared error on its channels by which such a set must improve on the grown one (1). By judgement.
+pub(super) const OTHER_SET_LEAST_GAIN: f64 = 0.1;
+
+/// Price of each place of an effect in the criterion (1), which decides only between sets that are otherwise equal. By
+/// judgement.
+pub(super) const PLACE_PRICE: f64 = 0.01;
+
+// --- the last set
+
+/// Least decrease of the criterion for an exchange of members (1). By judgement.
+pub(super) const EXCHANGE_LEAST_DECREASE: f64 = 1.0;
+
+/// Two members whose criteria differ by less than this (1) are equally good. By judgement.
+pub(super) const EQUALLY_GOOD_DIFFERENCE: f64 = 5.0;
+
+/// An effect is dropped if it explains less than this many times the repeatable squares that stay unexplained on its
+/// channels (1): an unknown law is as likely there. By definition.
+pub(super) const EFFECT_LEAST_UNEXPLAINED_RATIO: f64 = 1.0;
+
+// --- alternatives, probabilities and what is undetermined
+
+/// A set is distinguishable from the best one if its criterion is worse by this much (1): twice the logarithm of the
+/// likelihood, with the effective number of samples. By judgement.
+pub(super) const MIN_DISTINCTION: f64 = 9.0;
+
+/// An alternative must explain at least this share of what the effect explains (1). By judgement.
+pub(super) const MIN_SUBSTITUTE_SHARE: f64 = 0.8;
+
+/// A force signal fault or a body is evaluated with a column at its estimated value, if the squares of its set are
+/// below this factor times those of the best set (1). By judgement.
+pub(super) const SUBSTITUTE_MOST_RATIO: f64 = 3.0;
+
+/// An effect that explains less than this share of the squares (1) has no alternatives. By judgement.
+pub(super) const NEGLIGIBLE_EFFECT_SHARE: f64 = 1e-6;
+
+/// Largest odds for an effect, as twice their logarithm (1). By judgement.
+pub(super) const MAX_LOG_ODDS: f64 = 20.0;
+
+/// Probability that another cause, which is no candidate, explains what an effect explains, if the residual is noise
+/// (1). By judgement.
+pub(super) const UNKNOWN_CAUSE_PROBABILITY: f64 = 0.02;
+
+/// The same if a repeatable part of the residual is unexplained (1). By judgement.
+pub(super) const UNKNOWN_CAUSE_IF_UNEXPLAINED: f64 = 0.25;
+
+/// A column whose share of squares outside of the others is below this (1) is a combination of them along any motion,
+/// and its effect is not listed as undetermined. Below it is rounding. By judgement.
+pub(super) const UNDETERMINED_LEAST_SHARE: f64 = 1e-18;
+
+/// An effect is undetermined if the squares of a force as large as the drives' own, without what the other columns
+/// explain of it, are below this many variances of the residual (1): the uncertainty of the effect is then larger than
+/// that force. By definition.
+pub(super) const UNDETERMINED_MOST_VARIANCES: f64 = 1.0;
+
+// --- noise
+
+/// Errors below this share of a force (1) are rounding, of the recording or of its simulation. By judgement.
+pub const FORCE_ROUNDING: f64 = 3e-6;
+
+/// The noise of a residual is coloured if its effective number of samples is at most this share of all samples (1). By
+/// judgement.
+pub(super) const COLOURED_MOST_EFFECTIVE_SHARE: f64 = 0.5;
+
+/// The variance of coloured noise must exceed that of the white noise by this factor (1). By judgement.
+pub(super) const COLOURED_LEAST_VARIANCE_RATIO: f64 = 1.5;
+
+// --- outliers, reversals and coarse readings
+
+/// Least distance of an outlier from the median of its neighbours, in robust standard deviations (1). By judgement.
+pub(super) const FORCE_OUTLIER_DEVIATIONS: f64 = 7.0;
+
+/// Distances below this share of the rms force (1) are rounding and no outliers. By judgement.
+pub(super) const OUTLIER_LEAST_FORCE_SHARE: f64 = 1e-3;
+
+/// If at least this share of the samples stands out (1), they are part of the force and no outliers. By judgement.
+pub(super) const OUTLIERS_MOST_SHARE: f64 = 0.05;
+
+/// Samples on either side of a reversal in which no outliers are searched. By judgement.
+pub(super) const REVERSAL_OUTLIER_SAMPLES: usize = 4;
+
+/// Samples on either side of a reversal that decide nothing. By judgement.
+pub(super) const REVERSAL_UNDECIDED_SAMPLES: usize = 1;
+
+/// If the samples next to reversals are at least this share of all samples (1), they decide like the others. By
+/// judgement.
+pub(super) const REVERSALS_MOST_SHARE: f64 = 0.1;
+
+/// Different values that a quantised force must have at least. By judgement.
+pub(super) const QUANTISED_FEWEST_VALUES: usize = 3;
+
+/// Samples per different value that a quantised force must have at least: quantised values repeat. By judgement.
+pub(super) const QUANTISED_FEWEST_REPEATS: usize = 4;
+
+/// Largest distance of a difference between values from a multiple of the step, in steps (1). By judgement.
+pub(super) const QUANTISED_MOST_OFF_STEP: f64 = 1e-3;
+
+/// The error of the steps must exceed this part of the noise (1); otherwise they are not reported. By judgement.
+pub(super) const QUANTISED_LEAST_NOISE_PART: f64 = 0.3;
+
+// --- hum
+
+/// Least ratio of a spectral line to the median of the spectrum around it (1). By judgement.
+pub(super) const MIN_LINE_RATIO: f64 = 60.0;
+
+/// Lines below this frequency, Hz, may come from the motion, and are found only in the residual of a diagnosis. By
+/// judgement.
+pub(super) const LINE_LOWEST_HZ: f64 = 3.0;
+
+/// Below this frequency, Hz, a line must be most of the residual of a channel. By judgement.
+pub(super) const LINE_LOW_HZ: f64 = 8.0;
+
+/// A line is most of the residual if it explains this share of the squares (1). By judgement.
+pub(super) const LINE_MAIN_SHARE: f64 = 0.6;
+
+/// Largest number of lines in a residual; more are a periodic motion and no hum. By judgement.
+pub(super) const MOST_LINES: usize = 6;
+
+/// Least share of a channel's squared residual that all of its lines together must explain (1). By judgement.
+pub(super) const MIN_LINE_SHARE: f64 = 0.02;
+
+/// Periods of a slow line that every segment must have at least (1). By judgement.
+pub(super) const SLOW_LINE_LEAST_PERIODS: f64 = 4.0;
+
+/// Parts of every segment in each of which a slow line must explain most of the residual, with the same amplitude and
+/// phase. By judgement.
+pub(super) const SLOW_LINE_PARTS: usize = 4;
+
+/// Largest share of the non-repeatable residual that may remain after a slow line, where a part of the residual is
+/// repeatable (1). By judgement.
+pub(super) const SLOW_LINE_MOST_REMAINING_SHARE: f64 = 0.5;
+
+/// Least share of every segment that a slow line must explain before its frequency is refined (1). By judgement.
+pub(super) const SLOW_LINE_LEAST_SEGMENT_SHARE: f64 = 0.3;
+
+// --- proposed laws
+
+/// From this mean square of the residual on, relative to white noise (1), a law is searched even if nothing else shows
+/// that the residual is repeatable. By judgement.
+pub(super) const LAW_LEAST_NOISE_RATIO: f64 = 4.0;
+
+/// Least share of the repeatable residual that a law must explain (1). By judgement.
+pub(super) const LAW_LEAST_REPEATABLE_SHARE: f64 = 0.5;
+
+/// Least share of the total residual that a law must explain where nothing else shows that it is repeatable (1). By
+/// judgement.
+pub(super) const LAW_LEAST_SHARE_ALONE: f64 = 0.6;
+
+/// Part of that share which a term must reach with its first constants, for a search of better ones (1). By judgement.
+pub(super) const LAW_HOPEFUL_PART: f64 = 0.2;
+
+/// Independent columns of the grammar of laws (1), of which the best is compared with chance. By judgement.
+pub(super) const LAW_INDEPENDENT_COLUMNS: f64 = 1e5;
+
+/// Largest probability that one of these columns does as well by chance (1). By judgement.
+pub(super) const LAW_MOST_CHANCE: f64 = 1e-3;
+
+/// Standard deviations over the blocks by which two terms must be better than one (1). By judgement.
+pub(super) const SECOND_TERM_LEAST_T: f64 = 3.0;
+
+/// Differences between laws below this share of what the best one explains (1) are not significant: errors of sensors
+/// and derivatives are not noise. By judgement.
+pub(super) const LAW_SAME_SHARE: f64 = 0.002;
+
+/// Largest number of nearly equal laws that are reported. By judgement.
+pub(super) const MAX_NEAR_TIES: usize = 8;
+
+/// A column of a law is dependent if at most this share of its squares remains after the projection (1). By judgement.
+pub(super) const LAW_INDEPENDENCE_TOLERANCE: f64 = 1e-5;
+
+/// A proposed law that explains at least this share of the residual (1) may replace effects that it makes unnecessary.
+/// By judgement.
+pub(super) const REPLACING_LAW_LEAST_SHARE: f64 = 0.5;

@@ -1,0 +1,237 @@
+//! Chapters 1 to 4 of the page: the simulated runs, the errors of the forces, and the cause of these errors.
+
+use crate::page::ExperimentPage;
+use crate::study::DriveColumns;
+use crate::wording::{explained_text, largest, least, nominal, percent, rounding, share};
+use crate::{PaperExperiment, figures, printed};
+use modelmill::text::table::significant;
+
+/// Forces below this share of their root mean square count as near zero.
+const NEAR_ZERO: f64 = 0.1;
+
+impl ExperimentPage {
+    /// The summary at the top of the page.
+    pub(crate) fn summary(&mut self, experiment: &PaperExperiment) {
+        let plain = &experiment.benches[0].runs;
+        let rods = &experiment.benches[1].runs;
+        let [calculated, consistent, estimated] = &experiment.base;
+        self.0.push_str("<div class=\"short\">\n");
+        // The result of the page: the reduction is exact, and the paper's error has one cause.
+        self.paragraph(&format!(
+            "Summary. Before identification, the forces of the paper's reduced model differ from those of its \
+             multibody model by 8 to 10 %. The paper names the places of the lumped masses in general as the cause. \
+             Here the complete robot, 11 groups with true parallel cranks, is simulated by a program that shares no \
+             mechanics with the model. A reduced model in which the platform's mass m4 acts at one place agrees with \
+             it to {} without any identification: the reduction loses nothing. The paper's treatment, with the same \
+             masses, has an error of {} to {} (nrms). Of that error, {} is the force of one mass, m4, which the \
+             balance of moments places elsewhere than the balance of forces. The cause is that of the paper's error. \
+             The size differs, because it depends on lengths and motions that the paper does not print (section 7).",
+            rounding(largest(plain, |along, d| along.errors(d, &along.calculated[1]).nrms)),
+            percent(least(plain, |along, d| along.errors(d, &along.calculated[0]).nrms)),
+            percent(largest(plain, |along, d| along.errors(d, &along.calculated[0]).nrms)),
+            explained_text(plain),
+        ));
+        // The same conclusion from the paper's own numbers.
+        self.paragraph(&format!(
+            "The paper's own Table 1 agrees: p4,min = m4 (1 - dc3/d3), which is zero for a mass in one place, falls \
+             from {} kg to {} kg by identification (with d3 = 1.03 m; for any d3, by more than {}). p3,min and p5,min \
+             come within {} and {} of the consistent values.",
+            significant(calculated[3], 3),
+            significant(estimated[3], 3),
+            percent(1.0 - printed::ESTIMATED[1].1 / nominal(experiment, "m4")),
+            percent((estimated[2] / consistent[2] - 1.0).abs()),
+            percent((estimated[4] / consistent[4] - 1.0).abs()),
+        ));
+        // The part of the error that has another cause.
+        self.paragraph(&format!(
+            "With spindles that have mass (rods of 8 kg), {} of the error of the paper's treatment (2-norm, \
+             verification run) is not caused by m4. This part comes from the rods.",
+            percent(rods[1].explained_error().remains)
+        ));
+        self.0.push_str("</div>\n");
+    }
+
+    /// Chapter 1: excitation, rigs and models.
+    pub(crate) fn method(&mut self, experiment: &PaperExperiment) {
+        let [excitation, test] = &experiment.trajectories;
+        self.heading("1  Method");
+        // The trajectories, so that the experiment can be repeated.
+        self.paragraph(&format!(
+            "Excitation, eq. (14), (15) and (17): {} harmonics and a period of {} s, as in the paper, within the \
+             limits of spidermill.toml. The best of {} random trajectories has condition number {}, the optimised one \
+             {} (paper: {}). The test run is another random series, with {} harmonics and a period of {} s. \
+             Coefficients are rounded to four decimals and printed at the end, so that the runs can be repeated \
+             without the search.",
+            excitation.series.first().map_or(0, |s| s.mu.len()),
+            excitation.period,
+            excitation.random,
+            significant(excitation.start, 4),
+            significant(excitation.condition_number, 4),
+            printed::CONDITION_NUMBER,
+            test.series.first().map_or(0, |s| s.mu.len()),
+            test.period,
+        ));
+        // The rigs in the place of the paper's multibody model, and the two reduced models.
+        self.paragraph(&format!(
+            "Both are simulated at {} Hz on two rigs: spidermill-full.toml, whose 11 groups sum up to Table 1, and \
+             spidermill-with-rods.toml, the same with a rod of 8 kg and 0.9 m in each spindle. The sensors are \
+             perfect, so every difference between rig and model is a model error. Two reduced models are compared \
+             with them: spidermill-paper.toml, which is exactly eq. (5) and eq. (16), and spidermill.toml, the \
+             consistent one.",
+            experiment.rate
+        ));
+        // The difference between the two models.
+        self.paragraph(
+            "The paper assigns half of m4 to each coupler. In the coupler's balance of forces it acts at the joint \
+             R3m. In the balance of moments about the elbow it acts at the coupler's centre of mass. This is the \
+             origin of the products m4 dc3 and m4 dc3^2 of eq. (5). A mass at one place gives four base parameters \
+             instead of five.",
+        );
+        // Motion and forces of both runs.
+        let drives = experiment.paper.drives();
+        let runs = &experiment.benches[0].runs;
+        for (k, title) in ["Identification run", "Verification run"].into_iter().enumerate() {
+            let svg = figures::motion(title, &experiment.trajectories[k], &runs[k], &drives);
+            self.figure(&svg, "Compare Fig. 6 and 7 of the paper, a to d. Rig without rods.");
+        }
+    }
+
+    /// Chapter 2: errors of both treatments, compared with Table 2 of the paper.
+    pub(crate) fn table_2(&mut self, experiment: &PaperExperiment) {
+        self.heading("2  Table 2, compared with the paper's");
+        // The measures of error: the paper's, and two without its peaks.
+        self.paragraph(
+            "The paper's measure is the mean of |error| / |force|. It is dominated by the times at which a force \
+             passes through zero (section 4). The tables therefore also show the median of the same quotient and the \
+             nrms (2-norm of the error divided by that of the force).",
+        );
+        let names = ["fe1, left", "fe10, right"];
+        // One table per treatment; only the first one has numbers of the paper.
+        for (t, title) in ["The paper's treatment", "The consistent treatment"]
+            .into_iter()
+            .enumerate()
+        {
+            self.paragraph(&format!("{title}:"));
+            // One row per run, stage of identification, and drive.
+            let mut rows = Vec::new();
+            for (k, run) in ["identification", "verification"].into_iter().enumerate() {
+                for (s, stage) in ["calculated", "estimated"].into_iter().enumerate() {
+                    for (d, name) in names.into_iter().enumerate() {
+                        // The paper's number first, then the errors on both rigs.
+                        let mut row = vec![format!("{run}, {stage}, {name}")];
+                        if t == 0 {
+                            row.push(format!("{:.2} %", printed::TABLE_2[s][d][k]));
+                        }
+                        for bench in &experiment.benches {
+                            let along = &bench.runs[k];
+                            let modelled: &DriveColumns = match s {
+                                0 => &along.calculated[t],
+                                _ => &along.estimated[t],
+                            };
+                            let e = along.errors(d, modelled);
+                            row.extend([e.mean_relative, e.median_relative, e.nrms].map(percent));
+                        }
+                        rows.push(row);
+                    }
+                }
+            }
+            // Three measures of error for each of the two rigs.
+            let columns = ["rig: mean", "median", "nrms", "with rods: mean", "median", "nrms"];
+            let mut head = vec!["run"];
+            if t == 0 {
+                head.push("*paper: mean");
+            }
+            head.extend(columns);
+            self.table(&head, &rows);
+        }
+        // Errors over time on both rigs.
+        let drives = experiment.paper.drives();
+        self.figure(
+            &figures::errors(
+                "Forces and errors, verification run, rig as in Table 1",
+                &experiment.benches[0].runs[1],
+                &drives,
+            ),
+            "All errors have one scale. Calculated: parameters of Table 1, left column; estimated: by least squares \
+             from the identification run. The consistent treatment has no visible error.",
+        );
+        self.figure(
+            &figures::errors(
+                "Forces and errors, verification run, rig with spindle rods",
+                &experiment.benches[1].runs[1],
+                &drives,
+            ),
+            "The spindles add an error that the consistent treatment has as well. Identification lowers it but cannot \
+             remove it, because no base parameter represents a rod.",
+        );
+    }
+
+    /// Chapter 3: the error of the paper's treatment compared with the force of the misplaced mass.
+    pub(crate) fn placement(&mut self, experiment: &PaperExperiment) {
+        self.heading("3  The error of the paper's treatment is the force of the misplaced m4");
+        // Two independent ways to the same curve.
+        self.paragraph(
+            "Subtract the forces of the two reduced models with the parameters of Table 1: the difference is the \
+             force of m4 at R3m minus its force where the paper's balance of moments places it. This needs no rig. \
+             The error of the paper's treatment needs the rig, which is independent of both models. Both are the same \
+             curve:",
+        );
+        // Correlation and residual for each rig and run.
+        let mut rows = Vec::new();
+        for (bench, name) in experiment.benches.iter().zip(["rig", "rig with rods"]) {
+            for (along, run) in bench.runs.iter().zip(["identification", "verification"]) {
+                let explained = along.explained_error();
+                rows.push(vec![
+                    format!("{name}, {run}"),
+                    format!("{:.6}", explained.correlation),
+                    percent(explained.remains),
+                    share(1.0 - explained.remains * explained.remains),
+                ]);
+            }
+        }
+        self.table(
+            &["run", "correlation", "residual error (2-norm)", "explained (squares)"],
+            &rows,
+        );
+        // Error, explanation and residual over time.
+        let drives = experiment.paper.drives();
+        for (bench, title) in experiment.benches.iter().zip([
+            "Verification run, rig as in Table 1",
+            "Verification run, rig with spindle rods",
+        ]) {
+            self.figure(
+                &figures::decomposition(title, &bench.runs[1], &drives),
+                "Calculated parameters. One scale for all panels.",
+            );
+        }
+    }
+
+    /// Chapter 4: the relative error where a force passes through zero.
+    pub(crate) fn peaks(&mut self, experiment: &PaperExperiment) {
+        self.heading("4  The peaks of the relative error");
+        // The left spindle in the verification run, since its force often passes through zero.
+        let along = &experiment.benches[0].runs[1];
+        let drives = experiment.paper.drives();
+        let modelled = &along.calculated[0];
+        // Samples near zero, and their contribution to the mean relative error.
+        let [samples, part] = along.near_zero(0, modelled, NEAR_ZERO);
+        let errors = along.errors(0, modelled);
+        self.paragraph(&format!(
+            "The paper remarks that peaks of the relative error arise where the force is close to zero. This is \
+             confirmed: the force of the left spindle passes through zero {} times in this run. The error does not, \
+             so their quotient is unbounded there. The {} of the samples with a force below {} of its root mean \
+             square cause {} of the mean relative error. The median, {}, is not affected by peaks; the mean is {}.",
+            along.zeros(0).len(),
+            percent(samples),
+            percent(NEAR_ZERO),
+            percent(part),
+            percent(errors.median_relative),
+            percent(errors.mean_relative),
+        ));
+        let name = drives.first().map_or("", String::as_str);
+        self.figure(
+            &figures::peaks("Left spindle, verification run, rig as in Table 1", along, 0, name),
+            "Compare Fig. 6 e of the paper.",
+        );
+    }
+}

@@ -1,0 +1,132 @@
+//! Thresholds of the audit: the numbers that decide which faults of a recording are reported with a model. Each says
+//! what it bounds, its unit, and how it was chosen. Numbers that only set an accuracy or a grid stay where they are
+//! used.
+
+use std::ops::Range;
+
+// --- Columns, signs and gravity
+
+/// Samples that a recording must exceed to be checked with the model. By judgement.
+pub(super) const AUDIT_FEWEST_SAMPLES: usize = 100;
+
+/// Relative error of the best fit (1) up to which no exchanged columns and no wrong signs are suspected. By judgement.
+pub(super) const WIRING_LEAST_ERROR: f64 = 0.05;
+
+/// Relative error (1) below which a correction of the motion must bring the fit if the mechanism cannot reach the poses
+/// as recorded, so that there is no error to compare with. By judgement.
+pub(super) const UNREACHABLE_MOST_ERROR: f64 = 0.3;
+
+/// A correction, such as an exchange or reversed gravity, is suggested if it brings the error of the best fit below
+/// this share of the error without it (1). Columns are not suspected if a delay does the same. By judgement.
+pub(super) const CORRECTION_MOST_RATIO: f64 = 0.5;
+
+/// Coordinates whose wrong sign explains the forces equally well are named together if their errors differ by less than
+/// this share (1). By judgement.
+pub(super) const SAME_ERROR_TOLERANCE: f64 = 0.05;
+
+/// Rows for each base parameter with which a correction of the motion must be judged; exchanges are not tried if there
+/// is time for fewer only. By judgement.
+pub(super) const CORRECTION_ROWS_PER_COLUMN: usize = 4;
+
+/// Relative error, with friction and offsets of the drives fitted (1), below which the direction of gravity is
+/// accepted. By judgement.
+pub(super) const GRAVITY_LEAST_ERROR: f64 = 0.01;
+
+// --- Forces compared with the nominal values
+
+/// Magnitude of the correlation with the nominal forces (1) below which nothing is said of a force: friction and wrong
+/// nominal values may be the cause. By judgement.
+pub(super) const NOMINAL_LEAST_CORRELATION: f64 = 0.8;
+
+/// Nominal values may be wrong by this factor (1). Units of force differ by powers of 1000, far more. By judgement.
+pub(super) const NOMINAL_FORCE_FACTOR: f64 = 4.0;
+
+/// Ratios of nominal to measured force that may be those of a gear (1): motor torques before the gear. At smaller
+/// ratios nominal values may be wrong, at larger ones the unit. By judgement.
+pub(super) const GEAR_RATIOS: Range<f64> = 12.0..1000.0 / NOMINAL_FORCE_FACTOR;
+
+// --- Contacts and pushes
+
+/// Widest median filters that must fit into the samples of a run; in shorter runs no events are searched. By judgement.
+pub(super) const EVENT_FEWEST_FILTER_WIDTHS: usize = 40;
+
+/// The usual residual of a drive is the one that this share of the run stays below (1). By judgement.
+pub(super) const USUAL_RESIDUAL_SHARE: f64 = 0.8;
+
+/// An event exceeds the usual residual by this factor (1). By judgement.
+pub(super) const EVENT_RESIDUAL_FACTOR: f64 = 5.0;
+
+/// An event also exceeds this share of the drive's rms force (1). By judgement.
+pub(super) const EVENT_LEAST_FORCE_SHARE: f64 = 0.02;
+
+/// A lull belongs to the event about it if it is shorter than this many widths of the median filter. By judgement.
+pub(super) const EVENT_LULL_FILTER_WIDTHS: usize = 2;
+
+/// An event that lasts less is not reported, s. By judgement.
+pub(super) const SHORTEST_EVENT_S: f64 = 0.1;
+
+/// Most events of a run; if there are more, they are a property of the machine, and none is reported. By judgement.
+pub(super) const MOST_EVENTS: usize = 4;
+
+/// Events are reported only if they last less than this share of the run together (1). By judgement.
+pub(super) const EVENTS_MOST_DURATION_SHARE: f64 = 0.15;
+
+/// A drive that is slower than this share of its fastest rate (1) may be reversing. Its residual then neither starts
+/// nor ends an event. By judgement.
+pub(super) const EVENT_REVERSAL_RATE_SHARE: f64 = 0.1;
+
+/// Samples are neighbours in state if their distance is below this many standard deviations of the states. By
+/// judgement.
+pub(super) const NEIGHBOUR_MOST_DISTANCE_SIGMAS: f64 = 1.0;
+
+/// A residual repeats with the motion if its neighbours in state have at least this share of it on average (1). By
+/// judgement.
+pub(super) const REPEATED_LEAST_RESIDUAL_SHARE: f64 = 0.4;
+
+// --- Delays
+
+/// Longest delay that is searched, s. By judgement.
+pub(super) const LONGEST_DELAY_S: f64 = 0.25;
+
+/// Longest delay that is searched, steps of the recording; the longer of both counts, for recordings with few samples
+/// per second. By judgement.
+pub(super) const LONGEST_DELAY_STEPS: f64 = 64.0;
+
+/// Longest delay that is searched, as a share of the recording (1); it bounds both of the others. By judgement.
+pub(super) const LONGEST_DELAY_SHARE: f64 = 0.1;
+
+/// Samples at which a drive is slower than this share of its fastest rate (1) are not used: friction near reversals
+/// causes an apparent delay. By judgement.
+pub(super) const DELAY_REVERSAL_RATE_SHARE: f64 = 0.1;
+
+/// A delay of all drives must exceed this many half widths of its interval, since model errors are not random. Two
+/// drives differ in their delay, or a drive is delayed at all, only from this many on. By judgement.
+pub(super) const DELAY_LEAST_HALF_WIDTHS: f64 = 1.5;
+
+/// The same for a drive that alone is delayed: missing laws often act on one drive. By judgement.
+pub(super) const SINGLE_DELAY_LEAST_HALF_WIDTHS: f64 = 3.0;
+
+/// Shortest delay of all drives that is reported, steps of the recording. By judgement.
+pub(super) const DELAY_LEAST_STEPS: f64 = 0.2;
+
+/// Shortest delay of single drives that is reported, steps of the recording. By judgement.
+pub(super) const SINGLE_DELAY_LEAST_STEPS: f64 = 0.3;
+
+/// Delays that differ by less are equal whatever their intervals, steps of the recording. By judgement.
+pub(super) const SAME_DELAY_TOLERANCE_STEPS: f64 = 0.1;
+
+/// A delay of all drives must lower the residual by more than this share (1). By judgement.
+pub(super) const DELAY_LEAST_GAIN: f64 = 0.003;
+
+/// A delay of a single drive must lower the residual of the drive by more than this share (1). By judgement.
+pub(super) const SINGLE_DELAY_LEAST_GAIN: f64 = 0.03;
+
+/// The note on a delay is a warning if the delay lowers the residual by more than this share (1). By judgement.
+pub(super) const DELAY_WARNING_GAIN: f64 = 0.1;
+
+/// Drives that must each show a common delay on their own; all of them if there are fewer. By judgement.
+pub(super) const COMMON_DELAY_FEWEST_DRIVES: usize = 2;
+
+/// Single drives are delayed only if the half width of one of the other drives is below this share of the delay (1):
+/// that drive shows that the common clock is right. By judgement.
+pub(super) const PROMPT_DRIVE_MOST_HALF_WIDTH: f64 = 0.5;

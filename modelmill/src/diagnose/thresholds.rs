@@ -1,0 +1,77 @@
+//! Thresholds of the diagnosis: the numbers that decide what is reported of a recording or a model. Each says
+//! what it bounds, its unit, and how it was chosen. Numbers that only set an accuracy or a grid stay where they
+//! are used.
+
+/// Most relative error on validation data, as a part of the force (1), for which findings are reported: above 1
+/// a model without any force would do better. By definition.
+pub(super) const MOST_VALIDATION_ERROR: f64 = 1.0;
+
+/// Differences between recordings are assumed only if leaving them out makes the mean square residual this many
+/// times as large (1). Otherwise what the model lacks may look like a difference. By judgement.
+pub(super) const DIFFERENCE_LEAST_GAIN: f64 = 1.5;
+
+/// If this part of the error stays after the last step (1), the verdict quotes the drive whose error falls most
+/// instead of all drives together. By judgement.
+pub(super) const HARDLY_LOWER: f64 = 0.99;
+
+/// Forces are called noise-free if their noise is at most this many times the rounding of recorded numbers (1).
+/// By judgement.
+pub(super) const NOISE_FREE_ROUNDINGS: f64 = 2.0;
+
+/// Samples that each recording must have after decimation; fewer cannot separate effects from chance. By judgement.
+pub(super) const FEWEST_SAMPLES: usize = 60;
+
+/// A base parameter differs from its nominal value if the difference is above this many standard deviations
+/// (1). By judgement.
+pub(super) const OFF_NOMINAL_SIGMAS: f64 = 5.0;
+
+/// A base parameter differs from its nominal value if the difference is also above this part of the value (1).
+/// By judgement.
+pub(super) const OFF_NOMINAL_PART: f64 = 0.01;
+
+/// Every parameter of a body may differ from the file by this factor (1) before the sign of a base parameter is called
+/// impossible. By judgement.
+pub(super) const BODY_PARAMETER_FACTOR: f64 = 3.0;
+
+/// Random bodies within `BODY_PARAMETER_FACTOR` that must all agree on the sign of a base parameter. By judgement.
+pub(super) const SIGN_TRIALS: usize = 200;
+
+/// Time before and after a contact or push that is left out of the fit, s. By judgement.
+pub(super) const CONTACT_MARGIN_S: f64 = 0.15;
+
+/// A contact or push that lasts less is not reported, s. By judgement.
+pub(super) const CONTACT_SHORTEST_S: f64 = 0.18;
+
+/// Contacts with less time between them are reported as one, s. By judgement.
+pub(super) const CONTACT_GAP_S: f64 = 0.3;
+
+/// Samples beyond the place of a contact, at other times, that decide whether the force is a function of the
+/// position. With fewer the event is not called a contact. By judgement.
+pub(super) const REPEATED_PLACE_FEWEST_SAMPLES: usize = 10;
+
+/// The force of an event is a function of the position, such as an end stop, if the line fitted during the
+/// event leaves less than this part of the squared force at other times (1). By judgement.
+pub(super) const REPEATED_PLACE_MOST_RESIDUAL: f64 = 0.5;
+
+/// A tilt of the base about an axis is tried if it changes a base column by more than this (unit of the
+/// column). Below it is rounding. By judgement.
+pub(super) const TILT_LEAST_EFFECT: f64 = 1e-6;
+
+/// A column of a payload has no effect if its largest value is below this part of the largest of all payload
+/// columns (1). Below it is rounding. By judgement.
+pub(super) const PAYLOAD_LEAST_EFFECT: f64 = 1e-9;
+
+/// A column of a length or an angle has no effect if its largest difference is below this (unit of the column).
+/// Below it is rounding of the central differences. By judgement.
+pub(super) const CONSTANT_LEAST_EFFECT: f64 = 1e-7;
+
+/// Samples that each wave of an encoder error must have; errors with fewer are not tried. By judgement.
+pub(super) const ENCODER_WAVE_SAMPLES: f64 = 12.0;
+
+/// A central difference above this many times the median is a jump of a sign, such as that of dry friction, and
+/// is set to zero (1). By judgement.
+pub(super) const SLOPE_JUMP_MEDIANS: f64 = 100.0;
+
+/// A kind of effect repeats along the travel of its place if its shortest wavelength is below this part of the
+/// travel (1). By judgement.
+pub(super) const WAVE_SHORTEST_TRAVEL: f64 = 0.5;

@@ -1,0 +1,11 @@
+//! The library on recordings that are made for it, with what is in them known.
+
+mod draws;
+mod events;
+mod every_model;
+mod hanging;
+mod made;
+mod missing;
+mod runs;
+mod undriven;
+mod variants;

@@ -1,0 +1,219 @@
+//! `diagnose` where an arm carries more than its model, where a length of the model or the direction of gravity is wrong, and where
+//! a gear yields or an encoder has another zero. Forces are those of a model file that has the body or the length; errors of
+//! encoders are put into the recorded positions.
+
+use std::path::Path;
+
+use modelmill::Model;
+use modelmill::diagnose::{DiagnosisFindings, DiagnosisOptions, DiagnosisVerdict, FixedParameters, MissingEffect};
+use modelmill::identify::EstimatorOptions;
+use modelmill::recording::RecordingOptions;
+
+use crate::made::{Made, bundled, run, run_of};
+
+const ARM: &str = "puma560";
+
+fn diagnosed(file: &Path, held: FixedParameters) -> DiagnosisFindings {
+    let model = Model::open(bundled(ARM)).expect("the model");
+    let recording = model
+        .recording(file, &RecordingOptions::default())
+        .expect("the recording");
+    let question = DiagnosisOptions {
+        fixed: held,
+        repeat_with_nominal: false,
+    };
+    (model.diagnose(&[&recording], &[], &question)).expect("an answer")
+}
+
+/// The only effect that was found, at its place.
+#[track_caller]
+fn only<'a>(findings: &'a DiagnosisFindings, kind: &str, at: &str) -> &'a MissingEffect {
+    let [found] = &findings.missing[..] else {
+        panic!("{:#?}", findings.missing);
+    };
+    assert_eq!(
+        (found.effect.kind.as_str(), &found.effect.at[..]),
+        (kind, &[at.to_owned()][..])
+    );
+    found
+}
+
+#[track_caller]
+fn near(found: &MissingEffect, name: &str, truth: f64, part: f64) {
+    let estimate = found.estimates.iter().find(|one| one.name == name);
+    let value = estimate.expect("an estimate").value;
+    assert!(
+        (value - truth).abs() < part * truth.abs(),
+        "{name}: {value}, not {truth}"
+    );
+}
+
+#[test]
+fn a_load_on_the_flange_is_weighed_and_placed_while_the_base_is_held() {
+    let part = "\n[[part]]\nname = \"tool\"\non = \"link6\"\nmass = 2.8\ncentre = [0.03, -0.02, 0.08]\n\
+                inertia = { xx = 0.004, yy = 0.005, zz = 0.006 }\n";
+    let file = run(ARM, 700, Made::Body(part));
+    let findings = diagnosed(&file, FixedParameters::All);
+    let found = only(&findings, "payload", "link6");
+    near(found, "mass", 2.8, 0.05);
+    near(found, "mz", 2.8 * 0.08, 0.1);
+    // Beside free base parameters it is none of what may be missing.
+    let free = diagnosed(&file, FixedParameters::Known);
+    assert!(free.missing.is_empty(), "{:#?}", free.missing);
+    let candidates = &free.diagnosis.candidates;
+    assert!(candidates.iter().all(|one| one.effect.kind != "payload"));
+}
+
+#[test]
+fn nothing_is_carried_where_nothing_was_added() {
+    for seed in 710..713 {
+        let file = run(ARM, seed, Made::Nothing);
+        let findings = diagnosed(&file, FixedParameters::All);
+        assert!(findings.missing.is_empty(), "{:#?}", findings.missing);
+    }
+}
+
+#[test]
+fn a_length_that_is_off_is_found_with_its_error() {
+    let text = std::fs::read_to_string(bundled(ARM)).expect("a model");
+    let longer = text.replacen("r4 = { value = 0.4331", "r4 = { value = 0.5331", 1);
+    assert_ne!(text, longer);
+    let truth = Model::from_text("longer", &longer).expect("the model");
+    let file = run_of(&truth, ARM, 720, Made::Nothing);
+    let findings = diagnosed(&file, FixedParameters::Known);
+    near(only(&findings, "constant_error", "r4"), "error", 0.1, 0.1);
+}
+
+#[test]
+fn a_gear_that_yields_is_found_with_its_compliance() {
+    let file = run(ARM, 730, Made::Yields(1, 4e-4));
+    let findings = diagnosed(&file, FixedParameters::All);
+    let drive = findings.channels()[1].clone();
+    near(only(&findings, "drive_compliance", &drive), "compliance", 4e-4, 0.2);
+}
+
+/// A zero is a fault of the recording: the model lacks nothing. Beside free base parameters only joints behind it tell.
+#[test]
+fn an_encoder_with_another_zero_is_found_with_its_shift() {
+    for (seed, joint, held) in [
+        (750, 1, FixedParameters::Known),
+        (751, 2, FixedParameters::Known),
+        (752, 1, FixedParameters::All),
+        (753, 2, FixedParameters::All),
+    ] {
+        let file = run(ARM, seed, Made::Zero(joint, 0.05));
+        let findings = diagnosed(&file, held);
+        assert!(findings.missing.is_empty(), "{:#?}", findings.missing);
+        let zeros = findings.diagnosis.disturbances.iter();
+        let zeros: Vec<_> = zeros.filter(|one| one.kind == "encoder_zero").collect();
+        let [zero] = &zeros[..] else {
+            panic!("{:#?}", findings.diagnosis.disturbances);
+        };
+        assert_eq!(zero.at, [format!("q{}", joint + 1)]);
+        let shift = zero.estimates[0].value;
+        assert!((shift - 0.05).abs() < 0.006, "{seed}: {shift}");
+    }
+}
+
+/// Friction that the model has, with values of another day: it lacks none, and what is other about it is said.
+#[test]
+fn friction_of_another_day_is_no_further_friction() {
+    let friction = "[[effect]]\nkind = \"coulomb_friction\"\nat = \"PLACE\"\nparameters = { Fc = { name = \"Fc\", nominal = 2.0 } }\n\n\
+                    [[effect]]\nkind = \"viscous_friction\"\nat = \"PLACE\"\nparameters = { Fv = { name = \"Fv\", nominal = 3.0 } }\n";
+    let text = std::fs::read_to_string(bundled(ARM)).expect("a model");
+    let drive = Model::open(bundled(ARM)).expect("the model").drives()[1].clone();
+    let text = format!("{text}\n{}", friction.replace("PLACE", &drive));
+    let model = Model::from_text("with friction", &text).expect("the model");
+    let file = run(ARM, 760, Made::Friction(1, 5.0, 7.0));
+    let recording = model.recording(&file, &RecordingOptions::default());
+    let recording = recording.expect("the recording");
+    let question = DiagnosisOptions {
+        fixed: FixedParameters::All,
+        repeat_with_nominal: false,
+    };
+    let findings = model.diagnose(&[&recording], &[], &question);
+    let findings = findings.expect("an answer");
+    assert!(findings.missing.is_empty(), "{:#?}", findings.missing);
+    let changes = findings.diagnosis.disturbances.iter();
+    let changes: Vec<_> = changes.filter(|one| one.kind == "different_runs").collect();
+    let [change] = &changes[..] else {
+        panic!("{:#?}", findings.diagnosis.disturbances);
+    };
+    assert_eq!((change.kind.as_str(), &change.at), ("different_runs", &vec![drive]));
+    for (name, truth) in [("change of Fc", 3.0), ("change of Fv", 4.0)] {
+        let value = change.estimates.iter().find(|one| one.name == name);
+        let value = value.expect("an estimate").value;
+        assert!((value - truth).abs() < 0.1 * truth, "{name}: {value}");
+    }
+}
+
+/// No polynomial is like a pull that gives way: it is one effect all the same, with one place.
+#[test]
+fn a_hose_that_gives_way_is_one_effect() {
+    for (seed, way) in [(732, 0.35), (733, 0.5)] {
+        let file = run(ARM, seed, Made::Hose(2, 12.0, way));
+        let findings = diagnosed(&file, FixedParameters::All);
+        let drive = findings.channels()[2].clone();
+        only(&findings, "cable_torque", &drive);
+        assert_eq!(findings.diagnosis.verdict, DiagnosisVerdict::MissingEffect);
+    }
+}
+
+/// A fit of one run is known to its own deviations only: a further run in which nothing changed misses it by as much, and a load
+/// stands out against that.
+#[test]
+fn what_a_fit_does_not_know_is_no_error_of_the_model() {
+    let model = Model::open(bundled(ARM)).expect("the model");
+    let read = |file: &Path| {
+        let recording = model.recording(file, &RecordingOptions::default());
+        recording.expect("the recording")
+    };
+    let before = read(&run(ARM, 740, Made::Nothing));
+    let found = model.identify(&[&before], &[], &EstimatorOptions::default());
+    let found = found.expect("a fit");
+    let values = model.values_of(&found.fit, "fit.json");
+    let values = values.expect("its values");
+    assert!(values.covariance.is_some());
+    let fitted = model.with_fit(&values);
+    let question = DiagnosisOptions {
+        fixed: FixedParameters::All,
+        repeat_with_nominal: false,
+    };
+    let asked = |file: &Path| {
+        let recording = read(file);
+        fitted.diagnose(&[&recording], &[], &question).expect("an answer")
+    };
+    let same = asked(&run(ARM, 741, Made::Nothing));
+    assert!(same.missing.is_empty(), "{:#?}", same.missing);
+    assert_eq!(same.diagnosis.verdict, DiagnosisVerdict::Adequate);
+    let part = "\n[[part]]\nname = \"tool\"\non = \"link6\"\nmass = 1.4\ncentre = [0.03, -0.02, 0.08]\n\
+                inertia = { xx = 0.004, yy = 0.005, zz = 0.006 }\n";
+    let loaded = asked(&run(ARM, 742, Made::Body(part)));
+    near(only(&loaded, "payload", "link6"), "mass", 1.4, 0.05);
+}
+
+/// Bodies that would have to push upwards: gravity is turned, and so are drives that count the other way.
+#[test]
+fn what_turns_the_sign_of_bodies_is_suspected() {
+    let text = std::fs::read_to_string(bundled("spidermill")).expect("a model");
+    let suspicions = |text: &str| -> Vec<String> {
+        let model = Model::from_text("spidermill.toml", text).expect("a model");
+        let runs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../recordings/spidermill-mbs");
+        let recording =
+            |name: &str| (model.recording(runs.join(name), &RecordingOptions::default())).expect("a recording");
+        let question = DiagnosisOptions {
+            fixed: FixedParameters::Known,
+            repeat_with_nominal: false,
+        };
+        let [fit, check] = ["plain-fit.csv", "plain-check.csv"].map(recording);
+        let found = model.diagnose(&[&fit], &[&check], &question);
+        let notes = found.expect("an answer").notes.into_iter();
+        let says = notes.map(|note| note.says.in_library_words());
+        says.filter(|says| says.contains("no bodies near")).collect()
+    };
+    assert!(suspicions(&text).is_empty());
+    let turned = text.replace("[0, \"-g\", 0]", "[0, \"g\", 0]");
+    assert_ne!(turned, text);
+    let says = suspicions(&turned);
+    assert!(says.len() == 1 && says[0].starts_with("p1_min comes out"), "{says:?}");
+}
