@@ -47,7 +47,7 @@ impl DiagnosisFindings {
                     "estimates": estimates(&missing.estimates),
                     "probability": missing.probability,
                     "indistinguishable_from": missing.indistinguishable_from,
-                    "separating_experiment": missing.separating_experiment,
+                    "separate_by": missing.separating_experiment,
                     "separate_command": separation.and_then(|asked| spelling.spell_separation(model, asked)),
                 })
             })
