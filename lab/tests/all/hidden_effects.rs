@@ -217,12 +217,12 @@ fn the_report_counts_what_is_right_and_lists_what_is_not() {
         "one       66.7 % right, 2 of 3; target 95 %",
         "none       0.0 % right, 0 of 1; target 98 %",
         "outside   50.0 % right, 1 of 2; target 90 %",
-        "located  1 of 1 unexplained ones first of all in the drive that feels them",
-        "fall      50.0 % of 2 found within 1.3 of the noise floor on the check run; target 100 %",
-        "- seed 7 case 2 (one): the check error stays 1.31 times the noise floor",
+        "located  1 of 1 unexplained forces reported first in the drive on which they act",
+        "fall      50.0 % of 2 found with a validation error within 1.3 times the noise floor; target 100 %",
+        "- seed 7 case 2 (one): the validation error is 1.31 times the noise floor",
         "- seed 7 case 3 (one): wrong place",
         "- seed 7 case 4 (none): failed: no such column",
-        "- seed 7 case 5 (outside): a guess dressed as a finding",
+        "- seed 7 case 5 (outside): effect claimed for a force outside the library",
     ] {
         assert!(text.lines().any(|l| l == line), "no line `{line}` in\n{text}");
     }
