@@ -123,7 +123,7 @@ impl DrawnDisturbance {
     /// Claims that are true because of it, as kind and place.
     pub fn makes_true(self) -> Vec<EffectAtom> {
         let of = |kind: &str, place: &str| (kind.to_owned(), place.to_owned());
-        // An effect on all forces is true for each drive and for the force as a whole.
+        // An effect on all forces is true for each drive and for `force`, which stands for all drives.
         let everywhere = |kind: &str| {
             let places = DRIVES.iter().chain(&["force"]);
             places.map(|place| of(kind, place)).collect()

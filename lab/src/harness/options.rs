@@ -33,7 +33,7 @@ pub fn run_benchmark(usage: &BenchmarkUsage, run: impl FnOnce(&BenchmarkOptions)
     let options = match BenchmarkOptions::read(usage, std::env::args().skip(1)) {
         Ok(options) => options,
         Err(says) => {
-            eprintln!("{says}; {}", usage.line);
+            eprintln!("{says}; usage: {}", usage.line);
             return ExitCode::from(2);
         }
     };
