@@ -107,8 +107,8 @@ fn report(findings: &[Finding], recordings: usize, seed: u64) -> String {
     let share = findings.iter().map(outcome).sum::<f64>() / n;
     let brier = findings.iter().map(|f| (f.probability - outcome(f)).powi(2));
     let mut text = format!(
-        "seed {seed}, {recordings} pairs of recordings, {} findings, {:.1} % of them true\nBrier score {:.4}; {:.4} for a constant forecast \
-         of {share:.3}\n\n{:<12}{:>10}{:>12}{:>8}{:>14}\n",
+        "seed {seed}, {recordings} pairs of recordings, {} findings, {:.1} % of them true\n\
+         Brier score {:.4}; {:.4} for a constant forecast of {share:.3}\n\n{:<12}{:>10}{:>12}{:>8}{:>14}\n",
         findings.len(),
         100.0 * share,
         brier.sum::<f64>() / n,

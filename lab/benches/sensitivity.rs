@@ -92,8 +92,8 @@ fn run(options: &BenchmarkOptions) -> Result<(), String> {
     let rate = (alarms as f64 + 0.5) / (calm as f64 + 1.0);
     let oracle = quantile(1.0 - 0.5 * rate);
     println!(
-        "{alarms} alarms on {calm} recordings without effects, a rate of {:.2} %. At this rate an oracle finds half of the effects with \
-         d' = {oracle:.2}.\n\n{:<32}{:>8}{:>18}{:>10}  about",
+        "{alarms} alarms on {calm} recordings without effects, a rate of {:.2} %. \
+         At this rate an oracle finds half of the effects with d' = {oracle:.2}.\n\n{:<32}{:>8}{:>18}{:>10}  about",
         100.0 * rate,
         "kind",
         "d'",

@@ -62,7 +62,7 @@ pub(crate) enum Law {
     Hysteresis,
     /// `v exp(-|v|/s)`: a film that breaks down.
     Film,
-    /// `x a`: a mass that is wound up as it goes.
+    /// `x a`: an inertia that grows with the position, such as a rope that is wound up.
     WoundUp,
 }
 
