@@ -88,7 +88,7 @@ fn run(options: &BenchmarkOptions) -> Result<(), String> {
     let done = work_off(&cases, WORKERS, |case, folder| case.measure(&plant, folder, &program))?;
     let quiet = cases.iter().zip(&done).filter(|(case, _)| case.kind.is_none());
     let alarms = quiet.filter(|(_, done)| done.size > 0.0).count();
-    // Half an alarm is added, because the rate is too small to be counted exactly.
+    // Half an alarm is added, so that the estimated rate is positive even without alarms.
     let rate = (alarms as f64 + 0.5) / (calm as f64 + 1.0);
     let oracle = quantile(1.0 - 0.5 * rate);
     println!(

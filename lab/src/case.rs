@@ -118,7 +118,7 @@ impl HiddenCase {
             _ => CourseRepeats::Never,
         };
         let full = random.chance(1.0 / 3.0);
-        // Three of five cases with a hidden effect have noise of 1 N; all others have a drawn level.
+        // Three of five cases with something hidden have noise of 1 N; all others have a drawn level.
         let plain_noise = random.chance(0.6) && class != CaseClass::None;
         let noise = if plain_noise {
             1.0
@@ -315,7 +315,7 @@ impl HiddenCase {
             .collect::<Result<Vec<_>, _>>()?;
         let added = along.added(&effects)?;
         let shown = rms(&span.rest(&added));
-        // Rounding is all that the base parameters do not represent.
+        // The base parameters represent the effects up to rounding.
         if shown <= 1e-9 * rms(&added) {
             return Ok(None);
         }
@@ -370,7 +370,7 @@ impl HiddenCase {
                 for placed in &less {
                     others.extend(columns(along, placed, 1.0, &[]).unwrap_or_default());
                 }
-                // The residual contains this effect only, because the span has everything else.
+                // Everything except this effect is in the span, so the residual belongs to it.
                 if !enough(rms(&others.rest(&total))) {
                     return Ok(false);
                 }

@@ -187,7 +187,7 @@ fn spidermill(plant: &SpidermillPlant, course: &DrawnCourse, rate: f64) -> Resul
     })
 }
 
-/// The arm along a course; its model has no effects, so the library has columns per drive.
+/// The arm along a course; its places are the drives, and each drive has its own columns of the library.
 fn arm(model: &Model, course: &DrawnCourse, rate: f64) -> Result<Scene, String> {
     let times = course.times(rate);
     let all: Vec<modelmill_rig::RigState> = times.iter().map(|t| course.state_at(*t)).collect();
