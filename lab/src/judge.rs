@@ -209,7 +209,7 @@ fn mark_answer(
 
 /// Number of aliases in an answer, and number of those that are indistinguishable from their claim.
 ///
-/// An alias is indistinguishable if it has the same residual of the true forces as the claim that it replaces.
+/// An alias is indistinguishable if its squared residual exceeds that of the replaced claim by less than [`SAME`].
 pub fn aliases(answer: &ProgramAnswer, excess: &mut dyn FnMut(&[PlacedEffect]) -> f64) -> [usize; 2] {
     let claims: Vec<PlacedEffect> = answer.effects.iter().map(|c| c.effect.clone()).collect();
     let mut counts = [0, 0];
