@@ -90,11 +90,11 @@ impl DrawnCourse {
         // Without a common period, the harmonics are shifted at random by up to 16 %.
         let mut frequencies = Vec::new();
         for k in 1..=HARMONICS {
-            let segment = match repeats {
+            let frequency_scale = match repeats {
                 CourseRepeats::Never => 1.0 + 0.08 * random.normal().clamp(-2.0, 2.0),
                 _ => 1.0,
             };
-            frequencies.push(f64::from(k) * segment * 2.0 * PI / PERIOD);
+            frequencies.push(f64::from(k) * frequency_scale * 2.0 * PI / PERIOD);
         }
         let sums = limits.coordinates.iter().map(|(_, of_one)| {
             let fill = random.uniform_between(0.75, 0.97);
