@@ -1,6 +1,6 @@
 """Compares speeds on the same data: `modelmill-fleet identify`, `modelmill identify` on one file, and numpy with pandas.
 
-    cargo build --release -p modelmill-fleet-program -p modelmill-cli
+    cargo build --profile dist -p modelmill-fleet-program -p modelmill-cli
     python fleet/speed.py                        # in an environment with numpy, pandas and pyarrow
 
 A fleet of five-bars is simulated in a temporary folder. All programs run on one core, one after the other, in several rounds. The
@@ -159,7 +159,7 @@ def spent(work: Callable[[], object]) -> float:
 
 def main() -> None:
     about = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    about.add_argument("--programs", type=Path, default=Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "release")
+    about.add_argument("--programs", type=Path, default=Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "dist")
     about.add_argument("--robots", type=int, default=3, help="each on 10 days with two recordings of 60 s at 250 Hz")
     about.add_argument("--rounds", type=int, default=3)
     about.add_argument("--seed", type=int, default=1)

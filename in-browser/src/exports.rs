@@ -29,9 +29,9 @@ struct BrowserState {
 thread_local! {
     // A worker is single-threaded, so one state per thread is one state per module.
     static STATE: RefCell<BrowserState> = RefCell::new(BrowserState {
-        request_handler: RequestHandler::new(|| seconds(), |view_json| {
-            let view_json = view_json.to_string();
-            goes(view_json.as_ptr(), view_json.len());
+        request_handler: RequestHandler::new(|| seconds(), |response| {
+            let response = response.to_string();
+            goes(response.as_ptr(), response.len());
         }),
         given: Vec::new(),
         answer: String::new(),

@@ -20,8 +20,8 @@ fn workspace_root() -> PathBuf {
 /// Why the compiler cannot build for WebAssembly, with a remedy; `None` if it can.
 pub fn missing_target() -> Option<String> {
     let asked = ["--print", "target-libdir", "--target", TARGET];
-    let view_json = Command::new("rustc").args(asked).output().ok();
-    let library = view_json.map(|view_json| String::from_utf8_lossy(&view_json.stdout).trim().to_owned());
+    let output = Command::new("rustc").args(asked).output().ok();
+    let library = output.map(|output| String::from_utf8_lossy(&output.stdout).trim().to_owned());
     let is_there = library.is_some_and(|path| !path.is_empty() && Path::new(&path).is_dir());
     (!is_there).then(|| format!("the compiler has no target {TARGET}; run `rustup target add {TARGET}` first"))
 }

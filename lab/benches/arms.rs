@@ -1,7 +1,7 @@
-//! Real machines from their bodies alone: how far the error falls with what `diagnose` finds, beside the noise of the forces.
+//! Real machines from models of their bodies alone: errors before and after the effects of `diagnose`, and force noise.
 //!
-//! `cargo bench -p modelmill-lab --bench arms -- [--only NAME] [--program PATH]`. The recordings lie beside the project and are
-//! not copied; a machine without them is left out, with a word. Figures are relative 2-norms over all drives.
+//! `cargo bench -p modelmill-lab --bench arms -- [--only NAME] [--program PATH]`. The recordings are in a folder next
+//! to the project. A machine without recordings is reported and skipped. Figures are relative 2-norms over all drives.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -15,15 +15,16 @@ use serde_json::Value;
 struct Machine {
     name: &'static str,
     model: Model,
-    /// Below `shared/data`.
+    /// Recordings, relative to `shared/data`.
     fit: &'static [&'static str],
     check: Option<&'static str>,
 }
 
+/// The model file of a machine.
 enum Model {
-    /// A bundled one, whose effects are taken out.
+    /// A bundled model, whose effects are removed.
     Bundled(&'static str),
-    /// One that lies with the recordings.
+    /// A model in the folder of the recordings.
     Beside(&'static str),
 }
 
@@ -76,11 +77,14 @@ fn run(options: &BenchmarkOptions) -> Result<(), String> {
     let only = options.text("only");
     let machines: Vec<&Machine> = (MACHINES.iter()).filter(|one| one.name.contains(only)).collect();
     let program = options.program()?;
-    // One at a time, since each is timed.
+    // One machine at a time, because the run time is measured.
     let rows = work_off(&machines, 1, |machine, folder| {
         let mut files = machine.fit.iter().chain(&machine.check);
         if !files.all(|file| data.join(file).is_file()) {
-            return Ok(format!("{}: there are no recordings beside the project", machine.name));
+            return Ok(format!(
+                "{}: skipped, because its recordings are not in shared/data next to the project",
+                machine.name
+            ));
         }
         let model = match &machine.model {
             Model::Beside(path) => data.join(path),
@@ -88,7 +92,7 @@ fn run(options: &BenchmarkOptions) -> Result<(), String> {
         };
         machine.row(&program, &model, &data)
     })?;
-    println!("| machine | bodies alone, fit / check | with what is found | effects | noise | s |");
+    println!("| machine | bodies alone, fit / validation | with the effects found | effects | noise | s |");
     println!("|---|---|---|---|---|---|");
     for row in rows {
         println!("{row}");
@@ -96,7 +100,7 @@ fn run(options: &BenchmarkOptions) -> Result<(), String> {
     Ok(())
 }
 
-/// A bundled model without its effects, as a file that extends it.
+/// Writes a model file that extends a bundled one and removes its effects.
 fn bare(models: &Path, name: &str, scratch: &Path) -> Result<PathBuf, String> {
     let model = models.join(format!("{name}.toml"));
     let text = read(&model)?;
@@ -119,7 +123,7 @@ fn bare(models: &Path, name: &str, scratch: &Path) -> Result<PathBuf, String> {
 }
 
 impl Machine {
-    /// Asks the program, and tells what came of it as a row of a table.
+    /// Runs the diagnosis and returns a row of the table.
     fn row(&self, program: &TestedProgram, model: &Path, data: &Path) -> Result<String, String> {
         let fit: Vec<PathBuf> = self.fit.iter().map(|file| data.join(file)).collect();
         let check: Vec<PathBuf> = self.check.iter().map(|file| data.join(file)).collect();
@@ -142,6 +146,7 @@ impl Machine {
     }
 }
 
+/// A share as per cent with one decimal; `-` if there is none.
 fn percent(share: Option<&Value>) -> String {
     let share = share.and_then(Value::as_f64);
     share.map_or_else(|| "-".to_owned(), |share| format!("{:.1} %", 100.0 * share))

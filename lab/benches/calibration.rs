@@ -1,11 +1,11 @@
-//! Calibration: recordings with hidden effects and whatever else sensors, drives and days do to data, from a seed; whether
-//! findings are true as often as their `probability` says.
+//! Calibration: recordings with hidden effects and with disturbances by sensors, drives and different days, drawn from
+//! a seed. Prints whether findings are true as often as their `probability` states.
 //!
-//! `cargo bench -p modelmill-lab --bench calibration -- [--count 300] [--seed 1] [--list FILE] [--program PATH]`. Prints the
-//! Brier score (G. Brier, Monthly Weather Review 78, 1950), beside that of a forecast that always says the share of true
-//! findings, and a table of reliability: in each bin as many findings must be true as the binomial law of its mean probability
-//! bears, 95 % of the time. `--list` writes every finding into a file. A finding is true if all that it says, kind by place,
-//! is there.
+//! `cargo bench -p modelmill-lab --bench calibration -- [--count 300] [--seed 1] [--list FILE] [--program PATH]`.
+//! Prints the Brier score (G. Brier, Monthly Weather Review 78, 1950), compared with that of a constant forecast: the
+//! share of true findings. The table of reliability compares the number of true findings in each bin with the 95 %
+//! interval of the binomial distribution for its mean probability. `--list` writes every finding into a file. A finding
+//! is true if its kind is present at all its places.
 
 use std::fmt::Write as _;
 use std::process::ExitCode;
@@ -19,8 +19,9 @@ use modelmill_lab::plant::{DRIVES, SpidermillPlant};
 use modelmill_lab::random::CaseRandom;
 use modelmill_lab::record::FILES;
 
+/// Number of bins of the table of reliability.
 const BINS: usize = 10;
-/// The part of chance that lies beyond an interval, on each side.
+/// Probability beyond an interval, on each side.
 const BEYOND: f64 = 0.025;
 
 /// A claim of the program.
@@ -60,7 +61,7 @@ fn run(options: &BenchmarkOptions) -> Result<(), String> {
             truth.extend(DRIVES.map(|drive| ("time_delay".to_owned(), drive.to_owned())));
         }
         if let Some(outside) = &case.outside {
-            // Other names for friction that remembers, and for the mean of friction that differs by place.
+            // Library effects that describe hysteresis, and the mean of friction that depends on the position.
             let kind = match outside.law {
                 OutsideLaw::Hysteresis => "dahl_friction",
                 OutsideLaw::FrictionByPlace => "viscous_friction",
@@ -106,17 +107,17 @@ fn report(findings: &[Finding], recordings: usize, seed: u64) -> String {
     let share = findings.iter().map(outcome).sum::<f64>() / n;
     let brier = findings.iter().map(|f| (f.probability - outcome(f)).powi(2));
     let mut text = format!(
-        "seed {seed}, {recordings} pairs of recordings, {} findings, {:.1} % of them true\nBrier score {:.4}; {:.4} for who always \
-         says {share:.3}\n\n{:<12}{:>10}{:>12}{:>8}{:>14}\n",
+        "seed {seed}, {recordings} pairs of recordings, {} findings, {:.1} % of them true\n\
+         Brier score {:.4}; {:.4} for a constant forecast of {share:.3}\n\n{:<12}{:>10}{:>12}{:>8}{:>14}\n",
         findings.len(),
         100.0 * share,
         brier.sum::<f64>() / n,
         share * (1.0 - share),
         "probability",
         "findings",
-        "mean says",
+        "mean prob.",
         "true",
-        "may be"
+        "95 % interval"
     );
     let mut inside = [0, 0];
     for bin in 0..BINS {
@@ -144,7 +145,7 @@ fn report(findings: &[Finding], recordings: usize, seed: u64) -> String {
     text + &format!("{} of {} bins within their binomial intervals\n", inside[0], inside[1])
 }
 
-/// The least and the most of so many that come true, each with a probability, all but [`BEYOND`] of the time.
+/// Interval of the number of true findings out of `count`, with [`BEYOND`] outside on each side.
 fn binomial(count: usize, probability: f64) -> [usize; 2] {
     let p = probability.clamp(1e-9, 1.0 - 1e-9);
     let mut log = count as f64 * (-p).ln_1p();

@@ -1,9 +1,9 @@
-//! Calm: recordings of a machine that lacks nothing, with force noise white or coloured, from a seed; how often `diagnose`
-//! says that the model is adequate, and what it says otherwise.
+//! Calm: recordings of a machine without missing effects, drawn from a seed, with white or coloured force noise. Prints
+//! how often `diagnose` reports that the model is adequate, and each other answer.
 //!
-//! `cargo bench -p modelmill-lab --bench calm -- [--seeds 10] [--first 1] [--corners white,60,30,15,8,3,1]
-//! [--program PATH]`. Noise has 0.5 to 3 N; the low-pass is of first order for odd seeds, of second for even ones; masses are
-//! not those of the file for two seeds of three. Figures go to standard output, progress to standard error.
+//! `cargo bench -p modelmill-lab --bench calm -- [--seeds 10] [--first 1] [--corners white,60,30,15,8,3,1] [--program
+//! PATH]`. Noise has 0.5 to 3 N. The low-pass has first order for odd seeds and second order for even ones. Masses
+//! differ from the file for two seeds of three. Figures go to standard output, progress to standard error.
 
 use std::fmt::Write as _;
 use std::process::ExitCode;
@@ -17,11 +17,11 @@ use modelmill_lab::plant::{DRIVES, PlantMotion, SpidermillPlant};
 use modelmill_lab::random::{CaseRandom, three_digits};
 use modelmill_lab::record::{FILES, RecordedSamples};
 
-/// Deviations of the noise, N.
+/// Range of the standard deviation of the noise, N.
 const NOISE: [f64; 2] = [0.5, 3.0];
 const REPEATS: [CourseRepeats; 3] = [CourseRepeats::Once, CourseRepeats::Thrice, CourseRepeats::Never];
 
-/// A recording without anything to find.
+/// A pair of recordings without missing effects; `corner` is that of the noise, Hz, `None` if it is white.
 struct Calm {
     seed: u64,
     corner: Option<f64>,
@@ -47,7 +47,7 @@ fn run(options: &BenchmarkOptions) -> Result<(), String> {
         number => number
             .parse()
             .map(Some)
-            .map_err(|_| format!("--corners: `{number}` is no number")),
+            .map_err(|_| format!("--corners: `{number}` is neither a number nor `white`")),
     });
     let corners: Vec<Option<f64>> = corners.collect::<Result<_, String>>()?;
     let plant = SpidermillPlant::load()?;
@@ -113,7 +113,7 @@ fn run(options: &BenchmarkOptions) -> Result<(), String> {
     Ok(())
 }
 
-/// What an alarm says.
+/// A wrong answer as text: verdict, effects and disturbances, or the failure.
 fn told(answer: &Result<ProgramAnswer, String>) -> String {
     match answer {
         Err(why) => why.clone(),
@@ -130,7 +130,7 @@ fn told(answer: &Result<ProgramAnswer, String>) -> String {
 }
 
 impl Calm {
-    /// Fit (0) or check (1) as text.
+    /// The fit (0) or the validation run (1) as CSV text.
     fn record(&self, plant: &SpidermillPlant, which: usize) -> Result<String, String> {
         let number = self.corner.map_or(0, f64::to_bits);
         let stream = |purpose: u64| CaseRandom::new(self.seed, number, purpose + 1000 * self.repeats as u64);

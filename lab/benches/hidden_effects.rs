@@ -1,11 +1,11 @@
-//! Hidden effects: recordings with something hidden in them, made by the rig from a seed; `diagnose` looks for it, and
-//! the score says how often it was right.
+//! Hidden effects: simulates recordings of the rig with hidden effects from a seed, runs `diagnose` on them, and prints
+//! how often the answer was right.
 //!
 //! `cargo bench -p modelmill-lab --bench hidden_effects -- [--count 240] [--seed 1] [--only one|two|none|outside]
 //! [--keep DIR] [--list] [--program PATH] [--no-diagnosis]`. Figures go to standard output, progress to standard error;
-//! the same seed gives the same cases on every machine. `--keep` leaves the recordings in a folder, with `truth.json`;
-//! `--list` says what is hidden and makes no recordings; `--program` asks another build of modelmill, `--no-diagnosis`
-//! nobody.
+//! the same seed gives the same cases on every machine. `--keep` keeps the recordings in a folder, with `truth.json`;
+//! `--list` prints what is hidden and writes no recordings; `--program` tests another build of modelmill;
+//! `--no-diagnosis` runs none.
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -31,19 +31,19 @@ const USAGE: BenchmarkUsage = BenchmarkUsage {
     takes_folder: false,
 };
 
-/// How cases are made and who is asked about them.
+/// Settings of a run.
 struct Inquiry<'a> {
     seed: u64,
     plant: &'a SpidermillPlant,
-    /// Where recordings stay.
+    /// Folder in which recordings are kept.
     keep: Option<&'a Path>,
-    /// Says what is hidden and makes no recordings.
+    /// Whether to print what is hidden without recordings.
     list: bool,
-    /// Nobody, if recordings are made for others.
+    /// The tested program; `None` if only recordings are written.
     program: Option<&'a TestedProgram>,
 }
 
-/// What is known of a case in the end.
+/// Result of a case.
 struct Done {
     name: String,
     /// Entry of `truth.json`.
@@ -61,7 +61,7 @@ fn run(options: &BenchmarkOptions) -> Result<(), String> {
         "" => None,
         name => {
             let class = CaseClass::ALL.into_iter().find(|class| class.name() == name);
-            Some(class.ok_or_else(|| format!("there is no class `{name}`"))?)
+            Some(class.ok_or_else(|| format!("there is no class `{name}`; use one, two, none or outside"))?)
         }
     };
     let numbers: Vec<u64> = (1..)
@@ -100,7 +100,7 @@ fn run(options: &BenchmarkOptions) -> Result<(), String> {
 }
 
 impl Inquiry<'_> {
-    /// Draws a case, records it, asks for a diagnosis and marks it.
+    /// Draws a case, records it, runs the diagnosis and marks the answer.
     fn one(&self, number: u64, folder: &Path) -> Result<Done, String> {
         let case = HiddenCase::draw(self.plant, self.seed, number)?;
         let recording = format!(
@@ -110,7 +110,7 @@ impl Inquiry<'_> {
             case.noise
         );
         let line = format!(
-            "{:>4} {:<8}{} | error {:.2} % fit, {:.2} % check | {recording}",
+            "{:>4} {:<8}{} | error {:.2} % fit, {:.2} % validation | {recording}",
             number,
             case.class.name(),
             case.truth(),

@@ -1,11 +1,16 @@
-//! Sensitivity: the size at which half of the effects of a kind are found, beside an oracle that knows the shape of each.
+//! Sensitivity: the size at which half of the effects of a kind are found, compared with an oracle that knows their
+//! shape.
 //!
 //! `cargo bench -p modelmill-lab --bench sensitivity -- [--seeds 6] [--calm 200] [--figure FILE.svg] [--only KIND]
-//! [--program PATH]`. An effect is as large as the square root of the squares that it adds to both recordings, beside base
-//! parameters, in units of the white noise: d'; of a kind that holds a simpler one, what it adds beside that. A matched filter (W. Peterson, T. Birdsall, W. Fox 1954) at the false-alarm
-//! rate of `diagnose` on `--calm` recordings without anything finds half of the effects whose d' is the two-sided
-//! quantile of that rate. For each seed, motion and noise, the size at which `diagnose` begins to name the effect, by itself or
-//! among what it cannot be told from, is found by halving; half of the effects are found at the median over the seeds.
+//! [--program PATH]`.
+//!
+//! The size of an effect is d': the 2-norm of its residual in both recordings when the base parameters are fitted, in
+//! units of the white noise. If the kind contains a simpler one, that one is fitted as well. The oracle is a matched
+//! filter (W. Peterson, T. Birdsall, W. Fox 1954) at the false-alarm rate of `diagnose` on `--calm` recordings without
+//! effects. It finds half of the effects whose d' is the two-sided quantile of that rate.
+//!
+//! For each seed, motion and noise, bisection finds the size from which `diagnose` names the effect, as a claim or as
+//! an alias. Half of the effects are found at the median over the seeds.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -25,27 +30,28 @@ use modelmill_lab::random::CaseRandom;
 use modelmill_lab::record::{FILES, RecordedSamples};
 use modelmill_lab::span::{ColumnSpan, norm};
 
-/// Deviation of the noise, N.
+/// Standard deviation of the noise, N.
 const NOISE: f64 = 1.0;
-/// Between which sizes is searched, d', and how often these are halved.
+/// Range of the search, d'.
 const SIZES: [f64; 2] = [1.5, 60.0];
+/// Number of bisections of the range.
 const HALVINGS: usize = 6;
-/// How many times the oracle's size counts as good.
+/// Largest ratio to the oracle's size that counts as good.
 const TWICE: f64 = 2.0;
-/// Smallest change of a delay, s.
+/// Half the distance of the central difference for a delay, s.
 const SHORT: f64 = 1e-4;
 
-/// A kind with one motion and one noise; nothing is hidden in a calm one.
+/// A kind with one motion and one noise; without a kind, nothing is hidden.
 struct Case {
     kind: Option<HiddenChoice>,
     seed: u64,
 }
 
-/// What came of a case.
+/// Result of a case.
 struct Done {
-    /// d' at which the effect begins to be named; infinite where it never is. Of a calm one, whether anything was named.
+    /// Least d' at which the effect is named, infinite if it never is. Without an effect, 1 for a false alarm, else 0.
     size: f64,
-    /// A value of the effect at that size.
+    /// The effect with its values at that size.
     value: String,
 }
 
@@ -64,7 +70,7 @@ fn main() -> ExitCode {
 fn run(options: &BenchmarkOptions) -> Result<(), String> {
     let [seeds, calm]: [u64; 2] = [options.number("seeds")?, options.number("calm")?];
     let plant = SpidermillPlant::load()?;
-    // Of each kind the first place.
+    // The first place of each kind.
     let mut kinds: Vec<HiddenChoice> = Vec::new();
     for choice in choices() {
         if choice.kind.contains(options.text("only")) && kinds.iter().all(|k| k.kind != choice.kind) {
@@ -82,12 +88,12 @@ fn run(options: &BenchmarkOptions) -> Result<(), String> {
     let done = work_off(&cases, WORKERS, |case, folder| case.measure(&plant, folder, &program))?;
     let quiet = cases.iter().zip(&done).filter(|(case, _)| case.kind.is_none());
     let alarms = quiet.filter(|(_, done)| done.size > 0.0).count();
-    // Of a rate that was seen so seldom the middle of what it may be.
+    // Half an alarm is added, so that the estimated rate is positive even without alarms.
     let rate = (alarms as f64 + 0.5) / (calm as f64 + 1.0);
     let oracle = quantile(1.0 - 0.5 * rate);
     println!(
-        "{alarms} alarms on {calm} recordings without anything: a rate of {:.2} %, at which an oracle finds half of the effects of \
-         d' = {oracle:.2}\n\n{:<32}{:>8}{:>18}{:>10}  about",
+        "{alarms} alarms on {calm} recordings without effects, a rate of {:.2} %. \
+         At this rate an oracle finds half of the effects with d' = {oracle:.2}.\n\n{:<32}{:>8}{:>18}{:>10}  about",
         100.0 * rate,
         "kind",
         "d'",
@@ -106,7 +112,7 @@ fn run(options: &BenchmarkOptions) -> Result<(), String> {
             let of = |place: f64| found.iter().zip(0..).find(|(_, k)| f64::from(*k) >= place);
             [of(low), of(high)].map(|one| one.map_or(f64::INFINITY, |(done, _)| done.size))
         };
-        // Between two of them the geometric mean; infinite is infinite.
+        // Geometric mean of two neighbours; an infinite size stays infinite.
         let sizes = [0.25, 0.5, 0.75].map(|share| {
             let [low, high] = at(share);
             (low * high).sqrt()
@@ -124,7 +130,7 @@ fn run(options: &BenchmarkOptions) -> Result<(), String> {
     }
     let good = rows.iter().filter(|(_, sizes)| sizes[1] <= TWICE * oracle).count();
     println!(
-        "\n{good} of {} kinds within {TWICE} times the oracle's; target 12 of 15",
+        "\n{good} of {} kinds within {TWICE} times the size of the oracle; target 12 of 15",
         rows.len()
     );
     match options.path("figure") {
@@ -183,7 +189,7 @@ impl Case {
         let is_found = |size: f64| -> Result<bool, String> {
             let answer = ask(size / unit)?;
             let claims = answer.effects.iter();
-            // Names for the same thing stand side by side: none makes another needless.
+            // Aliases count like claims, because they are alternatives to them.
             let named = claims
                 .flat_map(|c| c.aliases.iter().chain([&c.effect]))
                 .flat_map(|one| atoms([one]))
@@ -196,7 +202,7 @@ impl Case {
             let claims: Vec<String> = claims.iter().map(|c| c.effect.to_string()).collect();
             return Ok(Done {
                 size: f64::INFINITY,
-                value: format!("never, but {}", claims.join(", ")),
+                value: format!("never named at the largest size; claimed: {}", claims.join(", ")),
             });
         }
         for _ in 0..HALVINGS {
@@ -216,8 +222,8 @@ impl Case {
     }
 }
 
-/// How much effects show beside base parameters, which are those of both recordings, and beside simpler kinds; in deviations of
-/// the noise.
+/// The size d' of effects: the 2-norm of their residual when the base parameters and simpler kinds are fitted to both
+/// recordings, in standard deviations of the noise.
 fn shown(
     plant: &SpidermillPlant,
     alongs: &[PlantMotion],
@@ -240,14 +246,14 @@ fn shown(
     Ok(least)
 }
 
-/// Columns of one recording behind those of another.
+/// Appends the columns of one recording to those of another.
 fn extend(columns: &mut [Vec<f64>], more: Vec<Vec<f64>>) {
     for (column, more) in columns.iter_mut().zip(more) {
         column.extend(more);
     }
 }
 
-/// Simpler kinds that are part of what is hidden, each by itself: beside them it must show what it is.
+/// Simpler kinds that the hidden effect contains, one by one; the effect must be visible relative to each.
 fn lesser(hidden: &[HiddenEffect]) -> Vec<PlacedEffect> {
     let Some(first) = hidden.first() else {
         return Vec::new();
@@ -266,12 +272,12 @@ fn lesser(hidden: &[HiddenEffect]) -> Vec<PlacedEffect> {
     kinds.iter().map(of).collect()
 }
 
-/// What bends the curve of what is hidden.
+/// The shape parameter of the hidden effects; 1 if they have none.
 fn constant(hidden: &[HiddenEffect]) -> f64 {
     hidden.iter().find_map(HiddenEffect::constant).unwrap_or(1.0)
 }
 
-/// What effects of unit size add to the forces. A delay has no size but its own: what it changes by each of its seconds.
+/// Forces that effects of unit size add, N; for a delay, the derivative with respect to the delay, N/s.
 fn added_by(hidden: &[HiddenEffect], along: &PlantMotion, course: &DrawnCourse) -> Result<Vec<f64>, String> {
     if hidden.iter().any(|one| one.delay() > 0.0) {
         let at = |by: f64| {
@@ -289,7 +295,7 @@ fn added_by(hidden: &[HiddenEffect], along: &PlantMotion, course: &DrawnCourse) 
     along.added(&effects?)
 }
 
-/// The quantile of the normal distribution, by halving.
+/// The quantile of the normal distribution for a probability of at least one half, by bisection.
 fn quantile(probability: f64) -> f64 {
     let below = |x: f64| 0.5 * libm::erfc(-x / std::f64::consts::SQRT_2);
     let (mut low, mut high) = (0.0, 10.0);
@@ -304,7 +310,7 @@ fn quantile(probability: f64) -> f64 {
     low
 }
 
-/// A bar for each kind, with its middle half, beside the oracle and twice of it.
+/// An SVG with one row per kind: median and quartiles of d', with lines for the oracle's size and twice this size.
 fn figure(rows: &[(&str, [f64; 3])], oracle: f64) -> String {
     let (left, step, width) = (230.0, 24.0, 460.0);
     let height = step * rows.len() as f64;
@@ -344,7 +350,7 @@ fn figure(rows: &[(&str, [f64; 3])], oracle: f64) -> String {
     }
     let _ = writeln!(
         svg,
-        "<text x=\"{}\" y=\"{}\" text-anchor=\"middle\">size at which half are found, d'</text>\n</svg>",
+        "<text x=\"{}\" y=\"{}\" text-anchor=\"middle\">size d' at which half of the effects are found</text>\n</svg>",
         left + 0.5 * width,
         height + 50.0
     );

@@ -1,7 +1,6 @@
-//! What could stand for what is hidden: claimed effects go in; what they leave of the true forces, without noise, comes
-//! out.
+//! Alternatives to what is hidden: claimed effects go in; their residual of the true forces without noise comes out.
 //!
-//! Two explanations that leave the same cannot be told apart on these recordings, whoever tries.
+//! Two explanations with the same residual are indistinguishable on these recordings.
 //!
 //! Decision: a claim in place of the truth counts only if it names the truth as its alternative, and if, fitted to
 //! the noise-free forces of both runs, it leaves less than three standard deviations of the noise with values of
@@ -18,9 +17,11 @@ use crate::plant::SpidermillPlant;
 use crate::span::{ColumnSpan, norm, rms};
 
 impl HiddenCase {
-    /// The squared error, in units of the noise's variance, that claimed effects leave of the true forces on both
-    /// runs; infinite where a claim is of a kind that cannot be worked out.
+    /// Squared residual of the true forces of both runs with the claimed effects, in units of the noise variance.
+    ///
+    /// Infinite if a claim has no columns, or if a value has a physically impossible sign.
     pub fn excess(&self, plant: &SpidermillPlant, claims: &[PlacedEffect]) -> Result<f64, String> {
+        // Rows of the fit come first, then those of the validation run.
         let both = |of: &dyn Fn(usize) -> Result<Vec<f64>, String>| -> Result<Vec<f64>, String> {
             Ok([of(0)?, of(1)?].concat())
         };
@@ -33,10 +34,11 @@ impl HiddenCase {
             let fit = columns(fit, claim, constant, &beside)?;
             Some(joined(&fit, &columns(check, claim, constant, &beside)?))
         };
-        // All columns of each claim, with the first value of what bends its curve.
+        // All columns of each claim, with the first value of its shape parameter.
         let mut all: Vec<Vec<Vec<f64>>> = Vec::new();
         for claim in claims {
             all.push(if claim.kind == "time_delay" {
+                // If a delay is hidden, its exact change of the forces is the column, else that of a small delay.
                 let delayed = self.hidden.iter().any(|one| one.delay() > 0.0);
                 let column = if delayed {
                     let prompt = both(&|k| self.prompt_forces(&self.coarse[k]))?;
@@ -52,13 +54,14 @@ impl HiddenCase {
                 }
             });
         }
-        // Curves are bent one after the other to what leaves least beside all other claims, and once more.
+        // Shape parameters are chosen one by one for the least residual together with all other claims, in two passes.
         for (k, claim) in [claims, claims].concat().iter().enumerate() {
             let k = k % claims.len();
             let mut tried = constants(&claim.kind);
             if tried.len() == 1 {
                 continue;
             }
+            // The true shape parameter is tried as well, so that a grid cannot miss it.
             let same = self.hidden.iter().filter(|h| h.placed.kind == claim.kind);
             tried.extend(same.filter_map(HiddenEffect::constant));
             let mut others = ColumnSpan::from_columns(base.clone());
@@ -78,6 +81,7 @@ impl HiddenCase {
                 }
             }
         }
+        // Each column with whether its value must be positive.
         let mut claimed: Vec<(Vec<f64>, bool)> = Vec::new();
         for (claim, columns) in claims.iter().zip(all) {
             let signs = must_be_positive(&claim.kind).iter().copied();
@@ -88,12 +92,13 @@ impl HiddenCase {
         if self.has_wrong_sign(&base, &claimed, &total) {
             return Ok(f64::INFINITY);
         }
+        // Squares of the coarse samples are scaled to the number of recorded ones.
         let rest = rms(&span.rest(&total)) / self.noise;
         let rows = total.len() as f64 * RATE / COARSE;
         Ok(rest * rest * rows)
     }
 
-    /// Whether least squares give a value that must be positive a negative one, by more than the noise could.
+    /// Whether a least-squares value that must be positive is below minus three standard deviations.
     fn has_wrong_sign(&self, base: &[Vec<f64>], claimed: &[(Vec<f64>, bool)], total: &[f64]) -> bool {
         claimed.iter().enumerate().any(|(k, (column, positive))| {
             if !positive {
@@ -103,15 +108,16 @@ impl HiddenCase {
             let rest = claimed.iter().enumerate().filter(|(j, _)| *j != k);
             others.extend(rest.map(|(_, (column, _))| column.clone()));
             let own = others.rest(column);
-            // The value times the column's own size, and its deviation for the noise of all samples.
+            // The value times the norm of its independent column, and its standard deviation for all recorded samples.
             let size: f64 = own.iter().zip(total).map(|(a, b)| a * b).sum::<f64>() / norm(&own);
             let deviation = self.noise * (COARSE / RATE).sqrt();
             norm(&own) > 1e-9 * norm(column) && size < -3.0 * deviation
         })
     }
 
-    /// Choices of one kind that nobody could tell from the one effect that is hidden. A ripple whose wavelength is free
-    /// is not among what is tried.
+    /// Choices of one kind that are indistinguishable from the one hidden effect; empty for other classes.
+    ///
+    /// Ripple is not tried, because its wavelength is estimated.
     pub fn doubles(&self, plant: &SpidermillPlant) -> Result<Vec<PlacedEffect>, String> {
         let truth = atoms(&self.placed());
         let mut doubles = Vec::new();
@@ -120,7 +126,7 @@ impl HiddenCase {
         }
         for choice in choices() {
             let claims = choice.claims();
-            // What holds the truth among other things is no double of it.
+            // A choice that contains the truth is not an alternative to it.
             let holds = |(kind, place): &EffectAtom| {
                 let mut less = vec![kind.as_str()];
                 less.extend(HOLDS.iter().filter(|(more, _)| more == kind).map(|(_, l)| *l));
@@ -138,7 +144,7 @@ impl HiddenCase {
     }
 }
 
-/// Columns of fit and check below each other.
+/// Columns of the fit, each followed by the column of the validation run.
 fn joined(fit: &[Vec<f64>], check: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let pairs = fit.iter().zip(check);
     pairs.map(|(a, b)| [a.as_slice(), b].concat()).collect()

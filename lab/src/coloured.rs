@@ -1,19 +1,22 @@
-//! Noise with a memory: white noise through a low-pass, as current loops and filters of amplifiers leave it.
+//! Coloured noise: white noise through a low-pass, as current loops and filters of amplifiers cause it.
 
 use std::f64::consts::PI;
 
 use crate::random::CaseRandom;
 
-/// How steeply the spectrum falls beyond the corner.
+/// Order of the low-pass, which gives the slope of the spectrum above the corner frequency.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SpectrumFall {
-    /// A low-pass of first order.
+    /// First order.
     Gentle,
-    /// Butterworth's of second order.
+    /// Butterworth, second order.
     Steep,
 }
 
-/// Noise of a given deviation; `corner` is that of the low-pass, Hz, and `None` means white.
+/// Noise with a given standard deviation, one value per sample.
+///
+/// `rate` is the sampling frequency, Hz. `corner` is the corner frequency of the low-pass, Hz, with its order; `None`
+/// means white noise.
 pub fn noise(
     random: &mut CaseRandom,
     samples: usize,
@@ -24,7 +27,7 @@ pub fn noise(
     let Some((corner, fall)) = corner else {
         return (0..samples).map(|_| deviation * random.normal()).collect();
     };
-    // Bilinear transform: numerator and denominator, constant first.
+    // Bilinear transform: coefficients of numerator and denominator, undelayed one first.
     let k = libm::tan(PI * corner / rate);
     let (b, a) = match fall {
         SpectrumFall::Gentle => ([k, k, 0.0], [1.0 + k, k - 1.0, 0.0]),
@@ -36,16 +39,18 @@ pub fn noise(
             )
         }
     };
+    // One sample through the filter (transposed direct form II).
     let step = |state: &mut [f64; 2], x: f64| {
         let y = (b[0] * x + state[0]) / a[0];
         *state = [b[1] * x - a[1] * y + state[1], b[2] * x - a[2] * y];
         y
     };
-    // So long that nothing is left of the beginning; its answer to an impulse says how much of the noise passes.
+    // Number of samples after which the initial state of the filter has decayed.
     let mut settles = 0.0;
     while settles * corner < 4.0 * rate {
         settles += 1.0;
     }
+    // The squared impulse response sums up to the variance of the output.
     let mut state = [0.0; 2];
     let mut squares = step(&mut state, 1.0).powi(2);
     let mut left = settles;
@@ -54,6 +59,7 @@ pub fn noise(
         left -= 1.0;
     }
     let gain = deviation / squares.sqrt();
+    // The filter runs before the first sample, so that the noise is stationary.
     let mut state = [0.0; 2];
     while settles > 0.0 {
         step(&mut state, random.normal());

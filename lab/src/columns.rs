@@ -1,4 +1,6 @@
-//! Columns of the library along a motion: what each kind could say at a place, whatever its values.
+//! Columns of the library along a motion: a kind with its places goes in, its forces for unit values come out.
+//!
+//! The columns of a kind span all forces that it can have there for any values.
 
 use modelmill_rig::RigEffect;
 
@@ -7,17 +9,20 @@ use crate::hidden::effect;
 use crate::placed::PlacedEffect;
 use crate::plant::{DRIVES, PlantMotion};
 
-/// A delay of this size stands for small ones, s.
+/// Half the distance of the central difference that represents small delays, s.
 const DELAY: f64 = 0.005;
 
-/// Columns of a kind at its places; what bends its curve takes the value `constant`, and friction by load feels the
-/// masses `beside` it. `None` for kinds that the rig does not know, or cannot have there.
+/// Columns of a kind at its places, N for unit values, samples times drives.
+///
+/// The shape parameter of the kind has the value `constant`. Load friction depends on the effects `beside` it, such as
+/// masses. `None` if the rig does not know the kind or cannot have it there.
 pub fn columns(
     along: &PlantMotion,
     placed: &PlacedEffect,
     constant: f64,
     beside: &[RigEffect],
 ) -> Option<Vec<Vec<f64>>> {
+    // The column of one effect with given values.
     let of = |kind: &str, at: &[String], values: &[(&str, f64)]| {
         let placed = PlacedEffect {
             kind: kind.to_owned(),
@@ -31,8 +36,10 @@ pub fn columns(
     };
     let at = placed.at.as_slice();
     let kind = placed.kind.as_str();
+    // One column per set of values of the kind itself.
     let with =
         |all: &[&[(&str, f64)]]| -> Option<Vec<Vec<f64>>> { all.iter().map(|values| of(kind, at, values)).collect() };
+    // One column per unit mass at a point.
     let masses = |points: [&str; 3]| -> Option<Vec<Vec<f64>>> {
         let column = |p: &str| of("point_mass", &[p.to_owned()], &[("m", 1.0)]);
         points.into_iter().map(column).collect()
@@ -47,6 +54,7 @@ pub fn columns(
         "directional_coulomb_friction" => with(&[&[("Fcp", 1.0), ("Fcn", 0.0)], &[("Fcp", 0.0), ("Fcn", 1.0)]]),
         "drive_inertia" => with(&[&[("Ia", 1.0)]]),
         "force_offset" => with(&[&[("F0", 1.0)]]),
+        // The rest length of a spring acts as an offset.
         "spring" => Some(
             [
                 with(&[&[("k", 1.0)]])?,
@@ -55,7 +63,7 @@ pub fn columns(
             .concat(),
         ),
         "force_ripple" => with(&[&[("As", 1.0), ("pitch", constant)], &[("Ac", 1.0), ("pitch", constant)]]),
-        // Sine and cosine of the coordinate.
+        // Sine and cosine of the coordinate: a ripple with one period per revolution.
         "counterbalance" => ["As", "Ac"]
             .iter()
             .map(|symbol| {
@@ -67,14 +75,14 @@ pub fn columns(
             })
             .collect(),
         "coupled_drive" => with(&[&[("Ia", 1.0)], &[("Fv", 1.0)], &[("Fs", 1.0)]]),
-        // Moment of inertia about the pivot, and mass times distance of the centre.
+        // Moment of inertia, and mass times distance of the centre.
         "rod_inertia" => with(&[
             &[("m", 0.0), ("c", 0.0), ("I", 1.0)],
             &[("m", 1.0), ("c", 0.5), ("I", 0.0)],
         ]),
         "point_mass" => with(&[&[("m", 1.0)]]),
         "gravity_tilt" => with(&[&[("tz", 1e-3)]]),
-        // Points of a part at three distances say whatever mass, centre and inertia along a bar can.
+        // Point masses at three places represent any mass, centre and inertia along a bar.
         "untied_part" => match at {
             [part] if part == "crank_left" => masses(["R2m", "A_left", "R2m"]),
             [part] if part == "crank_right" => masses(["R4m", "A_right", "R4m"]),
@@ -86,20 +94,22 @@ pub fn columns(
     }
 }
 
-/// Which of a kind's [`columns`] have values that physics wants positive, as far as they come first; the others may be
-/// anything.
+/// Whether the values of the [`columns`] of a kind must be positive for physical reasons.
+///
+/// Columns beyond the end of the list may have any sign.
 pub fn must_be_positive(kind: &str) -> &'static [bool] {
     match kind {
         "directional_viscous_friction" | "directional_coulomb_friction" => &[true, true],
         "force_offset" | "force_ripple" | "counterbalance" | "coupled_drive" | "rod_inertia" | "gravity_tilt"
         | "untied_part" => &[],
-        // Of a spring the stiffness only, its rest being anywhere.
+        // Of a spring only the stiffness, because its rest length may be on either side.
         _ => &[true],
     }
 }
 
-/// What bends the curve of a kind, in values to try; one value for kinds without.
+/// Values of the shape parameter to try for a kind, SI units; the single value 1 for kinds without one.
 pub fn constants(kind: &str) -> Vec<f64> {
+    // `n` values with a constant ratio.
     let geometric = |low: f64, high: f64, n: i32| -> Vec<f64> {
         let step = libm::log(high / low) / f64::from(n - 1);
         (0..n).map(|k| low * libm::exp(step * f64::from(k))).collect()
@@ -111,7 +121,7 @@ pub fn constants(kind: &str) -> Vec<f64> {
     }
 }
 
-/// How forces change when they are read later: the column of a small delay. `forces` gives them along any times.
+/// The column of a small delay: a central difference of the forces, N. `forces` returns them along a motion.
 pub fn delay_column(
     along: &PlantMotion,
     course: &DrawnCourse,
@@ -125,12 +135,13 @@ pub fn delay_column(
     Ok(earlier.iter().zip(&later).map(|(a, b)| a - b).collect())
 }
 
-/// Every column of the library at every place where it acts alone, for the question what no library can say.
+/// All columns of the library at all places, to check that a force is outside their span.
 pub fn library(along: &PlantMotion) -> Vec<Vec<f64>> {
     let mut all = Vec::new();
     let mut put = |kind: &str, at: &[&str], constant: f64| {
         all.extend(columns(along, &PlacedEffect::new(kind, at), constant, &[]).unwrap_or_default());
     };
+    // Nonlinear kinds have a few values of their shape parameter each.
     for drive in DRIVES {
         for kind in [
             "viscous_friction",
@@ -153,6 +164,7 @@ pub fn library(along: &PlantMotion) -> Vec<Vec<f64>> {
             put("force_ripple", &[drive], pitch);
         }
     }
+    // Friction of joints, and point masses, which act outside the drives.
     for angle in ["gamma1", "gamma2", "theta1", "theta2"] {
         put("viscous_friction", &[angle], 1.0);
         put("coulomb_friction", &[angle], 1.0);

@@ -11,10 +11,10 @@ use crate::random::CaseRandom;
 const PERIOD: f64 = 7.29;
 /// Harmonics of the paper's trajectories.
 const HARMONICS: u32 = 7;
-/// Times at which limits are checked.
+/// Number of times per motion at which limits are checked.
 const CHECKS: usize = 1500;
 
-/// How a recording repeats.
+/// Number of periods of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CourseRepeats {
     /// Three periods.
@@ -28,7 +28,7 @@ pub enum CourseRepeats {
 }
 
 impl CourseRepeats {
-    /// A word for lists.
+    /// The number of periods as text, as printed and as stored in `truth.json`.
     pub fn word(self) -> &'static str {
         match self {
             Self::Thrice => "three periods",
@@ -39,22 +39,24 @@ impl CourseRepeats {
     }
 }
 
-/// A motion of all active coordinates and how long it lasts.
+/// A motion of all active coordinates with its duration.
 pub struct DrawnCourse {
-    /// One for each coordinate.
+    /// One sum of sines per active coordinate.
     sums: Vec<HarmonicSum>,
-    /// s
+    /// Duration of the recording, s.
     pub duration: f64,
 }
 
-/// `offset + sum of sine*sin(omega t) + cosine*cos(omega t)`.
+/// The motion of one coordinate, rad: `offset + sum of sine*sin(omega t) + cosine*cos(omega t)`.
 struct HarmonicSum {
+    /// Mean value, rad.
     offset: f64,
-    /// Angular frequency, sine, cosine.
+    /// Angular frequency (rad/s), coefficient of sine and coefficient of cosine (rad) of each term.
     terms: Vec<[f64; 3]>,
 }
 
 impl HarmonicSum {
+    /// Value, rate and acceleration at a time in s.
     fn motion_at(&self, t: f64) -> [f64; 3] {
         let mut motion = [self.offset, 0.0, 0.0];
         for [w, a, b] in &self.terms {
@@ -67,6 +69,7 @@ impl HarmonicSum {
         motion
     }
 
+    /// Multiplies all amplitudes by a factor; the offset stays.
     fn scale(&mut self, factor: f64) {
         for [_, a, b] in &mut self.terms {
             *a *= factor;
@@ -76,7 +79,7 @@ impl HarmonicSum {
 }
 
 impl DrawnCourse {
-    /// Draws a motion that fills most of the limits of positions and keeps those of rates and accelerations.
+    /// Draws a motion that uses most of the position limits and satisfies those of rate and acceleration.
     pub fn draw(random: &mut CaseRandom, limits: &MotionLimits, repeats: CourseRepeats) -> Self {
         let duration = match repeats {
             CourseRepeats::Thrice => 3.0 * PERIOD,
@@ -84,13 +87,14 @@ impl DrawnCourse {
             CourseRepeats::Once => PERIOD,
             CourseRepeats::Never => random.uniform_between(7.0, 12.0),
         };
+        // Without a common period, the harmonics are shifted at random by up to 16 %.
         let mut frequencies = Vec::new();
         for k in 1..=HARMONICS {
-            let segment = match repeats {
+            let frequency_scale = match repeats {
                 CourseRepeats::Never => 1.0 + 0.08 * random.normal().clamp(-2.0, 2.0),
                 _ => 1.0,
             };
-            frequencies.push(f64::from(k) * segment * 2.0 * PI / PERIOD);
+            frequencies.push(f64::from(k) * frequency_scale * 2.0 * PI / PERIOD);
         }
         let sums = limits.coordinates.iter().map(|(_, of_one)| {
             let fill = random.uniform_between(0.75, 0.97);
@@ -99,10 +103,12 @@ impl DrawnCourse {
                 offset: 0.0,
                 terms: Vec::new(),
             };
+            // Amplitudes fall with the number of the harmonic.
             for (k, w) in (1..).zip(&frequencies) {
                 let size = 1.0 / f64::from(k);
                 sum.terms.push([*w, size * random.normal(), size * random.normal()]);
             }
+            // Least and greatest value of the motion or of one of its derivatives.
             let ends = |sum: &HarmonicSum, derivative: usize| {
                 let times = (0..CHECKS).map(|i| duration * i as f64 / CHECKS as f64);
                 times.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], t| {
@@ -110,6 +116,7 @@ impl DrawnCourse {
                     [low.min(x), high.max(x)]
                 })
             };
+            // The travel is 75 to 97 % of the range of positions, less if rate or acceleration require it.
             let [least, greatest] = ends(&sum, 0);
             sum.scale(fill * (high - low) / (greatest - least));
             for (derivative, range) in [(1, of_one.rate), (2, of_one.acceleration)] {
@@ -121,6 +128,7 @@ impl DrawnCourse {
                     }
                 }
             }
+            // Coefficients are rounded to five decimals before the mean is drawn.
             for [_, a, b] in &mut sum.terms {
                 [*a, *b] = [*a, *b].map(|x| (1e5 * x).round() / 1e5);
             }
@@ -136,7 +144,7 @@ impl DrawnCourse {
         }
     }
 
-    /// Times of the samples, s.
+    /// Times of the samples for a sampling frequency in Hz, s.
     pub fn times(&self, rate: f64) -> Vec<f64> {
         let mut times = Vec::new();
         while times.len() as f64 <= rate * self.duration {
@@ -145,7 +153,7 @@ impl DrawnCourse {
         times
     }
 
-    /// Coordinates with derivatives at a time in s.
+    /// Coordinates, rates and accelerations at a time in s.
     pub fn state_at(&self, t: f64) -> RigState {
         let mut state = RigState::default();
         for sum in &self.sums {

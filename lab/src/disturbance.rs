@@ -1,5 +1,6 @@
-//! What real sensors, drives and days do to recordings, of sizes drawn at random: a case goes in, its recordings with one
-//! disturbance come out, and which claims it makes true.
+//! Disturbances of recordings by sensors, drives and different days, with sizes drawn at random.
+//!
+//! A case goes in; its recordings with one disturbance come out, and the claims that are true because of it.
 
 use std::f64::consts::{PI, TAU};
 
@@ -11,7 +12,7 @@ use crate::plant::{DRIVES, PlantMotion};
 use crate::random::{CaseRandom, three_digits};
 use crate::record::{RecordedSamples, RecordingText};
 
-/// Kinds of effects that fade and differ from day to day.
+/// Kinds of effects whose size may fade during a run and differ between days.
 const FRICTION: [&str; 7] = [
     "viscous_friction",
     "coulomb_friction",
@@ -24,46 +25,47 @@ const FRICTION: [&str; 7] = [
 
 /// A disturbance with its size.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[allow(missing_docs, reason = "each kind says what its numbers are")]
+#[allow(missing_docs, reason = "the comment of each kind describes its numbers")]
 pub enum DrawnDisturbance {
-    /// White noise, and nothing else.
+    /// White noise only.
     None,
-    /// Noise through a low-pass, Hz.
+    /// Noise through a low-pass with a corner frequency, Hz.
     Coloured { corner: f64, fall: SpectrumFall },
-    /// 50 Hz on all forces, N.
+    /// A sine of 50 Hz on all forces, amplitude in N.
     Hum { size: f64 },
-    /// Half a percent of the forces off, N in the mean square.
+    /// Errors of half a percent of the force samples, rms in N.
     Outliers { size: f64 },
-    /// Forces in steps, N.
+    /// Forces rounded to steps, N.
     Steps { size: f64 },
-    /// A reading that drifts over each run, N.
+    /// A force reading whose offset grows linearly to `size` over each run, N.
     Drift { drive: usize, size: f64 },
-    /// Friction that falls by a part in the course of each run.
+    /// Friction that falls linearly by a share during each run.
     Fades { part: f64 },
-    /// Forces that are read late, of one drive or of all, s.
+    /// Delayed force signal of one drive or of all, s.
     Late { drive: Option<usize>, by: f64 },
-    /// All forces through a low-pass of first order, Hz.
+    /// All forces through a low-pass of first order with a corner frequency, Hz.
     Lag { corner: f64 },
-    /// A force that reads too much by a part.
+    /// A force reading that is too large by a share.
     Scale { drive: usize, part: f64 },
-    /// An encoder that errs a few times a turn, rad.
+    /// An eccentric encoder: a sine error of amplitude `size`, rad, with `times` periods per revolution.
     Eccentric { coordinate: usize, size: f64, times: u8 },
-    /// Steps of time that are uneven by a part, adding up, stamped as if even.
+    /// Sampling steps with accumulating errors, as a share of a step, with evenly spaced time stamps.
     Jitter { part: f64 },
-    /// Friction of the check run is lower by a part.
+    /// Friction that is lower by a share in the validation run.
     OtherDay { part: f64 },
-    /// More at the platform in the check run, kg.
+    /// Additional mass at the platform in the validation run, kg.
     Payload { mass: f64 },
-    /// A push for half a second of the check run, N.
+    /// A push of half a second in the validation run, N; `at` is its start as a share of the run.
     Push { size: f64, at: f64 },
 }
 
 impl DrawnDisturbance {
-    /// Draws one; those that change friction need some.
+    /// Draws a disturbance; those that change friction are drawn only for cases with hidden friction.
     pub fn draw(case: &HiddenCase, random: &mut CaseRandom) -> Self {
         let drive = random.below(DRIVES.len());
         let part = three_digits(random.uniform_between(0.1, 0.3));
         let has_friction = case.hidden.iter().any(is_friction);
+        // Without friction, numbers 8 and 9 are a delay and a lag.
         match random.below(16) {
             0 | 1 => Self::None,
             2 | 3 => Self::Coloured {
@@ -118,9 +120,10 @@ impl DrawnDisturbance {
         }
     }
 
-    /// What may be claimed because of it, kind by place.
+    /// Claims that are true because of it, as kind and place.
     pub fn makes_true(self) -> Vec<EffectAtom> {
         let of = |kind: &str, place: &str| (kind.to_owned(), place.to_owned());
+        // An effect on all forces is true for each drive and for `force`, which stands for all drives.
         let everywhere = |kind: &str| {
             let places = DRIVES.iter().chain(&["force"]);
             places.map(|place| of(kind, place)).collect()
@@ -135,12 +138,13 @@ impl DrawnDisturbance {
         }
     }
 
-    /// Records fit (0) or check (1) of a case with it.
+    /// Records the fit (0) or the validation run (1) of a case with this disturbance.
     pub fn record(self, case: &HiddenCase, seed: u64, which: usize) -> Result<RecordingText, String> {
         let course = &case.courses[which];
         let stream = |purpose: u64| CaseRandom::new(seed, case.number, 300 + 50 * which as u64 + purpose);
         let mut random = stream(0);
         let stamps = course.times(RATE);
+        // With jitter, the true times are a random walk around the time stamps.
         let times = match self {
             Self::Jitter { part } => {
                 let mut late = 0.0;
@@ -154,6 +158,7 @@ impl DrawnDisturbance {
         };
         let along = PlantMotion::new(&case.rig, course, times)?;
         let mut forces = case.forces(&along, course)?;
+        // Shares of the friction that are missing at the start and at the end of the run.
         let changes_friction = match self {
             Self::Fades { part } => Some([0.0, part]),
             Self::OtherDay { part } if which == 1 => Some([part, part]),
@@ -170,6 +175,7 @@ impl DrawnDisturbance {
                 *f -= (first + share * (last - first)) * friction;
             }
         }
+        // Disturbances of the forces before noise is added.
         match self {
             Self::Late { drive, by } => {
                 let times = along.times.iter().map(|t| t - by).collect();
@@ -194,6 +200,7 @@ impl DrawnDisturbance {
             }
             _ => {}
         }
+        // An eccentric encoder or jitter would contradict exact derivatives, so they are not recorded.
         let mut samples = RecordedSamples::new(
             &along,
             &forces,
@@ -214,7 +221,7 @@ impl DrawnDisturbance {
         Ok(samples.recorded())
     }
 
-    /// What it does to what is read.
+    /// Disturbs the readings: forces after noise was added, and positions.
     fn on_readings(self, samples: &mut RecordedSamples, random: &mut CaseRandom, which: usize) {
         let times = &samples.times;
         let duration = times.last().copied().unwrap_or(1.0);
@@ -236,6 +243,7 @@ impl DrawnDisturbance {
                 }
             }
         }
+        // The error of an eccentric encoder is a function of its angle.
         if let Self::Eccentric {
             coordinate,
             size,
@@ -249,9 +257,12 @@ impl DrawnDisturbance {
     }
 }
 
-/// A low-pass of first order whose time constant is so many samples, exact for forces that are straight between them.
+/// Applies a low-pass of first order in place; `constant` is its time constant in samples.
+///
+/// It is exact for forces that are linear between samples.
 fn lag<'a>(forces: impl Iterator<Item = &'a mut f64>, constant: f64) {
     let keeps = (-constant.recip()).exp();
+    // The previous force with the state of the filter; the filter starts in its steady state.
     let mut past: Option<(f64, f64)> = None;
     for force in forces {
         let now = *force;
@@ -263,6 +274,7 @@ fn lag<'a>(forces: impl Iterator<Item = &'a mut f64>, constant: f64) {
     }
 }
 
+/// Whether the kind of a hidden effect is one of [`FRICTION`].
 fn is_friction(one: &crate::hidden::HiddenEffect) -> bool {
     FRICTION.contains(&one.placed.kind.as_str())
 }

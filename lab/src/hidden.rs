@@ -1,22 +1,23 @@
-//! Effects of the library that can be hidden: kinds at their places, with values of a sensible size.
+//! Library effects that can be hidden: kinds with their places and values of plausible size.
 
 use modelmill_rig::{Rig, RigEffect};
 
 use crate::placed::PlacedEffect;
 use crate::random::{CaseRandom, three_digits};
 
-/// An effect with values.
+/// A library effect with its values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HiddenEffect {
     /// Kind and places.
     pub placed: PlacedEffect,
     /// Values by symbol, in SI units, as the rig takes them.
     pub values: Vec<(&'static str, f64)>,
-    /// The values by their places in the list that grow with the effect.
+    /// Indices of the values that grow with the size of the effect.
     scaled: Vec<usize>,
 }
 
 impl HiddenEffect {
+    /// An effect from values that grow with its size (`scaled`) and values that do not (`fixed`).
     fn new(kind: &str, at: &[&str], scaled: &[(&'static str, f64)], fixed: &[(&'static str, f64)]) -> Self {
         Self {
             placed: PlacedEffect::new(kind, at),
@@ -25,7 +26,7 @@ impl HiddenEffect {
         }
     }
 
-    /// The same, larger or smaller; values are rounded to what people write.
+    /// The effect multiplied by a factor; values are rounded to three digits.
     #[must_use]
     pub fn times(&self, factor: f64) -> Self {
         let mut scaled = self.clone();
@@ -35,24 +36,24 @@ impl HiddenEffect {
         scaled
     }
 
-    /// Whether a factor changes it at all; a delay is drawn as it is.
+    /// Whether a factor changes the effect; a delay keeps its drawn value.
     pub fn has_size(&self) -> bool {
         !self.scaled.is_empty()
     }
 
-    /// As an effect of the rig.
+    /// The same effect in the rig; fails if the rig does not know its kind or place.
     pub fn effect(&self, rig: &Rig) -> Result<RigEffect, String> {
         effect(rig, &self.placed, &self.values)
     }
 
-    /// What bends its curve: a speed or a wavelength.
+    /// The shape parameter, `vs` or `pitch`, SI units; `None` for kinds without one.
     pub fn constant(&self) -> Option<f64> {
         let mut values = self.values.iter();
         let bent = values.find(|(symbol, _)| ["vs", "pitch"].contains(symbol));
         bent.map(|(_, value)| *value)
     }
 
-    /// The delay of the forces, s.
+    /// The delay of the forces, s; zero for all other kinds.
     pub fn delay(&self) -> f64 {
         let of = self.values.iter().find(|_| self.placed.kind == "time_delay");
         of.map_or(0.0, |(_, value)| *value)
@@ -66,7 +67,7 @@ impl std::fmt::Display for HiddenEffect {
     }
 }
 
-/// An effect of the rig by names.
+/// Creates an effect of the rig from names; the error lists all faults.
 pub fn effect(rig: &Rig, placed: &PlacedEffect, values: &[(&str, f64)]) -> Result<RigEffect, String> {
     let at: Vec<&str> = placed.at.iter().map(String::as_str).collect();
     rig.effect(&placed.kind, &at, values).map_err(|faults| {
@@ -75,23 +76,26 @@ pub fn effect(rig: &Rig, placed: &PlacedEffect, values: &[(&str, f64)]) -> Resul
     })
 }
 
-/// What can be hidden, and where.
+/// A kind that can be hidden, with its places.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct HiddenChoice {
-    /// A kind, or `stribeck` for Stribeck's curve, which is Coulomb friction and what it has besides near standstill.
+    /// A kind, or `stribeck` for the Stribeck curve: Coulomb friction and its excess near standstill.
     pub kind: &'static str,
-    /// Places; several mean the same kind at each, or a kind that takes two.
+    /// Places. Several mean the same kind at each of them, or one kind that takes two.
     pub at: &'static [&'static str],
 }
 
+/// The left drive.
 const LEFT: &[&str] = &["spindle_left"];
+/// The right drive.
 const RIGHT: &[&str] = &["spindle_right"];
+/// Both drives.
 const BOTH: &[&str] = &["spindle_left", "spindle_right"];
 
-/// Every kind at every sensible place.
+/// Every kind at every plausible place.
 ///
-/// Left out is what base parameters take up: masses that both sides share (R3m, both elbows), and
-/// `lumped_mass_placement`, which is one of the model with nominal values and none after identification.
+/// Effects that base parameters represent are left out: masses that both sides share (R3m, both elbows), and
+/// `lumped_mass_placement`, which has no effect after identification.
 pub fn choices() -> Vec<HiddenChoice> {
     let of_drives: [(&str, &[&[&str]]); 12] = [
         ("viscous_friction", &[LEFT, RIGHT, BOTH]),
@@ -130,15 +134,16 @@ impl HiddenChoice {
         if self.kind == "coupled_drive" {
             return vec![PlacedEffect::new(self.kind, self.at)];
         }
-        // Sizes of several places may differ.
+        // Values at several places may differ, so each place is an effect of its own.
         self.at
             .iter()
             .map(|place| PlacedEffect::new(self.kind, &[*place]))
             .collect()
     }
 
-    /// Draws values; all that grows with the effect is of unit size, and sizes of several places differ half of the
-    /// time.
+    /// Draws values of unit size, to be multiplied later.
+    ///
+    /// Values at several places differ in half of the draws.
     pub fn draw(&self, random: &mut CaseRandom) -> Vec<HiddenEffect> {
         if self.kind == "coupled_drive" || self.at.len() == 1 {
             return self.at_places(self.at, random);
@@ -155,6 +160,7 @@ impl HiddenChoice {
         all
     }
 
+    /// One effect at the given places, or the two parts of a Stribeck curve, with values of unit size.
     fn at_places(&self, at: &[&str], random: &mut CaseRandom) -> Vec<HiddenEffect> {
         let one = |scaled: &[(&'static str, f64)], fixed: &[(&'static str, f64)]| {
             vec![HiddenEffect::new(self.kind, at, scaled, fixed)]
@@ -165,6 +171,7 @@ impl HiddenChoice {
             "drive_inertia" => one(&[("Ia", 1.0)], &[]),
             "force_offset" => one(&[("F0", random.sign())], &[]),
             "point_mass" => one(&[("m", 1.0)], &[]),
+            // The excess near standstill is 0.8 to 2.5 times the Coulomb friction.
             "stribeck" => {
                 let vs = three_digits(random.log_between(0.015, 0.06));
                 vec![
@@ -178,6 +185,7 @@ impl HiddenChoice {
                 ]
             }
             "directional_viscous_friction" | "directional_coulomb_friction" => {
+                // The values of both directions differ from their mean by 25 to 70 %.
                 let more = random.sign() * random.uniform_between(0.25, 0.7);
                 let symbols = if self.kind == "directional_viscous_friction" {
                     ["Fvp", "Fvn"]
@@ -191,12 +199,13 @@ impl HiddenChoice {
                 &[("k", 1.0)],
                 &[("rest", three_digits(random.uniform_between(0.5, 0.95)))],
             ),
+            // Amplitude 1 with a random phase.
             "force_ripple" => {
                 let (sin, cos) = libm::sincos(random.uniform_between(0.0, 2.0 * std::f64::consts::PI));
                 let pitch = three_digits(random.log_between(0.008, 0.1));
                 one(&[("As", sin), ("Ac", cos)], &[("pitch", pitch)])
             }
-            // A uniform rod, of unit mass at first.
+            // A uniform rod of unit mass, with its centre at half its length.
             "rod_inertia" => {
                 let length = random.uniform_between(0.7, 1.1);
                 one(
@@ -208,6 +217,7 @@ impl HiddenChoice {
             "time_delay" => one(&[], &[("T", three_digits(random.uniform_between(0.002, 0.012)))]),
             "coupled_drive" => {
                 let parts = [("Ia", 30.0), ("Fv", 150.0), ("Fs", 20.0)];
+                // One part is always present, each of the others in three of five draws.
                 let always = random.below(parts.len());
                 let mut values = Vec::new();
                 for (k, (symbol, size)) in parts.into_iter().enumerate() {
@@ -223,8 +233,9 @@ impl HiddenChoice {
     }
 }
 
-/// The largest value of a symbol that a machine of this size would have, SI units.
+/// The largest plausible value of a symbol for a machine of this size, SI units; infinite if it is not limited.
 pub fn largest(placed: &PlacedEffect, symbol: &str) -> f64 {
+    // Friction of the passive joints is limited to less than that of the drives.
     let passive = placed.at.iter().any(|place| place.starts_with("gamma"));
     match symbol {
         "Fv" if passive => 120.0,

@@ -1,31 +1,33 @@
-//! Right or wrong: truth, answer, and what the noise-free motion says can be told apart go in; a mark comes out.
+//! Marks of answers: truth, answer and residual without noise go in; a mark comes out.
+//!
+//! The residual decides whether a wrong claim is indistinguishable from the truth on these recordings.
 
 use std::collections::BTreeSet;
 
 use crate::answer::ProgramAnswer;
 use crate::placed::{EffectAtom, HOLDS, PlacedEffect, atoms};
 
-/// Two explanations whose squared errors differ by less, in units of the noise's variance, cannot be told apart: three
-/// standard deviations.
+/// Two explanations are indistinguishable if their squared errors differ by less, in units of the noise variance. It is
+/// the square of three standard deviations.
 pub const SAME: f64 = 9.0;
-/// How much above the noise floor the error on the check run may stay.
+/// Largest acceptable error on the validation run, relative to the noise floor.
 pub const FALL: f64 = 1.3;
 
-/// What is hidden in a recording.
+/// Class of what is hidden in a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CaseClass {
     /// One effect of the library.
     One,
-    /// Two of them.
+    /// Two effects of the library.
     Two,
-    /// Nothing, or what base parameters take up.
+    /// Nothing, or changes that base parameters represent.
     None,
-    /// Something that no library holds.
+    /// A force that no effect of the library represents.
     Outside,
 }
 
 impl CaseClass {
-    /// All of them, in the order of tables.
+    /// All classes, in the order of tables.
     pub const ALL: [Self; 4] = [Self::One, Self::Two, Self::None, Self::Outside];
 
     /// Its name in files and on the command line.
@@ -38,7 +40,7 @@ impl CaseClass {
         }
     }
 
-    /// The share of right answers that is asked for, %.
+    /// Target for the share of right answers, %.
     pub fn target(self) -> f64 {
         match self {
             Self::One => 95.0,
@@ -49,32 +51,32 @@ impl CaseClass {
     }
 }
 
-/// How an answer did.
+/// The mark of an answer.
 #[derive(Clone, Debug, PartialEq)]
 pub enum AnswerMark {
-    /// All effects with their places and no others; or the verdict that is true.
+    /// All effects with their places and no others; without effects, the true verdict.
     Right,
-    /// Another effect stands in for the true one; it is named as its alias, and nobody could tell them apart.
+    /// Another effect replaces the true one. The answer names the true one as alias, and both are indistinguishable.
     Alias,
-    /// Right effects, but the verdict is another than `missing_effect`.
+    /// Right effects, but another verdict than `missing_effect`.
     WrongVerdict,
-    /// Nothing was found.
+    /// No effect is claimed.
     Missed,
-    /// Some of the effects were found, and nothing else.
+    /// Some of the true effects are claimed, and no others.
     Partly,
     /// The right kind at another place.
     WrongPlace,
     /// Another kind.
     WrongKind,
-    /// All true effects, and others besides.
+    /// All true effects and others in addition.
     Extra,
-    /// Nothing was hidden.
+    /// An effect is claimed, or the verdict is not `adequate`, but nothing was hidden.
     FalseAlarm,
-    /// Something outside the library was taken for an effect of it.
+    /// A force outside the library was identified as an effect of the library.
     Guess,
-    /// It is outside the library, and was taken for noise.
+    /// A force outside the library was treated as noise: the verdict is `adequate`.
     Overlooked,
-    /// The program failed, or its JSON is not that of `cli.md`.
+    /// The program failed, or its JSON differs from the format in `cli.md`.
     Failed(String),
 }
 
@@ -84,29 +86,31 @@ impl AnswerMark {
         matches!(self, Self::Right | Self::Alias)
     }
 
-    /// In words.
+    /// The mark as text, as the table prints it.
     pub fn in_words(&self) -> String {
         match self {
             Self::Right => "right",
-            Self::Alias => "right, by an honest alias",
+            Self::Alias => "right, by an indistinguishable alias",
             Self::WrongVerdict => "right effects, wrong verdict",
             Self::Missed => "missed",
-            Self::Partly => "found in part",
+            Self::Partly => "some effects missed",
             Self::WrongPlace => "wrong place",
             Self::WrongKind => "wrong kind",
             Self::Extra => "extra effects",
             Self::FalseAlarm => "false alarm",
-            Self::Guess => "a guess dressed as a finding",
-            Self::Overlooked => "taken for noise",
+            Self::Guess => "effect claimed for a force outside the library",
+            Self::Overlooked => "force outside the library treated as noise",
             Self::Failed(why) => return format!("failed: {why}"),
         }
         .to_owned()
     }
 }
 
-/// Marks an answer. `excess` gives the squared error, in units of the noise's variance, that a set of claimed effects
-/// leaves of the true forces without noise; infinite for kinds that it does not know. `disturbance` is what something outside
-/// the library is called among the disturbances of recordings: named so, the model lacks nothing.
+/// Marks an answer.
+///
+/// `excess` returns the squared residual of the true forces without noise for a set of claimed effects, in units of the
+/// noise variance; it is infinite for unknown kinds. `disturbance` is the kind of disturbance that describes a force
+/// outside the library. An answer that reports it with the verdict `adequate` is right.
 pub fn judge(
     class: CaseClass,
     hidden: &[PlacedEffect],
@@ -140,6 +144,7 @@ pub fn judge(
     }
 }
 
+/// Compares claimed with true effects, kind by place; the verdict is marked elsewhere.
 fn mark_answer(
     hidden: &[PlacedEffect],
     answer: &ProgramAnswer,
@@ -148,6 +153,7 @@ fn mark_answer(
     let truth = atoms(hidden);
     let claims: Vec<PlacedEffect> = answer.effects.iter().map(|c| c.effect.clone()).collect();
     let claimed = atoms(&claims);
+    // Answers that differ from the truth in one direction only.
     if truth == claimed {
         return AnswerMark::Right;
     }
@@ -162,7 +168,7 @@ fn mark_answer(
     if others.is_empty() {
         return AnswerMark::Partly;
     }
-    // A stand-in must be named as what it is, by the claim itself, and be one that nobody could tell from the truth.
+    // A wrong claim counts only if it names the true effect as its alias and is indistinguishable from it.
     let stand_ins = answer
         .effects
         .iter()
@@ -178,7 +184,7 @@ fn mark_answer(
             .iter()
             .any(|alias| atoms([alias]).iter().any(|a| lacking.contains(a)))
     });
-    // What holds the truth among other things is the less simple answer, and no stand-in.
+    // A claim that contains the truth is the more complex answer, and is not accepted in its place.
     let holds = others.iter().any(|(kind, place)| {
         let less = HOLDS.iter().find(|(more, _)| more == kind);
         less.is_some_and(|(_, less)| lacking.contains(&((*less).to_owned(), place.clone())))
@@ -191,6 +197,7 @@ fn mark_answer(
     {
         return AnswerMark::Alias;
     }
+    // The right kinds at other places are a smaller error than other kinds.
     let kinds =
         |set: &BTreeSet<&EffectAtom>| -> BTreeSet<String> { set.iter().map(|(kind, _)| kind.clone()).collect() };
     if kinds(&lacking) == kinds(&others) {
@@ -200,14 +207,16 @@ fn mark_answer(
     }
 }
 
-/// How many aliases an answer names, and how many of them leave no more of the true forces than the claims themselves
-/// would, so that nobody could tell them apart.
+/// Number of aliases in an answer, and number of those that are indistinguishable from their claim.
+///
+/// An alias is indistinguishable if its squared residual exceeds that of the replaced claim by less than [`SAME`].
 pub fn aliases(answer: &ProgramAnswer, excess: &mut dyn FnMut(&[PlacedEffect]) -> f64) -> [usize; 2] {
     let claims: Vec<PlacedEffect> = answer.effects.iter().map(|c| c.effect.clone()).collect();
     let mut counts = [0, 0];
     if answer.effects.iter().all(|claim| claim.aliases.is_empty()) {
         return counts;
     }
+    // Each alias in turn replaces its claim, and the residuals are compared.
     let with_claims = excess(&claims);
     for (k, claim) in answer.effects.iter().enumerate() {
         for alias in &claim.aliases {

@@ -1,9 +1,10 @@
-//! What all benchmarks of `diagnose` have in common: one plant, one stream of random numbers, one harness.
+//! Shared parts of the benchmarks of `diagnose`: one plant, one random generator, one harness.
 //!
-//! [`plant`] is the SpiderMill's rig beside its reduced model, [`course`] a motion that is drawn from a seed, [`hidden`] and
-//! [`outside`] what is hidden in its forces, [`record`] what sensors make of them. [`case`] draws all of that, [`judge`] marks
-//! what the program answers, and [`table`] prints marks. A benchmark of `benches` takes from these what it needs; the
-//! [`harness`] reads its options, works its cases off and asks the program. Nothing of this is part of the program.
+//! [`plant`] simulates the complete SpiderMill next to its reduced model. [`course`] draws a motion from a seed,
+//! [`hidden`] and [`outside`] draw the effects that are hidden in its forces, [`record`] adds sensors. [`case`]
+//! combines these, [`judge`] compares the program's answer with the truth, and [`table`] prints the scores. The
+//! [`harness`] reads the options of a benchmark, runs the program on each case and collects the results. Nothing of
+//! this is part of the program.
 
 pub mod alternatives;
 pub mod answer;

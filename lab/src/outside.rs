@@ -1,43 +1,43 @@
-//! Forces that no library of effects holds, made from the true motion of the drives.
+//! Forces that no effect of the library represents, computed from the true motion of the drives.
 //!
-//! A spring of third order is none of them: over the travel of a spindle a ripple beside a spring says as much.
+//! A cubic spring is not one of them: over the travel of a spindle, a spring with a ripple represents it as well.
 
 use std::f64::consts::PI;
 
 use crate::plant::{DRIVES, PlantMotion};
 use crate::random::{CaseRandom, three_digits};
 
-/// A law of one drive, the other being number `1 - at`.
+/// A law that acts on drive `at`, with its size and shape. The other drive has number `1 - at`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OutsideForce {
-    /// Which law.
+    /// The law.
     pub law: OutsideLaw,
-    /// Which drive feels it.
+    /// Index of the drive on which it acts.
     pub at: usize,
-    /// Its size: N, or what makes N of the law's function.
+    /// Factor of the law's function, so that the product is in N; for saturation the limit, N.
     pub size: f64,
-    /// What shapes it: a length in m, a frequency in Hz or 1/m, or nothing.
+    /// Parameter of the law: a length, m, or a frequency, Hz or 1/m; zero if it has none.
     shape: f64,
 }
 
-/// The laws. `l` is the length of the drive, `m` that of the other.
+/// The laws. `l` is the length of the drive and `m` that of the other, m; a prime marks a rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OutsideLaw {
-    /// `size * m'`: this drive alone feels the other's rate.
+    /// `size * m'`: a force on this drive that is proportional to the rate of the other.
     OtherRate,
     /// `size * l' * m'`
     ProductOfRates,
-    /// A spring that drags a block along: the stretch is at most `shape`, and what it is depends on the way there.
+    /// A spring that drags a block: its elongation is at most `shape` and depends on the path.
     Hysteresis,
-    /// `size * sin(2 pi l shape) * l'`: viscous friction that differs from place to place, beside `size * l'`.
+    /// `size * (1 + sin(2 pi l shape)) * l'`: viscous friction that depends on the position.
     FrictionByPlace,
-    /// `size * (l - shape)` beyond a length, nothing before.
+    /// `size * (l - shape)` beyond the length `shape`, zero below.
     Stop,
-    /// The whole force is cut where it is beyond `size`.
+    /// The magnitude of the total force is limited to `size`.
     Saturation,
-    /// `size * t`
+    /// `size * t`: a force that grows with time.
     Drift,
-    /// `size * sin(2 pi shape t)`
+    /// `size * sin(2 pi shape t)`: a force that is periodic in time.
     Hum,
 }
 
@@ -68,7 +68,7 @@ impl OutsideLaw {
         }
     }
 
-    /// What it is called among the disturbances of recordings, if it is one.
+    /// The kind under which the program reports it as a disturbance of the recordings, if it does.
     pub fn disturbance(self) -> Option<&'static str> {
         match self {
             Self::Drift => Some("offset_drift"),
@@ -86,7 +86,7 @@ impl std::fmt::Display for OutsideForce {
 }
 
 impl OutsideForce {
-    /// Draws a drive and a shape; the size is one.
+    /// Draws a drive and a shape; the size is 1, or -1 for some laws.
     pub fn draw(law: OutsideLaw, random: &mut CaseRandom) -> Self {
         let shape = match law {
             OutsideLaw::Hysteresis => random.uniform_between(0.02, 0.06),
@@ -110,7 +110,7 @@ impl OutsideForce {
         }
     }
 
-    /// The same, larger or smaller.
+    /// The same law with its size multiplied by a factor and rounded to three digits.
     #[must_use]
     pub fn times(&self, factor: f64) -> Self {
         Self {
@@ -119,11 +119,12 @@ impl OutsideForce {
         }
     }
 
-    /// What it adds to the forces along a motion: samples times drives.
+    /// The forces that it adds along a motion, N, samples times drives; zero for the other drive.
     pub fn added(&self, along: &PlantMotion) -> Vec<f64> {
         let own = along.of_drive(self.at);
         let other = along.of_drive(1 - self.at);
         let mut rows = vec![0.0; along.plain.len()];
+        // Position of the dragged block, m: the memory of the hysteresis.
         let mut block = own.first().map_or(0.0, |m| m.value);
         for (i, (l, m)) in own.iter().zip(&other).enumerate() {
             let row = DRIVES.len() * i + self.at;
@@ -136,6 +137,7 @@ impl OutsideForce {
                 }
                 OutsideLaw::FrictionByPlace => (1.0 + libm::sin(2.0 * PI * self.shape * l.value)) * l.rate,
                 OutsideLaw::Stop => (l.value - self.shape).max(0.0),
+                // The limited force minus the force without effects.
                 OutsideLaw::Saturation => {
                     let force = along.plain[row];
                     rows[row] = force.clamp(-self.size, self.size) - force;

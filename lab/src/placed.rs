@@ -1,18 +1,18 @@
-//! Effects by kind and place, as truth, answers and aliases name them, and when two sets of them say the same.
+//! Effects by kind and place, as truth, answers and aliases name them, and the equivalence of two sets of them.
 
 use std::collections::BTreeSet;
 
 /// A kind at its places.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PlacedEffect {
-    /// Kind, as in `cli.md`.
+    /// Kind, as named in `cli.md`.
     pub kind: String,
     /// Places; one effect on both drives lists both.
     pub at: Vec<String>,
 }
 
 impl PlacedEffect {
-    /// A kind at places that are named.
+    /// A kind at named places.
     pub fn new(kind: &str, at: &[&str]) -> Self {
         Self {
             kind: kind.to_owned(),
@@ -27,7 +27,7 @@ impl std::fmt::Display for PlacedEffect {
     }
 }
 
-/// Kinds that hold another one at the same place: with one of their values at zero they are it.
+/// Pairs of kinds at one place: the first contains the second as a special case.
 pub const HOLDS: [(&str, &str); 2] = [
     ("directional_viscous_friction", "viscous_friction"),
     ("spring", "force_offset"),
@@ -36,11 +36,10 @@ pub const HOLDS: [(&str, &str); 2] = [
 /// A kind at one place.
 pub type EffectAtom = (String, String);
 
-/// What a set of effects says, kind by place, so that two ways of saying the same thing are equal.
+/// The kinds of a set of effects at each place, in a form in which equivalent sets are equal.
 ///
-/// One effect on both drives and one for each are alike. Offset and Coulomb friction make Coulomb friction that differs
-/// by direction, exactly. Viscous friction beside the directional one, and an offset beside a spring whose rest is not
-/// known, add nothing.
+/// One effect on both drives equals one effect on each. Directional Coulomb friction is exactly Coulomb friction with
+/// an offset. Viscous friction adds nothing to its directional form, and an offset adds nothing to a spring.
 pub fn atoms<'a>(effects: impl IntoIterator<Item = &'a PlacedEffect>) -> BTreeSet<EffectAtom> {
     let mut atoms = BTreeSet::new();
     for effect in effects {
@@ -54,6 +53,7 @@ pub fn atoms<'a>(effects: impl IntoIterator<Item = &'a PlacedEffect>) -> BTreeSe
             }
         }
     }
+    // A kind that another one at the same place contains is removed.
     for (more, less) in HOLDS {
         let places: Vec<String> = atoms
             .iter()

@@ -1,4 +1,4 @@
-//! The machine: the whole SpiderMill as a rig, with what a model file names besides, and its reduced model beside it.
+//! The simulated machine: the complete SpiderMill as a rig, and its reduced model, which is diagnosed.
 
 use std::path::PathBuf;
 
@@ -10,8 +10,9 @@ use modelmill_spec::MotionLimits;
 use crate::course::DrawnCourse;
 use crate::harness::in_project;
 
-/// The rig of the bundled recordings with the angles of the couplers against the cranks, which the model calls gamma1
-/// and gamma2, and the points of the model that the rig calls otherwise. Joints may be redundant.
+/// The rig of the bundled recordings with joints and points that the model names in addition.
+///
+/// The joints are gamma1 and gamma2, the angles of the couplers relative to the cranks. Joints may be redundant.
 const RIG: &str = r#"
 schema = 1
 name = "spidermill_hidden"
@@ -45,13 +46,13 @@ on = "G10"
 at = [0.5, 0, 0]
 "#;
 
-/// Rig and reduced model.
+/// The rig and its reduced model.
 pub struct SpidermillPlant {
-    /// Without effects.
+    /// The rig without effects.
     pub rig: Rig,
     /// The model under diagnosis.
     pub derivation: Derivation,
-    /// Its file.
+    /// Path of the model file.
     pub model: PathBuf,
 }
 
@@ -59,9 +60,10 @@ pub struct SpidermillPlant {
 pub const DRIVES: [&str; 2] = ["spindle_left", "spindle_right"];
 
 impl SpidermillPlant {
-    /// Reads both from the bundled rigs and models.
+    /// Loads both from the bundled files; fails if rig and model have different drives.
     pub fn load() -> Result<Self, String> {
         let specs = in_project("model-spec");
+        // The rig extends a bundled one, so its path is in the same folder.
         let path = specs.join("rigs").join("hidden.toml");
         let rig = modelmill_rig::load(&path.to_string_lossy(), RIG, &DiskFiles::default())
             .map_err(|failure| failure.render(false))?
@@ -72,32 +74,35 @@ impl SpidermillPlant {
         let of_model = derivation.mechanism.drives.iter().map(|d| d.name.as_str());
         let of_rig = rig.drives.iter().map(|d| d.name.as_str());
         if !of_model.eq(DRIVES) || !of_rig.eq(DRIVES) {
-            return Err("rig and model name their drives otherwise".to_owned());
+            return Err("rig and model have different drives".to_owned());
         }
         Ok(Self { rig, derivation, model })
     }
 
-    /// What motions keep.
+    /// Limits of the motions, from the model file.
     pub fn limits(&self) -> &MotionLimits {
         &self.derivation.mechanism.limits
     }
 }
 
-/// The rig along a course: poses of all bodies at some times, from which forces with any effects follow.
-/// Rows are samples times drives, drives innermost.
+/// The rig along a motion: the motion of all bodies at given times, from which forces with any effects are computed.
+///
+/// A column of forces has samples times drives rows, drives innermost.
 pub struct PlantMotion {
+    /// The rig without effects.
     rig: Rig,
-    /// s
+    /// Times of the samples, s.
     pub times: Vec<f64>,
-    /// Coordinates as prescribed.
+    /// Prescribed coordinates with derivatives at each time.
     pub states: Vec<RigState>,
+    /// Motion of all bodies at each time.
     motions: Vec<RigMotion>,
     /// Forces without effects, N.
     pub plain: Vec<f64>,
 }
 
 impl PlantMotion {
-    /// Follows a course at the given times; fails where the rig cannot.
+    /// Moves the rig along a course at the given times, s; fails if the rig cannot follow.
     pub fn new(rig: &Rig, course: &DrawnCourse, times: Vec<f64>) -> Result<Self, String> {
         let states: Vec<RigState> = times.iter().map(|t| course.state_at(*t)).collect();
         let mut tracker = RigTracker::new(rig).map_err(|error| error.to_string())?;
@@ -122,7 +127,7 @@ impl PlantMotion {
         &self.rig
     }
 
-    /// Forces with effects, N.
+    /// Forces of the drives with effects, N.
     pub fn forces(&self, effects: &[RigEffect]) -> Result<Vec<f64>, String> {
         let mut rig = self.rig.clone();
         rig.effects = effects.to_vec();
@@ -133,32 +138,33 @@ impl PlantMotion {
         Ok(rows)
     }
 
-    /// What effects add to the forces, N.
+    /// Change of the forces by effects, relative to the rig without effects, N.
     pub fn added(&self, effects: &[RigEffect]) -> Result<Vec<f64>, String> {
         let with = self.forces(effects)?;
         Ok(with.iter().zip(&self.plain).map(|(a, b)| a - b).collect())
     }
 
-    /// What an effect adds to the forces that others need already, N.
+    /// Change of the forces by one effect when others are present, N.
     pub fn added_beside(&self, others: &[RigEffect], effect: RigEffect) -> Result<Vec<f64>, String> {
         let without = self.forces(others)?;
         let with = self.forces(&[others, &[effect]].concat())?;
         Ok(with.iter().zip(&without).map(|(a, b)| a - b).collect())
     }
 
-    /// Length, rate and acceleration of a drive at each time.
+    /// Length (m), rate and acceleration of a drive at each time.
     pub fn of_drive(&self, drive: usize) -> Vec<ScalarMotion> {
         self.of_place(RigPlace::Drive(drive)).unwrap_or_default()
     }
 
-    /// The same of any place that moves.
+    /// The same for any place; `None` if the place has no motion.
     pub fn of_place(&self, place: RigPlace) -> Option<Vec<ScalarMotion>> {
         let at = |motion| modelmill_rig::place_motion(&self.rig, place, motion);
         self.motions.iter().map(at).collect()
     }
 
-    /// Columns of the model's base parameters.
+    /// Columns of the regressor for the base parameters of the model, samples times drives.
     pub fn base(&self, derivation: &Derivation) -> Result<Vec<Vec<f64>>, String> {
+        // The evaluator takes one column per coordinate.
         let column = |of: fn(&RigState) -> &Vec<f64>, k: usize| -> Vec<f64> {
             self.states.iter().map(|state| of(state)[k]).collect()
         };
@@ -180,6 +186,7 @@ impl PlantMotion {
     }
 }
 
+/// The columns as slices.
 fn slices(columns: &[Vec<f64>]) -> Vec<&[f64]> {
     columns.iter().map(Vec::as_slice).collect()
 }

@@ -1,4 +1,4 @@
-//! Recordings of a case: encoders of 20 bits with noise, forces with noise; and the noise floor that is true.
+//! Recordings of a case: encoders of 20 bits with noise and forces with noise, together with the true noise floor.
 
 use std::f64::consts::PI;
 use std::fmt::Write as _;
@@ -10,44 +10,46 @@ use crate::plant::{DRIVES, PlantMotion};
 use crate::random::CaseRandom;
 use crate::span::norm;
 
-/// Steps of an encoder per turn.
+/// Steps of an encoder per revolution, 2^20.
 const STEPS: f64 = 1_048_576.0;
 /// Standard deviation of the encoders' noise, rad.
 pub const ENCODER_NOISE: f64 = 4e-6;
-/// What the files are called.
+/// File names of the fit and of the validation run.
 pub const FILES: [&str; 2] = ["fit.csv", "check.csv"];
 
-/// The step of the encoder that is next to an angle, rad.
+/// An angle rounded to the nearest step of the encoder, rad.
 pub fn encoder_step(angle: f64) -> f64 {
     let step = 2.0 * PI / STEPS;
     (angle / step).round() * step
 }
 
-/// A recording as text.
+/// A recording as CSV text.
 pub struct RecordingText {
     /// Times, readings and forces, with a header.
     pub csv: String,
-    /// Norm of the noise over that of the measured forces: what a model with the truth would leave.
+    /// 2-norm of the noise divided by that of the measured forces: the residual of a model with the true effects.
     pub floor: f64,
 }
 
-/// A recording before it is written; columns of samples.
+/// A recording before it is written, as columns of samples.
 pub struct RecordedSamples {
-    /// s
+    /// Times of the samples, s.
     pub times: Vec<f64>,
-    /// Readings of the coordinates, rad, before they are rounded to steps of the encoder.
+    /// Readings of the coordinates before rounding to encoder steps, `[coordinate][sample]`, rad.
     pub positions: Vec<Vec<f64>>,
-    /// Rates and accelerations, where they are recorded.
+    /// Exact rates (rad/s), then accelerations (rad/s^2), `[column][sample]`; empty if they are not recorded.
     pub derivatives: Vec<Vec<f64>>,
-    /// Readings of the forces, N.
+    /// Readings of the forces with noise, `[drive][sample]`, N.
     pub forces: Vec<Vec<f64>>,
-    /// What of them is noise, N.
+    /// The noise in these readings, `[drive][sample]`, N.
     pub noise: Vec<Vec<f64>>,
 }
 
 impl RecordedSamples {
-    /// What the sensors read along a motion: `truth` are the forces (samples times drives), `noise` is added to them, and
-    /// `random` gives the noise of each encoder.
+    /// Readings of the sensors along a motion.
+    ///
+    /// `truth` has the forces (samples times drives), `noise` is added to them, and `random` returns the random numbers
+    /// of each encoder. With `full`, rates and accelerations are recorded.
     pub fn new(
         along: &PlantMotion,
         truth: &[f64],
@@ -59,11 +61,13 @@ impl RecordedSamples {
             along.states.iter().map(|state| of(state)[k]).collect()
         };
         let all = |of: fn(&RigState) -> &Vec<f64>| (0..DRIVES.len()).map(move |k| column(of, k));
+        // Positions have noise of the encoder; derivatives are exact.
         let with_noise = |(k, exact): (usize, Vec<f64>)| {
             let mut random = random(k);
             let read = exact.iter().map(|q| q + ENCODER_NOISE * random.normal());
             read.collect::<Vec<f64>>()
         };
+        // Forces of one drive are every n-th row for n drives.
         let read = |(k, noise): (usize, &Vec<f64>)| {
             let exact = truth.iter().skip(k).step_by(DRIVES.len());
             exact.zip(noise).map(|(f, e)| f + e).collect()
@@ -81,7 +85,7 @@ impl RecordedSamples {
         }
     }
 
-    /// As a file.
+    /// The recording as CSV, with its noise floor.
     pub fn recorded(&self) -> RecordingText {
         let mut csv = String::from("t,theta1,theta2,");
         if !self.derivatives.is_empty() {
@@ -109,11 +113,12 @@ impl RecordedSamples {
     }
 }
 
-/// Records fit (0) or check (1).
+/// Records the fit (0) or the validation run (1) of a case; fails if the rig cannot follow the motion.
 pub fn record(case: &HiddenCase, seed: u64, which: usize) -> Result<RecordingText, String> {
     let course = &case.courses[which];
     let along = PlantMotion::new(&case.rig, course, course.times(RATE))?;
     let truth = case.forces(&along, course)?;
+    // Every channel has its own stream of random numbers: encoders first, then forces.
     let random = |channel: usize| CaseRandom::new(seed, case.number, 10 + 10 * which as u64 + channel as u64);
     let noise = (0..DRIVES.len()).map(|k| {
         let mut random = random(DRIVES.len() + k);

@@ -1,11 +1,12 @@
-//! What columns cannot say: an orthonormal basis of columns goes in, the rest of another column comes out.
+//! Projection on columns: columns go in as an orthonormal basis, the residual of another column comes out.
 
-/// A column that loses all but this share of itself is said by the others.
+/// A column whose residual is below this share of its norm depends linearly on the others.
 const NOTHING: f64 = 1e-9;
 
-/// The span of columns, as an orthonormal basis (Gram and Schmidt, each column twice).
+/// The span of columns, as an orthonormal basis (Gram-Schmidt, each column orthogonalised twice).
 #[derive(Clone, Default)]
 pub struct ColumnSpan {
+    /// Orthonormal columns, in the order in which they were added.
     basis: Vec<Vec<f64>>,
 }
 
@@ -17,10 +18,11 @@ impl ColumnSpan {
         span
     }
 
-    /// Takes more columns in; those that say nothing new are passed over.
+    /// Adds columns to the span; linearly dependent ones are skipped.
     pub fn extend(&mut self, columns: impl IntoIterator<Item = Vec<f64>>) {
         for column in columns {
             let before = norm(&column);
+            // The second pass removes the rounding of the first.
             let mut rest = self.rest(&self.rest(&column));
             let after = norm(&rest);
             if after > NOTHING * before {
@@ -32,7 +34,7 @@ impl ColumnSpan {
         }
     }
 
-    /// What is left of a column.
+    /// The residual of a column: its part orthogonal to the span.
     pub fn rest(&self, column: &[f64]) -> Vec<f64> {
         let mut rest = column.to_vec();
         for direction in &self.basis {
@@ -45,12 +47,12 @@ impl ColumnSpan {
     }
 }
 
-/// The 2-norm.
+/// The 2-norm of a column.
 pub fn norm(column: &[f64]) -> f64 {
     column.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// Root of the mean square.
+/// Root mean square of a column; zero if it is empty.
 pub fn rms(column: &[f64]) -> f64 {
     norm(column) / (column.len().max(1) as f64).sqrt()
 }

@@ -15,8 +15,8 @@ pub type Outcome<T = ()> = Result<T, Error>;
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum Error {
-    /// A model, rig or plan file is invalid. It contains all errors and warnings of the file, each with its line and
-    /// column.
+    /// A model, rig or plan file is invalid. The value contains all errors and warnings of the file, each with its line
+    /// and column.
     Model(Box<modelmill_spec::LoadFailure>),
     /// The equations of the mechanism cannot be derived.
     Derivation {

@@ -38,13 +38,14 @@
 //!
 //! # Methods
 //!
-//! Methods of [`Model`] need a model whose equations have been derived; methods of [`Host`] do not.
+//! Methods of [`Model`] use the equations that were derived when the model was read. Methods of [`Host`] need no
+//! model.
 //!
 //! | method | what it does |
 //! |---|---|
 //! | [`Model::check`] | summary of the model, and the numeric rank of its regressor (over random states) compared with the exact rank |
 //! | [`model::ModelChanges::from_models`] | entries, base parameters and operation counts that differ between a model and its variant |
-//! | [`variants::VariantComparison::along_recordings`] | forces, power, work, use of limits, and errors of two variants |
+//! | [`variants::VariantComparison::along_recordings`] | forces, power, work, utilisation of limits, and errors of two variants |
 //! | [`Host::kinds`] | the kinds of effects that a model may have |
 //! | [`Model::with_added_effects`] | the model with effects added to its file |
 //! | [`Model::picture`] | the mechanism at a pose, as SVG |
@@ -57,7 +58,7 @@
 //! | [`Model::diagnose`] | the physical effects that are missing |
 //! | [`Model::runs`] | changes between recordings of one machine |
 //! | [`report::page`] | a diagnosis as one page |
-//! | [`Host::simulate`] | simulation of a rig (a numeric stand-in for the machine, with every body modelled) along a trajectory |
+//! | [`Host::simulate`] | simulation of a rig (a numeric model of the complete machine, used in place of hardware) along a trajectory |
 //! | [`Host::reduce`] | the reduction of a rig to a planar model |
 //! | [`Host::import`] | a model file from a URDF, MJCF or SDF |
 //! | [`export::description`], [`Model::export`] | a URDF or MJCF from a model file, or from a fit |
@@ -164,15 +165,17 @@
 //! # Progress, cancellation, notes
 //!
 //! A [`progress::ProgressListener`] of the host receives the name and the progress of each job, can stop it
-//! ([`Error::Cancelled`]), and receives notes when they occur. Results contain these notes too; their type is
-//! [`RecordingNote`].
+//! ([`Error::Cancelled`]), and receives notes. A note ([`RecordingNote`]) states a choice that was made, or warns of a
+//! condition that is likely to affect the result. Results contain the notes too.
 //!
 //! # Modules
 //!
-//! In the order of the data flow; each module uses only modules before it: [`text`], [`error`], [`progress`], [`host`],
-//! [`model`], [`picture`], [`atlas`], [`segment`], [`along`], [`audit`], [`recording`], [`compare`], [`evaluate`],
-//! [`states`], [`identify`], [`runs`], [`diagnose`], [`add`], [`adopt`], [`interpret`], [`excite`], [`variants`],
-//! [`generate`], [`simulate`], [`reduce`], [`mod@import`], [`mod@export`], [`mod@print`], [`report`].
+//! The modules are listed in the order of the data flow. Each module uses only modules before it.
+//!
+//! [`text`], [`error`], [`progress`], [`host`], [`model`], [`picture`], [`atlas`], [`segment`], [`along`], [`audit`],
+//! [`recording`], [`compare`], [`evaluate`], [`states`], [`identify`], [`runs`], [`diagnose`], [`add`], [`adopt`],
+//! [`interpret`], [`excite`], [`variants`], [`generate`], [`simulate`], [`reduce`], [`mod@import`], [`mod@export`],
+//! [`mod@print`], [`report`].
 
 pub mod add;
 pub mod adopt;

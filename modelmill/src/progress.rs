@@ -10,8 +10,8 @@ use crate::error::{Error, Outcome};
 
 /// Receives progress and notes of a method. All methods have empty default implementations.
 pub trait ProgressListener: Send + Sync {
-    /// A job starts. `what` is its name, `total` its number of steps, 0 if that is unknown. `job` lives until the job
-    /// ends, so that a listener may read it at any time.
+    /// A job starts. `what` is its name, `total` its number of steps, 0 if that is unknown. A listener may keep a clone
+    /// of `job` to read the progress or cancel the job later.
     fn on_job_start(&self, what: &str, total: usize, job: &Arc<JobHandle>) {
         let _ = (what, total, job);
     }
@@ -45,7 +45,7 @@ impl JobHandle {
         self.done.load(Ordering::Relaxed)
     }
 
-    /// Requests the job to stop; it ends with [`Error::Cancelled`] at its next step.
+    /// Requests that the job stop; it ends with [`Error::Cancelled`] at its next step.
     pub fn cancel(&self) {
         self.is_cancelled.store(true, Ordering::Relaxed);
     }

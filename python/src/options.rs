@@ -112,7 +112,7 @@ pub(crate) struct EstimationOptions {
     physical: bool,
     /// Whether parameters that the recording does not support are left out.
     essential: bool,
-    /// Equations of a drive that is slower than this fraction of its fastest rate are excluded.
+    /// Equations of a drive that is slower than this fraction of its maximum rate are excluded.
     standstill: Option<f64>,
 }
 

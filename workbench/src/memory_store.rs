@@ -76,8 +76,8 @@ impl SessionEnvironment for MemoryStore {
         // Only the page itself makes changes, and it gets them as responses.
     }
 
-    fn report_progress(&self, view_json: &Value) {
-        (self.goes_on)(view_json);
+    fn report_progress(&self, progress: &Value) {
+        (self.goes_on)(progress);
     }
 
     fn spawn_work(&self, work: Box<dyn FnOnce() + Send>) -> Result<(), String> {

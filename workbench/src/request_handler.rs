@@ -66,12 +66,12 @@ impl RequestHandler {
                 None => Err("no model is open".to_owned().into()),
             }
         };
-        let (status, view_json) = match found {
-            Ok(PageResponse::Json(view_json)) => (200, view_json),
-            Ok(PageResponse::Svg(view_json) | PageResponse::Html(view_json)) => (200, json!(view_json)),
+        let (status, response) = match found {
+            Ok(PageResponse::Json(response)) => (200, response),
+            Ok(PageResponse::Svg(response) | PageResponse::Html(response)) => (200, json!(response)),
             Err(RequestRefusal(fault, says)) => (fault.status(), json!({ "says": says })),
         };
-        json!({ "status": status, "told": view_json }).to_string()
+        json!({ "status": status, "told": response }).to_string()
     }
 
     /// Opens a session on the files that were added; each recording is one file.
@@ -88,9 +88,9 @@ impl RequestHandler {
         let memory_store = Arc::new(self.memory_store.clone());
         let opened = WorkbenchSession::open(&Host::new(), options, Arc::new(PageSpelling), memory_store);
         let session = Arc::new(opened.map_err(|error| error.to_string())?);
-        let view_json = session.view();
+        let response = session.view();
         self.session = Some(session);
-        Ok(PageResponse::Json(view_json))
+        Ok(PageResponse::Json(response))
     }
 }
 
@@ -148,49 +148,49 @@ mod tests {
 
     use super::*;
 
-    fn view_json(answer: &str) -> (u64, Value) {
+    fn response(answer: &str) -> (u64, Value) {
         let mut answer: Value = serde_json::from_str(answer).unwrap();
-        let view_json = answer["told"].take();
-        (answer["status"].as_u64().unwrap(), view_json)
+        let response = answer["told"].take();
+        (answer["status"].as_u64().unwrap(), response)
     }
 
     #[test]
     fn a_desk_answers_as_the_server_does() {
         let mut request_handler = RequestHandler::new(|| 0.0, |_| {});
-        assert_eq!(view_json(&request_handler.answer_request("view", b"")).0, 422);
+        assert_eq!(response(&request_handler.answer_request("view", b"")).0, 422);
         let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../model-spec/models/");
         for name in ["delta.toml", "delta_tied.toml"] {
             request_handler.add_file(name, &std::fs::read(format!("{folder}{name}")).unwrap());
         }
         let (status, view) =
-            view_json(&request_handler.answer_request("open", br#"{ "model": "delta_tied.toml", "first": 40 }"#));
+            response(&request_handler.answer_request("open", br#"{ "model": "delta_tied.toml", "first": 40 }"#));
         assert_eq!((status, &view["valid"]), (200, &json!(true)), "{view}");
         assert_eq!((&view["revision"], &view["version"]), (&json!(41), &json!(41)));
         let edit = |base: u64, text: &str| json!({ "base": base, "text": text }).to_string();
-        let (status, fault) = view_json(&request_handler.answer_request("edit", edit(41, "schema = [").as_bytes()));
+        let (status, fault) = response(&request_handler.answer_request("edit", edit(41, "schema = [").as_bytes()));
         assert_eq!((status, &fault["valid"]), (200, &json!(false)));
         assert_eq!(fault["diagnostics"][0]["line"], 1, "{fault}");
         // Compared with the saved file, and with another model of the folder.
         let text = view["text"].as_str().unwrap();
         let saved = request_handler.answer_request("edit", edit(42, text).as_bytes());
-        assert_eq!(view_json(&saved).1["valid"], true, "{saved}");
-        let (_, models) = view_json(&request_handler.answer_request("models", b"{}"));
+        assert_eq!(response(&saved).1["valid"], true, "{saved}");
+        let (_, models) = response(&request_handler.answer_request("models", b"{}"));
         assert_eq!(models, json!({ "models": ["delta.toml"], "named": null }));
         for beside in [json!(null), json!("delta.toml")] {
             let body = json!({ "beside": beside }).to_string();
-            let (status, variant) = view_json(&request_handler.answer_request("variant", body.as_bytes()));
+            let (status, variant) = response(&request_handler.answer_request("variant", body.as_bytes()));
             assert_eq!((status, &variant["same"]), (200, &json!(beside.is_null())));
             assert_eq!(variant["along"], json!(null), "there is no recording");
         }
         // Made of a text that is no longer there, or of nothing.
         assert_eq!(
-            view_json(&request_handler.answer_request("edit", edit(41, "").as_bytes())).0,
+            response(&request_handler.answer_request("edit", edit(41, "").as_bytes())).0,
             409
         );
-        assert_eq!(view_json(&request_handler.answer_request("edit", b"{}")).0, 400);
-        assert_eq!(view_json(&request_handler.answer_request("compile", b"{}")).0, 404);
+        assert_eq!(response(&request_handler.answer_request("edit", b"{}")).0, 400);
+        assert_eq!(response(&request_handler.answer_request("compile", b"{}")).0, 404);
         assert_eq!(
-            view_json(&request_handler.answer_request("open", br#"{ "model": "none.toml" }"#)).0,
+            response(&request_handler.answer_request("open", br#"{ "model": "none.toml" }"#)).0,
             422
         );
     }

@@ -378,11 +378,11 @@ impl WorkbenchSession {
                 saved.filter(|saved| seeing.shadow && saved.text() != model.text())
             }
         };
-        let view_json = |error| self.error_text(&error);
+        let to_text = |error| self.error_text(&error);
         match model.picture(&drawing, shadow.as_ref()) {
             // The other mechanism may have other coordinates, or may not reach this pose; then it is left out.
-            Err(_) if shadow.is_some() => model.picture(&drawing, None).map_err(view_json),
-            drawn => drawn.map_err(view_json),
+            Err(_) if shadow.is_some() => model.picture(&drawing, None).map_err(to_text),
+            drawn => drawn.map_err(to_text),
         }
     }
 
@@ -448,10 +448,10 @@ impl WorkbenchSession {
             };
             ModelVersion::new(model, stretches(fit).collect(), stretches(check).collect(), held)
         };
-        let view_json = |error| self.error_text(&error);
+        let to_text = |error| self.error_text(&error);
         // Curves of models with different drives cannot be compared.
         let other = saved.filter(|saved| saved.text() != model.text() && saved.drives() == model.drives());
-        let edited = version(model).map_err(view_json)?;
+        let edited = version(model).map_err(to_text)?;
         Ok(match other.map(version) {
             Some(Ok(saved)) => report::curves(&saved, Some(&edited), ["model as saved", "as edited"]),
             _ => report::curves(&edited, None, ["model", ""]),

@@ -120,9 +120,9 @@ impl<const P: u64> FieldElement<P> {
     }
 }
 
-/// The element congruent to a number below 2^124.
+/// The element congruent to a number below 2^124. As `P` is just below 2^61, the upper bits are folded onto the lower
+/// ones.
 #[inline]
-/// A product of two elements modulo `P`. As `P` is just below 2^61, the upper bits are folded onto the lower ones.
 fn reduce<const P: u64>(x: u128) -> FieldElement<P> {
     // The lower 61 bits.
     const MASK: u64 = (1 << 61) - 1;

@@ -40,7 +40,7 @@ names! {
         Data => "data",
         /// Keeps every n-th sample.
         Decimate => "decimate",
-        /// Drops parameters that a recording does not need.
+        /// Removes parameters that a recording does not determine.
         Essential => "essential",
         /// Effects from which one is distinguished.
         From => "from",
@@ -70,7 +70,7 @@ names! {
         Picture => "picture",
         /// The plan of a reduction.
         Plan => "plan",
-        /// Nominal values that count as measurements.
+        /// Uses nominal values as measurements with a standard deviation.
         Prior => "prior",
         /// Samples per second.
         Rate => "rate",
@@ -88,9 +88,9 @@ names! {
         Source => "source",
         /// Leaves out equations of drives at standstill.
         Standstill => "standstill",
-        /// Samples dropped at both ends.
+        /// Numbers of samples removed at the start and at the end.
         Trim => "trim",
-        /// Parameters that are solved for.
+        /// Physical parameters that are computed from base parameters.
         Unknown => "unknown",
         /// Weights of equations.
         Weights => "weights",
@@ -106,7 +106,7 @@ names! {
         Check => "check",
         /// Finds the effects that a model lacks.
         Diagnose => "diagnose",
-        /// Forces of a model along a motion.
+        /// Computes the forces of a model along a motion.
         Evaluate => "evaluate",
         /// Plans a motion.
         Excite => "excite",

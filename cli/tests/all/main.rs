@@ -2,6 +2,7 @@
 //!
 //! One target for all of them, since each target links the whole program anew.
 
+mod advice_in_sources;
 mod atlas;
 #[cfg(target_os = "linux")]
 mod bombs;

@@ -5,6 +5,7 @@
 //! more scripts: one that collects errors first, and one that uses wheel, pointer and keys last. It reads what they
 //! wrote from the dumped document.
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::process::Command;
 
@@ -67,6 +68,23 @@ fn the_page_holds_what_diagnose_says_and_needs_nothing_else() {
     }
     for effect in found["effects"].as_array().expect("effects") {
         let kind = effect["kind"].as_str().expect("a kind");
+        // Programs of others read these keys.
+        let keys: BTreeSet<&str> = effect
+            .as_object()
+            .expect("an object")
+            .keys()
+            .map(String::as_str)
+            .collect();
+        let expected = [
+            "kind",
+            "at",
+            "estimates",
+            "probability",
+            "indistinguishable_from",
+            "separate_by",
+            "separate_command",
+        ];
+        assert_eq!(keys, BTreeSet::from(expected));
         assert!(page.contains(&format!("modelmill add {file} {kind} --at ")), "{kind}");
     }
     for part in [

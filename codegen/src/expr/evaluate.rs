@@ -51,7 +51,7 @@ pub struct EvaluationTape {
     roots: Vec<u32>,
 }
 
-/// One value of a [`Tape`]; what it needs stands in the tape's lists.
+/// One value of an [`EvaluationTape`]; what it needs stands in the tape's lists.
 #[derive(Clone, Debug)]
 enum TapeStep {
     Rational(u32),
@@ -227,13 +227,12 @@ impl EvaluationTape {
     }
 }
 
-/// A position in a list of a [`Tape`].
+/// A position in a list of an [`EvaluationTape`].
 fn index(position: usize) -> u32 {
     u32::try_from(position).expect("tape below 4G nodes")
 }
 
 /// Double-precision evaluation; the values of atoms come from a function.
-/// Floating-point evaluation; atoms come from a function.
 pub struct FloatDomain<F: Fn(Atom) -> f64>(
     /// Value of an atom.
     pub F,

@@ -51,9 +51,8 @@ pub enum ProgramOp {
 }
 
 impl ProgramOp {
-    /// The same operation on other operands.
-    #[must_use]
     /// The same operation on the operands that `new` gives.
+    #[must_use]
     pub fn map_operands(self, new: impl Fn(ValueId) -> ValueId) -> Self {
         match self {
             Self::Number(_) | Self::Input(_) => self,
@@ -218,9 +217,8 @@ impl fmt::Display for OperationCount {
 }
 
 impl StraightLineProgram {
-    /// The same program without the operations that no output and no guard needs.
-    #[must_use]
     /// The same program without operations that no output and no guard needs.
+    #[must_use]
     pub fn without_dead_code(self) -> Self {
         let mut needed = vec![false; self.ops.len()];
         for value in self
@@ -250,9 +248,8 @@ impl StraightLineProgram {
         self.without_dead_code()
     }
 
-    /// The same program with the operations that `order` names, in that order; operands stand before what needs them.
-    #[must_use]
     /// The same program with the operations of `order`, in that order; operands must come before their users.
+    #[must_use]
     pub fn reorder(&self, order: &[usize]) -> Self {
         // Position of each old value in the new program.
         let mut places: Vec<Option<ValueId>> = vec![None; self.ops.len()];

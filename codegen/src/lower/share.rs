@@ -102,7 +102,7 @@ struct PairCounts {
 }
 
 impl PairCounts {
-    /// Pairs that occur most often and at least twice. No operand is in two of them, so that they can be replaced together.
+    /// Counts the pairs of the nodes that `roots` need, and of no others.
     fn update(&mut self, graph: &Graph, roots: &[ExprId]) {
         // Fixed nodes are computed once, so their pairs are not worth sharing.
         let node = |i: usize| graph.node(ExprId(u32::try_from(i).expect("graph below 4G nodes")));
@@ -130,9 +130,8 @@ impl PairCounts {
         }
     }
 
-    /// The pairs that occur most often, if that is more than once; no operand twice, so that they can be replaced together.
+    /// Pairs that occur most often and at least twice. No operand is in two of them, so that they can be replaced together.
     fn most_common(&self) -> BTreeSet<OperandPair> {
-        // Pairs with their counts.
         let most = self.counts.values().copied().max().unwrap_or(0);
         if most < 2 {
             return BTreeSet::new();

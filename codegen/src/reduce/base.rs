@@ -78,9 +78,8 @@ pub(crate) fn lumped_formulas(mechanism: &Mechanism, reduction: &BaseReduction, 
     }
 }
 
-/// What base parameters divide by: a function of the constants that may vanish.
-#[derive(Clone, Debug)]
 /// A divisor of the base parameters: a function of the constants that may vanish.
+#[derive(Clone, Debug)]
 pub struct BaseDenominator {
     /// The divisor as a formula.
     pub value: PrintedFormula,

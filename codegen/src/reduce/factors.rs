@@ -167,7 +167,7 @@ impl PrimeFieldOracle for MotionFactorOracle<'_> {
         let at_once = rank * rank * self.regressor.n_columns;
         let one_by_one: usize = self.relations.iter().map(|r| (r.len() + 1).pow(3)).sum();
         self.charge(at_once.min(one_by_one))?;
-        // One relation at a time: its columns at as many points as the survey of dependences used.
+        // One relation at a time: its columns at no more points than the survey of dependences used.
         if one_by_one < at_once {
             // Few points are enough for relations between few columns.
             let mut open: Vec<RelationRows<P>> = self.relations.iter().map(RelationRows::new).collect();

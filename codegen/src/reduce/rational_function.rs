@@ -146,22 +146,6 @@ impl RationalFunction {
         self.numerator.is_empty()
     }
 
-    /// The number that it equals; `None` if it depends on constants.
-    pub fn as_constant(&self) -> Option<Rational> {
-        if self.is_zero() {
-            return Some(Rational::ZERO);
-        }
-        // Both polynomials are numbers.
-        match (
-            self.numerator.len(),
-            self.numerator.get(&PowerProduct::new()),
-            self.denominator.get(&PowerProduct::new()),
-        ) {
-            (1, Some(n), Some(d)) if self.denominator.len() == 1 => Some(n * &d.recip()),
-            _ => None,
-        }
-    }
-
     /// Its value at a point of the field; `None` where the denominator vanishes.
     pub(crate) fn value<const P: u64>(&self, point: &FieldPoint<FieldElement<P>>) -> Option<FieldElement<P>> {
         let denominator = polynomial_value(&self.denominator, point)?.inverse()?;

@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use modelmill::print::{CommandName, LibrarySpelling, OptionName, OptionSetting, RemedySpelling};
 use modelmill::recording::{RecordingOptions, StatePreparation};
 use modelmill_fleet::{FleetFault, folder};
 use modelmill_fleet_program::{generate, identify, score};
@@ -160,9 +161,35 @@ fn main() -> ExitCode {
             ExitCode::SUCCESS
         }
         Err(fault) => {
-            eprintln!("error: {fault}");
+            eprintln!("error: {}", fault.message().spell(&FleetSpelling));
             ExitCode::from(1)
         }
+    }
+}
+
+/// Spells options as flags of this program, and commands as those of `modelmill`.
+struct FleetSpelling;
+
+impl RemedySpelling for FleetSpelling {
+    fn spell_options(&self, settings: &[OptionSetting]) -> String {
+        let one = |setting: &OptionSetting| {
+            let flag = match setting.name {
+                OptionName::Columns => "--map",
+                OptionName::CutoffHz => "--cutoff",
+                OptionName::Decimate => "--decimate",
+                OptionName::SkipBadSamples => "--skip-bad-samples",
+                _ => return LibrarySpelling.spell_options(std::slice::from_ref(setting)),
+            };
+            match &setting.value {
+                None => format!("`{flag}`"),
+                Some(value) => format!("`{flag} \"{value}\"`"),
+            }
+        };
+        settings.iter().map(one).collect::<Vec<_>>().join(" ")
+    }
+
+    fn spell_command(&self, command: CommandName) -> String {
+        format!("`modelmill {}`", command.name())
     }
 }
 

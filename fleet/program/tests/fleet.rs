@@ -212,3 +212,25 @@ fn read(path: &Path, ground: &FleetModel) -> Vec<(String, Vec<f64>)> {
     };
     ground.columns().into_iter().map(column).collect()
 }
+
+/// A recording without the columns of the model: the remedy is a flag of this program, not a word of the library.
+#[test]
+fn advice_names_flags_of_this_program() {
+    let folder = std::env::temp_dir().join(format!("modelmill-fleet-flags-{}", std::process::id()));
+    fs::create_dir_all(&folder).expect("a folder");
+    let run = folder.join("run.csv");
+    fs::write(&run, "t,angle,elbow\n0,0,0\n0.01,0,0\n").expect("a recording");
+    let model = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../model-spec/models/two_link.toml");
+    let output = std::process::Command::new(env!("CARGO_BIN_EXE_modelmill-fleet"))
+        .arg("plan")
+        .args([&model, &run])
+        .arg("--out")
+        .arg(folder.join("plan.json"))
+        .output()
+        .expect("the program runs");
+    let says = String::from_utf8_lossy(&output.stderr).into_owned();
+    fs::remove_dir_all(&folder).expect("the folder goes");
+    assert_eq!(output.status.code(), Some(1), "{says}");
+    assert!(says.contains("`--map \"q1="), "{says}");
+    assert!(!says.contains("option `"), "{says}");
+}

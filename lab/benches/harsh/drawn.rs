@@ -1,5 +1,6 @@
-//! Cases drawn from a seed: the forty kinds of `spidermill-harsh` with other sizes, sides, motions and noise. What is hidden and
-//! what is wrong with the recordings come out, with the entry of `truth.json` by which an answer is judged.
+//! Cases drawn from a seed: the forty kinds of `spidermill-harsh` with other sizes, sides, motions and noise.
+//!
+//! Hidden effects and faults of the recordings come out, with the `truth.json` by which an answer is judged.
 
 use modelmill_rig::RigEffect;
 use serde_json::{Value, json};
@@ -12,16 +13,16 @@ use modelmill_lab::span::{ColumnSpan, rms};
 use super::laws::Law;
 use super::sensors::Fault;
 
-/// Samples per second at which sizes are worked out.
+/// Samples per second of the motions on which sizes are computed, Hz.
 const COARSE: f64 = 50.0;
-/// What a law leaves of a drive's force beside the base parameters, N.
+/// Range of the rms residual of a law in the force of its drive, when the base parameters are fitted, N.
 const LAW_SHOWS: [f64; 2] = [5.0, 16.0];
-/// The same of effects that are hidden, at least.
+/// Least such residual of hidden effects, N.
 const EFFECT_SHOWS: f64 = 1.5;
-/// Draws before a case is given up.
+/// Draws before a case fails.
 const ATTEMPTS: u64 = 60;
 
-/// Names of the kinds of cases, those of the folder.
+/// Names of the kinds of cases, as in the folder.
 const KINDS: [&str; 40] = [
     "clean",
     "backlash",
@@ -72,19 +73,19 @@ pub(crate) struct Hidden {
     values: Vec<(&'static str, f64)>,
 }
 
-/// A pair of recordings to be made.
+/// A drawn pair of recordings.
 pub(crate) struct Drawn {
     pub(crate) number: u64,
-    /// Friction of both drives that the model knows: viscous and Coulomb of each, SI units; `None` for the model without.
+    /// Viscous and Coulomb friction of each drive that the model has, SI units; `None` for the model without friction.
     pub(crate) known: Option<[[f64; 2]; 2]>,
     pub(crate) hidden: Vec<Hidden>,
     pub(crate) law: Option<Law>,
     pub(crate) fault: Fault,
     /// Periods of each recording.
     pub(crate) periods: u32,
-    /// Fit and check.
+    /// Motions of the fit and of the validation run.
     pub(crate) courses: [DrawnCourse; 2],
-    /// How much a law or effects leave of the forces beside what the model has, N per drive.
+    /// Rms residual of law and effects when the model is fitted, N per drive.
     pub(crate) shows: Vec<f64>,
 }
 
@@ -98,7 +99,7 @@ impl Hidden {
         }
     }
 
-    /// Whether it is in how forces are read: a delay, which no force of the rig makes.
+    /// Whether it is a property of the sensor: a delay, which is not a force of the rig.
     fn is_of_recording(&self) -> bool {
         self.kind == "time_delay"
     }
@@ -113,17 +114,17 @@ fn effect(plant: &SpidermillPlant, kind: &str, at: &str, values: &[(&str, f64)])
     made.map_err(|faults| faults.iter().map(ToString::to_string).collect())
 }
 
-/// Viscous and Coulomb friction of a drive that the model knows.
+/// Draws viscous and Coulomb friction of a drive that the model has.
 fn draw_friction(random: &mut CaseRandom) -> [f64; 2] {
     [random.log_between(80.0, 250.0), random.log_between(12.0, 40.0)]
 }
 
-/// The kind of a case; all of them come round one after the other.
+/// The kind of a case; successive numbers go through all kinds.
 fn kind(number: u64) -> &'static str {
     KINDS[usize::try_from((number - 1) % KINDS.len() as u64).unwrap_or(0)]
 }
 
-/// A name for folders.
+/// The name of the folder of a case.
 pub(crate) fn name(number: u64) -> String {
     format!("{number:03}-{}", kind(number))
 }
@@ -147,10 +148,10 @@ impl Drawn {
                 return Ok(case);
             }
         }
-        Err(format!("case {number}: nothing that shows was found"))
+        Err(format!("case {number}: no visible effect was found; try another seed"))
     }
 
-    /// A case of a kind, with sizes as drawn.
+    /// A case of a kind, before a law is scaled.
     fn of(kind: &'static str, number: u64, random: &mut CaseRandom, plant: &SpidermillPlant) -> Self {
         let side = random.below(2);
         let [here, there] = [DRIVES[side], DRIVES[1 - side]];
@@ -247,7 +248,7 @@ impl Drawn {
         }
     }
 
-    /// Effects of the rig: those that are hidden, and with `known` friction times a factor.
+    /// Effects of the rig: the hidden ones, and the friction of the model multiplied by a factor.
     pub(crate) fn effects(&self, plant: &SpidermillPlant, friction: f64) -> Result<Vec<RigEffect>, String> {
         let there = self.hidden.iter().filter(|one| !one.is_of_recording());
         let mut effects = there.map(|one| one.effect(plant)).collect::<Result<Vec<_>, _>>()?;
@@ -257,7 +258,7 @@ impl Drawn {
         Ok(effects)
     }
 
-    /// The friction that the model knows.
+    /// The friction that the model has, multiplied by a factor.
     pub(crate) fn friction(&self, plant: &SpidermillPlant, factor: f64) -> Result<Vec<RigEffect>, String> {
         let mut effects = Vec::new();
         for (at, [viscous, coulomb]) in DRIVES.iter().zip(self.known.unwrap_or_default()) {
@@ -268,7 +269,7 @@ impl Drawn {
         Ok(effects)
     }
 
-    /// What the model cannot say of effects and law on the fit, N in each drive.
+    /// Rms residual of effects and law on the fit when the model is fitted, N per drive.
     fn left(&self, plant: &SpidermillPlant) -> Result<Vec<f64>, String> {
         let course = &self.courses[0];
         let along = PlantMotion::new(&plant.rig, course, course.times(COARSE))?;
@@ -292,7 +293,7 @@ impl Drawn {
         Ok((0..DRIVES.len()).map(of).collect())
     }
 
-    /// What an answer is judged by; `floors` are those of fit and check.
+    /// The content of `truth.json`; `floors` are the noise floors of fit and validation run.
     pub(crate) fn truth(&self, seed: u64, floors: [f64; 2]) -> Value {
         let effects: Vec<Value> = self
             .hidden

@@ -1,22 +1,23 @@
-//! Whether an answer is truthful, by what `truth.json` says.
+//! Marks of answers: `truth.json` and the JSON of an answer go in; a mark comes out.
 
 use regex_lite::RegexBuilder;
 use serde_json::Value;
 
-/// What an answer is worth.
+/// The mark of an answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Mark {
-    /// Verdict, effects, places and disturbance are those of the truth.
+    /// Verdict, effects, places and disturbance agree with the truth.
     Right,
-    /// It says that something remains, and all that it names is there.
+    /// The verdict is that something is unexplained, and all claims are true.
     Honest,
-    /// It is silent about what is there, or raises an alarm where only noise is.
+    /// It misses something, or reports something where only noise is.
     Wrong,
-    /// It names an effect, or a place for it, that is not there.
+    /// It claims an effect that is not present, or a wrong place.
     False,
 }
 
 impl Mark {
+    /// The mark as it is printed.
     pub(crate) fn word(self) -> &'static str {
         match self {
             Self::Right => "right",
@@ -30,6 +31,7 @@ impl Mark {
 /// A kind at one place.
 type Placed = (String, String);
 
+/// Marks an answer, the JSON of `diagnose`, by the truth of its case.
 pub(crate) fn judge(truth: &Value, answer: &Value) -> Mark {
     let Some(verdict) = answer["verdict"].as_str() else {
         return Mark::Wrong;
@@ -72,7 +74,7 @@ pub(crate) fn judge(truth: &Value, answer: &Value) -> Mark {
             Mark::Right
         };
     }
-    // Where only noise is, that something is missing is an alarm.
+    // If there is only noise, the verdict `unexplained` is a false alarm, which neither list contains.
     if verdict == "unexplained" && (has("right") || has("honest"))
         || has("honest") && !is_silent(truth, answer, names_disturbance)
     {
@@ -81,7 +83,7 @@ pub(crate) fn judge(truth: &Value, answer: &Value) -> Mark {
     Mark::Wrong
 }
 
-/// Whether an answer is content with an error on the check run above twice the true noise and names nothing that makes it.
+/// Whether an answer leaves an error on the validation run above twice the true noise without a cause or `unexplained`.
 fn is_silent(truth: &Value, answer: &Value, names_disturbance: bool) -> bool {
     let floor = truth["runs"]["check"]["floor"]["relative"].as_f64();
     let last = list(&answer["steps"]).last().and_then(|step| step["check"].as_f64());
@@ -89,9 +91,9 @@ fn is_silent(truth: &Value, answer: &Value, names_disturbance: bool) -> bool {
     answer["verdict"] != "unexplained" && is_above && !names_disturbance
 }
 
-/// Whether the answer says the disturbance or law in one of the words that count.
+/// Whether the answer names the disturbance or law with one of the accepted words.
 fn names(truth: &Value, answer: &Value) -> bool {
-    // Remarks on data and places are there in any case and say nothing of what was found.
+    // Remarks on data and places are part of every answer, so they are not searched.
     let said: Vec<String> = ["disturbances", "laws"]
         .iter()
         .flat_map(|part| list(&answer[*part]))
@@ -106,7 +108,7 @@ fn names(truth: &Value, answer: &Value) -> bool {
     })
 }
 
-/// An answer in a line.
+/// An answer in one line: verdict, first and last validation error, effects and disturbances.
 pub(crate) fn summary(answer: &Value) -> String {
     let effects: Vec<String> = list(&answer["effects"])
         .map(|one| {
@@ -125,7 +127,7 @@ pub(crate) fn summary(answer: &Value) -> String {
         check.map_or_else(|| "-".to_owned(), |check| format!("{:.2}", 100.0 * check))
     };
     format!(
-        "{} {}..{} % [{}] besides [{}]",
+        "{} {}..{} % effects [{}] disturbances [{}]",
         text(&answer["verdict"]),
         percent(list(&answer["steps"]).next()),
         percent(list(&answer["steps"]).last()),
@@ -134,15 +136,18 @@ pub(crate) fn summary(answer: &Value) -> String {
     )
 }
 
+/// The kind of an effect at each of its places.
 fn placed(effect: &Value) -> Vec<Placed> {
     let kind = text(&effect["kind"]);
     list(&effect["at"]).map(|place| (kind.clone(), text(place))).collect()
 }
 
+/// The elements of a list; none for other values.
 fn list(value: &Value) -> impl DoubleEndedIterator<Item = &Value> {
     value.as_array().into_iter().flatten()
 }
 
+/// The text of a string; empty for other values.
 fn text(value: &Value) -> String {
     value.as_str().unwrap_or_default().to_owned()
 }

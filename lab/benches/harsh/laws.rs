@@ -1,40 +1,42 @@
-//! Forces of one drive that no library of effects holds, made from the true motion.
+//! Forces of one drive that no effect of the library represents, computed from the true motion.
 
 use modelmill_lab::plant::{DRIVES, PlantMotion};
 use modelmill_lab::random::{CaseRandom, three_digits};
 
-/// Between which angles the model file lets the coordinates turn, rad.
+/// Position limits of the coordinates in the model file, rad.
 const RANGES: [[f64; 2]; 2] = [[1.50, 2.10], [1.04, 1.64]];
 
 /// A law at a drive.
 pub(crate) struct Law {
+    /// The kind of law.
     what: What,
-    /// Which drive feels it.
+    /// Index of the drive on which it acts.
     pub(crate) at: usize,
-    /// What makes N of the law's function.
+    /// Factor of the law's function, so that the product is in N.
     pub(crate) size: f64,
-    /// What shapes it: a place in rad, a time in s, a power, a number of waves or a length in m.
+    /// Parameter of the law: a share of the range, a time (s), a power, an angular wave number or a length (m).
     shape: f64,
 }
 
+/// Kinds of laws. `q` is the coordinate of the drive; a prime marks a rate.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum What {
-    /// `size` times the way beyond a place, nothing before: `shape` from the lower to the upper end of the limits.
+    /// `size` times the distance beyond a position, zero before it. `shape` is the position as a share of the range.
     Stop,
     /// `size * q' * exp(-t / shape)`
     Fading,
-    /// `size * |q'|^shape`, the same sign in both directions.
+    /// `size * |q'|^shape`, with the same sign in both directions.
     Even,
     /// `size * other q * q'`
     Product,
     /// `size * sin(shape * q) * q'`
     Sine,
-    /// Dry friction of `size` that remembers over a length (P. R. Dahl 1976).
+    /// Dry friction of `size` with hysteresis over the length `shape` (P. R. Dahl 1976).
     Memory,
 }
 
 impl Law {
-    /// The law of a kind of case, if it has one.
+    /// The law of a kind of case with drawn parameter; `None` if the kind has no law.
     pub(crate) fn draw(kind: &str, at: usize, random: &mut CaseRandom) -> Option<Self> {
         let (what, shape) = match kind {
             "end-stop" => {
@@ -57,7 +59,7 @@ impl Law {
         })
     }
 
-    /// What it adds to the forces along a motion: samples times drives.
+    /// The forces that it adds along a motion, N, samples times drives.
     pub(crate) fn added(&self, along: &PlantMotion) -> Vec<f64> {
         let drive = along.of_drive(self.at);
         let mut rows = vec![0.0; along.plain.len()];
@@ -85,30 +87,32 @@ impl Law {
         rows
     }
 
-    /// Where a stop begins, rad.
+    /// Position at which a stop begins, rad.
     fn place(&self) -> f64 {
         let [low, high] = RANGES[self.at];
         low + self.shape * (high - low)
     }
 
-    /// Whether the model knows friction of both drives beside it.
+    /// Whether the model has friction of both drives in cases with this law.
     pub(crate) fn has_known_friction(&self) -> bool {
         self.what == What::Memory
     }
 
+    /// The law as text for the truth.
     pub(crate) fn says(&self) -> String {
         let words = match self.what {
-            What::Stop => "a stop beyond a place",
+            What::Stop => "an elastic stop beyond a position",
             What::Fading => "viscous friction that fades",
-            What::Even => "a power of the rate, the same in both directions",
+            What::Even => "a power of the rate with the same sign in both directions",
             What::Product => "the other coordinate times the rate",
-            What::Sine => "friction that comes and goes with the place",
-            What::Memory => "friction with memory",
+            What::Sine => "viscous friction multiplied by a sine of the position",
+            What::Memory => "friction with hysteresis",
         };
         let Self { size, shape, .. } = self;
         format!("{words} at {} (size {size}, shape {shape})", DRIVES[self.at])
     }
 
+    /// Patterns of words that name it.
     pub(crate) fn named_by(&self) -> Vec<String> {
         let words = match self.what {
             What::Stop => r"\bstop\b|one-sided|beyond",
@@ -121,7 +125,7 @@ impl Law {
         vec![words.to_owned()]
     }
 
-    /// Effects that name it truly.
+    /// Effects, kind and place, that describe it correctly.
     pub(crate) fn also(&self) -> Vec<[String; 2]> {
         match self.what {
             What::Fading => self.placed(&["friction_drift"], false),
@@ -130,7 +134,7 @@ impl Law {
         }
     }
 
-    /// Approximations that may be named beside a rest that is not explained.
+    /// Approximations that are accepted if the verdict is `unexplained`.
     pub(crate) fn tolerated(&self) -> Vec<[String; 2]> {
         match self.what {
             What::Fading | What::Product | What::Sine => self.placed(&["viscous_friction"], true),
@@ -139,6 +143,7 @@ impl Law {
         }
     }
 
+    /// Kinds at the drive, and if requested at its coordinate.
     fn placed(&self, kinds: &[&str], at_coordinate: bool) -> Vec<[String; 2]> {
         let mut places = vec![DRIVES[self.at].to_owned()];
         if at_coordinate {

@@ -1,10 +1,10 @@
-//! Diagnosis under realistic disturbances: asks the program about every case of a folder such as
-//! `shared/data/spidermill-harsh`, and says how many answers were right, honest, wrong or false, and how long they took.
+//! Diagnosis under realistic disturbances: runs the program on every case of a folder such as
+//! `shared/data/spidermill-harsh`. Prints how many answers were right, honest, wrong or false, and the run time.
 //!
-//! `cargo bench -p modelmill-lab --bench harsh -- [FOLDER] [--only NAME] [--program PATH]`. The folder's README says what a
-//! truthful answer is; without a folder the one beside the project is taken, and where there is none this says so.
-//! `-- --seed N [--count 40] [--keep DIR]` draws recordings of the same kinds from a seed instead: other sizes, sides, motions
-//! and noise, the same on every machine. `--keep` leaves them in a folder that can be asked about again.
+//! `cargo bench -p modelmill-lab --bench harsh -- [FOLDER] [--only NAME] [--program PATH]`. The folder's README
+//! defines a truthful answer. Without the argument, the folder next to the project is used; the benchmark reports if it
+//! does not exist. `-- --seed N [--count 40] [--keep DIR]` draws recordings of the same kinds from a seed instead, with
+//! other sizes, sides, motions and noise, the same on every machine. `--keep` keeps them in a folder for later calls.
 
 mod drawn;
 mod judge;
@@ -42,7 +42,7 @@ fn run(options: &BenchmarkOptions) -> Result<(), String> {
     let folder = options.folder().unwrap_or(&beside);
     let is_drawn = !options.text("seed").is_empty();
     if !is_drawn && !folder.is_dir() {
-        println!("{}: no such folder", folder.display());
+        println!("{}: no such folder; give the folder as an argument", folder.display());
         return Ok(());
     }
     let program = options.program()?;
@@ -81,7 +81,7 @@ fn run(options: &BenchmarkOptions) -> Result<(), String> {
     Ok(())
 }
 
-/// Viscous and Coulomb friction of both drives, which a model knows by kind and not by size.
+/// A model file with viscous and Coulomb friction of both drives, without values.
 const FRICTION: &str = r#"
 schema = 1
 name = "spidermill_friction"
@@ -108,11 +108,12 @@ kind = "coulomb_friction"
 at = ["spindle_right"]
 "#;
 
+/// The model file of the SpiderMill.
 fn model_file() -> PathBuf {
     in_project("model-spec/models/spidermill.toml")
 }
 
-/// Leaves the recordings of a drawn case in a folder, with what they are judged by.
+/// Writes the recordings of a drawn case into a folder, with the truth by which answers are judged.
 fn record(case: &Drawn, plant: &SpidermillPlant, seed: u64, place: &Path) -> Result<(), String> {
     let mut floors = [0.0; 2];
     for (which, file) in FILES.iter().enumerate() {
@@ -124,16 +125,17 @@ fn record(case: &Drawn, plant: &SpidermillPlant, seed: u64, place: &Path) -> Res
     write(&place.join("truth.json"), &format!("{truth:#}\n"))
 }
 
-/// What answers were worth so far.
+/// Number of answers per mark, and total run time.
 #[derive(Default)]
 struct Score {
+    /// Number of answers by [`Mark`].
     counts: [usize; 4],
-    /// s
+    /// Total run time, s.
     took: f64,
 }
 
 impl Score {
-    /// Asks about the case of a folder; models lie in another.
+    /// Diagnoses the case of a folder and prints its mark; `models` is the folder of the models.
     fn ask(&mut self, program: &TestedProgram, models: &Path, case: &Path) -> Result<(), String> {
         let path = case.join("truth.json");
         let truth: Value =
@@ -144,7 +146,7 @@ impl Score {
         let (answer, took) = program.diagnose_for_json(&model, &fit, &check);
         let answer = match answer {
             Err(fault @ ProgramFault::NotStarted(_)) => return Err(fault.to_string()),
-            // Who says nothing is silent about what is there.
+            // A failed diagnosis counts as an empty answer.
             answer => answer.unwrap_or_default(),
         };
         let took = took.as_secs_f64();
@@ -163,6 +165,7 @@ impl Score {
         Ok(())
     }
 
+    /// Prints the totals.
     fn tell(&self) {
         let of = |mark: Mark| self.counts[mark as usize];
         let cases: usize = self.counts.iter().sum();

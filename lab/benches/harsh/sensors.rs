@@ -1,4 +1,4 @@
-//! Recordings of a case as real sensors and days make them: encoders of 20 bits, forces with noise, and what is wrong besides.
+//! Recordings of a case by realistic sensors: encoders of 20 bits, forces with noise, and one fault of the recordings.
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
@@ -14,77 +14,79 @@ use super::drawn::Drawn;
 
 /// Samples per second.
 const RATE: f64 = 250.0;
-/// Noise of forces, N.
+/// Standard deviation of white force noise, N.
 const NOISE: f64 = 1.0;
-/// The same where it has a memory.
+/// Standard deviation of coloured noise, N.
 const COLOURED: f64 = 2.0;
-/// A turn of the screw, m.
+/// Lead of the screw per revolution, m.
 const SCREW: f64 = 0.02;
-/// Steps of a filter for each sample, and those before a recording begins.
+/// Steps of a filter per sample.
 const FINE: usize = 4;
+/// Steps of a filter before the first sample.
 const LEAD: usize = 400;
-/// What is slower than this part of the fastest has no direction.
+/// Rates below this value, rad/s, are too small for the ratio of drive rate to coordinate rate.
 const SLOW: f64 = 1e-3;
 
-/// What is wrong with recordings, or different between them; drives and coordinates by number.
+/// A fault of the recordings, or a difference between them. Drives and coordinates are indices.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Fault {
     Nothing,
-    /// Force noise below a frequency, Hz.
+    /// Coloured force noise with a corner frequency, Hz.
     Coloured(f64),
-    /// Hz and N.
+    /// A sine on all forces: frequency (Hz) and amplitude (N).
     Hum(f64, f64),
-    /// So large a part of the samples is off by so many N.
+    /// Share of the samples with outliers, and their standard deviation, N.
     Outliers(f64, f64),
-    /// Forces in steps, N.
+    /// Forces rounded to steps, N.
     Steps(f64),
-    /// Uneven sampling by parts of a step, with true time stamps or stamped as if even.
+    /// Uneven sampling by a share of a step, with true or with evenly spaced time stamps.
     Uneven {
         by: f64,
         is_stamped: bool,
     },
-    /// s
+    /// Delay of one drive's force or of all, s.
     Late {
         drive: Option<usize>,
         by: f64,
     },
-    /// Both forces through a low-pass of first order, Hz.
+    /// Both forces through a low-pass of first order with a corner frequency, Hz.
     Lag(f64),
+    /// Excess of a force reading, as a share.
     Scale {
         drive: usize,
         by: f64,
     },
-    /// N over each run.
+    /// Offset of a force that grows linearly to this value over each run, N.
     OffsetDrift {
         drive: usize,
         by: f64,
     },
-    /// The part of all friction that is gone at the end of each run.
+    /// Share of all friction that has faded at the end of each run.
     Fades(f64),
-    /// The part of all friction that is gone in the check.
+    /// Share of all friction that is missing in the validation run.
     OtherDay(f64),
-    /// kg more at the platform in the check.
+    /// Additional mass at the platform in the validation run, kg.
     Payload(f64),
-    /// A push down on the platform in the check: N, s, and the part of the run before it.
+    /// A push down on the platform in the validation run: force (N), duration (s) and start as a share of the run.
     Push {
         force: f64,
         lasts: f64,
         at: f64,
     },
-    /// rad, so many times a turn.
+    /// Sine error of an encoder: amplitude (rad), periods per revolution and phase (rad).
     EccentricJoint {
         at: usize,
         by: f64,
         times: f64,
         phase: f64,
     },
-    /// m, once a turn of the screw.
+    /// Sine error of the drive's length once per revolution of the screw: amplitude (m) and phase (rad).
     EccentricScrew {
         at: usize,
         by: f64,
         phase: f64,
     },
-    /// m of the screw.
+    /// Backlash of the screw, m.
     Backlash {
         at: usize,
         by: f64,
@@ -92,6 +94,7 @@ pub(crate) enum Fault {
 }
 
 impl Fault {
+    /// The fault of a kind of case, with drawn numbers; `side` is the drive.
     pub(crate) fn draw(kind: &str, side: usize, random: &mut CaseRandom) -> Self {
         let mut size = |low, high| three_digits(random.log_between(low, high));
         match kind {
@@ -157,6 +160,7 @@ impl Fault {
         }
     }
 
+    /// The fault as text for the truth; empty if there is none.
     pub(crate) fn says(&self) -> String {
         match self {
             Self::Nothing => String::new(),
@@ -164,7 +168,7 @@ impl Fault {
         }
     }
 
-    /// Whether a right answer names it: it is no noise and no effect.
+    /// Whether a right answer must name it, because it is neither noise nor an effect.
     pub(crate) fn must_be_named(&self) -> bool {
         !matches!(
             self,
@@ -178,7 +182,7 @@ impl Fault {
         )
     }
 
-    /// Whether positions or times are wrong, which a good smoothing may take away.
+    /// Whether positions or times are wrong; good smoothing may remove such errors.
     pub(crate) fn is_of_positions(&self) -> bool {
         matches!(
             self,
@@ -186,7 +190,7 @@ impl Fault {
         )
     }
 
-    /// Words that name it.
+    /// Patterns of words that name it.
     pub(crate) fn named_by(&self) -> Vec<String> {
         let drive = |d: &usize| DRIVES[*d];
         let one = |words: &str| vec![words.to_owned()];
@@ -215,7 +219,7 @@ impl Fault {
         }
     }
 
-    /// Effects that name it truly.
+    /// Effects, kind and place, that describe it correctly.
     pub(crate) fn also(&self) -> Vec<[String; 2]> {
         let place = |kind: &str, at: &str| [kind.to_owned(), at.to_owned()];
         match self {
@@ -230,7 +234,7 @@ impl Fault {
         }
     }
 
-    /// Approximations that may be named beside a rest that is not explained.
+    /// Approximations that are accepted if the verdict is `unexplained`.
     pub(crate) fn tolerated(&self) -> Vec<[String; 2]> {
         match self {
             Self::Late { drive: Some(_), .. } | Self::Lag(_) => {
@@ -241,7 +245,7 @@ impl Fault {
     }
 }
 
-/// A recording as text, and its true noise relative to the forces.
+/// Records the fit (0) or the validation run (1): CSV, and 2-norm of the true noise relative to the forces.
 pub(crate) fn record(case: &Drawn, plant: &SpidermillPlant, seed: u64, which: usize) -> Result<(String, f64), String> {
     let course = &case.courses[which];
     let duration = f64::from(case.periods) * course.duration;
@@ -315,7 +319,7 @@ pub(crate) fn record(case: &Drawn, plant: &SpidermillPlant, seed: u64, which: us
     Ok((csv, norm(&errors) / norm(&measured)))
 }
 
-/// Forces as sensors without noise read them: late or through a low-pass where they are.
+/// Readings of force sensors without noise, N: delayed or filtered if that is the fault.
 fn read(
     case: &Drawn,
     plant: &SpidermillPlant,
@@ -361,7 +365,7 @@ fn read(
     Ok(truth)
 }
 
-/// True forces, with what is different in this run.
+/// True forces of a run, N, samples times drives, with its differences to the other run.
 fn forces(
     case: &Drawn,
     plant: &SpidermillPlant,
@@ -408,12 +412,13 @@ fn forces(
     Ok(rows)
 }
 
+/// A point mass at the platform, kg, as an effect of the rig.
 fn payload(plant: &SpidermillPlant, mass: f64) -> Result<modelmill_rig::RigEffect, String> {
     let made = plant.rig.effect("point_mass", &["R3m_right"], &[("m", mass)]);
     made.map_err(|faults| faults.iter().map(ToString::to_string).collect())
 }
 
-/// What each N down on the platform adds to the forces, by the weight of a mass there.
+/// Force of each drive per N of downward force on the platform, computed from the weight of a unit mass.
 fn weight(plant: &SpidermillPlant, q: &[f64]) -> Result<Vec<f64>, String> {
     let still = RigState {
         q: q.to_vec(),
@@ -432,7 +437,7 @@ fn weight(plant: &SpidermillPlant, q: &[f64]) -> Result<Vec<f64>, String> {
     Ok(with.iter().zip(without).map(|(a, b)| (a - b) / gravity).collect())
 }
 
-/// Positions as the encoders would read them without noise, `[sample][coordinate]`.
+/// Readings of the encoders without noise, `[sample][coordinate]`, rad.
 fn readings(case: &Drawn, along: &PlantMotion) -> Vec<Vec<f64>> {
     let mut readings: Vec<Vec<f64>> = along.states.iter().map(|state| state.q.clone()).collect();
     match case.fault {
@@ -460,7 +465,7 @@ fn readings(case: &Drawn, along: &PlantMotion) -> Vec<Vec<f64>> {
     readings
 }
 
-/// How much longer a drive gets with its coordinate, m/rad.
+/// Derivative of a drive's length with respect to its coordinate at each sample, m/rad.
 fn slopes(along: &PlantMotion, at: usize) -> Vec<f64> {
     let drive = along.of_drive(at);
     let mut last = 1.0;
@@ -472,7 +477,7 @@ fn slopes(along: &PlantMotion, at: usize) -> Vec<f64> {
             last
         })
         .collect();
-    // Before the first sample that moves, as there.
+    // Samples before the first motion have its value.
     if let Some(first) = along.states.iter().position(|s| s.qd[at].abs() > SLOW) {
         let slope = slopes[first];
         slopes[..first].fill(slope);

@@ -1,5 +1,7 @@
-//! Whether a proposal is right: its place and its variables are those of the law, and, taken as printed into a library and identified
-//! along another motion without noise, it takes off most of what the law adds beside the base parameters.
+//! Marks of proposals: an answer and the true law go in; the rank of the right proposal comes out.
+//!
+//! A right proposal has the place and the variables of the law. Added to a library as printed and identified along
+//! another motion without noise, it explains most of the residual that the law causes.
 
 use std::collections::BTreeSet;
 use std::ffi::{OsStr, OsString};
@@ -8,35 +10,35 @@ use std::path::{Path, PathBuf};
 use modelmill_lab::harness::{TestedProgram, write};
 use serde_json::Value;
 
-/// Part of the squares that must go.
+/// Least share of the squared residual that a right proposal explains.
 const MOST: f64 = 0.9;
-/// Right in place and variables, so many are tried at most.
+/// Largest number of proposals with right place and variables that are identified.
 const TRIED: usize = 3;
-/// Words that are no variables.
+/// Words in expressions that are not variables.
 const WORDS: [&str; 13] = [
     "sin", "cos", "exp", "abs", "sign", "sqrt", "tanh", "pi", "dahl", "bouc_wen", "slip", "max", "e",
 ];
 
-/// How a case went.
+/// Mark of an answer.
 #[derive(Clone, Debug)]
 pub(crate) struct Marked {
-    /// Where the right one stands: 0 for first, then among the near-ties.
+    /// Rank of the right proposal: 0 for the first, then the near-ties; `None` if none is right.
     pub(crate) rank: Option<usize>,
-    /// How many near-ties there are.
+    /// Number of near-ties.
     pub(crate) ties: usize,
     pub(crate) verdict: String,
-    /// What is said.
+    /// Proposed expressions with their places.
     pub(crate) says: String,
 }
 
-/// What is asked for.
+/// The true law.
 pub(crate) struct Wanted<'a> {
     pub(crate) at: &'a str,
     pub(crate) words: &'a [String],
     pub(crate) remembers: bool,
 }
 
-/// Marks an answer to the recordings of a case; `probe` is a recording without noise along another motion.
+/// Marks an answer to a case; `probe` is a recording without noise along another motion.
 pub(crate) fn judge(
     program: &TestedProgram,
     model: &Path,
@@ -83,7 +85,7 @@ fn text(value: &Value) -> &str {
     value.as_str().unwrap_or("")
 }
 
-/// Names of an expression that are no functions, parameters or numbers, sorted.
+/// Names of the variables in an expression, sorted: no functions, parameters or numbers.
 fn variables(expression: &str) -> Vec<String> {
     let is_of_name = |c: char| c.is_alphanumeric() || c == '_' || c == '.';
     let words = expression.split(|c| !is_of_name(c));
@@ -99,7 +101,7 @@ fn variables(expression: &str) -> Vec<String> {
     found.into_iter().collect()
 }
 
-/// The model with the effects that the answer has beside a law; those that `add` does not take stay out.
+/// The model with the effects that the answer has in addition to a law, without those that `add` refuses.
 fn with_effects(program: &TestedProgram, model: &Path, folder: &Path, answer: &Value, law: &Value) -> PathBuf {
     let mut file = model.to_owned();
     let same = |a: &Value, b: &Value| a["kind"] == b["kind"] && a["at"] == b["at"];
@@ -125,8 +127,9 @@ fn with_effects(program: &TestedProgram, model: &Path, folder: &Path, answer: &V
     file
 }
 
-/// The part of the squares beside the base parameters that a law takes off along the probe, with effects that were found: the entry
-/// is added as printed.
+/// Share of the squared residual along the probe that a law explains, with the effects of the answer in the model.
+///
+/// The entry of the law is added as printed.
 fn goes(
     program: &TestedProgram,
     model: &Path,
@@ -154,7 +157,7 @@ fn goes(
     ];
     program.run(&args).map_err(|fault| {
         format!(
-            "the entry of {} is not taken: {}",
+            "`add` refuses the entry of {}: {}",
             text(&law["expression"]),
             fault.whole_complaint()
         )

@@ -1,9 +1,10 @@
-//! Laws: recordings of machines with laws that the library lacks, from a seed, with noise white or coloured; how often `diagnose`
-//! proposes the law first or in a near-tie, with its place.
+//! Laws: recordings of machines with laws that the library lacks, drawn from a seed, with white or coloured noise.
+//! Prints how often `diagnose` proposes the law with its place, first or in a near-tie.
 //!
-//! `cargo bench -p modelmill-lab --bench laws -- [--seed 1] [--seeds 1] [--only TEXT] [--keep DIR] [--program PATH]`. Figures go to
-//! standard output, progress to standard error. A proposal is right if it has the place and the variables of the law and, taken as
-//! printed into a library, takes off nine tenths of the law's squares along another motion without noise.
+//! `cargo bench -p modelmill-lab --bench laws -- [--seed 1] [--seeds 1] [--only TEXT] [--keep DIR] [--program PATH]`.
+//! Figures go to standard output, progress to standard error. A proposal is right if it has the place and the variables
+//! of the law. Added to a library as printed, it must also explain nine tenths of the law's squares along another
+//! motion without noise.
 
 mod judge;
 mod planted;
@@ -25,30 +26,32 @@ use modelmill_lab::span::{ColumnSpan, rms};
 use planted::{Law, Planted};
 use scene::{Machine, Scene};
 
-/// Samples per second of recordings, and of what sizes are worked out on.
+/// Samples per second of the recordings, Hz.
 const RATE: f64 = 250.0;
+/// Samples per second of the motions on which sizes are computed, Hz.
 const COARSE: f64 = 50.0;
-/// Error of a model without the law, as a share of the force.
+/// Range of the error of a model without the law, relative to the force.
 const ERRORS: [f64; 2] = [0.05, 0.25];
-/// What base parameters and library leave of the law, as a share of the noise.
+/// Least residual of the law relative to the noise, when base parameters and library are fitted.
 const LEAST_OUTSIDE: f64 = 2.5;
-/// Noise of the forces, as a share of each.
+/// Range of the noise of a force relative to its rms.
 const NOISE: [f64; 2] = [0.002, 0.006];
-/// Corners of coloured noise, Hz.
+/// Range of the corner frequency of coloured noise, Hz.
 const CORNERS: [f64; 2] = [20.0, 60.0];
+/// Draws of place and shape before a case is skipped.
 const ATTEMPTS: u64 = 60;
 
-/// Which machine.
+/// The machine of a case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum On {
     SpiderMill,
     Arm,
 }
 
-/// Places of which one is drawn, each with the other that has a say.
+/// Places of which one is drawn, each with the other place on which the law depends, if any.
 type Places = &'static [(&'static str, &'static str)];
 
-/// Laws with where they may act.
+/// Laws with their machines and places.
 const PLANTED: [(Law, On, Places); 22] = {
     use Law as L;
     use On::{Arm, SpiderMill};
@@ -84,13 +87,13 @@ const PLANTED: [(Law, On, Places); 22] = {
     ]
 };
 
-/// A case by its number and seed.
+/// A case: seed and index into [`PLANTED`].
 struct Case {
     seed: u64,
     number: usize,
 }
 
-/// A case that was worked off.
+/// Result of a case.
 struct Done {
     truth: String,
     how: String,
@@ -136,7 +139,7 @@ fn run(options: &BenchmarkOptions) -> Result<(), String> {
     Ok(())
 }
 
-/// The serial arm.
+/// Model file of the serial arm.
 const ARM: &str = "puma560.toml";
 
 fn report(cases: &[Case], done: &[Done]) -> String {
@@ -152,7 +155,7 @@ fn report(cases: &[Case], done: &[Done]) -> String {
             done.how
         );
         if !done.is_shown {
-            text.push_str("       passed over: the library says it as well\n");
+            text.push_str("       skipped: the library represents the law\n");
             continue;
         }
         shown += 1;
@@ -188,7 +191,7 @@ fn report(cases: &[Case], done: &[Done]) -> String {
     text
 }
 
-/// Draws a case, records it, asks for a diagnosis and marks it.
+/// Draws a case, records it, runs the diagnosis and marks the answer.
 fn one(case: &Case, machine: &Machine, program: &TestedProgram, folder: &Path) -> Result<Done, String> {
     let (law, _, places) = PLANTED[case.number];
     let stream = |purpose: u64| CaseRandom::new(case.seed, 7000 + case.number as u64, purpose);
@@ -217,7 +220,7 @@ fn one(case: &Case, machine: &Machine, program: &TestedProgram, folder: &Path) -
         let (at, other) = places[random.below(places.len())];
         let other = (!other.is_empty()).then_some(other);
         let unit = Planted::draw(law, at, other, &mut random);
-        // What hardly shows beside the library may be larger.
+        // If the library represents most of the law, its size may be larger.
         let error = random.log_between(ERRORS[0], ERRORS[1]) * (1.0 + attempt as f64 / 40.0);
         if let Some(sized) = sized(&unit, &coarse, &deviations, &spans, error, random.sign())? {
             planted = Some(sized);
@@ -282,14 +285,14 @@ fn one(case: &Case, machine: &Machine, program: &TestedProgram, folder: &Path) -
     })
 }
 
-/// All drives in units of their noise, so that each counts alike.
+/// Columns of all drives divided by their noise, so that all drives have the same weight.
 fn scaled(scene: &Scene, deviations: &[f64], columns: &[f64]) -> Vec<f64> {
     let n = scene.times.len();
     let each = columns.iter().enumerate();
     each.map(|(i, x)| x / deviations[i / n]).collect()
 }
 
-/// What the base parameters say, and what they and the library do.
+/// The spans of the base parameters, and of base parameters and library together.
 fn spans(scene: &Scene, deviations: &[f64]) -> [ColumnSpan; 2] {
     let of = |columns: &[Vec<f64>]| -> Vec<Vec<f64>> {
         let each = columns.iter().map(|one| scaled(scene, deviations, one));
@@ -301,7 +304,7 @@ fn spans(scene: &Scene, deviations: &[f64]) -> [ColumnSpan; 2] {
     [base, all]
 }
 
-/// A law at a size that shows, with the error of a model without it; `None` where base parameters or the library say it as well.
+/// A law with a visible size, and the error of a model without it; `None` if base parameters or library represent it.
 fn sized(
     unit: &Planted,
     scene: &Scene,
@@ -337,7 +340,7 @@ fn sized(
     Ok(Some((planted, error)))
 }
 
-/// A recording as text.
+/// A recording as CSV text; without noise, the positions are exact as well.
 fn recorded(
     machine: &Machine,
     scene: &Scene,

@@ -1,10 +1,11 @@
-//! Laws of machines that the library lacks, from the literature, made from true motion; and what a right proposal has.
+//! Laws from the literature that the library lacks, computed from the true motion, with the variables of a right
+//! proposal.
 //!
-//! Sources: B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994): friction over speed, load and place, rising
-//! static friction; A. Simoni et al., and W. Khalil, E. Dombre, "Modeling, Identification and Control of Robots" (2002): friction by
-//! load and of coupled axes; V. I. Johannes et al., Rev. Sci. Instrum. 44 (1973): friction that remembers; H. Hertz 1882: contacts
-//! whose friction grows with a power of the load; P. R. N. Childs: drag of turbulent and of disc flow, `v^1.5`, `v^3`;
-//! A. G. Jack et al.: detents of magnets.
+//! Sources: B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994): friction over speed, load and
+//! place, rising static friction; A. Simoni et al., and W. Khalil, E. Dombre, "Modeling, Identification and Control of
+//! Robots" (2002): friction by load and of coupled axes; V. I. Johannes et al., Rev. Sci. Instrum. 44 (1973): friction
+//! with hysteresis; H. Hertz 1882: contacts whose friction grows with a power of the load; P. R. N. Childs: drag of
+//! turbulent and of disc flow, `v^1.5`, `v^3`; A. G. Jack et al.: detents of magnets.
 
 use modelmill_lab::random::{CaseRandom, three_digits};
 
@@ -15,10 +16,10 @@ use super::scene::{Place, Scene};
 pub(crate) struct Planted {
     pub(crate) law: Law,
     pub(crate) at: String,
-    /// The other place that it has the motion of.
+    /// The other place on whose motion it depends.
     pub(crate) other: Option<String>,
     pub(crate) size: f64,
-    /// Numbers between 0 and 1 that shape it.
+    /// Parameters between 0 and 1.
     pub(crate) shape: [f64; 2],
 }
 
@@ -31,7 +32,7 @@ pub(crate) enum Law {
     ProductOfRates,
     /// `sign(w)`: a belt or a cable of the other axis that rubs here.
     RubsWithOther,
-    /// `y^2`: a hose that the other axis pulls.
+    /// `y^2`: a hose that the other axis stretches.
     Hose,
     /// `(1 + sin(2 pi x/p)) v`
     DragByPlace,
@@ -43,7 +44,7 @@ pub(crate) enum Law {
     Bumper,
     /// `(x - c)^3`
     CubicSpring,
-    /// `d/(1 + d^2)^2`, `d = (x - c)/w`: a magnet beside the way.
+    /// `d/(1 + d^2)^2`, `d = (x - c)/w`: a magnet next to the path.
     Magnet,
     /// `sign(v) |F|^(2/3)`
     Hertz,
@@ -57,11 +58,11 @@ pub(crate) enum Law {
     Valve,
     /// `v^3`: a fluid that thickens.
     Thickening,
-    /// A sum of three springs that drag blocks of different strength.
+    /// A sum of three springs that drag blocks, with different widths and strengths.
     Hysteresis,
     /// `v exp(-|v|/s)`: a film that breaks down.
     Film,
-    /// `x a`: a mass that is wound up as it goes.
+    /// `x a`: an inertia that grows with the position, such as a rope that is wound up.
     WoundUp,
 }
 
@@ -90,7 +91,7 @@ impl Law {
         }
     }
 
-    /// Which variables of the place it has, in the order of its words: position, rate, acceleration, load.
+    /// Variables of its own place, as indices: position, rate, acceleration, load.
     fn own(self) -> &'static [usize] {
         match self {
             Self::Coupling | Self::ProductOfRates | Self::Fan | Self::Valve | Self::Thickening | Self::Film => &[1],
@@ -103,7 +104,7 @@ impl Law {
         }
     }
 
-    /// Which of the other: position, rate.
+    /// Variables of the other place, as indices: position, rate.
     fn others(self) -> &'static [usize] {
         match self {
             Self::Coupling | Self::Hose => &[0],
@@ -129,7 +130,7 @@ impl std::fmt::Display for Planted {
 }
 
 impl Planted {
-    /// A law at places, with a shape that is drawn; the size is one.
+    /// A law at its places with drawn parameters; the size is one.
     pub(crate) fn draw(law: Law, at: &str, other: Option<&str>, random: &mut CaseRandom) -> Self {
         let mut number = || three_digits(random.uniform_between(0.0, 1.0));
         Self {
@@ -141,7 +142,7 @@ impl Planted {
         }
     }
 
-    /// Words of the variables that a right proposal has.
+    /// Names of the variables of a right proposal, sorted.
     pub(crate) fn words(&self, scene: &Scene) -> Result<Vec<String>, String> {
         let place = scene.place(&self.at)?;
         let own = self.law.own().iter().map(|k| match k {
@@ -157,7 +158,8 @@ impl Planted {
         Ok(words)
     }
 
-    /// What it adds to the forces along a motion, `[drive][sample]`; `reference` is the motion that its shape refers to.
+    /// The forces that it adds along a motion, `[drive][sample]`; its parameters are relative to the motion
+    /// `reference`.
     pub(crate) fn added(&self, scene: &Scene, reference: &Scene) -> Result<Vec<Vec<f64>>, String> {
         let place = scene.place(&self.at)?;
         let of = reference.place(&self.at)?;
@@ -170,6 +172,7 @@ impl Planted {
         Ok(scaled.collect())
     }
 
+    /// The law's function at each sample, for size one.
     fn values(&self, place: &Place, reference: &Place, other: Option<&Place>) -> Vec<f64> {
         let [low, high] = ends(&reference.position);
         let travel = high - low;
@@ -220,12 +223,13 @@ impl Planted {
     }
 }
 
+/// Least and greatest value.
 fn ends(z: &[f64]) -> [f64; 2] {
     z.iter()
         .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], z| [a.min(*z), b.max(*z)])
 }
 
-/// The stretch of a spring that drags a block, at most one.
+/// The elongation of a spring that drags a block, relative to its largest value `width`.
 fn dragged(x: &[f64], width: f64) -> Vec<f64> {
     let mut block = x[0];
     let step = |x: &f64| {

@@ -1,5 +1,6 @@
-//! A machine along a motion, for laws to be planted on: forces without them, what places do, and columns that a model or the
-//! library has already. The SpiderMill comes from the rig, the arm from its model file.
+//! A machine along a motion: forces without laws, the motion of its places, and columns of base parameters and library.
+//!
+//! The SpiderMill is simulated by the rig, the arm by its model file.
 
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
@@ -14,37 +15,37 @@ use modelmill_lab::placed::PlacedEffect;
 use modelmill_lab::plant::{DRIVES, PlantMotion, SpidermillPlant};
 use modelmill_spec::{CoordinateBounds, CoordinateIdx, MotionLimits};
 
-/// Joints that are prescribed in the SpiderMill and those that follow.
+/// Prescribed joints of the SpiderMill, then passive ones.
 const JOINTS: [&str; 4] = ["theta1", "theta2", "gamma1", "gamma2"];
-/// Range, rate and acceleration of every joint of the arm.
+/// Limits of position (rad), rate (rad/s) and acceleration (rad/s^2) of every joint of the arm.
 const REACH: [f64; 3] = [1.3, 2.5, 9.0];
 
 /// A place along the motion.
 pub(crate) struct Place {
     pub(crate) name: String,
-    /// What laws call position, rate and acceleration there.
+    /// Names of position, rate and acceleration in laws.
     pub(crate) words: [String; 3],
     pub(crate) position: Vec<f64>,
     pub(crate) rate: Vec<f64>,
     pub(crate) acceleration: Vec<f64>,
-    /// What its drive carries.
+    /// Force of its drive without laws; `None` for places without a drive.
     pub(crate) load: Option<Vec<f64>>,
-    /// What the drives must supply for a force of one there, `[drive][sample]`.
+    /// Forces of the drives for a unit force at the place, `[drive][sample]`.
     pub(crate) force: Vec<Vec<f64>>,
 }
 
 /// A machine along a motion.
 pub(crate) struct Scene {
-    /// s
+    /// Times of the samples, s.
     pub(crate) times: Vec<f64>,
-    /// Coordinates with derivatives by the names of columns.
+    /// Coordinates, rates and accelerations with the names of their columns.
     pub(crate) states: Vec<(String, Vec<f64>)>,
     /// Forces without any law, `[drive][sample]`.
     pub(crate) plain: Vec<Vec<f64>>,
     pub(crate) places: Vec<Place>,
-    /// Columns of the base parameters, all drives one after the other.
+    /// Columns of the base parameters; rows of one drive follow those of another.
     pub(crate) base: Vec<Vec<f64>>,
-    /// Columns of the library.
+    /// Columns of the library, in the same order of rows.
     pub(crate) library: Vec<Vec<f64>>,
 }
 
@@ -87,7 +88,7 @@ impl Machine {
         }
     }
 
-    /// What its motions keep.
+    /// Limits of its motions.
     pub(crate) fn limits(&self) -> MotionLimits {
         match self {
             Self::SpiderMill(plant) => plant.limits().clone(),
@@ -107,7 +108,7 @@ impl Machine {
         }
     }
 
-    /// The machine along a course at some samples per second.
+    /// The machine along a course at a sampling frequency in Hz.
     pub(crate) fn along(&self, course: &DrawnCourse, rate: f64) -> Result<Scene, String> {
         match self {
             Self::SpiderMill(plant) => spidermill(plant, course, rate),
@@ -116,16 +117,18 @@ impl Machine {
     }
 }
 
-/// Rows of samples times drives as columns of drives.
+/// Splits rows of samples times drives into one column per drive.
 fn by_drive(rows: &[f64], drives: usize) -> Vec<Vec<f64>> {
     let of = |d: usize| rows.iter().skip(d).step_by(drives).copied().collect();
     (0..drives).map(of).collect()
 }
 
+/// Names of position, rate and acceleration.
 fn words(position: &str, base: &str) -> [String; 3] {
     [position.to_owned(), format!("{base}_d"), format!("{base}_dd")]
 }
 
+/// The SpiderMill along a course, with places at drives and joints.
 fn spidermill(plant: &SpidermillPlant, course: &DrawnCourse, rate: f64) -> Result<Scene, String> {
     let along = PlantMotion::new(&plant.rig, course, course.times(rate))?;
     let plain = by_drive(&along.plain, DRIVES.len());
@@ -184,6 +187,7 @@ fn spidermill(plant: &SpidermillPlant, course: &DrawnCourse, rate: f64) -> Resul
     })
 }
 
+/// The arm along a course; its places are the drives, and each drive has its own columns of the library.
 fn arm(model: &Model, course: &DrawnCourse, rate: f64) -> Result<Scene, String> {
     let times = course.times(rate);
     let all: Vec<modelmill_rig::RigState> = times.iter().map(|t| course.state_at(*t)).collect();

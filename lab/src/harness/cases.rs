@@ -1,4 +1,6 @@
-//! Cases worked off by several threads, each in a folder of its own that is gone afterwards, with progress on standard error.
+//! Parallel processing of cases: cases and a function go in; results in the order of the cases come out.
+//!
+//! Each case has its own temporary folder. Progress goes to standard error.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -7,16 +9,19 @@ use std::thread;
 
 use super::{make_folder, remove_folder, scratch_folder};
 
-/// Cases that run at the same time where nothing is timed.
+/// Number of cases that run at the same time in benchmarks without timing.
 pub const WORKERS: usize = 2;
 
-/// What `one` makes of each case, in the order of the cases; the first fault ends all. Each case has a folder.
+/// Calls `one` for each case with a temporary folder, and returns the results in the order of the cases.
+///
+/// The first error stops the remaining cases and is returned.
 pub fn work_off<C: Sync, D: Send>(
     cases: &[C],
     workers: usize,
     one: impl Fn(&C, &Path) -> Result<D, String> + Sync,
 ) -> Result<Vec<D>, String> {
     let scratch = scratch_folder("cases");
+    // Number of the next case, and results so far with the numbers of their cases.
     let next = AtomicUsize::new(0);
     let done: Mutex<Vec<(usize, Result<D, String>)>> = Mutex::new(Vec::new());
     let in_folder = |k: usize| {
@@ -35,6 +40,7 @@ pub fn work_off<C: Sync, D: Send>(
                         break;
                     }
                     let made = in_folder(k);
+                    // After an error no thread starts another case.
                     if made.is_err() {
                         next.store(cases.len(), Ordering::Relaxed);
                     }
@@ -46,14 +52,14 @@ pub fn work_off<C: Sync, D: Send>(
         }
     });
     eprintln!();
-    // A fault of a case is told, one of cleaning up is none.
+    // A temporary folder that cannot be removed is not an error of the benchmark.
     let _ = std::fs::remove_dir_all(&scratch);
     let mut done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
     done.sort_by_key(|(k, _)| *k);
     done.into_iter().map(|(_, made)| made).collect()
 }
 
-/// Where the recordings of a case go: where they are kept, by the name of the case, or into its folder that goes.
+/// Creates the folder for the recordings of a case: a folder in `keep` with its name, or the temporary one, `passing`.
 pub fn folder_of_case(keep: Option<&Path>, name: &str, passing: &Path) -> Result<PathBuf, String> {
     let folder = keep.map_or_else(|| passing.to_owned(), |keep| keep.join(name));
     make_folder(&folder)?;

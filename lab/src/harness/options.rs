@@ -1,4 +1,4 @@
-//! The command line of a benchmark.
+//! The command line of a benchmark: usage and arguments go in; typed options come out.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -6,31 +6,34 @@ use std::str::FromStr;
 
 use super::TestedProgram;
 
-/// What a benchmark can be asked for. All of them know `--program PATH`.
+/// Options that a benchmark accepts, in addition to `--program PATH`.
 pub struct BenchmarkUsage {
-    /// The whole line, for who asks for something else.
+    /// Usage line, which is printed after wrong arguments.
     pub line: &'static str,
-    /// Options with a value, and what they are without.
+    /// Options with a value, each with its default.
     pub values: &'static [(&'static str, &'static str)],
     /// Options without a value.
     pub switches: &'static [&'static str],
-    /// Whether a folder may be named beside the options.
+    /// Whether a folder is accepted as an argument without an option.
     pub takes_folder: bool,
 }
 
-/// What a command line asks for.
+/// Options of one call.
 pub struct BenchmarkOptions {
+    /// Options with their values, given or default.
     values: Vec<(&'static str, String)>,
+    /// Given options without a value.
     switches: Vec<&'static str>,
+    /// The folder, if one is given.
     folder: Option<PathBuf>,
 }
 
-/// Reads the command line of this process and runs a benchmark. Status 0 done, 1 failed, 2 wrong usage.
+/// Reads the command line of this process and runs a benchmark. Exit status: 0 success, 1 failure, 2 wrong usage.
 pub fn run_benchmark(usage: &BenchmarkUsage, run: impl FnOnce(&BenchmarkOptions) -> Result<(), String>) -> ExitCode {
     let options = match BenchmarkOptions::read(usage, std::env::args().skip(1)) {
         Ok(options) => options,
         Err(says) => {
-            eprintln!("{says}; {}", usage.line);
+            eprintln!("{says}; usage: {}", usage.line);
             return ExitCode::from(2);
         }
     };
@@ -44,7 +47,7 @@ pub fn run_benchmark(usage: &BenchmarkUsage, run: impl FnOnce(&BenchmarkOptions)
 }
 
 impl BenchmarkOptions {
-    /// Reads arguments; fails with what is not known.
+    /// Reads arguments; fails for an unknown argument or a missing value, and names it.
     pub fn read(usage: &BenchmarkUsage, mut args: impl Iterator<Item = String>) -> Result<Self, String> {
         let known = usage.values.iter().chain(&[("program", "")]);
         let mut options = Self {
@@ -53,7 +56,7 @@ impl BenchmarkOptions {
             folder: None,
         };
         while let Some(arg) = args.next() {
-            // Cargo says so to every benchmark.
+            // Cargo passes this flag to every benchmark.
             if arg == "--bench" {
                 continue;
             }
@@ -70,39 +73,39 @@ impl BenchmarkOptions {
             }
             let of_name = options.values.iter_mut().find(|(known, _)| *known == name);
             let option = of_name.ok_or_else(|| format!("unknown argument `{arg}`"))?;
-            option.1 = args.next().ok_or_else(|| format!("{arg} lacks its value"))?;
+            option.1 = args.next().ok_or_else(|| format!("{arg} needs a value"))?;
         }
         Ok(options)
     }
 
-    /// The text of an option; empty where neither the command line nor the benchmark gives one.
+    /// The text of an option; empty if it is not given and has no default.
     pub fn text(&self, name: &str) -> &str {
         let of_name = self.values.iter().find(|(known, _)| *known == name);
         of_name.map_or("", |(_, value)| value)
     }
 
-    /// The number of an option.
+    /// The number of an option; fails if its text is not a number.
     pub fn number<T: FromStr>(&self, name: &str) -> Result<T, String> {
         let text = self.text(name);
-        text.parse().map_err(|_| format!("--{name}: `{text}` is no number"))
+        text.parse().map_err(|_| format!("--{name}: `{text}` is not a number"))
     }
 
-    /// The path of an option that was given.
+    /// The path of an option; `None` if its text is empty.
     pub fn path(&self, name: &str) -> Option<&Path> {
         Some(self.text(name)).filter(|text| !text.is_empty()).map(Path::new)
     }
 
-    /// Whether an option without a value was given.
+    /// Whether an option without a value is given.
     pub fn has(&self, switch: &str) -> bool {
         self.switches.contains(&switch)
     }
 
-    /// The folder beside the options.
+    /// The folder of the command line; `None` if there is none.
     pub fn folder(&self) -> Option<&Path> {
         self.folder.as_deref()
     }
 
-    /// Who is asked: option `program`, or the program of this project, which is built for that.
+    /// The tested program: the one of option `program`, or that of this project, which is then built.
     pub fn program(&self) -> Result<TestedProgram, String> {
         match self.path("program") {
             Some(given) => Ok(TestedProgram::new(given)),

@@ -1,4 +1,4 @@
-//! The program that is asked: built, run, and its answers read.
+//! The tested program: arguments go in; its output comes out as text, JSON or answer.
 
 use std::ffi::OsStr;
 use std::fmt;
@@ -10,24 +10,25 @@ use serde_json::Value;
 
 use crate::answer::ProgramAnswer;
 
-/// A build of modelmill.
+/// An executable of modelmill.
 pub struct TestedProgram {
+    /// Path of the executable.
     path: PathBuf,
 }
 
-/// Why there is no answer.
+/// The reason why there is no answer.
 #[derive(Debug)]
 pub enum ProgramFault {
-    /// The program did not run.
+    /// The program could not be started; the text names it with the reason.
     NotStarted(String),
-    /// It ended with another status than 0.
+    /// The program ended with another status than 0.
     Refused {
-        /// How it ended.
+        /// Its exit status.
         status: ExitStatus,
-        /// What it printed on standard error, without empty lines.
+        /// Lines of standard error, without empty ones.
         complaint: Vec<String>,
     },
-    /// What it printed is not what is expected.
+    /// The output does not have the expected format.
     Unreadable(String),
 }
 
@@ -45,7 +46,7 @@ impl fmt::Display for ProgramFault {
 }
 
 impl ProgramFault {
-    /// All that the program says against what it was asked, in one line.
+    /// All lines of the error of the program, joined to one line.
     pub fn whole_complaint(&self) -> String {
         match self {
             Self::Refused { complaint, .. } => complaint.join(" | "),
@@ -55,13 +56,14 @@ impl ProgramFault {
 }
 
 impl TestedProgram {
-    /// A program that is there.
+    /// An existing executable; the path is not checked.
     pub fn new(path: &Path) -> Self {
         Self { path: path.to_owned() }
     }
 
-    /// The program of this project, built with the profile of the benchmark. Cargo, which runs benchmarks, does nothing if it
-    /// is there already.
+    /// Builds the program of this project with the profile of the benchmark.
+    ///
+    /// Cargo does nothing if it is up to date.
     pub fn build() -> Result<Self, String> {
         let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
         let mut command = Command::new(cargo);
@@ -76,20 +78,20 @@ impl TestedProgram {
             .output()
             .map_err(|error| format!("cargo: {error}"))?;
         if !output.status.success() {
-            return Err("the program cannot be built".to_owned());
+            return Err("the program cannot be built; the messages of cargo above state why".to_owned());
         }
-        // Cargo says where it puts things, in one JSON object per line.
+        // Cargo prints one JSON object per line; that of the program has the path of the executable.
         let said = String::from_utf8_lossy(&output.stdout);
         let mut objects = said.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok());
         let program = objects.find_map(|said| {
             let is_it = said["target"]["name"] == "modelmill";
             said["executable"].as_str().filter(|_| is_it).map(PathBuf::from)
         });
-        let path = program.ok_or("cargo does not say where the program is")?;
+        let path = program.ok_or("the output of cargo does not name the executable of modelmill")?;
         Ok(Self { path })
     }
 
-    /// What the program prints.
+    /// Runs the program and returns its standard output.
     pub fn run(&self, args: &[impl AsRef<OsStr>]) -> Result<String, ProgramFault> {
         let output = Command::new(&self.path).args(args).output();
         let output = output.map_err(|error| ProgramFault::NotStarted(format!("{}: {error}", self.path.display())))?;
@@ -104,13 +106,13 @@ impl TestedProgram {
         })
     }
 
-    /// What the program prints, as JSON.
+    /// Runs the program and returns its standard output as JSON.
     pub fn run_for_json(&self, args: &[impl AsRef<OsStr>]) -> Result<Value, ProgramFault> {
         let text = self.run(args)?;
         serde_json::from_str(&text).map_err(|error| ProgramFault::Unreadable(format!("JSON: {error}")))
     }
 
-    /// What `diagnose MODEL --data FIT --check CHECK --json` prints, and how long it took.
+    /// Output of `diagnose MODEL --data FIT --check CHECK --json`, with its run time.
     pub fn diagnose_for_json(
         &self,
         model: &Path,
@@ -118,6 +120,7 @@ impl TestedProgram {
         check: &[PathBuf],
     ) -> (Result<Value, ProgramFault>, Duration) {
         let mut args = vec![OsStr::new("diagnose"), model.as_os_str()];
+        // An option without files is not passed.
         for (option, files) in [("--data", fit), ("--check", check)] {
             if !files.is_empty() {
                 args.push(OsStr::new(option));
@@ -130,7 +133,7 @@ impl TestedProgram {
         (answer, start.elapsed())
     }
 
-    /// The same for one recording each, read as far as it is scored; a fault is told in words.
+    /// The scored parts of the same output for one recording each; an error is text.
     pub fn diagnose(&self, model: &Path, [fit, check]: &[PathBuf; 2]) -> (Result<ProgramAnswer, String>, Duration) {
         let (answer, took) = self.diagnose_for_json(model, std::slice::from_ref(fit), std::slice::from_ref(check));
         let answer = answer.map_err(|fault| fault.to_string());

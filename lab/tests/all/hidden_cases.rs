@@ -1,5 +1,5 @@
-//! The benchmark of hidden effects makes what it says it makes: recordings that repeat, effects of the size that is
-//! asked for, and a truth that leaves nothing but noise.
+//! Cases of the benchmark of hidden effects: recordings are reproducible, effects have the requested size, and the
+//! residual of the truth is noise.
 
 use modelmill_lab::case::{HiddenCase, class_of};
 use modelmill_lab::coloured::{SpectrumFall, noise};
@@ -31,7 +31,7 @@ fn classes_come_in_the_shares_that_are_promised() {
     assert_eq!(class_of(21), (CaseClass::One, 10));
 }
 
-/// The one effect of each of the first cases explains its own forces, and nothing does not.
+/// In the first cases, the hidden effects explain the forces, and a model without effects does not.
 #[test]
 fn the_truth_explains_its_recording() {
     let plant = plant();
@@ -48,7 +48,7 @@ fn the_truth_explains_its_recording() {
     }
 }
 
-/// The recorded forces, minus what the model can say, are the noise that the floor is made of.
+/// The residual of the model is the noise from which the noise floor is computed.
 #[test]
 fn a_recording_with_nothing_hidden_is_the_model_and_noise() {
     let plant = plant();
@@ -71,7 +71,7 @@ fn a_recording_with_nothing_hidden_is_the_model_and_noise() {
     assert!((deviation - 1.0).abs() < 0.05, "{deviation}");
 }
 
-/// What is outside stays outside if every column of the library is taken together.
+/// A force outside the library has a residual even if all columns of the library are fitted together.
 #[test]
 fn no_library_says_what_is_outside() {
     let plant = plant();
@@ -86,7 +86,7 @@ fn no_library_says_what_is_outside() {
     }
 }
 
-/// Of a low-pass of first order by the bilinear transform neighbours correlate by half of one and its pole.
+/// For a bilinear low-pass of first order, the correlation of neighbouring samples is the mean of 1 and the pole.
 #[test]
 fn coloured_noise_has_the_size_and_the_memory_that_are_asked_for() {
     let (rate, corner) = (250.0, 15.0);

@@ -1,4 +1,4 @@
-//! The benchmark of hidden effects marks answers as it says: made-up answers, each with the mark it must get.
+//! Marks of the benchmark of hidden effects: constructed answers, each with its expected mark.
 
 use modelmill_lab::answer::ProgramAnswer;
 use modelmill_lab::harness::TestedProgram;
@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 const LEFT: &str = "spindle_left";
 const RIGHT: &str = "spindle_right";
 
-/// An answer in the form of `cli.md`: effects as `(kind, places, aliases)`.
+/// An answer in the format of `cli.md`, with effects as `(kind, places, aliases)`.
 fn said(verdict: &str, effects: &[(&str, &[&str], &[PlacedEffect])]) -> Value {
     let effects: Vec<Value> = effects
         .iter()
@@ -36,14 +36,14 @@ fn said(verdict: &str, effects: &[(&str, &[&str], &[PlacedEffect])]) -> Value {
     })
 }
 
-/// The mark of an answer where claims leave `excess` of the true forces.
+/// The mark of an answer if the squared residual of all claims is `excess`.
 fn mark(class: CaseClass, hidden: &[(&str, &[&str])], answer: &Value, excess: f64) -> AnswerMark {
     let hidden: Vec<PlacedEffect> = hidden.iter().map(|(k, at)| PlacedEffect::new(k, at)).collect();
     let answer = ProgramAnswer::from_json(answer).expect("the form of cli.md");
     judge(class, &hidden, None, &answer, &mut |_| excess)
 }
 
-/// The mark where anything else than the truth is told apart with ease.
+/// The mark if every wrong claim is clearly distinguishable from the truth.
 fn plainly(class: CaseClass, hidden: &[(&str, &[&str])], answer: &Value) -> AnswerMark {
     mark(class, hidden, answer, 1e4)
 }
@@ -103,7 +103,7 @@ fn the_same_columns_by_other_names_are_alike() {
         &[("spring", &[LEFT])],
         &[("spring", &[LEFT], &[]), ("force_offset", &[LEFT], &[])]
     ));
-    // The offset of the other drive is none of the spring's rest, and one half of a double is not the whole.
+    // An offset of the other drive is not part of the spring. Coulomb friction alone is not its directional form.
     assert!(!alike(
         &[("spring", &[LEFT])],
         &[("spring", &[LEFT], &[]), ("force_offset", &[RIGHT], &[])]
@@ -127,14 +127,14 @@ fn an_alias_counts_where_it_is_named_and_nobody_could_do_better() {
     assert_eq!(answer(names_truth, 2.0 * SAME), AnswerMark::WrongPlace);
     assert_eq!(answer(names_other, 0.5 * SAME), AnswerMark::WrongPlace);
     assert_eq!(answer(&[], 0.0), AnswerMark::WrongPlace);
-    // A spring that is as good as an offset is the less simple answer.
+    // A spring contains an offset, so it is the more complex answer.
     let offset: &[(&str, &[&str])] = &[("force_offset", &[LEFT])];
     let spring = said(
         "missing_effect",
         &[("spring", &[LEFT], &[PlacedEffect::new("force_offset", &[LEFT])])],
     );
     assert_eq!(mark(CaseClass::One, offset, &spring, 0.0), AnswerMark::WrongKind);
-    // A stand-in does not excuse what stands beside it.
+    // An indistinguishable alias does not excuse an additional wrong effect.
     let more = said(
         "missing_effect",
         &[
@@ -217,12 +217,12 @@ fn the_report_counts_what_is_right_and_lists_what_is_not() {
         "one       66.7 % right, 2 of 3; target 95 %",
         "none       0.0 % right, 0 of 1; target 98 %",
         "outside   50.0 % right, 1 of 2; target 90 %",
-        "located  1 of 1 unexplained ones first of all in the drive that feels them",
-        "fall      50.0 % of 2 found within 1.3 of the noise floor on the check run; target 100 %",
-        "- seed 7 case 2 (one): the check error stays 1.31 times the noise floor",
+        "located  1 of 1 unexplained forces reported first in the drive on which they act",
+        "fall      50.0 % of 2 found with a validation error within 1.3 times the noise floor; target 100 %",
+        "- seed 7 case 2 (one): the validation error is 1.31 times the noise floor",
         "- seed 7 case 3 (one): wrong place",
         "- seed 7 case 4 (none): failed: no such column",
-        "- seed 7 case 5 (outside): a guess dressed as a finding",
+        "- seed 7 case 5 (outside): effect claimed for a force outside the library",
     ] {
         assert!(text.lines().any(|l| l == line), "no line `{line}` in\n{text}");
     }
@@ -242,7 +242,7 @@ fn json_that_departs_from_the_contract_is_refused() {
     assert!(ProgramAnswer::from_json(&answer).is_err());
 }
 
-/// A program that prints what it was told to stands in for modelmill.
+/// A script with a fixed output replaces modelmill.
 #[cfg(unix)]
 #[test]
 fn the_program_is_asked_as_the_contract_says() {

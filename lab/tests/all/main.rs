@@ -1,4 +1,4 @@
-//! The parts of benchmarks do what they say.
+//! Tests of the parts that the benchmarks share.
 
 mod hidden_cases;
 mod hidden_effects;

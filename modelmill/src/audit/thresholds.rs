@@ -71,7 +71,7 @@ pub(super) const MOST_EVENTS: usize = 4;
 /// Events are reported only if they last less than this share of the run together (1). By judgement.
 pub(super) const EVENTS_MOST_DURATION_SHARE: f64 = 0.15;
 
-/// A drive that is slower than this share of its fastest rate (1) may be reversing. Its residual then neither starts
+/// A drive that is slower than this share of its maximum rate (1) may be reversing. Its residual then neither starts
 /// nor ends an event. By judgement.
 pub(super) const EVENT_REVERSAL_RATE_SHARE: f64 = 0.1;
 
@@ -95,7 +95,7 @@ pub(super) const LONGEST_DELAY_STEPS: f64 = 64.0;
 /// Longest delay that is searched, as a share of the recording (1); it bounds both of the others. By judgement.
 pub(super) const LONGEST_DELAY_SHARE: f64 = 0.1;
 
-/// Samples at which a drive is slower than this share of its fastest rate (1) are not used: friction near reversals
+/// Samples at which a drive is slower than this share of its maximum rate (1) are not used: friction near reversals
 /// causes an apparent delay. By judgement.
 pub(super) const DELAY_REVERSAL_RATE_SHARE: f64 = 0.1;
 

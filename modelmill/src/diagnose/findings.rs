@@ -84,14 +84,15 @@ pub struct DiagnosisFindings {
     pub laws: Vec<LawHypothesis>,
     /// Effects that the recordings can neither show nor exclude.
     pub undecided: Vec<UndecidedEffect>,
-    /// Base parameters of the bodies whose estimates differ from the file, sorted by the difference between
-    /// estimate and nominal value in standard deviations of the estimate, largest first.
+    /// Base parameters of bodies (not of effects) whose estimates differ from their nominal values. The largest
+    /// difference comes first, in standard deviations of the estimate.
     pub off_nominal: Vec<OffNominalParameter>,
     /// The second diagnosis, with all base parameters fixed at their nominal values. `None` if it was not requested,
     /// was not needed because no estimate differs, or the first one has fixed them all already.
     pub with_nominal: Option<NominalDiagnosis>,
-    /// Ranges of a coordinate, rate, load or time for the report. If the verdict is [`DiagnosisVerdict::Unexplained`],
-    /// those of the residual of the unexplained drives; otherwise those of `places`.
+    /// Regions of large error for the report: ranges of a coordinate, rate, load or time. If the verdict is
+    /// [`DiagnosisVerdict::Unexplained`], the error is the residual of the unexplained drives. Otherwise it is the
+    /// error of the given model, as in `places`.
     pub regions: Vec<ErrorRegion>,
     /// The given model, without added effects, along all recordings.
     pub before: ModelVersion,
@@ -102,7 +103,8 @@ pub struct DiagnosisFindings {
     pub entries: Vec<NewEffect>,
     /// The model file with these entries; `None` if there are none or they cannot be added.
     pub edited: Option<CompletedModelFile>,
-    /// Ranges of a variable that contain more than their share of the squared error of the given model.
+    /// Ranges of a variable in which the given model has a large error: their share of the squared error is larger than
+    /// their share of the samples.
     pub places: ErrorLocations,
     /// The same for the model with the effects found; `None` if there is no such model.
     pub residual_locations: Option<ErrorLocations>,
@@ -127,11 +129,11 @@ pub struct MissingEffect {
     pub probability: f64,
     /// Its alternatives: effects that explain the recordings equally well.
     pub indistinguishable_from: Vec<LocatedEffect>,
-    /// Experiment that distinguishes it from these, as described in the effect library. `None` if there are no
-    /// alternatives, or the library describes no experiment.
+    /// Experiment that distinguishes the effect from its alternatives, as described in the effect library. `None` if
+    /// there are no alternatives, or the library describes no experiment.
     pub separating_experiment: Option<String>,
-    /// Request for a motion that distinguishes it from these, for [`Model::excite`]. `None` if there are no
-    /// alternatives, or no motion can be planned.
+    /// Input of [`Model::excite`] for a motion that distinguishes the effect from its alternatives. `None` if there are
+    /// no alternatives, or no motion can be planned.
     pub separation: Option<SeparationProposal>,
 }
 
@@ -153,8 +155,8 @@ pub struct SeparationProposal {
     pub effect: NamedEffect,
     /// Its alternatives: effects that explain the recordings equally well.
     pub rivals: Vec<LocatedEffect>,
-    /// The other effects found, which are assumed to be present whether this effect or one of its rivals is the true
-    /// one, with their constants.
+    /// The other effects found, with their constants. They are assumed to be present in both cases: if this effect is
+    /// the true one, and if one of its alternatives is.
     pub common_effects: Vec<NamedEffect>,
     /// Noise of the forces, rms over the drives, N or N m; `None` if it is zero or unknown.
     pub noise: Option<f64>,
@@ -215,7 +217,8 @@ impl DiagnosisFindings {
 
 impl Model {
     /// Finds the physical effects that the model lacks. Parameters are fitted to the recordings `fit`. Errors are
-    /// evaluated on the validation runs `check`, or by cross-validation if there are none. `question` are the options.
+    /// evaluated on the validation runs `check`, or by cross-validation if there are none. `question` contains the
+    /// options.
     ///
     /// Fails if a recording is too short, has no forces, or contains positions at which the loops of the mechanism
     /// cannot close, and if the fitted model predicts the forces worse than a model without any force.

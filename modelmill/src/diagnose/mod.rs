@@ -10,7 +10,7 @@
 //! 2. `places`: lists the places of the mechanism on which effects may act.
 //! 3. `candidates`: derives the effects that `add` could add to the model file.
 //! 4. `columns`, `numbers`: evaluate the forces of these effects along the recordings.
-//! 5. `faults`: finds faults of recordings, which are subtracted or left out before the search.
+//! 5. `faults`: finds faults of recordings. Before the search, their forces are subtracted or their samples excluded.
 //! 6. `encoders`, `gears`, `memory`, `payloads`, `constants`, `tilt`, `held_friction`: add candidates that a model file
 //!    cannot contain.
 //! 7. `problem`: formulates the search with all of these, and solves it.
@@ -21,7 +21,7 @@
 //! 12. `findings`: collects the results.
 //!
 //! In addition, `requested_effects` derives and evaluates effects that the user names, `words` writes sentences, and
-//! `thresholds` contains the numbers that decide.
+//! `thresholds` contains the decision thresholds.
 
 pub(crate) mod added_effects;
 mod candidates;

@@ -71,7 +71,7 @@ impl Host {
         &*self.files
     }
 
-    /// The host with further libraries of effects, which every model that it reads may use.
+    /// The host with further libraries of effects. All models that this host reads can use them.
     #[must_use]
     pub fn with_libraries(mut self, paths: impl IntoIterator<Item = PathBuf>) -> Self {
         self.libraries.extend(paths);
@@ -169,8 +169,8 @@ impl Host {
 
     /// Adds an effect to the text of a model file, keeping its comments and layout; the result is validated.
     ///
-    /// Fails when the edited file is invalid, such as by an unknown kind or place, a missing value, or an effect that
-    /// the file already has.
+    /// Fails when the edited file is invalid: for example, a kind or place is unknown, a value is missing, or the file
+    /// already has the effect.
     pub fn edit(&self, path: &str, text: &str, effect: &NewEffect) -> Outcome<EditedModel> {
         add_to_model(path, text, effect, &self.libraries, self.files()).map_err(|failure| match failure {
             EditFailure::Effect(says) => Error::input(format!("{path}: {says}")),

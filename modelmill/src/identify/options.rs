@@ -7,14 +7,15 @@ use crate::identify::refine::EstimateRefinement;
 pub struct EstimatorOptions {
     /// Weights of the equations.
     pub weights: EquationWeights,
-    /// Bound of Huber's robust estimator (1): residuals larger than this many standard deviations get less weight. The
-    /// standard deviation is estimated per drive as 1.4826 times the median of the absolute residuals; 1.345 is usual.
-    /// `None` for no robust estimation.
+    /// Bound of Huber's robust estimator, dimensionless: residuals larger than this many standard deviations get less
+    /// weight. A usual bound is 1.345. The standard deviation is estimated per drive as 1.4826 times the median of the
+    /// absolute residuals. `None` for no robust estimation.
     pub robust: Option<f64>,
     /// Refinement of the least-squares solution.
     pub refinement: EstimateRefinement,
-    /// Bound of standstill (1): equations of a drive are excluded while it is slower than this fraction of its fastest
-    /// rate, since friction at standstill may have any value. 0.01 is usual; `None` excludes no equation.
+    /// Bound of standstill, as a fraction of the maximum rate of the drive over all recordings of the fit. Below this
+    /// bound, the equations of the drive are excluded, because static friction is not determined by the state. A usual
+    /// bound is 0.01; `None` excludes no equation.
     pub standstill: Option<f64>,
 }
 

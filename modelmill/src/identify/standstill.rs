@@ -13,7 +13,7 @@ use crate::text::table::count;
 
 /// Gives equations at standstill the weight 0, and adds a note with their number.
 ///
-/// `part` is the fraction of a drive's fastest rate below which it is at standstill. Fails when all equations of a
+/// `part` is the fraction of a drive's maximum rate below which it is at standstill. Fails when all equations of a
 /// drive would be excluded.
 pub(crate) fn exclude_standstill(model: &Model, data: &mut [RecordingSegment], part: f64) -> Outcome {
     let drives = model.drives();
@@ -26,7 +26,7 @@ pub(crate) fn exclude_standstill(model: &Model, data: &mut [RecordingSegment], p
             Ok(rates.into_iter().map(pick).collect())
         })
         .collect::<Outcome<_>>()?;
-    // The fastest rate of each drive is taken over all recordings.
+    // The maximum rate of each drive is taken over all recordings.
     let fastest: Vec<f64> = (0..drives.len())
         .map(|d| {
             let all = rates.iter().flat_map(|run| &run[d]);

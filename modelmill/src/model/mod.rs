@@ -272,13 +272,13 @@ impl Model {
         self.loaded.sources.paths()
     }
 
-    /// A warning if the base parameters are valid only for the geometry of this file (found numerically, or derived
-    /// with constants replaced by their values); otherwise `None`.
+    /// A warning if the base parameters are valid only for the geometry of this file; otherwise `None`. This is the
+    /// case if they were computed numerically, or if constants were replaced by their values before the derivation.
     pub fn caution(&self) -> Option<RecordingNote> {
         caution(&self.derivation, &self.path)
     }
 
-    /// Gravity in the base frame for the constants of the file, m/s^2.
+    /// Gravity vector in the base frame, evaluated with the constants of the file, m/s^2.
     pub fn gravity(&self) -> [f64; 3] {
         let mechanism = &self.derivation.mechanism;
         let value = |symbol| match symbol {
@@ -405,7 +405,8 @@ impl Model {
             .collect()
     }
 
-    /// Names of the regressor rows, in their order: drives, and rows without an actuator.
+    /// Names of the regressor rows, in their order: those of drives, and those of degrees of freedom without an
+    /// actuator, see [`Model::undriven_rows`].
     pub fn drives(&self) -> Vec<String> {
         let drives = self.derivation.mechanism.drives.iter();
         drives.map(|d| d.name.clone()).collect()
@@ -465,8 +466,8 @@ impl Model {
 
     /// The model with the values of a fit, see [`Model::values_of`].
     ///
-    /// If the fit has a covariance and a diagnosis fixes all parameters, [`Model::diagnose`] does not fix them exactly:
-    /// it uses the values and their covariance as a prior.
+    /// The covariance of the fit matters for a diagnosis with all parameters fixed. [`Model::diagnose`] then uses the
+    /// values and their covariance as a prior. Without a covariance, it fixes the parameters exactly at the values.
     #[must_use]
     pub fn with_fit(&self, fit: &BaseParameterValues) -> Self {
         Self {
@@ -534,8 +535,8 @@ impl Model {
         })
     }
 
-    /// Whether passive coordinates (determined by loop closure) are solved for iteratively, by Newton's method from
-    /// state to state, because there is no closed form.
+    /// Whether passive coordinates (determined by loop closure) are solved for by Newton's method, because there is no
+    /// closed form.
     pub fn has_iterative_loops(&self) -> bool {
         matches!(
             self.derivation.programs.passive_position,

@@ -47,7 +47,7 @@ impl DiagnosisFindings {
                     "estimates": estimates(&missing.estimates),
                     "probability": missing.probability,
                     "indistinguishable_from": missing.indistinguishable_from,
-                    "separating_experiment": missing.separating_experiment,
+                    "separate_by": missing.separating_experiment,
                     "separate_command": separation.and_then(|asked| spelling.spell_separation(model, asked)),
                 })
             })
@@ -247,6 +247,8 @@ impl DiagnosisFindings {
         lines.push(style.bold("Missing effects"));
         // Each kind is explained at its first place only.
         let mut explained: Vec<&str> = Vec::new();
+        // So is the experiment that distinguishes it from its alternatives.
+        let mut distinguished: Vec<&str> = Vec::new();
         for found in &self.missing {
             let name = found.effect.kind.as_str();
             let is_first = !explained.contains(&name);
@@ -259,7 +261,7 @@ impl DiagnosisFindings {
                         .map_or_else(String::new, |std| format!(" ± {}", significant(std, 2)));
                     let unit = if e.unit == "1" { "" } else { &e.unit };
                     let said = format!("{} = {}{std} {unit}", e.name, number(e.value));
-                    said.trim_end().to_owned().trim_end().to_owned()
+                    said.trim_end().to_owned()
                 })
                 .collect();
             lines.push(format!("  {}: {}", words::effect(&found.effect), values.join(", ")));
@@ -277,7 +279,10 @@ impl DiagnosisFindings {
                     "    With these recordings it is not distinguishable from {}.",
                     words::effects(&found.indistinguishable_from)
                 ));
-                if let Some(says) = found.separating_experiment.as_ref().filter(|_| is_first) {
+                if let Some(says) = &found.separating_experiment
+                    && !distinguished.contains(&name)
+                {
+                    distinguished.push(name);
                     let wrapped = words::lines(says, 96);
                     lines.extend(wrapped.iter().map(|line| style.dim(&format!("    {line}"))));
                 }

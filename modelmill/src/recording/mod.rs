@@ -273,8 +273,8 @@ fn note_idle_options(data: &mut [RecordingSegment], args: &RecordingOptions) {
     }
 }
 
-/// Adds warnings about recordings that are given twice, also as copies. In the fit (`data`) such a recording has double
-/// weight; as a validation run (`check`) it proves nothing.
+/// Adds warnings about recordings that are given twice, as the same file or as a copy. A recording that is twice in the
+/// fit (`data`) has double weight. One that is in both fit and validation (`check`) gives no independent validation.
 pub fn note_duplicates(model: &Model, data: &mut [RecordingSegment], check: &mut [RecordingSegment]) {
     // A recording is compared with all earlier ones.
     for k in 1..data.len() {
@@ -330,7 +330,7 @@ impl Model {
     ///     ..RecordingOptions::default()
     /// };
     /// let run = model.recording("run.csv", &options)?;
-    /// // `says` is the text of a note. Its remedies are written here as fields of the Rust options.
+    /// // `says` is the text of a note. It can recommend options; `in_library_words` writes their names as in Rust.
     /// for note in run.notes() {
     ///     println!("{}", note.says.in_library_words());
     /// }
@@ -340,8 +340,8 @@ impl Model {
         self.recording_of(&[path.as_ref()], reading)
     }
 
-    /// As [`Model::recording`], for several files of one run. Their columns are joined on time: the file with the
-    /// lowest sampling rate determines the sample times, and the others are interpolated to them.
+    /// As [`Model::recording`], for one recording that consists of several files. Their columns are joined on time: the
+    /// file with the lowest sampling rate determines the sample times, and the others are interpolated to them.
     pub fn recording_of(&self, paths: &[&Path], reading: &RecordingOptions) -> Outcome<PreparedRecording> {
         let opened = RecordingFiles::open(self.host().files(), paths);
         let read = opened

@@ -206,9 +206,21 @@ impl<T: Real, const NB: usize, const NQ: usize> ParameterWatch<T, NB, NQ> {
         self.watched
     }
 
+    /// The name of [`ParameterWatch::watched_drives`] in earlier versions.
+    #[deprecated(note = "renamed to `watched_drives`")]
+    pub fn watched(&self) -> [bool; NQ] {
+        self.watched_drives()
+    }
+
     /// Number of blocks of a drive that were excluded because a number in them was NaN or too large.
     pub fn n_skipped_blocks(&self) -> u64 {
         self.left_out
+    }
+
+    /// The name of [`ParameterWatch::n_skipped_blocks`] in earlier versions.
+    #[deprecated(note = "renamed to `n_skipped_blocks`")]
+    pub fn left_out(&self) -> u64 {
+        self.n_skipped_blocks()
     }
 
     /// Adds the waiting blocks of at most so many drives to the estimators.

@@ -35,9 +35,11 @@ type Definition = (String, String);
 /// Types and functions that a file defines before its tests.
 fn definitions(text: &str, file: &str) -> [Vec<Definition>; 2] {
     let mut found = [Vec::new(), Vec::new()];
-    for (number, line) in text.lines().enumerate() {
-        let line = line.trim();
-        if line.starts_with("#[cfg(test)]") {
+    let lines: Vec<&str> = text.lines().map(str::trim).collect();
+    for (number, line) in lines.iter().enumerate() {
+        // Tests are the last module of a file.
+        let next = lines.get(number + 1).copied().unwrap_or_default();
+        if line.starts_with("#[cfg(test)]") && next.starts_with("mod ") && next.contains('{') {
             break;
         }
         if line.starts_with("//") {

@@ -65,9 +65,8 @@ impl RationalFunction {
         PrintedFormula::term(&number * &divisor.recip(), above, below)
     }
 
-    /// The number in front and the function without it, so that equal functions up to a number can be recognised.
-    #[cfg(any(test, feature = "review"))]
     /// The rational factor and the function without it, so that functions that differ by a number only are equal.
+    #[cfg(any(test, feature = "review"))]
     pub(crate) fn split_number(&self) -> (Rational, Self) {
         let Some((_, leading)) = ordered_terms(&self.numerator).into_iter().next() else {
             return (Rational::ZERO, Self::constant(Rational::ONE));
