@@ -126,10 +126,13 @@ pub(super) fn newton<'a>(derivation: &'a Derivation, scope: &NameScope) -> Optio
     };
     // Methods of the model that make the traits available without importing them.
     let methods = quote! {
+        /// Passive coordinates of a pose, in the assembly mode of the nominal pose, followed from there; see
+        /// [`Assembly::passive_position`].
+        ///
+        #[doc = #cost]
         ///
         /// # Errors
         /// A pose that is out of reach, cannot be followed from the nominal pose, is singular, or is NaN.
-        #[doc = #cost]
         pub fn passive_position(&self, q: &[T; N_ACTIVE]) -> Result<[T; N_PASSIVE], PoseError> {
             Assembly::passive_position(self, q)
         }
