@@ -365,7 +365,7 @@ impl Case {
                 moved[k] = moved[k].max(free);
                 let Some(place) = place else { continue };
                 if free > 1e-6 {
-                    return Err(self.breach(&format!("{what} is told but not determined ({free:.1e})")));
+                    return Err(self.breach(&format!("{what} is reported but not determined ({free:.1e})")));
                 }
                 let error = (row.dot(&solution) - values[*place][0]).abs() / (scale * size.max(1.0));
                 found.error = found.error.max(error);

@@ -1,5 +1,5 @@
-//! What code of a model is written from, beside its programs: how its loops and drives are numbered on the page of equations, how
-//! far a self-test looks, and base parameters as formulas.
+//! Facts that the emission of code needs in addition to the programs: numbers of equations of loops and drives on the
+//! page of equations, the range of a self-test, and base parameters as formulas.
 
 use crate::Derivation;
 use crate::expr::print::PrintedFormula;

@@ -107,6 +107,23 @@ pub(crate) struct PointPairPath<'a> {
 }
 
 impl PointPairPath<'_> {
+    /// Rotations from the common frame to each frame along the paths: none for the common frame itself, then those after
+    /// each rotation on the way to either point.
+    pub(crate) fn frames(&self, tree: &KinematicTree) -> Vec<Vec<AxisRotation>> {
+        let mut frames = vec![Vec::new()];
+        for path in self.paths {
+            let mut turns = Vec::new();
+            for &i in path {
+                let link = &tree.links[i];
+                for turn in link.pre.iter().chain([&link.joint]) {
+                    push_rotation(&mut turns, turn);
+                    frames.push(turns.clone());
+                }
+            }
+        }
+        frames
+    }
+
     /// The vector from the second point to the first as segments, in the common frame rotated by `start`.
     pub(crate) fn segments(&self, graph: &mut Graph, tree: &KinematicTree, start: &[AxisRotation]) -> Vec<PathSegment> {
         // Both paths start in the common frame.
@@ -163,17 +180,8 @@ pub(crate) fn distance_squared(
             best = Some((size, square));
         }
     };
-    // The common frame itself is tried first, then the frames after each rotation on the way to either point.
-    try_frame(graph, &[]);
-    for path in between.paths {
-        let mut turns = Vec::new();
-        for &i in path {
-            let link = &tree.links[i];
-            for turn in link.pre.iter().chain([&link.joint]) {
-                push_rotation(&mut turns, turn);
-                try_frame(graph, &turns);
-            }
-        }
+    for turns in between.frames(tree) {
+        try_frame(graph, &turns);
     }
     let (_, square) = best.expect("the common frame was tried");
     Ok(square)

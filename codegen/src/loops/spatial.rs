@@ -41,16 +41,8 @@ pub(crate) fn equations(graph: &mut Graph, tree: &KinematicTree, between: &Point
         let path = between.segments(graph, tree, &inverse_rotations(turns));
         found.extend(sum_segments(graph, &path));
     };
-    in_frame(graph, &[]);
-    for path in between.paths {
-        let mut turns = Vec::new();
-        for &i in path {
-            let link = &tree.links[i];
-            for turn in link.pre.iter().chain([&link.joint]) {
-                push_rotation(&mut turns, turn);
-                in_frame(graph, &turns);
-            }
-        }
+    for turns in between.frames(tree) {
+        in_frame(graph, &turns);
     }
     // From the origin of each joint, the squared distance to the closing point is the same along both paths.
     for side in 0..2 {

@@ -22,6 +22,7 @@ use serde::Serialize;
 
 use super::bench::{EffectSelector, SelectedEffect};
 use super::pool::{FitScope, dot, solve_gram};
+use super::rejection::RejectionReason;
 use super::thresholds::{
     BLOCKS_LEAST_T, EXPLICABLE_LEAST_NOISE_RATIO, LARGE_GAIN, LEAST_GAIN, LEAST_SHARES_T, MIN_SHARE_OF_FORCE,
     MIN_SHARE_OF_OTHERS, NOISE_LEAST_GAIN_VARIANCES, NOISE_LEAST_T, WHITE_LEAST_EFFECTIVE_SHARE,
@@ -78,21 +79,21 @@ impl SelectionEvidence {
         self.blocks_t >= least_t || self.gain >= LARGE_GAIN && self.shares_t >= LEAST_SHARES_T
     }
 
-    /// Why the evidence is not sufficient, in words; `None` if it is. `has_check` selects the name of the validation
+    /// Why the evidence is not sufficient; `None` if it is. `has_check` selects the name of the validation
     /// method.
-    pub fn insufficiency_reason(&self, has_check: bool) -> Option<&'static str> {
+    pub fn insufficiency_reason(&self, has_check: bool) -> Option<RejectionReason> {
         if self.above_noise <= EXPLICABLE_LEAST_NOISE_RATIO {
-            Some("what is left is rounding")
+            Some(RejectionReason::OnlyNoiseRemains)
         } else if self.gain <= 0.0 || !self.is_steady() {
             Some(if has_check {
-                "not supported by the check"
+                RejectionReason::NotConfirmedByValidation
             } else {
-                "not supported by cross-validation"
+                RejectionReason::NotConfirmedByFolds
             })
         } else if self.gain < self.least_gain {
-            Some("too small to matter")
+            Some(RejectionReason::GainTooSmall)
         } else if self.bic <= 0.0 {
-            Some("not worth its parameters")
+            Some(RejectionReason::TooManyParameters)
         } else {
             None
         }

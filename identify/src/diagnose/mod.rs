@@ -46,6 +46,7 @@ mod noise;
 mod numbered;
 mod pool;
 mod problem;
+mod rejection;
 mod reproducible;
 mod search;
 mod simplification;
@@ -73,6 +74,7 @@ pub use problem::{
     ForceReadingFault, LoadDependentQuery, LocatedEffect, NoColumnProvider, ReadingFaultKind, SampleLayout,
     SampleSegment, SignConstraint,
 };
+pub use rejection::RejectionReason;
 pub use thresholds::FORCE_ROUNDING;
 pub use tilt::{ForceSensitivity, TiltCandidate};
 
@@ -83,16 +85,6 @@ use thresholds::{EFFECT_LEAST_UNEXPLAINED_RATIO, LEAST_GAIN, REPLACING_LAW_LEAST
 
 /// Kinds of friction of which a drift is a change.
 const FRICTION: [&str; 2] = ["viscous_friction", "coulomb_friction"];
-
-/// Reason for rejecting an effect whose estimate has a sign that is physically impossible. Reasons are values of the
-/// JSON, which stay; printers spell them out.
-const WRONG_SIGN: &str = "sign";
-
-/// Reason for rejecting an effect that is less useful than another one.
-const EXPLAINED_BETTER: &str = "another explains more";
-
-/// Reason for rejecting an effect that only cancels another one.
-const CANCELS: &str = "it would only cancel another effect at its place";
 
 /// Verdict of a diagnosis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -153,8 +145,8 @@ pub struct CandidateOutcome {
     /// Gain in addition to the effects found, on data that was not fitted where it was tested there; for an effect that
     /// was found, the loss without it.
     pub gain: f64,
-    /// Why it was rejected, in words; `None` if it was found.
-    pub rejection_reason: Option<String>,
+    /// Why it was rejected; `None` if it was found.
+    pub rejection_reason: Option<RejectionReason>,
 }
 
 /// Result of a diagnosis.
@@ -589,33 +581,33 @@ impl EffectSelector<'_> {
                 (self.evidence(&without, picks, &channels).gain, None)
             } else if let Some(refused) = found.rejected.iter().find(|r| r.pick.candidate == k) {
                 let why = if refused.wrong_sign {
-                    WRONG_SIGN
+                    RejectionReason::WrongSign
                 } else if refused.cancels {
-                    CANCELS
+                    RejectionReason::CancelsAnother
                 } else {
                     refused
                         .evidence
                         .insufficiency_reason(has_check)
-                        .unwrap_or(EXPLAINED_BETTER)
+                        .unwrap_or(RejectionReason::ExplainedBetter)
                 };
-                (refused.evidence.gain, Some(why.to_owned()))
+                (refused.evidence.gain, Some(why))
             } else if let Some(pick) = &self.current_choices[k] {
                 let mut with = picks.to_vec();
                 with.push(pick.clone());
                 let trial = self.fit_from_gram(&table, with);
                 let gain = if now > 0.0 { 1.0 - trial.squares / now } else { 0.0 };
                 let why = if trial.wrong_sign.contains(&picks.len()) {
-                    WRONG_SIGN
+                    RejectionReason::WrongSign
                 } else if trial.cancelling.contains(&picks.len()) {
-                    CANCELS
+                    RejectionReason::CancelsAnother
                 } else if gain < LEAST_GAIN {
-                    "explains nothing that is left"
+                    RejectionReason::ExplainsNothing
                 } else {
-                    EXPLAINED_BETTER
+                    RejectionReason::ExplainedBetter
                 };
-                (gain, Some(why.to_owned()))
+                (gain, Some(why))
             } else {
-                (0.0, Some("the model says it already".to_owned()))
+                (0.0, Some(RejectionReason::LinearlyDependent))
             };
             considered.push(CandidateOutcome {
                 effect: candidate.effect.clone(),

@@ -1,4 +1,4 @@
-//! Thresholds of the diagnosis: the numbers that decide what is reported of a recording or a model. Each says what it
+//! Thresholds of the diagnosis: the numbers that decide what is reported of a recording or a model. Each states what it
 //! bounds, its unit, and how it was chosen. Numbers that only set an accuracy, a grid or the effort of a search stay
 //! where they are used. With all of them together, 200 recordings with white noise and without any effect raised no
 //! alarm (`docs/guide/src/figures.md`).

@@ -1,4 +1,4 @@
-//! Thresholds of excitation: the numbers that decide what is reported of effects along a motion. Each says what it
+//! Thresholds of excitation: the numbers that decide what is reported of effects along a motion. Each states what it
 //! bounds, its unit, and how it was chosen. Numbers that only set an accuracy, a grid or the effort of a search stay
 //! where they are used.
 

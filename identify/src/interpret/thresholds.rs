@@ -1,5 +1,5 @@
 //! Thresholds of the interpretation: the numbers that decide what is reported of solutions for physical parameters.
-//! Each says what it bounds, its unit, and how it was chosen. Numbers that only set an accuracy stay where they are
+//! Each states what it bounds, its unit, and how it was chosen. Numbers that only set an accuracy stay where they are
 //! used.
 
 /// A solution is multiple, and has no standard deviations, if the smallest singular value of its scaled Jacobian is

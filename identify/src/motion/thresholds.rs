@@ -1,5 +1,5 @@
 //! Thresholds of the preparation: the numbers that decide how a motion is smoothed, and what is reported of it. Each
-//! says what it bounds, its unit, and how it was chosen. Numbers that only set an accuracy or a grid stay where they
+//! states what it bounds, its unit, and how it was chosen. Numbers that only set an accuracy or a grid stay where they
 //! are used.
 
 use std::ops::Range;

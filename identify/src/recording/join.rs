@@ -33,12 +33,12 @@ pub(crate) struct JoinedColumns {
     pub(crate) columns: Vec<(usize, Vec<f64>)>,
 }
 
-/// Joins parts; `None` if there are none. `tell` receives notes about what was done.
+/// Joins parts; `None` if there are none. `add_note` receives notes about what was done.
 ///
 /// Fails when the times of a part do not increase, or parts have no time in common.
 pub(crate) fn join_parts(
     mut parts: Vec<JoinPart>,
-    tell: &mut dyn FnMut(RecordingNote),
+    add_note: &mut dyn FnMut(RecordingNote),
 ) -> Result<Option<JoinedColumns>, RecordingFault> {
     // A single part needs no interpolation.
     if parts.len() < 2 {
@@ -96,7 +96,7 @@ pub(crate) fn join_parts(
         return Err(RecordingFault::NoCommonTime { parts: names });
     }
     if !others.is_empty() {
-        tell(RecordingNote::info(format!(
+        add_note(RecordingNote::info(format!(
             "The sample times are those of `{}`, {base_step:.3e} s apart; {} {} interpolated linearly to them.",
             base.name,
             backquoted_list(&others),
@@ -104,7 +104,7 @@ pub(crate) fn join_parts(
         )));
     }
     if covered < n {
-        tell(RecordingNote::warning(format!(
+        add_note(RecordingNote::warning(format!(
             "{} of `{}` {} left out, because another part has no samples around that time.",
             count_of(n - covered, "sample", "samples"),
             base.name,

@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 
 use modelmill_identify::diagnose::{
     CandidateEffect, CandidateNature, ColumnChoice, ColumnSource, DiagnosisProblem, DiagnosisVerdict, EffectParameter,
-    ForceColumn, LocatedEffect, ModelDiagnosis, NoColumnProvider, SampleLayout, SampleSegment, SignConstraint,
-    diagnose, white_noise,
+    ForceColumn, LocatedEffect, ModelDiagnosis, NoColumnProvider, RejectionReason, SampleLayout, SampleSegment,
+    SignConstraint, diagnose, white_noise,
 };
 use modelmill_runtime::RandomBits;
 
@@ -160,13 +160,13 @@ fn found(diagnosis: &ModelDiagnosis) -> Vec<&str> {
 }
 
 /// What became of a candidate.
-fn refused<'a>(diagnosis: &'a ModelDiagnosis, kind: &str) -> Option<&'a str> {
+fn refused(diagnosis: &ModelDiagnosis, kind: &str) -> Option<&'static str> {
     let mut all = diagnosis.candidates.iter();
     let considered = all.find(|c| c.effect.kind == kind);
     considered
         .expect("every candidate is listed")
         .rejection_reason
-        .as_deref()
+        .map(RejectionReason::name)
 }
 
 #[test]

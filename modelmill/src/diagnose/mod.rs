@@ -54,7 +54,8 @@ pub use findings::{
 pub use laws::{LawEntry, LawHypothesis, ProposedLaw};
 pub use model_versions::{ForceComparison, ModelVersion};
 pub use modelmill_identify::diagnose::{
-    DiagnosisVerdict, Disturbance, EstimatedQuantity, LocatedEffect, ModelDiagnosis, ResidualBudget, SelectionStep,
+    DiagnosisVerdict, Disturbance, EstimatedQuantity, LocatedEffect, ModelDiagnosis, RejectionReason, ResidualBudget,
+    SelectionStep,
 };
 pub use off_nominal::OffNominalParameter;
 pub use problem::FixedParameters;

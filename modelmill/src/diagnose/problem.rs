@@ -4,8 +4,8 @@
 use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
     CandidateOutcome, ColumnChoice, ColumnProvider, ColumnSource, DiagnosisProblem, Disturbance, FORCE_ROUNDING,
-    ForceColumn, LawSite, LoadDependentQuery, ModelDiagnosis, diagnose, drift_candidates, reading_fault_candidates,
-    white_noise,
+    ForceColumn, LawSite, LoadDependentQuery, ModelDiagnosis, RejectionReason, diagnose, drift_candidates,
+    reading_fault_candidates, white_noise,
 };
 
 use crate::along::drive_rates;
@@ -147,7 +147,7 @@ pub(crate) fn find_missing_effects(
             effect,
             explained: 0.0,
             gain: 0.0,
-            rejection_reason: Some("no finite value somewhere along the recordings".to_owned()),
+            rejection_reason: Some(RejectionReason::NotFinite),
         }));
     Ok(DiagnosisSolution {
         problem: problem.without_columns(),

@@ -1,4 +1,4 @@
-//! Thresholds of the diagnosis: the numbers that decide what is reported of a recording or a model. Each says
+//! Thresholds of the diagnosis: the numbers that decide what is reported of a recording or a model. Each states
 //! what it bounds, its unit, and how it was chosen. Numbers that only set an accuracy or a grid stay where they
 //! are used.
 

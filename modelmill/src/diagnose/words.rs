@@ -2,7 +2,7 @@
 //! values of a diagnosis, output is English text without line breaks.
 
 use modelmill_identify::diagnose::{
-    DiagnosisVerdict, Disturbance, FORCE_ROUNDING, LocatedEffect, ModelDiagnosis, SelectionStep,
+    DiagnosisVerdict, Disturbance, FORCE_ROUNDING, LocatedEffect, ModelDiagnosis, RejectionReason, SelectionStep,
 };
 
 use crate::audit::SUSPICIONS;
@@ -97,25 +97,23 @@ pub fn floor_label(noise_floor: f64) -> &'static str {
     }
 }
 
-/// Why a candidate was rejected, as a sentence for people; `reason` is the word of the search, and
-/// `has_effects` says whether the diagnosis found any effect. A reason without a sentence of its own is
-/// returned unchanged.
-pub fn refusal(reason: &str, has_effects: bool) -> &str {
+/// Why a candidate was rejected, as a sentence for people; `has_effects` states whether the diagnosis found any effect.
+pub fn refusal(reason: RejectionReason, has_effects: bool) -> &'static str {
     match reason {
-        // Words of the search at the left, sentences at the right.
-        "sign" => "a parameter would have an impossible sign",
-        "explains nothing that is left" if has_effects => {
+        RejectionReason::WrongSign => "a parameter would have an impossible sign",
+        RejectionReason::CancelsAnother => "it would only cancel another effect at its place",
+        RejectionReason::ExplainedBetter => "another candidate explains more",
+        RejectionReason::ExplainsNothing if has_effects => {
             "redundant: it explains almost nothing in addition to the effects found"
         }
-        "explains nothing that is left" => "explains almost none of the error",
-        "another explains more" => "another candidate explains more",
-        "what is left is rounding" => "only noise is left to explain",
-        "not supported by the check" => "not confirmed on the validation run",
-        "not supported by cross-validation" => "not confirmed by cross-validation",
-        "not worth its parameters" => "the gain is too small for its number of parameters",
-        "the model says it already" => "linearly dependent on the columns of the model",
-        "no finite value somewhere along the recordings" => "its formula has no finite value at some samples",
-        other => other,
+        RejectionReason::ExplainsNothing => "explains almost none of the error",
+        RejectionReason::OnlyNoiseRemains => "only noise is left to explain",
+        RejectionReason::NotConfirmedByValidation => "not confirmed on the validation run",
+        RejectionReason::NotConfirmedByFolds => "not confirmed by cross-validation",
+        RejectionReason::GainTooSmall => "the gain is too small to matter",
+        RejectionReason::TooManyParameters => "the gain is too small for its number of parameters",
+        RejectionReason::LinearlyDependent => "linearly dependent on the columns of the model",
+        RejectionReason::NotFinite => "its formula has no finite value at some samples",
     }
 }
 

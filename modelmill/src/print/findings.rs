@@ -303,12 +303,12 @@ impl DiagnosisFindings {
         let candidates = self.diagnosis.candidates.iter();
         let rows: Vec<Vec<String>> = candidates
             .filter_map(|c| {
-                let why = c.rejection_reason.clone()?;
+                let why = c.rejection_reason?;
                 (c.explained > NAMED_LEAST_SHARE).then(|| {
                     vec![
                         words::effect(&c.effect),
                         percent(Some(c.explained)),
-                        words::refusal(&why, has_effects).to_owned(),
+                        words::refusal(why, has_effects).to_owned(),
                     ]
                 })
             })

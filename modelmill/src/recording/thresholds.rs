@@ -1,5 +1,5 @@
 //! Thresholds of reading and preparing recordings: the numbers that decide which recordings are refused, which force
-//! peaks are outliers, and which smoothing is chosen. Each says what it bounds, its unit, and how it was chosen.
+//! peaks are outliers, and which smoothing is chosen. Each states what it bounds, its unit, and how it was chosen.
 //! Numbers that only set an accuracy or a grid stay where they are used.
 
 /// Largest difference of the length of a recorded quaternion from 1 (1). A larger one is not rounding, but another

@@ -268,7 +268,7 @@ pub(crate) fn candidates(findings: &DiagnosisFindings) -> String {
     let row = |c: &CandidateOutcome| -> Vec<TableCell> {
         let verdict = match &c.rejection_reason {
             None => TableCell::html("<b>found</b>".to_owned()),
-            Some(why) => TableCell::text(words::refusal(why, has_effects)),
+            Some(why) => TableCell::text(words::refusal(*why, has_effects)),
         };
         vec![
             TableCell::text(&words::kind(&c.effect.kind)),

@@ -1,4 +1,4 @@
-//! Thresholds of the comparison of runs: the numbers that decide which changes between runs are reported. Each says
+//! Thresholds of the comparison of runs: the numbers that decide which changes between runs are reported. Each states
 //! what it bounds, its unit, and how it was chosen. Numbers that only set an accuracy or a grid stay where they are
 //! used.
 

@@ -1,5 +1,5 @@
 //! Thresholds of the comparison of variants: the numbers that decide which differences between two models are reported.
-//! Each says what it bounds, its unit, and how it was chosen. Numbers that only set an accuracy or a grid stay where
+//! Each states what it bounds, its unit, and how it was chosen. Numbers that only set an accuracy or a grid stay where
 //! they are used.
 
 /// A difference of forces up to this share of the larger rms force (1) has no cause. Below it is rounding. By

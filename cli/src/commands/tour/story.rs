@@ -151,7 +151,7 @@ impl TourText {
                 vec![
                     words::effect(&c.effect),
                     format!("{:.0} %", 100.0 * c.explained),
-                    (c.rejection_reason.as_deref())
+                    c.rejection_reason
                         .map_or("found", |why| words::refusal(why, has_effects))
                         .to_owned(),
                 ]

@@ -226,12 +226,12 @@ const LIST: u8 = 9;
 const SET: u8 = 10;
 const STRUCT: u8 = 12;
 
-/// Reads a structure. `tell` receives every integer and every boolean with the path of its field numbers; a false
+/// Reads a structure. `visit` receives every integer and every boolean with the path of its field numbers; a false
 /// boolean has no value.
 fn read_fields(
     stream: &mut dyn Read,
     path: &mut Vec<i64>,
-    tell: &mut dyn FnMut(&[i64], Option<i64>),
+    visit: &mut dyn FnMut(&[i64], Option<i64>),
 ) -> io::Result<()> {
     if path.len() > DEEPEST {
         return Err(io::Error::other("a page's header has no end"));
@@ -251,13 +251,13 @@ fn read_fields(
         path.push(field);
         // Integers and booleans are passed on, structures are read, all others are skipped.
         match head & 15 {
-            TRUE => tell(path, Some(1)),
-            FALSE => tell(path, None),
+            TRUE => visit(path, Some(1)),
+            FALSE => visit(path, None),
             4..=6 => {
                 let number = decode_zigzag(varint(stream)?);
-                tell(path, Some(number));
+                visit(path, Some(number));
             }
-            STRUCT => read_fields(stream, path, tell)?,
+            STRUCT => read_fields(stream, path, visit)?,
             kind => skip_value(stream, kind, path)?,
         }
         path.pop();
