@@ -1,7 +1,7 @@
 //! `adopt`: writes a fit into a model file, so that every reader of the file uses its values.
 //!
-//! A fit of physical parameters (`identify --physical`) becomes values of parameters that bodies can have. Any other
-//! fit becomes values of base parameters, which do not determine the parameters of single bodies.
+//! A fit of physical parameters (`identify --physical`) becomes values of the physical parameters of the bodies. Any
+//! other fit becomes values of base parameters, which do not determine the parameters of single bodies.
 
 use modelmill_identify::{FitFile, ParameterStatus, RecordingNote};
 use modelmill_spec::LoadedModel;

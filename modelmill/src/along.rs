@@ -16,8 +16,8 @@ pub fn forces(model: &Model, data: &RecordingSegment, values: &[f64]) -> Outcome
     columns(model, data, |states| evaluator.inverse_dynamics(states, values))
 }
 
-/// Determined components of the reactions along a segment for nominal parameters, `[component][sample]`, N or N m,
-/// decimated.
+/// Reactions of the joints along a segment for nominal parameters, `[component][sample]`, N or N m, decimated. Only
+/// those components are computed that the equations of motion determine.
 ///
 /// Fails when a pose has no solution, or the segment is too short to be filtered.
 pub fn reactions(model: &Model, data: &RecordingSegment, reactions: &ReactionPrograms) -> Outcome<Vec<Vec<f64>>> {

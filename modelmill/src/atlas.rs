@@ -1,7 +1,8 @@
 //! An atlas of mechanisms: how many base parameters each has, what they are, and what its functions cost.
 //!
 //! Base parameters are counted for the bodies alone, without the effects of the file, so that they can be compared with
-//! published ones: with gravity and without, for general constants and numerically for the file's values.
+//! published ones: with gravity and without. They are counted symbolically, for arbitrary values of the constants, and
+//! numerically, for the file's values.
 
 use std::fmt::Write as _;
 
@@ -29,20 +30,20 @@ pub struct AtlasEntry {
     pub loops: usize,
     /// Number of drives.
     pub drives: usize,
-    /// Numbers of base parameters of the bodies for general constants: with gravity and without.
+    /// Numbers of base parameters of the bodies for arbitrary values of the constants: with gravity and without.
     pub base: [usize; 2],
     /// The numeric rank, eq. (9), of the same regressor at the file's values, with gravity.
     pub at_values: usize,
-    /// Whether the reduction is exact for general constants; else it is numeric.
+    /// Whether the reduction is exact for arbitrary values of the constants; otherwise it is numeric.
     pub is_exact: bool,
-    /// Number of effects of the file, and of base parameters including them.
+    /// Number of effects in the file, and number of base parameters of the model with these effects.
     pub effects: [usize; 2],
     /// Numbers of operations of the regressor and of the inverse dynamics per state, effects included.
     pub operations: [OperationCount; 2],
     /// Time of the derivation, s, if it was measured.
     pub seconds: Option<f64>,
-    /// Whether the model was imported from a robot description: it has a line and a picture, but no page of
-    /// expressions.
+    /// Whether the model was imported from a robot description. Then it has a row in the table and a picture, but no
+    /// page of expressions.
     pub is_imported: bool,
 }
 

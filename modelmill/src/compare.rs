@@ -1,4 +1,4 @@
-//! `compare`: errors of a model along recordings, and the regions in which they occur.
+//! `compare`: errors of a model along recordings, and the ranges of variables in which they are large.
 
 use modelmill_identify::{
     BandError, ErrorAccumulator, ErrorFigures, ErrorRegion, FilteredFigures, LocateOptions, RecordingNote, TIME_COLUMN,
@@ -19,7 +19,7 @@ pub struct ModelComparison {
     pub files: Vec<String>,
     /// Error metrics, over all drives and for each drive.
     pub figures: ErrorFigures,
-    /// Regions in which the error occurs.
+    /// Ranges of variables in which the error is large.
     pub places: ErrorLocations,
     /// Notes on the recordings.
     pub notes: Vec<RecordingNote>,
@@ -55,14 +55,17 @@ impl Model {
     }
 }
 
-/// The highest frequency at which forces along some recordings are compared, Hz: the lowest of their bands.
+/// The highest frequency at which the forces of all recordings can be compared, Hz. The preparation of a recording can
+/// set such a frequency: the cut-off of the filter, or the band of the motion. The result is the lowest of them; `None`
+/// if no recording has one.
 pub fn band(data: &[RecordingSegment]) -> Option<f64> {
     let bands = data.iter().filter_map(|one| one.run.prepared.band_hz);
     bands.reduce(f64::min)
 }
 
-/// Error metrics over several recordings: over every sample whose force was measured, and below `band_hz`, Hz.
-/// `forces` are the model's, `[drive][sample]` for each recording.
+/// Error metrics over several recordings, from all samples whose force was measured. With `band_hz` (Hz), the result
+/// also contains the metrics after a low-pass of both forces with this cut-off. `forces` are the model's,
+/// `[drive][sample]` for each recording.
 ///
 /// Fails when a recording has no forces, or when forces differ in number.
 pub fn figures(
@@ -96,7 +99,7 @@ pub fn figures(
     Ok(figures)
 }
 
-/// Error metrics of the rows that a fit used, if decimation made fewer rows than samples; else `None`.
+/// Error metrics of the decimated forces that a fit used; `None` if no recording is decimated.
 ///
 /// Fails as [`figures`] does.
 pub fn figures_of_rows(
@@ -129,15 +132,16 @@ fn comparison(model: &Model) -> ErrorAccumulator {
 /// not depend on the mechanism.
 pub const ROUNDING: f64 = 1e-6;
 
-/// Locations of errors.
+/// Ranges of variables in which the error of a model is large.
 pub struct ErrorLocations {
-    /// Regions with more than their share of the error.
+    /// Ranges of a variable whose share of the squared error is larger than their share of the samples.
     pub regions: Vec<ErrorRegion>,
     /// Drives whose error is rounding and was not located.
     pub rounding: Vec<String>,
 }
 
-/// Regions of coordinates, rates, loads and time that contain more than their share of the error.
+/// Ranges of coordinates, rates, loads and time in which the error is large: their share of the squared error is larger
+/// than their share of the samples.
 ///
 /// With several recordings, time is analysed in each of them separately.
 ///

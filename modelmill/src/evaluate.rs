@@ -22,8 +22,9 @@ pub struct RecordingEvaluation {
 }
 
 impl Model {
-    /// The model's forces along a recording, one column for each drive, at the time at which they act: without the
-    /// delay of the model's `time_delay`. `values` are those of the base parameters.
+    /// The model's forces along a recording, one column for each drive. `values` are those of the base parameters. If
+    /// the model file has a `time_delay` of the force signals, it is not applied: forces are those at the time of the
+    /// state.
     ///
     /// Fails when the recording lacks a position, or contains a pose that the mechanism cannot reach.
     pub fn evaluate(

@@ -88,8 +88,10 @@ pub struct CodeOptions {
 }
 
 impl Model {
-    /// The model as source files: one module in Rust, a header and a source in C99, or a crate with a copy of the
-    /// runtime, so that its folder can be moved freely. Paths are relative to that folder.
+    /// The model as source files, in the form that the target language has ([`CodeLanguage::form`]): one module,
+    /// several sources (such as header and source in C99), or a Rust crate. A crate contains a copy of the runtime
+    /// library, so that its folder can be moved freely. Paths of the files are relative to the folder of the generated
+    /// code.
     ///
     /// Fails when the language lacks a requested part, or the equations cannot be derived for the mechanism.
     ///

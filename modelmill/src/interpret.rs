@@ -154,7 +154,7 @@ impl InterpretationResult {
         }
     }
 
-    /// Directions in which the unknowns may change without any effect.
+    /// Directions in which the unknown parameters may change without a change of the base parameters.
     pub fn directions(&self) -> &[NullDirection] {
         match &self.found {
             PhysicalInterpretation::Undetermined { directions, .. } => directions,

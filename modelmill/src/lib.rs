@@ -2,9 +2,14 @@
 //! From recordings it identifies parameter values, detects the physical effects that a model lacks, and writes these
 //! findings as one page.
 //!
-//! The library uses no terminal, no fixed path and no global state. A [`Host`] provides files and libraries of effects,
-//! and passes progress to the caller's listener. Results are values; [`mod@print`] and [`report`] convert them to text,
-//! JSON and pages. A [`print::StepSpelling`] formats the recommended next steps for the reader: as a command, as a
+//! The library uses no terminal, no fixed path and no global state. A [`Host`] reads files, provides the libraries of
+//! effects, and passes progress to the caller's listener.
+//!
+//! A physical effect adds forces to those of the bodies, such as friction of a drive or inertia of a rod. A library of
+//! effects defines kinds of effects; one is built in.
+//!
+//! Results are values; [`mod@print`] and [`report`] convert them to text, JSON and pages. A diagnosis recommends next
+//! steps, such as adding an effect to the model file. A [`print::StepSpelling`] formats these steps: as a command, as a
 //! Python call, or in words for a caller of the Rust library.
 //!
 //! All quantities are in SI units (m, rad, kg, s, N, N m). A recording or a model file may declare other units for its
@@ -49,12 +54,12 @@
 //! | [`Host::kinds`] | the kinds of effects that a model may have |
 //! | [`Model::with_added_effects`] | the model with effects added to its file |
 //! | [`Model::picture`] | the mechanism at a pose, as SVG |
-//! | [`Model::equations`] | parameter products p_g, linear dependencies of the regressor columns, base parameters p_min and straight-line programs, as a page |
+//! | [`Model::equations`] | parameter products p_g, linear dependencies of the regressor columns, base parameters p_min, and straight-line programs (the equations as a list of assignments without branches), as a page |
 //! | [`Model::generate`] | source code of the model in a target language |
 //! | [`Model::evaluate`] | forces along a recording |
 //! | [`Model::functions`] | forces, regressor, mass matrix and other functions at given states |
 //! | [`Model::identify`] | base parameters from recordings by least squares, eq. (12) |
-//! | [`Model::compare`] | error metrics (such as the NRMS), and the regions in which errors occur |
+//! | [`Model::compare`] | error metrics (such as the NRMS), and the ranges of coordinates, rates, loads and time in which errors are large |
 //! | [`Model::diagnose`] | the physical effects that are missing |
 //! | [`Model::runs`] | changes between recordings of one machine |
 //! | [`report::page`] | a diagnosis as one page |
@@ -165,8 +170,8 @@
 //! # Progress, cancellation, notes
 //!
 //! A [`progress::ProgressListener`] of the host receives the name and the progress of each job, can stop it
-//! ([`Error::Cancelled`]), and receives notes. A note ([`RecordingNote`]) states a choice that was made, or warns of a
-//! condition that is likely to affect the result. Results contain the notes too.
+//! ([`Error::Cancelled`]), and receives notes. A note ([`RecordingNote`]) states a choice that the library made, such
+//! as a cut-off frequency, or warns of a condition that is likely to affect the result. Results contain the notes too.
 //!
 //! # Modules
 //!

@@ -70,8 +70,8 @@ impl Model {
         Ok(MechanismScene::new(mechanism, &pose))
     }
 
-    /// The model as SVG: links, joints, loops, drives and masses. `before`, if given, is drawn below it as a shadow,
-    /// at the same scale and pose.
+    /// The model as SVG: links, joints, loops, drives and masses. `before`, if given, is a second model that is drawn
+    /// behind it as a shadow, at the same scale and pose.
     ///
     /// Fails when a name is not an active coordinate, and when the loops cannot close.
     ///

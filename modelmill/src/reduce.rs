@@ -28,11 +28,12 @@ pub struct RigReduction {
 }
 
 impl Host {
-    /// Reduces a full-body rig to a planar model file by a plan, and measures every approximation. Without a plan,
+    /// Reduces a rig with spatial bodies to a planar model file, and measures the error of every approximation. `plan`
+    /// is the path of a plan file, which states the plane and the bodies that are merged to one part. Without a plan,
     /// every body becomes a separate part.
     ///
-    /// Fails with every finding about rig and plan, each with its place, and when the reduction does not support the
-    /// mechanism.
+    /// Fails with all errors and warnings of rig and plan, each with its place, and when the reduction does not support
+    /// the mechanism.
     pub fn reduce(&self, path: &Path, plan: Option<&Path>) -> Outcome<RigReduction> {
         let loaded = self.rig(path)?;
         // The plan names parts and their bodies; the default plan has one part for each body.

@@ -43,7 +43,7 @@ impl RigSimulation {
 impl Host {
     /// Reads a rig file.
     ///
-    /// Fails with every finding about the file, each with its place.
+    /// Fails with all errors and warnings of the file, each with its place.
     ///
     /// ```
     /// use std::path::Path;
@@ -75,7 +75,8 @@ impl Host {
     }
 
     /// Drives a rig along a trajectory, which is a recording of its coordinates, and records the readings of its
-    /// sensors. `columns` are pairs of a name of the rig and the trajectory's column.
+    /// sensors. `columns` are pairs: the name of a coordinate of the rig, and the trajectory's column. `seed` is the
+    /// seed of the noise; `None` uses the seed of the rig file.
     ///
     /// Fails when the trajectory lacks a coordinate, or the rig cannot follow it.
     pub fn simulate(

@@ -1,5 +1,5 @@
 //! Functions of a model at given states, many at once: forces, regressor, mass matrix, bias, forward dynamics,
-//! reactions. A program of the derivation is interpreted over blocks of states, so that no compiler is needed.
+//! reactions. The derived equations are interpreted over blocks of states, so that no compiler is needed.
 
 use std::ops::Range;
 use std::sync::OnceLock;
@@ -146,9 +146,10 @@ impl ModelFunctions {
         })
     }
 
-    /// A function at all given states, row by row, state after state. `values` are those of the base parameters, in
-    /// the order of the model. The work is distributed over all cores, unless each state starts from the one before
-    /// (loops without closed form).
+    /// A function at all given states, row by row, state after state. `values` are those of the base parameters, in the
+    /// order of the model. The work is distributed over all cores. Models with loops solved by Newton's method
+    /// ([`Model::has_iterative_loops`]) use one core, since the initial guess at a state is the solution of the
+    /// previous state.
     ///
     /// Fails when a required input is missing or has another length, and at the first state without a solution.
     ///
@@ -220,8 +221,8 @@ impl ModelFunctions {
     /// A function as C source for many states ([`vectors_c`]), for callers with a C compiler. Base parameters are
     /// arguments of the function; all other values are those of the model.
     ///
-    /// Fails for forward dynamics, which is not a straight-line program, and when each state starts from the one
-    /// before.
+    /// Fails for forward dynamics, which is not a list of assignments without branches, and for loops that are solved
+    /// by Newton's method ([`Model::has_iterative_loops`]).
     pub fn vectors_c(&self, function: ModelFunction) -> Outcome<String> {
         let derivation = &self.model.derivation;
         if self.model.has_iterative_loops() || function == ModelFunction::ForwardDynamics {

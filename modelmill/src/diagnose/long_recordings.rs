@@ -28,8 +28,8 @@ const LEFT: usize = 4;
 const ORDER: usize = 4;
 
 impl PreparedRecording {
-    /// The recording with long segments in the fewer samples that a diagnosis uses. Use it to save memory if
-    /// the recording is needed for nothing else.
+    /// The recording with its long segments decimated to the samples that a diagnosis needs. This saves memory if the
+    /// recording is not needed for anything else. Segments that are not long stay unchanged.
     ///
     /// Fails if a segment cannot be filtered.
     pub fn for_diagnosis(&self, model: &Model) -> Outcome<Self> {

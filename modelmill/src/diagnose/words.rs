@@ -28,7 +28,7 @@ impl ValidationMethod {
         }
     }
 
-    /// The same as the head of a column.
+    /// The same as a label for the head of a table column.
     pub fn label(self) -> &'static str {
         match self {
             Self::Check => "validation",
@@ -121,7 +121,7 @@ pub fn refusal(reason: RejectionReason, has_effects: bool) -> &'static str {
 /// which effects were found and how the error falls, which part of the residual stays unexplained, disturbances
 /// in the recordings.
 ///
-/// `channels` are the names of the drives.
+/// `channels` are the names of the drives. `judged` states the data on which errors are evaluated.
 pub fn verdict(diagnosis: &ModelDiagnosis, channels: &[String], judged: ValidationMethod) -> String {
     let ladder = &diagnosis.steps;
     // Without steps there is no verdict.

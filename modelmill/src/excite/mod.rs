@@ -72,9 +72,10 @@ pub struct ExcitationResult {
     pub found: ExcitationTrajectory,
     /// The options of the search.
     pub options: Options,
-    /// The difference of the effects along it, if effects were to be distinguished.
+    /// The difference of the effects along the trajectory; `None` if the request had no effects to distinguish.
     pub separated: Option<SeparationResult>,
-    /// Condition number of the regressor with columns of equal norm; `None` if there is none.
+    /// Condition number of the regressor with columns of equal norm; `None` if it is infinite or no base parameter is
+    /// unknown.
     pub scaled: Option<f64>,
     /// Times of one period, s.
     pub time: Vec<f64>,
@@ -89,9 +90,13 @@ pub struct ExcitationResult {
 }
 
 impl Model {
-    /// Searches for the periodic trajectory within limits that determines the base parameters, or distinguishes
-    /// effects, best. `recordings` provide ranges of motion, and the size of the effect and the noise if these are
-    /// not given; the result is compared with them.
+    /// Searches for a periodic trajectory within limits. The best trajectory determines the base parameters most
+    /// accurately, or distinguishes the requested effects most clearly.
+    ///
+    /// `recordings` may be empty. They provide limits of coordinates for which neither the request nor the model file
+    /// has a range of positions. If effects are to be distinguished, they also provide the size of the effect and the
+    /// noise of the forces, unless the request does. The difference of the effects along these recordings is then part
+    /// of the result.
     ///
     /// Fails when a coordinate has no limits, when no trajectory keeps them, or when no motion distinguishes the
     /// effects.

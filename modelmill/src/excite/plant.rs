@@ -13,8 +13,9 @@ pub const AXES: [&str; 3] = ["x", "y", "z"];
 /// Names of the limits of least singular values, which must stay above a fraction of those at the nominal pose.
 const SINGULARITIES: [&str; 2] = ["singularity of the loops", "singularity of the drives"];
 
-/// The fraction of a limit that a trajectory uses, 1 at the limit. Most excesses count from the middle of a range;
-/// those of least singular values count from their limit, relative to the least value along the trajectory.
+/// The fraction of a limit that a trajectory uses, 1 at the limit. For a range, it is the largest distance from the
+/// middle, divided by half the range. For a least singular value, it is the limit divided by the smallest value along
+/// the trajectory.
 pub fn used_fraction(margin: &LimitMargin) -> f64 {
     if SINGULARITIES.contains(&margin.name.as_str()) {
         1.0 / (1.0 - margin.excess).max(0.0)

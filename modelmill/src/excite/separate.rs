@@ -56,16 +56,19 @@ impl RivalEffect {
     }
 }
 
-/// The distance of effects along a motion.
+/// The distance of an effect from its nearest alternative along a motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EffectDistance {
-    /// Force of the effect and of its residuals, rms over all drives.
+    /// Rms forces over all drives: force of the effect, and its residuals after fits of the base parameters and of the
+    /// alternatives.
     pub figures: SeparationMeasure,
     /// Index of the nearest alternative.
     pub rival: usize,
     /// Constants of the nearest alternative.
     pub constants: Vec<(String, f64)>,
-    /// The distance, rms over all drives, N or N m: the smaller of both directions, as far as these can be determined.
+    /// The distance, rms over all drives, N or N m: the smaller of two residuals. The first is that of the effect after
+    /// a fit of the nearest alternative. The second is that of the alternative after a fit of the effect. Only the
+    /// first counts if the alternative is a special case of the effect.
     pub force: f64,
 }
 

@@ -44,11 +44,11 @@ pub(crate) struct SeparationTask {
 pub struct SeparationResult {
     /// The effects.
     pub(crate) task: SeparationTask,
-    /// Along the trajectory, with the samples of its file.
+    /// The distance along the trajectory, at the samples of the trajectory file.
     pub distance: EffectDistance,
     /// The distance along the best of the random trajectories, N or N m.
     pub random: f64,
-    /// Along the given recordings; `None` without any.
+    /// The distance along the given recordings; `None` if there are none.
     pub before: Option<EffectDistance>,
     /// Unit of the forces.
     pub unit: &'static str,

@@ -13,8 +13,8 @@ use modelmill_spec::{EffectKind, LoadedModel};
 use crate::error::{Error, Outcome};
 use crate::progress::{JobHandle, ProgressListener, SilentProgress, run_job};
 
-/// Provides files and libraries of effects in addition to the built-in one, and passes progress and notes to a
-/// listener.
+/// Reads files, provides libraries of effects, and passes progress and notes to a listener. The built-in library of
+/// effects is always available.
 ///
 /// Every model keeps the host with which it was read. Files that are read for it later, such as recordings, come from
 /// the same source.
@@ -103,11 +103,11 @@ impl Host {
         self
     }
 
-    /// Whether constants are replaced by their numeric values before the derivation
+    /// The host with this setting: whether constants are replaced by their numeric values before the derivation
     /// ([`modelmill_spec::Mechanism::with_numeric_constants`]).
     ///
-    /// The model is then valid for this geometry only: special geometry can reduce the number of base parameters, and
-    /// generated code has no geometric constants as inputs.
+    /// If they are, the model is valid for this geometry only. Special geometry can reduce the number of base
+    /// parameters, and generated code has no geometric constants as inputs.
     #[must_use]
     pub fn at_values(mut self, is_wanted: bool) -> Self {
         self.is_at_values = is_wanted;

@@ -49,9 +49,9 @@ pub struct InstrumentStatistics {
     pub least_squares: Vec<f64>,
 }
 
-/// Identifies the base parameters of a model from recordings, eq. (12). Base parameters that are numbers of the model
-/// file are no unknowns: their force is subtracted from the measured one. `instruments` has one segment for each of
-/// `data`, or none.
+/// Identifies the base parameters of a model from recordings, eq. (12). Base parameters that contain only constants and
+/// numbers are known ([`Model::is_known`]). They are not estimated; their force is subtracted from the measured one.
+/// `instruments` has one segment for each of `data`, or none.
 ///
 /// Fails when nothing is unknown, and as [`Model::identify`] does.
 pub fn identify(

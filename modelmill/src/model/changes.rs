@@ -9,7 +9,8 @@ use crate::model::entries::entries;
 /// A named entry before and after a change.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EntryChange {
-    /// Its name: its table and its own name, or a product of parameters.
+    /// Name of the entry. An entry of a model file is named by its table and its own name. Entries of the derived
+    /// equations are named by a product of parameters.
     pub name: String,
     /// Its text before; `None` if it is new.
     pub before: Option<String>,
@@ -75,9 +76,10 @@ fn pieces(text: &str) -> impl Iterator<Item = &str> {
 pub struct ModelChanges {
     /// Entries of the model files.
     pub entries: Vec<EntryChange>,
-    /// p_g, eq. (5): products that enter it, or lose their effect.
+    /// Products of parameters in p_g, eq. (5), that differ. The text is `in p_g`, or `without effect` if the forces do
+    /// not depend on the product.
     pub products: Vec<EntryChange>,
-    /// Dependencies of columns, eq. (6).
+    /// Linear dependencies of the regressor columns, eq. (6), named by the dependent column.
     pub dependencies: Vec<EntryChange>,
     /// p_min, eq. (16), named by retained products.
     pub base: Vec<EntryChange>,

@@ -41,12 +41,13 @@ pub struct Model {
     pub path: String,
     /// The contents of the file.
     pub loaded: Arc<LoadedModel>,
-    /// The derivation: parameter products p_g, linear dependencies of the regressor columns, base parameters p_min and
-    /// straight-line programs.
+    /// The derivation: parameter products p_g, linear dependencies of the regressor columns, base parameters p_min, and
+    /// straight-line programs. A straight-line program is a list of assignments without branches.
     pub derivation: Arc<Derivation>,
     /// The base parameters, eq. (16), with names, expressions and units.
     pub base: Vec<BaseParameterEntry>,
-    /// Values of the base parameters, in their units: computed from the file's nominal values, or identified in a fit.
+    /// The current values of the base parameters, in their units and in the order of `base`. Each is computed from the
+    /// nominal values of the file, unless the file or a fit provides an identified value, see [`Model::is_identified`].
     pub nominal: Vec<f64>,
     /// Notes on the file in addition to the warnings of `loaded`, such as entries that are ignored.
     pub notes: Vec<RecordingNote>,
@@ -272,8 +273,9 @@ impl Model {
         self.loaded.sources.paths()
     }
 
-    /// A warning if the base parameters are valid only for the geometry of this file; otherwise `None`. This is the
-    /// case if they were computed numerically, or if constants were replaced by their values before the derivation.
+    /// A warning if the base parameters are valid only for the geometry of this file; `None` if they are valid for all
+    /// values of the constants. They depend on the geometry if they were computed numerically, or if constants were
+    /// replaced by their values before the derivation.
     pub fn caution(&self) -> Option<RecordingNote> {
         caution(&self.derivation, &self.path)
     }
@@ -319,11 +321,12 @@ impl Model {
         self.signs[parameter]
     }
 
-    /// Priors for the base parameters `among`, with their nominal values as means. Each product of parameters in a base
-    /// parameter is assumed to have the relative standard deviation `sigma`, and these uncertainties are added as root
-    /// sum of squares. Base parameters without a nominal value get no prior.
+    /// Priors for some base parameters, with their nominal values as means. `among` contains indices of base
+    /// parameters. Each product of parameters in a base parameter is assumed to have the relative standard deviation
+    /// `sigma`. The products are assumed to be independent: the standard deviation of the prior is `sigma` times the
+    /// root of the sum of squares of all summands. A base parameter gets no prior if all its summands are zero.
     ///
-    /// The index in each prior is a position in `among`.
+    /// The index in each prior is a position in `among`, not an index of a base parameter of the model.
     pub fn parameter_priors(&self, among: &[usize], sigma: f64) -> Vec<ParameterPrior> {
         let parameters = &self.derivation.mechanism.parameters;
         let values: Vec<f64> = parameters.iter().map(|p| p.nominal).collect();
@@ -405,7 +408,7 @@ impl Model {
             .collect()
     }
 
-    /// Names of the regressor rows, in their order: those of drives, and those of degrees of freedom without an
+    /// Names of the regressor rows, in their order. A row belongs to a drive, or to a degree of freedom without an
     /// actuator, see [`Model::undriven_rows`].
     pub fn drives(&self) -> Vec<String> {
         let drives = self.derivation.mechanism.drives.iter();
@@ -466,8 +469,9 @@ impl Model {
 
     /// The model with the values of a fit, see [`Model::values_of`].
     ///
-    /// The covariance of the fit matters for a diagnosis with all parameters fixed. [`Model::diagnose`] then uses the
-    /// values and their covariance as a prior. Without a covariance, it fixes the parameters exactly at the values.
+    /// The covariance of the fit has an effect only on a diagnosis with
+    /// [`FixedParameters::All`](crate::diagnose::FixedParameters::All). With a covariance, [`Model::diagnose`] uses the
+    /// values and the covariance as a prior. Without one, it fixes the parameters exactly at the values.
     #[must_use]
     pub fn with_fit(&self, fit: &BaseParameterValues) -> Self {
         Self {

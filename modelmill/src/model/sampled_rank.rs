@@ -37,7 +37,9 @@ const HIGH_CONDITION: f64 = 1e6;
 pub struct SampledRank {
     /// Rank, number of states and condition number.
     pub numeric_rank: NumericRank,
-    /// Ratio of the last singular value that counts to the first that does not, or to the level of rounding.
+    /// Ratio of two singular values: the smallest that contributes to the rank, and the next smaller one. The level of
+    /// rounding replaces the second if it is higher, or if there is no smaller one. Below about 1e3 the rank is
+    /// uncertain.
     pub gap: f64,
     /// Number of random states that were left out because the model is singular or undefined there.
     pub left_out: usize,

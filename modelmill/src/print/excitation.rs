@@ -20,8 +20,8 @@ impl ExcitationResult {
     ///
     /// - `condition_number` of the regressor, `start` for the best random trajectory, `scaled_condition_number`
     ///   with columns of equal norm
-    /// - `value` and `ends`: the criterion at the result and at the end of each start
-    /// - `limits`: the part of each limit that is used (1), and whether it is proven for all times
+    /// - `value` and `ends`: the criterion at the result, and at the end of each local search
+    /// - `limits`: the fraction of each limit that is used (1 at the limit), and whether it is proven for all times
     /// - `coefficients`: offset and Fourier coefficients of each coordinate (m or rad); `period` is in s
     pub fn json(&self) -> Value {
         let found = &self.found;

@@ -19,7 +19,8 @@ impl DiagnosisFindings {
     /// All findings as one JSON object; `spelling` writes commands or calls for its reader.
     ///
     /// - `verdict`, `noise_floor` (relative to the force, as all errors here)
-    /// - `budget`: for each drive the parts of its residual relative to its force, whose `rms` is in `unit`
+    /// - `budget`: for each drive, the parts of its residual (`noise`, `not_repeating`, `model`), relative to the rms
+    ///   force of the drive; `rms` is this force in `unit`
     /// - `disturbances`: faults of the recordings, with estimates and times (`interval`, s)
     /// - `steps`: errors after each added effect, on fitted (`fit`) and validation data (`check`)
     /// - `effects`: missing effects with estimates, probability and alternatives

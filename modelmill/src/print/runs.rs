@@ -18,7 +18,7 @@ impl RunsComparison {
     /// - `changes`: physical changes of a run relative to the first
     /// - `change_points`: lasting changes, from four runs on
     /// - `unread`: files that could not be evaluated, with the reason
-    /// - `per_run`: the joint fit in which runs have some values for themselves, if it was requested
+    /// - `per_run`: the fit of all runs at once in which some values are separate for each run, if it was requested
     pub fn json(&self, spelling: &dyn RemedySpelling) -> Value {
         let later = || self.runs.iter().enumerate().skip(1);
         // All figures are relative to the first run.
@@ -136,7 +136,7 @@ impl RunsComparison {
         })
     }
 
-    /// The comparison as text: lasting changes, joint fit, and each run.
+    /// The comparison as text: lasting changes, the fit of all runs at once, and each run.
     pub fn text(&self, style: TerminalStyle, spelling: &dyn RemedySpelling) -> String {
         let [first, later @ ..] = &self.runs[..] else {
             return String::new();

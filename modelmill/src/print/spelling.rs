@@ -14,21 +14,21 @@ use crate::diagnose::SeparationProposal;
 use crate::model::Model;
 
 /// Formats the recommended next steps after a diagnosis for the reader. The program writes commands, the Python package
-/// writes calls.
+/// writes calls. Each method returns the text of one step and does not perform it.
 pub trait StepSpelling: RemedySpelling {
-    /// Adds an effect to the file of a model.
+    /// Step: add an effect to the file of a model.
     fn spell_effect(&self, model: &Model, effect: &NewEffect) -> String;
 
-    /// Adds an effect whose kind is defined in the library file `library`.
+    /// Step: add an effect whose kind is defined in the library file `library`.
     fn spell_effect_of_library(&self, model: &Model, effect: &NewEffect, library: &str) -> String {
         let effect = self.spell_effect(model, effect);
         format!("{effect}, with the library {library}")
     }
 
-    /// Identifies a model again from the same recordings.
+    /// Step: identify a model again from the same recordings.
     fn spell_identification(&self, model: &Model) -> String;
 
-    /// Plans a motion that distinguishes effects; `None` if the reader has no command for it.
+    /// Step: plan a motion that distinguishes effects; `None` if the reader has no command for it.
     fn spell_separation(&self, model: &Model, separation: &SeparationProposal) -> Option<String>;
 }
 

@@ -52,7 +52,7 @@ impl ModelCheck {
     }
 }
 
-/// Why a valid model cannot be used, as one JSON object.
+/// The reason (`says`) why a valid model cannot be used, as one JSON object. `path` is the path of the model file.
 pub fn refusal(says: &str, path: &str) -> Value {
     json!({
         "valid": false,

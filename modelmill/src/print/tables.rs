@@ -65,9 +65,9 @@ pub fn expressions(indent: usize, model: &Model) -> Vec<String> {
         .collect()
 }
 
-/// Error figures of several comparisons: a line for all drives together, where they have one unit, and a line
-/// for each drive. Errors are in the unit of the force, `nrms` and its like relative to it. The rows that a fit
-/// used follow as a second table.
+/// Error figures of several comparisons: a line for all drives together, where they have one unit, and a line for each
+/// drive. Errors are in the unit of the force, `nrms` and its like relative to it. If a fit used decimated samples, the
+/// error figures of these follow as a second table.
 pub fn figures(named: &[(&str, &ErrorFigures)]) -> Vec<String> {
     let mut rows = Vec::new();
     // The name stands in the first row of its comparison only.

@@ -22,7 +22,7 @@ impl VariantComparison {
     /// - `drives`: peak and rms force (N or N m), peak and rms power (W), positive and net work (J), and the
     ///   terms that cause the difference; their shares sum to 1, and `by_value` is the part of a share that
     ///   comes from the new value
-    /// - `limits`: range of each limit and the part of it that is used (1)
+    /// - `limits`: range of each limit, and the fraction of it that is used (1 at the limit)
     /// - `errors`: relative to measured forces, if the recordings have them
     pub fn json(&self, spelling: &dyn RemedySpelling) -> Value {
         // Limits with the range in both files and the use by both models.

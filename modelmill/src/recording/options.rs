@@ -6,16 +6,17 @@ use modelmill_identify::StatePreparation;
 /// names of the model.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RecordingOptions {
-    /// Columns of the model, each with its name in the recording, `("theta1", "pos_left")`, or with a sum of columns,
-    /// possibly in other units: `("q6", "(pos6 - pos5)/32 - 90 [deg]")`. Columns of the model are `t`, a coordinate,
-    /// a coordinate with `_d` or `_dd`, a drive, and a drive with `_var` for the variance of its force.
+    /// Assigns columns of the recording to signals that the model needs, as pairs. The first text of a pair is the
+    /// signal: `t`, a coordinate, a coordinate with `_d` (rate) or `_dd` (acceleration), a drive (its force), or a
+    /// drive with `_var` (variance of its force). The second text is the name of the column: `("theta1", "pos_left")`.
+    /// It may also be a sum of columns, possibly in other units: `("q6", "(pos6 - pos5)/32 - 90 [deg]")`.
     pub columns: Vec<(String, String)>,
     /// How positions are filtered and differentiated, and which samples are left out.
     pub preparation: StatePreparation,
     /// Whether to leave out samples with NaN, infinite or empty fields. If not, such a recording is refused.
     pub skip_bad_samples: bool,
-    /// Whether to leave forces during contacts and pushes out of fits and error metrics: intervals in which no
-    /// parameters explain the forces.
+    /// Whether to exclude contacts and pushes from fits and error metrics. These are intervals in which forces act that
+    /// no parameters explain.
     pub leave_out_events: bool,
     /// Read only the samples between these times, s.
     pub between: Option<(f64, f64)>,

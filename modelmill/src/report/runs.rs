@@ -235,8 +235,9 @@ fn picture(compared: &RunsComparison, k: usize) -> String {
     parameter_history(&compared.parameters[k], "run", runs.len(), &known, &steps)
 }
 
-/// Picture of a base parameter over `n` runs or days (`what`). `known` has the index of a run with value and
-/// standard deviation; `steps` has the index of the first run of each change with the mean before and since.
+/// Picture of a base parameter over `n` runs or days; `what` is the label of this axis. An entry of `known` is the
+/// index of a run, with value and standard deviation. An entry of `steps` is the index of the first run after a change,
+/// with the means before and after it.
 pub fn parameter_history(
     info: &ParameterInfo,
     what: &str,

@@ -74,9 +74,9 @@ pub enum PhysicalChange {
         /// The factor; 1 without a change.
         factor: ChangeEstimate,
     },
-    /// A changed clock.
+    /// A changed clock of the time stamps.
     Clock {
-        /// Ratio of the true speed to that of the time stamps; 1 without a change.
+        /// Ratio of the true speed of the motion to the speed that follows from the time stamps; 1 without a change.
         factor: ChangeEstimate,
     },
     /// A contact or a push within the run.
@@ -99,8 +99,8 @@ pub enum PhysicalChange {
 pub type NamedEstimate = (&'static str, ChangeEstimate, &'static str);
 
 impl PhysicalChange {
-    /// The kind for scripts, its places, and its values with symbols and units; `unit` is the unit of the force or
-    /// coordinate.
+    /// The change in the form of the JSON: name of its kind, its places, and its values with symbols and units. `unit`
+    /// is the unit of the force or coordinate that it changes.
     pub fn parts(&self, unit: &'static str) -> (&'static str, Vec<&str>, Vec<NamedEstimate>) {
         let (kind, at, estimates) = match self {
             Self::ContactEvent { drives, interval } => {
@@ -139,12 +139,12 @@ impl PhysicalChange {
 pub struct RunChange {
     /// The physical change.
     pub change: PhysicalChange,
-    /// Rise of the sum of squares of the white residual without the change; 0 for events, which are found
-    /// separately.
+    /// Increase of the sum of squared residuals if the change is omitted, relative to the variance of the residual. 0
+    /// for events, which are found separately.
     pub gain: f64,
     /// Unit of its values, if that depends on the drive or coordinate.
     pub unit: &'static str,
-    /// Names of changes that explain nearly as much in its place.
+    /// Names of other changes that explain the difference between the runs nearly as well.
     pub rivals: Vec<String>,
     /// The change as text.
     pub says: String,

@@ -1,10 +1,10 @@
 //! `runs`: reports changes between recordings of one machine.
 //!
-//! Each run is fitted alone, and all runs are fitted together. Every later run is compared with the first: physical
-//! changes are searched that explain what the two do not share. Possible changes are another load on any body,
-//! other friction of a drive, an offset or another scale of its force, another clock, and other zeros of encoders.
-//! Payloads have columns of their own, ten for each body, derived from the model with such a body added, so that
-//! the model file needs no parameters for them.
+//! Each run is fitted alone, and all runs are fitted together. Every later run is compared with the first: a search
+//! finds the physical changes that explain the difference. Possible changes are those of the load of a body, of the
+//! friction of a drive, of the offset or scale of its force, of the clock, and of the zeros of encoders. The model file
+//! needs no parameters for loads. For each body, the columns of a load with ten inertial parameters are derived from
+//! the model.
 
 mod changes;
 mod columns;
@@ -52,7 +52,7 @@ pub struct FittedValue {
 }
 
 impl FittedValue {
-    /// The standard deviation of its difference from another value.
+    /// The standard deviation of its difference from another value. An unknown standard deviation counts as 0.
     pub fn difference_deviation(self, other: Self) -> f64 {
         let [a, b] = [self, other].map(|one| one.deviation.unwrap_or(0.0));
         a.hypot(b)
@@ -86,7 +86,8 @@ pub struct UnreadRun {
 /// Requests in addition to the search of changes.
 #[derive(Clone, Debug, Default)]
 pub struct RunsOptions {
-    /// Values that each run has separately in one fit of all runs; without any there is no such fit.
+    /// Values that are fitted separately for each run, in one fit of all runs. If the list is empty, this fit is not
+    /// made.
     pub per_run: Vec<PerRunSelection>,
     /// Loads of known mass, which determine the scales of all measured forces.
     pub loads: Vec<KnownLoad>,
@@ -104,7 +105,7 @@ pub struct RunsComparison {
     pub runs: Vec<RunReport>,
     /// Runs without a result.
     pub unread: Vec<UnreadRun>,
-    /// Runs from which on parameters have changed permanently, in the order of the runs.
+    /// Change points, in the order of the runs: runs at which parameters changed permanently.
     pub points: Vec<ChangePoint>,
     /// The fit of all runs with separate values for each run, if it was requested.
     pub shared: Option<SharedFit>,
@@ -115,8 +116,8 @@ pub struct RunsComparison {
 impl Model {
     /// Compares runs of one machine with the first of them and reports changes.
     ///
-    /// The runs are processed one after the other, and only their sums are kept, so that there may be hundreds.
-    /// Runs that cannot be read or prepared are listed in the result.
+    /// The runs are processed one after the other. Of each run only its normal equations are kept, not its samples, so
+    /// that there may be hundreds of runs. Runs that cannot be read or prepared are listed in the result.
     ///
     /// Fails with fewer than two runs, if the first or all later runs cannot be read, if no force was measured, or
     /// if `asked` names something that the model does not have.

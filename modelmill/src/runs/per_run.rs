@@ -86,7 +86,7 @@ impl PerRunSelection {
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct KnownLoad {
-    /// The run: the end of its file name.
+    /// The run, as the end of its file name.
     pub run: String,
     /// Mass of the load, kg.
     pub mass: f64,
@@ -135,7 +135,8 @@ pub struct RunValue {
 pub struct SharedFit {
     /// Shared base parameters, by index; `None` for those that are separate for each run.
     pub shared: Vec<Option<FittedValue>>,
-    /// The factor by which each drive's measured force becomes the true one, if a known load determines it.
+    /// Names of drives, each with the factor from its measured force to the true force. Empty if no load of known mass
+    /// was given.
     pub gains: Vec<(String, FittedValue)>,
     /// The runs, each with its separate values.
     pub runs: Vec<(String, Vec<RunValue>)>,

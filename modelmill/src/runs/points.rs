@@ -26,14 +26,15 @@ impl ParameterStep {
     }
 }
 
-/// A run from which on something has changed permanently.
+/// A change point: from one run on, base parameters have other values permanently.
 #[derive(Clone, Debug)]
 pub struct ChangePoint {
     /// Index of the first run after the change.
     pub run: usize,
     /// Parameters that changed there, the clearest first.
     pub steps: Vec<ParameterStep>,
-    /// The physical changes: the runs since the previous change point, compared with those until the next.
+    /// The physical changes from the runs before this change point to those after it. The runs before begin at the
+    /// previous change point; those after end at the next one.
     pub changes: Vec<RunChange>,
 }
 

@@ -19,7 +19,9 @@ use crate::runs::payload::PayloadColumns;
 use crate::runs::rows::{MeasuredMoments, RunRows};
 use crate::runs::{FittedValue, RunAnalyser, RunChange, changes, merge_known};
 
-/// The reference of a fleet, with which all runs are summed up and compared.
+/// The reference of a fleet, which is a group of machines with the same model. It contains base parameters from
+/// reference runs. With these parameters, normal equations of all other runs are computed so that they can be added and
+/// compared.
 #[derive(Clone)]
 pub struct ReferenceFit {
     /// The model of all machines.
@@ -32,26 +34,28 @@ pub struct ReferenceFit {
     sizes: MeasuredMoments,
 }
 
-/// One run as additive statistics.
+/// One run as additive statistics. The statistics of several runs are the sums of those of each run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunSums {
     /// Number of samples that were used, after decimation.
     pub samples: usize,
-    /// Sums over rows of variance 1: columns of unknown base parameters, followed by those of every possible
-    /// change.
+    /// Normal equations over all rows, each scaled so that its noise has variance 1. Columns are those of the unknown
+    /// base parameters, followed by those of every possible change.
     pub total: NormalEquations,
     /// The R factor of the base columns alone, over the same rows.
     pub base: RFactor,
-    /// Difference between the parts of the run, the scale of what is no change.
+    /// Largest sum of squares that a change between parts of this run would explain, per effective row. A difference
+    /// between two runs is a change only if it is clearly larger.
     pub within: f64,
-    /// Relative residual of the force of each drive with the run's own parameters.
+    /// Residual of each drive relative to its force (rms over rms, 1), with base parameters fitted to this run alone.
     pub residual_ratios: Vec<f64>,
     /// Contacts and pushes, whose forces are excluded.
     pub events: Vec<RunChange>,
 }
 
 impl ReferenceFit {
-    /// The reference from reference runs: parameters fitted to all of them at once, and the size of their forces.
+    /// The reference from reference runs: parameters fitted to all of them at once, and normal equations of each drive,
+    /// which determine how large its forces are.
     ///
     /// Fails without runs, and when a run cannot be fitted.
     pub fn from_reference_runs(model: &Model, reference: &[&PreparedRecording]) -> Outcome<Self> {
@@ -111,7 +115,7 @@ impl ReferenceFit {
         self.values.as_slice()
     }
 
-    /// Sums over the rows of each drive of the reference runs, as measured.
+    /// Normal equations of each drive over the reference runs, from rows that are not scaled by their noise.
     pub fn sizes(&self) -> &[NormalEquations] {
         &self.sizes.0
     }
@@ -131,7 +135,7 @@ impl ReferenceFit {
         RunAnalyser::new(&self.model, &self.payloads)
     }
 
-    /// The sums of a recording.
+    /// The additive statistics of a recording.
     ///
     /// Fails when a force was not measured, or the recording cannot be evaluated.
     pub fn sums(&self, recording: &PreparedRecording) -> Outcome<RunSums> {
@@ -146,8 +150,9 @@ impl ReferenceFit {
         })
     }
 
-    /// The base parameters from an R factor, with those known from the file. Standard deviations assume independent
-    /// rows of variance 1, or more if they scatter more.
+    /// All base parameters from an R factor over rows of variance 1 ([`RunSums::base`]); those known from the file are
+    /// included. Standard deviations assume independent rows. If the variance of the residual is larger than 1, they
+    /// are increased accordingly.
     ///
     /// Fails when the R factor belongs to another model or has no rows.
     pub fn fit_parameters(&self, base: &RFactor) -> Outcome<Vec<FittedValue>> {
@@ -172,8 +177,8 @@ impl ReferenceFit {
         }))
     }
 
-    /// Changes of later runs relative to those before, the largest first. `within` is the difference between parts
-    /// of one run, or between runs that are assumed to be equal.
+    /// Changes of later runs relative to those before, the largest first. `within` is the difference that is expected
+    /// without a change: between parts of one run ([`RunSums::within`]), or between runs that are assumed to be equal.
     pub fn changes(&self, before: &[NormalEquations], later: &[NormalEquations], within: f64) -> Vec<RunChange> {
         let bench = self.analyser();
         let runs = RunPair {
@@ -184,20 +189,21 @@ impl ReferenceFit {
         bench.identified_changes(&bench.significant_changes(&runs, &self.sizes), &self.values)
     }
 
-    /// The gain of every possible change, each alone, in explaining what a later run does not share with those
-    /// before: sums of squares over the variance of the residual. The order is always the same.
+    /// For every possible change, how much it alone explains of the difference between a later run and those before.
+    /// The figure is the decrease of the sum of squared residuals, relative to the variance of the residual. The order
+    /// of the changes is always the same.
     pub fn gains(&self, before: &[NormalEquations], later: &NormalEquations) -> Vec<f64> {
         single_change_gains(&pair_runs(before, later), &self.analyser().search)
     }
 
-    /// One of these changes, by its index, whatever it explains.
+    /// Fits one change of the list of [`ReferenceFit::gains`], by its index, even if it explains nothing.
     pub fn single_change(&self, before: &[NormalEquations], later: &NormalEquations, which: usize) -> RunChange {
         let bench = self.analyser();
         let found = fit_single_change(&pair_runs(before, later), &bench.search, which);
         changes::identified_change(&self.model, &bench.possible, &found, &self.values)
     }
 
-    /// The name of one of these changes.
+    /// Name of one change of the list of [`ReferenceFit::gains`], by its index; empty if there is no such index.
     pub fn name_of_change(&self, which: usize) -> String {
         self.analyser()
             .possible

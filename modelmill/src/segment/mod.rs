@@ -28,7 +28,8 @@ pub struct RecordingSegment {
     pub weights: Option<Vec<f64>>,
     /// Load of the drives, `[drive][sample]`, for effects that depend on it; `None` stands for the measured forces.
     pub load: Option<Vec<Vec<f64>>>,
-    /// The options that read all angles in degrees; empty if the segment was not read from a file.
+    /// Remedy if the audit finds that angles are in degrees: the reading options that convert all angles to rad. Empty
+    /// if the segment was not read from a file.
     pub maps_from_degrees: Vec<OptionSetting>,
     /// Disturbances that were found in the recording.
     pub faults: Vec<Disturbance>,

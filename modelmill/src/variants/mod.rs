@@ -88,10 +88,12 @@ impl VariantComparison {
         ModelCounterparts::match_models(models).map(|_| ())
     }
 
-    /// Compares two models along the motions of recordings: `runs` are the same recordings, read for the first and
-    /// for the second model. Motions are those of the first, base parameters those of the files. Effects that
-    /// depend on the load use the force of their own model without these effects, so that a recording needs no
-    /// forces.
+    /// Compares two models along the motions of recordings: `runs` are the same recordings, read for the first and for
+    /// the second model. The motions of the first reading are used for both models, and the base parameters are those
+    /// of the files.
+    ///
+    /// Measured forces are not needed. Effects that depend on the load of a drive get a calculated load: the force of
+    /// their own model without these effects.
     ///
     /// Fails when the models do not have the same active coordinates, have no drive in common, or cannot follow
     /// a motion.

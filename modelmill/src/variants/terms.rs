@@ -22,7 +22,8 @@ use crate::segment::RecordingSegment;
 /// the share of a single summand, it does not depend on which columns are retained.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProductShare {
-    /// The product of p_g, eq. (5), such as `mP`; an expression of p_min if its value was identified as one number.
+    /// The product of p_g, eq. (5), such as `mP`. If a base parameter has an identified value in one of the models, its
+    /// products are not known separately. Then its expression is used.
     pub product: String,
     /// Its share, 1 for the complete difference.
     pub share: f64,
@@ -45,8 +46,8 @@ pub struct TermShare {
     pub after: Option<f64>,
     /// Its share.
     pub share: f64,
-    /// The part of the share from its value; the rest is from its column, which other geometry and other constants
-    /// of effects change.
+    /// The part of the share due to the change of its value. The rest is due to the change of its regressor column, by
+    /// other geometry or other constants of effects.
     pub by_value: f64,
 }
 

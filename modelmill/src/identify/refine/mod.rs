@@ -23,8 +23,8 @@ pub enum EstimateRefinement {
     None,
     /// Nominal values as a prior, with this relative standard deviation of each product of parameters.
     Prior(f64),
-    /// Only parameters that bodies can have (positive definite pseudo-inertias), nearest to the nominal ones. This
-    /// also gives all physical parameters.
+    /// Physically consistent parameters: the pseudo-inertia of every body is positive definite. Where the recordings do
+    /// not determine the parameters, the nominal values do. The result also contains all physical parameters.
     Physical,
     /// Base parameters that the recordings do not support are removed one by one, as long as the residual does not rise
     /// significantly.
@@ -36,12 +36,12 @@ pub enum EstimateRefinement {
 pub enum RefinementResult {
     /// No refinement.
     Nothing,
-    /// Removed parameters, by index among the unknown ones, and the rise of the residual.
+    /// Removed parameters, by index among the unknown ones, and the relative increase of the residual norm (0.01 for 1
+    /// per cent).
     Essential(Vec<DroppedParameter>, f64),
     /// Relative standard deviation of the prior, and the number of base parameters with a prior.
     Prior(f64, usize),
-    /// Physical parameters that bodies can have, the names of the bodies, and the residual norm without this
-    /// constraint.
+    /// Physically consistent parameters, the names of the bodies, and the residual norm without this constraint.
     Physical(Box<PhysicalParameters>, Vec<String>, f64),
 }
 
