@@ -41,7 +41,8 @@ pub struct NewEffect {
 pub struct NewParameter {
     /// Its symbol in the kind.
     pub symbol: String,
-    /// Its name if that is not to be `symbol_place`. The name of an existing parameter shares that parameter.
+    /// Its name in the model file; `None` for the default `symbol_place`. If a parameter of this name exists, the
+    /// effect uses that parameter.
     pub name: Option<String>,
     /// Nominal value in SI units.
     pub nominal: Option<f64>,

@@ -207,7 +207,8 @@ pub struct KindParameter {
     pub symbol: String,
     /// The sign that it must have.
     pub sign: Sign,
-    /// Units by what the place carries; only where the kind may act.
+    /// Its unit for each kind of load of a place (force, torque, mass, other). Only loads of places where the kind may
+    /// act are included.
     pub units: Vec<(PlaceLoad, String)>,
     /// Remark; may be empty.
     pub note: String,

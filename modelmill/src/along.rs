@@ -150,7 +150,7 @@ fn check_finite(block: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>, PoseFault> {
     }
 }
 
-/// Low-pass filters and decimates every column by the factor of the recording; a column of zeros stays zero.
+/// Applies a low-pass to every column, then decimates it by the factor of the recording; a column of zeros stays zero.
 ///
 /// Fails when a column is too short for the filter.
 pub fn filter_and_decimate(columns: Vec<Vec<f64>>, data: &RecordingSegment) -> Outcome<Vec<Vec<f64>>> {

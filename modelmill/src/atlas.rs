@@ -22,7 +22,8 @@ pub struct AtlasEntry {
     pub title: String,
     /// Numbers of revolute and of prismatic joints, including passive ones (determined by loop closure).
     pub joints: [usize; 2],
-    /// Number of free bodies: bodies without a joint to the base.
+    /// Number of free bodies (with six degrees of freedom) whose orientation is a quaternion. The coordinates of a free
+    /// body with three angles are counted in `joints`.
     pub free: usize,
     /// Number of passive coordinates (determined by loop closure).
     pub passive: usize,
@@ -32,7 +33,7 @@ pub struct AtlasEntry {
     pub drives: usize,
     /// Numbers of base parameters of the bodies for arbitrary values of the constants: with gravity and without.
     pub base: [usize; 2],
-    /// The numeric rank, eq. (9), of the same regressor at the file's values, with gravity.
+    /// The numeric rank, eq. (9), of the bodies' regressor at the file's values, with gravity.
     pub at_values: usize,
     /// Whether the reduction is exact for arbitrary values of the constants; otherwise it is numeric.
     pub is_exact: bool,

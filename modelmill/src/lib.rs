@@ -49,7 +49,7 @@
 //! | method | what it does |
 //! |---|---|
 //! | [`Model::check`] | summary of the model, and the numeric rank of its regressor (over random states) compared with the exact rank |
-//! | [`model::ModelChanges::from_models`] | entries, base parameters and operation counts that differ between a model and its variant |
+//! | [`model::ModelChanges::from_models`] | entries of the model file, base parameters and operation counts that differ between a model and its variant |
 //! | [`variants::VariantComparison::along_recordings`] | forces, power, work, utilisation of limits, and errors of two variants |
 //! | [`Host::kinds`] | the kinds of effects that a model may have |
 //! | [`Model::with_added_effects`] | the model with effects added to its file |

@@ -1,4 +1,4 @@
-//! `reduce`: reduces a full-body rig to a planar model and measures the error of every approximation.
+//! `reduce`: reduces a rig with spatial bodies to a planar model and measures the error of every approximation.
 
 use std::path::Path;
 

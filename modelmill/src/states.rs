@@ -68,9 +68,10 @@ pub enum ModelFunction {
     InverseDynamics,
     /// H_min of eq. (4): a row for each drive, a column for each base parameter.
     Regressor,
-    /// M of `J' f = M q'' + b`: a row and a column for each active coordinate.
+    /// M of `J^T f = M q'' + b`: a row and a column for each active coordinate. f are the forces of the drives; J is
+    /// the Jacobian of their coordinates with respect to the active coordinates.
     MassMatrix,
-    /// b of `J' f = M q'' + b`: generalised forces of rates, gravity and effects, one for each active coordinate.
+    /// b of `J^T f = M q'' + b`: generalised forces of rates, gravity and effects, one for each active coordinate.
     Bias,
     /// Accelerations of the active coordinates for given forces of the drives, rad/s^2 or m/s^2.
     ForwardDynamics,

@@ -142,8 +142,8 @@ pub struct CandidateOutcome {
     pub effect: LocatedEffect,
     /// Share of the squared error of the unchanged model that it explains alone, 0 to 1.
     pub explained: f64,
-    /// Gain in addition to the effects found, on data that was not fitted where it was tested there; for an effect that
-    /// was found, the loss without it.
+    /// Relative decrease of the squared error if the candidate is added to the other effects found. It is computed on
+    /// data that was not fitted if the effect was found or the search tested it, otherwise on the fitted data.
     pub gain: f64,
     /// Why it was rejected; `None` if it was found.
     pub rejection_reason: Option<RejectionReason>,
@@ -166,8 +166,8 @@ pub struct ModelDiagnosis {
     pub effects: Vec<IdentifiedEffect>,
     /// All candidates: first those that were found, then by the share that they explain alone.
     pub candidates: Vec<CandidateOutcome>,
-    /// Effects that the recordings cannot decide: a force as large as the drive's own would be absorbed by columns of
-    /// the model.
+    /// Effects that the recordings can neither show nor exclude. Even if such an effect had a force as large as that of
+    /// the drive, the part of it that the other columns cannot reproduce would be too small to detect.
     pub undetermined_effects: Vec<LocatedEffect>,
     /// Residual of the last set, `[channel][sample]`, N or N m.
     pub residual: Vec<Vec<f64>>,

@@ -36,7 +36,8 @@ pub enum ParameterStatus {
     /// The recordings determine it.
     #[default]
     Identified,
-    /// The recordings do not determine it: the value is the nearest to the nominal ones that fits.
+    /// The recordings do not determine it. Of all values that fit equally well, it is the one nearest to the nominal
+    /// values.
     Undetermined,
     /// Fixed at its nominal value, or at 0 without one, as the recordings do not support another value in addition to
     /// the other parameters (`identify --essential`).

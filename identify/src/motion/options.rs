@@ -32,7 +32,7 @@ pub enum SmoothingMethod {
     },
 }
 
-/// Options for preparing states from a recording. The default fits a file of positions.
+/// Options for preparing states from a recording. The default is suitable for a file that contains only positions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct StatePreparation {
@@ -44,7 +44,8 @@ pub struct StatePreparation {
     /// anything was filtered, but at most a sixth of the recording. Transients fall tenfold in each period, to 0.1 %
     /// of the acceleration.
     pub trim: Option<(usize, usize)>,
-    /// Every how many samples one is kept, after the parallel filter on the regressor and the forces; 1 keeps all.
+    /// Factor of decimation: one of so many samples is kept, after the parallel filter on the regressor and the forces.
+    /// 1 keeps all.
     pub decimate: usize,
     /// Which derivatives are prepared and which are read.
     pub source: DerivativeSource,
@@ -53,8 +54,8 @@ pub struct StatePreparation {
     /// Highest frequency at which forces are compared in addition to the raw figures, Hz; `None` for the cut-off or
     /// the band of the motion.
     pub band_hz: Option<f64>,
-    /// Whether cut-off, smoothing and decimation were chosen by their error of the forces, instead of given by the
-    /// user.
+    /// Whether the library chose cut-off, smoothing and decimation by the residual of the forces. Otherwise the user
+    /// gave them, or they follow from the signal.
     #[serde(skip)]
     pub chosen: bool,
     /// Whether the search for a period is omitted, as for thousands of recordings that are prepared in the same way.

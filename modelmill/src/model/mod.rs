@@ -548,8 +548,8 @@ impl Model {
         )
     }
 
-    /// Kinds of the model's effects whose force depends on the load of the drive. An effect appears once for each entry
-    /// in the file.
+    /// Kinds of the model's effects whose force depends on the load of the drive. A kind appears once for each effect
+    /// of this kind in the file.
     pub fn load_dependent_effects(&self) -> Vec<&str> {
         let effects = self.derivation.mechanism.effects.iter();
         effects

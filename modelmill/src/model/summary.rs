@@ -71,8 +71,8 @@ pub struct ModelSummary {
     pub passive: Vec<String>,
     /// Names of the loops.
     pub loops: Vec<String>,
-    /// Names of the drives. Drives without rows of their own in the regressor are included. A mechanism has these if it
-    /// has more drives than degrees of freedom, such as cables.
+    /// Names of all drives. A mechanism with more drives than degrees of freedom, such as a cable robot, has drives
+    /// without rows of their own in the regressor. These are included.
     pub drives: Vec<String>,
     /// Names of the regressor rows without an actuator.
     pub undriven: Vec<String>,

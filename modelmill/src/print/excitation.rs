@@ -21,7 +21,8 @@ impl ExcitationResult {
     /// - `condition_number` of the regressor, `start` for the best random trajectory, `scaled_condition_number`
     ///   with columns of equal norm
     /// - `value` and `ends`: the criterion at the result, and at the end of each local search
-    /// - `limits`: the fraction of each limit that is used (1 at the limit), and whether it is proven for all times
+    /// - `limits`: the fraction of each limit that is used (1 at the limit), and whether a bound proves
+    ///   this for all times (otherwise it was checked at fine samples)
     /// - `coefficients`: offset and Fourier coefficients of each coordinate (m or rad); `period` is in s
     pub fn json(&self) -> Value {
         let found = &self.found;

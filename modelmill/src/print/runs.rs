@@ -16,7 +16,7 @@ impl RunsComparison {
     /// - `together`: base parameters of one fit to all runs; `runs`: those of each run fitted separately
     /// - `moved`: base parameters that differ between the first run and another, in standard deviations (`sigmas`)
     /// - `changes`: physical changes of a run relative to the first
-    /// - `change_points`: lasting changes, from four runs on
+    /// - `change_points`: permanent changes; they are searched for if there are at least four runs
     /// - `unread`: files that could not be evaluated, with the reason
     /// - `per_run`: the fit of all runs at once in which some values are separate for each run, if it was requested
     pub fn json(&self, spelling: &dyn RemedySpelling) -> Value {

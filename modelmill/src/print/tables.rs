@@ -66,8 +66,8 @@ pub fn expressions(indent: usize, model: &Model) -> Vec<String> {
 }
 
 /// Error figures of several comparisons: a line for all drives together, where they have one unit, and a line for each
-/// drive. Errors are in the unit of the force, `nrms` and its like relative to it. If a fit used decimated samples, the
-/// error figures of these follow as a second table.
+/// drive. `rms` and `largest` are in the unit of the force; the other figures are relative to the force. If a fit used
+/// decimated samples, the error figures of these follow as a second table.
 pub fn figures(named: &[(&str, &ErrorFigures)]) -> Vec<String> {
     let mut rows = Vec::new();
     // The name stands in the first row of its comparison only.

@@ -71,7 +71,7 @@ pub enum PhysicalChange {
     Scale {
         /// The drive.
         drive: String,
-        /// The factor; 1 without a change.
+        /// Scale of the measured force in this run, divided by its scale in the first run; 1 without a change.
         factor: ChangeEstimate,
     },
     /// A changed clock of the time stamps.
@@ -142,7 +142,8 @@ pub struct RunChange {
     /// Increase of the sum of squared residuals if the change is omitted, relative to the variance of the residual. 0
     /// for events, which are found separately.
     pub gain: f64,
-    /// Unit of its values, if that depends on the drive or coordinate.
+    /// Unit of the force or coordinate that changed, for [`PhysicalChange::parts`]: `m` for a load, `1` for the clock,
+    /// `s` for an event.
     pub unit: &'static str,
     /// Names of other changes that explain the difference between the runs nearly as well.
     pub rivals: Vec<String>,

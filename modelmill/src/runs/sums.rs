@@ -44,8 +44,9 @@ pub struct RunSums {
     pub total: NormalEquations,
     /// The R factor of the base columns alone, over the same rows.
     pub base: RFactor,
-    /// Largest sum of squares that a change between parts of this run would explain, per effective row. A difference
-    /// between two runs is a change only if it is clearly larger.
+    /// Differences within this run, for comparison: parts of it are compared as if they were different runs. The value
+    /// is the largest sum of squares that a single change between them explains, divided by the effective number of
+    /// rows. A difference between two runs is a change only if it is clearly larger.
     pub within: f64,
     /// Residual of each drive relative to its force (rms over rms, 1), with base parameters fitted to this run alone.
     pub residual_ratios: Vec<f64>,
@@ -54,8 +55,8 @@ pub struct RunSums {
 }
 
 impl ReferenceFit {
-    /// The reference from reference runs: parameters fitted to all of them at once, and normal equations of each drive,
-    /// which determine how large its forces are.
+    /// The reference from reference runs: parameters fitted to all of them at once, and normal equations of each drive.
+    /// The latter provide the rms force of a drive, with which the force of a change is compared.
     ///
     /// Fails without runs, and when a run cannot be fitted.
     pub fn from_reference_runs(model: &Model, reference: &[&PreparedRecording]) -> Outcome<Self> {

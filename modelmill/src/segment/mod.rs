@@ -132,8 +132,8 @@ impl RecordingSegment {
         &self.run.notes
     }
 
-    /// Calls `visit` with one block of states after the other. The inner result of `visit` is a pose without a
-    /// solution, which becomes an error with its place in the recording.
+    /// Calls `visit` with one block of states after the other. `visit` returns a [`PoseFault`] in its inner result if a
+    /// pose has no solution. The fault becomes an error with its place in the recording.
     ///
     /// Fails with the first pose without a solution, with any error of `visit`, and when an effect needs a load
     /// that is missing.

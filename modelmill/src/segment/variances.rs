@@ -1,5 +1,5 @@
-//! Variances of the measured forces, if a recording has them: columns `DRIVE_var`, as an average over many periods
-//! provides them.
+//! Variances of the measured forces, if a recording has the columns `DRIVE_var`. For example, whoever averages a motion
+//! over many periods can compute them.
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};

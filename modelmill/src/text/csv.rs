@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use modelmill_boundary::text::csv_field;
 
-/// A line of names and one line for each sample. Recordings read the names back unchanged, except for control
-/// characters and line breaks, which are replaced.
+/// A line of names and one line for each sample. If the text is read as a recording, the names are the same, except
+/// that control characters and line breaks are replaced.
 ///
 /// # Panics
 /// If a column is shorter than the first.

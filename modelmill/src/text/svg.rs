@@ -170,8 +170,8 @@ impl<'a> SvgFigure<'a> {
 /// An SVG file with the colours of all figures, 900 units wide and `height` units high. The title begins `left` units
 /// from the left edge. `title` and `body` are SVG text.
 ///
-/// CSS classes for `body` are `c0`, `c1` and `c2` for curves, discs and their names, `zero` for lines, `scale` for
-/// small text, and `part` for marked areas.
+/// CSS classes for `body`: `c0`, `c1` and `c2` set the colour of curves, of filled circles and of their labels. `zero`
+/// is for lines, `scale` for small text, and `part` for marked areas.
 pub fn sheet(title: &str, left: f64, height: f64, body: &str) -> String {
     format!(
         r#"<svg xmlns="http://www.w3.org/2000/svg" class="figure" role="img" aria-label="{title}" viewBox="0 0 {WIDTH} {height:.0}">

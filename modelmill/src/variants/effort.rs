@@ -1,6 +1,6 @@
 //! Requirements on a drive along motions: force, power and work.
 
-/// Requirements on a drive. Power is force times the rate along which the drive acts.
+/// Requirements on a drive. Power is the force of the drive times its rate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DriveEffort {
     /// The largest magnitude of the force, N or N m.
