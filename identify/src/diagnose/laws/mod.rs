@@ -328,7 +328,7 @@ fn without_motion(site: LawSite) -> LawSite {
 fn drop_effects_on(bench: &EffectSelector<'_>, picks: &[SelectedEffect], open: &[usize]) -> Vec<SelectedEffect> {
     let stays = |pick: &&SelectedEffect| {
         let channels = bench.affected_channels(std::slice::from_ref(*pick));
-        bench.candidate(pick).nature == CandidateNature::Disturbance || channels.iter().all(|d| !open.contains(d))
+        bench.candidate(pick).nature.is_disturbance() || channels.iter().all(|d| !open.contains(d))
     };
     picks.iter().filter(stays).cloned().collect()
 }
