@@ -141,14 +141,17 @@ impl EffectSelector<'_> {
             let model = left * again[d];
             let force = problem.measured_force(d);
             let removed = problem.removed.get(d).copied().unwrap_or(0.0);
+            // What follows the time without being stationary is no noise.
+            let found = time_residual(problem, d, rest, again[d]);
+            let noise = found.as_ref().map_or(left - model, |found| found.noise.powi(2));
+            let in_time_power = (left - model - noise).max(0.0);
             let budget = ResidualBudget {
-                noise: (left - model).max(0.0).sqrt(),
-                non_repeatable: (size(&disturbed) + removed).sqrt(),
+                noise: noise.max(0.0).sqrt(),
+                non_repeatable: (size(&disturbed) + removed + in_time_power).sqrt(),
                 model: model.sqrt(),
                 force: size(&force).sqrt(),
             };
-            // What follows the time without being stationary is no noise.
-            match time_residual(problem, d, rest, again[d]) {
+            match found {
                 Some(found) => in_time.push(found),
                 None => coloured.extend(self.coloured_noise(d, rest, again[d])),
             }

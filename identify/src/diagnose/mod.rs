@@ -225,7 +225,10 @@ pub fn diagnose(problem: &mut DiagnosisProblem, supply: &dyn ColumnProvider) -> 
 impl DiagnosisProblem {
     /// Adds changes in time to the candidates; they replace earlier ones of the same kind and place.
     fn add_changes(&mut self, found: Vec<FoundChange>) {
-        for FoundChange { candidate, intervals } in found {
+        for FoundChange {
+            candidate, intervals, ..
+        } in found
+        {
             let effect = candidate.effect.clone();
             self.change_intervals.retain(|(other, _)| *other != effect);
             self.change_intervals.push((effect, intervals));

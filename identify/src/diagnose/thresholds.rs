@@ -233,11 +233,18 @@ pub(super) const CHANGE_LEAST_ADVANTAGE: f64 = 1.1;
 /// An interval must explain this many times what a step explains (1), since it has a second time. By judgement.
 pub(super) const INTERVAL_LEAST_ADVANTAGE: f64 = 1.3;
 
+/// A change with fewer parameters is kept if it explains this share of what the more general one explains (1). By
+/// judgement.
+pub(super) const SIMPLER_CHANGE_SHARE: f64 = 0.9;
+
 // --- residual that follows the time
 
 /// A residual is tested for a part that follows the time if its variance is this many times that of the white noise
 /// (1): twice the noise. By the truth sets of `beyond`: no error above twice the noise is adequate.
 pub(super) const TIME_RESIDUAL_LEAST_NOISE_RATIO: f64 = 4.0;
+
+/// Fewest samples of a window. By judgement: outliers that a filter has spread cover a few samples only.
+pub(super) const WINDOW_FEWEST_SAMPLES: f64 = 25.0;
 
 /// A window is loud if its power is this many times the median power (1). By judgement: with eight independent samples
 /// in a window, stationary noise exceeds four times its median in one window of 100.

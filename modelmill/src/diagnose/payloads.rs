@@ -110,28 +110,41 @@ pub(crate) fn payloads(model: &Model, loads: &[FrameLoad]) -> Vec<CandidateEffec
     candidates
 }
 
-/// A load that is taken or put down during a recording: mass and first moments on each frame on which they act.
-pub(crate) fn load_changes(loads: &[FrameLoad]) -> impl Iterator<Item = ChangeShape> {
-    loads.iter().filter_map(|load| {
-        let acting = (0..POINT_MASS_PARAMETERS).filter(|k| !load.columns[*k].is_zero());
-        let acting: Vec<usize> = acting.collect();
-        let parameter = |k: &usize| {
-            let (symbol, unit, _) = PARAMETERS[*k];
-            EffectParameter {
-                symbol: symbol.to_owned(),
-                unit: unit.to_owned(),
-                // A load may be put down as well.
-                sign: SignConstraint::Any,
-            }
+/// Symbols of the inertia of a load about the origin of its frame.
+const INERTIA: [&str; 6] = ["Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"];
+
+/// A load that is taken or put down during a recording: for each frame a point mass, and a body with inertia.
+pub(crate) fn load_changes(loads: &[FrameLoad]) -> Vec<ChangeShape> {
+    let each = loads
+        .iter()
+        .flat_map(|load| [(load, POINT_MASS_PARAMETERS), (load, TEN)]);
+    each.filter_map(|(load, most)| load_change(load, most)).collect()
+}
+
+/// The change of a load with the first `most` of its ten parameters; `None` if none of them acts.
+fn load_change(load: &FrameLoad, most: usize) -> Option<ChangeShape> {
+    let acting: Vec<usize> = (0..most).filter(|k| !load.columns[*k].is_zero()).collect();
+    let parameter = |k: &usize| {
+        let (symbol, unit) = match *k {
+            k @ 0..POINT_MASS_PARAMETERS => (PARAMETERS[k].0, PARAMETERS[k].1),
+            k => (INERTIA[k - POINT_MASS_PARAMETERS], "kg m^2"),
         };
-        (!acting.is_empty()).then(|| ChangeShape {
-            effect: LocatedEffect {
-                kind: "payload_change".to_owned(),
-                at: vec![load.frame.clone()],
-            },
-            parameters: acting.iter().map(parameter).collect(),
-            force: ChangeForce::Columns(acting.iter().map(|k| load.columns[*k].clone()).collect()),
-        })
+        EffectParameter {
+            symbol: symbol.to_owned(),
+            unit: unit.to_owned(),
+            // A load may be put down as well.
+            sign: SignConstraint::Any,
+        }
+    };
+    // A body without first moments is no load.
+    let has_weight = acting.iter().any(|k| *k < POINT_MASS_PARAMETERS);
+    has_weight.then(|| ChangeShape {
+        effect: LocatedEffect {
+            kind: "payload_change".to_owned(),
+            at: vec![load.frame.clone()],
+        },
+        parameters: acting.iter().map(parameter).collect(),
+        force: ChangeForce::Columns(acting.iter().map(|k| load.columns[*k].clone()).collect()),
     })
 }
 

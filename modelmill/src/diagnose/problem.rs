@@ -125,7 +125,10 @@ pub(crate) fn find_missing_effects(
         if held == FixedParameters::All || problem.base.is_empty() {
             further.extend(payloads(model, &loads));
         }
-        problem.change_shapes = load_changes(&loads).chain(signal_changes(&problem, &units)).collect();
+        problem.change_shapes = load_changes(&loads)
+            .into_iter()
+            .chain(signal_changes(&problem, &units))
+            .collect();
     }
     problem.candidates.extend(further);
     // None of these can be an entry of a model file.

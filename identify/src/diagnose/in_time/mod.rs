@@ -19,7 +19,7 @@ use super::problem::{
     CandidateEffect, CandidateNature, ColumnChoice, ColumnSource, DiagnosisProblem, EffectParameter, LocatedEffect,
     SignConstraint,
 };
-use super::thresholds::{CHANGE_LEAST_ADVANTAGE, CHANGE_LEAST_SHARE, INTERVAL_LEAST_ADVANTAGE};
+use super::thresholds::{CHANGE_LEAST_ADVANTAGE, CHANGE_LEAST_SHARE, INTERVAL_LEAST_ADVANTAGE, SIMPLER_CHANGE_SHARE};
 use products::BlockProducts;
 use profile::{TimeProfile, slow_profiles};
 pub(crate) use residual::time_residual;
@@ -63,6 +63,8 @@ pub(crate) struct FoundChange {
     pub(crate) candidate: CandidateEffect,
     /// When it acts.
     pub(crate) intervals: Vec<ChangeInterval>,
+    /// Weighted squares that it explains in all recordings.
+    explained: f64,
 }
 
 /// Changes that explain more of the residual of a set than slow changes of the same shape do. `set` are the columns of
@@ -74,9 +76,23 @@ pub(crate) fn find_changes(problem: &DiagnosisProblem, set: &[&ForceColumn]) -> 
     let Some(products) = BlockProducts::new(problem, set) else {
         return Vec::new();
     };
-    let shapes = problem.change_shapes.iter().enumerate();
-    let found = shapes.filter_map(|(k, shape)| find_change(problem, &products, k, shape));
-    found.collect()
+    let mut found: Vec<FoundChange> = Vec::new();
+    for (k, shape) in problem.change_shapes.iter().enumerate() {
+        let Some(change) = find_change(problem, &products, k, shape) else {
+            continue;
+        };
+        // Of two shapes with the same kind and place the one with fewer columns comes first: it is kept if it explains
+        // nearly as much.
+        let same = found
+            .iter_mut()
+            .find(|other| other.candidate.effect == change.candidate.effect);
+        match same {
+            Some(other) if other.explained < SIMPLER_CHANGE_SHARE * change.explained => *other = change,
+            Some(_) => {}
+            None => found.push(change),
+        }
+    }
+    found
 }
 
 /// Possible changes of each force signal: a jump of its zero and another scale. `units` are those of the forces,
@@ -124,11 +140,13 @@ fn find_change(
     let mut parameters = Vec::new();
     let mut columns = Vec::new();
     let mut intervals = Vec::new();
+    let mut explained = 0.0;
     let times = problem.layout.times();
     for (r, recording) in products.recordings.iter().enumerate() {
-        let Some(profile) = best_profile(products, k, r) else {
+        let Some((gain, profile)) = best_profile(products, k, r) else {
             continue;
         };
+        explained += gain;
         let samples = products.refine_times(k, r, &profile);
         let last = recording.samples.end - 1;
         intervals.push(ChangeInterval {
@@ -161,12 +179,13 @@ fn find_change(
             }]),
         },
         intervals,
+        explained,
     })
 }
 
-/// The step or interval of a shape that explains most in a recording; `None` if it explains too little, or hardly more
+/// The step or interval of a shape that explains most in a recording, with the squares that it explains; `None` if it explains too little, or hardly more
 /// than a slow change.
-fn best_profile(products: &BlockProducts<'_>, shape: usize, recording: usize) -> Option<TimeProfile> {
+fn best_profile(products: &BlockProducts<'_>, shape: usize, recording: usize) -> Option<(f64, TimeProfile)> {
     let blocks = products.recordings[recording].blocks.len();
     let explained = |profile: &TimeProfile| products.explained_squares(shape, recording, &profile.values(blocks));
     let best = |profiles: &mut dyn Iterator<Item = TimeProfile>| {
@@ -175,18 +194,16 @@ fn best_profile(products: &BlockProducts<'_>, shape: usize, recording: usize) ->
     };
     let (gain, step) = best(&mut TimeProfile::steps(blocks))?;
     let total = products.residual_squares(shape, recording);
-    let slow = slow_profiles(blocks)
-        .iter()
-        .map(|values| products.explained_squares(shape, recording, values));
-    let slow = slow.fold(0.0, f64::max);
+    let slow = slow_profiles(blocks).map(|values| products.explained_squares(shape, recording, &values));
+    let slow = slow.into_iter().fold(0.0, f64::max);
     let is_enough = |gain: f64| gain > CHANGE_LEAST_SHARE * total && gain > CHANGE_LEAST_ADVANTAGE * slow;
     // An interval has a second time, so that it must explain clearly more than a step.
     let interval = best(&mut TimeProfile::intervals(blocks));
     match interval {
         Some((of_interval, interval)) if of_interval > INTERVAL_LEAST_ADVANTAGE * gain && is_enough(of_interval) => {
-            Some(interval)
+            Some((of_interval, interval))
         }
-        _ => is_enough(gain).then_some(step),
+        _ => is_enough(gain).then_some((gain, step)),
     }
 }
 

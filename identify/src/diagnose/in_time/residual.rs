@@ -5,6 +5,8 @@
 //! Stationary noise, white or coloured, has the same power at all times and a broad spectrum. What has not is no noise,
 //! however small the part that repeats with the state.
 
+use std::ops::Range;
+
 use serde::Serialize;
 
 use super::super::noise::effective_samples;
@@ -13,7 +15,7 @@ use super::super::problem::DiagnosisProblem;
 use super::super::thresholds::{
     LARGE_RESIDUAL_LEAST_NOISE_RATIO, LARGE_RESIDUAL_LEAST_SHARE, LOUD_LEAST_RATIO, LOUD_LEAST_SHARE,
     LOUD_MOST_DURATION, RESONANCE_HALF_WIDTH, RESONANCE_LEAST_SHARE, RESONANCE_LOWEST_HZ, RESONANCE_MOST_LOW_SHARE,
-    TIME_RESIDUAL_LEAST_NOISE_RATIO,
+    TIME_RESIDUAL_LEAST_NOISE_RATIO, WINDOW_FEWEST_SAMPLES,
 };
 use super::ChangeInterval;
 use crate::signal::{hann_power, median};
@@ -100,7 +102,7 @@ fn loud_intervals(problem: &DiagnosisProblem, rest: &[f64]) -> Option<(Vec<Chang
         .map(|(_, part)| effective_samples(part))
         .sum();
     // A window has several independent samples, so that its power varies little in stationary noise.
-    let wanted = INDEPENDENT * rest.len() as f64 / worth.max(1.0);
+    let wanted = (INDEPENDENT * rest.len() as f64 / worth.max(1.0)).max(WINDOW_FEWEST_SAMPLES);
     let windows = segment_values(problem, rest).flat_map(|(start, part)| {
         let count = (part.len() as f64 / wanted).floor().max(1.0);
         #[expect(
@@ -112,7 +114,7 @@ fn loud_intervals(problem: &DiagnosisProblem, rest: &[f64]) -> Option<(Vec<Chang
         let place = move |k: usize| start + k * part.len() / count;
         (0..count).map(move |k| place(k)..place(k + 1))
     });
-    let windows: Vec<std::ops::Range<usize>> = windows.collect();
+    let windows: Vec<Range<usize>> = windows.collect();
     if windows.len() < FEWEST_WINDOWS {
         return None;
     }
@@ -120,11 +122,12 @@ fn loud_intervals(problem: &DiagnosisProblem, rest: &[f64]) -> Option<(Vec<Chang
         .iter()
         .map(|w| dot(&rest[w.clone()], &rest[w.clone()]))
         .collect();
-    let powers: Vec<f64> = squares
-        .iter()
-        .zip(&windows)
-        .map(|(s, w)| s / w.len().max(1) as f64)
-        .collect();
+    // The median of the squares, so that single outliers make no window loud.
+    let power = |window: &Range<usize>| {
+        let counted = rest[window.clone()].iter().filter(|r| **r != 0.0);
+        median(counted.map(|r| r * r).collect())
+    };
+    let powers: Vec<f64> = windows.iter().map(power).collect();
     let usual = median(powers.clone());
     let loud: Vec<usize> = (0..windows.len())
         .filter(|k| powers[*k] > LOUD_LEAST_RATIO * usual)
