@@ -201,8 +201,7 @@ pub fn diagnose(problem: &mut DiagnosisProblem, supply: &dyn ColumnProvider) -> 
     problem.add_changes(found);
     let (mut diagnosis, later) = diagnose_cleaned(problem, supply, with(cleaned.clone()));
     // A change that is hidden by a large missing effect is visible only in the residual of the effects found.
-    if !later.is_empty() {
-        problem.add_changes(later);
+    if problem.add_changes(later) {
         (diagnosis, _) = diagnose_cleaned(problem, supply, with(cleaned));
     }
     let ModelDiagnosis {
@@ -223,23 +222,25 @@ pub fn diagnose(problem: &mut DiagnosisProblem, supply: &dyn ColumnProvider) -> 
 }
 
 impl DiagnosisProblem {
-    /// Adds changes in time to the candidates; they replace earlier ones of the same kind and place.
-    fn add_changes(&mut self, found: Vec<FoundChange>) {
+    /// Adds changes in time to the candidates. Earlier ones of the same kind and place stay: they were found in more
+    /// recordings, since no effect explained a part of them yet. Returns whether there are new ones.
+    fn add_changes(&mut self, found: Vec<FoundChange>) -> bool {
+        let known = self.candidates.len();
         for FoundChange {
             candidate, intervals, ..
         } in found
         {
-            let effect = candidate.effect.clone();
-            self.change_intervals.retain(|(other, _)| *other != effect);
-            self.change_intervals.push((effect, intervals));
-            let is_same = |other: &CandidateEffect| {
-                other.nature == CandidateNature::ChangeInTime && other.effect == candidate.effect
-            };
-            match self.candidates.iter().position(is_same) {
-                Some(k) => self.candidates[k] = candidate,
-                None => self.candidates.push(candidate),
+            if self
+                .change_intervals
+                .iter()
+                .any(|(effect, _)| *effect == candidate.effect)
+            {
+                continue;
             }
+            self.change_intervals.push((candidate.effect.clone(), intervals));
+            self.candidates.push(candidate);
         }
+        self.candidates.len() > known
     }
 }
 

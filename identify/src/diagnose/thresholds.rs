@@ -243,6 +243,9 @@ pub(super) const SIMPLER_CHANGE_SHARE: f64 = 0.9;
 /// (1): twice the noise. By the truth sets of `beyond`: no error above twice the noise is adequate.
 pub(super) const TIME_RESIDUAL_LEAST_NOISE_RATIO: f64 = 4.0;
 
+/// Below this share of its largest rate a drive is near standstill (1). By judgement.
+pub(super) const STANDSTILL_RATE_SHARE: f64 = 0.02;
+
 /// Fewest samples of a window. By judgement: outliers that a filter has spread cover a few samples only.
 pub(super) const WINDOW_FEWEST_SAMPLES: f64 = 25.0;
 

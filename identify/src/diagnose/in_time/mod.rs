@@ -187,14 +187,17 @@ fn find_change(
 /// than a slow change.
 fn best_profile(products: &BlockProducts<'_>, shape: usize, recording: usize) -> Option<(f64, TimeProfile)> {
     let blocks = products.recordings[recording].blocks.len();
-    let explained = |profile: &TimeProfile| products.explained_squares(shape, recording, &profile.values(blocks));
+    // The level of the recording is free, since the other recordings may have changes too.
+    let level = vec![1.0; blocks];
+    let of_level = products.explained_squares(shape, recording, &[&level]);
+    let explained = |values: &[f64]| products.explained_squares(shape, recording, &[&level, values]) - of_level;
     let best = |profiles: &mut dyn Iterator<Item = TimeProfile>| {
-        let scored = profiles.map(|profile| (explained(&profile), profile));
+        let scored = profiles.map(|profile| (explained(&profile.values(blocks)), profile));
         scored.max_by(|a, b| a.0.total_cmp(&b.0))
     };
     let (gain, step) = best(&mut TimeProfile::steps(blocks))?;
     let total = products.residual_squares(shape, recording);
-    let slow = slow_profiles(blocks).map(|values| products.explained_squares(shape, recording, &values));
+    let slow = slow_profiles(blocks).map(|values| explained(&values));
     let slow = slow.into_iter().fold(0.0, f64::max);
     let is_enough = |gain: f64| gain > CHANGE_LEAST_SHARE * total && gain > CHANGE_LEAST_ADVANTAGE * slow;
     // An interval has a second time, so that it must explain clearly more than a step.

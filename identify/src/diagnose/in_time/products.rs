@@ -133,43 +133,49 @@ impl<'a> BlockProducts<'a> {
         squares.filter(|(d, _)| acts(*d)).map(|(_, squares)| squares).sum()
     }
 
-    /// Decrease of the weighted squares if a shape with a time profile, one value per block, acts in a recording.
-    pub(super) fn explained_squares(&self, shape: usize, recording: usize, profile: &[f64]) -> f64 {
-        let gram = self.reduced_gram(shape, recording, profile);
+    /// Decrease of the weighted squares if a shape acts in a recording with some time profiles, one value per block. Each
+    /// profile has its own parameters.
+    pub(super) fn explained_squares(&self, shape: usize, recording: usize, profiles: &[&[f64]]) -> f64 {
+        let gram = self.reduced_gram(shape, recording, profiles);
         self.squares - solve_gram(&gram).1
     }
 
-    /// Products of a shape with a profile and of the measured forces, with the set projected out.
-    fn reduced_gram(&self, shape: usize, recording: usize, profile: &[f64]) -> DMatrix<f64> {
+    /// Products of a shape with some profiles and of the measured forces, with the set projected out.
+    fn reduced_gram(&self, shape: usize, recording: usize, profiles: &[&[f64]]) -> DMatrix<f64> {
         let n = self.set.len();
         let (start, p) = (self.starts[shape], self.shapes[shape].len());
-        let mut own = DMatrix::zeros(p, p);
-        let mut with_set = DMatrix::zeros(n, p);
-        let mut right = DVector::zeros(p);
-        for (factor, block) in profile.iter().zip(&self.recordings[recording].products) {
-            if *factor == 0.0 {
-                continue;
-            }
+        let m = p * profiles.len();
+        let mut own = DMatrix::zeros(m, m);
+        let mut with_set = DMatrix::zeros(n, m);
+        let mut right = DVector::zeros(m);
+        for (b, block) in self.recordings[recording].products.iter().enumerate() {
             let last = block.ncols() - 1;
-            own += factor * factor * block.view((start, start), (p, p));
-            with_set += *factor * block.view((0, start), (n, p));
-            right += *factor * block.view((start, last), (p, 1)).column(0);
+            for (k, profile) in profiles.iter().enumerate().filter(|(_, profile)| profile[b] != 0.0) {
+                for (l, other) in profiles.iter().enumerate() {
+                    let mut part = own.view_mut((p * k, p * l), (p, p));
+                    part += profile[b] * other[b] * block.view((start, start), (p, p));
+                }
+                let mut part = with_set.view_mut((0, p * k), (n, p));
+                part += profile[b] * block.view((0, start), (n, p));
+                let mut part = right.rows_mut(p * k, p);
+                part += profile[b] * block.view((start, last), (p, 1)).column(0);
+            }
         }
         let halves = self.factor.forward_substitute(&with_set);
         let left = &own - halves.transpose() * &halves;
         right -= with_set.transpose() * &self.factors;
-        let mut gram = left.resize(p + 1, p + 1, 0.0);
-        for i in 0..p {
+        let mut gram = left.resize(m + 1, m + 1, 0.0);
+        for i in 0..m {
             // What remains at the level of rounding belongs to the set.
             if gram[(i, i)] <= DEPENDENT_SHARE * own[(i, i)] {
                 gram.row_mut(i).fill(0.0);
                 gram.column_mut(i).fill(0.0);
                 continue;
             }
-            gram[(i, p)] = right[i];
-            gram[(p, i)] = right[i];
+            gram[(i, m)] = right[i];
+            gram[(m, i)] = right[i];
         }
-        gram[(p, p)] = self.squares;
+        gram[(m, m)] = self.squares;
         gram
     }
 
@@ -177,26 +183,28 @@ impl<'a> BlockProducts<'a> {
     pub(super) fn refine_times(&self, shape: usize, recording: usize, profile: &TimeProfile) -> Range<usize> {
         let cut = &self.recordings[recording];
         let blocks = &cut.blocks;
+        // The change and the level of the recording, with one factor for each column.
         let values = profile.values(blocks.len());
-        let (own, _) = solve_gram(&self.reduced_gram(shape, recording, &values));
-        // Decrease of the squared residual at each sample if the change acts there. The factors of the set change with
-        // those of the change.
+        let level = vec![1.0; blocks.len()];
+        let profiles: [&[f64]; 2] = [&values, &level];
+        let (own, _) = solve_gram(&self.reduced_gram(shape, recording, &profiles));
+        // The factors of the set change with those of the shape.
         let n = self.set.len();
-        let mut with_set = DMatrix::zeros(n, own.len());
+        let p = self.shapes[shape].len();
         let start = self.starts[shape];
-        for (factor, block) in values.iter().zip(&cut.products) {
-            with_set += *factor * block.view((0, start), (n, own.len()));
-        }
-        let all = 0..self.problem.layout.samples();
-        let mut gram = self.set_products(&all);
-        let less = &with_set * &own;
-        for i in 0..n {
-            let right = gram[(i, n)] - less[i];
-            gram[(i, n)] = right;
-            gram[(n, i)] = right;
+        let mut gram = self.set_products(&(0..self.problem.layout.samples()));
+        for (k, profile) in profiles.iter().enumerate() {
+            for (factor, block) in profile.iter().zip(&cut.products) {
+                let less = *factor * block.view((0, start), (n, p)) * own.rows(p * k, p);
+                for i in 0..n {
+                    gram[(i, n)] -= less[i];
+                    gram[(n, i)] -= less[i];
+                }
+            }
         }
         let (factors, _) = solve_gram(&gram);
-        let decrease = self.decrease_by_sample(shape, own.as_slice(), &factors, &cut.samples);
+        let own = [own.rows(0, p), own.rows(p, p)].map(|part| part.iter().copied().collect::<Vec<f64>>());
+        let decrease = self.decrease_by_sample(shape, &own, &factors, &cut.samples);
         let first = cut.samples.start;
         // Sums from each sample on, within one block of the coarse time.
         let about = |block: usize| {
@@ -221,34 +229,39 @@ impl<'a> BlockProducts<'a> {
         begin..end.max(begin + 1)
     }
 
-    /// Decrease of the weighted squared residual at the samples of a recording if a change with known factors acts.
+    /// Decrease of the weighted squared residual at the samples of a recording if a change acts. `own` are the factors of
+    /// the change and of the level of the recording.
     fn decrease_by_sample(
         &self,
         shape: usize,
-        own: &[f64],
+        own: &[Vec<f64>; 2],
         factors: &DVector<f64>,
         samples: &Range<usize>,
     ) -> Vec<f64> {
         let mut decrease = vec![0.0; samples.len()];
         for d in 0..self.weights.len() {
-            let mut change = vec![0.0; samples.len()];
-            let mut acts = false;
-            for (column, factor) in self.shapes[shape].iter().zip(own) {
-                if let Some(values) = &column.0[d] {
-                    acts = true;
-                    for (sum, x) in change.iter_mut().zip(&values[samples.clone()]) {
-                        *sum += factor * x;
-                    }
-                }
-            }
+            let acts = self.shapes[shape].iter().any(|column| column.0[d].is_some());
             if !acts {
                 continue;
             }
+            let [change, level] = own.each_ref().map(|own| {
+                let mut force = vec![0.0; samples.len()];
+                for (column, factor) in self.shapes[shape].iter().zip(own) {
+                    for (sum, x) in force
+                        .iter_mut()
+                        .zip(column.0[d].iter().flat_map(|values| &values[samples.clone()]))
+                    {
+                        *sum += factor * x;
+                    }
+                }
+                force
+            });
             let rest = self.residual_with(d, factors);
             for (k, i) in samples.clone().enumerate() {
                 if !self.excluded[d][i] {
-                    let after = rest[i] - change[k];
-                    decrease[k] += self.weights[d] * (rest[i] * rest[i] - after * after);
+                    let before = rest[i] - level[k];
+                    let after = before - change[k];
+                    decrease[k] += self.weights[d] * (before * before - after * after);
                 }
             }
         }

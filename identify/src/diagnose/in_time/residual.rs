@@ -15,7 +15,7 @@ use super::super::problem::DiagnosisProblem;
 use super::super::thresholds::{
     LARGE_RESIDUAL_LEAST_NOISE_RATIO, LARGE_RESIDUAL_LEAST_SHARE, LOUD_LEAST_RATIO, LOUD_LEAST_SHARE,
     LOUD_MOST_DURATION, RESONANCE_HALF_WIDTH, RESONANCE_LEAST_SHARE, RESONANCE_LOWEST_HZ, RESONANCE_MOST_LOW_SHARE,
-    TIME_RESIDUAL_LEAST_NOISE_RATIO, WINDOW_FEWEST_SAMPLES,
+    STANDSTILL_RATE_SHARE, TIME_RESIDUAL_LEAST_NOISE_RATIO, WINDOW_FEWEST_SAMPLES,
 };
 use super::ChangeInterval;
 use crate::signal::{hann_power, median};
@@ -61,6 +61,9 @@ pub(crate) fn time_residual(
     rest: &[f64],
     again: f64,
 ) -> Option<TimeResidual> {
+    // Near standstill dry friction takes any value, which is neither noise nor a function of the time.
+    let moving = without_standstill(problem, channel, rest);
+    let rest = moving.as_slice();
     let counted = rest.iter().filter(|r| **r != 0.0).count().max(1) as f64;
     let variance = dot(rest, rest) / counted * (1.0 - again);
     let noise = problem.noise[channel];
@@ -92,6 +95,25 @@ pub(crate) fn time_residual(
     let is_large =
         variance > LARGE_RESIDUAL_LEAST_SHARE * size && variance > LARGE_RESIDUAL_LEAST_NOISE_RATIO * noise * noise;
     is_large.then(|| one(ResidualCharacter::Large, variance.sqrt()))
+}
+
+/// A residual with zeros where the drive of its channel stands still or nearly so.
+fn without_standstill(problem: &DiagnosisProblem, channel: usize, rest: &[f64]) -> Vec<f64> {
+    let rates = problem.friction.get(3 * channel);
+    let Some(rates) = rates.and_then(|column| column.0[channel].as_ref()) else {
+        return rest.to_vec();
+    };
+    let fastest = rates.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+    let pairs = rest.iter().zip(rates);
+    pairs
+        .map(|(r, v)| {
+            if v.abs() < STANDSTILL_RATE_SHARE * fastest {
+                0.0
+            } else {
+                *r
+            }
+        })
+        .collect()
 }
 
 /// Intervals that have most of the squares of a residual and are far louder than the rest of the time, with the rms
