@@ -253,6 +253,7 @@ mod tests {
                 segments: vec![SampleSegment {
                     name: "run".into(),
                     samples: base.len(),
+                    start: 0.0,
                     step: 0.004,
                     recorded_step: 0.004,
                     is_check: false,

@@ -41,6 +41,7 @@ mod factored;
 mod fit_dependent;
 mod force_signals;
 mod hum;
+mod in_time;
 mod laws;
 mod noise;
 mod numbered;
@@ -67,6 +68,7 @@ pub use disturbance::{Disturbance, EstimatedQuantity, ResidualBudget};
 pub use drifts::drift_candidates;
 pub use evidence::SelectionEvidence;
 pub use force_signals::reading_fault_candidates;
+pub use in_time::{ChangeForce, ChangeInterval, ChangeShape, ResidualCharacter, TimeResidual, signal_changes};
 pub use laws::{LawFactor, LawProduct, LawProposal, LawShape, LawSite, LawTerm, LawVariable, SiteLaw};
 pub use noise::{effective_samples, white_noise};
 pub use problem::{
@@ -79,6 +81,7 @@ pub use thresholds::FORCE_ROUNDING;
 pub use tilt::{ForceSensitivity, TiltCandidate};
 
 use bench::{EffectSelector, SelectedEffect};
+use in_time::FoundChange;
 use pool::{FitScope, dot};
 use reproducible::repeatable_shares;
 use thresholds::{EFFECT_LEAST_UNEXPLAINED_RATIO, LEAST_GAIN, REPLACING_LAW_LEAST_SHARE};
@@ -175,6 +178,8 @@ pub struct ModelDiagnosis {
     pub repeatable_share: Vec<f64>,
     /// Indices of the channels whose residual is unexplained.
     pub unexplained: Vec<usize>,
+    /// Residuals that follow the time and not the state, and that cannot be noise.
+    pub time_residuals: Vec<TimeResidual>,
     /// Places on which proposed laws may act; empty unless something is unexplained.
     pub sites: Vec<LawSite>,
     /// Proposed laws that are in no library and would explain the unexplained residual.
@@ -192,7 +197,13 @@ pub fn diagnose(problem: &mut DiagnosisProblem, supply: &dyn ColumnProvider) -> 
     let raw = (problem.measured.clone(), problem.removed.clone());
     let with = |found: Vec<Disturbance>| known.iter().cloned().chain(found).collect();
     let cleaned = cleaning::clean_forces(problem);
-    let diagnosis = diagnose_cleaned(problem, supply, with(cleaned));
+    let found = in_time::find_changes(problem, &problem.base.iter().collect::<Vec<_>>());
+    problem.add_changes(found);
+    let (mut diagnosis, later) = diagnose_cleaned(problem, supply, with(cleaned.clone()));
+    // A change that is hidden by a large missing effect is visible only in the residual of the effects found.
+    if problem.add_changes(later) {
+        (diagnosis, _) = diagnose_cleaned(problem, supply, with(cleaned));
+    }
     let ModelDiagnosis {
         residual: rest,
         repeatable_share: again,
@@ -207,15 +218,39 @@ pub fn diagnose(problem: &mut DiagnosisProblem, supply: &dyn ColumnProvider) -> 
     // Start again from the original forces without that hum.
     (problem.measured, problem.removed) = raw;
     let cleaned = cleaning::clean_with_slow_lines(problem, &slow);
-    diagnose_cleaned(problem, supply, with(cleaned))
+    diagnose_cleaned(problem, supply, with(cleaned)).0
 }
 
-/// The diagnosis of a problem whose forces were cleaned from `disturbances`.
+impl DiagnosisProblem {
+    /// Adds changes in time to the candidates. Earlier ones of the same kind and place stay: they were found in more
+    /// recordings, since no effect explained a part of them yet. Returns whether there are new ones.
+    fn add_changes(&mut self, found: Vec<FoundChange>) -> bool {
+        let known = self.candidates.len();
+        for FoundChange {
+            candidate, intervals, ..
+        } in found
+        {
+            if self
+                .change_intervals
+                .iter()
+                .any(|(effect, _)| *effect == candidate.effect)
+            {
+                continue;
+            }
+            self.change_intervals.push((candidate.effect.clone(), intervals));
+            self.candidates.push(candidate);
+        }
+        self.candidates.len() > known
+    }
+}
+
+/// The diagnosis of a problem whose forces were cleaned from `disturbances`, and changes in time that show in its
+/// residual but are not among its effects.
 fn diagnose_cleaned(
     problem: &DiagnosisProblem,
     supply: &dyn ColumnProvider,
     mut disturbances: Vec<Disturbance>,
-) -> ModelDiagnosis {
+) -> (ModelDiagnosis, Vec<FoundChange>) {
     let mut bench = EffectSelector::new(problem, supply);
     bench.update_choices(&[]);
     // Stage 1: forward search over sets of effects.
@@ -269,14 +304,14 @@ fn diagnose_cleaned(
     // Stage 4: indistinguishable alternatives, the origin of the residual, disturbances and estimates.
     let aliases = bench.find_aliases(&picks);
     bench.weigh_channels(&picks);
-    let (budgets, coloured) = bench.residual_budgets(&picks, &rest, &again);
+    let (budgets, coloured, time_residuals) = bench.residual_budgets(&picks, &rest, &again);
     disturbances.extend(bench.disturbances(&picks));
     disturbances.extend(coloured);
     let estimates = bench.estimate_parameters(&picks, FitScope::Fit);
     let mut effects = Vec::new();
     for (i, (pick, aliases)) in picks.iter().zip(aliases).enumerate() {
         let candidate = bench.candidate(pick);
-        if candidate.nature == CandidateNature::Disturbance {
+        if candidate.nature.is_disturbance() {
             continue;
         }
         // Only other causes share the probability; another form of the same effect does not.
@@ -295,14 +330,17 @@ fn diagnose_cleaned(
     }
     merge_drifting_friction(&mut effects, &mut disturbances);
     // Unexplained residual decides before effects that were found.
-    let verdict = match (unexplained.is_empty(), effects.is_empty()) {
+    let changes_in_time = (picks.iter()).any(|pick| bench.candidate(pick).nature == CandidateNature::ChangeInTime);
+    let is_explained = unexplained.is_empty() && !changes_in_time && time_residuals.is_empty();
+    let verdict = match (is_explained, effects.is_empty()) {
         (false, _) => DiagnosisVerdict::Unexplained,
         (true, true) => DiagnosisVerdict::Adequate,
         (true, false) => DiagnosisVerdict::MissingEffect,
     };
     let candidates = bench.candidate_outcomes(&picks, &found, &alone);
     let untold = bench.find_undetermined(&picks, &rest);
-    ModelDiagnosis {
+    let later = bench.changes_in_residual(&picks);
+    let diagnosis = ModelDiagnosis {
         verdict,
         noise_floor: noise_floor(&budgets),
         budgets,
@@ -314,9 +352,11 @@ fn diagnose_cleaned(
         residual: rest,
         repeatable_share: again,
         unexplained,
+        time_residuals,
         sites,
         laws,
-    }
+    };
+    (diagnosis, later)
 }
 
 /// Joins friction that is missing and also drifts into one effect: friction that changes with time.
@@ -361,6 +401,15 @@ struct SetResidual {
 }
 
 impl EffectSelector<'_> {
+    /// Changes in time that the residual of a set shows and that are not members of the set.
+    fn changes_in_residual(&self, picks: &[SelectedEffect]) -> Vec<FoundChange> {
+        let columns: Vec<&ForceColumn> = self.columns(picks).iter().map(|k| self.pool.column(*k)).collect();
+        let mut found = in_time::find_changes(self.problem, &columns);
+        let is_member = |effect: &LocatedEffect| picks.iter().any(|pick| self.candidate(pick).effect == *effect);
+        found.retain(|change| !is_member(&change.candidate.effect));
+        found
+    }
+
     /// Residual of a set that is fitted to all samples, with its repeatable share; sets the weights of the channels
     /// from it.
     fn set_residual(&mut self, picks: &[SelectedEffect]) -> SetResidual {

@@ -512,6 +512,7 @@ mod tests {
             segments: vec![SampleSegment {
                 name: String::new(),
                 samples: 50,
+                start: 0.0,
                 step: 0.1,
                 recorded_step: 0.1,
                 is_check: false,
@@ -554,6 +555,7 @@ mod tests {
             segments: vec![SampleSegment {
                 name: String::new(),
                 samples: 50,
+                start: 0.0,
                 step: 0.1,
                 recorded_step: 0.1,
                 is_check: false,

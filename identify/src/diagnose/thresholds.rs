@@ -222,6 +222,63 @@ pub(super) const SLOW_LINE_MOST_REMAINING_SHARE: f64 = 0.5;
 /// Least share of every segment that a slow line must explain before its frequency is refined (1). By judgement.
 pub(super) const SLOW_LINE_LEAST_SEGMENT_SHARE: f64 = 0.3;
 
+// --- changes in time
+
+/// A change in time must explain this share of the squared residual of its recording on its channels (1). By judgement.
+pub(super) const CHANGE_LEAST_SHARE: f64 = 0.05;
+
+/// A step must explain this many times what a slow change of the same shape explains (1): drift is slow. By judgement.
+pub(super) const CHANGE_LEAST_ADVANTAGE: f64 = 1.1;
+
+/// An interval must explain this many times what a step explains (1), since it has a second time. By judgement.
+pub(super) const INTERVAL_LEAST_ADVANTAGE: f64 = 1.3;
+
+/// A change with fewer parameters is kept if it explains this share of what the more general one explains (1). By
+/// judgement.
+pub(super) const SIMPLER_CHANGE_SHARE: f64 = 0.9;
+
+// --- residual that follows the time
+
+/// A residual is tested for a part that follows the time if its variance is this many times that of the white noise
+/// (1): twice the noise. By the truth sets of `beyond`: no error above twice the noise is adequate.
+pub(super) const TIME_RESIDUAL_LEAST_NOISE_RATIO: f64 = 4.0;
+
+/// Below this share of its largest rate a drive is near standstill (1). By judgement.
+pub(super) const STANDSTILL_RATE_SHARE: f64 = 0.02;
+
+/// Fewest samples of a window. By judgement: outliers that a filter has spread cover a few samples only.
+pub(super) const WINDOW_FEWEST_SAMPLES: f64 = 25.0;
+
+/// A window is loud if its power is this many times the median power (1). By judgement: with eight independent samples
+/// in a window, stationary noise exceeds four times its median in one window of 100.
+pub(super) const LOUD_LEAST_RATIO: f64 = 6.0;
+
+/// Loud windows must have this share of the squares (1). By judgement.
+pub(super) const LOUD_LEAST_SHARE: f64 = 0.5;
+
+/// Loud windows may last for this share of the time at most (1); else they are no exception. By judgement.
+pub(super) const LOUD_MOST_DURATION: f64 = 0.4;
+
+/// Half width of the band of a resonance, relative to its frequency (1). By judgement.
+pub(super) const RESONANCE_HALF_WIDTH: f64 = 0.2;
+
+/// Share of the power above the white noise that must lie in this band (1). By judgement: a low-pass leaves at most a
+/// quarter in any such band.
+pub(super) const RESONANCE_LEAST_SHARE: f64 = 0.6;
+
+/// Largest share of the power below half of the frequency (1): coloured noise and drift are low. By judgement.
+pub(super) const RESONANCE_MOST_LOW_SHARE: f64 = 0.2;
+
+/// Lowest frequency of a resonance, Hz: below it lie motions. By judgement.
+pub(super) const RESONANCE_LOWEST_HZ: f64 = 2.0;
+
+/// From this share of the squared force on, a residual that follows the time is too large for noise (1): a tenth of the
+/// force. By judgement.
+pub(super) const LARGE_RESIDUAL_LEAST_SHARE: f64 = 0.01;
+
+/// The same relative to the variance of the white noise (1). By judgement.
+pub(super) const LARGE_RESIDUAL_LEAST_NOISE_RATIO: f64 = 16.0;
+
 // --- proposed laws
 
 /// From this mean square of the residual on, relative to white noise (1), a law is searched even if nothing else shows

@@ -5,7 +5,7 @@ use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
     CandidateOutcome, ColumnChoice, ColumnProvider, ColumnSource, DiagnosisProblem, Disturbance, FORCE_ROUNDING,
     ForceColumn, LawSite, LoadDependentQuery, ModelDiagnosis, RejectionReason, diagnose, drift_candidates,
-    reading_fault_candidates, white_noise,
+    reading_fault_candidates, signal_changes, white_noise,
 };
 
 use crate::along::drive_rates;
@@ -26,7 +26,7 @@ use super::held_friction;
 use super::laws::sites;
 use super::memory::dahl_candidates;
 use super::numbers::{layout, stack, variables};
-use super::payloads::payloads;
+use super::payloads::{frame_loads, load_changes, payloads};
 use super::thresholds::FEWEST_SAMPLES;
 use super::words;
 use crate::regressors::{SegmentList, regressor};
@@ -120,8 +120,15 @@ pub(crate) fn find_missing_effects(
     further.extend(gears(model, &all, &values, &slopes)?);
     further.extend(constants(model, &all, &|k| is_fixed(model, held, k)));
     further.extend(other_friction);
-    if asked.in_full && (held == FixedParameters::All || problem.base.is_empty()) {
-        further.extend(payloads(model, &all)?);
+    if asked.in_full {
+        let loads = frame_loads(model, &all)?;
+        if held == FixedParameters::All || problem.base.is_empty() {
+            further.extend(payloads(model, &loads));
+        }
+        problem.change_shapes = load_changes(&loads)
+            .into_iter()
+            .chain(signal_changes(&problem, &units))
+            .collect();
     }
     problem.candidates.extend(further);
     // None of these can be an entry of a model file.
@@ -189,7 +196,7 @@ struct ColumnSupply<'a> {
 impl ColumnProvider for ColumnSupply<'_> {
     fn columns_for_constant(&self, candidate: usize, constant: f64) -> Option<Vec<ForceColumn>> {
         // Candidates without an entry have no searched constant.
-        let (k, felt) = self.origins[candidate].as_ref()?;
+        let (k, felt) = self.origins.get(candidate)?.as_ref()?;
         let entry = &self.candidates.entries[*k];
         let columns = refined_columns(self.candidates, self.model, self.all, entry, constant)?;
         let kept = columns.into_iter().zip(felt).filter(|(_, felt)| **felt);
@@ -206,7 +213,7 @@ impl ColumnProvider for ColumnSupply<'_> {
         let only = match which {
             LoadDependentQuery::All => None,
             LoadDependentQuery::One(candidate, _) => {
-                let Some((entry, _)) = &self.origins[candidate] else {
+                let Some(Some((entry, _))) = self.origins.get(candidate) else {
                     return Vec::new();
                 };
                 Some(*entry)

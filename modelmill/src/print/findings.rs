@@ -30,6 +30,7 @@ impl DiagnosisFindings {
     /// - `laws`: hypotheses for the residual
     /// - `parameters_off_nominal`: base parameters that differ from the file, in standard deviations (`sigmas`)
     /// - `unexplained`: drives with a repeatable residual that no effect explains
+    /// - `follows_time`: drives with a residual that follows the time and not the state, and cannot be noise
     /// - `data`, `where`: notes on the recordings, and regions where the error is largest
     /// - `with_nominal_parameters`: the diagnosis with all parameters fixed
     pub fn json(&self, spelling: &dyn StepSpelling) -> Value {
@@ -103,6 +104,23 @@ impl DiagnosisFindings {
         let unexplained: Vec<Value> = (diagnosis.unexplained.iter())
             .map(|d| json!({"channel": channels[*d], "reproducible": diagnosis.repeatable_share[*d]}))
             .collect();
+        // Residuals that follow the time and are no noise.
+        let follows_time: Vec<Value> = (diagnosis.time_residuals.iter())
+            .map(|one| {
+                json!({
+                    "channel": channels[one.channel],
+                    "character": one.character,
+                    "rms": one.rms,
+                    "noise": one.noise,
+                    "unit": model.force_unit(one.channel),
+                    "frequency": one.frequency,
+                    "intervals": one.intervals.iter().map(|time| {
+                        json!({"recording": time.recording, "interval": time.interval})
+                    }).collect::<Vec<_>>(),
+                    "says": words::time_residual(one, &channels[one.channel], model.force_unit(one.channel)),
+                })
+            })
+            .collect();
         // Keys are part of the interface; their meaning is listed above.
         json!({
             "model": model.name,
@@ -119,6 +137,7 @@ impl DiagnosisFindings {
             "laws": laws::laws(&self.laws, model, spelling),
             "parameters_off_nominal": off,
             "unexplained": unexplained,
+            "follows_time": follows_time,
             "data": notes(&self.notes, spelling),
             "where": self.regions,
             "with_nominal_parameters": self.with_nominal.as_ref().map(|held| {
@@ -207,6 +226,16 @@ impl DiagnosisFindings {
             for one in &diagnosis.disturbances {
                 let says = format!("{}.", one.description.as_deref().unwrap_or_default());
                 let wrapped = words::lines(&says, 98);
+                lines.extend(wrapped.iter().map(|line| format!("  {line}")));
+            }
+        }
+        if !diagnosis.time_residuals.is_empty() {
+            lines.push(String::new());
+            lines.push(style.bold("Residuals that follow the time and not the state"));
+            for one in &diagnosis.time_residuals {
+                let unit = self.before.model.force_unit(one.channel);
+                let says = words::time_residual(one, &self.channels()[one.channel], unit);
+                let wrapped = words::lines(&format!("{says}."), 98);
                 lines.extend(wrapped.iter().map(|line| format!("  {line}")));
             }
         }
