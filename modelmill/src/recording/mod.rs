@@ -40,7 +40,10 @@ pub use options::RecordingOptions;
 fn read_raw(model: &Model, file: &RecordingFiles, reading: &RecordingOptions) -> Outcome<Raw> {
     let name = file.name();
     // Names of the file are needed to resolve the mapping.
-    let options = read_options(model, reading, &file.names()?, name)?;
+    let (options, notes) = read_options(model, reading, &file.names()?, name)?;
+    for note in &notes {
+        model.host().note(note);
+    }
     let mut raw = model
         .host()
         .run_job(&format!("reading {name}"), 0, |_| file.read(&options))??;
