@@ -13,9 +13,9 @@ use std::fmt;
 
 use num_traits::ToPrimitive;
 
+use crate::column_unit::{split_header_unit, unit_factor};
 use crate::diagnostic::{DiagnosticLog, SourceSpan};
 use crate::exact::ExactFunction;
-use crate::column_unit::{split_header_unit, unit_factor};
 use crate::formula::{FormulaAst, FormulaAstKind};
 use crate::joint_motion::CoordinateMotion;
 use crate::kinds::PlaceLoad;
@@ -198,7 +198,12 @@ pub fn read_column(
     }
     // Names without the unit behind them, where that is not ambiguous.
     let bases = names_without_units(names);
-    let full_name = |name: &str| bases.iter().find(|(base, _)| base == name).map(|(_, full)| full.as_str());
+    let full_name = |name: &str| {
+        bases
+            .iter()
+            .find(|(base, _)| base == name)
+            .map(|(_, full)| full.as_str())
+    };
     if let Some(full) = full_name(body) {
         return Ok(single(full, stated.unwrap_or_else(|| header_factor(full))));
     }
@@ -207,7 +212,11 @@ pub fn read_column(
         nearest: suggest::nearest(column, names.iter().map(String::as_str)).map(str::to_owned),
     };
     // Names with dots cannot be parsed; they are replaced by names that can.
-    let known: Vec<String> = names.iter().cloned().chain(bases.iter().map(|(base, _)| base.clone())).collect();
+    let known: Vec<String> = names
+        .iter()
+        .cloned()
+        .chain(bases.iter().map(|(base, _)| base.clone()))
+        .collect();
     let (plain, stand_ins) = with_plain_names(body, &known);
     let span = SourceSpan {
         file: 0,
@@ -252,12 +261,12 @@ pub fn read_column(
             says: format!("`{body}` contains no column of the recording"),
         });
     }
-    // Units in the names hold for the sum, unless a unit of the sum is stated.
-    let factors: Vec<f64> = sum
-        .terms
-        .iter()
-        .map(|(name, _)| stated.unwrap_or_else(|| header_factor(name)))
-        .collect();
+    sum_in_si(sum, body, &|name| stated.unwrap_or_else(|| header_factor(name)))
+}
+
+/// A sum in SI units; `factor` converts a column of it. Units in the names hold for the number in the sum, too.
+fn sum_in_si(sum: AffineValue, body: &str, factor: &dyn Fn(&str) -> f64) -> Result<ColumnSum, ColumnFault> {
+    let factors: Vec<f64> = sum.terms.iter().map(|(name, _)| factor(name)).collect();
     if sum.offset != 0.0 && factors.windows(2).any(|pair| pair[0].total_cmp(&pair[1]).is_ne()) {
         return Err(ColumnFault::Malformed {
             says: format!(
@@ -268,10 +277,7 @@ pub fn read_column(
     }
     Ok(ColumnSum {
         offset: factors[0] * sum.offset,
-        terms: sum
-            .terms
-            .into_iter()
-            .zip(factors)
+        terms: (sum.terms.into_iter().zip(factors))
             .map(|((name, value), factor)| (name, factor * value))
             .collect(),
     })
@@ -558,7 +564,12 @@ mod tests {
         // Without a number each column has its own unit, with one the unit is not clear.
         let mixed = read("q1 + arm.q3").unwrap();
         assert!((mixed.terms[0].1 - degree).abs() < 1e-16 && (mixed.terms[1].1 - 1.0).abs() < 1e-16);
-        assert!(read("q1 + arm.q3 - 1").unwrap_err().to_string().contains("different units"));
+        assert!(
+            read("q1 + arm.q3 - 1")
+                .unwrap_err()
+                .to_string()
+                .contains("different units")
+        );
         // Two columns of one name are not guessed.
         assert!(read("q5").is_err());
     }

@@ -9,9 +9,9 @@ use std::sync::Arc;
 use modelmill_boundary::files::{FileSource, OpenFile};
 
 use crate::recording::error::{RecordingError, RecordingFault};
-use crate::recording::formats::{LONGEST_STREAM, RecordingFormat, RecordingInput, SIGNATURE_BYTES, format_of};
 #[cfg(feature = "parquet")]
 use crate::recording::formats::{DataSetFiles, ParquetFormat};
+use crate::recording::formats::{LONGEST_STREAM, RecordingFormat, RecordingInput, SIGNATURE_BYTES, format_of};
 use crate::recording::table::{self, MemoryTable};
 use crate::recording::{ReadOptions, SignalRecording, TableInfo, display_name_of_bytes};
 

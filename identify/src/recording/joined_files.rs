@@ -102,7 +102,7 @@ impl RecordingFiles {
         self.check_unique_sources(&names, options)?;
         let mut parts = self.read_parts(&names, options)?;
         let mut notes: Vec<RecordingNote> = parts.iter().flat_map(|part| part.notes().iter().cloned()).collect();
-        let times = self.times_of_parts(&parts, options.time_interval)?;
+        let times = times_of_parts(&parts, options.time_interval)?;
         // Columns keep their values in the parts to be joined; the rest of each column is kept here.
         let mut columns: Vec<(String, SignalColumn)> = Vec::new();
         let mut timed = Vec::new();
@@ -177,54 +177,6 @@ impl RecordingFiles {
         Ok(parts)
     }
 
-    /// The times of every file. A file without times gets those of another one with as many samples. Time stamps are
-    /// counted from the first one of all files.
-    ///
-    /// Fails when the times of a file have other contents than numbers, or no file can lend its times.
-    fn times_of_parts(
-        &self,
-        parts: &[SignalRecording],
-        interval: Option<(f64, f64)>,
-    ) -> Result<Vec<PartTimes>, RecordingError> {
-        let earliest = parts.iter().filter_map(|part| part.zero_stamp).min();
-        let has_time = |part: &SignalRecording| part.has_column("t");
-        let mut is_lent = vec![false; parts.len()];
-        let mut times = Vec::new();
-        for part in parts {
-            let lender = if has_time(part) {
-                part
-            } else {
-                // Rows correspond only if the same ones were read.
-                let fits = |other: &SignalRecording| has_time(other) && has_same_rows(part, other);
-                let Some(lender) = parts.iter().position(fits) else {
-                    let timed = parts.iter().filter(|other| has_time(other));
-                    return Err(part.fault(RecordingFault::NoTimeOfOwn {
-                        samples: part.samples(),
-                        timed: timed.map(|other| other.file.clone()).collect(),
-                    }));
-                };
-                is_lent[lender] = true;
-                &parts[lender]
-            };
-            let shift = match (lender.zero_stamp, earliest) {
-                (Some(zero), Some(earliest)) => zero.wrapping_sub(earliest) as f64 / 1e9,
-                _ => 0.0,
-            };
-            let time = lender.column("t")?.iter().map(|t| t + shift);
-            let is_within = |t: f64| interval.is_none_or(|(from, to)| from <= t && t <= to);
-            let (samples, values) = time.enumerate().filter(|(_, t)| is_within(*t)).unzip();
-            times.push(PartTimes {
-                values,
-                samples,
-                is_lent: false,
-            });
-        }
-        for (time, is_lent) in times.iter_mut().zip(is_lent) {
-            time.is_lent = is_lent;
-        }
-        Ok(times)
-    }
-
     /// Fails when a needed column or a computed column has no unique file.
     fn check_unique_sources(&self, names: &[Vec<String>], options: &ReadOptions) -> Result<(), RecordingError> {
         // The time may be in every file, because it joins them.
@@ -283,6 +235,50 @@ struct PartTimes {
     samples: Vec<usize>,
     /// Whether another file without times uses them as well.
     is_lent: bool,
+}
+
+/// The times of every file. A file without times gets those of another one with as many samples. Time stamps are
+/// counted from the first one of all files.
+///
+/// Fails when the times of a file have other contents than numbers, or no file can lend its times.
+fn times_of_parts(parts: &[SignalRecording], interval: Option<(f64, f64)>) -> Result<Vec<PartTimes>, RecordingError> {
+    let earliest = parts.iter().filter_map(|part| part.zero_stamp).min();
+    let has_time = |part: &SignalRecording| part.has_column("t");
+    let mut is_lent = vec![false; parts.len()];
+    let mut times = Vec::new();
+    for part in parts {
+        let lender = if has_time(part) {
+            part
+        } else {
+            // Rows correspond only if the same ones were read.
+            let fits = |other: &SignalRecording| has_time(other) && has_same_rows(part, other);
+            let Some(lender) = parts.iter().position(fits) else {
+                let timed = parts.iter().filter(|other| has_time(other));
+                return Err(part.fault(RecordingFault::NoTimeOfOwn {
+                    samples: part.samples(),
+                    timed: timed.map(|other| other.file.clone()).collect(),
+                }));
+            };
+            is_lent[lender] = true;
+            &parts[lender]
+        };
+        let shift = match (lender.zero_stamp, earliest) {
+            (Some(zero), Some(earliest)) => zero.wrapping_sub(earliest) as f64 / 1e9,
+            _ => 0.0,
+        };
+        let time = lender.column("t")?.iter().map(|t| t + shift);
+        let is_within = |t: f64| interval.is_none_or(|(from, to)| from <= t && t <= to);
+        let (samples, values) = time.enumerate().filter(|(_, t)| is_within(*t)).unzip();
+        times.push(PartTimes {
+            values,
+            samples,
+            is_lent: false,
+        });
+    }
+    for (time, is_lent) in times.iter_mut().zip(is_lent) {
+        time.is_lent = is_lent;
+    }
+    Ok(times)
 }
 
 /// Whether two files have as many samples, and the same ones were left out.

@@ -66,7 +66,9 @@ pub(crate) fn likely_time_column(names: &[String]) -> Option<(&String, f64)> {
 
 /// A name without a unit of time in brackets, and the factor of the unit.
 fn split_time_unit(name: &str) -> (&str, f64) {
-    let inner = name.strip_suffix([']', ')']).and_then(|name| name.rsplit_once(['[', '(']));
+    let inner = name
+        .strip_suffix([']', ')'])
+        .and_then(|name| name.rsplit_once(['[', '(']));
     let unit = inner.and_then(|(bare, unit)| {
         let found = TIME_UNITS.iter().find(|(known, _)| *known == unit.trim());
         found.map(|(_, factor)| (bare.trim_end(), *factor))

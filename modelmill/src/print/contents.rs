@@ -36,6 +36,13 @@ impl RecordingContents {
         json!({ "file": self.file, "tables": self.tables.iter().map(of_table).collect::<Vec<_>>() })
     }
 
+    /// As [`RecordingContents::json`], with the JSON of a proposal under the key `proposal`.
+    pub fn json_with_proposal(&self, proposal: &Value) -> Value {
+        let mut object = self.json();
+        object["proposal"] = proposal.clone();
+        object
+    }
+
     /// The tables as text: for each a line with its size and time, and a list of its columns.
     pub fn text(&self, style: TerminalStyle) -> String {
         let mut lines = vec![style.bold(&self.file)];
@@ -62,7 +69,10 @@ impl RecordingContents {
             let hidden = rows.len().saturating_sub(MOST_ROWS);
             rows.truncate(MOST_ROWS);
             if hidden > 0 {
-                rows.push(vec![format!("and {hidden} more (JSON output lists all)"), String::new()]);
+                rows.push(vec![
+                    format!("and {hidden} more (JSON output lists all)"),
+                    String::new(),
+                ]);
             }
             if !rows.is_empty() {
                 let head = [("column", ColumnAlignment::Left), ("type", ColumnAlignment::Left)];
@@ -73,10 +83,13 @@ impl RecordingContents {
     }
 }
 
+/// Name of an element of a list, and its place in each list of the name.
+type ListElement<'a> = (&'a str, Vec<usize>);
+
 /// Rows of a table of columns: name and type. Elements of a list share a row with the first and the last of them.
 fn column_rows(columns: &[ColumnInfo]) -> Vec<Vec<String>> {
     // Lists in the order of their first elements.
-    let mut lists: Vec<(&str, Vec<(&str, Vec<usize>)>)> = Vec::new();
+    let mut lists: Vec<(&str, Vec<ListElement<'_>>)> = Vec::new();
     let mut known: BTreeMap<(String, &str), usize> = BTreeMap::new();
     for column in columns {
         let (pattern, places) = split_places(&column.name);
@@ -95,7 +108,11 @@ fn column_rows(columns: &[ColumnInfo]) -> Vec<Vec<String>> {
                 kind.to_owned(),
             ]);
         } else {
-            rows.extend(elements.iter().map(|(name, _)| vec![(*name).to_owned(), kind.to_owned()]));
+            rows.extend(
+                elements
+                    .iter()
+                    .map(|(name, _)| vec![(*name).to_owned(), kind.to_owned()]),
+            );
         }
     }
     rows
@@ -122,7 +139,7 @@ fn split_places(name: &str) -> (String, Vec<usize>) {
 }
 
 /// Whether all places between those of the first and the last element occur, so that these two name all of them.
-fn is_complete_grid(elements: &[(&str, Vec<usize>)]) -> bool {
+fn is_complete_grid(elements: &[ListElement<'_>]) -> bool {
     let (first, last) = (&elements[0].1, &elements[elements.len() - 1].1);
     let sides = first.iter().zip(last).map(|(from, to)| (to + 1).saturating_sub(*from));
     let is_within = |places: &Vec<usize>| {
@@ -130,7 +147,9 @@ fn is_complete_grid(elements: &[(&str, Vec<usize>)]) -> bool {
         all.all(|(place, (from, to))| from <= place && place <= to)
     };
     // Names differ, so that as many elements as places in the grid are all of them.
-    !first.is_empty() && sides.product::<usize>() == elements.len() && elements.iter().all(|(_, places)| is_within(places))
+    !first.is_empty()
+        && sides.product::<usize>() == elements.len()
+        && elements.iter().all(|(_, places)| is_within(places))
 }
 
 #[cfg(test)]
@@ -149,7 +168,8 @@ mod tests {
     /// The lists of a trajectory share two lines, whatever their length.
     #[test]
     fn lists_share_lines() {
-        let point = |i: usize| (1..=6).flat_map(move |j| ["positions", "effort"].map(|f| format!("t.points_{i}.{f}_{j}")));
+        let point =
+            |i: usize| (1..=6).flat_map(move |j| ["positions", "effort"].map(|f| format!("t.points_{i}.{f}_{j}")));
         let names: Vec<String> = (1..=300).flat_map(point).collect();
         assert_eq!(
             rows_of(&names),
@@ -163,7 +183,10 @@ mod tests {
     /// Lists with holes, short lists and other names are not abbreviated, because the ends would not say what is between.
     #[test]
     fn other_names_have_lines_of_their_own() {
-        let names = ["t", "q_1", "q_2", "q_3", "a_1", "a_2", "a_4", "a_5", "x1", "x2", "x3", "x4"].map(str::to_owned);
+        let names = [
+            "t", "q_1", "q_2", "q_3", "a_1", "a_2", "a_4", "a_5", "x1", "x2", "x3", "x4",
+        ]
+        .map(str::to_owned);
         assert_eq!(rows_of(&names).len(), names.len());
     }
 }

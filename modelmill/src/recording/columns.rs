@@ -2,8 +2,8 @@
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{Message, OptionName, Remedy};
-use modelmill_identify::{ComputedColumn, NonFinitePolicy, ReadOptions};
 use modelmill_identify::RecordingNote;
+use modelmill_identify::{ComputedColumn, NonFinitePolicy, ReadOptions};
 use modelmill_spec::{ColumnFault, ColumnQuantity, ColumnSum, read_column, split_header_unit, unit_factor};
 
 use super::options::RecordingOptions;
@@ -171,9 +171,7 @@ impl ColumnMapping {
     fn add(&mut self, ours: &str, sum: ColumnSum) {
         // A rename keeps the numbers of the file unchanged. A second name for one column is a copy of it.
         match sum.terms.as_slice() {
-            [(theirs, factor)]
-                if factor.total_cmp(&1.0).is_eq() && sum.offset == 0.0 && !self.is_renamed(theirs) =>
-            {
+            [(theirs, factor)] if factor.total_cmp(&1.0).is_eq() && sum.offset == 0.0 && !self.is_renamed(theirs) => {
                 self.renames.push((ours.to_owned(), theirs.clone()));
             }
             _ => self.computed.push(ComputedColumn {
@@ -201,17 +199,15 @@ impl ColumnMapping {
             [(theirs, _)] => Some((one.name.as_str(), theirs.as_str())),
             _ => None,
         });
-        let renames = self.renames.iter().map(|(ours, theirs)| (ours.as_str(), theirs.as_str()));
+        let renames = self
+            .renames
+            .iter()
+            .map(|(ours, theirs)| (ours.as_str(), theirs.as_str()));
         renames.chain(computed)
     }
 
     /// Notes on columns that two names share, and on units that do not fit.
-    fn notes(
-        &self,
-        known: &[(String, ColumnQuantity)],
-        torque: &[(String, f64)],
-        file: &str,
-    ) -> Vec<RecordingNote> {
+    fn notes(&self, known: &[(String, ColumnQuantity)], torque: &[(String, f64)], file: &str) -> Vec<RecordingNote> {
         let mut notes = Vec::new();
         let all: Vec<(&str, &str)> = self.single_columns().collect();
         for (k, (ours, theirs)) in all.iter().enumerate() {
@@ -222,7 +218,11 @@ impl ColumnMapping {
             }
         }
         // A motor current becomes a torque by the constant in the model file.
-        for (ours, theirs) in self.renames.iter().filter(|(ours, _)| !torque.iter().any(|(drive, _)| drive == ours)) {
+        for (ours, theirs) in self
+            .renames
+            .iter()
+            .filter(|(ours, _)| !torque.iter().any(|(drive, _)| drive == ours))
+        {
             let unit = split_header_unit(theirs).map(|(_, unit)| unit);
             if let (Some(unit), Some(quantity)) = (unit, quantity_of(known, ours))
                 && unit_factor(unit, quantity).is_none()

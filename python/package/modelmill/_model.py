@@ -663,7 +663,7 @@ class Model:
         Parameters
         ----------
         data
-            A path (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2), a tuple of paths that are joined on time, or a table: a dict of
+            A path (CSV, Parquet, MATLAB, HDF5, MCAP, ROS bags), a tuple of paths that are joined on time, or a table: a dict of
             arrays, a table of pandas or polars, anything with ``__arrow_c_stream__``. It needs ``t`` (s), one column for each
             coordinate (rad or m) and one for each drive (N or N m); ``columns`` gives other names and units.
         name : str, optional

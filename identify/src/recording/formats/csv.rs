@@ -93,7 +93,8 @@ impl RecordingFormat for CsvFormat {
             columns: names.into_iter().zip(kinds).map(info).collect(),
             samples,
             time: span,
-            remark: (!layout.has_names).then(|| "it has no line of names: columns are called by their numbers".to_owned()),
+            remark: (!layout.has_names)
+                .then(|| "it has no line of names: columns are called by their numbers".to_owned()),
         }])
     }
 }

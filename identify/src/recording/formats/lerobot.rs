@@ -99,12 +99,17 @@ fn sample_files(files: &dyn FileSource, folder: &Path) -> Result<Vec<PathBuf>, R
     for chunk in list(&folder.join("data"))? {
         if files.kind(&chunk) == PathKind::Folder {
             let inside = list(&chunk)?;
-            found.extend(inside.into_iter().filter(|path| path.extension().is_some_and(|e| e == "parquet")));
+            found.extend(
+                inside
+                    .into_iter()
+                    .filter(|path| path.extension().is_some_and(|e| e == "parquet")),
+            );
         }
     }
     if found.is_empty() {
         return Err(fault(
-            "it has no files such as `data/chunk-000/episode_000000.parquet`; copy the data of the set as well".to_owned(),
+            "it has no files such as `data/chunk-000/episode_000000.parquet`; copy the data of the set as well"
+                .to_owned(),
         ));
     }
     Ok(found)
@@ -157,7 +162,11 @@ fn element_names(value: &Value) -> Option<Vec<String>> {
             let mut values = map.values();
             let inner = values.next()?;
             // Several groups have no order among each other.
-            if values.next().is_some() { None } else { element_names(inner) }
+            if values.next().is_some() {
+                None
+            } else {
+                element_names(inner)
+            }
         }
         _ => None,
     }

@@ -122,7 +122,10 @@ impl ParquetSource<File> {
 
 impl<R: ChunkReader + 'static> ParquetSource<R> {
     /// An open file of the source with its columns.
-    fn open(&self, file: usize) -> Result<(SerializedFileReader<SharedChunkReader<R>>, ParquetColumns), RecordingFault> {
+    fn open(
+        &self,
+        file: usize,
+    ) -> Result<(SerializedFileReader<SharedChunkReader<R>>, ParquetColumns), RecordingFault> {
         let bytes = &self.files[file];
         let reader = SerializedFileReader::new(SharedChunkReader(bytes.clone())).map_err(parquet_fault)?;
         let columns = ParquetColumns::new(bytes, &reader, &self.elements)?;
@@ -223,7 +226,10 @@ impl ReadProgress {
         let wanted: Vec<bool> = self.columns.leaves.iter().map(is_read).collect();
         // The size of a batch keeps the number of fields in memory small.
         let leaves = self.columns.leaves.iter().zip(&wanted);
-        let n_read: usize = leaves.filter(|(_, is_read)| **is_read).map(|(leaf, _)| leaf.width).sum();
+        let n_read: usize = leaves
+            .filter(|(_, is_read)| **is_read)
+            .map(|(leaf, _)| leaf.width)
+            .sum();
         let most = (FIELDS / n_read.max(1)).clamp(1, BATCH);
         let schema = reader.metadata().file_metadata().schema_descr_ptr();
         // Each group of rows is checked before anything in it is decompressed.
@@ -331,7 +337,11 @@ pub(super) fn column_reader<R: ChunkReader + 'static>(
 }
 
 /// Fails when the pages of a row group would need too much memory. Nothing is decompressed for this, except gzip.
-pub(super) fn check_pages<R: ChunkReader>(bytes: &R, group: &RowGroupMetaData, wanted: &[bool]) -> Result<(), RecordingFault> {
+pub(super) fn check_pages<R: ChunkReader>(
+    bytes: &R,
+    group: &RowGroupMetaData,
+    wanted: &[bool],
+) -> Result<(), RecordingFault> {
     let refused = |error: io::Error| parquet_fault(ParquetError::General(error.to_string()));
     let mut sum = 0;
     // The largest pages of all needed columns are added.
@@ -399,10 +409,14 @@ fn tables_of<R: ChunkReader + 'static>(source: &ParquetSource<R>) -> Result<Vec<
         } else {
             kind_of(column)
         };
-        infos.extend(columns.names[leaf.first..leaf.first + leaf.width].iter().map(|name| ColumnInfo {
-            name: name.clone(),
-            kind: kind.clone(),
-        }));
+        infos.extend(
+            columns.names[leaf.first..leaf.first + leaf.width]
+                .iter()
+                .map(|name| ColumnInfo {
+                    name: name.clone(),
+                    kind: kind.clone(),
+                }),
+        );
     }
     let mut samples = 0;
     for k in 0..source.files.len() {
@@ -437,7 +451,12 @@ fn tables_of<R: ChunkReader + 'static>(source: &ParquetSource<R>) -> Result<Vec<
 /// Number of runs of equal values; `None` without any.
 fn count_changes(values: &[f64]) -> Option<usize> {
     values.first()?;
-    Some(1 + values.windows(2).filter(|pair| pair[0].total_cmp(&pair[1]).is_ne()).count())
+    Some(
+        1 + values
+            .windows(2)
+            .filter(|pair| pair[0].total_cmp(&pair[1]).is_ne())
+            .count(),
+    )
 }
 
 /// Type of a column, in the words that other formats use.

@@ -65,7 +65,7 @@ impl ParquetColumns {
         for i in 0..schema.num_columns() {
             let column = schema.column(i);
             let mut kind = ParquetValueKind::from_column(&column);
-            let mut name = column.path().string();
+            let path = column.path().string();
             let mut list = None;
             if column.max_rep_level() == 1 && !matches!(kind, ParquetValueKind::Unusable) {
                 list = list_shape(bytes, reader, i, &column)?;
@@ -74,14 +74,18 @@ impl ParquetColumns {
                     kind = ParquetValueKind::Unusable;
                 }
             }
-            if list.is_some() {
-                name = bare_name(&name).to_owned();
-            }
+            let name = if list.is_some() {
+                bare_name(&path).to_owned()
+            } else {
+                path
+            };
             let first = columns.names.len();
             match list {
                 None => columns.names.push(name.clone()),
                 Some(ListShape { width, .. }) => match elements.names_of(&name, width) {
-                    Some(own) => columns.names.extend(own.iter().map(|element| format!("{name}.{element}"))),
+                    Some(own) => columns
+                        .names
+                        .extend(own.iter().map(|element| format!("{name}.{element}"))),
                     None => columns.names.extend((1..=width).map(|place| format!("{name}_{place}"))),
                 },
             }
@@ -99,7 +103,10 @@ impl ParquetColumns {
 
 /// The name of a column without the parts that only say that it has lists.
 fn bare_name(path: &str) -> &str {
-    LIST_ENDINGS.iter().find_map(|ending| path.strip_suffix(ending)).unwrap_or(path)
+    LIST_ENDINGS
+        .iter()
+        .find_map(|ending| path.strip_suffix(ending))
+        .unwrap_or(path)
 }
 
 /// The lists of a column by those at the start of the file; `None` if they cannot be columns.

@@ -119,15 +119,15 @@ pub(super) fn read_batch(
     place: BatchPlace<'_>,
 ) -> Result<Vec<SampleField>, RecordingFault> {
     match column {
-        ColumnReader::BoolColumnReader(reader) => {
-            read_values(reader, n, place, |value| SampleField::Number(f64::from(u8::from(*value))))
-        }
+        ColumnReader::BoolColumnReader(reader) => read_values(reader, n, place, |value| {
+            SampleField::Number(f64::from(u8::from(*value)))
+        }),
         ColumnReader::Int32ColumnReader(reader) => read_values(reader, n, place, |value| {
             SampleField::finite(kind.convert_short_integer(*value))
         }),
-        ColumnReader::Int64ColumnReader(reader) => {
-            read_values(reader, n, place, |value| SampleField::finite(kind.convert_integer(*value)))
-        }
+        ColumnReader::Int64ColumnReader(reader) => read_values(reader, n, place, |value| {
+            SampleField::finite(kind.convert_integer(*value))
+        }),
         // Times of 12 bytes are converted to nanoseconds.
         ColumnReader::Int96ColumnReader(reader) => {
             let mut ticks = ParquetValueKind::Ticks {
@@ -255,10 +255,7 @@ fn read_lists<T: DataType>(
 /// Number of elements of the longest list among the next `n` samples of a column.
 pub(super) fn longest_list(column: &mut ColumnReader, n: usize, element_level: i16) -> Result<usize, RecordingFault> {
     /// Levels of the next samples of a typed column.
-    fn levels<T: DataType>(
-        reader: &mut ColumnReaderImpl<T>,
-        n: usize,
-    ) -> Result<(Vec<i16>, Vec<i16>), RecordingFault> {
+    fn levels<T: DataType>(reader: &mut ColumnReaderImpl<T>, n: usize) -> Result<(Vec<i16>, Vec<i16>), RecordingFault> {
         let (mut defined, mut repeated) = (Vec::new(), Vec::new());
         let read = reader.read_records(n, Some(&mut defined), Some(&mut repeated), &mut Vec::new());
         read.map_err(parquet_fault)?;

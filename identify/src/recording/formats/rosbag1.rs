@@ -83,14 +83,16 @@ impl BagRecordCode {
 fn replay_messages(stream: impl Read, bag: &mut BagCollector<'_>) -> Result<(), RecordingFault> {
     let mut stream = BufReader::with_capacity(1 << 20, stream);
     let mut magic = vec![0; MAGIC.len()];
-    stream.read_exact(&mut magic).map_err(|error| unreadable_fault(&error))?;
+    stream
+        .read_exact(&mut magic)
+        .map_err(|error| unreadable_fault(&error))?;
     if magic != MAGIC {
         return Err(format_fault(
             "only version 2.0 is supported; convert it with `rosbag fix` or record it again",
         ));
     }
     let mut state = BagFileState::default();
-    while let Some((header, data)) = read_record(&mut stream, &mut state.place)? {
+    while let Some(BagRecord { header, data }) = read_record(&mut stream, &mut state.place)? {
         let fields = BagFields::parse(&header, state.place)?;
         state.take_record(&fields, &data, false, bag)?;
     }
@@ -103,8 +105,16 @@ fn replay_messages(stream: impl Read, bag: &mut BagCollector<'_>) -> Result<(), 
     Ok(())
 }
 
-/// Header and data of the next record of a stream; `None` at the end. `place` is the position in the file, in bytes.
-fn read_record(stream: &mut impl Read, place: &mut u64) -> Result<Option<(Vec<u8>, Vec<u8>)>, RecordingFault> {
+/// A record: its header of named fields, and its data.
+struct BagRecord {
+    /// Named fields, each with its length before it.
+    header: Vec<u8>,
+    /// The data.
+    data: Vec<u8>,
+}
+
+/// The next record of a stream; `None` at the end. `place` is the position in the file, in bytes.
+fn read_record(stream: &mut impl Read, place: &mut u64) -> Result<Option<BagRecord>, RecordingFault> {
     let mut first = [0];
     if stream.read(&mut first).map_err(|error| unreadable_fault(&error))? == 0 {
         return Ok(None);
@@ -114,10 +124,12 @@ fn read_record(stream: &mut impl Read, place: &mut u64) -> Result<Option<(Vec<u8
     let length = u32::from_le_bytes([first[0], rest[0], rest[1], rest[2]]);
     let header = read_bytes(stream, length, *place)?;
     let mut length = [0; 4];
-    stream.read_exact(&mut length).map_err(|error| unreadable_fault(&error))?;
+    stream
+        .read_exact(&mut length)
+        .map_err(|error| unreadable_fault(&error))?;
     let data = read_bytes(stream, u32::from_le_bytes(length), *place)?;
     *place += 8 + header.len() as u64 + data.len() as u64;
-    Ok(Some((header, data)))
+    Ok(Some(BagRecord { header, data }))
 }
 
 /// The next bytes of a stream; memory is allocated as they arrive, not by the declared length.
@@ -171,10 +183,8 @@ impl BagFileState {
         bag: &mut BagCollector<'_>,
     ) -> Result<(), RecordingFault> {
         match fields.code()? {
-            BagRecordCode::BAG => {
-                if fields.get("encryptor").is_some_and(|name| !name.is_empty()) {
-                    return Err(format_fault("it is encrypted; decrypt it with `rosbag decrypt`"));
-                }
+            BagRecordCode::BAG if fields.get("encryptor").is_some_and(|name| !name.is_empty()) => {
+                return Err(format_fault("it is encrypted; decrypt it with `rosbag decrypt`"));
             }
             BagRecordCode::CONNECTION => self.take_connection(fields, data, bag)?,
             BagRecordCode::MESSAGE => {
@@ -192,7 +202,7 @@ impl BagFileState {
                 let mut records = bytes.as_deref().unwrap_or(data);
                 let mut within = 0;
                 let damaged = |_| fields.fault("is a chunk with a damaged record in it");
-                while let Some((header, data)) = read_record(&mut records, &mut within).map_err(damaged)? {
+                while let Some(BagRecord { header, data }) = read_record(&mut records, &mut within).map_err(damaged)? {
                     let inner = BagFields::parse(&header, fields.place)?;
                     self.take_record(&inner, &data, true, bag)?;
                 }
@@ -217,7 +227,9 @@ impl BagFileState {
         }
         let about = BagFields::parse(data, fields.place)?;
         let text = |fields: &BagFields<'_>, name: &str| {
-            fields.get(name).map(|bytes| String::from_utf8_lossy(bytes).into_owned())
+            fields
+                .get(name)
+                .map(|bytes| String::from_utf8_lossy(bytes).into_owned())
         };
         let topic = text(fields, "topic").or_else(|| text(&about, "topic"));
         let (Some(topic), Some(kind)) = (topic, text(&about, "type")) else {

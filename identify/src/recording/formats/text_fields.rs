@@ -97,8 +97,10 @@ fn number_of(text: &str) -> Option<(f64, Option<DecimalSign>)> {
     if let Ok(number) = text.parse::<f64>() {
         return Some((number, text.contains('.').then_some(DecimalSign::Point)));
     }
-    // Two signs are a thousands separator and a decimal sign, or a date.
-    if text.matches(',').count() != 1 || text.contains('.') {
+    // Two signs are a thousands separator and a decimal sign, or a date. A comma at an end separates fields.
+    let (before, after) = text.split_once(',')?;
+    let is_within = before.ends_with(|c: char| c.is_ascii_digit()) && after.starts_with(|c: char| c.is_ascii_digit());
+    if !is_within || after.contains(',') || text.contains('.') {
         return None;
     }
     let number = text.replace(',', ".").parse::<f64>().ok()?;

@@ -95,7 +95,7 @@ impl TextLayout {
     ///
     /// Fails when the bytes are no text in UTF-8, or when there is no clear separator.
     pub(super) fn read(stream: &mut impl BufRead) -> Result<(Self, Vec<u8>), RecordingFault> {
-        let (lines, comment, bytes) = read_head(stream)?;
+        let TextHead { lines, comment, bytes } = read_head(stream)?;
         let [first, others @ ..] = lines.as_slice() else {
             return Err(match comment {
                 Some(_) => RecordingFault::NoSamples,
@@ -143,8 +143,18 @@ impl TextLayout {
     }
 }
 
-/// The first lines with contents, the last comment before them, and all bytes that were read, without byte order mark.
-fn read_head(stream: &mut impl BufRead) -> Result<(Vec<HeadLine>, Option<String>, Vec<u8>), RecordingFault> {
+/// The start of a file.
+struct TextHead {
+    /// The first lines with contents.
+    lines: Vec<HeadLine>,
+    /// The last comment before them.
+    comment: Option<String>,
+    /// All bytes that were read, without byte order mark.
+    bytes: Vec<u8>,
+}
+
+/// Reads the start of a file.
+fn read_head(stream: &mut impl BufRead) -> Result<TextHead, RecordingFault> {
     let (mut lines, mut comment, mut bytes) = (Vec::new(), None, Vec::new());
     let mut limited = stream.take(LONGEST_HEAD);
     let mut number = 0;
@@ -189,7 +199,7 @@ fn read_head(stream: &mut impl BufRead) -> Result<(Vec<HeadLine>, Option<String>
     if bytes.starts_with(b"\xEF\xBB\xBF") {
         bytes.drain(..3);
     }
-    Ok((lines, comment, bytes))
+    Ok(TextHead { lines, comment, bytes })
 }
 
 /// A line as text without its end.
@@ -281,7 +291,12 @@ fn is_split_by_blanks_only(header: &str, last: &HeadLine) -> bool {
 /// Names from a comment before the samples: one for each field of a sample, at least one of which is no number.
 fn names_in_comment(comment: &str, separator: TextSeparator, sample: &[String]) -> Option<Vec<String>> {
     // Some writers separate the names in another way than the samples.
-    let candidates = [separator, TextSeparator::Comma, TextSeparator::Semicolon, TextSeparator::Blanks];
+    let candidates = [
+        separator,
+        TextSeparator::Comma,
+        TextSeparator::Semicolon,
+        TextSeparator::Blanks,
+    ];
     candidates.into_iter().find_map(|separator| {
         let names = separator.split(comment.trim());
         let names: Vec<String> = names.iter().map(|name| csv_name(name).trim().to_owned()).collect();
@@ -325,16 +340,18 @@ fn units_of_row(fields: &[String], width: usize) -> Option<Vec<String>> {
     let is_empty = |unit: &String| unit.is_empty() || unit == "-";
     let are_units = units.iter().all(|unit| is_empty(unit) || is_unit_text(unit));
     let has_unit = units.iter().any(|unit| !is_empty(unit) && is_unit_text(unit));
-    let shown = units.iter().map(|unit| if is_empty(unit) { String::new() } else { unit.clone() });
+    let shown = units
+        .iter()
+        .map(|unit| if is_empty(unit) { String::new() } else { unit.clone() });
     (are_units && has_unit).then(|| shown.collect())
 }
 
 /// Units that may stand in a row below the header; products, quotients and powers of them, too.
 const UNIT_WORDS: [&str; 63] = [
-    "s", "sec", "second", "seconds", "ms", "us", "µs", "μs", "ns", "min", "h", "m", "mm", "cm", "um", "µm", "rad", "mrad",
-    "radian", "radians", "deg", "degree", "degrees", "°", "rev", "turn", "N", "kN", "mN", "Nm", "kNm", "mNm", "Nmm", "Ncm",
-    "J", "W", "kW", "V", "mV", "A", "mA", "Hz", "kHz", "rpm", "kg", "g", "Pa", "kPa", "MPa", "bar", "K", "C", "°C", "%", "1",
-    "count", "counts", "cnt", "inc", "ticks", "tick", "pulse", "bool",
+    "s", "sec", "second", "seconds", "ms", "us", "µs", "μs", "ns", "min", "h", "m", "mm", "cm", "um", "µm", "rad",
+    "mrad", "radian", "radians", "deg", "degree", "degrees", "°", "rev", "turn", "N", "kN", "mN", "Nm", "kNm", "mNm",
+    "Nmm", "Ncm", "J", "W", "kW", "V", "mV", "A", "mA", "Hz", "kHz", "rpm", "kg", "g", "Pa", "kPa", "MPa", "bar", "K",
+    "C", "°C", "%", "1", "count", "counts", "cnt", "inc", "ticks", "tick", "pulse", "bool",
 ];
 
 /// Whether a text is a unit, such as `rad/s^2` or `N m`.
@@ -343,7 +360,9 @@ pub(super) fn is_unit_text(text: &str) -> bool {
     if text == "1" || text.parse::<f64>().is_ok() {
         return false;
     }
-    let mut words = text.split(['/', '*', '·', '.', ' ', '(', ')']).filter(|word| !word.is_empty());
+    let mut words = text
+        .split(['/', '*', '·', '.', ' ', '(', ')'])
+        .filter(|word| !word.is_empty());
     text.chars().count() <= 16
         && words.all(|word| {
             let base = word.trim_end_matches(['²', '³', '^', '-', '2', '3']);

@@ -39,7 +39,11 @@ fn parse_date(text: &str) -> Option<i64> {
         return None;
     }
     // Years begin in March, so that the leap day is the last one (H. Hinnant, chrono-compatible date algorithms).
-    let (year, month) = if month > 2 { (year, month - 3) } else { (year - 1, month + 9) };
+    let (year, month) = if month > 2 {
+        (year, month - 3)
+    } else {
+        (year - 1, month + 9)
+    };
     let day_of_year = (153 * month + 2) / 5 + day - 1;
     let era = year.div_euclid(400);
     let year_of_era = year.rem_euclid(400);

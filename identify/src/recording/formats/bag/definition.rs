@@ -285,7 +285,10 @@ mod tests {
     /// Every common type is complete: the types of its fields are common too.
     #[test]
     fn common_types_are_defined_without_a_file() {
-        let names: Vec<&str> = COMMON_TYPES.lines().filter_map(|line| line.strip_prefix("MSG: ")).collect();
+        let names: Vec<&str> = COMMON_TYPES
+            .lines()
+            .filter_map(|line| line.strip_prefix("MSG: "))
+            .collect();
         assert!(names.len() > 80, "{}", names.len());
         for name in names {
             let parsed = parse_definition(name, "", RosVersion::Two);
