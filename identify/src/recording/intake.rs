@@ -224,6 +224,7 @@ impl<'a> SampleIntake<'a> {
     }
 
     /// Leaves a gap of so many samples in times that follow from a sampling rate.
+    #[cfg(feature = "parquet")]
     pub(crate) fn skip_samples(&mut self, samples: usize) {
         self.passed += samples;
     }

@@ -5,6 +5,7 @@
 
 use std::path::Path;
 
+use indexmap::IndexMap;
 use modelmill_boundary::files::FileSource;
 
 use crate::recording::column::SignalColumn;
@@ -60,16 +61,16 @@ impl RecordingFiles {
     /// name of each of its files.
     pub fn names(&self) -> Result<Vec<String>, RecordingError> {
         let names = self.names_by_file()?;
-        let mut all: Vec<String> = Vec::new();
+        // The number of files that have each name; names of a log may be very many.
+        let mut counts: IndexMap<&String, usize> = IndexMap::new();
         for name in names.iter().flatten() {
-            if !all.contains(name) {
-                all.push(name.clone());
-            }
+            *counts.entry(name).or_insert(0) += 1;
         }
+        let mut all: Vec<String> = counts.keys().map(|name| (*name).clone()).collect();
         for (k, of_file) in names.iter().enumerate() {
-            for name in of_file {
+            for name in of_file.iter().filter(|name| counts[*name] > 1) {
                 let qualified = self.qualified_name(k, name);
-                if names.iter().filter(|others| others.contains(name)).count() > 1 && !all.contains(&qualified) {
+                if !counts.contains_key(&qualified) {
                     all.push(qualified);
                 }
             }

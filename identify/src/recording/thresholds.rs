@@ -61,4 +61,5 @@ pub(super) const ZERO_SHIFT_SHARE: f64 = 0.5;
 
 /// Sample intervals between episodes that are read one after another; long enough that any low-pass has them in segments
 /// of their own. By judgement.
+#[cfg(feature = "parquet")]
 pub(super) const EPISODE_GAP_STEPS: usize = 300;

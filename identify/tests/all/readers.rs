@@ -208,6 +208,29 @@ fn data_sets_of_lerobot_are_read_with_their_names() {
     check(&recording, "t", |k| time(k) + if k < 25 { 0.0 } else { 3.0 }, 1e-9);
 }
 
+/// A description that is no JSON, and a set without its data, are named with what to do.
+#[test]
+fn incomplete_data_sets_say_what_is_missing() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("lerobot-incomplete");
+    let _ = std::fs::remove_dir_all(&folder);
+    for part in ["data/chunk-000", "meta"] {
+        std::fs::create_dir_all(folder.join(part)).unwrap();
+    }
+    let file = folder.join("data/chunk-000/episode_000000.parquet");
+    let open = |path: &Path| RecordingFile::open(&DiskFiles::default(), path).map(|_| ());
+    std::fs::write(folder.join("meta/info.json"), "{\"features\": {}}").unwrap();
+    let says = open(&folder).unwrap_err().to_string();
+    assert!(
+        says.contains("no files such as") && says.contains("copy the data"),
+        "{says}"
+    );
+    std::fs::copy(fixture("lerobot-v2/data/chunk-000/episode_000000.parquet"), &file).unwrap();
+    open(&folder).unwrap();
+    std::fs::write(folder.join("meta/info.json"), "{").unwrap();
+    let says = open(&file).unwrap_err().to_string();
+    assert!(says.contains("info.json") && says.contains("repair it"), "{says}");
+}
+
 #[test]
 fn lists_of_other_lengths_are_no_silent_numbers() {
     let mut options = options(&[("t", "t"), ("a", "x_1"), ("b", "x_2")]);

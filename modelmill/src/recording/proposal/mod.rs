@@ -9,6 +9,7 @@ mod signals;
 mod thresholds;
 mod words;
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use modelmill_identify::{ReadOptions, RecordingFile, RecordingFiles};
@@ -17,6 +18,9 @@ use crate::error::Outcome;
 use crate::model::Model;
 use pairing::ColumnPairing;
 use signals::FileSignal;
+
+/// Most columns that are compared with the model's names; longer lists are those of trajectories and images.
+const MOST_COLUMNS: usize = 500;
 
 /// A column of a recording that is proposed for a name of the model.
 #[derive(Clone, Debug, PartialEq)]
@@ -68,24 +72,41 @@ fn read_signals(model: &Model, paths: &[&Path], files: &RecordingFiles) -> Outco
     for path in paths {
         let file = RecordingFile::open(model.host().files(), path)?;
         for table in file.tables()? {
-            let columns = table
-                .columns
-                .iter()
-                .filter(|column| column.kind != "text" && column.kind != "no number");
+            let columns = table.columns.iter();
+            let columns = columns.filter(|column| column.kind != "text" && column.kind != "no number");
             let columns: Vec<String> = columns.map(|column| column.name.clone()).collect();
             if table.name.is_empty() || pairing::has_signals(&columns) {
                 names.extend(columns);
             }
         }
     }
-    let all = files.names()?;
+    let all: BTreeSet<String> = files.names()?.into_iter().collect();
     // Logs have a time that is in no table.
-    if all.iter().any(|name| name == "t") && !names.iter().any(|name| name == "t") {
+    if all.contains("t") && !names.iter().any(|name| name == "t") {
         names.insert(0, "t".to_owned());
     }
-    names.retain(|name| all.contains(name));
-    names.dedup();
+    // A name in several files is unique with the name of its file.
+    let mut counts: BTreeMap<&String, usize> = BTreeMap::new();
+    for name in &names {
+        *counts.entry(name).or_insert(0) += 1;
+    }
+    let shared: Vec<String> = (counts.iter())
+        .filter(|(name, count)| **count > 1 && *name != "t")
+        .map(|(name, _)| format!(".{name}"))
+        .collect();
+    let is_qualified = |name: &String| shared.iter().any(|ending| name.ends_with(ending));
+    let is_clear = |name: &&String| all.contains(*name) && (counts[*name] == 1 || *name == "t");
+    let mut seen = BTreeSet::new();
+    let names: Vec<String> = (names.iter().filter(is_clear))
+        .chain(all.iter().filter(|name| is_qualified(name)))
+        .filter(|name| seen.insert((*name).clone()))
+        .take(MOST_COLUMNS)
+        .cloned()
+        .collect();
     let options = ReadOptions {
+        renames: (names.iter().filter(|name| is_qualified(name)))
+            .map(|name| (name.clone(), name.clone()))
+            .collect(),
         wanted: Some(names.clone()),
         ..ReadOptions::default()
     };

@@ -256,8 +256,12 @@ impl<'a> ColumnPairing<'a> {
         }
     }
 
-    /// Pairs the names that are left with the columns that are left, in their order, if there are as many.
+    /// Pairs all names of a role with its columns in their order, if there are as many and no name says more.
     fn pair_by_order(&mut self, role: SignalRole) {
+        // Where names say which joint some columns belong to, the others belong to something else.
+        if self.ours.iter().any(|one| one.role == role && one.pair.is_some()) {
+            return;
+        }
         let wanted = self.open_names(role);
         let mut found = self.candidates(role);
         let nameless: Vec<usize> = (0..self.signals.len())

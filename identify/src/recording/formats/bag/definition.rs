@@ -115,6 +115,12 @@ pub(super) fn parse_definition(name: &str, text: &str, ros: RosVersion) -> Resul
     let own = short_type_name(name);
     // Older logs have no definitions at all; an empty text defines nothing.
     if is_definition_missing(text) {
+        // The common types are those of ROS 2; ROS 1 has other ones with the same names.
+        if ros == RosVersion::One && own != "std_msgs/Empty" {
+            return Err(format!(
+                "the file does not define `{own}`; record it again, or convert it with a program that has its type"
+            ));
+        }
         let mut reader = RosDefinitionParser {
             texts: BTreeMap::new(),
             done: BTreeMap::new(),

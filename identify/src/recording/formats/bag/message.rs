@@ -12,7 +12,7 @@ const MOST_ELEMENTS: usize = 256;
 /// Longest list of messages within a message.
 const MOST_MESSAGES: usize = 4096;
 /// Most bytes behind a message that only fill it up.
-const MOST_PADDING: usize = 7;
+const MOST_PADDING: usize = 3;
 /// Stands for the length of a list that is skipped.
 const SKIPPED_LENGTH: u32 = u32::MAX;
 
