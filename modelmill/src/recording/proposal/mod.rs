@@ -91,7 +91,7 @@ fn read_signals(model: &Model, paths: &[&Path], files: &RecordingFiles) -> Outco
         *counts.entry(name).or_insert(0) += 1;
     }
     let shared: Vec<String> = (counts.iter())
-        .filter(|(name, count)| **count > 1 && *name != "t")
+        .filter(|(name, count)| **count > 1 && **name != "t")
         .map(|(name, _)| format!(".{name}"))
         .collect();
     let is_qualified = |name: &String| shared.iter().any(|ending| name.ends_with(ending));
