@@ -128,6 +128,30 @@ fn forces_without_names_are_paired_by_the_model() {
     assert!(table.contains("uncertain: the model explains"), "{table}");
 }
 
+/// A column with the name of the model is that one, and a wrong sign is remarked where nominal forces show it.
+#[test]
+fn equal_names_are_certain_and_wrong_signs_are_remarked() {
+    let turned = written(
+        "turned.csv",
+        "t,theta1,theta2,spindle_left,spindle_right\n",
+        |[t, q1, q2, _, _, left, right]| vec![*t, *q1, *q2, *left, -right],
+    );
+    let table = table_of(&printed(&["recordings", &turned, "--model", &model("spidermill.toml")]));
+    let line = |name: &str| {
+        table
+            .lines()
+            .find(|line| line.starts_with(name))
+            .expect("a line")
+            .to_owned()
+    };
+    assert!(
+        line("theta2").contains("the same name") && !line("theta2").contains("uncertain"),
+        "{table}"
+    );
+    assert!(line("spindle_right").contains("its sign is opposite"), "{table}");
+    assert!(!line("spindle_left").contains("its sign is opposite"), "{table}");
+}
+
 /// What is not in the recording is missing, and not taken from another column.
 #[test]
 fn names_without_a_column_are_missing() {

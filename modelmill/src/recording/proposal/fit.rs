@@ -17,15 +17,23 @@ const RANK_TOLERANCE: f64 = 1e-9;
 /// Further columns of a drive: an offset, its rate and the sign of it, for friction that the model may lack.
 const MORE: usize = 3;
 
-/// Shares of the variance of forces that a model explains, `[drive][column]`, from 0 to 1.
+/// How forces agree with a model.
+pub(super) struct ForceAgreement {
+    /// Shares of the variance of forces that the model explains with estimated parameters, `[drive][column]`, from 0 to 1.
+    pub(super) shares: Vec<Vec<f64>>,
+    /// Correlation with the forces of the nominal parameters, `[drive][column]`; zero if there are none.
+    pub(super) nominal: Vec<Vec<f64>>,
+}
+
+/// Compares columns of forces with a model.
 ///
 /// `motion` has the time and all active coordinates in SI units, `forces` the columns to explain, with as many samples.
 /// `None` if the motion cannot be prepared, or the model has no pose for it.
-pub(super) fn explained_shares(
+pub(super) fn compare_forces(
     model: &Model,
     motion: Vec<(String, Vec<f64>)>,
     forces: &[&[f64]],
-) -> Outcome<Option<Vec<Vec<f64>>>> {
+) -> Outcome<Option<ForceAgreement>> {
     let file = RecordingFiles::from_table("the proposed columns", motion)?;
     let reading = RecordingOptions {
         preparation: StatePreparation {
@@ -46,6 +54,8 @@ pub(super) fn explained_shares(
     let step = (total / FIT_MOST_SAMPLES).max(1);
     let n_drives = model.drives().len();
     let mut rows: Vec<DMatrix<f64>> = Vec::new();
+    let mut nominal: Vec<Vec<f64>> = vec![Vec::new(); n_drives];
+    let parameters = nominal_parameters(model);
     let mut samples: Vec<usize> = Vec::new();
     for one in &segments {
         let run = &one.run;
@@ -65,11 +75,52 @@ pub(super) fn explained_shares(
         let (Ok(regressor), Ok(drives)) = (evaluator.regressor(&states), evaluator.drive_motion(&states)) else {
             return Ok(None);
         };
+        if let Some(parameters) = parameters
+            .as_ref()
+            .filter(|parameters| parameters.len() == regressor.ncols())
+        {
+            let forces = &regressor * parameters;
+            for (i, force) in forces.iter().enumerate() {
+                nominal[i % n_drives].push(*force);
+            }
+        }
         rows.push(with_friction(regressor, &drives[n_drives..2 * n_drives]));
         // Rows of a table count from 1.
         samples.extend(chosen.iter().map(|k| usize::try_from(run.lines[*k]).unwrap_or(1) - 1));
     }
-    Ok(Some(shares_of_rows(&rows, n_drives, &samples, forces)))
+    let of_drive = |computed: &Vec<f64>| -> Vec<f64> {
+        let correlate = |force: &&[f64]| {
+            let measured: Vec<f64> = samples.iter().map(|k| force[*k]).collect();
+            correlation(computed, &measured)
+        };
+        forces.iter().map(correlate).collect()
+    };
+    Ok(Some(ForceAgreement {
+        nominal: nominal.iter().map(of_drive).collect(),
+        shares: shares_of_rows(&rows, n_drives, &samples, forces),
+    }))
+}
+
+/// The nominal values of all base parameters; `None` if one has none.
+fn nominal_parameters(model: &Model) -> Option<DVector<f64>> {
+    let values = model.nominal_values().values;
+    let is_known = (0..values.len()).all(|k| model.has_nominal(k));
+    is_known.then(|| DVector::from_vec(values))
+}
+
+/// Correlation of two signals; zero if one of them is constant or has another length.
+fn correlation(a: &[f64], b: &[f64]) -> f64 {
+    if a.len() != b.len() || a.is_empty() {
+        return 0.0;
+    }
+    let centred = |values: &[f64]| {
+        let values = DVector::from_column_slice(values);
+        let mean = values.mean();
+        values.add_scalar(-mean)
+    };
+    let (a, b) = (centred(a), centred(b));
+    let size = a.norm() * b.norm();
+    if size > 0.0 { a.dot(&b) / size } else { 0.0 }
 }
 
 /// The regressor with further columns for the drive of each row; `rates` has the rate of each drive at each sample.

@@ -1,11 +1,12 @@
 //! Pairs names of a model with columns of a recording, one kind of signal after another.
 
-use modelmill_spec::{ColumnQuantity, DriveKind, Mechanism, unit_factor};
+use modelmill_spec::{ColumnQuantity, DriveKind, Mechanism, split_header_unit, unit_factor};
 
-use super::fit::explained_shares;
+use super::fit::{ForceAgreement, compare_forces};
 use super::signals::{FileSignal, RateLink, find_rate_link, find_time, suggest_time_unit};
 use super::thresholds::{
-    FIT_LEAST_SHARE, FIT_MARGIN, LARGEST_ANGLE, NAME_LEAST_SIMILARITY, NAMELESS_LEAST_CORRELATION, UNIT_TOLERANCE,
+    FIT_LEAST_SHARE, FIT_MARGIN, LARGEST_ANGLE, NAME_LEAST_SIMILARITY, NAMELESS_LEAST_CORRELATION,
+    SIGN_LEAST_CORRELATION, UNIT_TOLERANCE,
 };
 use super::words::{NameParts, SignalRole, joint_similarity};
 use super::{ColumnProposal, ProposedColumn};
@@ -81,6 +82,7 @@ impl<'a> ColumnPairing<'a> {
 
     /// Finds all pairs.
     pub(super) fn pair_all(&mut self) -> Outcome {
+        self.pair_equal_names();
         self.pair_time();
         self.find_roles_by_numbers();
         for role in [
@@ -122,8 +124,32 @@ impl<'a> ColumnPairing<'a> {
         pairs.any(|pair| pair.signal == signal)
     }
 
-    /// Finds the time.
+    /// Pairs names of the model with columns of the same name.
+    fn pair_equal_names(&mut self) {
+        for one in &mut self.ours {
+            let signal = self.signals.iter().position(|signal| {
+                let header = split_header_unit(&signal.name).map(|(base, _)| base);
+                signal.name == one.name || header == Some(one.name.as_str())
+            });
+            one.pair = signal.map(|signal| ColumnPair {
+                signal,
+                unit: None,
+                is_reversed: false,
+                reasons: vec!["the same name".to_owned()],
+                is_guess: false,
+            });
+        }
+    }
+
+    /// Finds the time, unless it has the name of the model.
     fn pair_time(&mut self) {
+        if self
+            .ours
+            .iter()
+            .any(|one| one.role == SignalRole::Time && one.pair.is_some())
+        {
+            return;
+        }
         let Some(signal) = find_time(&self.signals) else {
             self.remarks
                 .push("No column increases as times do; give the sampling rate when the recording is read.".to_owned());
@@ -377,10 +403,11 @@ impl<'a> ColumnPairing<'a> {
             return Ok(());
         };
         let forces: Vec<&[f64]> = candidates.iter().map(|j| self.signals[*j].values.as_slice()).collect();
-        let Some(shares) = explained_shares(self.model, motion, &forces)? else {
+        let Some(agreement) = compare_forces(self.model, motion, &forces)? else {
             return Ok(());
         };
-        self.check_paired_forces(&rows, &candidates, &shares);
+        self.check_paired_forces(&rows, &candidates, &agreement);
+        let shares = agreement.shares;
         // The best explained ones first.
         let mut all: Vec<(f64, usize, usize)> = Vec::new();
         for (i, row) in rows.iter().enumerate() {
@@ -404,7 +431,8 @@ impl<'a> ColumnPairing<'a> {
     }
 
     /// Adds to forces with a pair how much of them the model explains, and names a column that fits better.
-    fn check_paired_forces(&mut self, rows: &[Option<usize>], candidates: &[usize], shares: &[Vec<f64>]) {
+    fn check_paired_forces(&mut self, rows: &[Option<usize>], candidates: &[usize], agreement: &ForceAgreement) {
+        let shares = &agreement.shares;
         for (one, row) in self.ours.iter_mut().zip(rows) {
             let (Some(row), Some(pair)) = (row, &mut one.pair) else {
                 continue;
@@ -415,6 +443,11 @@ impl<'a> ColumnPairing<'a> {
             let share = shares[*row][own];
             pair.reasons
                 .push(format!("the model explains {} of it", percent_text(share)));
+            if agreement.nominal[*row][own] < -SIGN_LEAST_CORRELATION {
+                pair.reasons
+                    .push("its sign is opposite to the forces of the nominal parameters".to_owned());
+                pair.is_guess = true;
+            }
             let best = (0..candidates.len()).max_by(|a, b| shares[*row][*a].total_cmp(&shares[*row][*b]));
             if let Some(best) = best.filter(|best| shares[*row][*best] > share + FIT_MARGIN) {
                 pair.reasons.push(format!(

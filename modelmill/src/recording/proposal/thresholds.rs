@@ -32,3 +32,7 @@ pub(super) const LARGEST_ANGLE: f64 = 4.0 * std::f64::consts::PI;
 
 /// Most samples that the model is compared with. By judgement.
 pub(super) const FIT_MOST_SAMPLES: usize = 1000;
+
+/// Least magnitude of a negative correlation with the forces of the nominal parameters for a remark on the sign (1). By
+/// judgement.
+pub(super) const SIGN_LEAST_CORRELATION: f64 = 0.8;
