@@ -47,6 +47,8 @@ pub struct SignalRecording {
     pub(crate) lines: Vec<u64>,
     /// Notes on the file and on what was done with it.
     pub(crate) notes: Vec<RecordingNote>,
+    /// The time stamp from which `t` is counted, ns since 1970, if the file has stamps.
+    pub(crate) zero_stamp: Option<i64>,
 }
 
 impl SignalRecording {
@@ -175,6 +177,7 @@ impl SignalRecording {
             others: self.others.clone(),
             lines: self.lines[start..end].to_vec(),
             notes: Vec::new(),
+            zero_stamp: self.zero_stamp,
         }
     }
 

@@ -58,3 +58,8 @@ pub(super) const TURN_TOLERANCE: f64 = 0.08;
 /// After jumps whose sum exceeds this share of the largest, the note says that the zero position is uncertain (1). By
 /// judgement.
 pub(super) const ZERO_SHIFT_SHARE: f64 = 0.5;
+
+/// Sample intervals between episodes that are read one after another; long enough that any low-pass has them in segments
+/// of their own. By judgement.
+#[cfg(feature = "parquet")]
+pub(super) const EPISODE_GAP_STEPS: usize = 300;

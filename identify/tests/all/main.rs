@@ -6,6 +6,7 @@ mod filters;
 mod formats;
 mod logs;
 mod preparation;
+mod readers;
 mod recordings;
 mod separate;
 mod synthetic;

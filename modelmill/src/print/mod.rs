@@ -13,6 +13,7 @@ mod identification;
 mod interpretation;
 pub(crate) mod laws;
 mod next_step;
+mod proposal;
 #[cfg(feature = "import")]
 mod reduction;
 mod runs;

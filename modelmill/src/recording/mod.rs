@@ -7,6 +7,7 @@ mod contents;
 pub(crate) mod free;
 mod leverage;
 mod options;
+mod proposal;
 mod smoother;
 mod thresholds;
 
@@ -33,6 +34,7 @@ pub use contents::{ColumnInfo, RecordingContents, TableInfo};
 pub use modelmill_identify::{DerivativeSource, MAX_FILTER_ORDER, has_recording_extension};
 pub use modelmill_identify::{PreparedRun, SmoothingMethod, StatePreparation};
 pub use options::RecordingOptions;
+pub use proposal::{ColumnProposal, ProposedColumn};
 
 /// Reads a recording with the columns that a model needs, completes free bodies and repairs faults of sensors.
 ///
@@ -40,7 +42,10 @@ pub use options::RecordingOptions;
 fn read_raw(model: &Model, file: &RecordingFiles, reading: &RecordingOptions) -> Outcome<Raw> {
     let name = file.name();
     // Names of the file are needed to resolve the mapping.
-    let options = read_options(model, reading, &file.names()?, name)?;
+    let (options, notes) = read_options(model, reading, &file.names()?, name)?;
+    for note in &notes {
+        model.host().note(note);
+    }
     let mut raw = model
         .host()
         .run_job(&format!("reading {name}"), 0, |_| file.read(&options))??;
@@ -312,7 +317,7 @@ pub struct PreparedRecording {
 }
 
 impl Model {
-    /// Reads a recording (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2), computes positions, rates and accelerations from
+    /// Reads a recording (CSV, Parquet, MATLAB, HDF5, MCAP, ROS bags), computes positions, rates and accelerations from
     /// it (filtered, differentiated and decimated as needed), and checks it. Its notes list these steps and all
     /// suspicious signals.
     ///
@@ -353,7 +358,7 @@ impl Model {
             let mut others = kinds.filter_map(|(path, kind)| Some((path.display(), kind?)));
             others.next().map_or(failure, |(path, kind)| {
                 Error::input(format!(
-                    "{path} is {kind}; a recording is expected (CSV, Parquet, MATLAB, HDF5, MCAP or rosbag2), with a column \
+                    "{path} is {kind}; a recording is expected (CSV, Parquet, MATLAB, HDF5, MCAP or ROS bags), with a column \
                      `t` and one for each coordinate and drive"
                 ))
             })
