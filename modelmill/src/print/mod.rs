@@ -15,7 +15,7 @@ pub(crate) mod laws;
 mod next_step;
 #[cfg(feature = "import")]
 mod reduction;
-mod runs;
+pub(crate) mod runs;
 mod spelling;
 mod summary;
 pub mod tables;
