@@ -334,7 +334,7 @@ fn undecided_text(undecided: &[UndecidedDrive]) -> Message {
     let unexplained = named(&|one| matches!(one, UndecidedReason::UnexplainedForce { .. }));
     if !unexplained.is_empty() {
         told.push(message!(
-            "The model leaves most of the force unexplained of {}, so that parameters fitted to it mean nothing. Find what is wrong \
+            "The model leaves most of the force of {} unexplained, so that parameters fitted to it mean nothing. Find what is wrong \
              with {}, then compare the runs again.",
             list(&unexplained),
             Remedy::command(CommandName::Diagnose)
@@ -350,7 +350,7 @@ fn undecided_text(undecided: &[UndecidedDrive]) -> Message {
     let insensitive = named(&|one| matches!(one, UndecidedReason::SmallestChange { .. }));
     if !insensitive.is_empty() {
         told.push(message!(
-            "Even a change of most of the force would not exceed noise and model error of {}. Record longer or faster motions.",
+            "Even a change of most of its force would be within noise and model error at {}. Record longer or faster motions.",
             list(&insensitive)
         ));
     }
@@ -480,6 +480,65 @@ fn write_shared_fit(fit: &SharedFit, lines: &mut Vec<String>, style: TerminalSty
         let unknown: Vec<String> = unknown.map(|one| format!("{} of {}", one.name, one.quantity)).collect();
         if !unknown.is_empty() {
             lines.push(format!("    not identifiable: {}", unknown.join(", ")));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::print::LibrarySpelling;
+    use crate::runs::ChangeEstimate;
+
+    /// A report with given numbers of moved parameters and of undecided drives of two.
+    fn report(moved: usize, undecided: usize, changes: Vec<RunChange>) -> RunReport {
+        RunReport {
+            file: "later.csv".to_owned(),
+            samples: 100,
+            alone: Vec::new(),
+            moved: (0..moved).collect(),
+            drives: 2,
+            undecided: (0..undecided)
+                .map(|d| UndecidedDrive {
+                    drive: format!("joint{d}"),
+                    reason: UndecidedReason::UnexplainedForce { share: 0.94 },
+                })
+                .collect(),
+            difference_factor: 1.0,
+            changes,
+        }
+    }
+
+    /// No sentence denies a change above a table of moved parameters, or where nothing can be known.
+    #[test]
+    fn no_sentence_contradicts_the_table_below_it() {
+        let offset = RunChange {
+            change: PhysicalChange::Offset {
+                drive: "joint0".to_owned(),
+                force: ChangeEstimate {
+                    value: 2.0,
+                    deviation: 0.1,
+                },
+            },
+            gain: 400.0,
+            unit: "N m",
+            rivals: Vec::new(),
+            drive_weights: Vec::new(),
+            says: "a constant force".to_owned(),
+        };
+        for moved in [0, 3] {
+            for undecided in 0..=2 {
+                for changes in [Vec::new(), vec![offset.clone()]] {
+                    let is_changed = !changes.is_empty();
+                    let one = report(moved, undecided, changes);
+                    let says = verdict_text(&one).spell(&LibrarySpelling);
+                    let denies = says.contains("No change found") || says.contains("No other change found");
+                    assert_eq!(denies, !is_changed && moved == 0 && undecided < 2, "{says}");
+                    let is_unknown = !is_changed && undecided == 2;
+                    assert_eq!(says.contains("Cannot tell"), is_unknown, "{says}");
+                    assert_eq!(says.contains("94.0 %"), undecided > 0, "{says}");
+                }
+            }
         }
     }
 }

@@ -5,7 +5,10 @@
 use crate::along::drive_rates;
 use crate::error::Outcome;
 use crate::model::Model;
-use crate::runs::thresholds::{RUN_STANDSTILL_SHARE, STANDING_FEWEST_MOVING_SHARE, TOP_SPEED_QUANTILE};
+use crate::runs::thresholds::{
+    NOISE_REVERSALS_PER_CUTOFF, RECORDED_CUTOFF_SHARE, RUN_STANDSTILL_SHARE, STANDING_FEWEST_MOVING_SHARE,
+    TOP_SPEED_QUANTILE,
+};
 use crate::segment::RecordingSegment;
 
 /// Gives equations at standstill the weight 0. Returns for each drive whether it stands nearly all the time: then its
@@ -26,7 +29,11 @@ pub(crate) fn exclude_uncertain_friction(model: &Model, segments: &mut [Recordin
             .collect();
         let kept = moving.iter().flatten().filter(|moves| **moves).count();
         let all: usize = moving.iter().map(Vec::len).sum();
-        if (kept as f64) < STANDING_FEWEST_MOVING_SHARE * all as f64 {
+        let is_noise = segments
+            .iter()
+            .zip(&own)
+            .all(|(segment, rate)| is_rate_noise(segment, rate, bound));
+        if is_noise || (kept as f64) < STANDING_FEWEST_MOVING_SHARE * all as f64 {
             *stands = true;
             continue;
         }
@@ -39,6 +46,23 @@ pub(crate) fn exclude_uncertain_friction(model: &Model, segments: &mut [Recordin
         }
     }
     Ok(stands)
+}
+
+/// Whether a rate is noise that the low-pass has let through. Noise reverses as fast as the cut-off allows, and motions
+/// below the cut-off reverse more slowly. Rates up to `bound` do not count: they are noise in pauses of a motion.
+fn is_rate_noise(segment: &RecordingSegment, rate: &[f64], bound: f64) -> bool {
+    let time = &segment.run.time;
+    let duration = match time.as_slice() {
+        [first, .., last] => last - first,
+        _ => return true,
+    };
+    let recorded = RECORDED_CUTOFF_SHARE * time.len() as f64 / duration;
+    let cutoff = segment.run.prepared.cutoff_hz.unwrap_or(recorded);
+    let moving: Vec<f64> = rate.iter().copied().filter(|rate| rate.abs() > bound).collect();
+    let reversals = moving.windows(2).filter(|pair| pair[0] * pair[1] < 0.0).count();
+    // A rate that is exactly zero does not reverse.
+    let is_zero = rate.iter().all(|rate| *rate == 0.0);
+    is_zero || reversals as f64 > NOISE_REVERSALS_PER_CUTOFF * cutoff * duration
 }
 
 /// The usual largest speed: single wrong samples do not raise it.

@@ -3,8 +3,8 @@
 //! used.
 
 /// A base parameter has changed if its difference from the first run exceeds this many standard deviations, which
-/// include the scatter between blocks. Of 60 pairs of runs of a simulated arm of 48 parameters without any change, with
-/// quick, slow and pausing motions, none has one beyond.
+/// include the scatter between blocks. Of 29 pairs of runs of a simulated UR5 without any change, with quick, slow and
+/// pausing motions, none has one beyond.
 pub(super) const PARAMETER_CHANGE_SIGMAS: f64 = 6.0;
 
 /// A change must have a value of more than this many standard deviations, which include the scatter between blocks. By
@@ -32,8 +32,20 @@ pub(super) const TOP_SPEED_QUANTILE: f64 = 0.98;
 /// A drive that moves in less than this share of the equations (1) stands, and keeps all of them. By judgement.
 pub(super) const STANDING_FEWEST_MOVING_SHARE: f64 = 0.1;
 
+/// A rate is noise if it reverses more often than this many times per period of the cut-off (1). White noise of
+/// positions reverses 1.5 times, and a motion twice per period of its own.
+pub(super) const NOISE_REVERSALS_PER_CUTOFF: f64 = 1.2;
+
+/// Cut-off that is assumed for recorded rates, as a share of the sampling rate (1). By judgement.
+pub(super) const RECORDED_CUTOFF_SHARE: f64 = 0.1;
+
+/// Further changes beside a load must change the force of a drive by more than this share of the load's own force there
+/// (1). Scales of forces that are wrong by so much in both runs would otherwise look like further changes. By judgement:
+/// torque constants are usually known to 10 %, so that two of them differ by up to this.
+pub(super) const FURTHER_CHANGE_LOAD_SHARE: f64 = 0.2;
+
 /// Largest number of windows of a run in which recorded rates are compared with positions. By judgement.
-pub(super) const TIME_BASE_WINDOWS: usize = 12;
+pub(super) const TIME_BASE_WINDOWS: usize = 8;
 
 /// Fewest samples of such a window. By judgement.
 pub(super) const TIME_BASE_FEWEST_SAMPLES: usize = 60;

@@ -129,7 +129,7 @@ fn window_slope(time: &[f64], position: &[f64], rate: &[f64]) -> Option<WindowSl
         integral[i] = integral[i - 1] + 0.5 * (rate[i] + rate[i - 1]) * (time[i] - time[i - 1]);
     }
     // The derivative of the rate is a difference over several samples, which has less noise.
-    let half = (n / 100).max(1);
+    let half = (n / 60).max(1);
     let slope = |i: usize| {
         let (from, to) = (i.saturating_sub(half), (i + half).min(n - 1));
         (rate[to] - rate[from]) / (time[to] - time[from]).max(f64::MIN_POSITIVE)
