@@ -28,8 +28,8 @@ use std::borrow::Borrow;
 
 use modelmill_boundary::message;
 use modelmill_identify::changes::{
-    ChangeHypotheses, NormalEquations, RunPair, SelectedChange, fit_blocks, fit_single_change, search_changes,
-    search_sensitivity, single_change_gains, within_run_spread,
+    ChangeHypotheses, NormalEquations, RunPair, SelectedChange, fit_blocks, search_changes, search_sensitivity,
+    within_run_spread,
 };
 use modelmill_identify::{ParameterInfo, RecordingNote};
 use nalgebra::DVector;
@@ -52,8 +52,7 @@ pub use points::{ChangePoint, ParameterStep};
 use rows::{MeasuredMoments, RunRows, UnexplainedShares, WhitenedRun};
 pub use sums::{ReferenceFit, RunSums};
 use thresholds::{
-    CHANGE_LEAST_FORCE_SHARE, CHANGE_VALUE_SIGMAS, FURTHER_CHANGE_LOAD_SHARE, PARAMETER_CHANGE_SIGMAS,
-    PUSH_MARGIN_SHARE, SHORTEST_PUSH_S,
+    CHANGE_LEAST_FORCE_SHARE, CHANGE_VALUE_SIGMAS, PARAMETER_CHANGE_SIGMAS, PUSH_MARGIN_SHARE, SHORTEST_PUSH_S,
 };
 use time_base::{TimeBase, correct_clock, time_scaling};
 use verdict::{RunKnowledge, undecided_reasons};
@@ -587,39 +586,7 @@ impl<'a> RunAnalyser<'a> {
             let mut moved = fractions.iter().zip(believed);
             moved.any(|(part, believed)| *believed && *part > CHANGE_LEAST_FORCE_SHARE) && has_certain_value(one)
         });
-        match self.sufficient_load(runs, sizes, &found) {
-            Some(load) => vec![load],
-            None => found,
-        }
-    }
-
-    /// A load alone, if several changes with a load explain hardly more. Each drive weighs a load in units of its own
-    /// force signal, and scales that disagree by some percent look like further changes.
-    fn sufficient_load(
-        &self,
-        runs: &RunPair,
-        sizes: &MeasuredMoments,
-        found: &[SelectedChange],
-    ) -> Option<SelectedChange> {
-        let is_load = |which: usize| matches!(self.possible[which].kind, ChangeKind::Payload(_));
-        if found.len() < 2 || !found.iter().any(|one| is_load(one.candidate)) {
-            return None;
-        }
-        let gains = single_change_gains(runs, &self.search);
-        let loads = (0..gains.len()).filter(|which| is_load(*which));
-        let best = loads.max_by(|a, b| gains[*a].total_cmp(&gains[*b]))?;
-        let load = fit_single_change(runs, &self.search, best);
-        // The force of all changes minus that of the load alone.
-        let columns = |one: &SelectedChange| self.possible[one.candidate].candidate.columns.clone();
-        let all = found.iter().map(|one| (columns(one), one.values.clone()));
-        let alone = (columns(&load), -&load.values);
-        let (difference, values): (Vec<Vec<usize>>, Vec<DVector<f64>>) = all.chain([alone]).unzip();
-        let values: Vec<f64> = values.iter().flat_map(|one| one.iter().copied()).collect();
-        let further = sizes.force_fractions(&difference.concat(), &DVector::from_vec(values));
-        let own = sizes.force_fractions(&columns(&load), &load.values);
-        let is_small =
-            |(further, own): (&f64, &f64)| *further < FURTHER_CHANGE_LOAD_SHARE * own + CHANGE_LEAST_FORCE_SHARE;
-        further.iter().zip(&own).all(is_small).then_some(load)
+        found
     }
 
     /// Changes with their physical values and texts.

@@ -6,8 +6,8 @@ use crate::along::drive_rates;
 use crate::error::Outcome;
 use crate::model::Model;
 use crate::runs::thresholds::{
-    NOISE_REVERSALS_PER_CUTOFF, RECORDED_CUTOFF_SHARE, RUN_STANDSTILL_SHARE, STANDING_FEWEST_MOVING_SHARE,
-    TOP_SPEED_QUANTILE,
+    NOISE_REVERSALS_PER_CUTOFF, RECORDED_CUTOFF_SHARE, ROUNDING_RATE, RUN_STANDSTILL_SHARE,
+    STANDING_FEWEST_MOVING_SHARE, TOP_SPEED_QUANTILE,
 };
 use crate::segment::RecordingSegment;
 
@@ -60,8 +60,8 @@ fn is_rate_noise(segment: &RecordingSegment, rate: &[f64], bound: f64) -> bool {
     let cutoff = segment.run.prepared.cutoff_hz.unwrap_or(recorded);
     let moving: Vec<f64> = rate.iter().copied().filter(|rate| rate.abs() > bound).collect();
     let reversals = moving.windows(2).filter(|pair| pair[0] * pair[1] < 0.0).count();
-    // A rate that is exactly zero does not reverse.
-    let is_zero = rate.iter().all(|rate| *rate == 0.0);
+    // The rate of a constant position is rounding, which may reverse slowly.
+    let is_zero = rate.iter().all(|rate| rate.abs() < ROUNDING_RATE);
     is_zero || reversals as f64 > NOISE_REVERSALS_PER_CUTOFF * cutoff * duration
 }
 

@@ -36,13 +36,11 @@ pub(super) const STANDING_FEWEST_MOVING_SHARE: f64 = 0.1;
 /// positions reverses 1.5 times, and a motion twice per period of its own.
 pub(super) const NOISE_REVERSALS_PER_CUTOFF: f64 = 1.2;
 
+/// Rates below this are rounding, rad/s or m/s. By judgement: no drive moves by less than 0.1 mm a day.
+pub(super) const ROUNDING_RATE: f64 = 1e-9;
+
 /// Cut-off that is assumed for recorded rates, as a share of the sampling rate (1). By judgement.
 pub(super) const RECORDED_CUTOFF_SHARE: f64 = 0.1;
-
-/// Further changes beside a load must change the force of a drive by more than this share of the load's own force there
-/// (1). Scales of forces that are wrong by so much in both runs would otherwise look like further changes. By judgement:
-/// torque constants are usually known to 10 %, so that two of them differ by up to this.
-pub(super) const FURTHER_CHANGE_LOAD_SHARE: f64 = 0.2;
 
 /// Largest number of windows of a run in which recorded rates are compared with positions. By judgement.
 pub(super) const TIME_BASE_WINDOWS: usize = 8;
