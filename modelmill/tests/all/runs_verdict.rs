@@ -4,7 +4,7 @@
 use modelmill::Model;
 use modelmill::print::LibrarySpelling;
 use modelmill::recording::PreparedRecording;
-use modelmill::runs::{KnownLoad, PhysicalChange, RunReport, RunVerdict, RunsComparison, RunsOptions, UndecidedReason};
+use modelmill::runs::{KnownLoad, PhysicalChange, RunReport, RunVerdict, RunsComparison, RunsOptions};
 use modelmill::text::TerminalStyle;
 
 use crate::run_plans::{PlannedMotion, RunPlan, arm_with_friction};
