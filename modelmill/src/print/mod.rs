@@ -16,7 +16,7 @@ mod next_step;
 mod proposal;
 #[cfg(feature = "import")]
 mod reduction;
-mod runs;
+pub(crate) mod runs;
 mod spelling;
 mod summary;
 pub mod tables;

@@ -441,6 +441,11 @@ impl PreparedRecording {
         self.raw.column(name).ok()
     }
 
+    /// Where its rates and accelerations were taken from.
+    pub(crate) fn derivative_source(&self) -> DerivativeSource {
+        self.reading.preparation.source
+    }
+
     /// The notes of all segments.
     pub fn notes(&self) -> impl Iterator<Item = &RecordingNote> {
         self.segments.iter().flat_map(RecordingSegment::notes)

@@ -6,6 +6,8 @@ mod every_model;
 mod hanging;
 mod made;
 mod missing;
+mod run_plans;
 mod runs;
+mod runs_verdict;
 mod undriven;
 mod variants;
