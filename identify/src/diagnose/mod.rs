@@ -45,6 +45,7 @@ mod hum;
 mod laws;
 mod noise;
 mod numbered;
+mod plausible;
 mod pool;
 mod problem;
 mod rejection;
@@ -585,6 +586,8 @@ impl EffectSelector<'_> {
                     RejectionReason::WrongSign
                 } else if refused.cancels {
                     RejectionReason::CancelsAnother
+                } else if refused.is_implausible {
+                    RejectionReason::ImplausibleValue
                 } else {
                     refused
                         .evidence
@@ -601,6 +604,8 @@ impl EffectSelector<'_> {
                     RejectionReason::WrongSign
                 } else if trial.cancelling.contains(&picks.len()) {
                     RejectionReason::CancelsAnother
+                } else if trial.implausible.contains(&picks.len()) {
+                    RejectionReason::ImplausibleValue
                 } else if gain < LEAST_GAIN {
                     RejectionReason::ExplainsNothing
                 } else {

@@ -49,6 +49,8 @@ pub(crate) struct RejectedCandidate {
     pub(crate) wrong_sign: bool,
     /// Whether an effect of the set does little but cancel another one.
     pub(crate) cancels: bool,
+    /// Whether an estimate is beyond what the machine's size and forces allow.
+    pub(crate) is_implausible: bool,
 }
 
 /// Result of the search.
@@ -262,6 +264,7 @@ impl EffectSelector<'_> {
                     evidence,
                     wrong_sign: !trial.wrong_sign.is_empty(),
                     cancels: !trial.cancelling.is_empty(),
+                    is_implausible: !trial.implausible.is_empty(),
                 });
             }
         }

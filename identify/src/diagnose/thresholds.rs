@@ -53,6 +53,59 @@ pub(super) const RANDOM_SIGN_SHARE: f64 = 0.05;
 /// of the squares is half of the amplitude. By judgement.
 pub(super) const CANCELLATION_SHARE: f64 = 0.25;
 
+/// The same for two effects at different places: their columns differ, so that only what cancels nearly completely is
+/// no effect (1). By judgement.
+pub(super) const FULL_CANCELLATION_SHARE: f64 = 0.03;
+
+/// A force of a parameter is implausible if half of its range is above this many times the largest force of its drive
+/// (1). A spring or a counterweight that carries most of the weight may be several times as strong as its drive. By
+/// judgement.
+pub(super) const PLAUSIBLE_MOST_FORCE_RATIO: f64 = 5.0;
+
+/// Largest plausible error of a length, as a part of the largest distance of two frames (1). By judgement.
+pub(super) const PLAUSIBLE_MOST_LENGTH_SHARE: f64 = 0.3;
+
+/// Largest plausible error of an angle or of the zero of an encoder, rad: what is larger is another fault. By judgement.
+pub(super) const PLAUSIBLE_MOST_ANGLE: f64 = 0.7;
+
+/// Largest plausible play of a gear or eccentricity of an encoder, rad. By judgement.
+pub(super) const PLAUSIBLE_MOST_PLAY: f64 = 0.1;
+
+/// The same for a length, as a part of the largest distance of two frames (1). By judgement.
+pub(super) const PLAUSIBLE_MOST_PLAY_SHARE: f64 = 0.05;
+
+/// Largest plausible delay or time constant of a force signal, s. By judgement.
+pub(super) const PLAUSIBLE_MOST_DELAY: f64 = 0.1;
+
+/// Largest plausible friction as a share of the load (1): a drive with more could not move. By judgement.
+pub(super) const PLAUSIBLE_MOST_LOAD_SHARE: f64 = 1.0;
+
+/// A constant above this part of the largest value of its grid (1) is at the end of its range. By judgement.
+pub(super) const GRID_END_SHARE: f64 = 0.99;
+
+/// Least plausible relative error of the scale of a force signal (1). A signal at -1 does not follow the motion at all.
+/// By judgement, from the torso of a robot with -1.085 and joints with pushes with -0.94 to -0.99 (issue 28).
+pub(super) const GAIN_LEAST: f64 = -0.75;
+
+/// Largest plausible relative error of the scale of a force signal (1). By judgement.
+pub(super) const GAIN_MOST: f64 = 3.0;
+
+/// A wrong scale of a force signal must leave at most this share of the squared error of its drive, on data that was not
+/// fitted (1). By judgement.
+pub(super) const SCALE_MOST_REMAINING_SHARE: f64 = 0.5;
+
+/// Largest difference of its values in the two halves of the data, relative to the larger one (1). By judgement.
+pub(super) const SCALE_MOST_DIFFERENCE: f64 = 0.3;
+
+/// Samples on either side of a reversal that are near it. By judgement.
+pub(super) const FAR_REVERSAL_SAMPLES: usize = 4;
+
+/// Share of the samples that must be far from reversals (1), so that a delay can be confirmed there. By judgement.
+pub(super) const FAR_LEAST_SHARE: f64 = 0.2;
+
+/// A delay or low-pass must have at least this part of its gain far from reversals too (1). By judgement.
+pub(super) const DELAY_LEAST_SHARE_FAR: f64 = 0.25;
+
 /// A column of an effect is dependent if less than this share of its squares remains after the projection on the others
 /// (1). By judgement.
 pub(super) const EFFECT_INDEPENDENCE_TOLERANCE: f64 = 1e-6;

@@ -26,7 +26,7 @@ use super::held_friction;
 use super::laws::sites;
 use super::memory::dahl_candidates;
 use super::numbers::{layout, stack, variables};
-use super::payloads::payloads;
+use super::payloads::{payloads, reach};
 use super::thresholds::FEWEST_SAMPLES;
 use super::words;
 use crate::regressors::{SegmentList, regressor};
@@ -278,6 +278,7 @@ fn problem(
         friction: friction(model, all)?,
         variables: variables(model, all),
         fixed_forces: None,
+        size: reach(&model.derivation.mechanism),
         ..DiagnosisProblem::default()
     };
     Ok((problem, made))
