@@ -33,6 +33,7 @@ mod cleaning;
 mod column;
 mod combinations;
 mod conditional;
+mod confirmed_readings;
 mod constant;
 mod disturbance;
 mod drifts;

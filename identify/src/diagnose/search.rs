@@ -8,8 +8,9 @@ use super::evidence::SelectionEvidence;
 use super::pool::FitScope;
 use super::problem::{ColumnSource, DiagnosisProblem};
 use super::thresholds::{
-    OTHER_KIND_SHARE, OTHER_SET_LEAST_ADVANTAGE, OTHER_SET_LEAST_GAIN, PLACE_PRICE, RIVAL_FINER_GAIN_FACTOR,
-    RIVAL_MOST_GRID_RATIO, RIVAL_MOST_RATIO, SIMPLER_KIND_SHARE, SIMPLER_SET_MOST_LOSS,
+    OTHER_KIND_SHARE, OTHER_SET_LEAST_ADVANTAGE, OTHER_SET_LEAST_GAIN, PLACE_PRICE, REFINEMENT_FEWEST_NUMBERS,
+    REFINEMENT_LEAST_GAIN, RIVAL_FINER_GAIN_FACTOR, RIVAL_MOST_GRID_RATIO, RIVAL_MOST_RATIO, SIMPLER_KIND_SHARE,
+    SIMPLER_SET_MOST_LOSS, STEP_MOST_RISE,
 };
 
 /// Sets that are followed at the same time (width of the beam).
@@ -156,6 +157,7 @@ impl EffectSelector<'_> {
             if settled.is_possible()
                 && evidence.is_sufficient()
                 && !self.is_worse_overall(accepted, &settled.picks, &channels)
+                && self.is_ladder_step(accepted, &settled, evidence.gain)
             {
                 return Some(EffectSetChange {
                     picks: settled.picks,
@@ -165,6 +167,19 @@ impl EffectSelector<'_> {
             // The set has lost its support; try the next one without it.
             trials.retain(|trial| candidate_indices(&trial.picks) != next.candidates);
         }
+    }
+
+    /// Whether a set may follow the accepted one: the error of all drives together does not rise, a general kind that
+    /// replaces simpler ones is much better, and faults of force signals are confirmed.
+    fn is_ladder_step(&self, accepted: &[SelectedEffect], next: &ScoredEffectSet, gain: f64) -> bool {
+        let before: usize = accepted.iter().map(|pick| self.freedoms(pick)).sum();
+        let is_refinement = next.freedoms >= before + REFINEMENT_FEWEST_NUMBERS
+            && next.picks.len() <= accepted.len()
+            && !Self::replaced_effects(accepted, &next.picks).is_empty();
+        let error = |picks: &[SelectedEffect]| self.relative_errors(picks).1;
+        (!is_refinement || gain >= REFINEMENT_LEAST_GAIN)
+            && self.are_readings_confirmed(&next.picks)
+            && error(&next.picks) <= (1.0 + STEP_MOST_RISE) * error(accepted)
     }
 
     /// The first trial that is supported by evidence. Sets that add one effect come first; `refused` receives the
@@ -215,7 +230,8 @@ impl EffectSelector<'_> {
     pub(crate) fn is_worse(&mut self, settled: &[SelectedEffect], before: &[SelectedEffect]) -> bool {
         self.weigh_channels(before);
         let channels: Vec<usize> = (0..self.weights.len()).collect();
-        self.evidence(settled, before, &channels).is_worth_keeping()
+        let evidence = self.evidence(settled, before, &channels);
+        evidence.is_worth_keeping() || evidence.gives_back()
     }
 
     /// Whether a trial adds exactly one effect to the accepted set; the new effect may replace members that it
@@ -250,7 +266,7 @@ impl EffectSelector<'_> {
             tested += usize::from(trial.is_possible());
             let news: Vec<SelectedEffect> = set_difference(&trial.picks, accepted);
             let evidence = self.evidence(accepted, &trial.picks, &self.affected_channels(&news));
-            if evidence.is_sufficient() && trial.is_possible() {
+            if evidence.is_sufficient() && trial.is_possible() && self.are_readings_confirmed(&trial.picks) {
                 return Some(SupportedEffectSet {
                     candidates: tried,
                     trial,

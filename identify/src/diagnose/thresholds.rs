@@ -13,6 +13,28 @@ pub(super) const LEAST_GAIN: f64 = 0.02;
 /// (CHANGELOG.md).
 pub(super) const NOISE_LEAST_GAIN_VARIANCES: f64 = 8.0;
 
+/// Least gain of any change (1): half of it is the fall of the error itself, which shows in the third printed digit of
+/// the error at the latest. By judgement.
+pub(super) const MATERIAL_LEAST_GAIN: f64 = 0.005;
+
+/// A kind with at least this many more estimated numbers is a refinement, which must lower the squared error on its
+/// channels by [`REFINEMENT_LEAST_GAIN`]. By judgement.
+pub(super) const REFINEMENT_FEWEST_NUMBERS: usize = 3;
+
+/// Least gain of a general kind that replaces simpler members (1). By judgement.
+pub(super) const REFINEMENT_LEAST_GAIN: f64 = 0.1;
+
+/// An exchange or a removal must not raise the squared error on data that was not fitted by more than this share (1).
+/// By judgement.
+pub(super) const GIVEN_BACK_MOST_SHARE: f64 = 0.04;
+
+/// A rise of the error that is below this many standard errors over the blocks (1) is noise. By judgement.
+pub(super) const GIVEN_BACK_LEAST_T: f64 = 1.0;
+
+/// A step may raise the relative error of all drives together by this part (1), if it lowers that of its own drive. By
+/// judgement.
+pub(super) const STEP_MOST_RISE: f64 = 1e-3;
+
 /// Least t value of the gain over the blocks if the residual is white noise (1): only noise makes blocks differ then.
 /// By judgement.
 pub(super) const NOISE_LEAST_T: f64 = 1.0;
