@@ -48,11 +48,13 @@ mod noise;
 mod numbered;
 mod plausible;
 mod pool;
+mod possible;
 mod problem;
 mod rejection;
 mod reproducible;
 mod search;
 mod simplification;
+mod support;
 mod thresholds;
 mod tile;
 mod tilt;
@@ -78,6 +80,7 @@ pub use problem::{
     SampleSegment, SignConstraint,
 };
 pub use rejection::RejectionReason;
+pub use support::EffectSupport;
 pub use thresholds::FORCE_ROUNDING;
 pub use tilt::{ForceSensitivity, TiltCandidate};
 
@@ -134,6 +137,8 @@ pub struct IdentifiedEffect {
     pub standard_deviations: Vec<Option<f64>>,
     /// Probability that the effect is present, 0 to 1.
     pub probability: f64,
+    /// What supports the effect; the probability follows from it.
+    pub support: EffectSupport,
     /// Effects that explain the data equally well.
     pub indistinguishable_from: Vec<LocatedEffect>,
 }
@@ -167,6 +172,9 @@ pub struct ModelDiagnosis {
     pub steps: Vec<SelectionStep>,
     /// Effects that are missing.
     pub effects: Vec<IdentifiedEffect>,
+    /// Effects that are less likely than not, which the model is not said to lack: with a probability below 0.5. They
+    /// are in no set whose error is reported last, and their estimates belong to the set that had them.
+    pub possible_effects: Vec<IdentifiedEffect>,
     /// All candidates: first those that were found, then by the share that they explain alone.
     pub candidates: Vec<CandidateOutcome>,
     /// Effects that the recordings cannot decide: a force as large as the drive's own would be absorbed by columns of
@@ -254,6 +262,14 @@ fn diagnose_cleaned(
             (picks, left, sites, laws) = (needed, left_then, sites_then, laws_then);
         }
     }
+    // Stage 4: indistinguishable alternatives and probabilities. Effects that are less likely than not are set aside.
+    let mut assessed = bench.assess_effects(&picks, &left);
+    let possible = assessed.set_aside_unlikely(&bench);
+    if !possible.is_empty() {
+        ladder.push(bench.selection_step(&picks, &assessed.picks, None));
+        picks.clone_from(&assessed.picks);
+        left = bench.set_residual(&picks);
+    }
     let SetResidual {
         residual: rest,
         repeatable_share: mut again,
@@ -269,33 +285,12 @@ fn diagnose_cleaned(
         }
     }
     unexplained.sort_unstable();
-    // Stage 4: indistinguishable alternatives, the origin of the residual, disturbances and estimates.
-    let aliases = bench.find_aliases(&picks);
+    // Stage 5: the origin of the residual, disturbances and estimates.
     bench.weigh_channels(&picks);
     let (budgets, coloured) = bench.residual_budgets(&picks, &rest, &again);
     disturbances.extend(bench.disturbances(&picks));
     disturbances.extend(coloured);
-    let estimates = bench.estimate_parameters(&picks, FitScope::Fit);
-    let mut effects = Vec::new();
-    for (i, (pick, aliases)) in picks.iter().zip(aliases).enumerate() {
-        let candidate = bench.candidate(pick);
-        if candidate.nature == CandidateNature::Disturbance {
-            continue;
-        }
-        // Only other causes share the probability; another form of the same effect does not.
-        let rivals = aliases.iter().filter(|alias| !alias.is_equivalent_form);
-        let rivals: Vec<f64> = rivals.map(|alias| alias.criterion_loss).collect();
-        let (values, deviations) = estimates[i].iter().copied().unzip();
-        effects.push(IdentifiedEffect {
-            effect: candidate.effect.clone(),
-            candidate: pick.candidate,
-            constants: pick.constants.clone(),
-            estimates: values,
-            standard_deviations: deviations,
-            probability: bench.probability(&picks, i, &rivals, &unexplained),
-            indistinguishable_from: aliases.into_iter().map(|alias| alias.effect).collect(),
-        });
-    }
+    let mut effects = assessed.identified_effects(&bench);
     merge_drifting_friction(&mut effects, &mut disturbances);
     // Unexplained residual decides before effects that were found.
     let verdict = match (unexplained.is_empty(), effects.is_empty()) {
@@ -303,7 +298,12 @@ fn diagnose_cleaned(
         (true, true) => DiagnosisVerdict::Adequate,
         (true, false) => DiagnosisVerdict::MissingEffect,
     };
-    let candidates = bench.candidate_outcomes(&picks, &found, &alone);
+    let mut candidates = bench.candidate_outcomes(&picks, &found, &alone);
+    for candidate in &mut candidates {
+        if possible.iter().any(|found| found.effect == candidate.effect) {
+            candidate.rejection_reason = Some(RejectionReason::LessLikelyThanNot);
+        }
+    }
     let untold = bench.find_undetermined(&picks, &rest);
     ModelDiagnosis {
         verdict,
@@ -312,6 +312,7 @@ fn diagnose_cleaned(
         disturbances,
         steps: ladder,
         effects,
+        possible_effects: possible,
         candidates,
         undetermined_effects: untold,
         residual: rest,

@@ -198,15 +198,36 @@ pub(super) const SUBSTITUTE_MOST_RATIO: f64 = 3.0;
 /// An effect that explains less than this share of the squares (1) has no alternatives. By judgement.
 pub(super) const NEGLIGIBLE_EFFECT_SHARE: f64 = 1e-6;
 
-/// Largest odds for an effect, as twice their logarithm (1). By judgement.
-pub(super) const MAX_LOG_ODDS: f64 = 20.0;
+/// Logarithm of the odds of an effect with the gain and the t value of reference and nothing unexplained (1).
+/// By judgement.
+pub(super) const ODDS_AT_REFERENCE: f64 = 2.0;
 
-/// Probability that another cause, which is no candidate, explains what an effect explains, if the residual is noise
-/// (1). By judgement.
-pub(super) const UNKNOWN_CAUSE_PROBABILITY: f64 = 0.02;
+/// Rise of these for each factor e of the t value (1). By judgement.
+pub(super) const ODDS_PER_T: f64 = 1.0;
 
-/// The same if a repeatable part of the residual is unexplained (1). By judgement.
-pub(super) const UNKNOWN_CAUSE_IF_UNEXPLAINED: f64 = 0.25;
+/// Rise of these for each factor e of the gain (1). By judgement.
+pub(super) const ODDS_PER_GAIN: f64 = 0.5;
+
+/// Fall of these for each factor e of one plus the unexplained ratio (1). By judgement.
+pub(super) const ODDS_PER_UNEXPLAINED: f64 = 2.0;
+
+/// Odds of an alternative that explains as much, relative to the effect that was preferred as the simpler one (1). By
+/// judgement.
+pub(super) const ODDS_OF_ALTERNATIVE: f64 = 0.5;
+
+/// The t value of reference, and the range to which a t value is limited (1). By judgement.
+pub(super) const SUPPORT_T_REFERENCE: f64 = 4.0;
+pub(super) const SUPPORT_T_RANGE: [f64; 2] = [0.2, 12.0];
+
+/// The gain of reference, and the range to which a gain is limited (1). By judgement.
+pub(super) const SUPPORT_GAIN_REFERENCE: f64 = 0.3;
+pub(super) const SUPPORT_GAIN_RANGE: [f64; 2] = [0.005, 1.0];
+
+/// Largest probability of an effect: no data exclude a cause that is no candidate (1). By judgement.
+pub(super) const PROBABILITY_MOST: f64 = 0.99;
+
+/// Below this probability an effect is possible, and the model is not said to lack it (1). By definition.
+pub(super) const LACKING_LEAST_PROBABILITY: f64 = 0.5;
 
 /// A column whose share of squares outside of the others is below this (1) is a combination of them along any motion,
 /// and its effect is not listed as undetermined. Below it is rounding. By judgement.
