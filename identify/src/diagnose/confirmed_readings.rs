@@ -2,7 +2,8 @@
 //!
 //! Decision: a scale is the bin into which any error in proportion to the force falls, so it must have the same value in
 //! each half of the data and explain most of the error of its drive. A delay or a low-pass explains what smoothing of the
-//! positions does to dry friction at reversals, so it must lower the error far from reversals too.
+//! positions does to dry friction at reversals, so it must lower the error far from reversals too. The same holds for
+//! friction that builds up after reversals.
 
 use super::bench::{EffectSelector, SelectedEffect};
 use super::pool::solve_gram;
@@ -12,20 +13,28 @@ use super::thresholds::{
 };
 
 impl EffectSelector<'_> {
-    /// Whether every fault of a force signal in a set is confirmed.
+    /// Whether every fault of a force signal in a set is confirmed, and every form of friction that resembles one.
     pub(crate) fn are_readings_confirmed(&self, picks: &[SelectedEffect]) -> bool {
         (0..picks.len()).all(|i| match self.candidate(&picks[i]).source {
             ColumnSource::ReadingFault(fault) if fault.kind == ReadingFaultKind::Scaled => {
                 self.is_scale_confirmed(picks, i)
             }
-            ColumnSource::ReadingFault(_) => self.is_delay_confirmed(picks, i),
+            ColumnSource::ReadingFault(_) => self.is_confirmed_far_from_reversals(picks, i),
+            _ if self.acts_after_reversals(&picks[i]) => self.is_confirmed_far_from_reversals(picks, i),
             _ => true,
         })
     }
 
-    /// Whether the delay or low-pass at a position of a set lowers the squared error far from reversals about as it does
+    /// Whether an effect is a form of friction that builds up over a searched distance after reversals, such as Dahl
+    /// friction.
+    fn acts_after_reversals(&self, pick: &SelectedEffect) -> bool {
+        let candidate = self.candidate(pick);
+        candidate.refines.is_some() && candidate.searched_constants > 0 && candidate.parameters.len() == 1
+    }
+
+    /// Whether the member at a position of a set lowers the squared error far from reversals about as it does
     /// everywhere. It is confirmed if few samples are far from reversals, since nothing can be known then.
-    fn is_delay_confirmed(&self, picks: &[SelectedEffect], member: usize) -> bool {
+    fn is_confirmed_far_from_reversals(&self, picks: &[SelectedEffect], member: usize) -> bool {
         let channels = self.affected_channels(&picks[member..=member]);
         let mut without = picks.to_vec();
         without.remove(member);

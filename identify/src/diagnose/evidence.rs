@@ -51,6 +51,8 @@ pub struct SelectionEvidence {
     pub above_noise: f64,
     /// Least gain that is accepted: a fixed share, or less if the residual is white noise.
     pub least_gain: f64,
+    /// Whether the residual after the change is white noise, so that nothing else is left.
+    pub is_residual_white: bool,
 }
 
 impl SelectionEvidence {
@@ -164,6 +166,7 @@ impl EffectSelector<'_> {
             bic: worth * (old_squares / new_squares.max(f64::MIN_POSITIVE)).ln() - (price(after) - price(before)),
             effective_samples: worth,
             above_noise: self.squares_over_noise(&old_rest, channels),
+            is_residual_white: is_noise_known,
             least_gain: {
                 // Weights are one over the variance of the residual, which is the noise where it is known.
                 let of_noise = NOISE_LEAST_GAIN_VARIANCES / total.max(f64::MIN_POSITIVE);

@@ -43,15 +43,20 @@ fn largest_value(candidate: &CandidateEffect, parameter: usize, size: f64) -> f6
     }
 }
 
-/// Whether the force of a parameter is compared with that of the drive. Terms of a polynomial are not: they cancel
-/// where the origin of the coordinate is far from its travel.
-fn is_force_bounded(candidate: &CandidateEffect, parameter: usize) -> bool {
+/// Whether the force of a parameter is compared with that of the drive. Terms of a polynomial are not, since they cancel
+/// where the origin of the coordinate is far from its travel, nor are several parameters at a place that is no drive,
+/// where a constant force has the curve of the lever. A polynomial has one term for each unit; further ones are waves.
+fn is_force_bounded(candidate: &CandidateEffect, parameter: usize, drives: &[String]) -> bool {
     let unit = |k: usize| candidate.parameters[k].unit.as_str();
-    let is_polynomial = (0..candidate.parameters.len()).any(|k| unit(k).contains("^3"));
-    match candidate.source {
-        ColumnSource::ReadingFault(_) => false,
-        _ => candidate.nature == CandidateNature::Effect && (!is_polynomial || matches!(unit(parameter), "N" | "N m")),
-    }
+    let numbers = candidate.parameters.len();
+    let is_polynomial = (0..numbers).any(|k| unit(k).contains("^3"));
+    let is_wave = (0..parameter).any(|k| unit(k) == unit(parameter));
+    let is_reading = matches!(candidate.source, ColumnSource::ReadingFault(_));
+    let is_at_drives = candidate.effect.at.iter().all(|place| drives.contains(place));
+    candidate.nature == CandidateNature::Effect
+        && !is_reading
+        && (numbers == 1 || is_at_drives)
+        && (!is_polynomial || is_wave)
 }
 
 /// Whether the searched constant of an effect with one parameter sits at the upper end of its range, such as a Stribeck
@@ -101,7 +106,7 @@ impl EffectSelector<'_> {
                 .enumerate()
                 .any(|(k, (value, column))| {
                     let is_too_strong = || {
-                        is_force_bounded(candidate, k)
+                        is_force_bounded(candidate, k, &self.problem.layout.channels)
                             && value.abs() * self.pool.relative_range(*column) > PLAUSIBLE_MOST_FORCE_RATIO
                     };
                     value.abs() > largest_value(candidate, k, self.problem.size) || is_too_strong()

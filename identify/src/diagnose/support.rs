@@ -27,6 +27,8 @@ pub struct EffectSupport {
     pub t: f64,
     /// Repeatable squares that stay unexplained on its drives, relative to those that it explains.
     pub unexplained: f64,
+    /// Whether the residual of its drives is white noise: then a small gain is as certain as a large one.
+    pub white_residual: bool,
     /// Its share of the probability among its alternatives, 0 to 1; 1 if there are none.
     pub share: f64,
 }
@@ -36,6 +38,12 @@ impl EffectSupport {
     pub fn probability(&self) -> f64 {
         let [least_t, most_t] = SUPPORT_T_RANGE;
         let [least_gain, most_gain] = SUPPORT_GAIN_RANGE;
+        // In white noise nothing else could explain the gain.
+        let [least_t, least_gain] = if self.white_residual {
+            [SUPPORT_T_REFERENCE, SUPPORT_GAIN_REFERENCE]
+        } else {
+            [least_t, least_gain]
+        };
         let log_odds = ODDS_AT_REFERENCE
             + ODDS_PER_T * (self.t.clamp(least_t, most_t) / SUPPORT_T_REFERENCE).ln()
             + ODDS_PER_GAIN * (self.gain.clamp(least_gain, most_gain) / SUPPORT_GAIN_REFERENCE).ln()
@@ -63,6 +71,7 @@ impl EffectSelector<'_> {
                     gain: evidence.gain,
                     t: steadiness(&evidence),
                     unexplained: self.unexplained_ratio(&without, &channels, left),
+                    white_residual: evidence.is_residual_white,
                     share: probability_share(aliases),
                 }
             })
@@ -133,6 +142,7 @@ mod tests {
                             gain,
                             t,
                             unexplained,
+                            white_residual: false,
                             share,
                         };
                         let p = one.probability();
@@ -143,6 +153,10 @@ mod tests {
                                 ..one
                             },
                             EffectSupport { t: t + 1.0, ..one },
+                            EffectSupport {
+                                white_residual: true,
+                                ..one
+                            },
                             EffectSupport {
                                 share: (share + 0.1).min(1.0),
                                 ..one
