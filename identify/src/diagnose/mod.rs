@@ -8,7 +8,7 @@
 //!    microseconds; `tuning` finds constants, `fit_dependent` computes columns that depend on the fit, `force_signals` those of
 //!    faulty force signals, `tilt` rotates gravity, `body` places an additional mass, `constant` corrects a number of
 //!    the model.
-//! 3. `search` - forward search over sets, with exchanges; `evidence` decides on time that was not fitted; `simplification`
+//! 3. `search` - forward search over sets, with exchanges; `combinations` tries pairs and the same kinds at all drives; `evidence` decides on time that was not fitted; `simplification`
 //!    makes the last set as small and simple as possible.
 //! 4. `aliases` - effects that this recording cannot distinguish; `reproducible` - the repeatable residual that no
 //!    candidate explains.
@@ -31,7 +31,9 @@ mod body;
 mod bounds;
 mod cleaning;
 mod column;
+mod combinations;
 mod conditional;
+mod confirmed_readings;
 mod constant;
 mod disturbance;
 mod drifts;
@@ -45,12 +47,15 @@ mod in_time;
 mod laws;
 mod noise;
 mod numbered;
+mod plausible;
 mod pool;
+mod possible;
 mod problem;
 mod rejection;
 mod reproducible;
 mod search;
 mod simplification;
+mod support;
 mod thresholds;
 mod tile;
 mod tilt;
@@ -77,6 +82,7 @@ pub use problem::{
     SampleSegment, SignConstraint,
 };
 pub use rejection::RejectionReason;
+pub use support::EffectSupport;
 pub use thresholds::FORCE_ROUNDING;
 pub use tilt::{ForceSensitivity, TiltCandidate};
 
@@ -134,6 +140,8 @@ pub struct IdentifiedEffect {
     pub standard_deviations: Vec<Option<f64>>,
     /// Probability that the effect is present, 0 to 1.
     pub probability: f64,
+    /// What supports the effect; the probability follows from it.
+    pub support: EffectSupport,
     /// Effects that explain the data equally well.
     pub indistinguishable_from: Vec<LocatedEffect>,
 }
@@ -167,6 +175,9 @@ pub struct ModelDiagnosis {
     pub steps: Vec<SelectionStep>,
     /// Effects that are missing.
     pub effects: Vec<IdentifiedEffect>,
+    /// Effects that are less likely than not, which the model is not said to lack: with a probability below 0.5. They
+    /// are in no set whose error is reported last, and their estimates belong to the set that had them.
+    pub possible_effects: Vec<IdentifiedEffect>,
     /// All candidates: first those that were found, then by the share that they explain alone.
     pub candidates: Vec<CandidateOutcome>,
     /// Effects that the recordings can neither show nor exclude. Even if such an effect had a force as large as that of
@@ -286,6 +297,14 @@ fn diagnose_cleaned(
             (picks, left, sites, laws) = (needed, left_then, sites_then, laws_then);
         }
     }
+    // Stage 4: indistinguishable alternatives and probabilities. Effects that are less likely than not are set aside.
+    let mut assessed = bench.assess_effects(&picks, &left);
+    let possible = assessed.set_aside_unlikely(&bench);
+    if !possible.is_empty() {
+        ladder.push(bench.selection_step(&picks, &assessed.picks, None));
+        picks.clone_from(&assessed.picks);
+        left = bench.set_residual(&picks);
+    }
     let SetResidual {
         residual: rest,
         repeatable_share: mut again,
@@ -301,33 +320,12 @@ fn diagnose_cleaned(
         }
     }
     unexplained.sort_unstable();
-    // Stage 4: indistinguishable alternatives, the origin of the residual, disturbances and estimates.
-    let aliases = bench.find_aliases(&picks);
+    // Stage 5: the origin of the residual, disturbances and estimates.
     bench.weigh_channels(&picks);
     let (budgets, coloured, time_residuals) = bench.residual_budgets(&picks, &rest, &again);
     disturbances.extend(bench.disturbances(&picks));
     disturbances.extend(coloured);
-    let estimates = bench.estimate_parameters(&picks, FitScope::Fit);
-    let mut effects = Vec::new();
-    for (i, (pick, aliases)) in picks.iter().zip(aliases).enumerate() {
-        let candidate = bench.candidate(pick);
-        if candidate.nature.is_disturbance() {
-            continue;
-        }
-        // Only other causes share the probability; another form of the same effect does not.
-        let rivals = aliases.iter().filter(|alias| !alias.is_equivalent_form);
-        let rivals: Vec<f64> = rivals.map(|alias| alias.criterion_loss).collect();
-        let (values, deviations) = estimates[i].iter().copied().unzip();
-        effects.push(IdentifiedEffect {
-            effect: candidate.effect.clone(),
-            candidate: pick.candidate,
-            constants: pick.constants.clone(),
-            estimates: values,
-            standard_deviations: deviations,
-            probability: bench.probability(&picks, i, &rivals, &unexplained),
-            indistinguishable_from: aliases.into_iter().map(|alias| alias.effect).collect(),
-        });
-    }
+    let mut effects = assessed.identified_effects(&bench);
     merge_drifting_friction(&mut effects, &mut disturbances);
     // Unexplained residual decides before effects that were found.
     let changes_in_time = (picks.iter()).any(|pick| bench.candidate(pick).nature == CandidateNature::ChangeInTime);
@@ -337,7 +335,12 @@ fn diagnose_cleaned(
         (true, true) => DiagnosisVerdict::Adequate,
         (true, false) => DiagnosisVerdict::MissingEffect,
     };
-    let candidates = bench.candidate_outcomes(&picks, &found, &alone);
+    let mut candidates = bench.candidate_outcomes(&picks, &found, &alone);
+    for candidate in &mut candidates {
+        if possible.iter().any(|found| found.effect == candidate.effect) {
+            candidate.rejection_reason = Some(RejectionReason::LessLikelyThanNot);
+        }
+    }
     let untold = bench.find_undetermined(&picks, &rest);
     let later = bench.changes_in_residual(&picks);
     let diagnosis = ModelDiagnosis {
@@ -347,6 +350,7 @@ fn diagnose_cleaned(
         disturbances,
         steps: ladder,
         effects,
+        possible_effects: possible,
         candidates,
         undetermined_effects: untold,
         residual: rest,
@@ -633,6 +637,8 @@ impl EffectSelector<'_> {
                     RejectionReason::WrongSign
                 } else if refused.cancels {
                     RejectionReason::CancelsAnother
+                } else if refused.is_implausible {
+                    RejectionReason::ImplausibleValue
                 } else {
                     refused
                         .evidence
@@ -649,6 +655,8 @@ impl EffectSelector<'_> {
                     RejectionReason::WrongSign
                 } else if trial.cancelling.contains(&picks.len()) {
                     RejectionReason::CancelsAnother
+                } else if trial.implausible.contains(&picks.len()) {
+                    RejectionReason::ImplausibleValue
                 } else if gain < LEAST_GAIN {
                     RejectionReason::ExplainsNothing
                 } else {

@@ -281,6 +281,8 @@ pub struct DiagnosisProblem {
     pub change_intervals: Vec<(LocatedEffect, Vec<ChangeInterval>)>,
     /// Disturbances of the recordings that are known already.
     pub disturbances: Vec<Disturbance>,
+    /// Largest distance of two frames of the machine, m, which bounds plausible lengths; zero if it is unknown.
+    pub size: f64,
     /// Whether only verdict, steps and effects are requested: no laws, no alternatives and no rejected candidates.
     pub effects_only: bool,
 }

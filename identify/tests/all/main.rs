@@ -5,6 +5,7 @@ mod emps;
 mod filters;
 mod formats;
 mod logs;
+mod many_drives;
 mod preparation;
 mod readers;
 mod recordings;

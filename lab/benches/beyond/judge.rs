@@ -64,7 +64,9 @@ pub(crate) fn judge(truth: &Value, answer: Option<&Value>) -> JudgedAnswer {
     let mut found = vec![false; missing.len()];
     let mut false_claims = Vec::new();
     for claim in list(&answer["effects"]) {
-        let ways: Vec<&Value> = std::iter::once(claim).chain(list(&claim["indistinguishable_from"])).collect();
+        let ways: Vec<&Value> = std::iter::once(claim)
+            .chain(list(&claim["indistinguishable_from"]))
+            .collect();
         let mut is_true = false;
         for way in &ways {
             let kind = text(&way["kind"]);

@@ -42,12 +42,18 @@ fn run(options: &BenchmarkOptions) -> Result<(), String> {
     let program = options.program()?;
     let judged = work_off(&cases, WORKERS, |case, _| mark_case(&program, case))?;
     for (case, one) in cases.iter().zip(&judged) {
-        let word = MARKS.iter().find(|(mark, _)| *mark == one.mark).map_or("", |(_, word)| word);
+        let word = MARKS
+            .iter()
+            .find(|(mark, _)| *mark == one.mark)
+            .map_or("", |(_, word)| word);
         let name = case.file_name().unwrap_or_default().to_string_lossy();
         println!("{word:<6} {name:<28} {}", one.false_claims.join("; "));
     }
     let count = |mark: FaultMark| judged.iter().filter(|one| one.mark == mark).count();
-    let totals: Vec<String> = MARKS.iter().map(|(mark, word)| format!("{} {word}", count(*mark))).collect();
+    let totals: Vec<String> = MARKS
+        .iter()
+        .map(|(mark, word)| format!("{} {word}", count(*mark)))
+        .collect();
     println!("{} of {}", totals.join(", "), judged.len());
     Ok(())
 }

@@ -4,7 +4,7 @@
 use modelmill_boundary::message;
 use modelmill_boundary::text::{CommandName, Message, OptionName, Remedy};
 use modelmill_identify::diagnose::{
-    DiagnosisVerdict, EffectParameter, IdentifiedEffect, LocatedEffect, ModelDiagnosis,
+    DiagnosisVerdict, EffectParameter, EffectSupport, IdentifiedEffect, LocatedEffect, ModelDiagnosis,
 };
 use modelmill_identify::{ErrorRegion, FitParameter, ParameterStatus, RecordingNote};
 use modelmill_spec::Mechanics;
@@ -80,6 +80,8 @@ pub struct DiagnosisFindings {
     pub diagnosis: ModelDiagnosis,
     /// The effects found: those that the model lacks.
     pub missing: Vec<MissingEffect>,
+    /// Effects with a probability below 0.5. The model is not said to lack them, and they are added to no model.
+    pub possible: Vec<MissingEffect>,
     /// Hypotheses: force laws that are in no library and would explain the residual.
     pub laws: Vec<LawHypothesis>,
     /// Effects that the recordings can neither show nor exclude.
@@ -127,6 +129,8 @@ pub struct MissingEffect {
     pub estimates: Vec<EffectEstimate>,
     /// Probability that the effect is present, between 0 and 1.
     pub probability: f64,
+    /// What supports it: the probability follows from this.
+    pub support: EffectSupport,
     /// Its alternatives: effects that explain the recordings equally well.
     pub indistinguishable_from: Vec<LocatedEffect>,
     /// Experiment that distinguishes the effect from its alternatives, as described in the effect library. `None` if
@@ -292,6 +296,7 @@ impl Model {
         let mut findings = DiagnosisFindings {
             diagnosis: answer.diagnosis.clone(),
             missing: Vec::new(),
+            possible: Vec::new(),
             laws: Vec::new(),
             undecided: Vec::new(),
             off_nominal: Vec::new(),
@@ -309,7 +314,8 @@ impl Model {
             variables,
         };
         // The parts of the findings that depend on others are filled in order.
-        findings.missing = missing_effects(&findings);
+        findings.missing = described_effects(&findings, &findings.diagnosis.effects);
+        findings.possible = described_effects(&findings, &findings.diagnosis.possible_effects);
         findings.laws = laws::hypotheses(&findings.before.model, &findings.diagnosis);
         findings.undecided = undecided_effects(&findings);
         findings.off_nominal = off_nominal_parameters(findings.final_version());
@@ -415,14 +421,15 @@ fn nominal_diagnosis(findings: &DiagnosisFindings, between: &[RecordingDifferenc
     })
 }
 
-/// Missing effects with estimates, alternatives and the experiment that separates them.
-fn missing_effects(findings: &DiagnosisFindings) -> Vec<MissingEffect> {
-    let found = findings.diagnosis.effects.iter();
-    found
+/// Effects with estimates, alternatives and the experiment that separates them.
+fn described_effects(findings: &DiagnosisFindings, effects: &[IdentifiedEffect]) -> Vec<MissingEffect> {
+    effects
+        .iter()
         .map(|found| MissingEffect {
             effect: found.effect.clone(),
             estimates: estimates(findings, found),
             probability: found.probability,
+            support: found.support,
             indistinguishable_from: found.indistinguishable_from.clone(),
             separating_experiment: separating_experiment(findings, found),
             separation: separation(findings, found),

@@ -26,7 +26,7 @@ use super::held_friction;
 use super::laws::sites;
 use super::memory::dahl_candidates;
 use super::numbers::{layout, stack, variables};
-use super::payloads::{frame_loads, load_changes, payloads};
+use super::payloads::{frame_loads, load_changes, payloads, reach};
 use super::thresholds::FEWEST_SAMPLES;
 use super::words;
 use crate::regressors::{SegmentList, regressor};
@@ -285,6 +285,7 @@ fn problem(
         friction: friction(model, all)?,
         variables: variables(model, all),
         fixed_forces: None,
+        size: reach(&model.derivation.mechanism),
         ..DiagnosisProblem::default()
     };
     Ok((problem, made))

@@ -108,6 +108,10 @@ pub fn refusal(reason: RejectionReason, has_effects: bool) -> &'static str {
     match reason {
         RejectionReason::WrongSign => "a parameter would have an impossible sign",
         RejectionReason::CancelsAnother => "it would only cancel another effect at its place",
+        RejectionReason::ImplausibleValue => {
+            "its value would be implausible for the size and the forces of this machine"
+        }
+        RejectionReason::LessLikelyThanNot => "possible, but less likely than not",
         RejectionReason::ExplainedBetter => "another candidate explains more",
         RejectionReason::ExplainsNothing if has_effects => {
             "redundant: it explains almost nothing in addition to the effects found"

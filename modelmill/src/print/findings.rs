@@ -5,7 +5,7 @@ use modelmill_identify::diagnose::{DiagnosisVerdict, LocatedEffect, SelectionSte
 use serde_json::{Map, Value, json};
 
 use super::laws;
-use crate::diagnose::{DiagnosisFindings, EffectEstimate, UndecidedEffect, words};
+use crate::diagnose::{DiagnosisFindings, EffectEstimate, MissingEffect, UndecidedEffect, words};
 use crate::print::{OptionName, Remedy, StepSpelling, notes};
 use crate::text::TerminalStyle;
 use crate::text::table::{ColumnAlignment, number, percent, significant, table};
@@ -23,7 +23,8 @@ impl DiagnosisFindings {
     ///   force of the drive; `rms` is this force in `unit`
     /// - `disturbances`: faults of the recordings, with estimates and times (`interval`, s)
     /// - `steps`: errors after each added effect, on fitted (`fit`) and validation data (`check`)
-    /// - `effects`: missing effects with estimates, probability and alternatives
+    /// - `effects`: missing effects with estimates, probability, what supports them, and alternatives
+    /// - `possible`: the same for effects with a probability below 0.5, which the model is not said to lack
     /// - `candidates`: all effects that were tried, with the share of the squared error that each explains
     ///   alone and the reason of its rejection
     /// - `untold`: effects that the recordings can neither show nor exclude
@@ -40,20 +41,22 @@ impl DiagnosisFindings {
         let model = &self.before.model;
         // Missing effects with the motion that would separate them from their alternatives. Kinds and places have
         // the names of the model file.
-        let effects: Vec<Value> = (self.missing.iter())
-            .map(|missing| {
+        let described = |effects: &[MissingEffect]| -> Vec<Value> {
+            let described = effects.iter().map(|missing| {
                 let separation = missing.separation.as_ref();
                 json!({
                     "kind": missing.effect.kind,
                     "at": missing.effect.at,
                     "estimates": estimates(&missing.estimates),
                     "probability": missing.probability,
+                    "support": missing.support,
                     "indistinguishable_from": missing.indistinguishable_from,
                     "separate_by": missing.separating_experiment,
                     "separate_command": separation.and_then(|asked| spelling.spell_separation(model, asked)),
                 })
-            })
-            .collect();
+            });
+            described.collect()
+        };
         // All candidates, including those that were found; they have no rejection reason. A script can sort them
         // by either share.
         let candidates: Vec<Value> = (diagnosis.candidates.iter())
@@ -129,7 +132,8 @@ impl DiagnosisFindings {
             "budget": budget,
             "disturbances": disturbances,
             "steps": steps(&diagnosis.steps),
-            "effects": effects,
+            "effects": described(&self.missing),
+            "possible": described(&self.possible),
             "candidates": candidates,
             "untold": self.undecided.iter().map(|one| {
                 json!({"kind": one.effect.kind, "at": one.effect.at, "says": one.reason, "separate_by": one.separating_experiment})
@@ -178,6 +182,7 @@ impl DiagnosisFindings {
         // The noise floor follows the table, as the lower bound of all errors.
         lines.push(format!("  {}", words::noise_floor_text(diagnosis)));
         self.missing_text(style, spelling, &mut lines);
+        self.possible_text(style, &mut lines);
         self.disturbances_text(style, &mut lines);
         lines.push(String::new());
         lines.push(style.bold(if diagnosis.verdict == DiagnosisVerdict::Unexplained {
@@ -283,18 +288,11 @@ impl DiagnosisFindings {
             let name = found.effect.kind.as_str();
             let is_first = !explained.contains(&name);
             explained.push(name);
-            // Values with standard deviations and units.
-            let values: Vec<String> = (found.estimates.iter())
-                .map(|e| {
-                    let std = e
-                        .std
-                        .map_or_else(String::new, |std| format!(" ± {}", significant(std, 2)));
-                    let unit = if e.unit == "1" { "" } else { &e.unit };
-                    let said = format!("{} = {}{std} {unit}", e.name, number(e.value));
-                    said.trim_end().to_owned()
-                })
-                .collect();
-            lines.push(format!("  {}: {}", words::effect(&found.effect), values.join(", ")));
+            lines.push(format!(
+                "  {}: {}",
+                words::effect(&found.effect),
+                values_text(&found.estimates)
+            ));
             // Kinds of the libraries have a text of their own; others are explained here.
             // The text of the library comes first, since users can add kinds.
             let mut kinds = self.answer.candidates.kinds.iter();
@@ -324,6 +322,30 @@ impl DiagnosisFindings {
                 }
             }
         }
+    }
+
+    /// Effects that are less likely than not, with their values and probabilities.
+    fn possible_text(&self, style: TerminalStyle, lines: &mut Vec<String>) {
+        if self.possible.is_empty() {
+            return;
+        }
+        lines.push(String::new());
+        lines.push(style.bold("Possible effects (less likely than not)"));
+        for found in &self.possible {
+            lines.push(format!(
+                "  {}: {}, probability {}",
+                words::effect(&found.effect),
+                values_text(&found.estimates),
+                significant(found.probability, 2)
+            ));
+        }
+        let advice = "The recordings do not show them clearly, so they are neither part of the verdict nor of the errors \
+                      above. To decide, record a longer motion with more reversals and other speeds.";
+        lines.extend(
+            words::lines(advice, 96)
+                .iter()
+                .map(|line| style.dim(&format!("    {line}"))),
+        );
     }
 
     /// The rejected candidates that explain most of the error alone, with the reason.
@@ -445,6 +467,19 @@ impl DiagnosisFindings {
         let fix_parameters = Remedy::option(OptionName::Held).spell(spelling);
         lines.push(format!("  (Details: {fix_parameters}.)"));
     }
+}
+
+/// Estimates with standard deviations and units, for a line of text.
+fn values_text(estimates: &[EffectEstimate]) -> String {
+    let values = estimates.iter().map(|e| {
+        let std = e
+            .std
+            .map_or_else(String::new, |std| format!(" ± {}", significant(std, 2)));
+        let unit = if e.unit == "1" { "" } else { &e.unit };
+        let said = format!("{} = {}{std} {unit}", e.name, number(e.value));
+        said.trim_end().to_owned()
+    });
+    values.collect::<Vec<String>>().join(", ")
 }
 
 /// Estimates as JSON.

@@ -303,6 +303,14 @@ class Diagnosis(Result):
         ]
 
     @property
+    def possible(self) -> list[Effect]:
+        """Effects with a probability below 0.5; the model is not said to lack them."""
+        return [
+            Effect(one["kind"], one["at"], one["estimates"], one.get("probability"), one.get("indistinguishable_from", []))
+            for one in self._object.get("possible", [])
+        ]
+
+    @property
     def candidates(self) -> list[dict[str, Any]]:
         """All effects that were tried, and why each was rejected."""
         candidates: list[dict[str, Any]] = self._object["candidates"]
