@@ -530,7 +530,7 @@ impl EffectSelector<'_> {
             let new = set.iter().filter(is_new);
             new.map(|pick| self.candidate(pick).effect.clone()).collect()
         };
-        let (fit, check, check_by_channel) = self.relative_errors(after);
+        let (fit, check, check_by_channel) = self.relative_errors(after, self.has_run_parameters(after));
         SelectionStep {
             added: effects(after, before),
             dropped: effects(before, after),
@@ -541,9 +541,16 @@ impl EffectSelector<'_> {
         }
     }
 
+    /// Whether a set has parameters that belong to one recording: those of a validation run are unknown to a fit of the
+    /// other recordings.
+    pub(crate) fn has_run_parameters(&self, picks: &[SelectedEffect]) -> bool {
+        picks.iter().any(|pick| self.candidate(pick).is_per_run)
+    }
+
     /// Relative errors of a set that is fitted to the recordings of the fit: on these, on the validation runs, and per
-    /// channel on the validation runs. Without any, cross-validation gives the last two.
-    fn relative_errors(&self, picks: &[SelectedEffect]) -> (f64, f64, Vec<f64>) {
+    /// channel on the validation runs. `by_folds` requests cross-validation over all recordings for the last two; it is
+    /// used in any case if there is no validation run.
+    fn relative_errors(&self, picks: &[SelectedEffect], by_folds: bool) -> (f64, f64, Vec<f64>) {
         let layout = &self.problem.layout;
         let split = layout.fit_samples();
         let rest = self.full_residual(picks);
@@ -556,12 +563,13 @@ impl EffectSelector<'_> {
         let relative = |error: f64, force: f64| (error / force.max(f64::MIN_POSITIVE)).sqrt();
         let whole = |errors: &[f64], forces: &[f64]| relative(errors.iter().sum(), forces.iter().sum());
         let fit = whole(&squares(&rest, 0..split), &squares(&forces, 0..split));
-        let judged = if layout.has_check() {
-            split..layout.samples()
+        let by_folds = by_folds || !layout.has_check();
+        let judged = if by_folds {
+            0..layout.samples()
         } else {
-            0..split
+            split..layout.samples()
         };
-        let errors = if layout.has_check() {
+        let errors = if !by_folds {
             squares(&rest, judged.clone())
         } else {
             // Validation errors are weighted by channel; reported errors are not.

@@ -176,7 +176,9 @@ impl EffectSelector<'_> {
         let is_refinement = next.freedoms >= before + REFINEMENT_FEWEST_NUMBERS
             && next.picks.len() <= accepted.len()
             && !Self::replaced_effects(accepted, &next.picks).is_empty();
-        let error = |picks: &[SelectedEffect]| self.relative_errors(picks).1;
+        // Both sets are judged by the same data.
+        let by_folds = self.has_run_parameters(accepted) || self.has_run_parameters(&next.picks);
+        let error = |picks: &[SelectedEffect]| self.relative_errors(picks, by_folds).1;
         (!is_refinement || gain >= REFINEMENT_LEAST_GAIN)
             && self.are_readings_confirmed(&next.picks)
             && error(&next.picks) <= (1.0 + STEP_MOST_RISE) * error(accepted)
