@@ -68,7 +68,7 @@ pub use motion::{
 };
 pub use recording::{
     ColumnInfo, ComputedColumn, NonFinitePolicy, NoteSeverity, ReadOptions, RecordingError, RecordingFault,
-    RecordingFile, RecordingFiles, RecordingNote, SignalRecording, TableInfo, display_name_of_bytes,
+    RecordingFile, RecordingFiles, RecordingNote, SignalRecording, TableInfo, UnwrappedAngle, display_name_of_bytes,
     has_recording_extension, sample_place_word,
 };
 pub use signal::{FilterError, LowPass, MAX_FILTER_ORDER};

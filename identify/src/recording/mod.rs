@@ -5,6 +5,7 @@
 //! [`PreparedRun`](crate::PreparedRun) of a recording.
 
 mod column;
+mod corrections;
 mod error;
 mod file;
 mod formats;
@@ -23,6 +24,7 @@ mod thresholds;
 use indexmap::IndexMap;
 
 use crate::words::nearest_name;
+pub use corrections::UnwrappedAngle;
 pub use error::{RecordingError, RecordingFault};
 pub use file::RecordingFile;
 pub use joined_files::RecordingFiles;
@@ -47,6 +49,8 @@ pub struct SignalRecording {
     pub(crate) lines: Vec<u64>,
     /// Notes on the file and on what was done with it.
     pub(crate) notes: Vec<RecordingNote>,
+    /// Angles from which jumps by a full turn were removed.
+    pub(crate) unwrapped: Vec<UnwrappedAngle>,
 }
 
 impl SignalRecording {
@@ -175,6 +179,7 @@ impl SignalRecording {
             others: self.others.clone(),
             lines: self.lines[start..end].to_vec(),
             notes: Vec::new(),
+            unwrapped: self.unwrapped.clone(),
         }
     }
 

@@ -13,6 +13,7 @@ use modelmill_spec::edit::NewEffect;
 use crate::along;
 use crate::compare::{self, ErrorLocations};
 use crate::error::{Error, Outcome};
+use crate::faults::SuspectedFault;
 use crate::model::Model;
 use crate::recording::{PreparedRecording, segments};
 use crate::runs::RecordingDifference;
@@ -20,6 +21,7 @@ use crate::segment::RecordingSegment;
 use crate::text::table::percent;
 
 use super::added_effects::{self, CompletedModelFile};
+use super::corrected::CorrectedRecordings;
 use super::faults;
 use super::laws::{self, LawHypothesis};
 use super::long_recordings;
@@ -112,6 +114,10 @@ pub struct DiagnosisFindings {
     pub validation: ValidationMethod,
     /// Notes on the model, on the recordings, and on estimates with an impossible sign.
     pub notes: Vec<RecordingNote>,
+    /// Faults of the recordings that were corrected hypothetically: all findings hold for the corrected recordings.
+    pub corrected: Vec<SuspectedFault>,
+    /// Faults that could not be corrected, since several explain a recording equally well. Nothing else is claimed then.
+    pub unresolved: Vec<SuspectedFault>,
     /// The search problem and its solution, without the columns.
     pub(crate) answer: DiagnosisSolution,
     /// Variables on which errors may depend, along the recordings on which errors are evaluated.
@@ -185,6 +191,28 @@ pub struct NominalDiagnosis {
 }
 
 impl DiagnosisFindings {
+    /// The verdict with figures, as sentences. It starts with faults of the recordings, which are corrected or leave
+    /// nothing else to state.
+    pub fn verdict_text(&self) -> String {
+        if !self.unresolved.is_empty() {
+            let before = if self.corrected.is_empty() {
+                String::new()
+            } else {
+                words::corrected_text(&self.corrected)
+            };
+            // After corrections the sentence goes on.
+            return before + &words::unresolved_text(&self.unresolved);
+        }
+        let says = words::verdict(&self.diagnosis, self.channels(), self.validation);
+        if self.corrected.is_empty() {
+            return says;
+        }
+        // The sentence goes on after the corrections.
+        let mut letters = says.chars();
+        let first = letters.next().map(|letter| letter.to_lowercase().to_string());
+        words::corrected_text(&self.corrected) + &first.unwrap_or_default() + letters.as_str()
+    }
+
     /// The entries that should be added: none if a suspected fault (exchanged columns, wrong sign, wrong units, wrong
     /// direction of gravity) could be the cause of the findings.
     pub fn entries_to_add(&self) -> &[NewEffect] {
@@ -198,11 +226,8 @@ impl DiagnosisFindings {
     /// Advice if not all effects can be added to the model file: because of a suspected fault, or of a delayed force
     /// signal.
     pub(crate) fn further_action(&self) -> Option<&'static str> {
-        if self.missing.is_empty() {
+        if self.missing.is_empty() || words::has_suspicion(&self.diagnosis) {
             return None;
-        }
-        if words::has_suspicion(&self.diagnosis) {
-            return Some("First check the fault that the verdict starts with: the effects may only compensate it.");
         }
         let is_late = |found: &MissingEffect| {
             let is_its = |entry: &NewEffect| entry.kind == found.effect.kind;
@@ -223,6 +248,32 @@ impl Model {
     /// Fails if a recording is too short, has no forces, or contains positions at which the loops of the mechanism
     /// cannot close, and if the fitted model predicts the forces worse than a model without any force.
     pub fn diagnose(
+        &self,
+        fit: &[&PreparedRecording],
+        check: &[&PreparedRecording],
+        question: &DiagnosisOptions,
+    ) -> Outcome<DiagnosisFindings> {
+        // What makes numbers meaningless comes first; the search runs on recordings without it.
+        let corrected = (self.host()).run_job("looking for faults of the recordings", 0, |_| {
+            CorrectedRecordings::new(self, fit, check)
+        })??;
+        let mut findings = match corrected {
+            None => self.diagnose_prepared(fit, check, question)?,
+            Some(all) => {
+                let [fit, check] = [&all.fit, &all.check].map(|runs| runs.iter().collect::<Vec<_>>());
+                let mut findings = all.model.diagnose_prepared(&fit, &check, question)?;
+                findings.add_corrections(all.corrected, all.unresolved);
+                findings
+            }
+        };
+        findings.respect_faults();
+        Ok(findings)
+    }
+
+    /// The diagnosis of recordings as they were prepared.
+    ///
+    /// Fails as [`Model::diagnose`] does.
+    fn diagnose_prepared(
         &self,
         fit: &[&PreparedRecording],
         check: &[&PreparedRecording],
@@ -305,6 +356,8 @@ impl Model {
             residual_locations: left,
             validation: judged,
             notes,
+            corrected: Vec::new(),
+            unresolved: Vec::new(),
             answer,
             variables,
         };
