@@ -13,6 +13,7 @@ use crate::recording::PreparedRecording;
 
 use super::findings::DiagnosisFindings;
 use super::thresholds::{CORRECTION_ROUNDS, SHARED_FAULT_LEAST_SCORE};
+use super::words;
 
 /// Recordings after hypothetical corrections.
 pub(super) struct CorrectedRecordings {
@@ -37,7 +38,7 @@ impl CorrectedRecordings {
         fit: &[&PreparedRecording],
         check: &[&PreparedRecording],
     ) -> Outcome<Option<Self>> {
-        if !fit.iter().chain(check).any(|one| one.suspect().is_some()) {
+        if !fit.iter().chain(check).any(|one| one.suspected_fault().is_some()) {
             return Ok(None);
         }
         let copies = |all: &[&PreparedRecording]| all.iter().map(|one| (*one).clone()).collect();
@@ -62,7 +63,11 @@ impl CorrectedRecordings {
                 FaultCorrection::Columns(_) => all.correct_columns(fault, &correction)?,
             }
         }
-        let left = all.fit.iter().chain(&all.check).filter_map(PreparedRecording::suspect);
+        let left = all
+            .fit
+            .iter()
+            .chain(&all.check)
+            .filter_map(PreparedRecording::suspected_fault);
         all.unresolved = merge_faults(left.cloned());
         Ok(Some(all))
     }
@@ -74,7 +79,7 @@ impl CorrectedRecordings {
             .fit
             .iter()
             .chain(&self.check)
-            .filter_map(PreparedRecording::suspect);
+            .filter_map(PreparedRecording::suspected_fault);
         let merged = merge_faults(found.cloned());
         let unclear = merged.iter().position(|fault| !fault.is_correctable());
         merged.into_iter().nth(unclear.unwrap_or(0))
@@ -103,7 +108,7 @@ impl CorrectedRecordings {
         };
         for one in self.fit.iter_mut().chain(&mut self.check) {
             let has_it = fault.recordings.iter().any(|file| file == one.file());
-            if !has_it && one.suspect().is_some() {
+            if !has_it && one.suspected_fault().is_some() {
                 continue;
             }
             // A recording that cannot be prepared with the correction does not have the fault.
@@ -139,6 +144,23 @@ fn merge_faults(all: impl Iterator<Item = SuspectedFault>) -> Vec<SuspectedFault
 }
 
 impl DiagnosisFindings {
+    /// The verdict with figures, as sentences. It starts with faults of the recordings, which are corrected or leave
+    /// nothing else to state.
+    pub fn verdict_text(&self) -> String {
+        let says = if self.unresolved.is_empty() {
+            words::verdict(&self.diagnosis, self.channels(), self.validation)
+        } else {
+            words::unresolved_text(&self.unresolved)
+        };
+        if self.corrected.is_empty() {
+            return says;
+        }
+        // The sentence goes on after the corrections.
+        let mut letters = says.chars();
+        let first = letters.next().map(|letter| letter.to_lowercase().to_string());
+        words::corrected_text(&self.corrected) + &first.unwrap_or_default() + letters.as_str()
+    }
+
     /// Adds what was corrected. Where a fault remains, nothing else is claimed.
     pub(super) fn add_corrections(&mut self, corrected: Vec<SuspectedFault>, unresolved: Vec<SuspectedFault>) {
         if !unresolved.is_empty() {

@@ -191,28 +191,6 @@ pub struct NominalDiagnosis {
 }
 
 impl DiagnosisFindings {
-    /// The verdict with figures, as sentences. It starts with faults of the recordings, which are corrected or leave
-    /// nothing else to state.
-    pub fn verdict_text(&self) -> String {
-        if !self.unresolved.is_empty() {
-            let before = if self.corrected.is_empty() {
-                String::new()
-            } else {
-                words::corrected_text(&self.corrected)
-            };
-            // After corrections the sentence goes on.
-            return before + &words::unresolved_text(&self.unresolved);
-        }
-        let says = words::verdict(&self.diagnosis, self.channels(), self.validation);
-        if self.corrected.is_empty() {
-            return says;
-        }
-        // The sentence goes on after the corrections.
-        let mut letters = says.chars();
-        let first = letters.next().map(|letter| letter.to_lowercase().to_string());
-        words::corrected_text(&self.corrected) + &first.unwrap_or_default() + letters.as_str()
-    }
-
     /// The entries that should be added: none if a suspected fault (exchanged columns, wrong sign, wrong units, wrong
     /// direction of gravity) could be the cause of the findings.
     pub fn entries_to_add(&self) -> &[NewEffect] {

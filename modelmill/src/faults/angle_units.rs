@@ -1,7 +1,7 @@
 //! Angles in degrees: all of them, those that are too large for rad, or a single one.
 
 use modelmill_boundary::message;
-use modelmill_boundary::text::{OptionSetting, Remedy};
+use modelmill_boundary::text::OptionSetting;
 
 use super::bench::FaultBench;
 use super::correction::{ColumnOperation, ForceChange, MotionChange};
@@ -26,15 +26,12 @@ impl RecordingFaultEntry for AngleUnit {
                 groups.push(group);
             }
         }
-        groups
-            .into_iter()
-            .map(|group| hypothesis(subject, bench, &group))
-            .collect()
+        groups.into_iter().map(|group| hypothesis(subject, &group)).collect()
     }
 }
 
 /// The hypothesis that some coordinates are in degrees.
-fn hypothesis(subject: &FaultSubject<'_>, bench: &FaultBench<'_>, group: &[usize]) -> FaultHypothesis {
+fn hypothesis(subject: &FaultSubject<'_>, group: &[usize]) -> FaultHypothesis {
     let names = subject.model.active_coordinates();
     let at: Vec<String> = group.iter().map(|i| names[*i].clone()).collect();
     let degree = 1.0_f64.to_radians();
@@ -66,13 +63,12 @@ fn hypothesis(subject: &FaultSubject<'_>, bench: &FaultBench<'_>, group: &[usize
     FaultHypothesis {
         kind: RecordingFaultKind::Units,
         clause: format!("the {angle} {} {is} in degrees and not in rad", name_list(&at)),
-        advice: message!("read in degrees what is in degrees ({})", Remedy::options(maps)),
+        advice: message!("read in degrees what is in degrees ({})", subject.column_remedy(maps)),
         motion: MotionChange::Scale(scaled.collect()),
         forces: ForceChange::default(),
         operations: vec![ColumnOperation::scale(columns.into_iter().flatten(), degree)],
-        is_implausible_now: group
-            .iter()
-            .all(|i| bench.largest_position(*i) > 2.0 * LARGEST_USUAL_ANGLE_RAD),
+        // A joint that turns on has large angles too.
+        is_implausible_now: false,
         at,
     }
 }

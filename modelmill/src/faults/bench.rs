@@ -46,7 +46,8 @@ pub(super) struct FaultBench<'a> {
 pub(super) struct HypothesisErrors {
     /// With all parameters fitted.
     pub(super) fit: Vec<Option<f64>>,
-    /// With nominal values of the bodies, and friction and an offset of each drive fitted.
+    /// With nominal values of the bodies, and friction and an offset of each drive fitted, relative to the error with
+    /// friction and offset alone: below 1 if the nominal values explain something.
     pub(super) nominal: Option<Vec<Option<f64>>>,
 }
 
@@ -322,7 +323,8 @@ impl HypothesisRows {
         errors
     }
 
-    /// Relative error of each drive with nominal values of the base parameters, and friction and an offset fitted.
+    /// Error of each drive with nominal values of the base parameters, and friction and an offset fitted, relative to
+    /// the error with friction and offset alone.
     fn nominal_errors(&self, change: &ForceChange, nominal: &[f64]) -> Vec<Option<f64>> {
         let one = |(d, channel): (usize, &ChannelMoments)| {
             let (source, factor) = change.source(d);
@@ -335,9 +337,14 @@ impl HypothesisRows {
             let right = &channel.right[source] * factor - products;
             let (first, many) = (self.base, MORE_WITH_NOMINAL);
             let normal = channel.normal.view((first, first), (many, many)).into_owned();
-            let right = right.rows(first, many).into_owned();
-            let explained = solve_scaled(normal, &right).map_or(0.0, |values| values.dot(&right));
-            (squares > 0.0).then(|| ((left - explained).max(0.0) / squares).sqrt())
+            let unexplained = |left: f64, right: &DVector<f64>| {
+                let right = right.rows(first, many).into_owned();
+                let explained = solve_scaled(normal.clone(), &right).map_or(0.0, |values| values.dot(&right));
+                (left - explained).max(0.0)
+            };
+            let alone = unexplained(squares, &(&channel.right[source] * factor));
+            let floor = FIT_ERROR_FLOOR * FIT_ERROR_FLOOR * squares;
+            (squares > 0.0).then(|| (unexplained(left, &right) / alone.max(floor)).sqrt())
         };
         self.channels.iter().enumerate().map(one).collect()
     }

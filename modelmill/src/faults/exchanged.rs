@@ -1,7 +1,7 @@
 //! Exchanged columns: of two forces, of two coordinates, or of two coordinates with the forces of their drives.
 
 use modelmill_boundary::message;
-use modelmill_boundary::text::{OptionName, OptionSetting, Remedy};
+use modelmill_boundary::text::{OptionName, OptionSetting};
 use modelmill_spec::DriveKind;
 
 use super::bench::FaultBench;
@@ -36,7 +36,7 @@ impl RecordingFaultEntry for ExchangedForces {
                 clause: format!("the forces of `{}` and `{}` are exchanged", drives[a], drives[b]),
                 advice: message!(
                     "check which column is which, and exchange them ({})",
-                    Remedy::options(exchange_maps(subject, &drives[a], &drives[b]))
+                    subject.column_remedy(exchange_maps(subject, &drives[a], &drives[b]))
                 ),
                 motion: MotionChange::None,
                 forces: ForceChange(vec![(a, b, 1.0), (b, a, 1.0)]),
@@ -75,7 +75,7 @@ impl RecordingFaultEntry for ExchangedCoordinates {
                     clause: format!("the coordinates `{one}` and `{other}` are exchanged"),
                     advice: message!(
                         "check which column is which, and exchange them ({})",
-                        Remedy::options(maps.clone())
+                        subject.column_remedy(maps.clone())
                     ),
                     motion: MotionChange::Exchange(*a, *b),
                     forces: ForceChange::default(),
@@ -94,7 +94,7 @@ impl RecordingFaultEntry for ExchangedCoordinates {
                             "the coordinates `{one}` and `{other}` are exchanged, and so are the forces of `{force}` and \
                              `{other_force}`"
                         ),
-                        advice: message!("check which column is which, and exchange them ({})", Remedy::options(all)),
+                        advice: message!("check which column is which, and exchange them ({})", subject.column_remedy(all)),
                         motion: MotionChange::Exchange(*a, *b),
                         forces: ForceChange(vec![(c, d, 1.0), (d, c, 1.0)]),
                         operations: vec![

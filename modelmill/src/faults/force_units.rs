@@ -1,7 +1,7 @@
 //! Forces in thousands or thousandths of their unit, such as N mm for N m: of all drives or of a single one.
 
 use modelmill_boundary::message;
-use modelmill_boundary::text::{OptionName, OptionSetting, Remedy};
+use modelmill_boundary::text::{OptionName, OptionSetting};
 
 use super::bench::FaultBench;
 use super::correction::{ColumnOperation, ForceChange, MotionChange};
@@ -51,7 +51,7 @@ fn hypothesis(subject: &FaultSubject<'_>, group: &[usize], factor: f64) -> Fault
     FaultHypothesis {
         kind: RecordingFaultKind::Units,
         clause: format!("the {forces} of {} {are} in {unit}", name_list(&at)),
-        advice: message!("read the columns in their unit ({})", Remedy::options(maps)),
+        advice: message!("read the columns in their unit ({})", subject.column_remedy(maps)),
         motion: MotionChange::None,
         forces: ForceChange(group.iter().map(|d| (*d, *d, factor)).collect()),
         operations: at

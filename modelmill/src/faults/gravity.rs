@@ -16,8 +16,8 @@ use std::path::Path;
 use super::bench::{FaultBench, HypothesisErrors, solve_scaled};
 use super::correction::{FaultCorrection, ForceChange, MotionChange};
 use super::thresholds::{
-    GRAVITY_AXIS_TOLERANCE_RAD, GRAVITY_LEAST_ANGLE_RAD, GRAVITY_LEAST_NOMINAL_ERROR, GRAVITY_MOST_UNCERTAINTY,
-    GRAVITY_SIZE_TOLERANCE, NOMINAL_GAIN_DECISIVE,
+    GRAVITY_AXIS_TOLERANCE_RAD, GRAVITY_FEWEST_DRIVES, GRAVITY_LEAST_ANGLE_RAD, GRAVITY_LEAST_GAIN_OF_DRIVE,
+    GRAVITY_LEAST_NOMINAL_ERROR, GRAVITY_MOST_NOMINAL_ERROR, GRAVITY_MOST_UNCERTAINTY, GRAVITY_SIZE_TOLERANCE,
 };
 use super::{FaultSubject, RecordingFaultKind, SuspectedFault, judge};
 use crate::error::{Error, Outcome};
@@ -68,7 +68,8 @@ pub(super) fn find_direction(
         .is_some_and(|error| error > GRAVITY_LEAST_NOMINAL_ERROR);
     // The pose of a free body contains the direction already.
     let has_free_bodies = model.joint_coordinates().len() < model.active_coordinates().len();
-    if !is_poor || has_free_bodies || given.norm() == 0.0 {
+    let is_single = bench.forces().len() < GRAVITY_FEWEST_DRIVES;
+    if !is_poor || has_free_bodies || is_single || given.norm() == 0.0 {
         return None;
     }
     let found = GravityRows::new(model, bench, nominal, given)?.solve(given.norm())?;
@@ -83,7 +84,10 @@ pub(super) fn find_direction(
     let other = bench.with_model(&corrected);
     let errors = other.errors(&other.rows(&MotionChange::None)?, &ForceChange::default());
     let [fit_gain, nominal_gain] = [errors.fit_gain(before), errors.nominal_gain(before)];
-    if nominal_gain < NOMINAL_GAIN_DECISIVE {
+    let is_explained = errors
+        .mean_nominal()
+        .is_some_and(|error| error < GRAVITY_MOST_NOMINAL_ERROR);
+    if nominal_gain < GRAVITY_LEAST_GAIN_OF_DRIVE * bench.forces().len() as f64 || !is_explained {
         return None;
     }
     let digits = gravity.map(|g| significant(g, 4)).join(", ");
@@ -122,10 +126,9 @@ fn nearest_axis(direction: Vector3<f64>) -> Vector3<f64> {
 
 /// A direction as an axis, `-z`, or as three components.
 fn direction_text(direction: Vector3<f64>) -> String {
-    let axis = nearest_axis(direction);
-    let place = axis.iamax();
-    if (axis - direction).norm() < 1e-6 {
-        let sign = if axis[place] < 0.0 { "-" } else { "" };
+    let place = direction.iamax();
+    if (direction[place].abs() - 1.0).abs() < 1e-6 {
+        let sign = if direction[place] < 0.0 { "-" } else { "" };
         return format!("{sign}{}", AXES[place]);
     }
     let components: Vec<String> = direction.iter().map(|x| format!("{x:.2}")).collect();

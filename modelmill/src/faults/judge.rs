@@ -5,8 +5,9 @@ use modelmill_boundary::text::Message;
 
 use super::bench::{FaultBench, HypothesisErrors, HypothesisRows};
 use super::thresholds::{
-    EQUIVALENT_ERROR_TOLERANCE, FIT_GAIN_DECISIVE, FIT_LOSS_TOLERANCE, MOTION_LEAST_ERROR, MOTION_LEAST_NOMINAL_ERROR,
-    NOMINAL_AFTER_MOST, NOMINAL_BEFORE_LEAST, NOMINAL_GAIN_DECISIVE, NOMINAL_LOSS_TOLERANCE, RIVAL_MARGIN,
+    EQUIVALENT_ERROR_TOLERANCE, FIT_GAIN_DECISIVE, FIT_LOSS_TOLERANCE, FIT_MOST_RATIO, MOTION_LEAST_ERROR,
+    MOTION_LEAST_NOMINAL_ERROR, NOMINAL_AFTER_MOST, NOMINAL_BEFORE_LEAST, NOMINAL_GAIN_DECISIVE,
+    NOMINAL_LOSS_TOLERANCE, RIVAL_MARGIN,
 };
 use super::{
     ENTRIES, FaultCorrection, FaultHypothesis, FaultSubject, ForceChange, MotionChange, RecordingFaultKind,
@@ -41,7 +42,11 @@ impl JudgedHypothesis {
 
     /// Whether the recording speaks clearly for the hypothesis.
     fn is_decisive(&self, before: &HypothesisErrors) -> bool {
-        let is_fitted = self.fit_gain > FIT_GAIN_DECISIVE && self.nominal_gain > -NOMINAL_LOSS_TOLERANCE;
+        let pairs = before.fit.iter().zip(&self.errors.fit);
+        let mut ratios = pairs.filter_map(|(before, after)| Some((*after)? / (*before)?));
+        let is_fitted = self.fit_gain > FIT_GAIN_DECISIVE
+            && self.nominal_gain > -NOMINAL_LOSS_TOLERANCE
+            && ratios.any(|ratio| ratio < FIT_MOST_RATIO);
         let is_likely = self.hypothesis.is_implausible_now && self.fit_gain > -FIT_LOSS_TOLERANCE && self.score() > 0.0;
         is_fitted || is_likely || self.is_decided_by_nominal(before)
     }
@@ -89,21 +94,6 @@ pub(crate) fn find_fault(subject: &FaultSubject<'_>) -> Option<SuspectedFault> {
         None => HypothesisErrors::out_of_reach(&bench),
     };
     let judged = judge_all(subject, &bench, rows.as_ref(), &before);
-    if std::env::var("MM_DEBUG").is_ok() {
-        eprintln!("before {before:?}");
-        let mut all: Vec<&JudgedHypothesis> = judged.iter().collect();
-        all.sort_by(|a, b| b.score().total_cmp(&a.score()));
-        for one in all.iter().take(6) {
-            eprintln!(
-                "  {:.2} {:.2} {} {} {:?}",
-                one.fit_gain,
-                one.nominal_gain,
-                one.is_decisive(&before),
-                one.hypothesis.clause,
-                one.errors
-            );
-        }
-    }
     let mut decisive: Vec<JudgedHypothesis> = judged.into_iter().filter(|one| one.is_decisive(&before)).collect();
     decisive.sort_by(|a, b| b.score().total_cmp(&a.score()));
     let file = subject.raw.file();
@@ -209,30 +199,32 @@ fn judge_all(
     // Exchanges of coordinates are the most numerous, and are omitted if all would take too long.
     let columns = (subject.model.base.len() + 4) as u64;
     let cost = |n: usize| columns.pow(2) * (bench.samples() * bench.forces().len() * n) as u64;
-    let mut motions: Vec<(MotionChange, Option<HypothesisRows>)> = Vec::new();
-    let mut judged = Vec::new();
-    for hypothesis in hypotheses {
-        let rows = if hypothesis.motion == MotionChange::None {
-            rows
-        } else {
-            if !is_poor && !hypothesis.is_implausible_now || cost(motions.len() + 1) > AFFORDABLE {
-                continue;
-            }
-            let known = motions.iter().position(|(motion, _)| *motion == hypothesis.motion);
-            let place = known.unwrap_or_else(|| {
-                motions.push((hypothesis.motion.clone(), bench.rows(&hypothesis.motion)));
-                motions.len() - 1
-            });
-            motions[place].1.as_ref()
-        };
-        let Some(rows) = rows else { continue };
+    let judge = |hypothesis: FaultHypothesis, rows: &HypothesisRows| {
         let errors = bench.errors(rows, &hypothesis.forces);
-        judged.push(JudgedHypothesis {
+        JudgedHypothesis {
             fit_gain: errors.fit_gain(before),
             nominal_gain: errors.nominal_gain(before),
             hypothesis,
             errors,
+        }
+    };
+    let (of_forces, of_motion): (Vec<_>, Vec<_>) =
+        hypotheses.into_iter().partition(|one| one.motion == MotionChange::None);
+    let of_forces = of_forces.into_iter().filter_map(|one| Some(judge(one, rows?)));
+    let mut judged: Vec<JudgedHypothesis> = of_forces.collect();
+    // A wrong coordinate may look like a wrong force, so both are compared.
+    let is_suspicious = is_poor || judged.iter().any(|one| one.is_decisive(before));
+    let mut motions: Vec<(MotionChange, Option<HypothesisRows>)> = Vec::new();
+    for hypothesis in of_motion {
+        if !is_suspicious && !hypothesis.is_implausible_now || cost(motions.len() + 1) > AFFORDABLE {
+            continue;
+        }
+        let known = motions.iter().position(|(motion, _)| *motion == hypothesis.motion);
+        let place = known.unwrap_or_else(|| {
+            motions.push((hypothesis.motion.clone(), bench.rows(&hypothesis.motion)));
+            motions.len() - 1
         });
+        judged.extend(motions[place].1.as_ref().map(|rows| judge(hypothesis, rows)));
     }
     judged
 }
@@ -248,9 +240,10 @@ pub(super) fn evidence_text(before: &HypothesisErrors, after: &HypothesisErrors,
     }
     // The nominal values are named if they decide.
     let (of, [before, after]) = match (before.mean_nominal(), after.mean_nominal()) {
-        (Some(nominal), Some(corrected)) if after.fit_gain(before) < FIT_GAIN_DECISIVE => {
-            ("The model with its nominal values", [nominal, corrected])
-        }
+        (Some(nominal), Some(corrected)) if after.fit_gain(before) < FIT_GAIN_DECISIVE => (
+            "The model with its nominal values, compared with friction alone,",
+            [nominal, corrected],
+        ),
         _ => ("The best fit of the model", [before.mean_fit(), after.mean_fit()]),
     };
     format!(

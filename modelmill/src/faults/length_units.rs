@@ -1,7 +1,7 @@
 //! Positions of prismatic joints in millimetres: all of them, or a single one.
 
 use modelmill_boundary::message;
-use modelmill_boundary::text::{OptionName, OptionSetting, Remedy};
+use modelmill_boundary::text::{OptionName, OptionSetting};
 
 use super::bench::FaultBench;
 use super::correction::{ColumnOperation, ForceChange, MotionChange};
@@ -51,7 +51,7 @@ fn hypothesis(subject: &FaultSubject<'_>, group: &[usize]) -> FaultHypothesis {
     FaultHypothesis {
         kind: RecordingFaultKind::Units,
         clause: format!("the {position} {} {is} in mm and not in m", name_list(&at)),
-        advice: message!("read the columns in their unit ({})", Remedy::options(maps)),
+        advice: message!("read the columns in their unit ({})", subject.column_remedy(maps)),
         motion: MotionChange::Scale(group.iter().map(|i| (*i, [1e-3; 3])).collect()),
         forces: ForceChange::default(),
         operations: vec![ColumnOperation::scale(columns, 1e-3)],

@@ -22,7 +22,7 @@ mod silent;
 mod thresholds;
 mod time_base;
 
-use modelmill_boundary::text::{Message, RemedySpelling};
+use modelmill_boundary::text::{Message, OptionName, OptionSetting, Remedy, RemedySpelling};
 use modelmill_identify::SignalRecording;
 use modelmill_identify::diagnose::Disturbance;
 
@@ -119,7 +119,7 @@ impl SuspectedFault {
             estimates: Vec::new(),
             recordings: self.recordings.clone(),
             interval: None,
-            description: Some(self.clause.clone()),
+            description: Some(self.clause.replace('`', "")),
         }
     }
 
@@ -163,9 +163,21 @@ pub(crate) struct FaultSubject<'a> {
     pub(crate) segments: &'a [RecordingSegment],
     /// Whether recorded derivatives are used.
     pub(crate) uses_recorded_derivatives: bool,
+    /// Whether columns have other names or formulas in the file.
+    pub(crate) has_mapping: bool,
 }
 
 impl FaultSubject<'_> {
+    /// The options that read columns in another way. Where the file has other names, only the option itself is named,
+    /// since its value depends on the present one.
+    fn column_remedy(&self, maps: impl IntoIterator<Item = OptionSetting>) -> Remedy {
+        if self.has_mapping {
+            Remedy::option(OptionName::Columns)
+        } else {
+            Remedy::options(maps)
+        }
+    }
+
     /// Whether the derivative of a coordinate of an order, 1 or 2, is recorded and used.
     fn is_recorded(&self, coordinate: &str, order: usize) -> bool {
         let suffix = if order == 1 { "_d" } else { "_dd" };

@@ -2,7 +2,7 @@
 //! a coordinate together with the force of its drive.
 
 use modelmill_boundary::message;
-use modelmill_boundary::text::{OptionName, OptionSetting, Remedy};
+use modelmill_boundary::text::{OptionName, OptionSetting};
 use modelmill_spec::DriveKind;
 
 use super::bench::FaultBench;
@@ -39,7 +39,7 @@ impl RecordingFaultEntry for ForceSign {
                 clause: format!("the {forces} of {} {have} the wrong sign", name_list(&at)),
                 advice: message!(
                     "check the direction in which the force counts as positive, and read the column with the other sign ({})",
-                    Remedy::options(at.iter().map(|name| reversed_column(name)))
+                    subject.column_remedy(at.iter().map(|name| reversed_column(name)))
                 ),
                 motion: MotionChange::None,
                 forces: ForceChange(group.iter().map(|d| (*d, *d, -1.0)).collect()),
@@ -70,7 +70,7 @@ impl RecordingFaultEntry for CoordinateSign {
                 clause: format!("the coordinate `{name}` has the wrong sign"),
                 advice: message!(
                     "check the direction in which its encoder counts, and read the column with the other sign ({})",
-                    Remedy::options(present().map(|column| reversed_column(column)))
+                    subject.column_remedy(present().map(|column| reversed_column(column)))
                 ),
                 motion: MotionChange::Scale(vec![(i, [-1.0; 3])]),
                 forces: ForceChange::default(),
@@ -97,7 +97,7 @@ impl RecordingFaultEntry for CoordinateSign {
                     clause: format!("the coordinate `{name}` and the force of `{force}` have the wrong sign"),
                     advice: message!(
                         "check the positive direction of the joint, and read both columns with the other sign ({})",
-                        Remedy::options(maps)
+                        subject.column_remedy(maps)
                     ),
                     motion: alone.motion.clone(),
                     forces: ForceChange(vec![(d, d, -1.0)]),

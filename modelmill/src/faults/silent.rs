@@ -13,8 +13,9 @@ use nalgebra::DVector;
 
 use super::RecordingFaultKind;
 use super::thresholds::{
-    SILENCE_FEWEST_SAMPLES, SILENCE_LEAST_FORCE_SHARE, SILENCE_MOST_INTERVALS, SILENCE_NOISE_SIGMAS,
-    SILENCE_RESIDUAL_FACTOR, SILENCE_SHORTEST_S, SILENCE_STANDSTILL_SHARE,
+    SILENCE_FEWEST_SAMPLES, SILENCE_LEAST_FORCE_SHARE, SILENCE_MOST_INTERVALS, SILENCE_MOTION_SHARE,
+    SILENCE_NOISE_SIGMAS, SILENCE_RESIDUAL_FACTOR, SILENCE_SHORTEST_S, SILENCE_STANDSTILL_SHARE,
+    SILENCE_VARIATION_FACTOR,
 };
 use crate::audit::rows::AuditRows;
 use crate::model::Model;
@@ -39,6 +40,8 @@ pub(crate) struct SilentInterval {
     pub(crate) drives: Vec<String>,
     /// Start and end, s.
     pub(crate) interval: [f64; 2],
+    /// Start and end with samples that were dropped at the ends of the recording, s.
+    pub(crate) reach: [f64; 2],
     /// The recording.
     pub(crate) file: String,
     /// The value at which the first drive is, with its unit.
@@ -82,7 +85,7 @@ impl SilentInterval {
             estimates: Vec::new(),
             recordings: vec![self.file.clone()],
             interval: Some(self.interval),
-            description: Some(format!("{}. These forces are left out", self.clause())),
+            description: Some(format!("{}. These forces are left out", self.clause().replace('`', ""))),
         }
     }
 
@@ -147,6 +150,23 @@ fn find_intervals(model: &Model, data: &RecordingSegment) -> Option<Vec<SilentIn
             continue;
         };
         let interval = [run.time[one.range.start], run.time[one.range.end - 1]];
+        // Samples that were dropped at the ends of the recording belong to an interval that reaches them.
+        let step = duration / (n.max(2) - 1) as f64;
+        let (start, end) = run.prepared.trimmed;
+        let reach = [
+            interval[0]
+                - if one.range.start == 0 {
+                    (start + 1) as f64 * step
+                } else {
+                    0.0
+                },
+            interval[1]
+                + if one.range.end == n {
+                    (end + 1) as f64 * step
+                } else {
+                    0.0
+                },
+        ];
         let name = drives[one.drive].name.clone();
         // The same interval of several drives is one fault.
         let is_same = |other: &&mut SilentInterval| {
@@ -159,6 +179,7 @@ fn find_intervals(model: &Model, data: &RecordingSegment) -> Option<Vec<SilentIn
                 kind,
                 drives: vec![name],
                 interval,
+                reach,
                 file: run.file.clone(),
                 level: format!("{} {unit}", significant(one.level, 3)),
                 predicted: format!("{} {unit} on `{}`", significant(predicted, 3), drives[one.drive].name),
@@ -324,8 +345,18 @@ impl<'a> SilenceFit<'a> {
         if !is_off || size > 1.5 * largest {
             return None;
         }
-        let stands = stands(model, data, one);
+        let moved = moved_share(model, data, one);
         let is_zero = one.is_zero(forces);
+        let stands = moved <= SILENCE_STANDSTILL_SHARE;
+        if !stands && moved < SILENCE_MOTION_SHARE {
+            return None;
+        }
+        // A stuck channel misses changes, not only a level, which friction may cause.
+        let middle = mean(&|x| x);
+        let variation = mean(&|x| (x - middle).powi(2)).sqrt();
+        if !is_zero && variation < SILENCE_VARIATION_FACTOR * self.residual[d].max(one.noise) {
+            return None;
+        }
         match (stands, is_zero) {
             // Dry friction may hold a joint without any force.
             (true, true) => (mean(&f64::abs) > self.dry[d]).then_some((RecordingFaultKind::Brakes, size)),
@@ -337,8 +368,9 @@ impl<'a> SilenceFit<'a> {
     }
 }
 
-/// Whether the joint of a drive stands during an interval; a drive between points stands if all joints do.
-fn stands(model: &Model, data: &RecordingSegment, one: &FlatInterval) -> bool {
+/// The share of its travel by which the joint of a drive moves during an interval; for a drive between points the
+/// largest share of all joints.
+fn moved_share(model: &Model, data: &RecordingSegment, one: &FlatInterval) -> f64 {
     let mechanism = &model.derivation.mechanism;
     let names = model.active_coordinates();
     let own = match mechanism.drives[one.drive].kind {
@@ -349,9 +381,9 @@ fn stands(model: &Model, data: &RecordingSegment, one: &FlatInterval) -> bool {
         let low = q.iter().copied().fold(f64::INFINITY, f64::min);
         q.iter().copied().fold(f64::NEG_INFINITY, f64::max) - low
     };
-    let stands = |q: &Vec<f64>| travel(&q[one.range.clone()]) <= SILENCE_STANDSTILL_SHARE * travel(q);
+    let share = |q: &Vec<f64>| travel(&q[one.range.clone()]) / travel(q).max(f64::MIN_POSITIVE);
     match own {
-        Some(i) => stands(&data.run.q[i]),
-        None => data.run.q.iter().all(stands),
+        Some(i) => share(&data.run.q[i]),
+        None => data.run.q.iter().map(share).fold(0.0, f64::max),
     }
 }

@@ -1,7 +1,7 @@
 //! Time in another unit than seconds: milliseconds or microseconds.
 
 use modelmill_boundary::message;
-use modelmill_boundary::text::{OptionName, Remedy};
+use modelmill_boundary::text::{OptionName, OptionSetting};
 
 use super::bench::FaultBench;
 use super::correction::{ColumnOperation, ForceChange, MotionChange};
@@ -45,7 +45,7 @@ impl RecordingFaultEntry for TimeUnit {
                     clause: format!("the time `t` is in {words} and not in seconds"),
                     advice: message!(
                         "read the column in its unit ({})",
-                        Remedy::option(OptionName::Columns).with_value(format!("t=t [{unit}]"))
+                        subject.column_remedy([OptionSetting::new(OptionName::Columns, format!("t=t [{unit}]"))])
                     ),
                     motion: MotionChange::Scale(scaled),
                     forces: ForceChange::default(),

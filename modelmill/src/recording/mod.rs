@@ -455,7 +455,7 @@ impl PreparedRecording {
         if !silent.is_empty() {
             let mut raw = (*prepared.raw).clone();
             for one in &silent {
-                let [from, to] = one.interval;
+                let [from, to] = one.reach;
                 for drive in &one.drives {
                     raw.leave_out_samples(drive, &|t| (from..=to).contains(&t));
                 }
@@ -497,6 +497,7 @@ impl PreparedRecording {
             raw: &self.raw,
             segments: &self.segments,
             uses_recorded_derivatives: source == DerivativeSource::RecordedFirst,
+            has_mapping: !self.requested.columns.is_empty() || !model.derivation.mechanism.recording.columns.is_empty(),
         });
         let of_segment = |one: &RecordingSegment| ForceDelayAudit::from_segment(model, one);
         let delays: Vec<Option<ForceDelayAudit>> = self.segments.iter().map(of_segment).collect();
@@ -525,7 +526,7 @@ impl PreparedRecording {
     }
 
     /// The suspected fault of the recording that explains it best.
-    pub(crate) fn suspect(&self) -> Option<&SuspectedFault> {
+    pub fn suspected_fault(&self) -> Option<&SuspectedFault> {
         self.suspect.as_ref()
     }
 
