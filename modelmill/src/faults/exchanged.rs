@@ -16,6 +16,7 @@ pub(super) struct ExchangedCoordinates;
 /// The options that read two names from each other's columns.
 fn exchange_maps(subject: &FaultSubject<'_>, one: &str, other: &str) -> Vec<OptionSetting> {
     let columns = ["", "_d", "_dd"].map(|suffix| [format!("{one}{suffix}"), format!("{other}{suffix}")]);
+    // Columns that the recording lacks need no option.
     let present = columns
         .into_iter()
         .filter(|pair| pair.iter().all(|name| subject.raw.has_column(name)));
@@ -27,6 +28,7 @@ impl RecordingFaultEntry for ExchangedForces {
     fn hypotheses(&self, subject: &FaultSubject<'_>, bench: &FaultBench<'_>) -> Vec<FaultHypothesis> {
         let drives = subject.model.drives();
         let n = bench.forces().len();
+        // Forces of different units, N and N m, have columns that differ too much to be confused.
         let pairs = (0..n).flat_map(|a| (a + 1..n).map(move |b| (a, b)));
         pairs
             .filter(|(a, b)| subject.model.force_unit(*a) == subject.model.force_unit(*b))
@@ -52,6 +54,7 @@ impl RecordingFaultEntry for ExchangedCoordinates {
         let names = subject.model.active_coordinate_types();
         let joints = subject.model.joint_coordinates();
         let mechanism = &subject.model.derivation.mechanism;
+        // The drive that acts on a coordinate itself, if there is one.
         let drive_of = |name: &str| {
             let is_its =
                 |kind: DriveKind| matches!(kind, DriveKind::Joint(k) if mechanism.coordinates[k.0].name == name);
@@ -84,6 +87,7 @@ impl RecordingFaultEntry for ExchangedCoordinates {
                 });
                 // The order of two joints may be exchanged as a whole.
                 if let (Some(c), Some(d)) = (drive_of(one), drive_of(other)) {
+                    // Drives have names of their own, which need not be those of the coordinates.
                     let [force, other_force] = [c, d].map(|k| mechanism.drives[k].name.clone());
                     let mut all = maps;
                     all.extend(exchange_maps(subject, &force, &other_force));

@@ -13,6 +13,7 @@ pub(super) struct ForceUnit;
 impl RecordingFaultEntry for ForceUnit {
     fn hypotheses(&self, subject: &FaultSubject<'_>, bench: &FaultBench<'_>) -> Vec<FaultHypothesis> {
         let drives = bench.forces().len();
+        // One logger has one unit for all forces, unless a column was converted by hand.
         let mut groups: Vec<Vec<usize>> = (0..drives).map(|d| vec![d]).collect();
         if drives > 1 {
             groups.push((0..drives).collect());
@@ -27,6 +28,7 @@ fn hypothesis(subject: &FaultSubject<'_>, group: &[usize], factor: f64) -> Fault
     let drives = subject.model.drives();
     let at: Vec<String> = group.iter().map(|d| drives[*d].clone()).collect();
     let is_large = factor < 1.0;
+    // The option divides, where the unit itself cannot be named.
     let maps = group.iter().map(|d| {
         let (name, unit) = (&drives[*d], subject.model.force_unit(*d));
         let column = if is_large {

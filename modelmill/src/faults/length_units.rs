@@ -16,6 +16,7 @@ impl RecordingFaultEntry for LengthUnit {
         let coordinates = subject.model.active_coordinate_types();
         let is_long = |i: &usize| !coordinates[*i].1 && bench.largest_position(*i) > LEAST_LENGTH_IN_MILLIMETRES;
         let long: Vec<usize> = (0..coordinates.len()).filter(is_long).collect();
+        // A long axis alone, or all of them together.
         let mut groups: Vec<Vec<usize>> = long.iter().map(|i| vec![*i]).collect();
         if long.len() > 1 {
             groups.push(long);
@@ -28,6 +29,7 @@ impl RecordingFaultEntry for LengthUnit {
 fn hypothesis(subject: &FaultSubject<'_>, group: &[usize]) -> FaultHypothesis {
     let names = subject.model.active_coordinates();
     let at: Vec<String> = group.iter().map(|i| names[*i].clone()).collect();
+    // Derivatives are in the same unit of length.
     let units = [("", "mm"), ("_d", "mm/s"), ("_dd", "mm/s^2")];
     let mut columns = Vec::new();
     let mut maps = Vec::new();

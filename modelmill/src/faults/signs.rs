@@ -23,6 +23,7 @@ impl RecordingFaultEntry for ForceSign {
     fn hypotheses(&self, subject: &FaultSubject<'_>, bench: &FaultBench<'_>) -> Vec<FaultHypothesis> {
         let n = bench.forces().len();
         let drives = subject.model.drives();
+        // A drive alone has another sensor or driver; all drives together have another convention.
         let mut groups: Vec<Vec<usize>> = (0..n).map(|d| vec![d]).collect();
         if n > 1 {
             groups.push((0..n).collect());
@@ -62,6 +63,7 @@ impl RecordingFaultEntry for CoordinateSign {
         let mut hypotheses = Vec::new();
         for i in subject.model.joint_coordinates() {
             let name = &names[i];
+            // Recorded derivatives come from the same encoder, and turn with it.
             let columns = ["", "_d", "_dd"].map(|suffix| format!("{name}{suffix}"));
             let present = || columns.iter().filter(|column| subject.raw.has_column(column));
             let alone = FaultHypothesis {
