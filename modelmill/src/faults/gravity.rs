@@ -63,13 +63,12 @@ pub(super) fn find_direction(
     let model = subject.model;
     let nominal = bench.nominal()?;
     let given = Vector3::from(model.gravity());
-    let is_poor = before
-        .mean_nominal()
-        .is_some_and(|error| error > GRAVITY_LEAST_NOMINAL_ERROR);
+    // Drives with a vertical axis carry no weight, so the mean of all would hide the others.
+    let poor = before.nominal.iter().flatten().flatten();
+    let is_poor = poor.filter(|error| **error > GRAVITY_LEAST_NOMINAL_ERROR).count() >= GRAVITY_FEWEST_DRIVES;
     // The pose of a free body contains the direction already.
     let has_free_bodies = model.joint_coordinates().len() < model.active_coordinates().len();
-    let is_single = bench.forces().len() < GRAVITY_FEWEST_DRIVES;
-    if !is_poor || has_free_bodies || is_single || given.norm() == 0.0 {
+    if !is_poor || has_free_bodies || given.norm() == 0.0 {
         return None;
     }
     let found = GravityRows::new(model, bench, nominal, given)?.solve(given.norm())?;

@@ -75,7 +75,7 @@ pub(super) const LEAST_LENGTH_IN_MILLIMETRES: f64 = 2.0;
 
 // --- Gravity
 
-/// Mean error with nominal values (1) up to which the direction of gravity is accepted. By judgement.
+/// Error of a drive with nominal values (1) up to which it does not question the direction of gravity. By judgement.
 pub(super) const GRAVITY_LEAST_NOMINAL_ERROR: f64 = 0.3;
 
 /// The estimated gravity has the size of that of the file within this share (1). By judgement.
@@ -95,8 +95,8 @@ pub(super) const GRAVITY_MOST_NOMINAL_ERROR: f64 = 0.5;
 /// give 1.4.
 pub(super) const GRAVITY_LEAST_GAIN_OF_DRIVE: f64 = 0.7;
 
-/// Fewest drives with which a direction of gravity is estimated: with one, any missing effect of the position may look
-/// like it. By judgement.
+/// Fewest drives that must question the direction of gravity: with one, any missing effect of the position may look like
+/// it. By judgement.
 pub(super) const GRAVITY_FEWEST_DRIVES: usize = 2;
 
 /// The component of gravity along an axis must be known to this share of gravity (1). By judgement.
