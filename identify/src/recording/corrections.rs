@@ -12,6 +12,9 @@ use crate::words::{count_of, with_digits};
 /// Full turns of an angle: in rad and in degrees, with the name of the turn.
 const TURNS: [(f64, &str); 2] = [(2.0 * PI, "2 pi"), (360.0, "360")];
 
+/// A turn with its name, and each first sample behind a jump by it with the direction of the jump.
+type FullTurns = (f64, &'static str, Vec<(usize, f64)>);
+
 /// Jumps of an angle by a full turn that were removed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UnwrappedAngle {
@@ -121,7 +124,7 @@ impl SignalRecording {
 
 /// The steps of an angle by about a full turn: the turn with its name, and each first sample behind a step with the
 /// direction of the step. `None` without any, or if the angle is not within one turn, as a wrapped angle is.
-fn find_full_turns(column: &SignalColumn) -> Option<(f64, &'static str, Vec<(usize, f64)>)> {
+fn find_full_turns(column: &SignalColumn) -> Option<FullTurns> {
     if column.text.is_some() || column.not_finite.is_some() || column.values.len() < 2 {
         return None;
     }

@@ -236,10 +236,10 @@ impl Model {
             CorrectedRecordings::new(self, fit, check)
         })??;
         let mut findings = match corrected {
-            None => self.diagnose_prepared(fit, check, question)?,
+            None => self.diagnose_prepared(fit, check, *question)?,
             Some(all) => {
                 let [fit, check] = [&all.fit, &all.check].map(|runs| runs.iter().collect::<Vec<_>>());
-                let mut findings = all.model.diagnose_prepared(&fit, &check, question)?;
+                let mut findings = all.model.diagnose_prepared(&fit, &check, *question)?;
                 findings.add_corrections(all.corrected, all.unresolved);
                 findings
             }
@@ -255,7 +255,7 @@ impl Model {
         &self,
         fit: &[&PreparedRecording],
         check: &[&PreparedRecording],
-        question: &DiagnosisOptions,
+        question: DiagnosisOptions,
     ) -> Outcome<DiagnosisFindings> {
         // Long recordings are decimated first, to save memory and time.
         let fewer = |all: &[&PreparedRecording]| -> Outcome<Vec<PreparedRecording>> {

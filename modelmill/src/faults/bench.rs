@@ -105,7 +105,7 @@ impl<'a> FaultBench<'a> {
     pub(super) fn new(model: &'a Model, segments: &[RecordingSegment]) -> Option<Self> {
         let drives = model.drives().len();
         let total: usize = segments.iter().map(RecordingSegment::samples).sum();
-        let wanted = (ROWS / drives.max(1)).min(SAMPLES).max(BENCH_FEWEST_SAMPLES);
+        let wanted = (ROWS / drives.max(1)).clamp(BENCH_FEWEST_SAMPLES, SAMPLES);
         let every = (total / wanted).max(1);
         let n_coordinates = model.active_coordinates().len();
         let mut motion: MotionColumns = std::array::from_fn(|_| vec![Vec::new(); n_coordinates]);

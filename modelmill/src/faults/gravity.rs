@@ -71,7 +71,10 @@ pub(super) fn find_direction(
     if !is_poor || has_free_bodies || given.norm() == 0.0 {
         return None;
     }
-    let found = GravityRows::new(model, bench, nominal, given)?.solve(given.norm())?;
+    // A motion about one pose cannot separate gravity from offsets of the drives; then only the opposite direction is
+    // tried, which the errors below accept or reject.
+    let solved = GravityRows::new(model, bench, nominal, given)?.solve(given.norm());
+    let found = solved.unwrap_or(-given);
     let is_sized = (found.norm() / given.norm() - 1.0).abs() < GRAVITY_SIZE_TOLERANCE;
     if !is_sized || found.angle(&given) < GRAVITY_LEAST_ANGLE_RAD {
         return None;
@@ -201,7 +204,7 @@ impl GravityRows {
         let n = self.columns.len();
         let width = 3 + FRICTION * n;
         let place = |d: usize, k: usize| if k < 3 { k } else { k + FRICTION * d };
-        let mut weights: Vec<f64> = self.measured.iter().map(|y| weight_of(y)).collect();
+        let mut weights: Vec<f64> = self.measured.iter().map(weight_of).collect();
         let mut values = DVector::zeros(width);
         let mut normal = DMatrix::zeros(width, width);
         for _ in 0..ROUNDS {

@@ -34,7 +34,7 @@ pub(crate) use correction::{ColumnOperation, FaultCorrection};
 use correction::{ForceChange, MotionChange};
 pub(crate) use gravity::with_gravity;
 pub(crate) use judge::{correction_score, find_fault};
-pub(crate) use silent::silent_intervals;
+pub(crate) use silent::{SilentInterval, silent_intervals};
 
 /// Kinds of faults of recordings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

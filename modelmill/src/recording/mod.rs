@@ -21,7 +21,9 @@ use modelmill_identify::{PositionFault, RecordingFiles, RecordingNote, SignalRec
 
 use crate::audit::{self, ForceDelayAudit};
 use crate::error::{Error, Outcome};
-use crate::faults::{ColumnOperation, FaultSubject, RecordingFaultKind, SuspectedFault, find_fault, silent_intervals};
+use crate::faults::{
+    ColumnOperation, FaultSubject, RecordingFaultKind, SilentInterval, SuspectedFault, find_fault, silent_intervals,
+};
 use crate::host::kinds_of_files;
 use crate::model::Model;
 use crate::progress::SilentProgress;
@@ -449,7 +451,7 @@ impl PreparedRecording {
         }
         let mut prepared = Self::prepare(model, raw, reading)?;
         // Forces that were not measured would spoil the choice of the preparation and every fit.
-        let silent: Vec<_> = (prepared.segments.iter())
+        let silent: Vec<SilentInterval> = (prepared.segments.iter())
             .flat_map(|one| silent_intervals(model, one))
             .collect();
         if !silent.is_empty() {
@@ -462,8 +464,8 @@ impl PreparedRecording {
             }
             prepared = Self::prepare(model, Arc::new(raw), reading)?;
             if let Some(first) = prepared.segments.first_mut() {
-                first.run.notes.extend(silent.iter().map(|one| one.note()));
-                first.faults.extend(silent.iter().map(|one| one.disturbance()));
+                first.run.notes.extend(silent.iter().map(SilentInterval::note));
+                first.faults.extend(silent.iter().map(SilentInterval::disturbance));
             }
         }
         emit_notes(model, &prepared.segments);

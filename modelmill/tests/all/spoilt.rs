@@ -89,6 +89,8 @@ fn check(table: &Table, model: &Model, expected: Option<(RecordingFaultKind, &st
 /// Units, signs and exchanges of an arm whose joints are coupled, over several motions.
 #[test]
 fn a_wrong_column_of_an_arm_is_named() {
+    use RecordingFaultKind::{ExchangedColumns, TimeBase, Units, WrongSign};
+
     let model = Model::open(bundled("puma560")).expect("a model");
     for seed in 0..2 {
         let sound = Table::made("puma560", seed);
@@ -96,7 +98,6 @@ fn a_wrong_column_of_an_arm_is_named() {
         let names = model.active_coordinates();
         let drives = model.drives();
         let degrees = 1.0_f64.to_degrees();
-        use RecordingFaultKind::{ExchangedColumns, TimeBase, Units, WrongSign};
         check(&sound.scaled(&names[2], degrees), &model, Some((Units, &names[2])));
         check(&sound.scaled(&names[1], -1.0), &model, Some((WrongSign, &names[1])));
         check(&sound.scaled(&drives[2], -1.0), &model, Some((WrongSign, &drives[2])));
