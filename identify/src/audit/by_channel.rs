@@ -123,20 +123,6 @@ impl ChannelRegressor {
         result
     }
 
-    /// Inner products of all columns with a vector that is interleaved per sample.
-    pub(super) fn multiply_transposed(&self, of: &DVector<f64>) -> DVector<f64> {
-        let n = self.channels.len();
-        let mut result = DVector::zeros(self.columns);
-        for (c, channel) in self.channels.iter().enumerate() {
-            // Entries of this channel.
-            let own = DVector::from_fn(channel.rows.nrows(), |i, _| of[i * n + c]);
-            for (k, column) in channel.column_indices.iter().zip(channel.rows.column_iter()) {
-                result[*k] += column.dot(&own);
-            }
-        }
-        result
-    }
-
     /// Normal equations of a range of samples: matrix and right side. `weights` and `measured` are interleaved per
     /// sample.
     pub(super) fn normal_equations(
@@ -226,10 +212,6 @@ mod tests {
         assert!(close(
             &column(rows.multiply(values.as_slice())),
             &column(&whole * &values)
-        ));
-        assert!(close(
-            &column(rows.multiply_transposed(&measured)),
-            &column(whole.transpose() * &measured)
         ));
         let (normal, right) = rows.normal_equations(&weights, &measured, 10..samples);
         let part = whole.rows_range(10 * n..);

@@ -1,11 +1,10 @@
 //! Faults of recordings whose numbers can all be read. Input: a recording, for some checks with a model's regressor.
-//! Output: warnings about columns, clocks and signals, and estimates of delays, exchanged columns and position faults.
+//! Output: warnings about columns, clocks and signals, and estimates of delays and position faults.
 
 mod by_channel;
 mod clock;
 mod columns;
 mod delay;
-mod exchange;
 mod positions;
 mod robust;
 mod signals;
@@ -13,6 +12,5 @@ mod thresholds;
 
 pub use by_channel::ChannelRegressor;
 pub use delay::{DelayAudit, DelayEstimate, ForceDelays};
-pub use exchange::{ForceAudit, WiringFault};
 pub use positions::PositionFault;
 pub use robust::{RobustFit, robust_fit};

@@ -163,9 +163,6 @@ pub(super) const BACKLASH_ALTERNATING_OF_FIVE: usize = 4;
 
 // --- Forces
 
-/// Rows for each column of a regressor below which exchanged and reversed forces are not searched. By judgement.
-pub(super) const WIRING_ROWS_PER_COLUMN: usize = 2;
-
 /// Residuals beyond this many standard deviations count less in a robust fit: Huber's bound for 95 % efficiency under
 /// normal residuals (the value of `estimate::HUBER_BOUND`).
 pub(super) const AUDIT_HUBER_BOUND_SIGMAS: f64 = 1.345;

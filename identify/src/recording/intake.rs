@@ -345,6 +345,7 @@ impl<'a> SampleIntake<'a> {
             lines: self.lines,
             notes,
             zero_stamp,
+            unwrapped: Vec::new(),
         })
     }
 }

@@ -158,6 +158,7 @@ impl RecordingFiles {
             lines,
             notes,
             zero_stamp: None,
+            unwrapped: Vec::new(),
         })
     }
 

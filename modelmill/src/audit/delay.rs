@@ -20,7 +20,7 @@ const LOOKED_AT: usize = 9000;
 const FEWEST: usize = 1200;
 
 /// Delays of the force signals of a segment.
-pub(super) struct ForceDelayAudit {
+pub(crate) struct ForceDelayAudit {
     /// Delays of all drives together and of each drive, with residuals.
     delays: ForceDelays,
     /// Time between samples, s.
@@ -37,7 +37,7 @@ fn pick<T: Clone>(columns: &[Vec<T>], which: &[usize]) -> Vec<Vec<T>> {
 impl ForceDelayAudit {
     /// Estimates the delays; `None` if forces are missing, the segment is too short, or a pose has no
     /// solution.
-    pub(super) fn from_segment(model: &Model, data: &RecordingSegment) -> Option<Self> {
+    pub(crate) fn from_segment(model: &Model, data: &RecordingSegment) -> Option<Self> {
         let run = &data.run;
         let forces = run.force.as_deref()?;
         let n = run.time.len();
@@ -144,13 +144,18 @@ impl ForceDelayAudit {
         delay.seconds.abs() > (clear * delay.half_width).max(least * self.step)
     }
 
-    /// The residual with the delay, as the geometric mean of relative errors over the drives; `None` without a delay.
-    pub(super) fn residual_with_delay(&self) -> Option<f64> {
-        if self.common_delay().is_some() {
-            Some(geometric_mean(&self.delays.residuals[1]))
+    /// Sum over the drives of the logarithms by which the delay lowers the residual; 0 without a delay.
+    pub(crate) fn log_gain(&self) -> f64 {
+        let with = if self.common_delay().is_some() {
+            1
+        } else if self.delayed_drives().is_empty() {
+            return 0.0;
         } else {
-            (!self.delayed_drives().is_empty()).then(|| geometric_mean(&self.delays.residuals[2]))
-        }
+            2
+        };
+        let [before, after] = [0, with].map(|which| geometric_mean(&self.delays.residuals[which]));
+        let drives = self.delays.residuals[0].len() as f64;
+        drives * (before / after.max(f64::MIN_POSITIVE)).ln()
     }
 
     /// The note on the delay; `None` without one. `file` is the name of the recording.

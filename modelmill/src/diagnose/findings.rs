@@ -13,6 +13,7 @@ use modelmill_spec::edit::NewEffect;
 use crate::along;
 use crate::compare::{self, ErrorLocations};
 use crate::error::{Error, Outcome};
+use crate::faults::SuspectedFault;
 use crate::model::Model;
 use crate::recording::{PreparedRecording, segments};
 use crate::runs::RecordingDifference;
@@ -20,6 +21,7 @@ use crate::segment::RecordingSegment;
 use crate::text::table::percent;
 
 use super::added_effects::{self, CompletedModelFile};
+use super::corrected::CorrectedRecordings;
 use super::faults;
 use super::laws::{self, LawHypothesis};
 use super::long_recordings;
@@ -114,6 +116,10 @@ pub struct DiagnosisFindings {
     pub validation: ValidationMethod,
     /// Notes on the model, on the recordings, and on estimates with an impossible sign.
     pub notes: Vec<RecordingNote>,
+    /// Faults of the recordings that were corrected hypothetically: all findings hold for the corrected recordings.
+    pub corrected: Vec<SuspectedFault>,
+    /// Faults that could not be corrected, since several explain a recording equally well. Nothing else is claimed then.
+    pub unresolved: Vec<SuspectedFault>,
     /// The search problem and its solution, without the columns.
     pub(crate) answer: DiagnosisSolution,
     /// Variables on which errors may depend, along the recordings on which errors are evaluated.
@@ -202,11 +208,8 @@ impl DiagnosisFindings {
     /// Advice if not all effects can be added to the model file: because of a suspected fault, or of a delayed force
     /// signal.
     pub(crate) fn further_action(&self) -> Option<&'static str> {
-        if self.missing.is_empty() {
+        if self.missing.is_empty() || words::has_suspicion(&self.diagnosis) {
             return None;
-        }
-        if words::has_suspicion(&self.diagnosis) {
-            return Some("First check the fault that the verdict starts with: the effects may only compensate it.");
         }
         let is_late = |found: &MissingEffect| {
             let is_its = |entry: &NewEffect| entry.kind == found.effect.kind;
@@ -231,6 +234,32 @@ impl Model {
         fit: &[&PreparedRecording],
         check: &[&PreparedRecording],
         question: &DiagnosisOptions,
+    ) -> Outcome<DiagnosisFindings> {
+        // What makes numbers meaningless comes first; the search runs on recordings without it.
+        let corrected = (self.host()).run_job("looking for faults of the recordings", 0, |_| {
+            CorrectedRecordings::new(self, fit, check)
+        })??;
+        let mut findings = match corrected {
+            None => self.diagnose_prepared(fit, check, *question)?,
+            Some(all) => {
+                let [fit, check] = [&all.fit, &all.check].map(|runs| runs.iter().collect::<Vec<_>>());
+                let mut findings = all.model.diagnose_prepared(&fit, &check, *question)?;
+                findings.add_corrections(all.corrected, all.unresolved);
+                findings
+            }
+        };
+        findings.respect_faults();
+        Ok(findings)
+    }
+
+    /// The diagnosis of recordings as they were prepared.
+    ///
+    /// Fails as [`Model::diagnose`] does.
+    fn diagnose_prepared(
+        &self,
+        fit: &[&PreparedRecording],
+        check: &[&PreparedRecording],
+        question: DiagnosisOptions,
     ) -> Outcome<DiagnosisFindings> {
         // Long recordings are decimated first, to save memory and time.
         let fewer = |all: &[&PreparedRecording]| -> Outcome<Vec<PreparedRecording>> {
@@ -310,6 +339,8 @@ impl Model {
             residual_locations: left,
             validation: judged,
             notes,
+            corrected: Vec::new(),
+            unresolved: Vec::new(),
             answer,
             variables,
         };

@@ -6,7 +6,7 @@ use modelmill_identify::diagnose::{
     SelectionStep, TimeResidual,
 };
 
-use crate::audit::SUSPICIONS;
+use crate::faults::{SuspectedFault, is_suspicion};
 use crate::text::table::{number, percent, significant};
 
 use super::thresholds::{HARDLY_LOWER, NOISE_FREE_ROUNDINGS};
@@ -145,11 +145,11 @@ pub fn verdict(diagnosis: &ModelDiagnosis, channels: &[String], judged: Validati
     let them = if found.len() == 1 { "it" } else { "them" };
     // Each verdict states the error and compares it with the noise.
     let says = match diagnosis.verdict {
-        DiagnosisVerdict::Adequate => format!(
-            "The model is adequate: its error {} is {} of the force. {noise} No effect of the library lowers this error.",
-            judged.phrase(),
-            percent(Some(last.check))
-        ),
+        // After a correction the verdict stays cautious, although nothing is left to explain.
+        DiagnosisVerdict::Unexplained if found.is_empty() && diagnosis.unexplained.is_empty() => {
+            adequate_text(last.check, &noise, judged)
+        }
+        DiagnosisVerdict::Adequate => adequate_text(last.check, &noise, judged),
         DiagnosisVerdict::MissingEffect => format!("The model lacks {}. With {them} {falls}. {noise}", effects(&found)),
         DiagnosisVerdict::Unexplained => unexplained_verdict(diagnosis, channels, judged, &found, &falls),
     };
@@ -266,6 +266,15 @@ pub(crate) fn time_residual(one: &TimeResidual, channel: &str, unit: &str) -> St
     }
 }
 
+/// The sentences of a model that lacks nothing.
+fn adequate_text(error: f64, noise: &str, judged: ValidationMethod) -> String {
+    format!(
+        "The model is adequate: its error {} is {} of the force. {noise} No effect of the library lowers this error.",
+        judged.phrase(),
+        percent(Some(error))
+    )
+}
+
 /// How the error falls: of all drives, or, if that hardly changes, of the drive whose error falls most. A small
 /// drive would otherwise be hidden by the others.
 fn error_reduction_text(
@@ -308,14 +317,33 @@ fn first_checks(diagnosis: &ModelDiagnosis) -> Option<String> {
     })
 }
 
+/// The faults that were corrected hypothetically, as sentences; the verdict on the corrected recordings follows.
+pub(crate) fn corrected_text(corrected: &[SuspectedFault]) -> String {
+    let sentences: Vec<String> = (corrected.iter())
+        .map(|fault| format!("In {} {}.", fault.recordings.join(", "), fault.clause.replace('`', "")))
+        .collect();
+    let with = if corrected.len() == 1 {
+        "With it corrected"
+    } else {
+        "With these corrected"
+    };
+    format!("{} {with}, ", sentences.join(" "))
+}
+
+/// The verdict if faults remain that cannot be corrected.
+pub(crate) fn unresolved_text(unresolved: &[SuspectedFault]) -> String {
+    let sentences: Vec<String> = (unresolved.iter())
+        .map(|fault| format!("In {} {}.", fault.recordings.join(", "), fault.clause.replace('`', "")))
+        .collect();
+    format!(
+        "Check the recording and the model first. {} Until this is clear, nothing can be stated about the model.",
+        sentences.join(" ")
+    )
+}
+
 /// Whether the recording or the model is in doubt. Until that is checked, no effect is worth adding.
 pub(crate) fn has_suspicion(diagnosis: &ModelDiagnosis) -> bool {
     diagnosis.disturbances.iter().any(is_suspicion)
-}
-
-/// Whether a disturbance is a fault that would make all findings invalid, such as exchanged columns.
-fn is_suspicion(one: &Disturbance) -> bool {
-    SUSPICIONS.contains(&one.kind.as_str())
 }
 
 /// Disturbances of the recordings by name, each kind once with all its places; `None` without any.

@@ -22,6 +22,8 @@ impl DiagnosisFindings {
     /// - `budget`: for each drive, the parts of its residual (`noise`, `not_repeating`, `model`), relative to the rms
     ///   force of the drive; `rms` is this force in `unit`
     /// - `disturbances`: faults of the recordings, with estimates and times (`interval`, s)
+    /// - `corrected`: faults of the recordings that were corrected hypothetically, with what to do about them (`todo`);
+    ///   all other findings hold for the corrected recordings
     /// - `steps`: errors after each added effect, on fitted (`fit`) and validation data (`check`)
     /// - `effects`: missing effects with estimates, probability, what supports them, and alternatives
     /// - `possible`: the same for effects with a probability below 0.5, which the model is not said to lack
@@ -89,7 +91,7 @@ impl DiagnosisFindings {
             })
             .collect();
         // Disturbances with estimates, recordings and times.
-        let disturbances: Vec<Value> = (diagnosis.disturbances.iter())
+        let disturbances: Vec<Value> = (self.disturbances().iter())
             .map(|one| {
                 json!({
                     "kind": one.kind,
@@ -131,6 +133,7 @@ impl DiagnosisFindings {
             "noise_floor": diagnosis.noise_floor,
             "budget": budget,
             "disturbances": disturbances,
+            "corrected": self.corrected.iter().map(|fault| fault.json(spelling)).collect::<Vec<_>>(),
             "steps": steps(&diagnosis.steps),
             "effects": described(&self.missing),
             "possible": described(&self.possible),
@@ -159,8 +162,7 @@ impl DiagnosisFindings {
     /// The findings as lines of text, the verdict first.
     pub fn text(&self, style: TerminalStyle, spelling: &dyn StepSpelling) -> Vec<String> {
         let diagnosis = &self.diagnosis;
-        let channels = self.channels();
-        let verdict = words::verdict(diagnosis, channels, self.validation);
+        let verdict = self.verdict_text();
         let mut lines: Vec<String> = (words::lines(&verdict, 100).iter())
             .map(|line| style.bold(line))
             .collect();
@@ -201,9 +203,12 @@ impl DiagnosisFindings {
         self.off_nominal_text(style, spelling, &mut lines);
         // Entries to add first, then advice for what a model file cannot contain. Steps are commands or calls,
         // depending on the reader.
-        let mut next: Vec<String> = (self.entries_to_add().iter())
-            .map(|entry| spelling.spell_effect(&self.before.model, entry))
+        let at_fault = self.corrected.iter().chain(&self.unresolved);
+        let mut next: Vec<String> = at_fault
+            .map(|fault| format!("Correct the recording first: {}.", fault.advice.spell(spelling)))
             .collect();
+        let entries = self.entries_to_add().iter();
+        next.extend(entries.map(|entry| spelling.spell_effect(&self.before.model, entry)));
         next.extend(self.further_action().map(str::to_owned));
         if !next.is_empty() {
             lines.push(String::new());
@@ -225,10 +230,11 @@ impl DiagnosisFindings {
     /// Disturbances of the recordings, and the parts of the residual of each drive.
     fn disturbances_text(&self, style: TerminalStyle, lines: &mut Vec<String>) {
         let diagnosis = &self.diagnosis;
-        if !diagnosis.disturbances.is_empty() {
+        let disturbances = self.disturbances();
+        if !disturbances.is_empty() {
             lines.push(String::new());
             lines.push(style.bold("Disturbances in the recordings (not model errors)"));
-            for one in &diagnosis.disturbances {
+            for one in &disturbances {
                 let says = format!("{}.", one.description.as_deref().unwrap_or_default());
                 let wrapped = words::lines(&says, 98);
                 lines.extend(wrapped.iter().map(|line| format!("  {line}")));

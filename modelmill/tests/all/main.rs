@@ -9,5 +9,6 @@ mod missing;
 mod run_plans;
 mod runs;
 mod runs_verdict;
+mod spoilt;
 mod undriven;
 mod variants;

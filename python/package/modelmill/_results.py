@@ -323,6 +323,12 @@ class Diagnosis(Result):
         return disturbances
 
     @property
+    def corrected(self) -> list[dict[str, Any]]:
+        """Faults of the recordings that were corrected hypothetically, and what to do; all findings hold for the corrected ones."""
+        corrected: list[dict[str, Any]] = self._object.get("corrected", [])
+        return corrected
+
+    @property
     def budget(self) -> dict[str, dict[str, Any]]:
         """The error of each drive, divided into noise, a non-repeatable part, and a repeatable part that nothing explains."""
         budget: dict[str, dict[str, Any]] = self._object["budget"]

@@ -211,5 +211,5 @@ impl TourComparison {
 
 /// The verdict of a diagnosis in words.
 fn verdict(findings: &DiagnosisFindings) -> String {
-    words::verdict(&findings.diagnosis, findings.channels(), findings.validation)
+    findings.verdict_text()
 }
