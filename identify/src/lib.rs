@@ -48,7 +48,9 @@ mod signal;
 mod test_noise;
 mod words;
 
-pub use audit::{ChannelRegressor, DelayAudit, DelayEstimate, ForceDelays, PositionFault, RobustFit, robust_fit};
+pub use audit::{
+    ChannelRegressor, DeadBand, DelayAudit, DelayEstimate, ForceDelays, PositionFault, RobustFit, robust_fit,
+};
 pub use estimate::{
     LeastSquares, LeastSquaresError, NullDirection, ParameterUncertainty, RANK_TOLERANCE, RFactor, RegressionSolution,
 };

@@ -1,6 +1,6 @@
 //! JSON views for the page: the model with its base parameters and those of the saved file, errors, findings.
 
-use modelmill::diagnose::{DiagnosisFindings, words};
+use modelmill::diagnose::DiagnosisFindings;
 use modelmill::identify::Identification;
 use modelmill::model::ModelCheck;
 use modelmill::print::{self, RemedySpelling, edit};

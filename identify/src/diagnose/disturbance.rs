@@ -1,11 +1,11 @@
 //! Disturbances of recordings, which are no part of the model, and the origin of the residual of each channel.
 
 use super::bench::{EffectSelector, SelectedEffect};
-use super::in_time::{TimeResidual, time_residual};
+use super::in_time::{ChangeInterval, TimeResidual, time_residual};
 use super::noise::effective_samples;
 use super::pool::dot;
 use super::problem::{CandidateNature, DiagnosisProblem};
-use super::thresholds::{COLOURED_LEAST_VARIANCE_RATIO, COLOURED_MOST_EFFECTIVE_SHARE};
+use super::thresholds::{COLOURED_LEAST_VARIANCE_RATIO, COLOURED_MOST_EFFECTIVE_SHARE, SAME_CHANGE_TIME_SHARE};
 
 /// A named value of a disturbance or an effect.
 #[derive(Clone, Debug, PartialEq)]
@@ -73,6 +73,8 @@ impl EffectSelector<'_> {
         let problem = self.problem;
         let fitted = self.estimate_parameters(picks, super::pool::FitScope::All);
         let mut found: Vec<Disturbance> = Vec::new();
+        // Channels and times of the changes in time so far.
+        let mut changes: Vec<(Vec<usize>, &[ChangeInterval])> = Vec::new();
         for (pick, values) in picks.iter().zip(fitted) {
             let candidate = self.candidate(pick);
             if candidate.nature == CandidateNature::Effect {
@@ -91,6 +93,18 @@ impl EffectSelector<'_> {
                 .iter()
                 .find(|(effect, _)| *effect == candidate.effect);
             let intervals = times.map_or(&[][..], |(_, intervals)| intervals);
+            // What a change leaves at its own time belongs to it: no column has its force exactly.
+            if candidate.nature == CandidateNature::ChangeInTime {
+                let channels = self.affected_channels(std::slice::from_ref(pick));
+                let is_same = |(others, known): &(Vec<usize>, &[ChangeInterval])| {
+                    channels.iter().any(|d| others.contains(d)) && begin_together(intervals, known)
+                };
+                let is_known = changes.iter().any(is_same);
+                changes.push((channels, intervals));
+                if is_known {
+                    continue;
+                }
+            }
             let constants = pick.constants.iter();
             let constants = constants.map(|(name, value)| EstimatedQuantity::new(name, *value, ""));
             found.push(Disturbance {
@@ -191,6 +205,17 @@ impl EffectSelector<'_> {
             description: None,
         })
     }
+}
+
+/// Whether all of some changes begin in the same recordings and at nearly the same times as others.
+fn begin_together(some: &[ChangeInterval], others: &[ChangeInterval]) -> bool {
+    some.iter().all(|one| {
+        others.iter().any(|other| {
+            let [length, other_length] = [one, other].map(|change| change.interval[1] - change.interval[0]);
+            let apart = (one.interval[0] - other.interval[0]).abs();
+            one.recording == other.recording && apart < SAME_CHANGE_TIME_SHARE * length.max(other_length)
+        })
+    })
 }
 
 impl DiagnosisProblem {

@@ -65,7 +65,12 @@ impl EffectSelector<'_> {
             .map(|(i, aliases)| {
                 let mut without = picks.to_vec();
                 let pick = without.remove(i);
-                let channels = self.affected_channels(&[pick]);
+                let mut channels = self.affected_channels(&[pick]);
+                // An equation without a drive has no noise of its own: base parameters satisfy it at the cost of the
+                // other channels, which then show what the effect explains.
+                if channels.iter().any(|d| self.problem.is_idle(*d)) {
+                    channels = (0..self.weights.len()).collect();
+                }
                 let evidence = self.evidence(&without, picks, &channels);
                 EffectSupport {
                     gain: evidence.gain,

@@ -330,6 +330,9 @@ pub(super) const CHANGE_LEAST_ADVANTAGE: f64 = 1.1;
 /// An interval must explain this many times what a step explains (1), since it has a second time. By judgement.
 pub(super) const INTERVAL_LEAST_ADVANTAGE: f64 = 1.3;
 
+/// Two changes begin together if their times differ by less than this share of the longer one (1). By judgement.
+pub(super) const SAME_CHANGE_TIME_SHARE: f64 = 0.1;
+
 /// A change with fewer parameters is kept if it explains this share of what the more general one explains (1). By
 /// judgement.
 pub(super) const SIMPLER_CHANGE_SHARE: f64 = 0.9;

@@ -346,6 +346,7 @@ impl<'a> SampleIntake<'a> {
             notes,
             zero_stamp,
             unwrapped: Vec::new(),
+            late_rates: Vec::new(),
         })
     }
 }

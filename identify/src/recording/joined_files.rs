@@ -159,6 +159,7 @@ impl RecordingFiles {
             notes,
             zero_stamp: None,
             unwrapped: Vec::new(),
+            late_rates: Vec::new(),
         })
     }
 

@@ -53,6 +53,8 @@ pub struct SignalRecording {
     pub(crate) zero_stamp: Option<i64>,
     /// Angles from which jumps by a full turn were removed.
     pub(crate) unwrapped: Vec<UnwrappedAngle>,
+    /// Coordinates whose recorded rates lag their positions and were removed, each with the delay, s.
+    pub(crate) late_rates: Vec<(String, f64)>,
 }
 
 impl SignalRecording {
@@ -183,6 +185,7 @@ impl SignalRecording {
             notes: Vec::new(),
             zero_stamp: self.zero_stamp,
             unwrapped: self.unwrapped.clone(),
+            late_rates: self.late_rates.clone(),
         }
     }
 

@@ -67,6 +67,7 @@ fn read_raw(model: &Model, file: &RecordingFiles, reading: &RecordingOptions) ->
         reading.skip_bad_samples,
         &|drive, sample| leverage.is_peak(drive, sample),
     );
+    raw.set_late_rates_aside(&model.active_coordinates());
     Ok(raw)
 }
 
@@ -202,6 +203,7 @@ fn prepare(model: &Model, recording: &Raw, args: &RecordingOptions, delay: f64) 
         (recording.position_faults(&model.active_coordinates()).into_iter())
             .map(|fault| position_fault(model, recording.file(), &fault))
             .chain(unwrapped)
+            .chain(late_rates_fault(recording))
             .collect()
     } else {
         Vec::new()
@@ -243,6 +245,26 @@ fn count_of_jumps(jumps: usize) -> String {
     } else {
         format!("{jumps} jumps")
     }
+}
+
+/// Rates that lag the positions as a disturbance for the diagnosis; `None` without any.
+fn late_rates_fault(recording: &Raw) -> Option<Disturbance> {
+    let late = recording.late_rates();
+    let (_, longest) = late.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let names: Vec<&str> = late.iter().map(|(name, _)| name.as_str()).collect();
+    Some(Disturbance {
+        kind: "late_rates".to_owned(),
+        at: late.iter().map(|(name, _)| name.clone()).collect(),
+        estimates: vec![EstimatedQuantity::new("delay", *longest, "s")],
+        recordings: vec![recording.file().to_owned()],
+        interval: None,
+        description: Some(format!(
+            "the recorded rates of `{}` in {} lag the positions by up to {} ms, as after a low-pass, and are not used",
+            names.join("`, `"),
+            recording.file(),
+            significant(1e3 * longest, 2)
+        )),
+    })
 }
 
 /// A fault of the positions as a disturbance for the diagnosis.

@@ -10,6 +10,7 @@ use super::super::factored::GramFactor;
 use super::super::pool::{dot, solve_gram};
 use super::super::problem::DiagnosisProblem;
 use super::profile::TimeProfile;
+use super::residual::standstill_samples;
 use super::{ChangeForce, ChangeShape};
 
 /// Number of blocks of a recording.
@@ -395,9 +396,15 @@ fn cut_recordings(problem: &DiagnosisProblem) -> Vec<CutRecording> {
     recordings.into_iter().map(cut).collect()
 }
 
-/// Samples that do not count, `[channel][sample]`: those that decide nothing and those that were not measured.
+/// Samples that do not count, `[channel][sample]`: those that decide nothing, those that were not measured, and those at
+/// which the drive of the channel stands still or nearly so, since dry friction takes any value there.
 fn excluded_samples(problem: &DiagnosisProblem) -> Vec<Vec<bool>> {
     let mut excluded = problem.undecided_samples();
+    for (d, out) in excluded.iter_mut().enumerate() {
+        for (out, stands) in out.iter_mut().zip(standstill_samples(problem, d)) {
+            *out |= stands;
+        }
+    }
     for (out, lost) in excluded.iter_mut().zip(&problem.layout.left_out) {
         for (out, lost) in out.iter_mut().zip(lost) {
             *out |= *lost;

@@ -97,23 +97,26 @@ pub(crate) fn time_residual(
     is_large.then(|| one(ResidualCharacter::Large, variance.sqrt()))
 }
 
-/// A residual with zeros where the drive of its channel stands still or nearly so.
-fn without_standstill(problem: &DiagnosisProblem, channel: usize, rest: &[f64]) -> Vec<f64> {
+/// Whether the drive of a channel stands still or nearly so, `[sample]`; empty if its rate is unknown.
+pub(super) fn standstill_samples(problem: &DiagnosisProblem, channel: usize) -> Vec<bool> {
     let rates = problem.friction.get(3 * channel);
     let Some(rates) = rates.and_then(|column| column.0[channel].as_ref()) else {
-        return rest.to_vec();
+        return Vec::new();
     };
     let fastest = rates.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
-    let pairs = rest.iter().zip(rates);
-    pairs
-        .map(|(r, v)| {
-            if v.abs() < STANDSTILL_RATE_SHARE * fastest {
-                0.0
-            } else {
-                *r
-            }
-        })
-        .collect()
+    let is_slow = |v: &f64| v.abs() < STANDSTILL_RATE_SHARE * fastest;
+    rates.iter().map(is_slow).collect()
+}
+
+/// A residual with zeros where the drive of its channel stands still or nearly so.
+fn without_standstill(problem: &DiagnosisProblem, channel: usize, rest: &[f64]) -> Vec<f64> {
+    let mut moving = rest.to_vec();
+    for (r, stands) in moving.iter_mut().zip(standstill_samples(problem, channel)) {
+        if stands {
+            *r = 0.0;
+        }
+    }
+    moving
 }
 
 /// Intervals that have most of the squares of a residual and are far louder than the rest of the time, with the rms
