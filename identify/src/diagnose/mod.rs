@@ -201,6 +201,7 @@ pub struct ModelDiagnosis {
 /// subtracted from the measured forces of the problem, and samples to be left out become zero.
 pub fn diagnose(problem: &mut DiagnosisProblem, supply: &dyn ColumnProvider) -> ModelDiagnosis {
     problem.removed.resize(problem.layout.channels.len(), 0.0);
+    problem.leave_out_standstill();
     problem.find_reversal_samples();
     problem.estimate_idle_noise();
     // The uncleaned forces are kept for a second cleaning, if slow hum shows in the residual of the first diagnosis.

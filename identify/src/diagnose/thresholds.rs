@@ -346,6 +346,12 @@ pub(super) const TIME_RESIDUAL_LEAST_NOISE_RATIO: f64 = 4.0;
 /// Below this share of its largest rate a drive is near standstill (1). By judgement.
 pub(super) const STANDSTILL_RATE_SHARE: f64 = 0.02;
 
+/// Standstill from this time on, s, is left out of the diagnosis. By judgement: reversals of a motion are shorter.
+pub(super) const STANDSTILL_SHORTEST_S: f64 = 0.3;
+
+/// A channel that stands for more than this share of the samples (1) keeps all of them. By judgement.
+pub(super) const STANDSTILL_MOST_SHARE: f64 = 0.6;
+
 /// Fewest samples of a window. By judgement: outliers that a filter has spread cover a few samples only.
 pub(super) const WINDOW_FEWEST_SAMPLES: f64 = 25.0;
 

@@ -22,8 +22,8 @@ use super::problem::{
 use super::thresholds::{CHANGE_LEAST_ADVANTAGE, CHANGE_LEAST_SHARE, INTERVAL_LEAST_ADVANTAGE, SIMPLER_CHANGE_SHARE};
 use products::BlockProducts;
 use profile::{TimeProfile, slow_profiles};
-pub(crate) use residual::time_residual;
 pub use residual::{ResidualCharacter, TimeResidual};
+pub(crate) use residual::{standstill_samples, time_residual};
 
 /// The force of a possible change, from the time on at which it begins.
 #[derive(Clone, Debug, PartialEq)]

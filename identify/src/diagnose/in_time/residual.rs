@@ -98,7 +98,7 @@ pub(crate) fn time_residual(
 }
 
 /// Whether the drive of a channel stands still or nearly so, `[sample]`; empty if its rate is unknown.
-pub(super) fn standstill_samples(problem: &DiagnosisProblem, channel: usize) -> Vec<bool> {
+pub(crate) fn standstill_samples(problem: &DiagnosisProblem, channel: usize) -> Vec<bool> {
     let rates = problem.friction.get(3 * channel);
     let Some(rates) = rates.and_then(|column| column.0[channel].as_ref()) else {
         return Vec::new();
