@@ -570,12 +570,12 @@ impl EffectSelector<'_> {
         } else {
             split..layout.samples()
         };
-        let errors = if !by_folds {
-            squares(&rest, judged.clone())
-        } else {
+        let errors = if by_folds {
             // Validation errors are weighted by channel; reported errors are not.
             let held_out = |d: usize| self.validation_errors(picks, &[d], true).iter().sum::<f64>() / self.weights[d];
             channels.map(held_out).collect()
+        } else {
+            squares(&rest, judged.clone())
         };
         let forces = squares(&forces, judged);
         let pairs = errors.iter().zip(&forces);

@@ -289,21 +289,15 @@ impl EffectSelector<'_> {
         None
     }
 
-    /// All sets with one more effect than those in the beam, and the best pairs. The best of them are improved by
-    /// exchanges. Returns at most 40, best first.
-    fn grow_sets(&mut self, accepted: &[SelectedEffect], beam: &[Vec<SelectedEffect>]) -> Vec<ScoredEffectSet> {
-        // One table of inner products serves all trials; the number of independent equations comes from the accepted
-        // set.
-        let all: Vec<SelectedEffect> = beam.iter().flatten().cloned().collect();
-        let table = self.projected_gram(&all);
-        let (factors, _) = self.fit(accepted, FitScope::All);
-        let rest = self.residual(accepted, &factors);
-        let channels: Vec<usize> = (0..rest.len()).collect();
-        // Number of independent equations for the information criterion.
-        let worth = self.effective_equations(&rest, &channels);
-        let mut trials: Vec<ScoredEffectSet> = Vec::new();
-        let mut known: HashSet<Vec<usize>> = HashSet::new();
-        // Stage 1: every set of the beam with every candidate.
+    /// Every set of the beam with every candidate; an effect that contains a member replaces it. `known` receives the
+    /// candidates of each set.
+    fn extend_beam(
+        &self,
+        beam: &[Vec<SelectedEffect>],
+        table: &ProjectedGram,
+        known: &mut HashSet<Vec<usize>>,
+    ) -> Vec<ScoredEffectSet> {
+        let mut trials = Vec::new();
         for set in beam {
             for pick in self.current_choices.iter().flatten() {
                 if set.iter().any(|p| p.candidate == pick.candidate) {
@@ -323,10 +317,28 @@ impl EffectSelector<'_> {
                 picks.push(pick);
                 // The same set may be reached from several sets of the beam.
                 if known.insert(candidate_indices(&picks)) {
-                    trials.push(self.fit_from_gram(&table, picks));
+                    trials.push(self.fit_from_gram(table, picks));
                 }
             }
         }
+        trials
+    }
+
+    /// All sets with one more effect than those in the beam, and the best pairs. The best of them are improved by
+    /// exchanges. Returns at most 40, best first.
+    fn grow_sets(&mut self, accepted: &[SelectedEffect], beam: &[Vec<SelectedEffect>]) -> Vec<ScoredEffectSet> {
+        // One table of inner products serves all trials; the number of independent equations comes from the accepted
+        // set.
+        let all: Vec<SelectedEffect> = beam.iter().flatten().cloned().collect();
+        let table = self.projected_gram(&all);
+        let (factors, _) = self.fit(accepted, FitScope::All);
+        let rest = self.residual(accepted, &factors);
+        let channels: Vec<usize> = (0..rest.len()).collect();
+        // Number of independent equations for the information criterion.
+        let worth = self.effective_equations(&rest, &channels);
+        let mut known: HashSet<Vec<usize>> = HashSet::new();
+        // Stage 1: every set of the beam with every candidate.
+        let mut trials = self.extend_beam(beam, &table, &mut known);
         // Stage 2: pairs of candidates.
         let pairs = self.best_pairs(accepted, &table, worth);
         trials.extend(
