@@ -3,7 +3,7 @@
 
 use std::collections::HashSet;
 
-use super::bench::{EffectSelector, ScoredEffectSet, SelectedEffect};
+use super::bench::{EffectSelector, ProjectedGram, ScoredEffectSet, SelectedEffect};
 use super::evidence::SelectionEvidence;
 use super::pool::FitScope;
 use super::problem::{ColumnSource, DiagnosisProblem};

@@ -144,6 +144,7 @@ fn arm(seed: u64, drives: usize, hidden: &dyn Fn(&DriveMotion) -> Vec<f64>) -> D
     let segment = |name: &str, is_check: bool| SampleSegment {
         name: name.into(),
         samples: SAMPLES,
+        start: 0.0,
         step: STEP,
         recorded_step: STEP,
         is_check,
