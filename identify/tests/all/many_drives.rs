@@ -236,7 +236,9 @@ fn a_force_far_above_that_of_the_drive_is_no_claim() {
     problem.effects_only = false;
     let diagnosis = answer(&problem);
     assert_eq!(found(&diagnosis), [""; 0]);
-    let refused = diagnosis.candidates[0].rejection_reason.map(|reason| reason.name());
+    let refused = diagnosis.candidates[0]
+        .rejection_reason
+        .map(modelmill_identify::diagnose::RejectionReason::name);
     assert_eq!(refused, Some("implausible value"));
 }
 

@@ -146,7 +146,7 @@ pub fn verdict(diagnosis: &ModelDiagnosis, channels: &[String], judged: Validati
     // Each verdict states the error and compares it with the noise.
     let says = match diagnosis.verdict {
         // After a correction the verdict stays cautious, although nothing is left to explain.
-        DiagnosisVerdict::Unexplained if found.is_empty() && diagnosis.unexplained.is_empty() => {
+        DiagnosisVerdict::Unexplained if found.is_empty() && is_all_explained(diagnosis) => {
             adequate_text(last.check, &noise, judged)
         }
         DiagnosisVerdict::Adequate => adequate_text(last.check, &noise, judged),
@@ -186,7 +186,7 @@ fn unexplained_verdict(
         .unwrap_or_default();
     let mut says = match (found, sits.is_empty()) {
         ([], true) => vec![format!(
-            "The error {} is {error} of the force. {noise}",
+            "The model does not explain all of the recordings: the error {} is {error} of the force. {noise}",
             judged.phrase()
         )],
         ([], false) => vec![format!(
@@ -209,7 +209,7 @@ fn unexplained_verdict(
     }
     // Changes in time are listed with the disturbances; here only what follows for the model.
     let changes: Vec<&str> = (diagnosis.disturbances.iter())
-        .filter(|one| CHANGES_IN_TIME.contains(&one.kind.as_str()))
+        .filter(|one| is_change_in_time(one))
         .filter_map(|one| one.description.as_deref())
         .collect();
     if !changes.is_empty() {
@@ -264,6 +264,17 @@ pub(crate) fn time_residual(one: &TimeResidual, channel: &str, unit: &str) -> St
              Repeat the motion to see what is noise"
         ),
     }
+}
+
+/// Whether the residual is noise everywhere, and nothing changes within a recording.
+fn is_all_explained(diagnosis: &ModelDiagnosis) -> bool {
+    let mut disturbances = diagnosis.disturbances.iter();
+    diagnosis.unexplained.is_empty() && diagnosis.time_residuals.is_empty() && !disturbances.any(is_change_in_time)
+}
+
+/// Whether a disturbance is a change within a recording.
+fn is_change_in_time(one: &Disturbance) -> bool {
+    one.interval.is_some() && CHANGES_IN_TIME.contains(&one.kind.as_str())
 }
 
 /// The sentences of a model that lacks nothing.

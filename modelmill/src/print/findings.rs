@@ -109,23 +109,6 @@ impl DiagnosisFindings {
         let unexplained: Vec<Value> = (diagnosis.unexplained.iter())
             .map(|d| json!({"channel": channels[*d], "reproducible": diagnosis.repeatable_share[*d]}))
             .collect();
-        // Residuals that follow the time and are no noise.
-        let follows_time: Vec<Value> = (diagnosis.time_residuals.iter())
-            .map(|one| {
-                json!({
-                    "channel": channels[one.channel],
-                    "character": one.character,
-                    "rms": one.rms,
-                    "noise": one.noise,
-                    "unit": model.force_unit(one.channel),
-                    "frequency": one.frequency,
-                    "intervals": one.intervals.iter().map(|time| {
-                        json!({"recording": time.recording, "interval": time.interval})
-                    }).collect::<Vec<_>>(),
-                    "says": words::time_residual(one, &channels[one.channel], model.force_unit(one.channel)),
-                })
-            })
-            .collect();
         // Keys are part of the interface; their meaning is listed above.
         json!({
             "model": model.name,
@@ -144,7 +127,7 @@ impl DiagnosisFindings {
             "laws": laws::laws(&self.laws, model, spelling),
             "parameters_off_nominal": off,
             "unexplained": unexplained,
-            "follows_time": follows_time,
+            "follows_time": self.time_residuals(),
             "data": notes(&self.notes, spelling),
             "where": self.regions,
             "with_nominal_parameters": self.with_nominal.as_ref().map(|held| {
@@ -157,6 +140,28 @@ impl DiagnosisFindings {
                 })
             }),
         })
+    }
+
+    /// Residuals that follow the time and are no noise, as JSON.
+    fn time_residuals(&self) -> Vec<Value> {
+        let (diagnosis, channels) = (&self.diagnosis, self.channels());
+        let model = &self.before.model;
+        (diagnosis.time_residuals.iter())
+            .map(|one| {
+                json!({
+                    "channel": channels[one.channel],
+                    "character": one.character,
+                    "rms": one.rms,
+                    "noise": one.noise,
+                    "unit": model.force_unit(one.channel),
+                    "frequency": one.frequency,
+                    "intervals": one.intervals.iter().map(|time| {
+                        json!({"recording": time.recording, "interval": time.interval})
+                    }).collect::<Vec<_>>(),
+                    "says": words::time_residual(one, &channels[one.channel], model.force_unit(one.channel)),
+                })
+            })
+            .collect()
     }
 
     /// The findings as lines of text, the verdict first.

@@ -515,7 +515,10 @@ impl<'a> RunAnalyser<'a> {
         }
         report.changes.extend(identified);
         // Fits that do not describe the forces have no parameters to compare.
-        if reasons.iter().any(|reason| !reason.is_some_and(|one| one.spoils_fit())) {
+        if reasons
+            .iter()
+            .any(|reason| !reason.is_some_and(verdict::UndecidedReason::spoils_fit))
+        {
             // Only parameters that both runs determine can be compared.
             let differs = |k: &usize| {
                 let (a, b) = (&report.alone[*k], &first.alone[*k]);
@@ -544,7 +547,9 @@ impl<'a> RunAnalyser<'a> {
         let sensitivity = search_sensitivity(&runs, &self.search, &self.scale_hypotheses());
         let knowledge = [before.knowledge(), run.knowledge()];
         let reasons = undecided_reasons(knowledge.each_ref(), self.layout.base, &sensitivity);
-        let believed = reasons.iter().map(|one| !one.is_some_and(|one| one.spoils_fit()));
+        let believed = reasons
+            .iter()
+            .map(|one| !one.is_some_and(verdict::UndecidedReason::spoils_fit));
         let believed: Vec<bool> = believed.collect();
         let mut found = self.significant_changes(&runs, &run.sizes, &believed);
         // A drive that stands may have any friction.
