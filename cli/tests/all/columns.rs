@@ -242,7 +242,9 @@ fn two_names_share_a_column() {
     });
     let maps = ["theta1=a", "theta2=a", "spindle_left=F_left", "spindle_right=F_right"];
     let mut args = vec!["compare", &spidermill, "--data", &one];
-    maps.iter().for_each(|map| args.extend(["--map", map]));
+    for map in &maps {
+        args.extend(["--map", map]);
+    }
     let found = ran(&args);
     assert!(!found.err.contains("renamed twice"), "{}", found.err);
     assert!(

@@ -73,7 +73,7 @@ fn slow_motions_with_the_same_friction_show_no_change() {
         let plan = |seed: u64, motion: PlannedMotion| {
             let plan = RunPlan {
                 motion,
-                decimate: if seed % 3 == 0 { 4 } else { 8 },
+                decimate: if seed.is_multiple_of(3) { 4 } else { 8 },
                 ..RunPlan::new(seed)
             };
             plan.record(&model, &model)
