@@ -37,11 +37,11 @@ pub(crate) struct FrameLoad {
     pub(crate) columns: [ForceColumn; TEN],
 }
 
-/// Columns of a load on every body, the last body first: of two with the same effect it is the one that carries tools.
+/// Columns of a load on every body of `payloads`, the last body first: of two with the same effect it is the one that
+/// carries tools.
 ///
-/// Fails when the derivation of the columns fails, or when a pose has no solution.
-pub(crate) fn frame_loads(model: &Model, all: &SegmentList<'_>) -> Outcome<Vec<FrameLoad>> {
-    let payloads = PayloadColumns::new(model)?;
+/// Fails when a pose has no solution.
+pub(crate) fn frame_loads(model: &Model, all: &SegmentList<'_>, payloads: &PayloadColumns) -> Outcome<Vec<FrameLoad>> {
     let columns = regressor(all, &ModelEvaluator::new(&payloads.derivation), model)?;
     let largest = columns.iter().map(size).fold(0.0, f64::max);
     // Columns at the level of rounding are zero.
@@ -113,12 +113,15 @@ pub(crate) fn payloads(model: &Model, loads: &[FrameLoad]) -> Vec<CandidateEffec
 /// Symbols of the inertia of a load about the origin of its frame.
 const INERTIA: [&str; 6] = ["Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"];
 
-/// A load that is taken or put down during a recording: for each frame a point mass, and a body with inertia.
-pub(crate) fn load_changes(loads: &[FrameLoad]) -> Vec<ChangeShape> {
+/// A load that is taken or put down during a recording: for each last body a point mass, and a body with inertia.
+///
+/// Fails when the derivation of the columns fails, or when a pose has no solution.
+pub(crate) fn load_changes(model: &Model, all: &SegmentList<'_>) -> Outcome<Vec<ChangeShape>> {
+    let loads = frame_loads(model, all, &PayloadColumns::of_last_bodies(model)?)?;
     let each = loads
         .iter()
         .flat_map(|load| [(load, POINT_MASS_PARAMETERS), (load, TEN)]);
-    each.filter_map(|(load, most)| load_change(load, most)).collect()
+    Ok(each.filter_map(|(load, most)| load_change(load, most)).collect())
 }
 
 /// The change of a load with the first `most` of its ten parameters; `None` if none of them acts.

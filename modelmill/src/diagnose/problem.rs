@@ -13,6 +13,7 @@ use crate::error::{Error, Outcome};
 use crate::identify::regression::zero_force_message;
 use crate::model::Model;
 use crate::runs::RecordingDifference;
+use crate::runs::payload::PayloadColumns;
 use crate::segment::RecordingSegment;
 use crate::text::table::count;
 
@@ -121,14 +122,12 @@ pub(crate) fn find_missing_effects(
     further.extend(constants(model, &all, &|k| is_fixed(model, held, k)));
     further.extend(other_friction);
     if asked.in_full {
-        let loads = frame_loads(model, &all)?;
         if held == FixedParameters::All || problem.base.is_empty() {
+            let loads = frame_loads(model, &all, &PayloadColumns::new(model)?)?;
             further.extend(payloads(model, &loads));
         }
-        problem.change_shapes = load_changes(&loads)
-            .into_iter()
-            .chain(signal_changes(&problem, &units))
-            .collect();
+        problem.change_shapes = load_changes(model, &all)?;
+        problem.change_shapes.extend(signal_changes(&problem, &units));
     }
     problem.candidates.extend(further);
     // None of these can be an entry of a model file.

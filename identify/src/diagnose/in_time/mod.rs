@@ -189,8 +189,9 @@ fn best_profile(products: &BlockProducts<'_>, shape: usize, recording: usize) ->
     let blocks = products.recordings[recording].blocks.len();
     // The level of the recording is free, since the other recordings may have changes too.
     let level = vec![1.0; blocks];
-    let of_level = products.explained_squares(shape, recording, &[&level]);
-    let explained = |values: &[f64]| products.explained_squares(shape, recording, &[&level, values]) - of_level;
+    let reduced = products.reduce_blocks(shape, recording);
+    let of_level = reduced.explained_squares(&[&level]);
+    let explained = |values: &[f64]| reduced.explained_squares(&[&level, values]) - of_level;
     let best = |profiles: &mut dyn Iterator<Item = TimeProfile>| {
         let scored = profiles.map(|profile| (explained(&profile.values(blocks)), profile));
         scored.max_by(|a, b| a.0.total_cmp(&b.0))

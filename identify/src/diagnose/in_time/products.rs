@@ -15,6 +15,8 @@ use super::{ChangeForce, ChangeShape};
 
 /// Number of blocks of a recording.
 const BLOCKS: usize = 40;
+/// Largest number of columns: the effort grows with its square. Larger models are not searched for changes.
+const MOST_COLUMNS: usize = 400;
 /// Fewest samples of a block.
 const FEWEST_IN_BLOCK: usize = 5;
 
@@ -30,6 +32,70 @@ pub(super) struct CutRecording {
     products: Vec<DMatrix<f64>>,
     /// Weighted squares of the residual of the set by channel.
     squares: Vec<f64>,
+}
+
+/// The products of a shape in one block, with the set projected out.
+struct ReducedBlock {
+    /// Columns of the shape with each other.
+    own: DMatrix<f64>,
+    /// Columns of the shape with the residual of the set.
+    right: DVector<f64>,
+    /// `L^-1 C` for the products `C` of the set with the columns of the shape, `L` the factor of the set.
+    halves: DMatrix<f64>,
+}
+
+/// The same for all blocks of a recording.
+pub(super) struct ReducedBlocks {
+    /// The blocks.
+    blocks: Vec<ReducedBlock>,
+    /// Number of columns of the shape.
+    columns: usize,
+    /// Weighted squares of the residual of the set.
+    squares: f64,
+}
+
+impl ReducedBlocks {
+    /// Decrease of the weighted squares if the shape acts with some time profiles, one value per block. Each profile has
+    /// its own parameters.
+    pub(super) fn explained_squares(&self, profiles: &[&[f64]]) -> f64 {
+        self.squares - solve_gram(&self.gram(profiles)).1
+    }
+
+    /// Products of the shape with some profiles and of the residual.
+    fn gram(&self, profiles: &[&[f64]]) -> DMatrix<f64> {
+        let p = self.columns;
+        let m = p * profiles.len();
+        let n = self.blocks.first().map_or(0, |block| block.halves.nrows());
+        let mut own = DMatrix::zeros(m, m);
+        let mut halves = DMatrix::zeros(n, m);
+        let mut right = DVector::zeros(m);
+        for (b, block) in self.blocks.iter().enumerate() {
+            for (k, profile) in profiles.iter().enumerate().filter(|(_, profile)| profile[b] != 0.0) {
+                for (l, other) in profiles.iter().enumerate().filter(|(_, other)| other[b] != 0.0) {
+                    let mut part = own.view_mut((p * k, p * l), (p, p));
+                    part += profile[b] * other[b] * &block.own;
+                }
+                let mut part = halves.view_mut((0, p * k), (n, p));
+                part += profile[b] * &block.halves;
+                let mut part = right.rows_mut(p * k, p);
+                part += profile[b] * &block.right;
+            }
+        }
+        let left = &own - halves.transpose() * &halves;
+        let mut gram = left.resize(m + 1, m + 1, 0.0);
+        for i in 0..m {
+            // What remains at the level of rounding belongs to the set.
+            if gram[(i, i)] <= DEPENDENT_SHARE * own[(i, i)] {
+                gram.row_mut(i).fill(0.0);
+                gram.column_mut(i).fill(0.0);
+                continue;
+            }
+            gram[(i, m)] = right[i];
+            gram[(m, i)] = right[i];
+        }
+        gram[(m, m)] = self.squares;
+        gram
+    }
 }
 
 /// All products that a search of changes needs.
@@ -57,7 +123,8 @@ pub(super) struct BlockProducts<'a> {
 }
 
 impl<'a> BlockProducts<'a> {
-    /// Fits the set and computes the products of all blocks; `None` if all recordings are too short.
+    /// Fits the set and computes the products of all blocks; `None` if all recordings are too short,
+    /// or if there are too many columns.
     pub(super) fn new(problem: &'a DiagnosisProblem, set: &[&'a ForceColumn]) -> Option<Self> {
         let cut = cut_recordings(problem);
         if cut.is_empty() {
@@ -65,6 +132,10 @@ impl<'a> BlockProducts<'a> {
         }
         // Friction that the model lacks would look like a change where the motion changes.
         let set: Vec<&ForceColumn> = set.iter().copied().chain(&problem.friction).collect();
+        let of_shapes = problem.change_shapes.iter().map(|shape| shape.parameters.len());
+        if set.len() + of_shapes.sum::<usize>() > MOST_COLUMNS {
+            return None;
+        }
         let excluded = excluded_samples(problem);
         let channels = problem.layout.channels.len();
         let mut one = Self {
@@ -134,50 +205,25 @@ impl<'a> BlockProducts<'a> {
         squares.filter(|(d, _)| acts(*d)).map(|(_, squares)| squares).sum()
     }
 
-    /// Decrease of the weighted squares if a shape acts in a recording with some time profiles, one value per block. Each
-    /// profile has its own parameters.
-    pub(super) fn explained_squares(&self, shape: usize, recording: usize, profiles: &[&[f64]]) -> f64 {
-        let gram = self.reduced_gram(shape, recording, profiles);
-        self.squares - solve_gram(&gram).1
-    }
-
-    /// Products of a shape with some profiles and of the measured forces, with the set projected out.
-    fn reduced_gram(&self, shape: usize, recording: usize, profiles: &[&[f64]]) -> DMatrix<f64> {
+    /// The blocks of a recording for one shape, with the set projected out.
+    pub(super) fn reduce_blocks(&self, shape: usize, recording: usize) -> ReducedBlocks {
         let n = self.set.len();
         let (start, p) = (self.starts[shape], self.shapes[shape].len());
-        let m = p * profiles.len();
-        let mut own = DMatrix::zeros(m, m);
-        let mut with_set = DMatrix::zeros(n, m);
-        let mut right = DVector::zeros(m);
-        for (b, block) in self.recordings[recording].products.iter().enumerate() {
+        let blocks = self.recordings[recording].products.iter();
+        let blocks = blocks.map(|block| {
             let last = block.ncols() - 1;
-            for (k, profile) in profiles.iter().enumerate().filter(|(_, profile)| profile[b] != 0.0) {
-                for (l, other) in profiles.iter().enumerate() {
-                    let mut part = own.view_mut((p * k, p * l), (p, p));
-                    part += profile[b] * other[b] * block.view((start, start), (p, p));
-                }
-                let mut part = with_set.view_mut((0, p * k), (n, p));
-                part += profile[b] * block.view((0, start), (n, p));
-                let mut part = right.rows_mut(p * k, p);
-                part += profile[b] * block.view((start, last), (p, 1)).column(0);
+            let with_set = block.view((0, start), (n, p)).into_owned();
+            ReducedBlock {
+                own: block.view((start, start), (p, p)).into_owned(),
+                right: block.view((start, last), (p, 1)).column(0) - with_set.transpose() * &self.factors,
+                halves: self.factor.forward_substitute(&with_set),
             }
+        });
+        ReducedBlocks {
+            blocks: blocks.collect(),
+            columns: p,
+            squares: self.squares,
         }
-        let halves = self.factor.forward_substitute(&with_set);
-        let left = &own - halves.transpose() * &halves;
-        right -= with_set.transpose() * &self.factors;
-        let mut gram = left.resize(m + 1, m + 1, 0.0);
-        for i in 0..m {
-            // What remains at the level of rounding belongs to the set.
-            if gram[(i, i)] <= DEPENDENT_SHARE * own[(i, i)] {
-                gram.row_mut(i).fill(0.0);
-                gram.column_mut(i).fill(0.0);
-                continue;
-            }
-            gram[(i, m)] = right[i];
-            gram[(m, i)] = right[i];
-        }
-        gram[(m, m)] = self.squares;
-        gram
     }
 
     /// Samples in which a change acts: the times of a profile, refined to samples.
@@ -188,7 +234,7 @@ impl<'a> BlockProducts<'a> {
         let values = profile.values(blocks.len());
         let level = vec![1.0; blocks.len()];
         let profiles: [&[f64]; 2] = [&values, &level];
-        let (own, _) = solve_gram(&self.reduced_gram(shape, recording, &profiles));
+        let (own, _) = solve_gram(&self.reduce_blocks(shape, recording).gram(&profiles));
         // The factors of the set change with those of the shape.
         let n = self.set.len();
         let p = self.shapes[shape].len();
