@@ -58,6 +58,15 @@ impl ChannelRegressor {
         self.channels.first().map_or(0, |c| c.rows.nrows())
     }
 
+    /// The rows of some channels, in the order of `kept`, with all columns.
+    #[must_use]
+    pub fn select_channels(&self, kept: &[usize]) -> Self {
+        Self {
+            columns: self.columns,
+            channels: kept.iter().map(|c| self.channels[*c].clone()).collect(),
+        }
+    }
+
     /// Keeps every `step`-th sample.
     #[must_use]
     pub fn subsample(&self, step: usize) -> Self {

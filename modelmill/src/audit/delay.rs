@@ -25,6 +25,13 @@ pub(super) struct ForceDelayAudit {
     delays: ForceDelays,
     /// Time between samples, s.
     step: f64,
+    /// Names of the drives with a force signal, in the order of the delays.
+    drives: Vec<String>,
+}
+
+/// Some of the columns; none if there are none at all.
+fn pick<T: Clone>(columns: &[Vec<T>], which: &[usize]) -> Vec<Vec<T>> {
+    which.iter().filter_map(|d| columns.get(*d).cloned()).collect()
 }
 
 impl ForceDelayAudit {
@@ -46,26 +53,33 @@ impl ForceDelayAudit {
         let every = ((to - from) / most).max(1);
         let samples: Vec<usize> = (from..to).step_by(every).collect();
         let rows = AuditRows::new(model, data, &samples)?;
-        let drives = forces.len();
+        // A drive without any force, as in the row of an undriven joint, has no signal that could be late.
+        let is_read = |d: &usize| forces[*d].iter().any(|force| *force != 0.0);
+        let read: Vec<usize> = (0..forces.len()).filter(is_read).collect();
         // Samples near reversals of a drive are not used.
-        let mut counts = vec![false; samples.len() * drives];
-        for (d, rates) in rows.motion[1].iter().enumerate() {
+        let mut counts = vec![false; samples.len() * read.len()];
+        for (k, rates) in read.iter().map(|d| &rows.motion[1][*d]).enumerate() {
             let fastest = rates.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
             for (i, rate) in rates.iter().enumerate() {
-                counts[i * drives + d] = rate.abs() > DELAY_REVERSAL_RATE_SHARE * fastest;
+                counts[i * read.len() + k] = rate.abs() > DELAY_REVERSAL_RATE_SHARE * fastest;
             }
         }
         let delays = ForceDelays::from_audit(&DelayAudit {
-            regressor: rows.regressor,
-            slope: AuditRows::slope(model, data, &samples)?,
+            regressor: rows.regressor.select_channels(&read),
+            slope: AuditRows::slope(model, data, &samples)?.select_channels(&read),
             time: rows.time,
             used_rows: counts,
             recording_time: &run.time,
-            forces,
-            excluded_forces: &run.left_out,
+            forces: &pick(forces, &read),
+            excluded_forces: &pick(&run.left_out, &read),
             max_delay: longest,
         })?;
-        Some(Self { delays, step })
+        let names = model.drives();
+        Some(Self {
+            delays,
+            step,
+            drives: read.iter().map(|d| names[*d].clone()).collect(),
+        })
     }
 
     /// Relative decrease of the residual with the delay, as a geometric mean over the drives. `with` is 1 for the
@@ -140,10 +154,10 @@ impl ForceDelayAudit {
     }
 
     /// The note on the delay; `None` without one. `file` is the name of the recording.
-    pub(super) fn delay_note(&self, model: &Model, file: &str) -> Option<RecordingNote> {
-        let names = model.drives();
+    pub(super) fn delay_note(&self, file: &str) -> Option<RecordingNote> {
+        let names = &self.drives;
         if let Some(all) = self.common_delay() {
-            return Some(self.common_delay_note(all, &names, file));
+            return Some(self.common_delay_note(all, names, file));
         }
         let late = self.delayed_drives();
         if late.is_empty() {

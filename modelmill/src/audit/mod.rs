@@ -162,7 +162,7 @@ fn findings(model: &Model, data: &RecordingSegment) -> Vec<AuditFinding> {
     }
     // A delay is reported only if nothing else is suspicious.
     if notes.is_empty() {
-        let late = late.and_then(|late| late.delay_note(model, &run.file));
+        let late = late.and_then(|late| late.delay_note(&run.file));
         notes.extend(late.map(|note| AuditFinding { note, fault: None }));
     }
     notes
