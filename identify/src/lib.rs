@@ -49,8 +49,8 @@ mod test_noise;
 mod words;
 
 pub use audit::{
-    ChannelRegressor, DelayAudit, DelayEstimate, ForceAudit, ForceDelays, PositionFault, RobustFit, WiringFault,
-    robust_fit,
+    ChannelRegressor, DeadBand, DelayAudit, DelayEstimate, ForceAudit, ForceDelays, PositionFault, RobustFit,
+    WiringFault, robust_fit,
 };
 pub use estimate::{
     LeastSquares, LeastSquaresError, NullDirection, ParameterUncertainty, RANK_TOLERANCE, RFactor, RegressionSolution,

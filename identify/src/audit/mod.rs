@@ -4,14 +4,17 @@
 mod by_channel;
 mod clock;
 mod columns;
+mod dead_band;
 mod delay;
 mod exchange;
+mod late_rates;
 mod positions;
 mod robust;
 mod signals;
 mod thresholds;
 
 pub use by_channel::ChannelRegressor;
+pub use dead_band::DeadBand;
 pub use delay::{DelayAudit, DelayEstimate, ForceDelays};
 pub use exchange::{ForceAudit, WiringFault};
 pub use positions::PositionFault;

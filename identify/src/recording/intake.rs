@@ -278,6 +278,7 @@ impl<'a> SampleIntake<'a> {
             others,
             lines: self.lines,
             notes,
+            late_rates: Vec::new(),
         })
     }
 }

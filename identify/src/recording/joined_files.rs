@@ -133,6 +133,7 @@ impl RecordingFiles {
             columns: std::iter::once(("t".to_owned(), time)).chain(columns).collect(),
             lines,
             notes,
+            late_rates: Vec::new(),
         })
     }
 

@@ -47,6 +47,8 @@ pub struct SignalRecording {
     pub(crate) lines: Vec<u64>,
     /// Notes on the file and on what was done with it.
     pub(crate) notes: Vec<RecordingNote>,
+    /// Coordinates whose recorded rates lag their positions and were removed, each with the delay, s.
+    pub(crate) late_rates: Vec<(String, f64)>,
 }
 
 impl SignalRecording {
@@ -175,6 +177,7 @@ impl SignalRecording {
             others: self.others.clone(),
             lines: self.lines[start..end].to_vec(),
             notes: Vec::new(),
+            late_rates: self.late_rates.clone(),
         }
     }
 
