@@ -3,7 +3,7 @@
 use modelmill::diagnose::NamedEffect;
 use modelmill::excite::{ExcitationCriterion, ExcitationRequest, Options, SeparationRequest, TrajectoryLimit};
 use modelmill::identify::{EquationWeights, EstimateRefinement, EstimatorOptions};
-use modelmill::recording::{DerivativeSource, MAX_FILTER_ORDER, RecordingOptions, SmoothingMethod, StatePreparation};
+use modelmill::recording::{DerivativeSource, MAX_FILTER_ORDER, RecordingOptions, SmoothingMethod, StandstillRule, StatePreparation};
 use modelmill::runs::{KnownLoad, PerRunSelection, RunsOptions};
 use pyo3::prelude::*;
 
@@ -79,6 +79,7 @@ impl ReadingOptions {
             skip_bad_samples: self.skip_bad_samples,
             leave_out_events: self.leave_out_events,
             between: self.between,
+            standstill: StandstillRule::default(),
         })
     }
 

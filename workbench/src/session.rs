@@ -395,14 +395,14 @@ impl WorkbenchSession {
 
     /// Reads the recordings for fit and validation with a model.
     fn recordings(&self, model: &Model) -> Outcome<SessionRecordings> {
-        let read = |all: &[Vec<PathBuf>]| -> Outcome<Vec<PreparedRecording>> {
-            let one = |run: &Vec<PathBuf>| {
-                let paths: Vec<&Path> = run.iter().map(PathBuf::as_path).collect();
-                model.recording_of(&paths, &self.options.reading)
-            };
-            all.iter().map(one).collect()
-        };
-        Ok([read(&self.options.data)?, read(&self.options.check)?])
+        let [fit, check] = [&self.options.data, &self.options.check];
+        let runs: Vec<Vec<&Path>> = (fit.iter().chain(check))
+            .map(|run| run.iter().map(PathBuf::as_path).collect())
+            .collect();
+        let all = model.prepare_recordings(&runs, &self.options.reading);
+        let mut all = all.into_iter().collect::<Outcome<Vec<PreparedRecording>>>()?;
+        let check = all.split_off(fit.len());
+        Ok([all, check])
     }
 
     /// Errors along the recordings, with the values of the file and with identified ones. `with_places` adds the

@@ -42,10 +42,13 @@ pub(crate) fn run(host: &Host, args: &RunsArgs) -> CommandOutcome {
     let model = commands::model(host, &args.model)?;
     let reading = args.preparation.reading();
     // A run that cannot be read is passed on with its error; the library decides whether the others are sufficient.
-    let recordings = data.iter().map(|path| {
-        let files = commands::files_of(path);
-        let files: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
-        model.recording_of(&files, &reading).map_err(|error| UnreadRun {
+    let files: Vec<Vec<PathBuf>> = data.iter().map(|path| commands::files_of(path)).collect();
+    let runs: Vec<Vec<&Path>> = (files.iter())
+        .map(|files| files.iter().map(PathBuf::as_path).collect())
+        .collect();
+    let read = model.prepare_recordings(&runs, &reading);
+    let recordings = data.iter().zip(read).map(|(path, read)| {
+        read.map_err(|error| UnreadRun {
             file: path.display().to_string(),
             error,
         })

@@ -1,4 +1,4 @@
-//! Choice of the smoothing of a recording if the user gave none: candidates are tested, and the one with the smallest
+//! Choice of the smoothing of recordings of one machine if the user gave none: candidates are tested, and the one with the smallest
 //! force residual on held-out parts of the run is taken.
 //!
 //! Spectra of positions alone cannot distinguish noise of clocks and encoders from motion; forces can. For each
@@ -12,18 +12,23 @@
 //! their residual equals that of the low-pass on all recordings that were examined.
 
 use modelmill_boundary::message;
-use modelmill_boundary::text::{OptionName, Remedy};
-use modelmill_codegen::{ModelEvaluator, MotionStates};
+use modelmill_boundary::text::{Message, OptionName, Remedy};
 use modelmill_identify::{
     DECIMATION_PASSBAND, LowPass, PreparationChoices, PreparedRun, RecordingNote, SignalRecording as Raw,
 };
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 use super::free;
+use super::friction_rows::{PickedStates, regressor_with_friction};
+use super::held_out::{
+    FOLDS, FoldSums, HeldOutResidual, OctavePower, ROUNDING, TimeWindow, WindowSamples, fit_folds, margin,
+};
 use super::options::RecordingOptions;
 use super::smoother::{SmootherCandidate, floor_to_count, series_up_to};
+use super::stick::StickPhases;
 use super::thresholds::{
-    SAME_RESIDUAL_TOLERANCE, SMOOTHING_LEAST_GAIN, SMOOTHING_ROWS_PER_COLUMN, WINDOW_FEWEST_SAMPLES,
+    CUTOFF_LEAST_PASSBANDS, DECIMATION_FEWEST_KEPT, SAME_RATE_TOLERANCE, SAME_RESIDUAL_TOLERANCE, SMOOTHING_LEAST_GAIN,
+    WINDOW_FEWEST_SAMPLES,
 };
 use crate::error::Outcome;
 use crate::model::Model;
@@ -39,8 +44,6 @@ const HIGHEST: f64 = 0.2;
 const FARTHEST: f64 = 8.0;
 /// The lowest cut-off, relative to the band of the forces.
 const LOWEST: f64 = 0.15;
-/// Number of parts of the time, each of which is held out once.
-const FOLDS: usize = 5;
 /// Number of octaves above the band of the motion that are evaluated.
 const OCTAVES: usize = 2;
 /// Largest number of samples for each candidate; longer recordings are evaluated in windows.
@@ -49,49 +52,66 @@ const LOOKED_AT: usize = 12_000;
 const FINE: f64 = 5.0;
 /// Number of windows of a long recording.
 const WINDOWS: usize = 10;
-/// Periods of the band that are dropped at both ends of a held-out part, and the largest share of it that may be
-/// dropped.
-const DROPPED: (f64, f64) = (1.5, 0.2);
 /// Passbands of the decimation that are tested, relative to the band of the forces.
 const PARALLEL: [f64; 3] = [0.5, 1.0, 2.0];
 /// Samples next to a window, at the rate of the evaluation, beyond which the low-pass has no influence.
 const BEYOND: usize = 60;
-/// A residual below this fraction of the force is rounding.
-const ROUNDING: f64 = 1e-6;
 /// A cut-off whose residual exceeds the smallest by this factor ends the search downwards.
 const HOPELESS: f64 = 1.5;
 
-/// The reading options with all open choices of the preparation made, and a note on them; `None` if nothing is open,
-/// or if the recording has no forces to decide it.
-pub(super) fn choose_preparation(
-    model: &Model,
-    raw: &Raw,
-    reading: &RecordingOptions,
-) -> Outcome<Option<(RecordingOptions, RecordingNote)>> {
-    let drives = model.drives();
-    let has_forces = !drives.is_empty() && drives.iter().all(|drive| raw.has_column(drive));
-    if !has_forces || model.base.is_empty() {
-        return Ok(None);
-    }
-    let open = raw.find_open_choices(&model.active_coordinates(), &drives, &reading.preparation)?;
-    Ok(open.and_then(|open| {
-        let search = SmootherSearch {
-            model,
-            raw,
-            reading,
-            open,
-        };
-        search.best_reading()
-    }))
+/// One recording whose preparation is chosen.
+#[derive(Clone, Copy)]
+pub(super) struct OpenRecording<'a> {
+    /// The recording before preparation.
+    pub(super) raw: &'a Raw,
+    /// Its index among the recordings of the stick phases.
+    pub(super) index: usize,
 }
 
-/// Force residual on held-out parts.
-#[derive(Clone, Copy)]
-struct HeldOutResidual {
-    /// The logarithm of the geometric mean of the residual over the drives, in units of the forces.
-    figure: f64,
-    /// The geometric mean of the relative residuals below the band of the motion over the drives.
-    relative: f64,
+/// A choice for some recordings together.
+pub(super) struct PreparationChoice {
+    /// Index of each recording, with its reading options.
+    pub(super) readings: Vec<(usize, RecordingOptions)>,
+    /// What was chosen, and why.
+    pub(super) note: RecordingNote,
+}
+
+/// The choices of the preparation that are open for recordings of one machine. All recordings with the same sampling
+/// rate get the same cut-off, smoothing and decimation: otherwise the same parameters would be fitted to one motion and
+/// compared with another that was smoothed differently.
+///
+/// Recordings in which nothing is open, or without forces to decide it, have no choice.
+pub(super) fn choose_preparation(
+    model: &Model,
+    recordings: &[&Raw],
+    reading: &RecordingOptions,
+    sticks: &StickPhases,
+) -> Outcome<Vec<PreparationChoice>> {
+    let drives = model.drives();
+    let coordinates = model.active_coordinates();
+    let mut groups: Vec<Vec<(OpenRecording<'_>, PreparationChoices)>> = Vec::new();
+    for (index, raw) in recordings.iter().enumerate() {
+        let has_forces = !drives.is_empty() && drives.iter().all(|drive| raw.has_column(drive));
+        if !has_forces || model.base.is_empty() {
+            continue;
+        }
+        let Some(open) = raw.find_open_choices(&coordinates, &drives, &reading.preparation)? else {
+            continue;
+        };
+        let one = OpenRecording { raw, index };
+        // A decimation counts samples, so it is common to equal rates only.
+        let is_alike = |(_, other): &(OpenRecording<'_>, PreparationChoices)| {
+            (open.rate_hz / other.rate_hz - 1.0).abs() < SAME_RATE_TOLERANCE
+        };
+        match groups.iter_mut().find(|group| group.iter().all(is_alike)) {
+            Some(group) => group.push((one, open)),
+            None => groups.push(vec![(one, open)]),
+        }
+    }
+    Ok(groups
+        .into_iter()
+        .filter_map(|group| SmootherSearch::new(model, reading, sticks, group)?.best_choice())
+        .collect())
 }
 
 /// Smoothers of one kind that were tested, in the order of decreasing bandwidth.
@@ -131,21 +151,51 @@ fn cost_text(difference: f64) -> String {
     }
 }
 
-/// The search for the best smoother of one recording.
+/// The search for the best smoother of some recordings with one sampling rate.
 struct SmootherSearch<'a> {
     /// The model that is fitted.
     model: &'a Model,
-    /// The recording before preparation.
-    raw: &'a Raw,
+    /// The recordings.
+    recordings: Vec<OpenRecording<'a>>,
+    /// The period of the motion of each, s, if it is periodic.
+    periods: Vec<Option<f64>>,
     /// The options of the user.
     reading: &'a RecordingOptions,
-    /// The choices that are open, with rate, band and period of the motion.
+    /// Intervals in which drives stick, whose forces do not count.
+    sticks: &'a StickPhases,
+    /// The choices that are open, with rate, band and period of the motions.
     open: PreparationChoices,
 }
 
-impl SmootherSearch<'_> {
-    /// The options with the best smoother and decimation, and the note that states the choice.
-    fn best_reading(&self) -> Option<(RecordingOptions, RecordingNote)> {
+impl<'a> SmootherSearch<'a> {
+    /// The search for a group of recordings: the fastest of their motions decides about the band. `None` without any.
+    fn new(
+        model: &'a Model,
+        reading: &'a RecordingOptions,
+        sticks: &'a StickPhases,
+        group: Vec<(OpenRecording<'a>, PreparationChoices)>,
+    ) -> Option<Self> {
+        let all = || group.iter().map(|(_, open)| open);
+        let periods: Vec<Option<f64>> = all().map(|open| open.period).collect();
+        let open = PreparationChoices {
+            rate_hz: all().map(|open| open.rate_hz).reduce(f64::min)?,
+            band_hz: all().map(|open| open.band_hz).reduce(f64::max)?,
+            cutoff_hz: all().map(|open| open.cutoff_hz).reduce(f64::max)?,
+            // A series needs a period in every recording; the longest has the most harmonics.
+            period: periods.iter().copied().reduce(|a, b| Some(a?.max(b?))).flatten(),
+        };
+        Some(Self {
+            model,
+            recordings: group.into_iter().map(|(one, _)| one).collect(),
+            periods,
+            reading,
+            sticks,
+            open,
+        })
+    }
+
+    /// The options with the best smoother and decimation for each recording, and the note that states the choice.
+    fn best_choice(&self) -> Option<PreparationChoice> {
         let PreparationChoices {
             rate_hz,
             band_hz,
@@ -194,32 +244,51 @@ impl SmootherSearch<'_> {
         };
         // Decimation is chosen last, for the smoother that was found.
         let (smoother, left) = tried.best();
-        let (decimate, left) = self.decimation(smoother, &looked_at).unwrap_or((1, left));
-        let mut reading = self.reading.clone();
-        smoother.apply_to(&mut reading.preparation);
-        reading.preparation.decimate = decimate;
-        reading.preparation.chosen = true;
+        let (smoother, decimate, left) = self.decimation(smoother, &looked_at).unwrap_or((smoother, 1, left));
+        let readings = (self.recordings.iter().zip(&self.periods)).map(|(one, period)| {
+            let mut reading = self.reading.clone();
+            smoother.apply_to(&mut reading.preparation, *period);
+            reading.preparation.decimate = decimate;
+            reading.preparation.chosen = true;
+            (one.index, reading)
+        });
         // The note states how the residual changes with the alternatives.
         let mut others = vec![String::new()];
         others.extend(tried.neighbours().chain(other));
-        let others = others.join(", ");
+        let says = self.choice_text(smoother, decimate, left, &others.join(", "));
+        Some(PreparationChoice {
+            readings: readings.collect(),
+            note: RecordingNote::info(says),
+        })
+    }
+
+    /// The note on a choice; `others` are the costs of the alternatives.
+    fn choice_text(
+        &self,
+        smoother: SmootherCandidate,
+        decimate: usize,
+        left: HeldOutResidual,
+        others: &str,
+    ) -> Message {
         let every = if decimate > 1 {
             format!(", and decimated by {decimate} after a low-pass on forces and regressor")
         } else {
             String::new()
         };
-        let says = message!(
-            "{} {}{every}. This was chosen automatically, since it predicts held-out parts of the run best. The error there is {} \
+        let files: Vec<&str> = self.recordings.iter().map(|one| one.raw.file()).collect();
+        let what = match files.as_slice() {
+            [one] => format!("{one} {}", smoother.describe(false)),
+            all => format!("{} {}", all.join(", "), smoother.describe(true)),
+        };
+        message!(
+            "{what}{every}. This was chosen automatically, since it predicts held-out parts of the run best. The error there is {} \
              (below {} Hz, geometric mean over the drives){others}. Set it yourself with {}, {} and {}.",
-            self.raw.file(),
-            smoother.describe(),
             percent(Some(left.relative)),
-            significant(band_hz, 3),
+            significant(self.open.band_hz, 3),
             Remedy::option(OptionName::CutoffHz),
             Remedy::option(OptionName::Smoothing),
             Remedy::option(OptionName::Decimate),
-        );
-        Some((reading, RecordingNote::info(says)))
+        )
     }
 
     /// Tests smoothers in the order of decreasing bandwidth, until the residual is clearly too large.
@@ -242,17 +311,36 @@ impl SmootherSearch<'_> {
         Some(SmootherTrials { all, best })
     }
 
-    /// The factor of decimation, with the residual on held-out parts; `None` if it cannot be evaluated.
-    fn decimation(&self, smoother: SmootherCandidate, looked_at: &[TimeWindow]) -> Option<(usize, HeldOutResidual)> {
-        let mut best: Option<(usize, HeldOutResidual)> = None;
+    /// The factor of decimation and the smoother that suits it, with the residual on held-out parts; `None` if it cannot
+    /// be evaluated.
+    ///
+    /// The low-pass of positions must pass what the decimation passes. Otherwise forces have frequencies that the
+    /// smoothed accelerations lack, and inertias become too large.
+    fn decimation(
+        &self,
+        smoother: SmootherCandidate,
+        looked_at: &[TimeWindow],
+    ) -> Option<(SmootherCandidate, usize, HeldOutResidual)> {
+        let mut best: Option<(SmootherCandidate, usize, HeldOutResidual)> = None;
+        let most = self
+            .recordings
+            .iter()
+            .map(|one| one.raw.samples() / DECIMATION_FEWEST_KEPT)
+            .min()?;
         // Passbands increase, so that the strongest decimation is tested first.
         for part in PARALLEL {
-            let passed = part * self.open.band_hz;
-            let factor = floor_to_count(DECIMATION_PASSBAND * self.open.rate_hz / passed).max(1);
+            let factor = floor_to_count(DECIMATION_PASSBAND * self.open.rate_hz / (part * self.open.band_hz));
+            let factor = factor.min(most).max(1);
+            let passed = DECIMATION_PASSBAND * self.open.rate_hz / factor as f64;
+            let suited = if factor == 1 {
+                smoother
+            } else {
+                smoother.at_least((CUTOFF_LEAST_PASSBANDS * passed).min(HIGHEST * self.open.rate_hz))
+            };
             let passed = if factor == 1 { f64::INFINITY } else { passed };
-            let left = self.held_out_residual(smoother, passed, looked_at)?;
-            if best.is_none_or(|(_, least)| left.figure < least.figure - SMOOTHING_LEAST_GAIN) {
-                best = Some((factor, left));
+            let left = self.held_out_residual(suited, passed, looked_at)?;
+            if best.is_none_or(|(_, _, least)| left.figure < least.figure - SMOOTHING_LEAST_GAIN) {
+                best = Some((suited, factor, left));
             }
             if factor == 1 {
                 break;
@@ -261,32 +349,36 @@ impl SmootherSearch<'_> {
         best
     }
 
-    /// The recording prepared with a smoother; `None` if that fails.
-    fn runs(&self, smoother: SmootherCandidate) -> Option<Vec<PreparedRun>> {
-        let mut preparation = self.reading.preparation.clone();
-        smoother.apply_to(&mut preparation);
-        // Band and period are known already; finding them again would need all positions.
-        preparation.band_hz = Some(self.open.band_hz);
-        preparation.unexamined = true;
-        let mut runs = free::runs(self.model, self.raw, &preparation).ok()?;
-        // Forces of a model with delay belong to earlier states.
+    /// The runs of each recording prepared with a smoother; `None` if that fails.
+    fn runs(&self, smoother: SmootherCandidate) -> Option<Vec<Vec<PreparedRun>>> {
         let delay = self.model.derivation.mechanism.force_delay;
-        if delay != 0.0 {
-            for run in &mut runs {
-                run.shift_states_by_delay(delay)?;
+        let prepare = |(one, period): (&OpenRecording<'_>, &Option<f64>)| {
+            let mut preparation = self.reading.preparation.clone();
+            smoother.apply_to(&mut preparation, *period);
+            // Band and period are known already; finding them again would need all positions.
+            preparation.band_hz = Some(self.open.band_hz);
+            preparation.unexamined = true;
+            let mut runs = free::runs(self.model, one.raw, &preparation).ok()?;
+            // Forces of a model with delay belong to earlier states.
+            if delay != 0.0 {
+                for run in &mut runs {
+                    run.shift_states_by_delay(delay)?;
+                }
             }
-        }
-        Some(runs)
+            Some(runs)
+        };
+        self.recordings.iter().zip(&self.periods).map(prepare).collect()
     }
 
     /// The intervals of time that all candidates have, or windows of them in a long recording.
-    fn windows(&self, runs: &[PreparedRun]) -> Vec<TimeWindow> {
-        let total: f64 = runs.iter().map(duration).sum();
+    fn windows(&self, runs: &[Vec<PreparedRun>]) -> Vec<TimeWindow> {
+        let total: f64 = runs.iter().flatten().map(duration).sum();
         let step = self.evaluation_rate().recip();
         let most = step * LOOKED_AT as f64;
         let share = if total > most { most / total } else { 1.0 };
         let mut windows = Vec::new();
-        for run in runs {
+        let each = runs.iter().enumerate();
+        for (recording, run) in each.flat_map(|(recording, runs)| runs.iter().map(move |run| (recording, run))) {
             let (Some(first), Some(last)) = (run.time.first(), run.time.last()) else {
                 continue;
             };
@@ -295,6 +387,7 @@ impl SmootherSearch<'_> {
             for part in 0..parts {
                 let from = first + length * part as f64;
                 windows.push(TimeWindow {
+                    recording,
                     from,
                     to: from + share * length,
                 });
@@ -330,7 +423,7 @@ impl SmootherSearch<'_> {
         let samples = windows
             .iter()
             .map(|window| {
-                let run = runs.iter().find(|run| {
+                let run = runs[window.recording].iter().find(|run| {
                     run.time[0] <= window.from + slack && run.time[run.time.len() - 1] >= window.to - slack
                 })?;
                 self.samples(run, window, every)
@@ -402,19 +495,22 @@ impl SmootherSearch<'_> {
         // Stage 3: the figure over the drives.
         let mut figure = 0.0;
         let mut relative = 0.0;
+        let mut counted = 0;
         for octaves in &octaves {
+            // A drive without a force, as in the row of an undriven joint, has no relative residual.
             let size = octaves.first()?.measured;
             if size <= 0.0 {
-                return None;
+                continue;
             }
+            counted += 1;
             let rounding = ROUNDING * ROUNDING * size;
             let above: f64 = octaves[1..].iter().map(|octave| octave.residual_power(true)).sum();
             let within = octaves[0].residual_power(false).max(rounding);
             figure += 0.5 * (within + above).ln();
             relative += 0.5 * (within / size).ln();
         }
-        let n = drives as f64;
-        Some(HeldOutResidual {
+        let n = f64::from(counted);
+        (counted > 0).then(|| HeldOutResidual {
             figure: figure / n,
             relative: (relative / n).exp(),
         })
@@ -423,13 +519,14 @@ impl SmootherSearch<'_> {
     /// Regressor and forces at every `every`-th sample of a window; `None` if there are too few samples.
     fn samples(&self, run: &PreparedRun, window: &TimeWindow, every: usize) -> Option<WindowSamples> {
         let forces = run.force.as_deref()?;
+        let recording = self.recordings[window.recording].index;
         let start = run.time.partition_point(|t| *t < window.from);
         let end = run.time.partition_point(|t| *t <= window.to);
         let samples: Vec<usize> = (start..end).step_by(every).collect();
         if samples.len() < WINDOW_FEWEST_SAMPLES {
             return None;
         }
-        let regressor = self.regressor(run, &samples)?;
+        let mut regressor = regressor_with_friction(self.model, &PickedStates::new(run, &samples))?;
         let mut picked = DMatrix::zeros(samples.len(), forces.len());
         // The filter also depends on samples outside the window.
         let from = start.saturating_sub(BEYOND * every);
@@ -446,244 +543,20 @@ impl SmootherSearch<'_> {
             for (i, sample) in samples.iter().enumerate() {
                 picked[(i, d)] = smooth[*sample - from];
             }
+            // Both sides of an equation are zero where the drive sticks.
+            let stuck = self
+                .sticks
+                .is_stuck(recording, d, samples.iter().map(|sample| run.time[*sample]));
+            for i in (0..samples.len()).filter(|i| stuck[*i]) {
+                picked[(i, d)] = 0.0;
+                regressor.row_mut(i * forces.len() + d).fill(0.0);
+            }
         }
         Some(WindowSamples {
             regressor,
             forces: picked,
         })
     }
-
-    /// The model's regressor at given samples, with friction and an offset of every drive added; one row per sample
-    /// and drive.
-    fn regressor(&self, run: &PreparedRun, samples: &[usize]) -> Option<DMatrix<f64>> {
-        let pick = |columns: &[Vec<f64>]| -> Vec<Vec<f64>> {
-            let pick = |column: &Vec<f64>| samples.iter().map(|k| column[*k]).collect();
-            columns.iter().map(pick).collect()
-        };
-        let states = [&run.q, &run.qd, &run.qdd].map(|columns| pick(columns));
-        let load = pick(run.force.as_deref().unwrap_or(&[]));
-        let states = MotionStates {
-            q: states[0].iter().map(Vec::as_slice).collect(),
-            qd: states[1].iter().map(Vec::as_slice).collect(),
-            qdd: states[2].iter().map(Vec::as_slice).collect(),
-            load: load.iter().map(Vec::as_slice).collect(),
-        };
-        let evaluator = ModelEvaluator::new(&self.model.derivation);
-        let regressor = evaluator.regressor(&states).ok()?;
-        let n = self.model.drives().len();
-        let rates = evaluator.drive_motion(&states).ok()?;
-        let rates = rates.get(n..2 * n)?;
-        let width = regressor.ncols();
-        // Three more columns for each drive: rate, its sign, and a constant.
-        let mut more = regressor.resize_horizontally(width + 3 * n, 0.0);
-        for (d, rate) in rates.iter().enumerate() {
-            for (i, rate) in rate.iter().enumerate() {
-                let sign = if *rate == 0.0 { 0.0 } else { rate.signum() };
-                for (k, value) in [*rate, sign, 1.0].into_iter().enumerate() {
-                    more[(i * n + d, width + 3 * d + k)] = value;
-                }
-            }
-        }
-        more.iter().all(|x| x.is_finite()).then_some(more)
-    }
-}
-
-/// An interval of time, s.
-struct TimeWindow {
-    /// First time.
-    from: f64,
-    /// Last time.
-    to: f64,
-}
-
-/// Rows of the regressor, one per sample and drive, and forces, one row per sample and one column per drive.
-struct WindowSamples {
-    /// Row `sample * n_drives + drive`, with the columns of friction and offset behind those of the model.
-    regressor: DMatrix<f64>,
-    /// `[sample, drive]`.
-    forces: DMatrix<f64>,
-}
-
-impl WindowSamples {
-    /// The same rows after a low-pass, Hz; `None` if there are too few samples. `rate` is that of the rows, Hz.
-    fn low_passed(&self, passed: f64, rate: f64) -> Option<Self> {
-        let mut filtered = Self {
-            regressor: self.regressor.clone(),
-            forces: self.forces.clone(),
-        };
-        if passed >= 0.45 * rate {
-            return Some(filtered);
-        }
-        let low_pass = LowPass::butterworth(4, passed, rate).ok()?;
-        let (n, drives) = self.forces.shape();
-        for d in 0..drives {
-            let force: Vec<f64> = self.forces.column(d).iter().copied().collect();
-            let force = low_pass.zero_phase(&force).ok()?;
-            filtered.forces.column_mut(d).copy_from_slice(&force);
-            for mut column in filtered.regressor.column_iter_mut() {
-                let values: Vec<f64> = (0..n).map(|i| column[i * drives + d]).collect();
-                if values.iter().all(|x| *x == 0.0) {
-                    continue;
-                }
-                for (i, value) in low_pass.zero_phase(&values).ok()?.into_iter().enumerate() {
-                    column[i * drives + d] = value;
-                }
-            }
-        }
-        Some(filtered)
-    }
-}
-
-/// Inner products of measured force and model force in one octave of one drive.
-#[derive(Clone, Default)]
-struct OctavePower {
-    /// Sum of squares of the measured force.
-    measured: f64,
-    /// Inner product of both forces.
-    product: f64,
-    /// Sum of squares of the model force.
-    model: f64,
-}
-
-impl OctavePower {
-    /// Adds samples of both forces.
-    fn add(&mut self, measured: &[f64], model: &[f64]) {
-        for (y, m) in measured.iter().zip(model) {
-            self.measured += y * y;
-            self.product += y * m;
-            self.model += m * m;
-        }
-    }
-
-    /// Residual power of the measured force. Where the model overestimates an octave, its force may be damped, as a
-    /// filter does above the band of the motion: noise there costs only what it hides.
-    fn residual_power(&self, may_be_damped: bool) -> f64 {
-        let scale = if may_be_damped && self.model > 0.0 {
-            (self.product / self.model).clamp(0.0, 1.0)
-        } else {
-            1.0
-        };
-        self.measured - 2.0 * scale * self.product + scale * scale * self.model
-    }
-}
-
-/// Number of samples at both ends of `n` that a low-pass at `band`, Hz, distorts.
-fn margin(n: usize, rate: f64, band: f64) -> usize {
-    floor_to_count((DROPPED.0 * rate / band).min(DROPPED.1 * n as f64))
-}
-
-/// Sums over the rows of one fold, drive by drive.
-#[derive(Clone)]
-struct FoldSums {
-    drives: Vec<DriveNormalEquations>,
-}
-
-/// Normal equations of one drive.
-#[derive(Clone)]
-struct DriveNormalEquations {
-    /// Gram matrix of the columns, lower triangle.
-    normal: DMatrix<f64>,
-    /// Inner products of columns and force.
-    right: DVector<f64>,
-    /// Sum of squares of the force.
-    size: f64,
-    /// Number of rows.
-    rows: usize,
-}
-
-impl FoldSums {
-    /// Sums without rows.
-    fn new(drives: usize, width: usize) -> Self {
-        let products = DriveNormalEquations {
-            normal: DMatrix::zeros(width, width),
-            right: DVector::zeros(width),
-            size: 0.0,
-            rows: 0,
-        };
-        Self {
-            drives: vec![products; drives],
-        }
-    }
-
-    /// Adds the rows of all drives at a sample.
-    fn add(&mut self, samples: &WindowSamples, i: usize) {
-        let drives = self.drives.len();
-        for (d, one) in self.drives.iter_mut().enumerate() {
-            let row = samples.regressor.row(i * drives + d).transpose();
-            let force = samples.forces[(i, d)];
-            one.normal.syger(1.0, &row, &row, 1.0);
-            one.right.axpy(force, &row, 1.0);
-            one.size += force * force;
-            one.rows += 1;
-        }
-    }
-}
-
-/// For each fold the values that fit the others; `None` if there are too few rows, or a force is zero.
-fn fit_folds(folds: &[FoldSums]) -> Option<Vec<DVector<f64>>> {
-    let n = folds.first()?.drives.len();
-    let width = folds[0].drives[0].right.len();
-    let total = |d: usize| -> f64 { folds.iter().map(|fold| fold.drives[d].size).sum() };
-    let sizes: Vec<f64> = (0..n).map(total).collect();
-    let rows: usize = folds.iter().map(|fold| fold.drives[0].rows).sum();
-    if rows * n < SMOOTHING_ROWS_PER_COLUMN * width || sizes.iter().any(|size| *size <= 0.0) {
-        return None;
-    }
-    // All drives have equal relative weights first, then weights from their residuals.
-    let mut left = sizes.clone();
-    let mut values = Vec::new();
-    for _ in 0..2 {
-        let weights: Vec<f64> = (left.iter().zip(&sizes))
-            .map(|(left, size)| rows as f64 / left.max(ROUNDING * ROUNDING * size))
-            .collect();
-        left = vec![0.0; n];
-        values.clear();
-        // All folds except the one that is held out.
-        for (out, judged) in folds.iter().enumerate() {
-            let mut normal = DMatrix::zeros(width, width);
-            let mut right = DVector::zeros(width);
-            for (_, fold) in folds.iter().enumerate().filter(|(k, _)| *k != out) {
-                for (one, weight) in fold.drives.iter().zip(&weights) {
-                    normal += &one.normal * *weight;
-                    right += &one.right * *weight;
-                }
-            }
-            let found = solve_scaled(&normal, &right)?;
-            // The sum of squares of the residual follows from the sums of the fold.
-            for (left, one) in left.iter_mut().zip(&judged.drives) {
-                let explained = 2.0 * one.right.dot(&found) - (symmetric(&one.normal) * &found).dot(&found);
-                *left += (one.size - explained).max(0.0);
-            }
-            values.push(found);
-        }
-    }
-    Some(values)
-}
-
-/// Solves scaled normal equations with a small ridge, since columns may be equal.
-fn solve_scaled(normal: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
-    let mut normal = symmetric(normal);
-    let n = right.len();
-    let scale: Vec<f64> = (0..n)
-        .map(|i| normal[(i, i)].max(0.0).sqrt())
-        .map(|norm| if norm > 0.0 { norm.recip() } else { 0.0 })
-        .collect();
-    for i in 0..n {
-        for j in 0..n {
-            normal[(i, j)] *= scale[i] * scale[j];
-        }
-        normal[(i, i)] += 1e-9;
-    }
-    let scale = DVector::from_vec(scale);
-    let scaled = right.component_mul(&scale);
-    Some(normal.cholesky()?.solve(&scaled).component_mul(&scale))
-}
-
-/// The symmetric matrix of a lower triangle.
-fn symmetric(lower: &DMatrix<f64>) -> DMatrix<f64> {
-    let mut whole = lower.clone();
-    whole.fill_upper_triangle_with_lower_triangle();
-    whole
 }
 
 /// Duration of a run, s.

@@ -4,10 +4,14 @@
 mod choice;
 mod columns;
 mod contents;
+mod faults;
 pub(crate) mod free;
+mod friction_rows;
+mod held_out;
 mod leverage;
 mod options;
 mod smoother;
+mod stick;
 mod thresholds;
 
 use std::path::Path;
@@ -16,23 +20,23 @@ use std::sync::Arc;
 use modelmill_boundary::files::MemoryFiles;
 use modelmill_boundary::message;
 use modelmill_boundary::text::{Message, OptionName, OptionSetting, Remedy};
-use modelmill_identify::diagnose::{Disturbance, EstimatedQuantity};
-use modelmill_identify::{PositionFault, RecordingFiles, RecordingNote, SignalRecording as Raw};
+use modelmill_identify::diagnose::Disturbance;
+use modelmill_identify::{RecordingFiles, RecordingNote, SignalRecording as Raw};
 
 use crate::audit;
 use crate::error::{Error, Outcome};
 use crate::host::kinds_of_files;
 use crate::model::Model;
 use crate::segment::{RecordingSegment, variances};
-use crate::text::table::significant;
 
 use columns::read_options;
 use leverage::DriveLeverage;
+use stick::StickPhases;
 
 pub use contents::{ColumnInfo, RecordingContents, TableInfo};
 pub use modelmill_identify::{DerivativeSource, MAX_FILTER_ORDER, has_recording_extension};
 pub use modelmill_identify::{PreparedRun, SmoothingMethod, StatePreparation};
-pub use options::RecordingOptions;
+pub use options::{RecordingOptions, StandstillRule};
 
 /// Reads a recording with the columns that a model needs, completes free bodies and repairs faults of sensors.
 ///
@@ -55,6 +59,10 @@ fn read_raw(model: &Model, file: &RecordingFiles, reading: &RecordingOptions) ->
         reading.skip_bad_samples,
         &|drive, sample| leverage.is_peak(drive, sample),
     );
+    // Rates of the file are used by default, so they must belong to the same time as the positions.
+    if reading.preparation.source == DerivativeSource::RecordedFirst && !reading.preparation.unexamined {
+        raw.set_late_rates_aside(&model.active_coordinates());
+    }
     Ok(raw)
 }
 
@@ -79,7 +87,9 @@ pub(crate) fn read_as_recorded(
 ) -> Outcome<Vec<RecordingSegment>> {
     let file = RecordingFiles::open(model.host().files(), &[path])?;
     let raw = read_raw(model, &file, reading)?;
-    let (mut reading, note) = resolve_reading(model, &raw, reading)?;
+    let sticks = stick_phases(model, &[&raw], reading)?;
+    let resolved = resolve_readings(model, &[&raw], reading, &sticks)?.pop();
+    let (mut reading, note) = resolved.unwrap_or_else(|| (reading.clone(), None));
     if reading.preparation.chosen {
         // Decimation was chosen for fits; forces are wanted at every sample.
         reading.preparation.decimate = 1;
@@ -96,20 +106,49 @@ pub(crate) fn read_as_recorded(
     Ok(data)
 }
 
-/// The reading options with all open choices of the preparation made, and a note on the choice.
-fn resolve_reading(
+/// The stick phases of recordings of one machine, from states that are prepared with the options of the user; none in
+/// recordings without forces, or if states cannot be prepared, which is reported where they are needed.
+fn stick_phases(model: &Model, raws: &[&Raw], reading: &RecordingOptions) -> Outcome<StickPhases> {
+    let drives = model.drives();
+    if reading.preparation.unexamined || drives.is_empty() || model.base.is_empty() {
+        return Ok(StickPhases::default());
+    }
+    let preparation = StatePreparation {
+        unexamined: true,
+        ..reading.preparation.clone()
+    };
+    Ok(model.host().run_job("finding where drives stick", 0, |_| {
+        let runs = |raw: &&Raw| {
+            let has_forces = drives.iter().all(|drive| raw.has_column(drive));
+            let runs = has_forces.then(|| free::runs(model, raw, &preparation).ok());
+            runs.flatten().unwrap_or_default()
+        };
+        let runs: Vec<Vec<PreparedRun>> = raws.iter().map(runs).collect();
+        StickPhases::find(model, &runs, reading.standstill)
+    })?)
+}
+
+/// The reading options of each recording with all open choices of the preparation made, each with a note on the choice
+/// at the first recording that it concerns.
+fn resolve_readings(
     model: &Model,
-    raw: &Raw,
+    raws: &[&Raw],
     reading: &RecordingOptions,
-) -> Outcome<(RecordingOptions, Option<RecordingNote>)> {
-    let says = format!("choosing how {} is smoothed", raw.file());
+    sticks: &StickPhases,
+) -> Outcome<Vec<(RecordingOptions, Option<RecordingNote>)>> {
+    let files: Vec<&str> = raws.iter().map(|raw| raw.file()).collect();
+    let says = format!("choosing how {} is smoothed", files.join(", "));
     let chosen = model
         .host()
-        .run_job(&says, 0, |_| choice::choose_preparation(model, raw, reading))??;
-    Ok(match chosen {
-        Some((reading, note)) => (reading, Some(note)),
-        None => (reading.clone(), None),
-    })
+        .run_job(&says, 0, |_| choice::choose_preparation(model, raws, reading, sticks))??;
+    let mut all = vec![(reading.clone(), None); raws.len()];
+    for choice in chosen {
+        let mut note = Some(choice.note);
+        for (index, reading) in choice.readings {
+            all[index] = (reading, note.take());
+        }
+    }
+    Ok(all)
 }
 
 /// Assigns to every force the states at the time at which it acted, by the model's delay, s.
@@ -181,12 +220,18 @@ fn prepare(model: &Model, recording: &Raw, args: &RecordingOptions, delay: f64) 
     // Faults of positions count as disturbances of every segment.
     let faults: Vec<Disturbance> = if is_examined {
         (recording.position_faults(&model.active_coordinates()).into_iter())
-            .map(|fault| position_fault(model, recording.file(), &fault))
+            .map(|fault| faults::position_fault(model, recording.file(), &fault))
+            .chain(faults::late_rates_fault(recording))
             .collect()
     } else {
         Vec::new()
     };
-    let with_variance = runs.into_iter().map(|run| {
+    let with_variance = runs.into_iter().map(|mut run| {
+        let mut faults = faults.clone();
+        if is_examined && let Some((fault, note)) = faults::dead_band_fault(model, &run) {
+            run.notes.push(note);
+            faults.push(fault);
+        }
         let variance = variances::recorded_variances(recording, &run, &model.drives())?;
         Ok(RecordingSegment {
             run,
@@ -194,56 +239,10 @@ fn prepare(model: &Model, recording: &Raw, args: &RecordingOptions, delay: f64) 
             weights: None,
             load: None,
             maps_from_degrees: maps_from_degrees.clone(),
-            faults: faults.clone(),
+            faults,
         })
     });
     with_variance.collect()
-}
-
-/// A fault of the positions as a disturbance for the diagnosis.
-fn position_fault(model: &Model, file: &str, fault: &PositionFault) -> Disturbance {
-    // Both faults have one number with a unit.
-    let (kind, at, name, value, unit, says) = match fault {
-        PositionFault::Jitter { time } => (
-            "time_jitter",
-            "t",
-            "jitter",
-            *time,
-            "s",
-            format!(
-                "the time stamps of {file} jitter: the position error is proportional to the rate, with the same time error for all coordinates, \
-                 {} ms rms",
-                significant(1e3 * time, 2)
-            ),
-        ),
-        PositionFault::Backlash { coordinate, width } => {
-            let is_angle = |(name, is): &(String, bool)| name == coordinate && *is;
-            let unit = if model.active_coordinate_types().iter().any(is_angle) {
-                "rad"
-            } else {
-                "m"
-            };
-            (
-                "backlash",
-                coordinate.as_str(),
-                "width",
-                *width,
-                unit,
-                format!(
-                    "backlash between the encoder of {coordinate} and its load: in {file} the reading jumps back and forth by {} {unit}",
-                    significant(*width, 2)
-                ),
-            )
-        }
-    };
-    Disturbance {
-        kind: kind.to_owned(),
-        at: vec![at.to_owned()],
-        estimates: vec![EstimatedQuantity::new(name, value, unit)],
-        recordings: vec![file.to_owned()],
-        interval: None,
-        description: Some(says),
-    }
 }
 
 /// Warns about filter options that have no effect because all derivatives are recorded.
@@ -309,6 +308,17 @@ pub struct PreparedRecording {
     raw: Arc<Raw>,
     /// The options with which it was prepared, including automatic choices.
     reading: RecordingOptions,
+    /// Intervals in which drives stick.
+    sticks: RecordingSticks,
+}
+
+/// The stick phases of one of several recordings.
+#[derive(Clone, Default)]
+struct RecordingSticks {
+    /// Those of all recordings.
+    all: Arc<StickPhases>,
+    /// Index of this recording.
+    index: usize,
 }
 
 impl Model {
@@ -343,12 +353,46 @@ impl Model {
     /// As [`Model::recording`], for one recording that consists of several files. Their columns are joined on time: the
     /// file with the lowest sampling rate determines the sample times, and the others are interpolated to them.
     pub fn recording_of(&self, paths: &[&Path], reading: &RecordingOptions) -> Outcome<PreparedRecording> {
+        PreparedRecording::new(self, self.read_raw_files(paths, reading)?, reading)
+    }
+
+    /// As [`Model::recording_of`], for several recordings of one machine, such as those of a fit and of its validation.
+    /// Cut-off, smoothing and decimation are chosen for all of them together, and drives stick at the same rate in all.
+    ///
+    /// Each recording has its own result, since some of them may be unreadable.
+    pub fn prepare_recordings(
+        &self,
+        runs: &[Vec<&Path>],
+        reading: &RecordingOptions,
+    ) -> Vec<Outcome<PreparedRecording>> {
+        // All files are read first, since each of them matters for the choice.
+        let mut raws = Vec::new();
+        let mut results: Vec<Option<Error>> = Vec::new();
+        for paths in runs {
+            match self.read_raw_files(paths, reading) {
+                Ok(raw) => {
+                    raws.push(raw);
+                    results.push(None);
+                }
+                Err(error) => results.push(Some(error)),
+            }
+        }
+        let mut prepared = PreparedRecording::new_together(self, raws, reading).into_iter();
+        let next = |error: Option<Error>| match error {
+            Some(error) => Some(Err(error)),
+            None => prepared.next(),
+        };
+        results.into_iter().filter_map(next).collect()
+    }
+
+    /// Reads the files of one recording.
+    fn read_raw_files(&self, paths: &[&Path], reading: &RecordingOptions) -> Outcome<Raw> {
         let opened = RecordingFiles::open(self.host().files(), paths);
         let read = opened
             .map_err(Error::from)
             .and_then(|file| read_raw(self, &file, reading));
         // A file of another kind, such as a model file, gets a message that names the kind.
-        let raw = read.map_err(|failure| {
+        read.map_err(|failure| {
             let kinds = paths.iter().map(|path| (path, kinds_of_files::file_kind(self.host(), path)));
             let mut others = kinds.filter_map(|(path, kind)| Some((path.display(), kind?)));
             others.next().map_or(failure, |(path, kind)| {
@@ -357,8 +401,7 @@ impl Model {
                      `t` and one for each coordinate and drive"
                 ))
             })
-        })?;
-        PreparedRecording::new(self, raw, reading)
+        })
     }
 
     /// As [`Model::recording`], for named columns in memory, such as those of a data frame. NaN marks
@@ -395,24 +438,63 @@ impl Model {
 impl PreparedRecording {
     /// Prepares a raw recording; unless it is `unexamined`, open choices are made and the audit runs.
     fn new(model: &Model, raw: Raw, reading: &RecordingOptions) -> Outcome<Self> {
-        let raw = Arc::new(raw);
-        if reading.preparation.unexamined {
-            return Ok(Self {
-                segments: prepare_segments(model, &raw, reading)?,
-                raw,
-                reading: reading.clone(),
-            });
+        let file = raw.file().to_owned();
+        let only = Self::new_together(model, vec![raw], reading).pop();
+        only.unwrap_or_else(|| Err(Error::input(format!("{file} cannot be prepared"))))
+    }
+
+    /// Prepares recordings of one machine, with choices that are common to all of them.
+    fn new_together(model: &Model, raws: Vec<Raw>, reading: &RecordingOptions) -> Vec<Outcome<Self>> {
+        let all: Vec<&Raw> = raws.iter().collect();
+        let chosen = if reading.preparation.unexamined {
+            Ok((StickPhases::default(), vec![(reading.clone(), None); raws.len()]))
+        } else {
+            stick_phases(model, &all, reading).and_then(|sticks| {
+                let readings = resolve_readings(model, &all, reading, &sticks)?;
+                Ok((sticks, readings))
+            })
+        };
+        match chosen {
+            Ok((sticks, readings)) => {
+                let sticks = Arc::new(sticks);
+                let each = raws.into_iter().zip(readings).enumerate();
+                each.map(|(index, (raw, (reading, note)))| {
+                    let sticks = RecordingSticks {
+                        all: sticks.clone(),
+                        index,
+                    };
+                    Self::with_choices(model, raw, reading, note, sticks)
+                })
+                .collect()
+            }
+            // A fault of one recording belongs to it alone, so that each is prepared by itself.
+            Err(error) if raws.len() < 2 => vec![Err(error)],
+            Err(_) => raws.into_iter().map(|raw| Self::new(model, raw, reading)).collect(),
         }
-        let (reading, note) = resolve_reading(model, &raw, reading)?;
+    }
+
+    /// Prepares a raw recording with all choices made.
+    fn with_choices(
+        model: &Model,
+        raw: Raw,
+        reading: RecordingOptions,
+        note: Option<RecordingNote>,
+        sticks: RecordingSticks,
+    ) -> Outcome<Self> {
         let mut stretches = prepare_segments(model, &raw, &reading)?;
         if let (Some(note), Some(first)) = (note, stretches.first_mut()) {
             first.note(model, note);
         }
-        audit::examine(model, &mut stretches, reading.leave_out_events);
+        if !reading.preparation.unexamined {
+            audit::examine(model, &mut stretches, reading.leave_out_events);
+            // Events are searched in all forces, so that a push during standstill is found.
+            sticks.all.leave_out(model, sticks.index, &mut stretches);
+        }
         Ok(Self {
             segments: stretches,
-            raw,
+            raw: Arc::new(raw),
             reading,
+            sticks,
         })
     }
 
@@ -422,6 +504,7 @@ impl PreparedRecording {
             segments: stretches,
             raw: self.raw.clone(),
             reading: self.reading.clone(),
+            sticks: self.sticks.clone(),
         }
     }
 
@@ -447,6 +530,7 @@ impl PreparedRecording {
         let faulty = self.raw.restore_sensor_faults()?;
         let delay = model.derivation.mechanism.force_delay;
         let mut stretches = prepare(model, &faulty, &self.reading, delay).ok()?;
+        self.sticks.all.mark(self.sticks.index, &mut stretches);
         // Weights of other exclusions are kept.
         for (faulty, sound) in stretches.iter_mut().zip(&self.segments) {
             if faulty.samples() == sound.samples() {
@@ -459,7 +543,9 @@ impl PreparedRecording {
     /// The segments prepared again for another model of the same machine, which may have another delay of the force
     /// signal.
     pub(crate) fn prepare_for(&self, model: &Model) -> Outcome<Vec<RecordingSegment>> {
-        prepare_segments(model, &self.raw, &self.reading)
+        let mut stretches = prepare_segments(model, &self.raw, &self.reading)?;
+        self.sticks.all.mark(self.sticks.index, &mut stretches);
+        Ok(stretches)
     }
 }
 

@@ -7,5 +7,6 @@ mod hanging;
 mod made;
 mod missing;
 mod runs;
+mod stick;
 mod undriven;
 mod variants;
