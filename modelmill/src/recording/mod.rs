@@ -117,7 +117,7 @@ fn stick_phases(model: &Model, raws: &[&Raw], reading: &RecordingOptions) -> Out
         unexamined: true,
         ..reading.preparation.clone()
     };
-    Ok(model.host().run_job("finding where drives stick", 0, |_| {
+    model.host().run_job("finding where drives stick", 0, |_| {
         let runs = |raw: &&Raw| {
             let has_forces = drives.iter().all(|drive| raw.has_column(drive));
             let runs = has_forces.then(|| free::runs(model, raw, &preparation).ok());
@@ -125,7 +125,7 @@ fn stick_phases(model: &Model, raws: &[&Raw], reading: &RecordingOptions) -> Out
         };
         let runs: Vec<Vec<PreparedRun>> = raws.iter().map(runs).collect();
         StickPhases::find(model, &runs, reading.standstill)
-    })?)
+    })
 }
 
 /// The reading options of each recording with all open choices of the preparation made, each with a note on the choice

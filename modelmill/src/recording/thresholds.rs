@@ -65,9 +65,9 @@ pub(super) const STICK_MOST_SHARE: f64 = 0.99;
 /// Half width by which smoothing blurs a reversal, periods of its cut-off: the quarter of a period. By judgement.
 pub(super) const STICK_BLUR_PERIODS: f64 = 0.25;
 
-/// Fewest decimated samples that a decimation keeps of a recording. A diagnosis needs 60; chosen so that one in 56 of
-/// 14000 samples is kept at least. By judgement.
-pub(super) const DECIMATION_FEWEST_KEPT: usize = 250;
+/// Fewest decimated samples that a decimation keeps of a recording. A diagnosis needs 60 samples at least; 250 were too
+/// few for 16 effects of a six-axis arm like ur5-mujoco, in which drives stick for up to a fifth of the time.
+pub(super) const DECIMATION_FEWEST_KEPT: usize = 400;
 
 /// Lowest ratio of the cut-off of positions to the passband of the decimation (1). Butterworth's filter of order 4, run
 /// both ways, passes 99.98 % at a third of its cut-off; with a ratio of 0.7 drive inertias were 4 % high on arms like

@@ -145,7 +145,7 @@ fn an_axis_that_sticks_is_identified_as_if_it_did_not() {
             );
             // Friction of the full size at every sample is wrong, and other parameters pay for it.
             let kept = read(&model, &columns, noise, StandstillRule::KeepAll);
-            assert_eq!(left_out(&kept), 0.0);
+            assert!(left_out(&kept) <= 0.0);
             let worse = errors(&model, &kept);
             assert!(
                 worse.iter().any(|error| error.abs() > 2.0 * most),
@@ -161,6 +161,6 @@ fn friction_by_sign_leaves_nothing_out() {
     for seed in 1..4 {
         let columns = simulate(Friction::BySign, seed);
         let recording = read(&model, &columns, false, StandstillRule::Automatic);
-        assert_eq!(left_out(&recording), 0.0, "{seed}");
+        assert!(left_out(&recording) <= 0.0, "{seed}");
     }
 }
