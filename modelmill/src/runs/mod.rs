@@ -40,7 +40,7 @@ pub use per_run::{KnownLoad, PerRunSelection, RunValue, SharedFit};
 pub use points::{ChangePoint, ParameterStep};
 use rows::{MeasuredMoments, RunRows, WhitenedRun};
 pub use sums::{ReferenceFit, RunSums};
-use thresholds::{CHANGE_LEAST_FORCE_SHARE, PARAMETER_CHANGE_SIGMAS, PUSH_MARGIN_SHARE, SHORTEST_PUSH_S};
+use thresholds::{CHANGE_LEAST_FORCE_SHARE, PARAMETER_CHANGE_SIGMAS, PUSH_LONGEST_GAP_S, PUSH_MARGIN_SHARE};
 
 /// A fitted value with its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -275,7 +275,8 @@ fn merged_contact_events(events: Vec<ContactEvent>, stretch: &RecordingSegment) 
             continue;
         }
         match all.last_mut() {
-            Some(last) if from - last.to < SHORTEST_PUSH_S => {
+            Some(last) if from - last.to < PUSH_LONGEST_GAP_S => {
+                last.is_confirmed |= event.is_confirmed;
                 last.to = to;
                 for (d, largest, usual) in event.drives {
                     match last.drives.iter_mut().find(|(other, ..)| *other == d) {
@@ -329,7 +330,7 @@ impl<'a> RunAnalyser<'a> {
         let mut stretches = recording.segments.clone();
         let mut told = Vec::new();
         for stretch in &mut stretches {
-            let found = events::events(self.model, stretch).unwrap_or_default();
+            let found = events::events(self.model, stretch);
             let found = merged_contact_events(found, stretch);
             // The start and the end of a push hardly exceed the usual residual, so that its interval is widened.
             let wide = found.iter().map(|event| {
@@ -338,11 +339,12 @@ impl<'a> RunAnalyser<'a> {
                     from: event.from - room,
                     to: event.to + room,
                     drives: Vec::new(),
+                    is_confirmed: event.is_confirmed,
                 }
             });
             events::leave_out_events(stretch, &wide.collect::<Vec<_>>());
-            // Short events are excluded, but not reported.
-            let lasting = found.iter().filter(|event| event.to - event.from >= SHORTEST_PUSH_S);
+            // Events that are only possible are excluded, but not reported.
+            let lasting = found.iter().filter(|event| event.is_confirmed);
             told.extend(lasting.map(|event| changes::event(self.model, event)));
         }
         let rows = RunRows::new(self.model, &stretches, self.payloads, values)?;
