@@ -107,8 +107,8 @@ pub(crate) struct PointPairPath<'a> {
 }
 
 impl PointPairPath<'_> {
-    /// Rotations from the common frame to each frame along the paths: none for the common frame itself, then those after
-    /// each rotation on the way to either point.
+    /// Rotations from the common frame to each frame along the paths: none for the common frame itself, then those
+    /// after each rotation on the way to either point.
     pub(crate) fn frames(&self, tree: &KinematicTree) -> Vec<Vec<AxisRotation>> {
         let mut frames = vec![Vec::new()];
         for path in self.paths {

@@ -1,4 +1,4 @@
-//! Thresholds of the audit: the numbers that decide which faults of a recording are reported. Each states what it bounds,
+//! Thresholds of the audit: numbers that decide which faults of a recording are reported. Each states what it bounds,
 //! its unit, and how it was chosen. Numbers that only set an accuracy or a grid stay where they are used.
 
 use std::f64::consts::PI;

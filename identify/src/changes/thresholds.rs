@@ -1,4 +1,4 @@
-//! Thresholds of changes between runs: the numbers that decide what is reported as a change. Each states what it bounds,
+//! Thresholds of changes between runs: numbers that decide what is reported as a change. Each states what it bounds,
 //! its unit, and how it was chosen. Numbers that only set an accuracy stay where they are used.
 
 /// A column is dependent if its squared residual after a fit of the others is below this share of it (1). By judgement.

@@ -30,7 +30,8 @@ pub enum RejectionReason {
 }
 
 impl RejectionReason {
-    /// The value of `refused` in the JSON of `diagnose`. These values are fixed, because programs of users compare them.
+    /// The value of `refused` in the JSON of `diagnose`. These values are fixed, because programs of users compare
+    /// them.
     pub fn name(self) -> &'static str {
         match self {
             Self::WrongSign => "sign",

@@ -1,4 +1,4 @@
-//! Thresholds of the estimation: the numbers that decide what is reported of parameters. Each states what it bounds, its
+//! Thresholds of the estimation: numbers that decide what is reported of parameters. Each states what it bounds, its
 //! unit, and how it was chosen. Numbers that only set an accuracy stay where they are used.
 
 /// Singular values of the column-scaled regressor below this fraction of the largest one (1) count as zero. By

@@ -1,6 +1,6 @@
 //! Thresholds of the figures: the numbers that decide which samples count and which regions of large error are
-//! reported. Each states what it bounds, its unit, and how it was chosen. Numbers that only set an accuracy, a grid or a
-//! size stay where they are used.
+//! reported. Each states what it bounds, its unit, and how it was chosen. Numbers that only set an accuracy, a grid or
+//! a size stay where they are used.
 
 /// Share of the samples that is dropped at each end of filtered forces (1), where the filter has transients. By
 /// judgement.

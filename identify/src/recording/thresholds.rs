@@ -1,4 +1,4 @@
-//! Thresholds of recordings: the numbers that decide what counts as a number, a gap, a spike or a jump. Each states what
+//! Thresholds of recordings: numbers that decide what counts as a number, a gap, a spike or a jump. Each states what
 //! it bounds, its unit, and how it was chosen. Limits of memory and of the formats stay where they are used.
 
 /// Largest magnitude of a number, unit of the column; a larger one counts as not finite. No measured quantity in SI

@@ -1,6 +1,6 @@
 //! Thresholds of the identification: the numbers that decide what is reported of an estimate, and which instruments are
-//! refused. Each states what it bounds, its unit, and how it was chosen. Numbers that only set an accuracy or a grid stay
-//! where they are used.
+//! refused. Each states what it bounds, its unit, and how it was chosen. Numbers that only set an accuracy or a grid
+//! stay where they are used.
 
 /// Instruments are weak if their smallest canonical correlation with the regressor (1) is below this value. By
 /// judgement.

@@ -136,7 +136,7 @@ impl RunsComparison {
         })
     }
 
-    /// The comparison as text: lasting changes, the fit of all runs at once, and each run.
+    /// The comparison as text: permanent changes, the fit of all runs at once, and each run.
     pub fn text(&self, style: TerminalStyle, spelling: &dyn RemedySpelling) -> String {
         let [first, later @ ..] = &self.runs[..] else {
             return String::new();

@@ -11,8 +11,8 @@ use serde_json::Value;
 
 /// The compilations of `cargo test --workspace`, none of which is run.
 ///
-/// `cargo tree` is stable and prints features, but neither profiles nor compilations. The build plan is a preview feature;
-/// `RUSTC_BOOTSTRAP` makes the stable program print it. Its format has been version 1 since 2020.
+/// `cargo tree` is stable and prints features, but neither profiles nor compilations. The build plan is a preview
+/// feature; `RUSTC_BOOTSTRAP` makes the stable program print it. Its format has been version 1 since 2020.
 fn planned_units() -> Vec<Value> {
     let plan = Command::new(env!("CARGO"))
         .args(["test", "--workspace", "--locked", "--offline"])
