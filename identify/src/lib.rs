@@ -9,8 +9,8 @@
 //!    between gaps in time. The caller evaluates its regressor along it, rows interleaved per sample
 //!    (`row = sample * n_channels + channel`), and applies [`decimate_table`] to regressor and force if the run
 //!    requires it.
-//! 3. [`SignalRecording::suspicious_columns`], [`SignalRecording::position_faults`] and [`ForceAudit`] - what is
-//!    likely wrong with them.
+//! 3. [`SignalRecording::suspicious_columns`] and [`SignalRecording::position_faults`] - what is likely wrong with
+//!    them.
 //! 4. [`estimate`] - eq. (12) from a stream of rows ([`LeastSquares`]), weighted, robust, with
 //!    instruments or nominal values, and the uncertainty of the result.
 //! 5. [`ErrorAccumulator`] and [`locate_errors`] - size and place of the model error; [`FitFile`] - the result as a
@@ -49,8 +49,7 @@ mod test_noise;
 mod words;
 
 pub use audit::{
-    ChannelRegressor, DelayAudit, DelayEstimate, ForceAudit, ForceDelays, PositionFault, RobustFit, WiringFault,
-    robust_fit,
+    ChannelRegressor, DeadBand, DelayAudit, DelayEstimate, ForceDelays, PositionFault, RobustFit, robust_fit,
 };
 pub use estimate::{
     LeastSquares, LeastSquaresError, NullDirection, ParameterUncertainty, RANK_TOLERANCE, RFactor, RegressionSolution,
@@ -68,7 +67,7 @@ pub use motion::{
 };
 pub use recording::{
     ColumnInfo, ComputedColumn, NonFinitePolicy, NoteSeverity, ReadOptions, RecordingError, RecordingFault,
-    RecordingFile, RecordingFiles, RecordingNote, SignalRecording, TableInfo, display_name_of_bytes,
+    RecordingFile, RecordingFiles, RecordingNote, SignalRecording, TableInfo, UnwrappedAngle, display_name_of_bytes,
     has_recording_extension, sample_place_word,
 };
 pub use signal::{FilterError, LowPass, MAX_FILTER_ORDER};

@@ -3,7 +3,8 @@
 //! A text such as `"q_meas_m"`, `"qm5/45"`, `"(qm6 - qm5)/32 - pi/2"` or `"pos1 [deg]"` and the column names of a
 //! recording go in. An affine sum of its columns in SI units comes out.
 //!
-//! A text that equals the name of a column is that column, even if it could also be an expression.
+//! A text that equals the name of a column is that column, even if it could also be an expression. A unit in the name of
+//! a column, as in `pos [deg]`, is the unit of its numbers, and the name may be written without it.
 //!
 //! Decision: this crate reads the sum and resolves it against each file, so that `modelmill-identify` gets numbers
 //! only.
@@ -12,6 +13,7 @@ use std::fmt;
 
 use num_traits::ToPrimitive;
 
+use crate::column_unit::{split_header_unit, unit_factor};
 use crate::diagnostic::{DiagnosticLog, SourceSpan};
 use crate::exact::ExactFunction;
 use crate::formula::{FormulaAst, FormulaAstKind};
@@ -92,9 +94,9 @@ const DEGREE: f64 = std::f64::consts::PI / 180.0;
 const TURN: f64 = std::f64::consts::TAU;
 
 /// Units of columns with their factors to SI; the SI unit comes first.
-fn units(quantity: ColumnQuantity) -> &'static [(&'static str, f64)] {
+pub(crate) fn units(quantity: ColumnQuantity) -> &'static [(&'static str, f64)] {
     match quantity {
-        ColumnQuantity::Time => &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("min", 60.0)],
+        ColumnQuantity::Time => &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("min", 60.0)],
         ColumnQuantity::Number => &[("1", 1.0)],
         ColumnQuantity::Angle(0) => &[("rad", 1.0), ("deg", DEGREE), ("mrad", 1e-3), ("rev", TURN)],
         ColumnQuantity::Angle(1) => &[("rad/s", 1.0), ("deg/s", DEGREE), ("rpm", TURN / 60.0), ("rev/s", TURN)],
@@ -177,24 +179,45 @@ pub fn read_column(
         offset: 0.0,
     };
     let has = |name: &str| names.iter().any(|other| other == name);
+    // The factor of the unit in the name of a column; a unit of another quantity leaves the numbers as they are.
+    let header_factor = |name: &str| {
+        let unit = split_header_unit(name).map(|(_, unit)| unit);
+        unit.and_then(|unit| unit_factor(unit, quantity)).unwrap_or(1.0)
+    };
     // The complete text comes first: a column may be called `pos [deg]`.
     if has(text) {
-        return Ok(single(text, 1.0));
+        return Ok(single(text, header_factor(text)));
     }
     let (body, unit) = split_unit(text);
-    let factor = match unit {
-        Some(unit) => factor_of(unit, quantity)?,
-        None => 1.0,
+    let stated = match unit {
+        Some(unit) => Some(factor_of(unit, quantity)?),
+        None => None,
     };
     if has(body) {
-        return Ok(single(body, factor));
+        return Ok(single(body, stated.unwrap_or(1.0)));
+    }
+    // Names without the unit behind them, where that is not ambiguous.
+    let bases = names_without_units(names);
+    let full_name = |name: &str| {
+        bases
+            .iter()
+            .find(|(base, _)| base == name)
+            .map(|(_, full)| full.as_str())
+    };
+    if let Some(full) = full_name(body) {
+        return Ok(single(full, stated.unwrap_or_else(|| header_factor(full))));
     }
     let missing = |column: &str| ColumnFault::Missing {
         column: column.to_owned(),
         nearest: suggest::nearest(column, names.iter().map(String::as_str)).map(str::to_owned),
     };
     // Names with dots cannot be parsed; they are replaced by names that can.
-    let (plain, stand_ins) = with_plain_names(body, names);
+    let known: Vec<String> = names
+        .iter()
+        .cloned()
+        .chain(bases.iter().map(|(base, _)| base.clone()))
+        .collect();
+    let (plain, stand_ins) = with_plain_names(body, &known);
     let span = SourceSpan {
         file: 0,
         start: 0,
@@ -218,10 +241,11 @@ pub fn read_column(
     // Names of columns take precedence over constants of the model.
     let sum = affine_value(&ast, &|name| {
         let stands_for = stand_ins.iter().find(|(stand_in, _)| stand_in == name);
-        if let Some((_, column)) = stands_for {
-            Some(AffineValue::column(column))
-        } else if has(name) {
+        let name = stands_for.map_or(name, |(_, column)| *column);
+        if has(name) {
             Some(AffineValue::column(name))
+        } else if let Some(full) = full_name(name) {
+            Some(AffineValue::column(full))
         } else {
             constants(name).map(AffineValue::number)
         }
@@ -237,14 +261,39 @@ pub fn read_column(
             says: format!("`{body}` contains no column of the recording"),
         });
     }
+    sum_in_si(sum, body, &|name| stated.unwrap_or_else(|| header_factor(name)))
+}
+
+/// A sum in SI units; `factor` converts a column of it. Units in the names hold for the number in the sum, too.
+fn sum_in_si(sum: AffineValue, body: &str, factor: &dyn Fn(&str) -> f64) -> Result<ColumnSum, ColumnFault> {
+    let factors: Vec<f64> = sum.terms.iter().map(|(name, _)| factor(name)).collect();
+    if sum.offset != 0.0 && factors.windows(2).any(|pair| pair[0].total_cmp(&pair[1]).is_ne()) {
+        return Err(ColumnFault::Malformed {
+            says: format!(
+                "the columns in `{body}` have different units, so the unit of the number in it is not clear; state the unit of \
+                 the sum behind it, such as `[deg]`"
+            ),
+        });
+    }
     Ok(ColumnSum {
-        terms: sum
-            .terms
-            .into_iter()
-            .map(|(name, value)| (name, factor * value))
+        offset: factors[0] * sum.offset,
+        terms: (sum.terms.into_iter().zip(factors))
+            .map(|((name, value), factor)| (name, factor * value))
             .collect(),
-        offset: factor * sum.offset,
     })
+}
+
+/// Names without the unit behind them, each with its full name; only those that belong to one column.
+fn names_without_units(names: &[String]) -> Vec<(String, String)> {
+    let split = |name: &String| split_header_unit(name).map(|(base, _)| base.to_owned());
+    let bases: Vec<Option<String>> = names.iter().map(split).collect();
+    let is_unique = |base: &String| {
+        let same = bases.iter().filter(|other| other.as_ref() == Some(base)).count();
+        same == 1 && !names.contains(base)
+    };
+    let pairs = bases.iter().zip(names);
+    let pairs = pairs.filter_map(|(base, full)| Some((base.clone()?, full.clone())));
+    pairs.filter(|(base, _)| is_unique(base)).collect()
 }
 
 /// Replaces names of columns with dots, such as `joint_states.position.elbow`, which no expression can contain.
@@ -311,8 +360,7 @@ fn split_unit(text: &str) -> (&str, Option<&str>) {
 /// The factor from a unit to SI; fails with the list of units that fit the quantity.
 fn factor_of(unit: &str, quantity: ColumnQuantity) -> Result<f64, ColumnFault> {
     let units = units(quantity);
-    let found = units.iter().find(|(name, _)| *name == unit);
-    found.map(|(_, factor)| *factor).ok_or_else(|| ColumnFault::Malformed {
+    unit_factor(unit, quantity).ok_or_else(|| ColumnFault::Malformed {
         says: format!(
             "the unit `{unit}` does not fit this quantity; expected one of {}",
             units
@@ -493,9 +541,37 @@ mod tests {
         check("2*(qm5 + 1) - qm5", &[("qm5", 1.0)], 2.0);
         check("pos [deg]", &[("pos", PI / 180.0)], 0.0);
         check("pos - 90 [deg]", &[("pos", PI / 180.0)], -PI / 2.0);
-        // The very name of a column is that column, and a unit may follow it.
-        check("pos 1 [deg]", &[("pos 1 [deg]", 1.0)], 0.0);
+        // The very name of a column is that column in the unit of its name, and a unit may follow it.
+        check("pos 1 [deg]", &[("pos 1 [deg]", PI / 180.0)], 0.0);
         check("pos 1 [deg] [deg]", &[("pos 1 [deg]", PI / 180.0)], 0.0);
+    }
+
+    /// A unit in the header converts the numbers, whatever form of the name is written.
+    #[test]
+    fn units_in_names_of_columns_convert() {
+        let names = ["q1 [deg]", "q2 (°)", "arm.q3 [rad]", "i4 [A]", "q5 [deg]", "q5 [rad]"].map(str::to_owned);
+        let read = |text: &str| read_column(text, ColumnQuantity::Angle(0), &names, &|_| None);
+        let factor = |text: &str| read(text).unwrap().terms[0].1;
+        let degree = PI / 180.0;
+        for text in ["q1", "q1 [deg]", "q2", "q2 (°)", "q2 [deg]"] {
+            assert!((factor(text) - degree).abs() < 1e-16, "{text}");
+        }
+        assert!((factor("q1 [rad]") - 1.0).abs() < 1e-16, "a stated unit has priority");
+        assert!((factor("2*arm.q3") - 2.0).abs() < 1e-16);
+        assert!((factor("i4") - 1.0).abs() < 1e-16, "another quantity is not converted");
+        let sum = read("(q1 - q2)/2 - 90").unwrap();
+        assert!((sum.terms[1].1 + degree / 2.0).abs() < 1e-16 && (sum.offset + PI / 2.0).abs() < 1e-15);
+        // Without a number each column has its own unit, with one the unit is not clear.
+        let mixed = read("q1 + arm.q3").unwrap();
+        assert!((mixed.terms[0].1 - degree).abs() < 1e-16 && (mixed.terms[1].1 - 1.0).abs() < 1e-16);
+        assert!(
+            read("q1 + arm.q3 - 1")
+                .unwrap_err()
+                .to_string()
+                .contains("different units")
+        );
+        // Two columns of one name are not guessed.
+        assert!(read("q5").is_err());
     }
 
     #[test]

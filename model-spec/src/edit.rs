@@ -231,6 +231,30 @@ pub fn write_identified(text: &str, values: &AdoptedValues) -> Result<String, St
     Ok(kept + &identified_table(values, line_end))
 }
 
+/// Writes the vector of gravity into the text of a model file, m/s^2: in place of its entry, or in front of all others.
+///
+/// Fails if the text is not TOML.
+///
+/// ```
+/// use modelmill_spec::edit::write_gravity;
+/// let text = write_gravity("name = \"arm\"\ngravity = [0, 0, \"-g\"] # up\n", [9.81, 0.0, 0.0]).unwrap();
+/// assert_eq!(text, "name = \"arm\"\ngravity = [\"9.81\", \"0\", \"0\"] # up\n");
+/// ```
+pub fn write_gravity(text: &str, gravity: [f64; 3]) -> Result<String, String> {
+    let mut log = DiagnosticLog::default();
+    let table = document::parse_toml(text, 0, &mut log);
+    if log.n_errors() > 0 {
+        return Err("this is not TOML; correct the file first".to_owned());
+    }
+    let components = gravity.map(|g| format!("\"{g}\""));
+    let entry = format!("gravity = [{}]", components.join(", "));
+    // Top-level entries come before all tables, so that the beginning of the file is always a valid place.
+    Ok(match find_key(&table, "gravity") {
+        Some((key, value)) => format!("{}{entry}{}", &text[..key.span.start], &text[value.span.end..]),
+        None => format!("{entry}\n{text}"),
+    })
+}
+
 /// The text of the table of identified values.
 fn identified_table(values: &AdoptedValues, line_end: &str) -> String {
     let mut lines = vec!["[identified]".to_owned()];

@@ -9,6 +9,7 @@ mod at_values;
 mod build;
 pub mod bundled;
 mod column;
+mod column_unit;
 mod diagnostic;
 mod document;
 pub mod edit;
@@ -50,6 +51,7 @@ mod words;
 
 pub use additions::{AddedEffect, ConstantValue};
 pub use column::{ColumnFault, ColumnQuantity, ColumnSum, read_column};
+pub use column_unit::{split_header_unit, unit_factor};
 pub use diagnostic::{Diagnostic, DiagnosticSeverity, SourceFile, SourceFiles, SourceSpan};
 pub use document::LARGEST_FILE;
 pub use exact::*;

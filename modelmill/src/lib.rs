@@ -194,6 +194,7 @@ pub mod evaluate;
 pub mod excite;
 #[cfg(feature = "import")]
 pub mod export;
+pub mod faults;
 pub mod generate;
 pub mod host;
 pub mod identify;

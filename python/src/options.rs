@@ -38,6 +38,8 @@ pub(crate) struct ReadingOptions {
     leave_out_events: bool,
     /// First and last time that are used, s.
     between: Option<(f64, f64)>,
+    /// Sampling rate of recordings without times, Hz.
+    rate: Option<f64>,
 }
 
 impl ReadingOptions {
@@ -79,6 +81,7 @@ impl ReadingOptions {
             skip_bad_samples: self.skip_bad_samples,
             leave_out_events: self.leave_out_events,
             between: self.between,
+            rate: check_positive("rate", self.rate, "a sampling rate in Hz such as 100")?,
         })
     }
 

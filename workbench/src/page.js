@@ -531,6 +531,7 @@
       box.append(make('p', `These recordings cannot distinguish ${effect.kind.replaceAll('_', ' ')} from ${others}. ${effect.separate_by || ''}`));
       if (effect.separate_command) box.append(make('code', effect.separate_command));
     }
+    for (const one of found.corrected) box.append(make('p', `Correct the recording first: ${one.todo}.`));
     for (const one of found.disturbances) box.append(make('p', `Disturbance in the recordings: ${one.says}.`));
     const figure = make('figure', undefined, 'still');
     figure.innerHTML = found.ladder;

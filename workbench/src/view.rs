@@ -1,6 +1,6 @@
 //! JSON views for the page: the model with its base parameters and those of the saved file, errors, findings.
 
-use modelmill::diagnose::{DiagnosisFindings, words};
+use modelmill::diagnose::DiagnosisFindings;
 use modelmill::identify::Identification;
 use modelmill::model::ModelCheck;
 use modelmill::print::{self, RemedySpelling, edit};
@@ -102,11 +102,7 @@ pub(crate) fn errors(
 pub(crate) fn findings(findings: &DiagnosisFindings, commands: &dyn WorkbenchCommands) -> Value {
     let model = &findings.before.model;
     let mut view_json = findings.json(commands);
-    view_json["says"] = json!(words::verdict(
-        &findings.diagnosis,
-        findings.channels(),
-        findings.validation
-    ));
+    view_json["says"] = json!(findings.verdict_text());
     view_json["ladder"] = json!(report::ladder(findings));
     view_json["judged"] = json!(findings.validation.phrase());
     view_json["entries"] = findings

@@ -103,7 +103,7 @@ pub(crate) struct EvaluateArgs {
 pub(crate) struct IdentifyArgs {
     /// Model file (TOML)
     pub(crate) model: PathBuf,
-    /// Recordings (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2) to identify from; may be repeated; `a.csv+b.csv` joins
+    /// Recordings (CSV, Parquet, MATLAB, HDF5, MCAP, ROS bags) to identify from; may be repeated; `a.csv+b.csv` joins
     /// files of one run on time
     #[arg(long, value_name = "RUN", required = true, num_args = 1..)]
     pub(crate) data: Vec<PathBuf>,
@@ -145,9 +145,13 @@ pub(crate) struct AdoptArgs {
 /// `recordings`.
 #[derive(Debug, Args)]
 pub(crate) struct RecordingsArgs {
-    /// Recordings (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2)
+    /// Recordings (CSV, Parquet, MATLAB, HDF5, MCAP, ROS bags)
     #[arg(required = true, value_name = "FILE")]
     pub(crate) files: Vec<PathBuf>,
+    /// Propose the table `[recording.columns]` for this model file: columns are paired with its names by name, unit, rates
+    /// and how much of a force the model explains; `a.csv+b.csv` joins files of one run on time
+    #[arg(long, value_name = "MODEL")]
+    pub(crate) model: Option<PathBuf>,
     /// Print one JSON object on standard output
     #[arg(long)]
     pub(crate) json: bool,
@@ -158,7 +162,7 @@ pub(crate) struct RecordingsArgs {
 pub(crate) struct CompareArgs {
     /// Model file (TOML)
     pub(crate) model: PathBuf,
-    /// Recordings (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2); may be repeated; `a.csv+b.csv` joins files of one run on
+    /// Recordings (CSV, Parquet, MATLAB, HDF5, MCAP, ROS bags); may be repeated; `a.csv+b.csv` joins files of one run on
     /// time
     #[arg(long, value_name = "RUN", required = true, num_args = 1..)]
     pub(crate) data: Vec<PathBuf>,
@@ -177,7 +181,7 @@ pub(crate) struct CompareArgs {
 pub(crate) struct DiagnosisArgs {
     /// Model file (TOML)
     pub(crate) model: PathBuf,
-    /// Recordings in which missing effects are searched (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2); may be repeated
+    /// Recordings in which missing effects are searched (CSV, Parquet, MATLAB, HDF5, MCAP, ROS bags); may be repeated
     #[arg(long, value_name = "RUN", required = true, num_args = 1..)]
     pub(crate) data: Vec<PathBuf>,
     /// Recordings for validation: an effect is accepted only if it lowers the error there. Without any, --data is split

@@ -285,7 +285,7 @@ pub(crate) struct DiffArgs {
     pub(crate) before: PathBuf,
     /// Model file as it is now
     pub(crate) after: PathBuf,
-    /// Recordings along which both models are compared (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2); may be repeated
+    /// Recordings along which both models are compared (CSV, Parquet, MATLAB, HDF5, MCAP, ROS bags); may be repeated
     #[arg(long, value_name = "RUN", num_args = 1..)]
     pub(crate) data: Vec<PathBuf>,
     #[command(flatten)]

@@ -57,6 +57,9 @@ pub(crate) struct PreparationArgs {
     /// Read only the samples between these times, s
     #[arg(long, value_name = "FROM,TO", value_parser = parse_between, allow_hyphen_values = true)]
     pub(crate) between: Option<(f64, f64)>,
+    /// Sampling rate of recordings without a column of times, Hz
+    #[arg(long, value_name = "HZ", value_parser = parse_cutoff, allow_negative_numbers = true)]
+    pub(crate) rate: Option<f64>,
 }
 
 /// Where derivatives come from.
@@ -91,6 +94,7 @@ impl PreparationArgs {
             skip_bad_samples: self.skip_bad_samples,
             leave_out_events: self.leave_out_events,
             between: self.between,
+            rate: self.rate,
         }
     }
 
@@ -124,6 +128,7 @@ impl PreparationArgs {
         option("period", number(self.period));
         option("band", number(self.band));
         option("between", self.between.map(|(from, to)| format!("{from},{to}")));
+        option("rate", number(self.rate));
         if self.skip_bad_samples {
             all.push_str(" --skip-bad-samples");
         }

@@ -28,7 +28,7 @@ pub(crate) const HELP: &str = "The first run is the reference; every other run i
 pub(crate) struct RunsArgs {
     /// Model file (TOML)
     pub(crate) model: PathBuf,
-    /// Recordings, folders of them, or patterns with * and ? (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2), two or more;
+    /// Recordings, folders of them, or patterns with * and ? (CSV, Parquet, MATLAB, HDF5, MCAP, ROS bags), two or more;
     /// the first is the reference
     #[arg(long, value_name = "RUN", required = true, num_args = 1..)]
     pub(crate) data: Vec<PathBuf>,

@@ -24,7 +24,7 @@ pub(crate) const HELP: &str = "The page is served on the loopback address of thi
 pub(crate) struct WorkArgs {
     /// Model file (TOML)
     pub(crate) model: PathBuf,
-    /// Recordings to fit and to compare with (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2); may be repeated
+    /// Recordings to fit and to compare with (CSV, Parquet, MATLAB, HDF5, MCAP, ROS bags); may be repeated
     #[arg(long, value_name = "RUN", num_args = 1..)]
     pub(crate) data: Vec<PathBuf>,
     /// Recordings for validation: an effect is accepted only if it lowers the error there. Without any, --data is split

@@ -30,7 +30,7 @@ pub(crate) fn run(host: &Host, args: &ReportArgs) -> CommandOutcome {
     };
     let findings = commands::diagnose(host, &args.diagnosis, question)?;
     target.write(&page(&findings, &CommandLineSpelling::from_args(&args.diagnosis))?)?;
-    let says = words::verdict(&findings.diagnosis, findings.channels(), findings.validation);
+    let says = findings.verdict_text();
     terminal::print(&format!(
         "{}\n\nThe page is {}.",
         words::lines(&says, 100).join("\n"),

@@ -230,7 +230,14 @@ fn runs_says_what_changed() {
     let [first, second] = &found["runs"].as_array().expect("runs")[..] else {
         panic!("{found:#}");
     };
-    assert_eq!(keys(second), ["file", "samples", "parameters"]);
+    assert_eq!(
+        keys(second),
+        ["file", "samples", "parameters", "verdict", "undecided", "says"]
+    );
+    assert_eq!(
+        (&first["verdict"], &second["verdict"]),
+        (&value!(null), &value!("unchanged"))
+    );
     assert_eq!(first["parameters"], second["parameters"]);
     assert_eq!(
         keys(&second["parameters"][0]),

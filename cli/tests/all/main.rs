@@ -9,6 +9,7 @@ mod bombs;
 #[cfg(unix)]
 mod boundary;
 mod cloos;
+mod columns;
 mod common;
 mod damaged_recordings;
 mod diagnose;

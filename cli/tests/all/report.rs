@@ -80,6 +80,7 @@ fn the_page_holds_what_diagnose_says_and_needs_nothing_else() {
             "at",
             "estimates",
             "probability",
+            "support",
             "indistinguishable_from",
             "separate_by",
             "separate_command",

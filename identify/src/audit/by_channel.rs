@@ -58,6 +58,15 @@ impl ChannelRegressor {
         self.channels.first().map_or(0, |c| c.rows.nrows())
     }
 
+    /// The rows of some channels, in the order of `kept`, with all columns.
+    #[must_use]
+    pub fn select_channels(&self, kept: &[usize]) -> Self {
+        Self {
+            columns: self.columns,
+            channels: kept.iter().map(|c| self.channels[*c].clone()).collect(),
+        }
+    }
+
     /// Keeps every `step`-th sample.
     #[must_use]
     pub fn subsample(&self, step: usize) -> Self {
@@ -109,20 +118,6 @@ impl ChannelRegressor {
             );
             for (i, value) in (&channel.rows * own).iter().enumerate() {
                 result[i * n + c] = *value;
-            }
-        }
-        result
-    }
-
-    /// Inner products of all columns with a vector that is interleaved per sample.
-    pub(super) fn multiply_transposed(&self, of: &DVector<f64>) -> DVector<f64> {
-        let n = self.channels.len();
-        let mut result = DVector::zeros(self.columns);
-        for (c, channel) in self.channels.iter().enumerate() {
-            // Entries of this channel.
-            let own = DVector::from_fn(channel.rows.nrows(), |i, _| of[i * n + c]);
-            for (k, column) in channel.column_indices.iter().zip(channel.rows.column_iter()) {
-                result[*k] += column.dot(&own);
             }
         }
         result
@@ -217,10 +212,6 @@ mod tests {
         assert!(close(
             &column(rows.multiply(values.as_slice())),
             &column(&whole * &values)
-        ));
-        assert!(close(
-            &column(rows.multiply_transposed(&measured)),
-            &column(whole.transpose() * &measured)
         ));
         let (normal, right) = rows.normal_equations(&weights, &measured, 10..samples);
         let part = whole.rows_range(10 * n..);

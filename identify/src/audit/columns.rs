@@ -88,16 +88,25 @@ impl SignalRecording {
     }
 
     /// Options that convert an angle recorded in degrees, and those of its recorded derivatives that are in degrees
-    /// too: all except those that are the derivatives in rad of the recorded signal before them.
+    /// too.
     pub fn degree_conversion_options(&self, name: &str) -> Vec<OptionSetting> {
         // An option that reads a column in another unit.
-        let map =
-            |column: &str, unit: &str| OptionSetting::new(OptionName::Columns, format!("{column}={column} [{unit}]"));
-        let mut maps = vec![map(name, "deg")];
-        for (of, order, unit) in [("", "_d", "deg/s"), ("_d", "_dd", "deg/s^2")] {
+        let units = ["deg", "deg/s", "deg/s^2"];
+        let columns = self.degree_columns(name).into_iter().zip(units);
+        columns
+            .map(|(column, unit)| OptionSetting::new(OptionName::Columns, format!("{column}={column} [{unit}]")))
+            .collect()
+    }
+
+    /// The columns that are in degrees if an angle is: the angle and its recorded derivatives, except for those that
+    /// are the derivatives in rad of the recorded signal before them.
+    pub fn degree_columns(&self, name: &str) -> Vec<String> {
+        let mut columns = vec![name.to_owned()];
+        for (of, order) in [("", "_d"), ("_d", "_dd")] {
             let [of, rate] = [of, order].map(|suffix| format!("{name}{suffix}"));
+            // Units are given in the order of the derivatives, so that none may be skipped.
             let Ok(values) = self.column(&rate) else {
-                continue;
+                break;
             };
             // A derivative that is 180/pi times too small is in rad already; the next one is then relative to rad as
             // well.
@@ -109,9 +118,9 @@ impl SignalRecording {
             if is_rad {
                 break;
             }
-            maps.push(map(&rate, unit));
+            columns.push(rate);
         }
-        maps
+        columns
     }
 
     /// Warning about jumps by a full turn between neighbouring samples; `None` without any.

@@ -84,7 +84,7 @@ pub(super) fn solve_normal(normal: DMatrix<f64>, right: &DVector<f64>) -> Option
 }
 
 /// Factor of normal equations whose columns are scaled to one, with a very small ridge, and the scales.
-pub(super) fn factor_normal(mut normal: DMatrix<f64>) -> Option<(Cholesky<f64, Dyn>, DVector<f64>)> {
+fn factor_normal(mut normal: DMatrix<f64>) -> Option<(Cholesky<f64, Dyn>, DVector<f64>)> {
     let scale = normal.diagonal().map(|x| if x > 0.0 { x.sqrt().recip() } else { 0.0 });
     for i in 0..scale.len() {
         for j in 0..scale.len() {

@@ -163,9 +163,6 @@ pub(super) const BACKLASH_ALTERNATING_OF_FIVE: usize = 4;
 
 // --- Forces
 
-/// Rows for each column of a regressor below which exchanged and reversed forces are not searched. By judgement.
-pub(super) const WIRING_ROWS_PER_COLUMN: usize = 2;
-
 /// Residuals beyond this many standard deviations count less in a robust fit: Huber's bound for 95 % efficiency under
 /// normal residuals (the value of `estimate::HUBER_BOUND`).
 pub(super) const AUDIT_HUBER_BOUND_SIGMAS: f64 = 1.345;
@@ -179,3 +176,36 @@ pub(super) const FAR_SHIFT_MIN_IMPROVEMENT: f64 = 0.05;
 
 /// Least uncertainty of a delay, steps of the recording. By judgement.
 pub(super) const DELAY_RESOLUTION_STEPS: f64 = 0.05;
+
+// --- Rates that lag positions
+
+/// Samples of a recording below which the delay of rates is not estimated. By judgement.
+pub(super) const LATE_RATE_FEWEST_SAMPLES: usize = 200;
+
+/// Least delay of a rate, samples. Differences of neighbouring positions are late by up to one. By judgement, above it.
+pub(super) const LATE_RATE_LEAST_STEPS: f64 = 2.0;
+
+/// Longest delay of a rate, s. A longer one is a fault of the clock or another column. By judgement.
+pub(super) const LATE_RATE_LONGEST_S: f64 = 0.3;
+
+/// The delay must explain this share of the squared difference between position and integral of the rate (1). By
+/// judgement; 0.97 to 0.99 on beyond/rates-filtered.
+pub(super) const LATE_RATE_EXPLAINED: f64 = 0.6;
+
+/// The rate of one coordinate must change within its delay by more than this share of its size, as rms values (1). On
+/// panda recorded rates with 0.015 predict forces better than positions do; beyond/rates-filtered has 0.07 to 0.13,
+/// machines/tiago 0.12.
+pub(super) const LATE_RATE_LEAST_CHANGE: f64 = 0.04;
+
+// --- Dead bands of forces
+
+/// Share of exact zeros of a reading with a dead band (1). The wrist of machines/tiago has 0.84 to 0.88; a force of a few
+/// quantisation steps has less. By judgement, between them.
+pub(super) const DEAD_BAND_LEAST_SHARE: f64 = 0.5;
+
+/// Intervals of zeros that a dead band makes at least. By judgement.
+pub(super) const DEAD_BAND_FEWEST_INTERVALS: usize = 10;
+
+/// The longest interval has less than this share of all zeros (1); a reading that fails has one long interval. By
+/// judgement.
+pub(super) const DEAD_BAND_LONGEST_SHARE: f64 = 0.5;

@@ -12,6 +12,17 @@ pub struct AutoregressiveNoise {
     pub coefficients: Vec<f64>,
     /// Standard deviation of `w`, in the unit of the residual; 0 if the residual is zero.
     pub standard_deviation: f64,
+    /// Best predictions from fewer than `p` past values, for the start of a segment: `[past values]`.
+    starts: Vec<ShortPrediction>,
+}
+
+/// The best prediction of a value from the few values before it.
+#[derive(Clone, Debug, PartialEq)]
+struct ShortPrediction {
+    /// Coefficients of the values before, the nearest first.
+    coefficients: Vec<f64>,
+    /// Standard deviation of its error, in the unit of the residual.
+    standard_deviation: f64,
 }
 
 impl AutoregressiveNoise {
@@ -20,7 +31,11 @@ impl AutoregressiveNoise {
     /// the residual: the residual of a nearly exact model would otherwise be predicted too well.
     pub fn from_residual(segments: &[&[f64]], floor: f64) -> Self {
         let n: usize = segments.iter().map(|s| s.len()).sum();
-        let highest = MAX_ORDER.min(n / 20);
+        // Lags that few segments are long enough for cannot be estimated.
+        let pairs = |lag: usize| segments.iter().map(|s| s.len().saturating_sub(lag)).sum::<usize>();
+        let highest = (1..=MAX_ORDER.min(n / 20))
+            .take_while(|lag| 2 * pairs(*lag) > n)
+            .count();
         // Autocovariances; products never cross the border of a segment.
         let mut covariance: Vec<f64> = (0..=highest)
             .map(|lag| {
@@ -28,13 +43,17 @@ impl AutoregressiveNoise {
                     let later = s.get(lag..).unwrap_or_default();
                     later.iter().zip(s.iter()).map(|(a, b)| a * b).sum()
                 };
-                segments.iter().map(of_stretch).sum::<f64>() / n.max(1) as f64
+                // One segment has `n - lag` products. Borders remove more of them, which must not look like a
+                // shorter memory.
+                let lost = (n - lag) as f64 / pairs(lag).max(1) as f64;
+                segments.iter().map(of_stretch).sum::<f64>() * lost / n.max(1) as f64
             })
             .collect();
         // White noise adds to the variance only.
         covariance[0] += floor * floor;
         let mut best = (f64::INFINITY, Vec::new(), covariance[0]);
         let (mut a, mut variance): (Vec<f64>, f64) = (Vec::new(), covariance[0]);
+        let mut starts = Vec::new();
         // Levinson-Durbin: each order follows from the one before.
         for order in 0..=highest {
             if order > 0 {
@@ -53,26 +72,34 @@ impl AutoregressiveNoise {
             }
             // Schwarz' criterion: likelihood and number of coefficients.
             let cost = n as f64 * variance.ln() + order as f64 * (n as f64).ln();
+            starts.push(ShortPrediction {
+                coefficients: a.clone(),
+                standard_deviation: variance.sqrt(),
+            });
             if cost < best.0 {
                 best = (cost, a.clone(), variance);
             }
         }
+        // The recursion has found the predictions of all lower orders on its way.
+        starts.truncate(best.1.len());
         Self {
+            starts,
             coefficients: best.1,
             standard_deviation: best.2.max(0.0).sqrt(),
         }
     }
 
-    /// Whitened series of one segment, in standard deviations of `w`. The first values have no past and are 0.
+    /// Whitened series of one segment, in standard deviations of `w`. The first values have a short past and are
+    /// predicted from that, so that segments between many gaps lose nothing.
     pub fn whiten(&self, series: &[f64]) -> Vec<f64> {
-        let order = self.coefficients.len();
         let white = |t: usize| {
-            if t < order {
-                return 0.0;
-            }
-            let past = self.coefficients.iter().enumerate();
+            let (coefficients, standard_deviation) = match self.starts.get(t) {
+                Some(start) => (&start.coefficients, start.standard_deviation),
+                None => (&self.coefficients, self.standard_deviation),
+            };
+            let past = coefficients.iter().enumerate();
             let known: f64 = past.map(|(i, a)| a * series[t - 1 - i]).sum();
-            (series[t] - known) / self.standard_deviation
+            (series[t] - known) / standard_deviation
         };
         (0..series.len()).map(white).collect()
     }
@@ -103,6 +130,25 @@ mod tests {
         let product = |lag: usize| -> f64 { white[lag..].iter().zip(&white).map(|(a, b)| a * b).sum::<f64>() / n };
         assert!((product(0) - 1.0).abs() < 0.05);
         assert!((1..20).all(|lag| product(lag).abs() < 0.03));
+    }
+
+    /// Short segments have the same memory as long ones, and their first values count with variance 1.
+    #[test]
+    fn segments_between_gaps_come_out_white_from_their_start() {
+        let mut noise = TestNoise::new(6);
+        let mut series = vec![0.0; 24_000];
+        for t in 2..series.len() {
+            series[t] = 1.6 * series[t - 1] - 0.8 * series[t - 2] + 0.3 * noise.normal();
+        }
+        // Segments of 24 values, with a gap after each.
+        let segments: Vec<&[f64]> = series.chunks(30).map(|some| &some[..24]).collect();
+        let found = AutoregressiveNoise::from_residual(&segments, 0.0);
+        assert!((found.standard_deviation - 0.3).abs() < 0.01, "{found:?}");
+        let white: Vec<Vec<f64>> = segments.iter().map(|some| found.whiten(some)).collect();
+        for t in 0..24 {
+            let variance = white.iter().map(|some| some[t] * some[t]).sum::<f64>() / white.len() as f64;
+            assert!((variance - 1.0).abs() < 0.2, "{t}: {variance}");
+        }
     }
 
     #[test]

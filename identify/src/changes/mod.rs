@@ -17,6 +17,7 @@
 //! shared and others own.
 
 mod coloured;
+mod jackknife;
 mod joint;
 mod moments;
 mod search;
@@ -24,10 +25,11 @@ mod segments;
 mod thresholds;
 
 pub use coloured::AutoregressiveNoise;
+pub use jackknife::{BlockFit, fit_blocks};
 pub use joint::{JointFit, JointRun, JointValues, fit_jointly};
 pub use moments::{NormalEquations, NormalSolution};
 pub use search::{
-    ChangeHypotheses, PossibleChange, RunPair, SelectedChange, fit_single_change, search_changes, single_change_gains,
-    within_run_spread,
+    ChangeHypotheses, PossibleChange, RunPair, SearchSensitivity, SelectedChange, fit_single_change, search_changes,
+    search_sensitivity, single_change_gains, within_run_spread,
 };
 pub use segments::{UncertainValue, change_points, weighted_mean};

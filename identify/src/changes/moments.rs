@@ -107,12 +107,13 @@ impl NormalEquations {
 
     /// The columns from `fitted` on, with those before them eliminated.
     pub(crate) fn schur_complement(&self, fitted: usize) -> SchurComplement {
-        let (mut table, _) = self.scaled_equations();
+        let (mut table, scale) = self.scaled_equations();
         for k in 0..fitted {
             sweep(&mut table, k);
         }
         let n = table.nrows() - fitted;
         SchurComplement {
+            scale: scale.rows(fitted, n - 1).into_owned(),
             table: table.view((fitted, fitted), (n, n)).into_owned(),
         }
     }
@@ -257,9 +258,20 @@ fn divide_by_scale(x: f64, scale: f64) -> f64 {
 pub(crate) struct SchurComplement {
     /// Their scaled normal equations with the others eliminated; the last row and column belong to the measured values.
     table: DMatrix<f64>,
+    /// The norm of each column before the elimination.
+    scale: DVector<f64>,
 }
 
 impl SchurComplement {
+    /// Sum of squares of a column after the elimination; 0 if the eliminated columns contain it.
+    pub(crate) fn squares(&self, column: usize) -> f64 {
+        let own = self.table[(column, column)];
+        if own < CHANGE_INDEPENDENCE_TOLERANCE {
+            return 0.0;
+        }
+        own * self.scale[column].powi(2)
+    }
+
     /// Squared residual after a fit of some of the columns, and which of these are independent.
     pub(crate) fn residual_squares(&self, columns: &[usize]) -> (f64, Vec<bool>) {
         let last = self.table.nrows() - 1;

@@ -8,9 +8,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::changes::jackknife::{occupied, sum_except, variance_factors};
 use crate::changes::moments::{NormalEquations, NormalSolution, SchurComplement};
 use crate::changes::thresholds::{
-    CHANCE_GAIN_RARITY, CHANGE_VALUE_PRICE, MIN_SIGNIFICANCE, MIN_SPREAD_RATIO, MIN_VALIDATION_SHARE, RIVAL_TOLERANCE,
+    CHANCE_GAIN_RARITY, CHANGE_VALUE_PRICE, JACKKNIFE_FEWEST_BLOCKS, MIN_SIGNIFICANCE, MIN_SPREAD_RATIO,
+    MIN_VALIDATION_SHARE, RIVAL_TOLERANCE,
 };
 
 /// Two runs as normal equations of rows with variance 1, block by block and with the same columns.
@@ -51,7 +53,7 @@ pub struct SelectedChange {
     pub candidate: usize,
     /// Changes of the coefficients of its columns.
     pub values: DVector<f64>,
-    /// Their covariance.
+    /// Their covariance, from the noise and from the scatter between blocks of the runs.
     pub covariance: DMatrix<f64>,
     /// Which of the values are determined individually.
     pub determined: Vec<bool>,
@@ -107,6 +109,34 @@ pub fn fit_single_change(runs: &RunPair, search: &ChangeHypotheses, which: usize
     ChangeSelector::new(runs, search).build_change(&[which], which)
 }
 
+/// What a search could find at all.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SearchSensitivity {
+    /// Least gain with which a change is reported, relative to the variance of the residual.
+    pub min_gain: f64,
+    /// The least gain that noise alone requires; [`Self::min_gain`] exceeds it where parts of one run differ.
+    pub min_gain_of_noise: f64,
+    /// For each requested change of one value, the smallest value that would be reported; infinite if none would.
+    pub smallest_values: Vec<f64>,
+}
+
+/// The smallest values of some changes of one value that a search would report. Without it, "nothing was found" could
+/// not be distinguished from "nothing could be found".
+pub fn search_sensitivity(runs: &RunPair, search: &ChangeHypotheses, which: &[usize]) -> SearchSensitivity {
+    let bench = ChangeSelector::new(runs, search);
+    let smallest = |which: &usize| {
+        let column = bench.starts[*which];
+        let price = bench.value_price * (1.0 + search.changes[*which].rarity);
+        let squares = bench.complement.squares(column) / bench.noise;
+        (bench.min_gain.max(price) / squares).sqrt()
+    };
+    SearchSensitivity {
+        min_gain: bench.min_gain,
+        min_gain_of_noise: MIN_SIGNIFICANCE * MIN_SIGNIFICANCE,
+        smallest_values: which.iter().map(smallest).collect(),
+    }
+}
+
 /// Differences within one run: the largest sum of squares that a single change between parts of it explains, relative
 /// to the effective number of rows of the difference. Noise alone makes it small. Model errors and drifting friction
 /// make it large, and then the same must be expected between two runs.
@@ -156,15 +186,6 @@ fn count_rows(blocks: &[NormalEquations]) -> f64 {
 /// Effective number of rows of a difference between two runs: half the harmonic mean of both.
 fn effective_rows([a, b]: [f64; 2]) -> f64 {
     if a > 0.0 && b > 0.0 { a * b / (a + b) } else { 0.0 }
-}
-
-/// Sum of all blocks except one.
-fn sum_except(blocks: &[NormalEquations], but: Option<usize>) -> NormalEquations {
-    let mut sum = NormalEquations::new(blocks.first().map_or(0, |block| block.rhs.len()));
-    for (_, block) in blocks.iter().enumerate().filter(|(k, _)| Some(*k) != but) {
-        sum.merge(block);
-    }
-    sum
 }
 
 /// A set with one more index.
@@ -346,6 +367,37 @@ impl<'a> ChangeSelector<'a> {
         gain > self.min_gain && held_out > MIN_VALIDATION_SHARE * gain
     }
 
+    /// Values of the last change of a set without one block each, for both runs.
+    fn values_without_blocks(&self, order: &[usize], values: usize) -> Vec<Vec<DVector<f64>>> {
+        let runs = [&self.runs.reference, &self.runs.later];
+        let of_run = |run: usize| {
+            let without = |k: usize| {
+                let others = sum_except(runs[run], Some(k));
+                let mut sums = self.sums.each_ref();
+                sums[run] = &others;
+                let solved = stack_runs(sums, &self.shared, &self.columns(order)).solve();
+                let at = solved.values.len() - values;
+                solved.values.rows(at, values).into_owned()
+            };
+            // Runs that are one block have no scatter, so their fits are not needed.
+            let some = occupied(runs[run]).filter(|_| runs[run].len() >= JACKKNIFE_FEWEST_BLOCKS);
+            some.map(without).collect()
+        };
+        (0..runs.len()).map(of_run).collect()
+    }
+
+    /// The covariance of the last change of a set: that of white noise, enlarged where blocks scatter more.
+    fn change_covariance(&self, order: &[usize], solved: &NormalSolution, values: usize) -> DMatrix<f64> {
+        let at = solved.values.len() - values;
+        let covariance: DMatrix<f64> = self.noise * solved.covariance.view((at, at), (values, values));
+        let variances: Vec<f64> = covariance.diagonal().iter().copied().collect();
+        let estimates = self.values_without_blocks(order, values);
+        let factors = variance_factors(&estimates, &variances, &solved.determined[at..]);
+        DMatrix::from_fn(values, values, |i, j| {
+            covariance[(i, j)] * (factors[i] * factors[j]).sqrt()
+        })
+    }
+
     /// The result for one of the chosen changes: values, gains and rivals.
     fn build_change(&self, chosen: &[usize], which: usize) -> SelectedChange {
         let rest = remove_index(chosen, which);
@@ -360,7 +412,7 @@ impl<'a> ChangeSelector<'a> {
         SelectedChange {
             candidate: which,
             values: solved.values.rows(at, n).into_owned(),
-            covariance: self.noise * solved.covariance.view((at, at), (n, n)),
+            covariance: self.change_covariance(&order, &solved, n),
             determined: solved.determined[at..].to_vec(),
             gain,
             validation_gain: held_out,

@@ -40,3 +40,6 @@ pub(super) const LONE_VALUE_DEVIATIONS: f64 = 3.5;
 
 /// Price of a lasting change in a series, in units of the logarithm of the number of values (1). By judgement.
 pub(super) const SEGMENT_PRICE: f64 = 3.0;
+
+/// Runs of fewer blocks show no scatter of their estimates. By judgement: the scatter of three values is hardly known.
+pub(super) const JACKKNIFE_FEWEST_BLOCKS: usize = 4;

@@ -3,7 +3,7 @@
 
 use super::bench::{EffectSelector, ScoredEffectSet, SelectedEffect, n_columns};
 use super::conditional::ConditioningSet;
-use super::problem::{ColumnSource, LocatedEffect};
+use super::problem::{CandidateEffect, ColumnSource, LocatedEffect};
 use super::thresholds::{MIN_DISTINCTION, MIN_SUBSTITUTE_SHARE, NEGLIGIBLE_EFFECT_SHARE, SUBSTITUTE_MOST_RATIO};
 
 /// An effect that cannot be distinguished from one that was found.
@@ -82,7 +82,8 @@ impl EffectSelector<'_> {
                     found.push(EffectAlias {
                         effect: self.candidate(candidate).effect.clone(),
                         criterion_loss: worse,
-                        is_equivalent_form: false,
+                        // With an offset, friction that depends on the direction is the same as friction.
+                        is_equivalent_form: more && self.is_refinement_of(candidate, &pick),
                     });
                 }
             }
@@ -129,6 +130,13 @@ impl EffectSelector<'_> {
             all.push(found);
         }
         all
+    }
+
+    /// Whether one of two effects at the same places is the general form of the other.
+    fn is_refinement_of(&self, one: &SelectedEffect, other: &SelectedEffect) -> bool {
+        let [one, other] = [one, other].map(|pick| self.candidate(pick));
+        let refines = |a: &CandidateEffect, b: &CandidateEffect| a.refines.as_ref() == Some(&b.effect.kind);
+        one.effect.at == other.effect.at && (refines(one, other) || refines(other, one))
     }
 
     /// Pairs of simpler effects that together are equivalent to one effect of a set; each effect is returned with the

@@ -10,11 +10,12 @@ use super::column::ForceColumn;
 use super::conditional::ConditioningSet;
 use super::factored::GramFactor;
 use super::noise::effective_samples;
+use super::plausible::largest_forces;
 use super::pool::{ColumnPool, FitScope, dot, solve_gram};
 use super::problem::{
     CandidateEffect, ColumnChoice, ColumnProvider, ColumnSource, DiagnosisProblem, EffectParameter, SignConstraint,
 };
-use super::thresholds::{CANCELLATION_SHARE, RANDOM_SIGN_SHARE};
+use super::thresholds::{CANCELLATION_SHARE, FULL_CANCELLATION_SHARE, RANDOM_SIGN_SHARE};
 
 /// A candidate with the columns for one choice of its constants.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,6 +47,8 @@ pub(crate) struct ScoredEffectSet {
     pub(crate) wrong_sign: Vec<usize>,
     /// Effects that do little but cancel another one at their place, by position.
     pub(crate) cancelling: Vec<usize>,
+    /// Effects with a value that is implausible for the machine, by position.
+    pub(crate) implausible: Vec<usize>,
     /// Information criterion by which sets are compared (less is better); infinite until it is computed.
     pub(crate) score: f64,
 }
@@ -53,7 +56,7 @@ pub(crate) struct ScoredEffectSet {
 impl ScoredEffectSet {
     /// Whether the estimates are physically possible.
     pub(crate) fn is_possible(&self) -> bool {
-        self.wrong_sign.is_empty() && self.cancelling.is_empty()
+        self.wrong_sign.is_empty() && self.cancelling.is_empty() && self.implausible.is_empty()
     }
 }
 
@@ -94,6 +97,7 @@ impl<'a> EffectSelector<'a> {
         let base = problem.base.iter().map(|c| pool.add(c)).collect();
         pool.prior_equations.clone_from(&problem.prior);
         let measured = pool.add(&problem.measured);
+        pool.force_scales = largest_forces(problem);
         let zero = pool.add(ForceColumn(vec![None; problem.layout.channels.len()]));
         let friction = problem.friction.iter().map(|c| pool.add(c)).collect();
         // Known columns enter the pool once, for every choice of the constants.
@@ -335,19 +339,21 @@ impl<'a> EffectSelector<'a> {
         wrong_sign.dedup();
         let freedoms = picks.iter().map(|p| self.freedoms(p)).sum();
         let cancelling = self.find_cancelling(&picks, factors);
+        let implausible = self.find_implausible(&picks, factors);
         ScoredEffectSet {
             picks,
             squares,
             freedoms,
             wrong_sign,
             cancelling,
+            implausible,
             score: f64::INFINITY,
         }
     }
 
-    /// Effects that cancel an earlier effect at their place: the sum of both has less than half of the amplitude of the
-    /// larger one. They are nearly the same curve twice, of which only the difference is visible. Returns positions in
-    /// `picks`.
+    /// Effects that cancel an earlier effect: at the same place, if the sum of both has less than half of the amplitude
+    /// of the larger one; elsewhere, if nearly nothing remains. They are nearly the same curve twice, of which only the
+    /// difference is visible. Returns positions in `picks`.
     fn find_cancelling(&self, picks: &[SelectedEffect], factors: &[f64]) -> Vec<usize> {
         let first = factors.len() - n_columns(picks);
         let starts: Vec<usize> = (picks.iter())
@@ -370,14 +376,22 @@ impl<'a> EffectSelector<'a> {
             .sum()
         };
         let effect = |i: usize| &self.candidate(&picks[i]).effect;
+        let squares: Vec<f64> = (0..picks.len()).map(|i| product(i, i)).collect();
         // Squares of the sum of both forces, compared with the larger of the two.
         let cancels = |j: &usize| {
             (0..*j).any(|i| {
-                if effect(i).at != effect(*j).at || effect(i).kind == effect(*j).kind {
+                let is_same_place = effect(i).at == effect(*j).at;
+                if is_same_place && effect(i).kind == effect(*j).kind {
                     return false;
                 }
-                let (a, b) = (product(i, i), product(*j, *j));
-                a + 2.0 * product(i, *j) + b < CANCELLATION_SHARE * a.max(b)
+                let most = if is_same_place {
+                    CANCELLATION_SHARE
+                } else {
+                    FULL_CANCELLATION_SHARE
+                };
+                let (a, b) = (squares[i], squares[*j]);
+                // Only forces of similar size can cancel.
+                a.min(b) > (1.0 - most.sqrt()).powi(2) * a.max(b) && a + 2.0 * product(i, *j) + b < most * a.max(b)
             })
         };
         (0..picks.len()).filter(cancels).collect()

@@ -183,6 +183,7 @@ mod tests {
                 segments: vec![SampleSegment {
                     name: String::new(),
                     samples: SAMPLES as usize,
+                    start: 0.0,
                     step: 0.1,
                     recorded_step: 0.1,
                     is_check: false,

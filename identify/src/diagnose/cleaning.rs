@@ -11,7 +11,7 @@ use super::problem::DiagnosisProblem;
 use super::thresholds::{
     FORCE_OUTLIER_DEVIATIONS, OUTLIER_LEAST_FORCE_SHARE, OUTLIERS_MOST_SHARE, QUANTISED_FEWEST_REPEATS,
     QUANTISED_FEWEST_VALUES, QUANTISED_LEAST_NOISE_PART, QUANTISED_MOST_OFF_STEP, REVERSAL_OUTLIER_SAMPLES,
-    REVERSAL_UNDECIDED_SAMPLES, REVERSALS_MOST_SHARE,
+    REVERSAL_UNDECIDED_SAMPLES, REVERSALS_MOST_SHARE, STANDSTILL_MOST_SHARE, STANDSTILL_SHORTEST_S,
 };
 use crate::signal::median;
 
@@ -218,6 +218,44 @@ impl DiagnosisProblem {
         self.jumps = (0..self.layout.channels.len()).map(of).collect();
     }
 
+    /// Leaves out the samples at which a drive stands still for some time: dry friction takes any value there, so that the
+    /// force is unknown up to twice the friction. A channel that mostly stands keeps all of its samples.
+    pub(crate) fn leave_out_standstill(&mut self) {
+        let channels = self.layout.channels.len();
+        let samples = self.layout.samples();
+        for d in 0..channels {
+            let stands = super::in_time::standstill_samples(self, d);
+            if stands.len() < samples {
+                continue;
+            }
+            let mut long = vec![false; samples];
+            let mut start = 0;
+            for segment in &self.layout.segments {
+                let end = start + segment.samples;
+                let mut first = start;
+                for i in start..=end {
+                    if i < end && stands[i] {
+                        continue;
+                    }
+                    // The samples from `first` on stand still up to here.
+                    if (i - first) as f64 * segment.step > STANDSTILL_SHORTEST_S {
+                        long[first..i].fill(true);
+                    }
+                    first = i + 1;
+                }
+                start = end;
+            }
+            let count = long.iter().filter(|long| **long).count();
+            if count == 0 || count as f64 > STANDSTILL_MOST_SHARE * samples as f64 {
+                continue;
+            }
+            self.left_out.resize(channels, vec![false; samples]);
+            for (out, long) in self.left_out[d].iter_mut().zip(&long) {
+                *out |= *long;
+            }
+        }
+    }
+
     /// Samples that decide nothing, `[channel][sample]`: those left out and those next to reversals.
     pub(crate) fn undecided_samples(&self) -> Vec<Vec<bool>> {
         let of = |d: usize| {
@@ -253,6 +291,7 @@ mod tests {
                 segments: vec![SampleSegment {
                     name: "run".into(),
                     samples: base.len(),
+                    start: 0.0,
                     step: 0.004,
                     recorded_step: 0.004,
                     is_check: false,

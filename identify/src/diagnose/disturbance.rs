@@ -1,10 +1,11 @@
 //! Disturbances of recordings, which are no part of the model, and the origin of the residual of each channel.
 
 use super::bench::{EffectSelector, SelectedEffect};
+use super::in_time::{ChangeInterval, TimeResidual, time_residual};
 use super::noise::effective_samples;
 use super::pool::dot;
 use super::problem::{CandidateNature, DiagnosisProblem};
-use super::thresholds::{COLOURED_LEAST_VARIANCE_RATIO, COLOURED_MOST_EFFECTIVE_SHARE};
+use super::thresholds::{COLOURED_LEAST_VARIANCE_RATIO, COLOURED_MOST_EFFECTIVE_SHARE, SAME_CHANGE_TIME_SHARE};
 
 /// A named value of a disturbance or an effect.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,8 +70,11 @@ pub(crate) fn is_white(problem: &DiagnosisProblem, channel: usize, variance: f64
 impl EffectSelector<'_> {
     /// Members of a set that are disturbances, with their estimates.
     pub(crate) fn disturbances(&self, picks: &[SelectedEffect]) -> Vec<Disturbance> {
+        let problem = self.problem;
         let fitted = self.estimate_parameters(picks, super::pool::FitScope::All);
         let mut found: Vec<Disturbance> = Vec::new();
+        // Channels and times of the changes in time so far.
+        let mut changes: Vec<(Vec<usize>, &[ChangeInterval])> = Vec::new();
         for (pick, values) in picks.iter().zip(fitted) {
             let candidate = self.candidate(pick);
             if candidate.nature == CandidateNature::Effect {
@@ -83,33 +87,52 @@ impl EffectSelector<'_> {
                 standard_deviation: deviation,
                 unit: p.unit.clone(),
             });
+            // A change in time has an interval in each of its recordings.
+            let times = problem
+                .change_intervals
+                .iter()
+                .find(|(effect, _)| *effect == candidate.effect);
+            let intervals = times.map_or(&[][..], |(_, intervals)| intervals);
+            // What a change leaves at its own time belongs to it: no column has its force exactly.
+            if candidate.nature == CandidateNature::ChangeInTime {
+                let channels = self.affected_channels(std::slice::from_ref(pick));
+                let is_same = |(others, known): &(Vec<usize>, &[ChangeInterval])| {
+                    channels.iter().any(|d| others.contains(d)) && begin_together(intervals, known)
+                };
+                let is_known = changes.iter().any(is_same);
+                changes.push((channels, intervals));
+                if is_known {
+                    continue;
+                }
+            }
             let constants = pick.constants.iter();
             let constants = constants.map(|(name, value)| EstimatedQuantity::new(name, *value, ""));
             found.push(Disturbance {
                 kind: candidate.effect.kind.clone(),
                 at: candidate.effect.at.clone(),
                 estimates: estimates.chain(constants).collect(),
-                recordings: Vec::new(),
-                interval: None,
+                recordings: intervals.iter().map(|one| one.recording.clone()).collect(),
+                interval: intervals.first().map(|one| one.interval),
                 description: None,
             });
         }
         found
     }
 
-    /// Splits the residual of each channel by its origin, and reports coloured noise. `rest` is `[channel][sample]`,
+    /// Splits the residual of each channel by its origin, and reports coloured noise and residuals that follow the time. `rest` is `[channel][sample]`,
     /// `again` the repeatable share of its squares.
     pub(crate) fn residual_budgets(
         &self,
         picks: &[SelectedEffect],
         rest: &[Vec<f64>],
         again: &[f64],
-    ) -> (Vec<ResidualBudget>, Vec<Disturbance>) {
+    ) -> (Vec<ResidualBudget>, Vec<Disturbance>, Vec<TimeResidual>) {
         let problem = self.problem;
         let (factors, _) = self.fit(picks, super::pool::FitScope::All);
         let size = |values: &[f64]| dot(values, values) / values.len().max(1) as f64;
         let mut budgets = Vec::new();
         let mut coloured = Vec::new();
+        let mut in_time = Vec::new();
         for (d, rest) in rest.iter().enumerate() {
             // Force of all members of the set that are disturbances.
             let mut disturbed = vec![0.0; rest.len()];
@@ -117,7 +140,7 @@ impl EffectSelector<'_> {
             let mut at = self.base.len();
             for pick in picks {
                 for k in &pick.columns {
-                    if self.candidate(pick).nature == CandidateNature::Disturbance
+                    if self.candidate(pick).nature.is_disturbance()
                         && let Some(values) = &self.pool.column(*k).0[d]
                     {
                         for (sum, x) in disturbed.iter_mut().zip(values) {
@@ -132,16 +155,23 @@ impl EffectSelector<'_> {
             let model = left * again[d];
             let force = problem.measured_force(d);
             let removed = problem.removed.get(d).copied().unwrap_or(0.0);
+            // What follows the time without being stationary is no noise.
+            let found = time_residual(problem, d, rest, again[d]);
+            let noise = found.as_ref().map_or(left - model, |found| found.noise.powi(2));
+            let in_time_power = (left - model - noise).max(0.0);
             let budget = ResidualBudget {
-                noise: (left - model).max(0.0).sqrt(),
-                non_repeatable: (size(&disturbed) + removed).sqrt(),
+                noise: noise.max(0.0).sqrt(),
+                non_repeatable: (size(&disturbed) + removed + in_time_power).sqrt(),
                 model: model.sqrt(),
                 force: size(&force).sqrt(),
             };
-            coloured.extend(self.coloured_noise(d, rest, again[d]));
+            match found {
+                Some(found) => in_time.push(found),
+                None => coloured.extend(self.coloured_noise(d, rest, again[d])),
+            }
             budgets.push(budget);
         }
-        (budgets, coloured)
+        (budgets, coloured, in_time)
     }
 
     /// Coloured noise of a channel: its samples are correlated, and most of it is not repeatable. `None` if the noise
@@ -175,6 +205,17 @@ impl EffectSelector<'_> {
             description: None,
         })
     }
+}
+
+/// Whether all of some changes begin in the same recordings and at nearly the same times as others.
+fn begin_together(some: &[ChangeInterval], others: &[ChangeInterval]) -> bool {
+    some.iter().all(|one| {
+        others.iter().any(|other| {
+            let [length, other_length] = [one, other].map(|change| change.interval[1] - change.interval[0]);
+            let apart = (one.interval[0] - other.interval[0]).abs();
+            one.recording == other.recording && apart < SAME_CHANGE_TIME_SHARE * length.max(other_length)
+        })
+    })
 }
 
 impl DiagnosisProblem {

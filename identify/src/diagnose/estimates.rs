@@ -1,16 +1,10 @@
-//! Estimates of a set of effects with their standard deviations, and the probability of each effect.
-//!
-//! Decision: odds from the likelihood are extreme for the best candidate. So a fiftieth is reserved for causes outside
-//! of all candidates, and a quarter where something of the effect's channels stays unexplained. The rest is shared with
-//! the alternatives, by how much worse they are.
+//! Estimates of a set of effects with their standard deviations.
 
 use nalgebra::DMatrix;
 
 use super::bench::{EffectSelector, SelectedEffect};
 use super::pool::FitScope;
-use super::thresholds::{
-    ESTIMATE_MOST_VARIANCE_RATIO, MAX_LOG_ODDS, UNKNOWN_CAUSE_IF_UNEXPLAINED, UNKNOWN_CAUSE_PROBABILITY,
-};
+use super::thresholds::ESTIMATE_MOST_VARIANCE_RATIO;
 
 impl EffectSelector<'_> {
     /// Estimates of each member's parameters with their standard deviations, `[effect][parameter]`; the deviation is
@@ -51,31 +45,5 @@ impl EffectSelector<'_> {
             at += pick.columns.len();
         }
         all
-    }
-
-    /// Probability that a member is present: from the odds against the set without it, shared with the alternatives,
-    /// whose losses are `rivals`. No evidence excludes unknown causes; they are more probable if a residual on its
-    /// channels is unexplained.
-    pub(crate) fn probability(
-        &self,
-        picks: &[SelectedEffect],
-        member: usize,
-        rivals: &[f64],
-        unexplained: &[usize],
-    ) -> f64 {
-        let mut without = picks.to_vec();
-        let pick = without.remove(member);
-        let channels = self.affected_channels(&[pick]);
-        let evidence = self.evidence(&without, picks, &channels);
-        // The criterion is twice the logarithm of the odds.
-        let for_it = (0.5 * evidence.bic.clamp(-MAX_LOG_ODDS, MAX_LOG_ODDS)).exp();
-        let others = rivals.iter().map(|worse| (-0.5 * worse).exp());
-        let share = 1.0 / (1.0 + others.sum::<f64>());
-        let outside = if channels.iter().any(|d| unexplained.contains(d)) {
-            UNKNOWN_CAUSE_IF_UNEXPLAINED
-        } else {
-            UNKNOWN_CAUSE_PROBABILITY
-        };
-        (1.0 - outside) * share * for_it / (1.0 + for_it)
     }
 }

@@ -24,9 +24,9 @@ use super::bench::{EffectSelector, SelectedEffect};
 use super::pool::{FitScope, dot, solve_gram};
 use super::rejection::RejectionReason;
 use super::thresholds::{
-    BLOCKS_LEAST_T, EXPLICABLE_LEAST_NOISE_RATIO, LARGE_GAIN, LEAST_GAIN, LEAST_SHARES_T, MIN_SHARE_OF_FORCE,
-    MIN_SHARE_OF_OTHERS, NOISE_LEAST_GAIN_VARIANCES, NOISE_LEAST_T, WHITE_LEAST_EFFECTIVE_SHARE,
-    WHITE_MOST_NOISE_RATIO,
+    BLOCKS_LEAST_T, EXPLICABLE_LEAST_NOISE_RATIO, GIVEN_BACK_LEAST_T, GIVEN_BACK_MOST_SHARE, LARGE_GAIN, LEAST_GAIN,
+    LEAST_SHARES_T, MATERIAL_LEAST_GAIN, MIN_SHARE_OF_FORCE, MIN_SHARE_OF_OTHERS, NOISE_LEAST_GAIN_VARIANCES,
+    NOISE_LEAST_T, WHITE_LEAST_EFFECTIVE_SHARE, WHITE_MOST_NOISE_RATIO,
 };
 
 /// Number of blocks into which the error of a segment is divided.
@@ -51,6 +51,8 @@ pub struct SelectionEvidence {
     pub above_noise: f64,
     /// Least gain that is accepted: a fixed share, or less if the residual is white noise.
     pub least_gain: f64,
+    /// Whether the residual after the change is white noise, so that nothing else is left.
+    pub is_residual_white: bool,
 }
 
 impl SelectionEvidence {
@@ -66,6 +68,11 @@ impl SelectionEvidence {
     pub(crate) fn is_worth_keeping(&self) -> bool {
         let is_large = self.gain >= LARGE_GAIN && self.bic > 0.0 && self.above_noise > EXPLICABLE_LEAST_NOISE_RATIO;
         self.is_sufficient() || is_large
+    }
+
+    /// Whether a change that would be undone here has lowered the error by more than noise.
+    pub(crate) fn gives_back(&self) -> bool {
+        self.gain > GIVEN_BACK_MOST_SHARE && self.blocks_t > GIVEN_BACK_LEAST_T
     }
 
     /// Whether the gain is consistent over time: in the mean over the blocks, or, if it is large, relative to each
@@ -159,13 +166,14 @@ impl EffectSelector<'_> {
             bic: worth * (old_squares / new_squares.max(f64::MIN_POSITIVE)).ln() - (price(after) - price(before)),
             effective_samples: worth,
             above_noise: self.squares_over_noise(&old_rest, channels),
+            is_residual_white: is_noise_known,
             least_gain: {
                 // Weights are one over the variance of the residual, which is the noise where it is known.
                 let of_noise = NOISE_LEAST_GAIN_VARIANCES / total.max(f64::MIN_POSITIVE);
                 if !self.is_above_smoothing_error(old_squares - new_squares, channels) {
                     f64::INFINITY
                 } else if is_noise_known {
-                    of_noise.min(LEAST_GAIN)
+                    of_noise.clamp(MATERIAL_LEAST_GAIN, LEAST_GAIN)
                 } else {
                     LEAST_GAIN
                 }

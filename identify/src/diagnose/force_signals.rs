@@ -273,6 +273,7 @@ mod tests {
                 segments: vec![SampleSegment {
                     name: "run".into(),
                     samples: times.len(),
+                    start: 0.0,
                     step,
                     recorded_step: 0.004,
                     is_check: false,

@@ -438,6 +438,7 @@ mod tests {
         let segment = |name: &str, is_check: bool| SampleSegment {
             name: name.into(),
             samples: rest.len() / 2,
+            start: 0.0,
             step: 1.0 / 44.0,
             recorded_step: 1.0 / 44.0,
             is_check,

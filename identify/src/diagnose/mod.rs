@@ -8,7 +8,7 @@
 //!    microseconds; `tuning` finds constants, `fit_dependent` computes columns that depend on the fit, `force_signals` those of
 //!    faulty force signals, `tilt` rotates gravity, `body` places an additional mass, `constant` corrects a number of
 //!    the model.
-//! 3. `search` - forward search over sets, with exchanges; `evidence` decides on time that was not fitted; `simplification`
+//! 3. `search` - forward search over sets, with exchanges; `combinations` tries pairs and the same kinds at all drives; `evidence` decides on time that was not fitted; `simplification`
 //!    makes the last set as small and simple as possible.
 //! 4. `aliases` - effects that this recording cannot distinguish; `reproducible` - the repeatable residual that no
 //!    candidate explains.
@@ -31,7 +31,9 @@ mod body;
 mod bounds;
 mod cleaning;
 mod column;
+mod combinations;
 mod conditional;
+mod confirmed_readings;
 mod constant;
 mod disturbance;
 mod drifts;
@@ -41,15 +43,19 @@ mod factored;
 mod fit_dependent;
 mod force_signals;
 mod hum;
+mod in_time;
 mod laws;
 mod noise;
 mod numbered;
+mod plausible;
 mod pool;
+mod possible;
 mod problem;
 mod rejection;
 mod reproducible;
 mod search;
 mod simplification;
+mod support;
 mod thresholds;
 mod tile;
 mod tilt;
@@ -67,6 +73,7 @@ pub use disturbance::{Disturbance, EstimatedQuantity, ResidualBudget};
 pub use drifts::drift_candidates;
 pub use evidence::SelectionEvidence;
 pub use force_signals::reading_fault_candidates;
+pub use in_time::{ChangeForce, ChangeInterval, ChangeShape, ResidualCharacter, TimeResidual, signal_changes};
 pub use laws::{LawFactor, LawProduct, LawProposal, LawShape, LawSite, LawTerm, LawVariable, SiteLaw};
 pub use noise::{effective_samples, white_noise};
 pub use problem::{
@@ -75,10 +82,12 @@ pub use problem::{
     SampleSegment, SignConstraint,
 };
 pub use rejection::RejectionReason;
+pub use support::EffectSupport;
 pub use thresholds::FORCE_ROUNDING;
 pub use tilt::{ForceSensitivity, TiltCandidate};
 
 use bench::{EffectSelector, SelectedEffect};
+use in_time::FoundChange;
 use pool::{FitScope, dot};
 use reproducible::repeatable_shares;
 use thresholds::{EFFECT_LEAST_UNEXPLAINED_RATIO, LEAST_GAIN, REPLACING_LAW_LEAST_SHARE};
@@ -131,6 +140,8 @@ pub struct IdentifiedEffect {
     pub standard_deviations: Vec<Option<f64>>,
     /// Probability that the effect is present, 0 to 1.
     pub probability: f64,
+    /// What supports the effect; the probability follows from it.
+    pub support: EffectSupport,
     /// Effects that explain the data equally well.
     pub indistinguishable_from: Vec<LocatedEffect>,
 }
@@ -164,6 +175,9 @@ pub struct ModelDiagnosis {
     pub steps: Vec<SelectionStep>,
     /// Effects that are missing.
     pub effects: Vec<IdentifiedEffect>,
+    /// Effects that are less likely than not, which the model is not said to lack: with a probability below 0.5. They
+    /// are in no set whose error is reported last, and their estimates belong to the set that had them.
+    pub possible_effects: Vec<IdentifiedEffect>,
     /// All candidates: first those that were found, then by the share that they explain alone.
     pub candidates: Vec<CandidateOutcome>,
     /// Effects that the recordings can neither show nor exclude. Even if such an effect had a force as large as that of
@@ -175,6 +189,8 @@ pub struct ModelDiagnosis {
     pub repeatable_share: Vec<f64>,
     /// Indices of the channels whose residual is unexplained.
     pub unexplained: Vec<usize>,
+    /// Residuals that follow the time and not the state, and that cannot be noise.
+    pub time_residuals: Vec<TimeResidual>,
     /// Places on which proposed laws may act; empty unless something is unexplained.
     pub sites: Vec<LawSite>,
     /// Proposed laws that are in no library and would explain the unexplained residual.
@@ -185,6 +201,7 @@ pub struct ModelDiagnosis {
 /// subtracted from the measured forces of the problem, and samples to be left out become zero.
 pub fn diagnose(problem: &mut DiagnosisProblem, supply: &dyn ColumnProvider) -> ModelDiagnosis {
     problem.removed.resize(problem.layout.channels.len(), 0.0);
+    problem.leave_out_standstill();
     problem.find_reversal_samples();
     problem.estimate_idle_noise();
     // The uncleaned forces are kept for a second cleaning, if slow hum shows in the residual of the first diagnosis.
@@ -192,7 +209,13 @@ pub fn diagnose(problem: &mut DiagnosisProblem, supply: &dyn ColumnProvider) -> 
     let raw = (problem.measured.clone(), problem.removed.clone());
     let with = |found: Vec<Disturbance>| known.iter().cloned().chain(found).collect();
     let cleaned = cleaning::clean_forces(problem);
-    let diagnosis = diagnose_cleaned(problem, supply, with(cleaned));
+    let found = in_time::find_changes(problem, &problem.base.iter().collect::<Vec<_>>());
+    problem.add_changes(found);
+    let (mut diagnosis, later) = diagnose_cleaned(problem, supply, with(cleaned.clone()));
+    // A change that is hidden by a large missing effect is visible only in the residual of the effects found.
+    if problem.add_changes(later) {
+        (diagnosis, _) = diagnose_cleaned(problem, supply, with(cleaned));
+    }
     let ModelDiagnosis {
         residual: rest,
         repeatable_share: again,
@@ -207,15 +230,39 @@ pub fn diagnose(problem: &mut DiagnosisProblem, supply: &dyn ColumnProvider) -> 
     // Start again from the original forces without that hum.
     (problem.measured, problem.removed) = raw;
     let cleaned = cleaning::clean_with_slow_lines(problem, &slow);
-    diagnose_cleaned(problem, supply, with(cleaned))
+    diagnose_cleaned(problem, supply, with(cleaned)).0
 }
 
-/// The diagnosis of a problem whose forces were cleaned from `disturbances`.
+impl DiagnosisProblem {
+    /// Adds changes in time to the candidates. Earlier ones of the same kind and place stay: they were found in more
+    /// recordings, since no effect explained a part of them yet. Returns whether there are new ones.
+    fn add_changes(&mut self, found: Vec<FoundChange>) -> bool {
+        let known = self.candidates.len();
+        for FoundChange {
+            candidate, intervals, ..
+        } in found
+        {
+            if self
+                .change_intervals
+                .iter()
+                .any(|(effect, _)| *effect == candidate.effect)
+            {
+                continue;
+            }
+            self.change_intervals.push((candidate.effect.clone(), intervals));
+            self.candidates.push(candidate);
+        }
+        self.candidates.len() > known
+    }
+}
+
+/// The diagnosis of a problem whose forces were cleaned from `disturbances`, and changes in time that show in its
+/// residual but are not among its effects.
 fn diagnose_cleaned(
     problem: &DiagnosisProblem,
     supply: &dyn ColumnProvider,
     mut disturbances: Vec<Disturbance>,
-) -> ModelDiagnosis {
+) -> (ModelDiagnosis, Vec<FoundChange>) {
     let mut bench = EffectSelector::new(problem, supply);
     bench.update_choices(&[]);
     // Stage 1: forward search over sets of effects.
@@ -251,6 +298,14 @@ fn diagnose_cleaned(
             (picks, left, sites, laws) = (needed, left_then, sites_then, laws_then);
         }
     }
+    // Stage 4: indistinguishable alternatives and probabilities. Effects that are less likely than not are set aside.
+    let mut assessed = bench.assess_effects(&picks, &left);
+    let possible = assessed.set_aside_unlikely(&bench);
+    if !possible.is_empty() {
+        ladder.push(bench.selection_step(&picks, &assessed.picks, None));
+        picks.clone_from(&assessed.picks);
+        left = bench.set_residual(&picks);
+    }
     let SetResidual {
         residual: rest,
         repeatable_share: mut again,
@@ -266,57 +321,47 @@ fn diagnose_cleaned(
         }
     }
     unexplained.sort_unstable();
-    // Stage 4: indistinguishable alternatives, the origin of the residual, disturbances and estimates.
-    let aliases = bench.find_aliases(&picks);
+    // Stage 5: the origin of the residual, disturbances and estimates.
     bench.weigh_channels(&picks);
-    let (budgets, coloured) = bench.residual_budgets(&picks, &rest, &again);
+    let (budgets, coloured, time_residuals) = bench.residual_budgets(&picks, &rest, &again);
     disturbances.extend(bench.disturbances(&picks));
     disturbances.extend(coloured);
-    let estimates = bench.estimate_parameters(&picks, FitScope::Fit);
-    let mut effects = Vec::new();
-    for (i, (pick, aliases)) in picks.iter().zip(aliases).enumerate() {
-        let candidate = bench.candidate(pick);
-        if candidate.nature == CandidateNature::Disturbance {
-            continue;
-        }
-        // Only other causes share the probability; another form of the same effect does not.
-        let rivals = aliases.iter().filter(|alias| !alias.is_equivalent_form);
-        let rivals: Vec<f64> = rivals.map(|alias| alias.criterion_loss).collect();
-        let (values, deviations) = estimates[i].iter().copied().unzip();
-        effects.push(IdentifiedEffect {
-            effect: candidate.effect.clone(),
-            candidate: pick.candidate,
-            constants: pick.constants.clone(),
-            estimates: values,
-            standard_deviations: deviations,
-            probability: bench.probability(&picks, i, &rivals, &unexplained),
-            indistinguishable_from: aliases.into_iter().map(|alias| alias.effect).collect(),
-        });
-    }
+    let mut effects = assessed.identified_effects(&bench);
     merge_drifting_friction(&mut effects, &mut disturbances);
     // Unexplained residual decides before effects that were found.
-    let verdict = match (unexplained.is_empty(), effects.is_empty()) {
+    let changes_in_time = (picks.iter()).any(|pick| bench.candidate(pick).nature == CandidateNature::ChangeInTime);
+    let is_explained = unexplained.is_empty() && !changes_in_time && time_residuals.is_empty();
+    let verdict = match (is_explained, effects.is_empty()) {
         (false, _) => DiagnosisVerdict::Unexplained,
         (true, true) => DiagnosisVerdict::Adequate,
         (true, false) => DiagnosisVerdict::MissingEffect,
     };
-    let candidates = bench.candidate_outcomes(&picks, &found, &alone);
+    let mut candidates = bench.candidate_outcomes(&picks, &found, &alone);
+    for candidate in &mut candidates {
+        if possible.iter().any(|found| found.effect == candidate.effect) {
+            candidate.rejection_reason = Some(RejectionReason::LessLikelyThanNot);
+        }
+    }
     let untold = bench.find_undetermined(&picks, &rest);
-    ModelDiagnosis {
+    let later = bench.changes_in_residual(&picks);
+    let diagnosis = ModelDiagnosis {
         verdict,
         noise_floor: noise_floor(&budgets),
         budgets,
         disturbances,
         steps: ladder,
         effects,
+        possible_effects: possible,
         candidates,
         undetermined_effects: untold,
         residual: rest,
         repeatable_share: again,
         unexplained,
+        time_residuals,
         sites,
         laws,
-    }
+    };
+    (diagnosis, later)
 }
 
 /// Joins friction that is missing and also drifts into one effect: friction that changes with time.
@@ -361,6 +406,15 @@ struct SetResidual {
 }
 
 impl EffectSelector<'_> {
+    /// Changes in time that the residual of a set shows and that are not members of the set.
+    fn changes_in_residual(&self, picks: &[SelectedEffect]) -> Vec<FoundChange> {
+        let columns: Vec<&ForceColumn> = self.columns(picks).iter().map(|k| self.pool.column(*k)).collect();
+        let mut found = in_time::find_changes(self.problem, &columns);
+        let is_member = |effect: &LocatedEffect| picks.iter().any(|pick| self.candidate(pick).effect == *effect);
+        found.retain(|change| !is_member(&change.candidate.effect));
+        found
+    }
+
     /// Residual of a set that is fitted to all samples, with its repeatable share; sets the weights of the channels
     /// from it.
     fn set_residual(&mut self, picks: &[SelectedEffect]) -> SetResidual {
@@ -477,7 +531,7 @@ impl EffectSelector<'_> {
             let new = set.iter().filter(is_new);
             new.map(|pick| self.candidate(pick).effect.clone()).collect()
         };
-        let (fit, check, check_by_channel) = self.relative_errors(after);
+        let (fit, check, check_by_channel) = self.relative_errors(after, self.has_run_parameters(after));
         SelectionStep {
             added: effects(after, before),
             dropped: effects(before, after),
@@ -488,9 +542,16 @@ impl EffectSelector<'_> {
         }
     }
 
+    /// Whether a set has parameters that belong to one recording: those of a validation run are unknown to a fit of the
+    /// other recordings.
+    pub(crate) fn has_run_parameters(&self, picks: &[SelectedEffect]) -> bool {
+        picks.iter().any(|pick| self.candidate(pick).is_per_run)
+    }
+
     /// Relative errors of a set that is fitted to the recordings of the fit: on these, on the validation runs, and per
-    /// channel on the validation runs. Without any, cross-validation gives the last two.
-    fn relative_errors(&self, picks: &[SelectedEffect]) -> (f64, f64, Vec<f64>) {
+    /// channel on the validation runs. `by_folds` requests cross-validation over all recordings for the last two; it is
+    /// used in any case if there is no validation run.
+    fn relative_errors(&self, picks: &[SelectedEffect], by_folds: bool) -> (f64, f64, Vec<f64>) {
         let layout = &self.problem.layout;
         let split = layout.fit_samples();
         let rest = self.full_residual(picks);
@@ -503,17 +564,18 @@ impl EffectSelector<'_> {
         let relative = |error: f64, force: f64| (error / force.max(f64::MIN_POSITIVE)).sqrt();
         let whole = |errors: &[f64], forces: &[f64]| relative(errors.iter().sum(), forces.iter().sum());
         let fit = whole(&squares(&rest, 0..split), &squares(&forces, 0..split));
-        let judged = if layout.has_check() {
+        let by_folds = by_folds || !layout.has_check();
+        let judged = if by_folds {
+            0..layout.samples()
+        } else {
             split..layout.samples()
-        } else {
-            0..split
         };
-        let errors = if layout.has_check() {
-            squares(&rest, judged.clone())
-        } else {
+        let errors = if by_folds {
             // Validation errors are weighted by channel; reported errors are not.
             let held_out = |d: usize| self.validation_errors(picks, &[d], true).iter().sum::<f64>() / self.weights[d];
             channels.map(held_out).collect()
+        } else {
+            squares(&rest, judged.clone())
         };
         let forces = squares(&forces, judged);
         let pairs = errors.iter().zip(&forces);
@@ -584,6 +646,8 @@ impl EffectSelector<'_> {
                     RejectionReason::WrongSign
                 } else if refused.cancels {
                     RejectionReason::CancelsAnother
+                } else if refused.is_implausible {
+                    RejectionReason::ImplausibleValue
                 } else {
                     refused
                         .evidence
@@ -600,6 +664,8 @@ impl EffectSelector<'_> {
                     RejectionReason::WrongSign
                 } else if trial.cancelling.contains(&picks.len()) {
                     RejectionReason::CancelsAnother
+                } else if trial.implausible.contains(&picks.len()) {
+                    RejectionReason::ImplausibleValue
                 } else if gain < LEAST_GAIN {
                     RejectionReason::ExplainsNothing
                 } else {

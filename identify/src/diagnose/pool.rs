@@ -7,7 +7,7 @@
 
 use std::array;
 use std::borrow::Cow;
-use std::cell::RefCell;
+use std::cell::{OnceCell, RefCell};
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
@@ -55,6 +55,10 @@ pub(crate) struct ColumnPool<'a> {
     left_out: Vec<Vec<usize>>,
     /// Prior knowledge of the factors of the first columns, as further equations: the inverse of their covariance.
     pub(crate) prior_equations: Option<DMatrix<f64>>,
+    /// Largest force of each channel, N or N m; infinite where there is none.
+    pub(crate) force_scales: Vec<f64>,
+    /// The range of each column relative to these forces, computed when it is first needed.
+    relative_ranges: Vec<OnceCell<f64>>,
 }
 
 impl<'a> ColumnPool<'a> {
@@ -73,6 +77,8 @@ impl<'a> ColumnPool<'a> {
             lost: layout.left_out.clone(),
             left_out: layout.left_out.iter().map(|out| true_indices(out)).collect(),
             prior_equations: None,
+            force_scales: Vec::new(),
+            relative_ranges: Vec::new(),
         }
     }
 
@@ -134,6 +140,7 @@ impl<'a> ColumnPool<'a> {
         self.columns.push(column);
         self.products.get_mut().push(PairProducts::default());
         self.of_folds.get_mut().push(PairProducts::default());
+        self.relative_ranges.push(OnceCell::new());
         self.columns.len() - 1
     }
 
@@ -145,6 +152,7 @@ impl<'a> ColumnPool<'a> {
     /// Removes all columns from an index on, with their products, and returns them.
     pub(crate) fn split_off(&mut self, known: usize) -> Vec<Cow<'a, ForceColumn>> {
         self.acts.truncate(known);
+        self.relative_ranges.truncate(known);
         self.products.get_mut().truncate(known);
         self.of_folds.get_mut().truncate(known);
         self.columns.split_off(known)
@@ -154,6 +162,7 @@ impl<'a> ColumnPool<'a> {
     pub(crate) fn release_column(&mut self, k: usize) {
         self.acts[k].fill(0);
         self.columns[k] = Cow::Owned(ForceColumn::default());
+        self.relative_ranges[k] = OnceCell::new();
         self.products.get_mut()[k] = PairProducts::default();
         self.of_folds.get_mut()[k] = PairProducts::default();
     }
@@ -161,6 +170,24 @@ impl<'a> ColumnPool<'a> {
     /// The column with an index.
     pub(crate) fn column(&self, k: usize) -> &ForceColumn {
         &self.columns[k]
+    }
+
+    /// Half of the range of a column's values, relative to the largest force of the channel; of several channels the
+    /// largest. A constant column has no range: its force may balance an origin of a coordinate.
+    pub(crate) fn relative_range(&self, k: usize) -> f64 {
+        *self.relative_ranges[k].get_or_init(|| {
+            let channels = self.columns[k].0.iter().zip(&self.force_scales);
+            let ranges = channels.filter_map(|(values, scale)| {
+                let values = values.as_ref()?;
+                let (low, high) = values
+                    .iter()
+                    .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
+                        (low.min(*x), high.max(*x))
+                    });
+                Some(0.5 * (high - low) / scale)
+            });
+            ranges.filter(|range| range.is_finite()).fold(0.0, f64::max)
+        })
     }
 
     /// Values of a column on a channel; `None` where they are all zero.
@@ -512,6 +539,7 @@ mod tests {
             segments: vec![SampleSegment {
                 name: String::new(),
                 samples: 50,
+                start: 0.0,
                 step: 0.1,
                 recorded_step: 0.1,
                 is_check: false,
@@ -554,6 +582,7 @@ mod tests {
             segments: vec![SampleSegment {
                 name: String::new(),
                 samples: 50,
+                start: 0.0,
                 step: 0.1,
                 recorded_step: 0.1,
                 is_check: false,

@@ -6,6 +6,7 @@ use super::body::AttachedBody;
 use super::column::ForceColumn;
 use super::constant::ConstantCorrection;
 use super::disturbance::Disturbance;
+use super::in_time::{ChangeInterval, ChangeShape};
 use super::laws::LawSite;
 use super::tilt::TiltCandidate;
 
@@ -16,6 +17,8 @@ pub struct SampleSegment {
     pub name: String,
     /// Number of samples.
     pub samples: usize,
+    /// Time of the first sample, s.
+    pub start: f64,
     /// Mean time between them, s.
     pub step: f64,
     /// Time between samples as recorded, before any were left out, s.
@@ -49,6 +52,15 @@ impl SampleLayout {
     pub fn fit_samples(&self) -> usize {
         let fit = self.segments.iter().filter(|s| !s.is_check);
         fit.map(|s| s.samples).sum()
+    }
+
+    /// Times of all samples, s: equally spaced in each segment.
+    pub fn times(&self) -> Vec<f64> {
+        let of = |segment: &SampleSegment| {
+            let (start, step) = (segment.start, segment.step);
+            (0..segment.samples).map(move |i| start + step * i as f64)
+        };
+        self.segments.iter().flat_map(of).collect()
     }
 
     /// Whether there is a validation run.
@@ -160,6 +172,15 @@ pub enum CandidateNature {
     Effect,
     /// A disturbance of the recordings, which is not a model error.
     Disturbance,
+    /// A change of the machine or of a signal within a recording: the model is valid for a part of it only.
+    ChangeInTime,
+}
+
+impl CandidateNature {
+    /// Whether it is part of the recordings and not of the model.
+    pub fn is_disturbance(self) -> bool {
+        self != Self::Effect
+    }
 }
 
 /// Selects the load-dependent candidates whose columns are requested.
@@ -254,8 +275,14 @@ pub struct DiagnosisProblem {
     pub jumps: Vec<Vec<bool>>,
     /// Mean square of the forces that were removed from each channel, since they are not a function of the state.
     pub removed: Vec<f64>,
+    /// Possible changes of the machine or of its signals within a recording.
+    pub change_shapes: Vec<ChangeShape>,
+    /// When the changes act that were added to the candidates, by kind and place.
+    pub change_intervals: Vec<(LocatedEffect, Vec<ChangeInterval>)>,
     /// Disturbances of the recordings that are known already.
     pub disturbances: Vec<Disturbance>,
+    /// Largest distance of two frames of the machine, m, which bounds plausible lengths; zero if it is unknown.
+    pub size: f64,
     /// Whether only verdict, steps and effects are requested: no laws, no alternatives and no rejected candidates.
     pub effects_only: bool,
 }
@@ -273,6 +300,7 @@ impl DiagnosisProblem {
             base: Vec::new(),
             friction: Vec::new(),
             variables: Vec::new(),
+            change_shapes: Vec::new(),
             ..self
         }
     }
@@ -288,6 +316,7 @@ mod tests {
         let segment = |samples| SampleSegment {
             name: String::new(),
             samples,
+            start: 0.0,
             step: 0.01,
             recorded_step: 0.01,
             is_check: false,

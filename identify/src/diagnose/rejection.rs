@@ -9,6 +9,10 @@ pub enum RejectionReason {
     WrongSign,
     /// It would only cancel another effect at its place.
     CancelsAnother,
+    /// A value is beyond what the machine's size and forces allow.
+    ImplausibleValue,
+    /// It is less likely than not, and reported as possible.
+    LessLikelyThanNot,
     /// Another candidate explains more.
     ExplainedBetter,
     /// It explains almost nothing of the residual.
@@ -36,6 +40,8 @@ impl RejectionReason {
         match self {
             Self::WrongSign => "sign",
             Self::CancelsAnother => "it would only cancel another effect at its place",
+            Self::ImplausibleValue => "implausible value",
+            Self::LessLikelyThanNot => "less likely than not",
             Self::ExplainedBetter => "another explains more",
             Self::ExplainsNothing => "explains nothing that is left",
             Self::OnlyNoiseRemains => "what is left is rounding",

@@ -273,6 +273,7 @@ mod tests {
             segments: vec![SampleSegment {
                 name: String::new(),
                 samples: n,
+                start: 0.0,
                 step: 0.004,
                 recorded_step: 0.004,
                 is_check: false,

@@ -8,18 +8,15 @@ use super::evidence::SelectionEvidence;
 use super::pool::FitScope;
 use super::problem::{ColumnSource, DiagnosisProblem};
 use super::thresholds::{
-    OTHER_KIND_SHARE, OTHER_SET_LEAST_ADVANTAGE, OTHER_SET_LEAST_GAIN, PLACE_PRICE, RIVAL_FINER_GAIN_FACTOR,
-    RIVAL_MOST_GRID_RATIO, RIVAL_MOST_RATIO, SIMPLER_KIND_SHARE, SIMPLER_SET_MOST_LOSS,
+    OTHER_KIND_SHARE, OTHER_SET_LEAST_ADVANTAGE, OTHER_SET_LEAST_GAIN, PLACE_PRICE, REFINEMENT_FEWEST_NUMBERS,
+    REFINEMENT_LEAST_GAIN, RIVAL_FINER_GAIN_FACTOR, RIVAL_MOST_GRID_RATIO, RIVAL_MOST_RATIO, SIMPLER_KIND_SHARE,
+    SIMPLER_SET_MOST_LOSS, STEP_MOST_RISE,
 };
 
 /// Sets that are followed at the same time (width of the beam).
 const BEAM: usize = 6;
 /// Sets of one size that are tested on validation data before the search stops.
 const TESTED: usize = 10;
-/// Number of candidates whose pairs are all tried: those that explain most in addition to the accepted set.
-const PAIRED: usize = 140;
-/// Number of pairs that join the other trial sets.
-const BEST_PAIRS: usize = 12;
 /// Largest number of effects in a set.
 const MOST: usize = 40;
 
@@ -53,6 +50,8 @@ pub(crate) struct RejectedCandidate {
     pub(crate) wrong_sign: bool,
     /// Whether an effect of the set does little but cancel another one.
     pub(crate) cancels: bool,
+    /// Whether an estimate is beyond what the machine's size and forces allow.
+    pub(crate) is_implausible: bool,
 }
 
 /// Result of the search.
@@ -147,6 +146,7 @@ impl EffectSelector<'_> {
                 .simplest_single_effect(accepted, &next.trial)
                 .unwrap_or((next.trial, next.evidence));
             let (picks, _) = self.simplest_set(accepted, trial, evidence, trials);
+            let picks = self.drop_unsupported_members(accepted, picks);
             let refined = self.refine_constants(picks);
             let polished = self.exchange_finely(refined);
             let refreshed = self.refresh_columns(polished);
@@ -157,6 +157,7 @@ impl EffectSelector<'_> {
             if settled.is_possible()
                 && evidence.is_sufficient()
                 && !self.is_worse_overall(accepted, &settled.picks, &channels)
+                && self.is_ladder_step(accepted, &settled, evidence.gain)
             {
                 return Some(EffectSetChange {
                     picks: settled.picks,
@@ -166,6 +167,21 @@ impl EffectSelector<'_> {
             // The set has lost its support; try the next one without it.
             trials.retain(|trial| candidate_indices(&trial.picks) != next.candidates);
         }
+    }
+
+    /// Whether a set may follow the accepted one: the error of all drives together does not rise, a general kind that
+    /// replaces simpler ones is much better, and faults of force signals are confirmed.
+    fn is_ladder_step(&self, accepted: &[SelectedEffect], next: &ScoredEffectSet, gain: f64) -> bool {
+        let before: usize = accepted.iter().map(|pick| self.freedoms(pick)).sum();
+        let is_refinement = next.freedoms >= before + REFINEMENT_FEWEST_NUMBERS
+            && next.picks.len() <= accepted.len()
+            && !Self::replaced_effects(accepted, &next.picks).is_empty();
+        // Both sets are judged by the same data.
+        let by_folds = self.has_run_parameters(accepted) || self.has_run_parameters(&next.picks);
+        let error = |picks: &[SelectedEffect]| self.relative_errors(picks, by_folds).1;
+        (!is_refinement || gain >= REFINEMENT_LEAST_GAIN)
+            && self.are_readings_confirmed(&next.picks)
+            && error(&next.picks) <= (1.0 + STEP_MOST_RISE) * error(accepted)
     }
 
     /// The first trial that is supported by evidence. Sets that add one effect come first; `refused` receives the
@@ -216,7 +232,8 @@ impl EffectSelector<'_> {
     pub(crate) fn is_worse(&mut self, settled: &[SelectedEffect], before: &[SelectedEffect]) -> bool {
         self.weigh_channels(before);
         let channels: Vec<usize> = (0..self.weights.len()).collect();
-        self.evidence(settled, before, &channels).is_worth_keeping()
+        let evidence = self.evidence(settled, before, &channels);
+        evidence.is_worth_keeping() || evidence.gives_back()
     }
 
     /// Whether a trial adds exactly one effect to the accepted set; the new effect may replace members that it
@@ -251,7 +268,7 @@ impl EffectSelector<'_> {
             tested += usize::from(trial.is_possible());
             let news: Vec<SelectedEffect> = set_difference(&trial.picks, accepted);
             let evidence = self.evidence(accepted, &trial.picks, &self.affected_channels(&news));
-            if evidence.is_sufficient() && trial.is_possible() {
+            if evidence.is_sufficient() && trial.is_possible() && self.are_readings_confirmed(&trial.picks) {
                 return Some(SupportedEffectSet {
                     candidates: tried,
                     trial,
@@ -265,27 +282,22 @@ impl EffectSelector<'_> {
                     evidence,
                     wrong_sign: !trial.wrong_sign.is_empty(),
                     cancels: !trial.cancelling.is_empty(),
+                    is_implausible: !trial.implausible.is_empty(),
                 });
             }
         }
         None
     }
 
-    /// All sets with one more effect than those in the beam, and the best pairs. The best of them are improved by
-    /// exchanges. Returns at most 40, best first.
-    fn grow_sets(&mut self, accepted: &[SelectedEffect], beam: &[Vec<SelectedEffect>]) -> Vec<ScoredEffectSet> {
-        // One table of inner products serves all trials; the number of independent equations comes from the accepted
-        // set.
-        let all: Vec<SelectedEffect> = beam.iter().flatten().cloned().collect();
-        let table = self.projected_gram(&all);
-        let (factors, _) = self.fit(accepted, FitScope::All);
-        let rest = self.residual(accepted, &factors);
-        let channels: Vec<usize> = (0..rest.len()).collect();
-        // Number of independent equations for the information criterion.
-        let worth = self.effective_equations(&rest, &channels);
-        let mut trials: Vec<ScoredEffectSet> = Vec::new();
-        let mut known: HashSet<Vec<usize>> = HashSet::new();
-        // Stage 1: every set of the beam with every candidate.
+    /// Every set of the beam with every candidate; an effect that contains a member replaces it. `known` receives the
+    /// candidates of each set.
+    fn extend_beam(
+        &self,
+        beam: &[Vec<SelectedEffect>],
+        table: &ProjectedGram,
+        known: &mut HashSet<Vec<usize>>,
+    ) -> Vec<ScoredEffectSet> {
+        let mut trials = Vec::new();
         for set in beam {
             for pick in self.current_choices.iter().flatten() {
                 if set.iter().any(|p| p.candidate == pick.candidate) {
@@ -305,10 +317,28 @@ impl EffectSelector<'_> {
                 picks.push(pick);
                 // The same set may be reached from several sets of the beam.
                 if known.insert(candidate_indices(&picks)) {
-                    trials.push(self.fit_from_gram(&table, picks));
+                    trials.push(self.fit_from_gram(table, picks));
                 }
             }
         }
+        trials
+    }
+
+    /// All sets with one more effect than those in the beam, and the best pairs. The best of them are improved by
+    /// exchanges. Returns at most 40, best first.
+    fn grow_sets(&mut self, accepted: &[SelectedEffect], beam: &[Vec<SelectedEffect>]) -> Vec<ScoredEffectSet> {
+        // One table of inner products serves all trials; the number of independent equations comes from the accepted
+        // set.
+        let all: Vec<SelectedEffect> = beam.iter().flatten().cloned().collect();
+        let table = self.projected_gram(&all);
+        let (factors, _) = self.fit(accepted, FitScope::All);
+        let rest = self.residual(accepted, &factors);
+        let channels: Vec<usize> = (0..rest.len()).collect();
+        // Number of independent equations for the information criterion.
+        let worth = self.effective_equations(&rest, &channels);
+        let mut known: HashSet<Vec<usize>> = HashSet::new();
+        // Stage 1: every set of the beam with every candidate.
+        let mut trials = self.extend_beam(beam, &table, &mut known);
         // Stage 2: pairs of candidates.
         let pairs = self.best_pairs(accepted, &table, worth);
         trials.extend(
@@ -316,6 +346,12 @@ impl EffectSelector<'_> {
                 .filter(|pair| beam.iter().all(|set| !is_same_set(set, &pair.picks)))
                 .collect::<Vec<ScoredEffectSet>>(),
         );
+        // Stage 3: the same kinds at all drives, and pairs of kinds at one drive.
+        for trial in self.alike_sets(accepted, &table) {
+            if known.insert(candidate_indices(&trial.picks)) {
+                trials.push(trial);
+            }
+        }
         // The best set gives the best estimate of the noise: with its residual, samples are less correlated and worth
         // more.
         let best = trials.iter().filter(|trial| trial.is_possible());
@@ -341,7 +377,7 @@ impl EffectSelector<'_> {
         trials.sort_by(|a, b| score(a).total_cmp(&score(b)));
         let all: Vec<SelectedEffect> = trials.iter().flat_map(|t| t.picks.clone()).collect();
         let table = self.projected_gram(&all);
-        // Stage 3: exchange every member of the best sets for every other candidate, as long as a set gets better.
+        // Stage 4: exchange every member of the best sets for every other candidate, as long as a set gets better.
         for k in 0..trials.len().min(BEAM) {
             // Repeat as long as any exchange improves the set.
             let mut best = trials[k].clone();
@@ -389,59 +425,6 @@ impl EffectSelector<'_> {
         trials.sort_by(|a, b| a.score.total_cmp(&b.score));
         trials.truncate(40);
         trials
-    }
-
-    /// The best pairs of further effects, added to the accepted set or to this set without one member. A pair may
-    /// explain everything where neither effect explains much alone, and where an effect that two places share was
-    /// accepted first.
-    fn best_pairs(&self, accepted: &[SelectedEffect], table: &ProjectedGram, worth: f64) -> Vec<ScoredEffectSet> {
-        let is_new = |pick: &&SelectedEffect| accepted.iter().all(|p| p.candidate != pick.candidate);
-        // Weighted squared residual of the accepted set with one more effect.
-        let alone = |pick: &SelectedEffect| {
-            let mut set = accepted.to_vec();
-            set.push(pick.clone());
-            self.fit_from_gram(table, set).squares
-        };
-        // Only effects with at most two estimated numbers take part in pairs.
-        let simple = self.current_choices.iter().flatten().filter(is_new);
-        let simple = simple.filter(|pick| self.freedoms(pick) <= 2);
-        let mut further: Vec<(f64, &SelectedEffect)> = simple.map(|pick| (alone(pick), pick)).collect();
-        further.sort_by(|a, b| a.0.total_cmp(&b.0));
-        further.truncate(PAIRED);
-        // The accepted set and every subset with one member less.
-        let mut kept: Vec<Vec<SelectedEffect>> = vec![accepted.to_vec()];
-        kept.extend((0..accepted.len()).map(|i| {
-            let mut fewer = accepted.to_vec();
-            fewer.remove(i);
-            fewer
-        }));
-        // Sorted list of the best pairs with their criterion.
-        let mut best: Vec<(f64, ScoredEffectSet)> = Vec::new();
-        for set in kept {
-            let beyond = self.extension_bound(table, &set);
-            for (i, (_, one)) in further.iter().enumerate() {
-                for (_, two) in &further[i + 1..] {
-                    // Once the list is full, skip pairs whose lower bound is above its last entry.
-                    if best.len() == BEST_PAIRS {
-                        let least = self.least_criterion(&beyond, &[one, two], worth);
-                        if best.last().is_some_and(|(last, _)| least > *last) {
-                            continue;
-                        }
-                    }
-                    let mut picks = set.clone();
-                    picks.extend([(*one).clone(), (*two).clone()]);
-                    let trial = self.fit_from_gram(table, picks);
-                    let own = criterion(self.problem, &trial, worth);
-                    if best.len() < BEST_PAIRS || best.last().is_some_and(|(last, _)| own < *last) {
-                        // Insert in order, so that the last entry is the worst of the list.
-                        let at = best.partition_point(|(other, _)| *other < own);
-                        best.insert(at, (own, trial));
-                        best.truncate(BEST_PAIRS);
-                    }
-                }
-            }
-        }
-        best.into_iter().map(|(_, trial)| trial).collect()
     }
 
     /// Exchanges members of a set for candidates that are nearly as good, each with finely searched constants: on the
@@ -528,7 +511,9 @@ impl EffectSelector<'_> {
         // Estimated numbers that the large effect adds: the budget for simple ones.
         let before: usize = accepted.iter().map(|p| self.freedoms(p)).sum();
         let budget = best.freedoms.checked_sub(before)?;
-        if budget < 2 {
+        // Kinds at all drives are simple effects already.
+        let news = best.picks.len().saturating_sub(accepted.len());
+        if budget < 2 || news > 2 {
             return None;
         }
         let mut all = accepted.to_vec();

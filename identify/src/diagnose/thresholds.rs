@@ -13,6 +13,28 @@ pub(super) const LEAST_GAIN: f64 = 0.02;
 /// (CHANGELOG.md).
 pub(super) const NOISE_LEAST_GAIN_VARIANCES: f64 = 8.0;
 
+/// Least gain of any change (1): half of it is the fall of the error itself, which shows in the third printed digit of
+/// the error at the latest. By judgement.
+pub(super) const MATERIAL_LEAST_GAIN: f64 = 0.005;
+
+/// A kind with at least this many more estimated numbers is a refinement, which must lower the squared error on its
+/// channels by [`REFINEMENT_LEAST_GAIN`]. By judgement.
+pub(super) const REFINEMENT_FEWEST_NUMBERS: usize = 3;
+
+/// Least gain of a general kind that replaces simpler members (1). By judgement.
+pub(super) const REFINEMENT_LEAST_GAIN: f64 = 0.1;
+
+/// An exchange or a removal must not raise the squared error on data that was not fitted by more than this share (1).
+/// By judgement.
+pub(super) const GIVEN_BACK_MOST_SHARE: f64 = 0.04;
+
+/// A rise of the error that is below this many standard errors over the blocks (1) is noise. By judgement.
+pub(super) const GIVEN_BACK_LEAST_T: f64 = 1.0;
+
+/// A step may raise the relative error of all drives together by this part (1), if it lowers that of its own drive. By
+/// judgement.
+pub(super) const STEP_MOST_RISE: f64 = 1e-3;
+
 /// Least t value of the gain over the blocks if the residual is white noise (1): only noise makes blocks differ then.
 /// By judgement.
 pub(super) const NOISE_LEAST_T: f64 = 1.0;
@@ -52,6 +74,59 @@ pub(super) const RANDOM_SIGN_SHARE: f64 = 0.05;
 /// Two effects at a place cancel if their sum has less than this share of the squares of the larger one (1). A quarter
 /// of the squares is half of the amplitude. By judgement.
 pub(super) const CANCELLATION_SHARE: f64 = 0.25;
+
+/// The same for two effects at different places: their columns differ, so that only what cancels nearly completely is
+/// no effect (1). By judgement.
+pub(super) const FULL_CANCELLATION_SHARE: f64 = 0.03;
+
+/// A force of a parameter is implausible if half of its range is above this many times the largest force of its drive
+/// (1). A spring or a counterweight that carries most of the weight may be several times as strong as its drive. By
+/// judgement.
+pub(super) const PLAUSIBLE_MOST_FORCE_RATIO: f64 = 5.0;
+
+/// Largest plausible error of a length, as a part of the largest distance of two frames (1). By judgement.
+pub(super) const PLAUSIBLE_MOST_LENGTH_SHARE: f64 = 0.3;
+
+/// Largest plausible error of an angle or of the zero of an encoder, rad: what is larger is another fault. By judgement.
+pub(super) const PLAUSIBLE_MOST_ANGLE: f64 = 0.7;
+
+/// Largest plausible play of a gear or eccentricity of an encoder, rad. By judgement.
+pub(super) const PLAUSIBLE_MOST_PLAY: f64 = 0.1;
+
+/// The same for a length, as a part of the largest distance of two frames (1). By judgement.
+pub(super) const PLAUSIBLE_MOST_PLAY_SHARE: f64 = 0.05;
+
+/// Largest plausible delay or time constant of a force signal, s. By judgement.
+pub(super) const PLAUSIBLE_MOST_DELAY: f64 = 0.1;
+
+/// Largest plausible friction as a share of the load (1): a drive with more could not move. By judgement.
+pub(super) const PLAUSIBLE_MOST_LOAD_SHARE: f64 = 1.0;
+
+/// A constant above this part of the largest value of its grid (1) is at the end of its range. By judgement.
+pub(super) const GRID_END_SHARE: f64 = 0.99;
+
+/// Least plausible relative error of the scale of a force signal (1). A signal at -1 does not follow the motion at all.
+/// By judgement, from the torso of a robot with -1.085 and joints with pushes with -0.94 to -0.99 (issue 28).
+pub(super) const GAIN_LEAST: f64 = -0.75;
+
+/// Largest plausible relative error of the scale of a force signal (1). By judgement.
+pub(super) const GAIN_MOST: f64 = 3.0;
+
+/// A wrong scale of a force signal must leave at most this share of the squared error of its drive, on data that was not
+/// fitted (1). By judgement.
+pub(super) const SCALE_MOST_REMAINING_SHARE: f64 = 0.5;
+
+/// Largest difference of its values in the two halves of the data, relative to the larger one (1). By judgement.
+pub(super) const SCALE_MOST_DIFFERENCE: f64 = 0.3;
+
+/// Samples on either side of a reversal that are near it. By judgement.
+pub(super) const FAR_REVERSAL_SAMPLES: usize = 4;
+
+/// Share of the samples that must be far from reversals (1), so that a delay can be confirmed there. By judgement.
+pub(super) const FAR_LEAST_SHARE: f64 = 0.2;
+
+/// A delay or low-pass must have at least this part of its gain far from reversals too (1). By judgement.
+pub(super) const DELAY_LEAST_SHARE_FAR: f64 = 0.25;
 
 /// A column of an effect is dependent if less than this share of its squares remains after the projection on the others
 /// (1). By judgement.
@@ -123,15 +198,37 @@ pub(super) const SUBSTITUTE_MOST_RATIO: f64 = 3.0;
 /// An effect that explains less than this share of the squares (1) has no alternatives. By judgement.
 pub(super) const NEGLIGIBLE_EFFECT_SHARE: f64 = 1e-6;
 
-/// Largest odds for an effect, as twice their logarithm (1). By judgement.
-pub(super) const MAX_LOG_ODDS: f64 = 20.0;
+/// Logarithm of the odds of an effect with the gain and the t value of reference and nothing unexplained (1).
+/// This and the next three were chosen by the largest likelihood on 43 claims with known truth (38 of them true) of
+/// `spidermill-harsh`, `spidermill-cases` and `beyond` in `shared/data`, rounded.
+pub(super) const ODDS_AT_REFERENCE: f64 = 0.9;
 
-/// Probability that another cause, which is no candidate, explains what an effect explains, if the residual is noise
-/// (1). By judgement.
-pub(super) const UNKNOWN_CAUSE_PROBABILITY: f64 = 0.02;
+/// Rise of these for each factor e of the t value (1). By the same likelihood.
+pub(super) const ODDS_PER_T: f64 = 1.5;
 
-/// The same if a repeatable part of the residual is unexplained (1). By judgement.
-pub(super) const UNKNOWN_CAUSE_IF_UNEXPLAINED: f64 = 0.25;
+/// Rise of these for each factor e of the gain (1). By the same likelihood.
+pub(super) const ODDS_PER_GAIN: f64 = 1.0;
+
+/// Fall of these for each factor e of one plus the unexplained ratio (1). By the same likelihood.
+pub(super) const ODDS_PER_UNEXPLAINED: f64 = 2.0;
+
+/// Odds of an alternative that explains as much, relative to the effect that was preferred as the simpler one (1). By
+/// judgement.
+pub(super) const ODDS_OF_ALTERNATIVE: f64 = 0.5;
+
+/// The t value of reference, and the range to which a t value is limited (1). By judgement.
+pub(super) const SUPPORT_T_REFERENCE: f64 = 4.0;
+pub(super) const SUPPORT_T_RANGE: [f64; 2] = [0.2, 12.0];
+
+/// The gain of reference, and the range to which a gain is limited (1). By judgement.
+pub(super) const SUPPORT_GAIN_REFERENCE: f64 = 0.3;
+pub(super) const SUPPORT_GAIN_RANGE: [f64; 2] = [0.005, 1.0];
+
+/// Largest probability of an effect: no data exclude a cause that is no candidate (1). By judgement.
+pub(super) const PROBABILITY_MOST: f64 = 0.99;
+
+/// Below this probability an effect is possible, and the model is not said to lack it (1). By definition.
+pub(super) const LACKING_LEAST_PROBABILITY: f64 = 0.5;
 
 /// A column whose share of squares outside of the others is below this (1) is a combination of them along any motion,
 /// and its effect is not listed as undetermined. Below it is rounding. By judgement.
@@ -221,6 +318,72 @@ pub(super) const SLOW_LINE_MOST_REMAINING_SHARE: f64 = 0.5;
 
 /// Least share of every segment that a slow line must explain before its frequency is refined (1). By judgement.
 pub(super) const SLOW_LINE_LEAST_SEGMENT_SHARE: f64 = 0.3;
+
+// --- changes in time
+
+/// A change in time must explain this share of the squared residual of its recording on its channels (1). By judgement.
+pub(super) const CHANGE_LEAST_SHARE: f64 = 0.05;
+
+/// A step must explain this many times what a slow change of the same shape explains (1): drift is slow. By judgement.
+pub(super) const CHANGE_LEAST_ADVANTAGE: f64 = 1.1;
+
+/// An interval must explain this many times what a step explains (1), since it has a second time. By judgement.
+pub(super) const INTERVAL_LEAST_ADVANTAGE: f64 = 1.3;
+
+/// Two changes begin together if their times differ by less than this share of the longer one (1). By judgement.
+pub(super) const SAME_CHANGE_TIME_SHARE: f64 = 0.1;
+
+/// A change with fewer parameters is kept if it explains this share of what the more general one explains (1). By
+/// judgement.
+pub(super) const SIMPLER_CHANGE_SHARE: f64 = 0.9;
+
+// --- residual that follows the time
+
+/// A residual is tested for a part that follows the time if its variance is this many times that of the white noise
+/// (1): twice the noise. By the truth sets of `beyond`: no error above twice the noise is adequate.
+pub(super) const TIME_RESIDUAL_LEAST_NOISE_RATIO: f64 = 4.0;
+
+/// Below this share of its largest rate a drive is near standstill (1). By judgement.
+pub(super) const STANDSTILL_RATE_SHARE: f64 = 0.02;
+
+/// Standstill from this time on, s, is left out of the diagnosis. By judgement: reversals of a motion are shorter.
+pub(super) const STANDSTILL_SHORTEST_S: f64 = 0.3;
+
+/// A channel that stands for more than this share of the samples (1) keeps all of them. By judgement.
+pub(super) const STANDSTILL_MOST_SHARE: f64 = 0.6;
+
+/// Fewest samples of a window. By judgement: outliers that a filter has spread cover a few samples only.
+pub(super) const WINDOW_FEWEST_SAMPLES: f64 = 25.0;
+
+/// A window is loud if its power is this many times the median power (1). By judgement: with eight independent samples
+/// in a window, stationary noise exceeds four times its median in one window of 100.
+pub(super) const LOUD_LEAST_RATIO: f64 = 6.0;
+
+/// Loud windows must have this share of the squares (1). By judgement.
+pub(super) const LOUD_LEAST_SHARE: f64 = 0.5;
+
+/// Loud windows may last for this share of the time at most (1); else they are no exception. By judgement.
+pub(super) const LOUD_MOST_DURATION: f64 = 0.4;
+
+/// Half width of the band of a resonance, relative to its frequency (1). By judgement.
+pub(super) const RESONANCE_HALF_WIDTH: f64 = 0.2;
+
+/// Share of the power above the white noise that must lie in this band (1). By judgement: a low-pass leaves at most a
+/// quarter in any such band.
+pub(super) const RESONANCE_LEAST_SHARE: f64 = 0.6;
+
+/// Largest share of the power below half of the frequency (1): coloured noise and drift are low. By judgement.
+pub(super) const RESONANCE_MOST_LOW_SHARE: f64 = 0.2;
+
+/// Lowest frequency of a resonance, Hz: below it lie motions. By judgement.
+pub(super) const RESONANCE_LOWEST_HZ: f64 = 2.0;
+
+/// From this share of the squared force on, a residual that follows the time is too large for noise (1): a tenth of the
+/// force. By judgement.
+pub(super) const LARGE_RESIDUAL_LEAST_SHARE: f64 = 0.01;
+
+/// The same relative to the variance of the white noise (1). By judgement.
+pub(super) const LARGE_RESIDUAL_LEAST_NOISE_RATIO: f64 = 16.0;
 
 // --- proposed laws
 

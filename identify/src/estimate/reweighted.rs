@@ -277,6 +277,36 @@ mod tests {
         assert!((scales[1] - 0.2).abs() < 0.02, "{scales:?}");
     }
 
+    /// A driven channel and one without a drive, whose equation says that two forces cancel: both parameters come back,
+    /// and the weight of the second channel stays finite.
+    #[test]
+    fn equations_without_a_force_do_not_take_all_weight() {
+        for seed in 0..8 {
+            let mut noise = TestNoise::new(40 + seed);
+            let truth = [1.2, 0.06, 0.024];
+            let mut rows = Rows {
+                w: Vec::new(),
+                y: Vec::new(),
+            };
+            for i in 0..1500 {
+                let t = 0.01 * f64::from(i);
+                let (a, b, c) = ((3.0 * t).sin(), (5.0 * t).cos(), (1.7 * t).sin());
+                rows.w.extend([a, b, 0.0]);
+                rows.y.push(truth[0] * a + truth[1] * b + 0.05 * noise.normal());
+                // The states have noise, so that zero parameters fit this channel best.
+                rows.w
+                    .extend([0.0, 0.4 * c + 0.01 * noise.normal(), -c + 0.01 * noise.normal()]);
+                rows.y.push(0.0);
+            }
+            let found = run(&rows, &WEIGHTED);
+            for (value, truth) in found.solution.values.iter().zip(truth) {
+                assert!((value / truth - 1.0).abs() < 0.2, "{:?}", found.solution.values);
+            }
+            let scales = &found.weighting.scales;
+            assert!(scales[1] >= scales[0], "{scales:?}");
+        }
+    }
+
     #[test]
     fn a_robust_estimate_is_not_moved_by_what_is_far_off() {
         let rows = rows(&mut TestNoise::new(4), 2000, [0.5, 0.5], 0.0, 0.08);

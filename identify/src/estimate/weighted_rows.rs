@@ -70,7 +70,7 @@ pub(crate) fn residual_scales<E: From<LeastSquaresError>>(
         }
         Ok(())
     })?;
-    Ok((0..channels)
+    let mut scales: Vec<f64> = (0..channels)
         .map(|channel| {
             let samples = counts[channel].max(1) as f64;
             let freedom = (samples - solution.rank as f64 / channels as f64).max(1.0);
@@ -84,7 +84,28 @@ pub(crate) fn residual_scales<E: From<LeastSquaresError>>(
                 spread.max(least).max(f64::MIN_POSITIVE.sqrt())
             }
         })
-        .collect())
+        .collect();
+    limit_idle_scales(&mut scales, &size);
+    Ok(scales)
+}
+
+/// Raises the scales of channels whose measured values are all zero, as those of undriven joints, to the least scale of
+/// the others; `size` is the sum of squared measured values of each channel.
+///
+/// The equations of such a channel are homogeneous: parameters near zero make their residual as small as one likes, so
+/// a weight from their own residual grows without bound and takes the parameters along.
+fn limit_idle_scales(scales: &mut [f64], size: &[f64]) {
+    let pairs = || scales.iter().zip(size);
+    let Some(least) = pairs()
+        .filter(|(_, size)| **size > 0.0)
+        .map(|(scale, _)| *scale)
+        .reduce(f64::min)
+    else {
+        return;
+    };
+    for (scale, _) in scales.iter_mut().zip(size).filter(|(_, size)| **size == 0.0) {
+        *scale = scale.max(least);
+    }
 }
 
 /// Regression of the reweighted rows.

@@ -295,5 +295,6 @@ pub(crate) fn find_motion_series(
     let signals: Vec<&[f64]> = incomplete
         .map(|column| column.signal_to_differentiate().values)
         .collect();
-    series::find_series(time, &signals)
+    let positions: Vec<&[f64]> = columns.iter().map(|column| column.q).collect();
+    series::find_series(time, &signals, &positions)
 }

@@ -15,8 +15,8 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use crate::motion::derivatives::SmoothedCoordinate;
 use crate::motion::periods::find_period;
 use crate::motion::thresholds::{
-    MIN_LINE_POWER_RATIO, SERIES_CLOSED_STEPS, SERIES_FEWEST_SAMPLES, SERIES_HIGHEST_SHARE, SERIES_MOST_HARMONICS,
-    SERIES_SAMPLES_PER_COLUMN, WHITE_MEAN_SIGMAS,
+    MIN_LINE_POWER_RATIO, SERIES_CLOSED_SHARE, SERIES_CLOSED_STEPS, SERIES_FEWEST_SAMPLES, SERIES_HIGHEST_SHARE,
+    SERIES_MOST_HARMONICS, SERIES_SAMPLES_PER_COLUMN, WHITE_MEAN_SIGMAS,
 };
 use crate::signal::{float_to_count, hann_power};
 
@@ -230,10 +230,11 @@ pub(crate) fn project_on_series(
 /// The series of which the signals are samples with white noise only; `None` if there is none.
 ///
 /// The period is the shortest one after which the run repeats, from [`find_period`]. Otherwise it is the length of
-/// the run, with or without a repetition of the first sample at the end. It is then refined for the smallest
+/// the run, with or without a repetition of the first sample at the end, if all positions and rates return to their
+/// start: signals that are rates may return while the `positions` do not, as in a swing-up. It is then refined for the smallest
 /// residual. Harmonics count up to the last one above the noise. The residual is noise if its spectrum is flat: no
 /// line may exceed the noise at the harmonics, and the mean must be that of the upper half of the band.
-pub(crate) fn find_series(time: &[f64], signals: &[&[f64]]) -> Option<PeriodicSeries> {
+pub(crate) fn find_series(time: &[f64], signals: &[&[f64]], positions: &[&[f64]]) -> Option<PeriodicSeries> {
     // Constant signals have no period.
     let moving: Vec<&[f64]> = signals
         .iter()
@@ -246,11 +247,13 @@ pub(crate) fn find_series(time: &[f64], signals: &[&[f64]]) -> Option<PeriodicSe
     let duration = time[time.len() - 1] - time[0];
     let step = duration / (time.len() - 1) as f64;
     // Candidates for the period: one that repeats in the run, otherwise the run as one period.
-    let found = find_period(time, &moving);
+    // Rates may repeat while positions advance, so both must.
+    let returning: Vec<&[f64]> = moving.iter().chain(positions).copied().collect();
+    let found = find_period(time, &returning);
     let whole = [duration + step, duration]
         .into_iter()
         .filter(|_| found.is_none() && time.len() <= LONGEST_ALONE)
-        .filter(|_| moving.iter().all(|values| is_closed(values)));
+        .filter(|_| returning.iter().all(|values| is_closed(values)));
     let (period, harmonics) = found
         .into_iter()
         .chain(whole)
@@ -272,10 +275,13 @@ pub(crate) fn find_series(time: &[f64], signals: &[&[f64]]) -> Option<PeriodicSe
     })
 }
 
-/// Whether a signal could continue at its end with its start: the difference is at most a few of its steps.
+/// Whether a signal could continue at its end with its start: the difference is at most a few of its steps, and so
+/// small beside its range that it is no part of the motion.
 fn is_closed(values: &[f64]) -> bool {
     let largest = values.windows(2).map(|w| (w[1] - w[0]).abs()).fold(0.0, f64::max);
-    (values[values.len() - 1] - values[0]).abs() <= SERIES_CLOSED_STEPS * largest
+    let [low, high] = [f64::min, f64::max].map(|choose| values.iter().copied().fold(values[0], choose));
+    let apart = (values[values.len() - 1] - values[0]).abs();
+    apart <= SERIES_CLOSED_STEPS * largest && apart <= SERIES_CLOSED_SHARE * (high - low)
 }
 
 /// The period near the given one, and the number of significant harmonics; `None` if their residual is not noise.
@@ -436,7 +442,7 @@ mod tests {
             let time: Vec<f64> = (0..n).map(|i| f64::from(i) * step).collect();
             let q = noisy(&time, 1e-5, |t| motion(t)[0]);
             let still = noisy(&time, 1e-6, |_| 0.2);
-            let found = find_series(&time, &[&q, &still]).expect("a series");
+            let found = find_series(&time, &[&q, &still], &[]).expect("a series");
             assert!((found.period - PERIOD).abs() < 3e-5, "{n}: {found:?}");
             assert_eq!(found.harmonics, 3, "{n}");
             assert!((found.noise[0] / 1e-5 - 1.0).abs() < 0.1, "{n}: {found:?}");
@@ -444,11 +450,25 @@ mod tests {
         }
     }
 
+    /// A swing-up: the rate starts and ends at zero and is smooth, and the position ends elsewhere.
+    #[test]
+    fn a_motion_that_ends_elsewhere_is_no_period() {
+        let time: Vec<f64> = (0..594).map(|i| f64::from(i) * PERIOD / 593.0).collect();
+        let rate = |t: f64| (TAU / PERIOD * t).cos() - 1.0 + 0.3 * (TAU * 2.0 / PERIOD * t).sin();
+        let rates = noisy(&time, 1e-4, rate);
+        let mut position = vec![0.0];
+        for i in 1..time.len() {
+            position.push(position[i - 1] + 0.5 * (rate(time[i]) + rate(time[i - 1])) * (time[i] - time[i - 1]));
+        }
+        assert!(find_series(&time, &[&rates], &[]).is_some());
+        assert_eq!(find_series(&time, &[&rates], &[&position]), None);
+    }
+
     #[test]
     fn what_leaves_more_than_noise_is_no_series() {
         let refused = |time: &[f64], truth: &dyn Fn(f64) -> f64| {
             let q = noisy(time, 1e-5, truth);
-            assert_eq!(find_series(time, &[&q]), None);
+            assert_eq!(find_series(time, &[&q], &[]), None);
         };
         let long = times(1482);
         // A vibration beside the period, a drift, a controller that does not repeat itself.

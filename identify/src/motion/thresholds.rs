@@ -136,6 +136,10 @@ pub(super) const SERIES_HIGHEST_SHARE: f64 = 0.2;
 /// judgement.
 pub(super) const SERIES_CLOSED_STEPS: f64 = 3.0;
 
+/// They must also differ by at most this share of the range of the signal (1). By judgement; a coarse encoder or a fast
+/// motion makes steps of some per cent.
+pub(super) const SERIES_CLOSED_SHARE: f64 = 0.1;
+
 /// A line is significant if its power exceeds the mean of the noise by this factor (1). White noise does so once in
 /// three million. By judgement.
 pub(super) const MIN_LINE_POWER_RATIO: f64 = 15.0;

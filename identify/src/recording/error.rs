@@ -75,17 +75,26 @@ pub enum RecordingFault {
         name: String,
         /// The other file.
         other: String,
+        /// The name with that of its file, which is unique.
+        qualified: String,
+    },
+    /// One of several joined files has no times, and no other file has as many samples.
+    NoTimeOfOwn {
+        /// Its number of samples.
+        samples: usize,
+        /// The files with times.
+        timed: Vec<String>,
     },
     /// A computed column has terms in several files.
     SumAcrossFiles {
         /// The name of the computed column.
         name: String,
     },
-    /// The first line contains numbers where column names are expected.
-    NoHeader,
-    /// The separator cannot be determined from the first line.
+    /// The separator cannot be determined from the first line with contents.
     UnclearSeparator {
-        /// The first line, shortened.
+        /// The line.
+        line: u64,
+        /// The text of the line, shortened.
         header: String,
     },
     /// A column has no name.
@@ -241,10 +250,9 @@ impl RecordingFault {
             | Self::NotANumber { line, .. }
             | Self::NotFinite { line, .. }
             | Self::OpenQuote { line }
+            | Self::UnclearSeparator { line, .. }
             | Self::TimeNotIncreasing { line, .. }
-            // The header is always the first line.
             | Self::TooLarge { line, .. } => Some(*line),
-            Self::NoHeader | Self::UnclearSeparator { .. } => Some(1),
             _ => None,
         }
     }
@@ -298,21 +306,27 @@ impl RecordingFault {
                 "{} have no samples at the same time, so they cannot be joined; are their clocks the same?",
                 backquoted_list(parts)
             ),
-            Self::ColumnInTwoFiles { name, other } => message!(
-                "the column `{name}` is in {other} too; rename it in one of the two files, or leave one of them out"
+            Self::ColumnInTwoFiles { name, other, qualified } => message!(
+                "the column `{name}` is in {other} too, so it is not clear which one is meant; name its file, as in {}, or \
+                 leave one of the files out",
+                Remedy::options([map(name, qualified)])
+            ),
+            Self::NoTimeOfOwn { samples, timed } => message!(
+                "it has no column of times, and its {} are not those of {}; add a column of times to it, or give the sampling \
+                 rate with {}",
+                count_of(*samples, "sample", "samples"),
+                match timed.as_slice() {
+                    [] => "another file with times".to_owned(),
+                    some => backquoted_list(some),
+                },
+                Remedy::option(OptionName::Rate).with_value("HZ")
             ),
             Self::SumAcrossFiles { name } => message!(
                 "`{name}` is a sum of columns of several files, but a sum is read from one file only; compute it in one file first"
             ),
-            Self::NoHeader => "the first line contains numbers, but column names are expected there; \
-                 put a line such as `t,theta1,spindle_left` on top"
-                .into(),
-            Self::UnclearSeparator { header } if header.starts_with('#') => message!(
-                "the first line must name the columns, but it is `{header}`; comment lines are not read, delete them"
-            ),
-            Self::UnclearSeparator { header } => message!(
-                "the separator of the columns is not clear in `{header}`; \
-                 use a comma (or `;` or a tab) throughout and a point for decimals"
+            Self::UnclearSeparator { header, .. } => message!(
+                "the separator of the columns is not clear in `{header}`; separate all lines by a comma, or all by `;`, a tab \
+                 or blanks"
             ),
             Self::UnnamedColumn { place } => {
                 message!("column {place} has no name; name it, or remove a separator at the end of the lines")
@@ -360,7 +374,16 @@ impl RecordingFault {
                     let theirs = nearest.as_deref().unwrap_or("THEIRS");
                     message!("Map one onto it with {}.", Remedy::options([map(name, theirs)]))
                 };
-                message!("{missing}{meant}{} {}", columns_there(present), how)
+                // A recording without times may still have a rate.
+                let rate = if name == "t" && nearest.is_none() && !by_renaming {
+                    message!(
+                        " If no column has times, give the sampling rate with {}.",
+                        Remedy::option(OptionName::Rate).with_value("HZ")
+                    )
+                } else {
+                    Message::from("")
+                };
+                message!("{missing}{meant}{} {}{}", columns_there(present), how, rate)
             }
             Self::MissingColumns { missing, present } => {
                 let all: Vec<String> = missing
@@ -384,9 +407,11 @@ impl RecordingFault {
                 column, text, count, ..
             } => {
                 let write_other_count = write_other_count(*count, "fields of the column are not numbers");
-                // A comma between two integers is most likely a decimal comma.
+                // A comma between two integers is most likely a decimal comma, in a file with points elsewhere.
                 let what = if looks_like_decimal_comma(text) {
-                    "write decimals with a point"
+                    "other numbers of the file have a decimal point, so write decimals with a point"
+                } else if text.parse::<f64>().is_ok() {
+                    "other fields have a decimal comma or are time stamps, so write all of them in one way"
                 } else {
                     "correct or remove it"
                 };
@@ -469,13 +494,9 @@ impl fmt::Display for RecordingFault {
     }
 }
 
-/// A sentence that lists the existing columns, with a hint if the header looks like a comment.
+/// A sentence that lists the existing columns.
 fn columns_there(present: &[String]) -> String {
-    let mut says = format!(" The columns are: {}.", backquoted_list(present));
-    if present.first().is_some_and(|first| first.starts_with('#')) {
-        says.push_str(" The first line must name the columns: comment lines are not read, delete them.");
-    }
-    says
+    format!(" The columns are: {}.", backquoted_list(present))
 }
 
 /// The number of affected fields in parentheses; empty if there is only one.

@@ -9,6 +9,8 @@ use std::sync::Arc;
 use modelmill_boundary::files::{FileSource, OpenFile};
 
 use crate::recording::error::{RecordingError, RecordingFault};
+#[cfg(feature = "parquet")]
+use crate::recording::formats::{DataSetFiles, ParquetFormat};
 use crate::recording::formats::{LONGEST_STREAM, RecordingFormat, RecordingInput, SIGNATURE_BYTES, format_of};
 use crate::recording::table::{self, MemoryTable};
 use crate::recording::{ReadOptions, SignalRecording, TableInfo, display_name_of_bytes};
@@ -25,6 +27,9 @@ pub struct RecordingFile {
 enum RecordingSource {
     /// A file on disk with its format.
     File(&'static dyn RecordingFormat, File),
+    /// Files of a data set with their description.
+    #[cfg(feature = "parquet")]
+    DataSet(DataSetFiles),
     /// A complete file in memory with its format.
     Memory(&'static dyn RecordingFormat, Arc<Vec<u8>>),
     /// Columns in memory.
@@ -39,6 +44,16 @@ impl RecordingFile {
             file: path.display().to_string(),
             fault: RecordingFault::Unreadable { reason },
         };
+        #[cfg(feature = "parquet")]
+        if let Some(set) = DataSetFiles::open(files, path).map_err(|fault| RecordingError {
+            file: name.clone(),
+            fault,
+        })? {
+            return Ok(Self {
+                name,
+                source: RecordingSource::DataSet(set),
+            });
+        }
         let opened = files.open(path, LONGEST_STREAM);
         match opened.map_err(|error| fail(error.fault.to_string()))? {
             OpenFile::File(mut file) => {
@@ -106,6 +121,8 @@ impl RecordingFile {
     ) -> Result<T, RecordingError> {
         let answer = match &self.source {
             RecordingSource::Table(table) => of_table(table),
+            #[cfg(feature = "parquet")]
+            RecordingSource::DataSet(set) => of_format(&ParquetFormat, RecordingInput::DataSet(set)),
             RecordingSource::Memory(format, bytes) => of_format(*format, RecordingInput::Bytes(bytes)),
             // The handle is shared, so the position must be reset before each read.
             RecordingSource::File(format, file) => {

@@ -21,6 +21,15 @@ pub(crate) enum IntakeFlow {
     Stop,
 }
 
+/// How the time of a sample is found.
+#[derive(Debug, Clone, PartialEq)]
+enum SampleClock {
+    /// A sum of fields, by position and factor, and a constant.
+    Fields(Vec<(usize, f64)>, f64),
+    /// The position of the sample over this rate, Hz.
+    Rate(f64),
+}
+
 /// Takes samples one by one and collects the columns that are needed.
 pub(crate) struct SampleIntake<'a> {
     /// What the caller wants to read.
@@ -39,8 +48,14 @@ pub(crate) struct SampleIntake<'a> {
     lines: Vec<u64>,
     /// Line of the first sample that was left out for a bad field, and the number of such samples.
     left_out: Option<(u64, usize)>,
-    /// The time as a sum of fields, by position and factor, and a constant; only if samples are selected by time.
-    time: Option<(Vec<(usize, f64)>, f64)>,
+    /// The time of a sample, only if samples are selected by time.
+    time: Option<SampleClock>,
+    /// Number of samples that were passed, with those that were left out.
+    passed: usize,
+    /// Times of the samples that were taken, s, if they follow from a sampling rate.
+    clock: Vec<f64>,
+    /// First time stamps of columns, ns since 1970, by position.
+    zeros: Vec<(usize, i64)>,
     /// Number of samples before the time interval.
     before: usize,
     /// The line at which reading stopped, because the time interval had ended.
@@ -74,6 +89,14 @@ impl<'a> SampleIntake<'a> {
                 }
             }
         }
+        // A rate replaces the times of the file.
+        if options.rate.is_some() {
+            for (name, of_theirs) in names.iter_mut().zip(&theirs) {
+                if name == "t" {
+                    *name = format!("{of_theirs} (as recorded)");
+                }
+            }
+        }
         find_duplicate(&names, true)?;
         // Without a list of wanted columns all of them are wanted.
         let is_wanted = |name: &String| {
@@ -98,15 +121,17 @@ impl<'a> SampleIntake<'a> {
             kept[place] = true;
         }
         // The time is needed to select samples; it may be computed itself.
-        let time = match options.time_interval {
-            None => None,
-            Some(_) => match options.computed.iter().find(|one| one.name == "t") {
+        let time = match (options.time_interval, options.rate) {
+            (None, _) => None,
+            (Some(_), Some(rate)) => Some(SampleClock::Rate(rate)),
+            (Some(_), None) => match options.computed.iter().find(|one| one.name == "t") {
                 Some(ComputedColumn { terms, offset, .. }) => {
                     let terms = terms.iter().map(|(name, factor)| Ok((place(name)?, *factor)));
-                    Some((terms.collect::<Result<Vec<_>, RecordingFault>>()?, *offset))
+                    let terms = terms.collect::<Result<Vec<_>, RecordingFault>>()?;
+                    Some(SampleClock::Fields(terms, *offset))
                 }
                 None => match names.iter().position(|name| name == "t") {
-                    Some(place) => Some((vec![(place, 1.0)], 0.0)),
+                    Some(place) => Some(SampleClock::Fields(vec![(place, 1.0)], 0.0)),
                     None => {
                         return Err(missing_column_fault("t", names.iter().map(String::as_str), false));
                     }
@@ -123,6 +148,9 @@ impl<'a> SampleIntake<'a> {
             lines: Vec::new(),
             left_out: None,
             time,
+            passed: 0,
+            clock: Vec::new(),
+            zeros: Vec::new(),
             before: 0,
             stopped: None,
             notes: Vec::new(),
@@ -152,8 +180,10 @@ impl<'a> SampleIntake<'a> {
         sample: &[SampleField],
         text: &dyn Fn(usize) -> String,
     ) -> Result<IntakeFlow, RecordingFault> {
+        let position = self.passed;
+        self.passed += 1;
         // First the time interval: times increase, so the first time behind it ends the reading.
-        if let (Some((from, to)), Some(time)) = (self.options.time_interval, self.time_of(sample)) {
+        if let (Some((from, to)), Some(time)) = (self.options.time_interval, self.time_of(sample, position)) {
             if time < from {
                 self.before += 1;
                 return Ok(IntakeFlow::Go);
@@ -182,6 +212,9 @@ impl<'a> SampleIntake<'a> {
             });
         }
         self.lines.push(line);
+        if let Some(rate) = self.options.rate {
+            self.clock.push(position as f64 / rate);
+        }
         for place in 0..sample.len() {
             if self.kept[place] {
                 self.columns[place].push(sample[place], line, &|| text(place));
@@ -190,9 +223,23 @@ impl<'a> SampleIntake<'a> {
         Ok(IntakeFlow::Go)
     }
 
-    /// The time of a sample; `None` if a field of it is not a number.
-    fn time_of(&self, sample: &[SampleField]) -> Option<f64> {
-        let (terms, offset) = self.time.as_ref()?;
+    /// Leaves a gap of so many samples in times that follow from a sampling rate.
+    #[cfg(feature = "parquet")]
+    pub(crate) fn skip_samples(&mut self, samples: usize) {
+        self.passed += samples;
+    }
+
+    /// States the first time stamp of a column, ns since 1970, from which its times are counted.
+    pub(crate) fn set_zero(&mut self, place: usize, stamp: i64) {
+        self.zeros.push((place, stamp));
+    }
+
+    /// The time of the sample at a position; `None` if a field of it is not a number.
+    fn time_of(&self, sample: &[SampleField], position: usize) -> Option<f64> {
+        let (terms, offset) = match self.time.as_ref()? {
+            SampleClock::Rate(rate) => return Some(position as f64 / rate),
+            SampleClock::Fields(terms, offset) => (terms, offset),
+        };
         let mut time = *offset;
         for (place, factor) in terms {
             match sample[*place] {
@@ -206,6 +253,9 @@ impl<'a> SampleIntake<'a> {
 
     /// First and last time that were taken, if the file has a column `t`.
     fn last_time(&self) -> Option<(f64, f64)> {
+        if self.options.rate.is_some() {
+            return Some((*self.clock.first()?, *self.clock.last()?));
+        }
         let place = self.names.iter().position(|name| name == "t")?;
         let column = &self.columns[place].values;
         Some((*column.first()?, *column.last()?))
@@ -245,8 +295,24 @@ impl<'a> SampleIntake<'a> {
         // Computed columns come from the kept columns, before these are sorted by whether they are wanted.
         let mut computed = IndexMap::new();
         for one in &self.options.computed {
+            // A rate has priority over a sum of columns for the time.
+            if self.options.rate.is_some() && one.name == "t" {
+                continue;
+            }
             computed.insert(one.name.clone(), compute_column(one, &self.theirs, &self.columns));
         }
+        if let Some(rate) = self.options.rate {
+            notes.push(RecordingNote::info(format!(
+                "The times of {file} are computed from the sampling rate of {rate} Hz."
+            )));
+            let time = SignalColumn {
+                values: self.clock,
+                ..SignalColumn::default()
+            };
+            computed.insert("t".to_owned(), time);
+        }
+        // The stamp from which the times of the recording are counted.
+        let zero_stamp = (self.zeros.iter().find(|(place, _)| self.names[*place] == "t")).map(|(_, stamp)| *stamp);
         let wanted = self.options.wanted.as_ref();
         let mut columns = IndexMap::new();
         let mut others = Vec::new();
@@ -278,13 +344,16 @@ impl<'a> SampleIntake<'a> {
             others,
             lines: self.lines,
             notes,
+            zero_stamp,
+            unwrapped: Vec::new(),
+            late_rates: Vec::new(),
         })
     }
 }
 
 /// Whether the time is computed from the field at this position.
-fn is_time_place(time: Option<&(Vec<(usize, f64)>, f64)>, place: usize) -> bool {
-    time.is_some_and(|(terms, _)| terms.iter().any(|(other, _)| *other == place))
+fn is_time_place(time: Option<&SampleClock>, place: usize) -> bool {
+    matches!(time, Some(SampleClock::Fields(terms, _)) if terms.iter().any(|(other, _)| *other == place))
 }
 
 /// A computed column: `offset + sum of factor * column`. Defects of any term are defects of the sum.

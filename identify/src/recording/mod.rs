@@ -5,6 +5,7 @@
 //! [`PreparedRun`](crate::PreparedRun) of a recording.
 
 mod column;
+mod corrections;
 mod error;
 mod file;
 mod formats;
@@ -23,6 +24,7 @@ mod thresholds;
 use indexmap::IndexMap;
 
 use crate::words::nearest_name;
+pub use corrections::UnwrappedAngle;
 pub use error::{RecordingError, RecordingFault};
 pub use file::RecordingFile;
 pub use joined_files::RecordingFiles;
@@ -47,6 +49,12 @@ pub struct SignalRecording {
     pub(crate) lines: Vec<u64>,
     /// Notes on the file and on what was done with it.
     pub(crate) notes: Vec<RecordingNote>,
+    /// The time stamp from which `t` is counted, ns since 1970, if the file has stamps.
+    pub(crate) zero_stamp: Option<i64>,
+    /// Angles from which jumps by a full turn were removed.
+    pub(crate) unwrapped: Vec<UnwrappedAngle>,
+    /// Coordinates whose recorded rates lag their positions and were removed, each with the delay, s.
+    pub(crate) late_rates: Vec<(String, f64)>,
 }
 
 impl SignalRecording {
@@ -175,6 +183,9 @@ impl SignalRecording {
             others: self.others.clone(),
             lines: self.lines[start..end].to_vec(),
             notes: Vec::new(),
+            zero_stamp: self.zero_stamp,
+            unwrapped: self.unwrapped.clone(),
+            late_rates: self.late_rates.clone(),
         }
     }
 

@@ -39,6 +39,9 @@ pub struct ReadOptions {
     pub may_be_missing: Vec<String>,
     /// Only samples with a time `t` in this interval are read, s; the others are counted in a note.
     pub time_interval: Option<(f64, f64)>,
+    /// Sampling rate of a recording without times, Hz: sample k gets the time k / rate, and a column of times is not
+    /// read. `None` takes the time from the file.
+    pub rate: Option<f64>,
     /// Most numbers that are kept, including the line of each sample. A larger recording is refused before memory is
     /// exhausted.
     pub max_numbers: usize,
@@ -61,6 +64,10 @@ impl ReadOptions {
         let is_term = |one: &ComputedColumn| one.terms.iter().any(|(name, _)| name == theirs);
         let renamed = self.renames.iter().find(|(_, other)| other == theirs);
         let ours = renamed.map_or(theirs, |(ours, _)| ours);
+        // A rate replaces the column of times.
+        if self.rate.is_some() && ours == "t" && !self.computed.iter().any(is_term) {
+            return false;
+        }
         self.computed.iter().any(is_term) || wanted.iter().any(|name| name == ours)
     }
 }
@@ -74,6 +81,7 @@ impl Default for ReadOptions {
             wanted: None,
             may_be_missing: Vec::new(),
             time_interval: None,
+            rate: None,
             max_numbers: 1 << 26,
         }
     }

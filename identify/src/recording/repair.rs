@@ -170,7 +170,7 @@ impl SignalColumn {
     /// Replaces samples that are marked by linear interpolation between their measured neighbours.
     ///
     /// Before the first and behind the last measured sample the nearest value is used.
-    fn interpolate_lost(&mut self) {
+    pub(super) fn interpolate_lost(&mut self) {
         let sound: Vec<usize> = (0..self.values.len()).filter(|i| !self.interpolated[*i]).collect();
         let (Some(first), Some(last)) = (sound.first().copied(), sound.last().copied()) else {
             return;

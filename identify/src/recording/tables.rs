@@ -40,15 +40,40 @@ impl TableInfo {
 /// Usual names of the time, in lower case, the most likely first.
 const TIME_NAMES: [&str; 8] = ["t", "time", "t_s", "time_s", "timestamp", "stamp", "seconds", "sec"];
 
-/// The column that is most likely the time, by its name behind the last point.
-pub(crate) fn likely_time_column(names: &[String]) -> Option<&String> {
+/// Units of time in names, with their factors to s.
+const TIME_UNITS: [(&str, f64); 6] = [
+    ("s", 1.0),
+    ("sec", 1.0),
+    ("ms", 1e-3),
+    ("us", 1e-6),
+    ("ns", 1e-9),
+    ("min", 60.0),
+];
+
+/// The column that is most likely the time, by its name behind the last point, and the factor of its unit to s.
+pub(crate) fn likely_time_column(names: &[String]) -> Option<(&String, f64)> {
     let is_called = |name: &String, time: &str| {
-        let last = name.rsplit('.').next().unwrap_or(name);
-        last.eq_ignore_ascii_case(time)
+        let (bare, factor) = split_time_unit(name);
+        let last = bare.rsplit('.').next().unwrap_or(bare);
+        last.eq_ignore_ascii_case(time).then_some(factor)
     };
-    TIME_NAMES
-        .iter()
-        .find_map(|time| names.iter().find(|name| is_called(name, time)))
+    TIME_NAMES.iter().find_map(|time| {
+        names
+            .iter()
+            .find_map(|name| is_called(name, time).map(|factor| (name, factor)))
+    })
+}
+
+/// A name without a unit of time in brackets, and the factor of the unit.
+fn split_time_unit(name: &str) -> (&str, f64) {
+    let inner = name
+        .strip_suffix([']', ')'])
+        .and_then(|name| name.rsplit_once(['[', '(']));
+    let unit = inner.and_then(|(bare, unit)| {
+        let found = TIME_UNITS.iter().find(|(known, _)| *known == unit.trim());
+        found.map(|(_, factor)| (bare.trim_end(), *factor))
+    });
+    unit.unwrap_or((name, 1.0))
 }
 
 /// First and last time of a table, s; `read` reads the recording of a single column.
@@ -56,8 +81,8 @@ pub(crate) fn find_time_range(
     names: &[String],
     read: impl FnOnce(&str) -> Option<SignalRecording>,
 ) -> Option<(f64, f64)> {
-    let name = likely_time_column(names)?;
+    let (name, factor) = likely_time_column(names)?;
     let recording = read(name)?;
     let time = recording.column(name).ok()?;
-    Some((*time.first()?, *time.last()?))
+    Some((factor * time.first()?, factor * time.last()?))
 }

@@ -58,3 +58,20 @@ pub(super) const TURN_TOLERANCE: f64 = 0.08;
 /// After jumps whose sum exceeds this share of the largest, the note says that the zero position is uncertain (1). By
 /// judgement.
 pub(super) const ZERO_SHIFT_SHARE: f64 = 0.5;
+
+/// Sample intervals between episodes that are read one after another; long enough that any low-pass has them in segments
+/// of their own. By judgement.
+#[cfg(feature = "parquet")]
+pub(super) const EPISODE_GAP_STEPS: usize = 300;
+// --- Wrapped angles
+
+/// A step of an angle is a full turn if it differs from one by less than this share of the turn (1): a joint that
+/// turns fast steps further within the sample. By judgement.
+pub(super) const WRAP_STEP_TOLERANCE: f64 = 0.1;
+
+/// A full turn counts as a wrapped angle if it exceeds this many median steps (1). By judgement.
+pub(super) const WRAP_LEAST_STEPS: f64 = 10.0;
+
+/// A wrapped angle exceeds the range of one turn by less than this share of the turn (1), for noise at its ends. By
+/// judgement.
+pub(super) const WRAP_RANGE_MARGIN: f64 = 0.01;

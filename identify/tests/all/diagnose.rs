@@ -117,6 +117,7 @@ fn problem(random: &mut Random, hidden: &[f64], candidates: Vec<CandidateEffect>
     let segment = |name: &str, is_check: bool| SampleSegment {
         name: name.into(),
         samples: SAMPLES,
+        start: 0.0,
         step: STEP,
         recorded_step: STEP,
         is_check,

@@ -36,14 +36,9 @@ fn files_that_are_no_recordings() {
         "run.csv: there is a header but no sample; one line of numbers per sample is expected",
     );
     check_refused(
-        "0.0,1.5\n0.1,1.6\n",
-        "run.csv, line 1: the first line contains numbers, but column names are expected there; \
-         put a line such as `t,theta1,spindle_left` on top",
-    );
-    check_refused(
-        "t q force\n0 1 2\n",
-        "run.csv, line 1: the separator of the columns is not clear in `t q force`; \
-         use a comma (or `;` or a tab) throughout and a point for decimals",
+        "t q force\n0,1,2\n",
+        "run.csv, line 1: the separator of the columns is not clear in `t q force`; separate all lines by a comma, or all \
+         by `;`, a tab or blanks",
     );
     check_refused(
         "PAR1\u{1}\u{2}",
@@ -152,7 +147,7 @@ fn a_column_with_other_things_than_numbers_is_refused_when_it_is_used() {
         says.iter()
             .any(|s| { s.contains("Column `remark` of run.csv contains text that is not a number (2 fields") })
     );
-    let decimal_comma = read("t;q\n0;1,5\n1;1,6\n").unwrap();
+    let decimal_comma = read("t;q\n0;1.5\n1;1,6\n").unwrap();
     assert!(
         decimal_comma
             .column("q")

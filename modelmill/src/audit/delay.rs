@@ -20,17 +20,24 @@ const LOOKED_AT: usize = 9000;
 const FEWEST: usize = 1200;
 
 /// Delays of the force signals of a segment.
-pub(super) struct ForceDelayAudit {
+pub(crate) struct ForceDelayAudit {
     /// Delays of all drives together and of each drive, with residuals.
     delays: ForceDelays,
     /// Time between samples, s.
     step: f64,
+    /// Names of the drives with a force signal, in the order of the delays.
+    drives: Vec<String>,
+}
+
+/// Some of the columns; none if there are none at all.
+fn pick<T: Clone>(columns: &[Vec<T>], which: &[usize]) -> Vec<Vec<T>> {
+    which.iter().filter_map(|d| columns.get(*d).cloned()).collect()
 }
 
 impl ForceDelayAudit {
     /// Estimates the delays; `None` if forces are missing, the segment is too short, or a pose has no
     /// solution.
-    pub(super) fn from_segment(model: &Model, data: &RecordingSegment) -> Option<Self> {
+    pub(crate) fn from_segment(model: &Model, data: &RecordingSegment) -> Option<Self> {
         let run = &data.run;
         let forces = run.force.as_deref()?;
         let n = run.time.len();
@@ -46,26 +53,33 @@ impl ForceDelayAudit {
         let every = ((to - from) / most).max(1);
         let samples: Vec<usize> = (from..to).step_by(every).collect();
         let rows = AuditRows::new(model, data, &samples)?;
-        let drives = forces.len();
+        // A drive without any force, as in the row of an undriven joint, has no signal that could be late.
+        let is_read = |d: &usize| forces[*d].iter().any(|force| *force != 0.0);
+        let read: Vec<usize> = (0..forces.len()).filter(is_read).collect();
         // Samples near reversals of a drive are not used.
-        let mut counts = vec![false; samples.len() * drives];
-        for (d, rates) in rows.motion[1].iter().enumerate() {
+        let mut counts = vec![false; samples.len() * read.len()];
+        for (k, rates) in read.iter().map(|d| &rows.motion[1][*d]).enumerate() {
             let fastest = rates.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
             for (i, rate) in rates.iter().enumerate() {
-                counts[i * drives + d] = rate.abs() > DELAY_REVERSAL_RATE_SHARE * fastest;
+                counts[i * read.len() + k] = rate.abs() > DELAY_REVERSAL_RATE_SHARE * fastest;
             }
         }
         let delays = ForceDelays::from_audit(&DelayAudit {
-            regressor: rows.regressor,
-            slope: AuditRows::slope(model, data, &samples)?,
+            regressor: rows.regressor.select_channels(&read),
+            slope: AuditRows::slope(model, data, &samples)?.select_channels(&read),
             time: rows.time,
             used_rows: counts,
             recording_time: &run.time,
-            forces,
-            excluded_forces: &run.left_out,
+            forces: &pick(forces, &read),
+            excluded_forces: &pick(&run.left_out, &read),
             max_delay: longest,
         })?;
-        Some(Self { delays, step })
+        let names = model.drives();
+        Some(Self {
+            delays,
+            step,
+            drives: read.iter().map(|d| names[*d].clone()).collect(),
+        })
     }
 
     /// Relative decrease of the residual with the delay, as a geometric mean over the drives. `with` is 1 for the
@@ -130,20 +144,25 @@ impl ForceDelayAudit {
         delay.seconds.abs() > (clear * delay.half_width).max(least * self.step)
     }
 
-    /// The residual with the delay, as the geometric mean of relative errors over the drives; `None` without a delay.
-    pub(super) fn residual_with_delay(&self) -> Option<f64> {
-        if self.common_delay().is_some() {
-            Some(geometric_mean(&self.delays.residuals[1]))
+    /// Sum over the drives of the logarithms by which the delay lowers the residual; 0 without a delay.
+    pub(crate) fn log_gain(&self) -> f64 {
+        let with = if self.common_delay().is_some() {
+            1
+        } else if self.delayed_drives().is_empty() {
+            return 0.0;
         } else {
-            (!self.delayed_drives().is_empty()).then(|| geometric_mean(&self.delays.residuals[2]))
-        }
+            2
+        };
+        let [before, after] = [0, with].map(|which| geometric_mean(&self.delays.residuals[which]));
+        let drives = self.delays.residuals[0].len() as f64;
+        drives * (before / after.max(f64::MIN_POSITIVE)).ln()
     }
 
     /// The note on the delay; `None` without one. `file` is the name of the recording.
-    pub(super) fn delay_note(&self, model: &Model, file: &str) -> Option<RecordingNote> {
-        let names = model.drives();
+    pub(super) fn delay_note(&self, file: &str) -> Option<RecordingNote> {
+        let names = &self.drives;
         if let Some(all) = self.common_delay() {
-            return Some(self.common_delay_note(all, &names, file));
+            return Some(self.common_delay_note(all, names, file));
         }
         let late = self.delayed_drives();
         if late.is_empty() {

@@ -134,7 +134,11 @@ pub(crate) fn events(model: &Model, data: &RecordingSegment) -> Option<Vec<Conta
     }
     // The residual of a robust fit is compared with its own usual level, drive by drive.
     let rest = UnexplainedForces::new(model, data, forces, &samples)?;
-    let levels: Vec<ResidualLevel> = (0..forces.len()).map(|d| rest.level(d, together)).collect();
+    let mut levels: Vec<ResidualLevel> = (0..forces.len()).map(|d| rest.level(d, together)).collect();
+    // A reading with a dead band jumps whenever it leaves the band, which is no contact.
+    for one in run.dead_bands() {
+        levels[one.drive].bound = f64::INFINITY;
+    }
     let flagged: Vec<bool> = (0..samples.len())
         .map(|i| levels.iter().any(|level| level.values[i] > level.bound))
         .collect();

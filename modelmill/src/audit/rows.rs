@@ -15,18 +15,18 @@ const MORE: usize = 6;
 const REACH: f64 = 1.0 / 16.0;
 
 /// The rows of a model at some samples.
-pub(super) struct AuditRows {
+pub(crate) struct AuditRows {
     /// Times of the samples, s.
-    pub(super) time: Vec<f64>,
+    pub(crate) time: Vec<f64>,
     /// The regressor and the further columns.
-    pub(super) regressor: ChannelRegressor,
+    pub(crate) regressor: ChannelRegressor,
     /// Positions, rates and accelerations of the drives, `[order][drive][sample]`.
-    pub(super) motion: [Vec<Vec<f64>>; 3],
+    pub(crate) motion: [Vec<Vec<f64>>; 3],
 }
 
 impl AuditRows {
     /// The rows at some samples; `None` if a pose has no solution, or a value is not finite.
-    pub(super) fn new(model: &Model, data: &RecordingSegment, samples: &[usize]) -> Option<Self> {
+    pub(crate) fn new(model: &Model, data: &RecordingSegment, samples: &[usize]) -> Option<Self> {
         let around = DriveStencil::new(model, data, samples)?;
         let mut rows = regressor(model, data, samples)?;
         around.add_extra_columns(&mut rows, |further| further.values);
@@ -42,19 +42,6 @@ impl AuditRows {
             regressor: ChannelRegressor::new(&rows, n),
             motion: [around.positions, rates, accelerations],
         })
-    }
-
-    /// The regressor and the further columns with reversed gravity.
-    pub(super) fn with_reversed_gravity(
-        model: &Model,
-        data: &RecordingSegment,
-        samples: &[usize],
-    ) -> Option<ChannelRegressor> {
-        let around = DriveStencil::new(model, data, samples)?;
-        let mut rows = regressor_with_reversed_gravity(model, data, samples)?;
-        around.add_extra_columns(&mut rows, |further| further.values);
-        let is_finite = rows.iter().all(|x| x.is_finite());
-        is_finite.then(|| ChannelRegressor::new(&rows, around.rates[1].len()))
     }
 
     /// The time derivative of the regressor and the further columns, per s.
@@ -186,20 +173,6 @@ fn regressor(model: &Model, data: &RecordingSegment, samples: &[usize]) -> Optio
     found.ok()
 }
 
-/// The regressor with reversed gravity. Columns at standstill are those of gravity, or of an effect whose sign a fit
-/// does not fix.
-pub(super) fn regressor_with_reversed_gravity(
-    model: &Model,
-    data: &RecordingSegment,
-    samples: &[usize],
-) -> Option<DMatrix<f64>> {
-    let evaluator = ModelEvaluator::new(&model.derivation);
-    // f(-g) = f(g) - 2 f(g) at standstill, since only gravity acts there.
-    let at_rest = SampledStates::new(data, samples).at_standstill();
-    let at_rest = at_rest.with_states(|states| evaluator.regressor(states)).ok()?;
-    Some(regressor(model, data, samples)? - 2.0 * at_rest)
-}
-
 /// States at some samples, with the load.
 struct SampledStates {
     /// Positions, rates and accelerations, `[order][coordinate][sample]`.
@@ -215,15 +188,6 @@ impl SampledStates {
             motion: [&data.run.q, &data.run.qd, &data.run.qdd].map(|all| select_samples(all, samples)),
             load: select_samples(data.run.force.as_deref().unwrap_or(&[]), samples),
         }
-    }
-
-    /// The same poses at standstill.
-    fn at_standstill(mut self) -> Self {
-        let [_, rates, accelerations] = &mut self.motion;
-        for column in rates.iter_mut().chain(accelerations) {
-            column.fill(0.0);
-        }
-        self
     }
 
     /// Calls a function with the states.

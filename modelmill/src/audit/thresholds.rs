@@ -4,33 +4,10 @@
 
 use std::ops::Range;
 
-// --- Columns, signs and gravity
+// --- Samples
 
 /// Samples that a recording must exceed to be checked with the model. By judgement.
 pub(super) const AUDIT_FEWEST_SAMPLES: usize = 100;
-
-/// Relative error of the best fit (1) up to which no exchanged columns and no wrong signs are suspected. By judgement.
-pub(super) const WIRING_LEAST_ERROR: f64 = 0.05;
-
-/// Relative error (1) below which a correction of the motion must bring the fit if the mechanism cannot reach the poses
-/// as recorded, so that there is no error to compare with. By judgement.
-pub(super) const UNREACHABLE_MOST_ERROR: f64 = 0.3;
-
-/// A correction, such as an exchange or reversed gravity, is suggested if it brings the error of the best fit below
-/// this share of the error without it (1). Columns are not suspected if a delay does the same. By judgement.
-pub(super) const CORRECTION_MOST_RATIO: f64 = 0.5;
-
-/// Coordinates whose wrong sign explains the forces equally well are named together if their errors differ by less than
-/// this share (1). By judgement.
-pub(super) const SAME_ERROR_TOLERANCE: f64 = 0.05;
-
-/// Rows for each base parameter with which a correction of the motion must be judged; exchanges are not tried if there
-/// is time for fewer only. By judgement.
-pub(super) const CORRECTION_ROWS_PER_COLUMN: usize = 4;
-
-/// Relative error, with friction and offsets of the drives fitted (1), below which the direction of gravity is
-/// accepted. By judgement.
-pub(super) const GRAVITY_LEAST_ERROR: f64 = 0.01;
 
 // --- Forces compared with the nominal values
 
@@ -38,12 +15,9 @@ pub(super) const GRAVITY_LEAST_ERROR: f64 = 0.01;
 /// nominal values may be the cause. By judgement.
 pub(super) const NOMINAL_LEAST_CORRELATION: f64 = 0.8;
 
-/// Nominal values may be wrong by this factor (1). Units of force differ by powers of 1000, far more. By judgement.
-pub(super) const NOMINAL_FORCE_FACTOR: f64 = 4.0;
-
 /// Ratios of nominal to measured force that may be those of a gear (1): motor torques before the gear. At smaller
 /// ratios nominal values may be wrong, at larger ones the unit. By judgement.
-pub(super) const GEAR_RATIOS: Range<f64> = 12.0..1000.0 / NOMINAL_FORCE_FACTOR;
+pub(super) const GEAR_RATIOS: Range<f64> = 12.0..250.0;
 
 // --- Contacts and pushes
 

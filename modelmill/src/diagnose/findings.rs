@@ -4,7 +4,7 @@
 use modelmill_boundary::message;
 use modelmill_boundary::text::{CommandName, Message, OptionName, Remedy};
 use modelmill_identify::diagnose::{
-    DiagnosisVerdict, EffectParameter, IdentifiedEffect, LocatedEffect, ModelDiagnosis,
+    DiagnosisVerdict, EffectParameter, EffectSupport, IdentifiedEffect, LocatedEffect, ModelDiagnosis,
 };
 use modelmill_identify::{ErrorRegion, FitParameter, ParameterStatus, RecordingNote};
 use modelmill_spec::Mechanics;
@@ -13,6 +13,7 @@ use modelmill_spec::edit::NewEffect;
 use crate::along;
 use crate::compare::{self, ErrorLocations};
 use crate::error::{Error, Outcome};
+use crate::faults::SuspectedFault;
 use crate::model::Model;
 use crate::recording::{PreparedRecording, segments};
 use crate::runs::RecordingDifference;
@@ -20,6 +21,7 @@ use crate::segment::RecordingSegment;
 use crate::text::table::percent;
 
 use super::added_effects::{self, CompletedModelFile};
+use super::corrected::CorrectedRecordings;
 use super::faults;
 use super::laws::{self, LawHypothesis};
 use super::long_recordings;
@@ -80,6 +82,8 @@ pub struct DiagnosisFindings {
     pub diagnosis: ModelDiagnosis,
     /// The effects found: those that the model lacks.
     pub missing: Vec<MissingEffect>,
+    /// Effects with a probability below 0.5. The model is not said to lack them, and they are added to no model.
+    pub possible: Vec<MissingEffect>,
     /// Hypotheses: force laws that are in no library and would explain the residual.
     pub laws: Vec<LawHypothesis>,
     /// Effects that the recordings can neither show nor exclude.
@@ -112,6 +116,10 @@ pub struct DiagnosisFindings {
     pub validation: ValidationMethod,
     /// Notes on the model, on the recordings, and on estimates with an impossible sign.
     pub notes: Vec<RecordingNote>,
+    /// Faults of the recordings that were corrected hypothetically: all findings hold for the corrected recordings.
+    pub corrected: Vec<SuspectedFault>,
+    /// Faults that could not be corrected, since several explain a recording equally well. Nothing else is claimed then.
+    pub unresolved: Vec<SuspectedFault>,
     /// The search problem and its solution, without the columns.
     pub(crate) answer: DiagnosisSolution,
     /// Variables on which errors may depend, along the recordings on which errors are evaluated.
@@ -127,6 +135,8 @@ pub struct MissingEffect {
     pub estimates: Vec<EffectEstimate>,
     /// Probability that the effect is present, between 0 and 1.
     pub probability: f64,
+    /// What supports it: the probability follows from this.
+    pub support: EffectSupport,
     /// Its alternatives: effects that explain the recordings equally well.
     pub indistinguishable_from: Vec<LocatedEffect>,
     /// Experiment that distinguishes the effect from its alternatives, as described in the effect library. `None` if
@@ -198,11 +208,8 @@ impl DiagnosisFindings {
     /// Advice if not all effects can be added to the model file: because of a suspected fault, or of a delayed force
     /// signal.
     pub(crate) fn further_action(&self) -> Option<&'static str> {
-        if self.missing.is_empty() {
+        if self.missing.is_empty() || words::has_suspicion(&self.diagnosis) {
             return None;
-        }
-        if words::has_suspicion(&self.diagnosis) {
-            return Some("First check the fault that the verdict starts with: the effects may only compensate it.");
         }
         let is_late = |found: &MissingEffect| {
             let is_its = |entry: &NewEffect| entry.kind == found.effect.kind;
@@ -227,6 +234,32 @@ impl Model {
         fit: &[&PreparedRecording],
         check: &[&PreparedRecording],
         question: &DiagnosisOptions,
+    ) -> Outcome<DiagnosisFindings> {
+        // What makes numbers meaningless comes first; the search runs on recordings without it.
+        let corrected = (self.host()).run_job("looking for faults of the recordings", 0, |_| {
+            CorrectedRecordings::new(self, fit, check)
+        })??;
+        let mut findings = match corrected {
+            None => self.diagnose_prepared(fit, check, *question)?,
+            Some(all) => {
+                let [fit, check] = [&all.fit, &all.check].map(|runs| runs.iter().collect::<Vec<_>>());
+                let mut findings = all.model.diagnose_prepared(&fit, &check, *question)?;
+                findings.add_corrections(all.corrected, all.unresolved);
+                findings
+            }
+        };
+        findings.respect_faults();
+        Ok(findings)
+    }
+
+    /// The diagnosis of recordings as they were prepared.
+    ///
+    /// Fails as [`Model::diagnose`] does.
+    fn diagnose_prepared(
+        &self,
+        fit: &[&PreparedRecording],
+        check: &[&PreparedRecording],
+        question: DiagnosisOptions,
     ) -> Outcome<DiagnosisFindings> {
         // Long recordings are decimated first, to save memory and time.
         let fewer = |all: &[&PreparedRecording]| -> Outcome<Vec<PreparedRecording>> {
@@ -292,6 +325,7 @@ impl Model {
         let mut findings = DiagnosisFindings {
             diagnosis: answer.diagnosis.clone(),
             missing: Vec::new(),
+            possible: Vec::new(),
             laws: Vec::new(),
             undecided: Vec::new(),
             off_nominal: Vec::new(),
@@ -305,11 +339,14 @@ impl Model {
             residual_locations: left,
             validation: judged,
             notes,
+            corrected: Vec::new(),
+            unresolved: Vec::new(),
             answer,
             variables,
         };
         // The parts of the findings that depend on others are filled in order.
-        findings.missing = missing_effects(&findings);
+        findings.missing = described_effects(&findings, &findings.diagnosis.effects);
+        findings.possible = described_effects(&findings, &findings.diagnosis.possible_effects);
         findings.laws = laws::hypotheses(&findings.before.model, &findings.diagnosis);
         findings.undecided = undecided_effects(&findings);
         findings.off_nominal = off_nominal_parameters(findings.final_version());
@@ -415,14 +452,15 @@ fn nominal_diagnosis(findings: &DiagnosisFindings, between: &[RecordingDifferenc
     })
 }
 
-/// Missing effects with estimates, alternatives and the experiment that separates them.
-fn missing_effects(findings: &DiagnosisFindings) -> Vec<MissingEffect> {
-    let found = findings.diagnosis.effects.iter();
-    found
+/// Effects with estimates, alternatives and the experiment that separates them.
+fn described_effects(findings: &DiagnosisFindings, effects: &[IdentifiedEffect]) -> Vec<MissingEffect> {
+    effects
+        .iter()
         .map(|found| MissingEffect {
             effect: found.effect.clone(),
             estimates: estimates(findings, found),
             probability: found.probability,
+            support: found.support,
             indistinguishable_from: found.indistinguishable_from.clone(),
             separating_experiment: separating_experiment(findings, found),
             separation: separation(findings, found),

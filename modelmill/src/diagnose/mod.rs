@@ -27,6 +27,7 @@ pub(crate) mod added_effects;
 mod candidates;
 mod columns;
 mod constants;
+mod corrected;
 mod encoders;
 mod faults;
 mod findings;

@@ -22,6 +22,7 @@ pub(crate) fn layout(model: &Model, all: &SegmentList<'_>) -> SampleLayout {
         LaidOut {
             name: one.run.file.clone(),
             samples: time.len(),
+            start: time.first().copied().unwrap_or(0.0),
             step: mean(&time),
             recorded_step: mean(&one.run.time),
             is_check: *is_check,

@@ -4,8 +4,8 @@
 
 use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
-    AttachedBody, CandidateEffect, CandidateNature, ColumnSource, EffectParameter, ForceColumn, LocatedEffect,
-    SignConstraint,
+    AttachedBody, CandidateEffect, CandidateNature, ChangeForce, ChangeShape, ColumnSource, EffectParameter,
+    ForceColumn, LocatedEffect, SignConstraint,
 };
 use modelmill_spec::{Kinematics, Mechanism};
 
@@ -29,25 +29,41 @@ const PARAMETERS: [(&str, &str, SignConstraint); 7] = [
 /// The first of them belong to a point mass; the others are second moments.
 const POINT_MASS_PARAMETERS: usize = 4;
 
-/// For every body a point mass, and the same with second moments.
+/// Columns of a load on one frame: mass, first moments and inertia.
+pub(crate) struct FrameLoad {
+    /// Name of the frame.
+    pub(crate) frame: String,
+    /// Columns of its ten parameters; zero for those without effect.
+    pub(crate) columns: [ForceColumn; TEN],
+}
+
+/// Columns of a load on every body of `payloads`, the last body first: of two with the same effect it is the one that
+/// carries tools.
 ///
-/// Fails when the derivation of the columns fails, or when a pose has no solution.
-pub(crate) fn payloads(model: &Model, all: &SegmentList<'_>) -> Outcome<Vec<CandidateEffect>> {
-    let payloads = PayloadColumns::new(model)?;
+/// Fails when a pose has no solution.
+pub(crate) fn frame_loads(model: &Model, all: &SegmentList<'_>, payloads: &PayloadColumns) -> Outcome<Vec<FrameLoad>> {
     let columns = regressor(all, &ModelEvaluator::new(&payloads.derivation), model)?;
+    let largest = columns.iter().map(size).fold(0.0, f64::max);
+    // Columns at the level of rounding are zero.
+    let of = |k: &Option<usize>| -> ForceColumn {
+        let column = k.map(|k| &columns[k]);
+        let column = column.filter(|column| size(column) > PAYLOAD_LEAST_EFFECT * largest);
+        column.map_or_else(|| ForceColumn(vec![None; model.drives().len()]), Clone::clone)
+    };
+    let frames = payloads.frames.iter().zip(&payloads.columns).rev();
+    let loads = frames.map(|(frame, which)| FrameLoad {
+        frame: frame.clone(),
+        columns: which.each_ref().map(of),
+    });
+    Ok(loads.collect())
+}
+
+/// For every body a point mass, and the same with second moments.
+pub(crate) fn payloads(model: &Model, loads: &[FrameLoad]) -> Vec<CandidateEffect> {
     // The size of the machine bounds the distance of the payload.
     let reach = reach(&model.derivation.mechanism);
-    let largest = columns.iter().map(size).fold(0.0, f64::max);
     let mut candidates = Vec::new();
-    // The last body first: of two with the same effect it is the one that carries tools.
-    for (frame, which) in payloads.frames.iter().zip(&payloads.columns).rev() {
-        // Columns at the level of rounding are zero.
-        let of = |k: &Option<usize>| -> ForceColumn {
-            let column = k.map(|k| &columns[k]);
-            let column = column.filter(|column| size(column) > PAYLOAD_LEAST_EFFECT * largest);
-            column.map_or_else(|| ForceColumn(vec![None; model.drives().len()]), Clone::clone)
-        };
-        let ten: [ForceColumn; TEN] = which.each_ref().map(of);
+    for FrameLoad { frame, columns: ten } in loads {
         let has_effect = |k: &usize| match *k {
             k @ 0..POINT_MASS_PARAMETERS => !ten[k].is_zero(),
             k => {
@@ -91,7 +107,48 @@ pub(crate) fn payloads(model: &Model, all: &SegmentList<'_>) -> Outcome<Vec<Cand
             });
         }
     }
-    Ok(candidates)
+    candidates
+}
+
+/// Symbols of the inertia of a load about the origin of its frame.
+const INERTIA: [&str; 6] = ["Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"];
+
+/// A load that is taken or put down during a recording: for each last body a point mass, and a body with inertia.
+///
+/// Fails when the derivation of the columns fails, or when a pose has no solution.
+pub(crate) fn load_changes(model: &Model, all: &SegmentList<'_>) -> Outcome<Vec<ChangeShape>> {
+    let loads = frame_loads(model, all, &PayloadColumns::of_last_bodies(model)?)?;
+    let each = loads
+        .iter()
+        .flat_map(|load| [(load, POINT_MASS_PARAMETERS), (load, TEN)]);
+    Ok(each.filter_map(|(load, most)| load_change(load, most)).collect())
+}
+
+/// The change of a load with the first `most` of its ten parameters; `None` if none of them acts.
+fn load_change(load: &FrameLoad, most: usize) -> Option<ChangeShape> {
+    let acting: Vec<usize> = (0..most).filter(|k| !load.columns[*k].is_zero()).collect();
+    let parameter = |k: &usize| {
+        let (symbol, unit) = match *k {
+            k @ 0..POINT_MASS_PARAMETERS => (PARAMETERS[k].0, PARAMETERS[k].1),
+            k => (INERTIA[k - POINT_MASS_PARAMETERS], "kg m^2"),
+        };
+        EffectParameter {
+            symbol: symbol.to_owned(),
+            unit: unit.to_owned(),
+            // A load may be put down as well.
+            sign: SignConstraint::Any,
+        }
+    };
+    // A body without first moments is no load.
+    let has_weight = acting.iter().any(|k| *k < POINT_MASS_PARAMETERS);
+    has_weight.then(|| ChangeShape {
+        effect: LocatedEffect {
+            kind: "payload_change".to_owned(),
+            at: vec![load.frame.clone()],
+        },
+        parameters: acting.iter().map(parameter).collect(),
+        force: ChangeForce::Columns(acting.iter().map(|k| load.columns[*k].clone()).collect()),
+    })
 }
 
 /// Largest magnitude of a column.

@@ -5,7 +5,7 @@ use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
     CandidateOutcome, ColumnChoice, ColumnProvider, ColumnSource, DiagnosisProblem, Disturbance, FORCE_ROUNDING,
     ForceColumn, LawSite, LoadDependentQuery, ModelDiagnosis, RejectionReason, diagnose, drift_candidates,
-    reading_fault_candidates, white_noise,
+    reading_fault_candidates, signal_changes, white_noise,
 };
 
 use crate::along::drive_rates;
@@ -13,6 +13,7 @@ use crate::error::{Error, Outcome};
 use crate::identify::regression::zero_force_message;
 use crate::model::Model;
 use crate::runs::RecordingDifference;
+use crate::runs::payload::PayloadColumns;
 use crate::segment::RecordingSegment;
 use crate::text::table::count;
 
@@ -26,7 +27,7 @@ use super::held_friction;
 use super::laws::sites;
 use super::memory::dahl_candidates;
 use super::numbers::{layout, stack, variables};
-use super::payloads::payloads;
+use super::payloads::{frame_loads, load_changes, payloads, reach};
 use super::thresholds::FEWEST_SAMPLES;
 use super::words;
 use crate::regressors::{SegmentList, regressor};
@@ -120,8 +121,13 @@ pub(crate) fn find_missing_effects(
     further.extend(gears(model, &all, &values, &slopes)?);
     further.extend(constants(model, &all, &|k| is_fixed(model, held, k)));
     further.extend(other_friction);
-    if asked.in_full && (held == FixedParameters::All || problem.base.is_empty()) {
-        further.extend(payloads(model, &all)?);
+    if asked.in_full {
+        if held == FixedParameters::All || problem.base.is_empty() {
+            let loads = frame_loads(model, &all, &PayloadColumns::new(model)?)?;
+            further.extend(payloads(model, &loads));
+        }
+        problem.change_shapes = load_changes(model, &all)?;
+        problem.change_shapes.extend(signal_changes(&problem, &units));
     }
     problem.candidates.extend(further);
     // None of these can be an entry of a model file.
@@ -189,7 +195,7 @@ struct ColumnSupply<'a> {
 impl ColumnProvider for ColumnSupply<'_> {
     fn columns_for_constant(&self, candidate: usize, constant: f64) -> Option<Vec<ForceColumn>> {
         // Candidates without an entry have no searched constant.
-        let (k, felt) = self.origins[candidate].as_ref()?;
+        let (k, felt) = self.origins.get(candidate)?.as_ref()?;
         let entry = &self.candidates.entries[*k];
         let columns = refined_columns(self.candidates, self.model, self.all, entry, constant)?;
         let kept = columns.into_iter().zip(felt).filter(|(_, felt)| **felt);
@@ -206,7 +212,7 @@ impl ColumnProvider for ColumnSupply<'_> {
         let only = match which {
             LoadDependentQuery::All => None,
             LoadDependentQuery::One(candidate, _) => {
-                let Some((entry, _)) = &self.origins[candidate] else {
+                let Some(Some((entry, _))) = self.origins.get(candidate) else {
                     return Vec::new();
                 };
                 Some(*entry)
@@ -278,6 +284,7 @@ fn problem(
         friction: friction(model, all)?,
         variables: variables(model, all),
         fixed_forces: None,
+        size: reach(&model.derivation.mechanism),
         ..DiagnosisProblem::default()
     };
     Ok((problem, made))

@@ -75,3 +75,12 @@ pub(super) const SLOPE_JUMP_MEDIANS: f64 = 100.0;
 /// A kind of effect repeats along the travel of its place if its shortest wavelength is below this part of the
 /// travel (1). By judgement.
 pub(super) const WAVE_SHORTEST_TRAVEL: f64 = 0.5;
+
+// --- Hypothetical corrections of recordings
+
+/// Rounds of looking for a fault of the recordings and correcting it. By judgement.
+pub(super) const CORRECTION_ROUNDS: usize = 3;
+
+/// A fault of one recording is corrected in another one if the errors fall by at least this sum of logarithms over the
+/// drives there (1). By judgement.
+pub(super) const SHARED_FAULT_LEAST_SCORE: f64 = 0.3;

@@ -2,13 +2,19 @@
 //! values of a diagnosis, output is English text without line breaks.
 
 use modelmill_identify::diagnose::{
-    DiagnosisVerdict, Disturbance, FORCE_ROUNDING, LocatedEffect, ModelDiagnosis, RejectionReason, SelectionStep,
+    DiagnosisVerdict, Disturbance, FORCE_ROUNDING, LocatedEffect, ModelDiagnosis, RejectionReason, ResidualCharacter,
+    SelectionStep, TimeResidual,
 };
 
-use crate::audit::SUSPICIONS;
+use crate::faults::{SuspectedFault, is_suspicion};
 use crate::text::table::{number, percent, significant};
 
 use super::thresholds::{HARDLY_LOWER, NOISE_FREE_ROUNDINGS};
+
+/// Kinds of changes during a recording.
+const CHANGES_IN_TIME: [&str; 3] = ["payload_change", "gain_change", "offset_step"];
+/// Intervals that a sentence lists at most.
+const MOST_INTERVALS: usize = 4;
 
 /// The data on which errors are evaluated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,6 +108,10 @@ pub fn refusal(reason: RejectionReason, has_effects: bool) -> &'static str {
     match reason {
         RejectionReason::WrongSign => "a parameter would have an impossible sign",
         RejectionReason::CancelsAnother => "it would only cancel another effect at its place",
+        RejectionReason::ImplausibleValue => {
+            "its value would be implausible for the size and the forces of this machine"
+        }
+        RejectionReason::LessLikelyThanNot => "possible, but less likely than not",
         RejectionReason::ExplainedBetter => "another candidate explains more",
         RejectionReason::ExplainsNothing if has_effects => {
             "redundant: it explains almost nothing in addition to the effects found"
@@ -135,44 +145,145 @@ pub fn verdict(diagnosis: &ModelDiagnosis, channels: &[String], judged: Validati
     let them = if found.len() == 1 { "it" } else { "them" };
     // Each verdict states the error and compares it with the noise.
     let says = match diagnosis.verdict {
-        DiagnosisVerdict::Adequate => format!(
-            "The model is adequate: its error {} is {} of the force. {noise} No effect of the library lowers this error.",
-            judged.phrase(),
-            percent(Some(last.check))
-        ),
-        DiagnosisVerdict::MissingEffect => format!("The model lacks {}. With {them} {falls}. {noise}", effects(&found)),
-        DiagnosisVerdict::Unexplained => {
-            let of = |d: &usize| 100.0 * diagnosis.repeatable_share[*d];
-            // Drives with a residual that a model could explain.
-            let sits: Vec<String> = (diagnosis.unexplained.iter())
-                .map(|d| {
-                    format!(
-                        "{} ({:.0} % of the squared residual is repeatable)",
-                        channels[*d],
-                        of(d)
-                    )
-                })
-                .collect();
-            let sits = sits.join(" and ");
-            if found.is_empty() {
-                format!(
-                    "The model lacks something that no effect of the library explains, on {sits}. The error {} is {} of the \
-                     force. {noise}",
-                    judged.phrase(),
-                    percent(Some(last.check))
-                )
-            } else {
-                format!(
-                    "The model lacks {}. With {them} {falls}. {noise} A part of the residual is not explained by any effect of \
-                     the library, on {sits}.",
-                    effects(&found)
-                )
-            }
+        // After a correction the verdict stays cautious, although nothing is left to explain.
+        DiagnosisVerdict::Unexplained if found.is_empty() && is_all_explained(diagnosis) => {
+            adequate_text(last.check, &noise, judged)
         }
+        DiagnosisVerdict::Adequate => adequate_text(last.check, &noise, judged),
+        DiagnosisVerdict::MissingEffect => format!("The model lacks {}. With {them} {falls}. {noise}", effects(&found)),
+        DiagnosisVerdict::Unexplained => unexplained_verdict(diagnosis, channels, judged, &found, &falls),
     };
     // Suspicions come first, since they may make the verdict wrong.
     let all = [first_checks(diagnosis), Some(says), disturbances(diagnosis)];
     all.into_iter().flatten().collect::<Vec<_>>().join(" ")
+}
+
+/// The verdict where something stays unexplained: effects that were found and how the error falls (`falls`), then what
+/// repeats with the state, what changes during a recording, and what follows the time.
+fn unexplained_verdict(
+    diagnosis: &ModelDiagnosis,
+    channels: &[String],
+    judged: ValidationMethod,
+    found: &[LocatedEffect],
+    falls: &str,
+) -> String {
+    let noise = noise_floor_text(diagnosis);
+    // Drives with a residual that a model could explain.
+    let sits: Vec<String> = (diagnosis.unexplained.iter())
+        .map(|d| {
+            format!(
+                "{} ({:.0} % of the squared residual is repeatable)",
+                channels[*d],
+                100.0 * diagnosis.repeatable_share[*d]
+            )
+        })
+        .collect();
+    let sits = sits.join(" and ");
+    let error = diagnosis
+        .steps
+        .last()
+        .map(|last| percent(Some(last.check)))
+        .unwrap_or_default();
+    let mut says = match (found, sits.is_empty()) {
+        ([], true) => vec![format!(
+            "The model does not explain all of the recordings: the error {} is {error} of the force. {noise}",
+            judged.phrase()
+        )],
+        ([], false) => vec![format!(
+            "The model lacks something that no effect of the library explains, on {sits}. The error {} is {error} of the force. \
+             {noise}",
+            judged.phrase()
+        )],
+        (found, _) => {
+            let them = if found.len() == 1 { "it" } else { "them" };
+            vec![format!(
+                "The model lacks {}. With {them} {falls}. {noise}",
+                effects(found)
+            )]
+        }
+    };
+    if !found.is_empty() && !sits.is_empty() {
+        says.push(format!(
+            "A part of the residual is not explained by any effect of the library, on {sits}."
+        ));
+    }
+    // Changes in time are listed with the disturbances; here only what follows for the model.
+    let changes: Vec<&str> = (diagnosis.disturbances.iter())
+        .filter(|one| is_change_in_time(one))
+        .filter_map(|one| one.description.as_deref())
+        .collect();
+    if !changes.is_empty() {
+        says.push(format!(
+            "Something changes during a recording: {}. One model cannot hold before and after: cut the recording there.",
+            changes.join("; ")
+        ));
+    }
+    // Drives with the same kind of residual share one sentence.
+    let in_time = diagnosis
+        .time_residuals
+        .iter()
+        .map(|one| channels[one.channel].as_str());
+    let in_time: Vec<&str> = in_time.collect();
+    if !in_time.is_empty() {
+        says.push(format!(
+            "A residual follows the time and not the state, on {}; it is more than noise (see the residuals that follow the time).",
+            in_time.join(", ")
+        ));
+    }
+    says.join(" ")
+}
+
+/// A residual that follows the time, as a sentence without the last full stop.
+pub(crate) fn time_residual(one: &TimeResidual, channel: &str, unit: &str) -> String {
+    let size = format!("{} {unit} rms", significant(one.rms, 3));
+    let noise = format!("the noise is {} {unit}", significant(one.noise, 2));
+    match one.character {
+        ResidualCharacter::Intervals => {
+            let mut times: Vec<String> = (one.intervals.iter().take(MOST_INTERVALS))
+                .map(|time| {
+                    let [from, to] = time.interval.map(|t| significant(t, 4));
+                    format!("from {from} to {to} s of {}", time.recording)
+                })
+                .collect();
+            if one.intervals.len() > MOST_INTERVALS {
+                times.push(format!("{} more", one.intervals.len() - MOST_INTERVALS));
+            }
+            format!(
+                "{channel} has an unexplained force of {size} in some intervals only ({noise}): {}. Look for contacts, stuck \
+                 signals and commands at these times",
+                times.join(", ")
+            )
+        }
+        ResidualCharacter::Resonance => format!(
+            "{channel} oscillates at about {} Hz with {size} ({noise}), as an elastic drive or a loose joint does. The model has \
+             rigid bodies only",
+            significant(one.frequency.unwrap_or_default(), 3)
+        ),
+        ResidualCharacter::Large => format!(
+            "{channel} has an unexplained force of {size} ({noise}) that does not repeat when the machine passes the same state. \
+             Repeat the motion to see what is noise"
+        ),
+    }
+}
+
+/// Whether the residual is noise everywhere, and nothing changes within a recording.
+fn is_all_explained(diagnosis: &ModelDiagnosis) -> bool {
+    let mut disturbances = diagnosis.disturbances.iter();
+    diagnosis.unexplained.is_empty() && diagnosis.time_residuals.is_empty() && !disturbances.any(is_change_in_time)
+}
+
+/// Whether a disturbance is a change within a recording.
+fn is_change_in_time(one: &Disturbance) -> bool {
+    one.interval.is_some() && CHANGES_IN_TIME.contains(&one.kind.as_str())
+}
+
+/// The sentences of a model that lacks nothing.
+fn adequate_text(error: f64, noise: &str, judged: ValidationMethod) -> String {
+    format!(
+        "The model is adequate: its error {} is {} of the force. {noise} No effect of the library lowers this error.",
+        judged.phrase(),
+        percent(Some(error))
+    )
 }
 
 /// How the error falls: of all drives, or, if that hardly changes, of the drive whose error falls most. A small
@@ -217,14 +328,33 @@ fn first_checks(diagnosis: &ModelDiagnosis) -> Option<String> {
     })
 }
 
+/// The faults that were corrected hypothetically, as sentences; the verdict on the corrected recordings follows.
+pub(crate) fn corrected_text(corrected: &[SuspectedFault]) -> String {
+    let sentences: Vec<String> = (corrected.iter())
+        .map(|fault| format!("In {} {}.", fault.recordings.join(", "), fault.clause.replace('`', "")))
+        .collect();
+    let with = if corrected.len() == 1 {
+        "With it corrected"
+    } else {
+        "With these corrected"
+    };
+    format!("{} {with}, ", sentences.join(" "))
+}
+
+/// The verdict if faults remain that cannot be corrected.
+pub(crate) fn unresolved_text(unresolved: &[SuspectedFault]) -> String {
+    let sentences: Vec<String> = (unresolved.iter())
+        .map(|fault| format!("In {} {}.", fault.recordings.join(", "), fault.clause.replace('`', "")))
+        .collect();
+    format!(
+        "Check the recording and the model first. {} Until this is clear, nothing can be stated about the model.",
+        sentences.join(" ")
+    )
+}
+
 /// Whether the recording or the model is in doubt. Until that is checked, no effect is worth adding.
 pub(crate) fn has_suspicion(diagnosis: &ModelDiagnosis) -> bool {
     diagnosis.disturbances.iter().any(is_suspicion)
-}
-
-/// Whether a disturbance is a fault that would make all findings invalid, such as exchanged columns.
-fn is_suspicion(one: &Disturbance) -> bool {
-    SUSPICIONS.contains(&one.kind.as_str())
 }
 
 /// Disturbances of the recordings by name, each kind once with all its places; `None` without any.
@@ -332,6 +462,16 @@ pub fn disturbance(one: &Disturbance) -> String {
                 significant(to, 4),
                 one.recordings.join(", ")
             )
+        }
+        "gain_change" | "offset_step" | "payload_change" if one.interval.is_some() => {
+            let [from, to] = one.interval.unwrap_or_default().map(|t| significant(t, 4));
+            let what = match one.kind.as_str() {
+                "gain_change" => format!("the scale of the measured force of {at} changes"),
+                "offset_step" => format!("the zero of the measured force of {at} jumps"),
+                _ => format!("the load on {at} changes"),
+            };
+            let runs = one.recordings.join(", ");
+            format!("{what} at t = {from} s and stays until {to} s ({runs}): {all}")
         }
         other => format!("{} ({at}): {all}", kind(other)),
     }

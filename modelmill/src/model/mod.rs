@@ -17,7 +17,7 @@ use modelmill_codegen::{BaseParameterEntry, ColumnDependency, Derivation, Parame
 use modelmill_identify::estimate::ParameterPrior;
 use modelmill_identify::{ParameterInfo, RecordingNote};
 use modelmill_spec::{
-    EffectKind, ExactExpression, Mechanism, ModelSymbol, ParameterIdx, PartInertia, PlaceQuantity, Sign,
+    EffectKind, ExactExpression, FrameStep, Mechanism, ModelSymbol, ParameterIdx, PartInertia, PlaceQuantity, Sign,
 };
 use nalgebra::DMatrix;
 
@@ -299,6 +299,23 @@ impl Model {
             .collect()
     }
 
+    /// Indices of the active coordinates that belong to joints, not to the pose of a free body.
+    pub(crate) fn joint_coordinates(&self) -> Vec<usize> {
+        let mechanism = &self.derivation.mechanism;
+        let steps = mechanism.frames.iter().flat_map(|frame| &frame.steps);
+        let bodies = steps.filter_map(|step| match step {
+            FrameStep::Free(body) => Some(body),
+            _ => None,
+        });
+        let free: Vec<usize> = bodies
+            .flat_map(|body| body.position.iter().chain(&body.quaternion))
+            .map(|i| i.0)
+            .collect();
+        let active = (0..mechanism.coordinates.len()).filter(|i| !mechanism.coordinates[*i].passive);
+        let of_joints = active.enumerate().filter(|(_, i)| !free.contains(i));
+        of_joints.map(|(place, _)| place).collect()
+    }
+
     /// The products of dynamic parameters whose linear combination is the base parameter `k`, each with its
     /// coefficient, evaluated with the constants of the file.
     pub fn products_of(&self, k: usize) -> Vec<(&ParameterMonomial, f64)> {
@@ -502,6 +519,12 @@ impl Model {
                 self.identified[k] = true;
             }
         }
+        self
+    }
+
+    /// The model with another host.
+    pub(crate) fn with_host(mut self, host: &Host) -> Self {
+        self.host = host.clone();
         self
     }
 

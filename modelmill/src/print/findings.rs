@@ -5,7 +5,7 @@ use modelmill_identify::diagnose::{DiagnosisVerdict, LocatedEffect, SelectionSte
 use serde_json::{Map, Value, json};
 
 use super::laws;
-use crate::diagnose::{DiagnosisFindings, EffectEstimate, UndecidedEffect, words};
+use crate::diagnose::{DiagnosisFindings, EffectEstimate, MissingEffect, UndecidedEffect, words};
 use crate::print::{OptionName, Remedy, StepSpelling, notes};
 use crate::text::TerminalStyle;
 use crate::text::table::{ColumnAlignment, number, percent, significant, table};
@@ -22,14 +22,18 @@ impl DiagnosisFindings {
     /// - `budget`: for each drive, the parts of its residual (`noise`, `not_repeating`, `model`), relative to the rms
     ///   force of the drive; `rms` is this force in `unit`
     /// - `disturbances`: faults of the recordings, with estimates and times (`interval`, s)
+    /// - `corrected`: faults of the recordings that were corrected hypothetically, with what to do about them (`todo`);
+    ///   all other findings hold for the corrected recordings
     /// - `steps`: errors after each added effect, on fitted (`fit`) and validation data (`check`)
-    /// - `effects`: missing effects with estimates, probability and alternatives
+    /// - `effects`: missing effects with estimates, probability, what supports them, and alternatives
+    /// - `possible`: the same for effects with a probability below 0.5, which the model is not said to lack
     /// - `candidates`: all effects that were tried, with the share of the squared error that each explains
     ///   alone and the reason of its rejection
     /// - `untold`: effects that the recordings can neither show nor exclude
     /// - `laws`: hypotheses for the residual
     /// - `parameters_off_nominal`: base parameters that differ from the file, in standard deviations (`sigmas`)
     /// - `unexplained`: drives with a repeatable residual that no effect explains
+    /// - `follows_time`: drives with a residual that follows the time and not the state, and cannot be noise
     /// - `data`, `where`: notes on the recordings, and regions where the error is largest
     /// - `with_nominal_parameters`: the diagnosis with all parameters fixed
     pub fn json(&self, spelling: &dyn StepSpelling) -> Value {
@@ -39,20 +43,22 @@ impl DiagnosisFindings {
         let model = &self.before.model;
         // Missing effects with the motion that would separate them from their alternatives. Kinds and places have
         // the names of the model file.
-        let effects: Vec<Value> = (self.missing.iter())
-            .map(|missing| {
+        let described = |effects: &[MissingEffect]| -> Vec<Value> {
+            let described = effects.iter().map(|missing| {
                 let separation = missing.separation.as_ref();
                 json!({
                     "kind": missing.effect.kind,
                     "at": missing.effect.at,
                     "estimates": estimates(&missing.estimates),
                     "probability": missing.probability,
+                    "support": missing.support,
                     "indistinguishable_from": missing.indistinguishable_from,
                     "separate_by": missing.separating_experiment,
                     "separate_command": separation.and_then(|asked| spelling.spell_separation(model, asked)),
                 })
-            })
-            .collect();
+            });
+            described.collect()
+        };
         // All candidates, including those that were found; they have no rejection reason. A script can sort them
         // by either share.
         let candidates: Vec<Value> = (diagnosis.candidates.iter())
@@ -85,7 +91,7 @@ impl DiagnosisFindings {
             })
             .collect();
         // Disturbances with estimates, recordings and times.
-        let disturbances: Vec<Value> = (diagnosis.disturbances.iter())
+        let disturbances: Vec<Value> = (self.disturbances().iter())
             .map(|one| {
                 json!({
                     "kind": one.kind,
@@ -110,8 +116,10 @@ impl DiagnosisFindings {
             "noise_floor": diagnosis.noise_floor,
             "budget": budget,
             "disturbances": disturbances,
+            "corrected": self.corrected.iter().map(|fault| fault.json(spelling)).collect::<Vec<_>>(),
             "steps": steps(&diagnosis.steps),
-            "effects": effects,
+            "effects": described(&self.missing),
+            "possible": described(&self.possible),
             "candidates": candidates,
             "untold": self.undecided.iter().map(|one| {
                 json!({"kind": one.effect.kind, "at": one.effect.at, "says": one.reason, "separate_by": one.separating_experiment})
@@ -119,6 +127,7 @@ impl DiagnosisFindings {
             "laws": laws::laws(&self.laws, model, spelling),
             "parameters_off_nominal": off,
             "unexplained": unexplained,
+            "follows_time": self.time_residuals(),
             "data": notes(&self.notes, spelling),
             "where": self.regions,
             "with_nominal_parameters": self.with_nominal.as_ref().map(|held| {
@@ -133,11 +142,32 @@ impl DiagnosisFindings {
         })
     }
 
+    /// Residuals that follow the time and are no noise, as JSON.
+    fn time_residuals(&self) -> Vec<Value> {
+        let (diagnosis, channels) = (&self.diagnosis, self.channels());
+        let model = &self.before.model;
+        (diagnosis.time_residuals.iter())
+            .map(|one| {
+                json!({
+                    "channel": channels[one.channel],
+                    "character": one.character,
+                    "rms": one.rms,
+                    "noise": one.noise,
+                    "unit": model.force_unit(one.channel),
+                    "frequency": one.frequency,
+                    "intervals": one.intervals.iter().map(|time| {
+                        json!({"recording": time.recording, "interval": time.interval})
+                    }).collect::<Vec<_>>(),
+                    "says": words::time_residual(one, &channels[one.channel], model.force_unit(one.channel)),
+                })
+            })
+            .collect()
+    }
+
     /// The findings as lines of text, the verdict first.
     pub fn text(&self, style: TerminalStyle, spelling: &dyn StepSpelling) -> Vec<String> {
         let diagnosis = &self.diagnosis;
-        let channels = self.channels();
-        let verdict = words::verdict(diagnosis, channels, self.validation);
+        let verdict = self.verdict_text();
         let mut lines: Vec<String> = (words::lines(&verdict, 100).iter())
             .map(|line| style.bold(line))
             .collect();
@@ -159,6 +189,7 @@ impl DiagnosisFindings {
         // The noise floor follows the table, as the lower bound of all errors.
         lines.push(format!("  {}", words::noise_floor_text(diagnosis)));
         self.missing_text(style, spelling, &mut lines);
+        self.possible_text(style, &mut lines);
         self.disturbances_text(style, &mut lines);
         lines.push(String::new());
         lines.push(style.bold(if diagnosis.verdict == DiagnosisVerdict::Unexplained {
@@ -177,9 +208,12 @@ impl DiagnosisFindings {
         self.off_nominal_text(style, spelling, &mut lines);
         // Entries to add first, then advice for what a model file cannot contain. Steps are commands or calls,
         // depending on the reader.
-        let mut next: Vec<String> = (self.entries_to_add().iter())
-            .map(|entry| spelling.spell_effect(&self.before.model, entry))
+        let at_fault = self.corrected.iter().chain(&self.unresolved);
+        let mut next: Vec<String> = at_fault
+            .map(|fault| format!("Correct the recording first: {}.", fault.advice.spell(spelling)))
             .collect();
+        let entries = self.entries_to_add().iter();
+        next.extend(entries.map(|entry| spelling.spell_effect(&self.before.model, entry)));
         next.extend(self.further_action().map(str::to_owned));
         if !next.is_empty() {
             lines.push(String::new());
@@ -201,12 +235,23 @@ impl DiagnosisFindings {
     /// Disturbances of the recordings, and the parts of the residual of each drive.
     fn disturbances_text(&self, style: TerminalStyle, lines: &mut Vec<String>) {
         let diagnosis = &self.diagnosis;
-        if !diagnosis.disturbances.is_empty() {
+        let disturbances = self.disturbances();
+        if !disturbances.is_empty() {
             lines.push(String::new());
             lines.push(style.bold("Disturbances in the recordings (not model errors)"));
-            for one in &diagnosis.disturbances {
+            for one in &disturbances {
                 let says = format!("{}.", one.description.as_deref().unwrap_or_default());
                 let wrapped = words::lines(&says, 98);
+                lines.extend(wrapped.iter().map(|line| format!("  {line}")));
+            }
+        }
+        if !diagnosis.time_residuals.is_empty() {
+            lines.push(String::new());
+            lines.push(style.bold("Residuals that follow the time and not the state"));
+            for one in &diagnosis.time_residuals {
+                let unit = self.before.model.force_unit(one.channel);
+                let says = words::time_residual(one, &self.channels()[one.channel], unit);
+                let wrapped = words::lines(&format!("{says}."), 98);
                 lines.extend(wrapped.iter().map(|line| format!("  {line}")));
             }
         }
@@ -254,18 +299,11 @@ impl DiagnosisFindings {
             let name = found.effect.kind.as_str();
             let is_first = !explained.contains(&name);
             explained.push(name);
-            // Values with standard deviations and units.
-            let values: Vec<String> = (found.estimates.iter())
-                .map(|e| {
-                    let std = e
-                        .std
-                        .map_or_else(String::new, |std| format!(" ± {}", significant(std, 2)));
-                    let unit = if e.unit == "1" { "" } else { &e.unit };
-                    let said = format!("{} = {}{std} {unit}", e.name, number(e.value));
-                    said.trim_end().to_owned()
-                })
-                .collect();
-            lines.push(format!("  {}: {}", words::effect(&found.effect), values.join(", ")));
+            lines.push(format!(
+                "  {}: {}",
+                words::effect(&found.effect),
+                values_text(&found.estimates)
+            ));
             // Kinds of the libraries have a text of their own; others are explained here.
             // The text of the library comes first, since users can add kinds.
             let mut kinds = self.answer.candidates.kinds.iter();
@@ -295,6 +333,30 @@ impl DiagnosisFindings {
                 }
             }
         }
+    }
+
+    /// Effects that are less likely than not, with their values and probabilities.
+    fn possible_text(&self, style: TerminalStyle, lines: &mut Vec<String>) {
+        if self.possible.is_empty() {
+            return;
+        }
+        lines.push(String::new());
+        lines.push(style.bold("Possible effects (less likely than not)"));
+        for found in &self.possible {
+            lines.push(format!(
+                "  {}: {}, probability {}",
+                words::effect(&found.effect),
+                values_text(&found.estimates),
+                significant(found.probability, 2)
+            ));
+        }
+        let advice = "The recordings do not show them clearly, so they are neither part of the verdict nor of the errors \
+                      above. To decide, record a longer motion with more reversals and other speeds.";
+        lines.extend(
+            words::lines(advice, 96)
+                .iter()
+                .map(|line| style.dim(&format!("    {line}"))),
+        );
     }
 
     /// The rejected candidates that explain most of the error alone, with the reason.
@@ -416,6 +478,19 @@ impl DiagnosisFindings {
         let fix_parameters = Remedy::option(OptionName::Held).spell(spelling);
         lines.push(format!("  (Details: {fix_parameters}.)"));
     }
+}
+
+/// Estimates with standard deviations and units, for a line of text.
+fn values_text(estimates: &[EffectEstimate]) -> String {
+    let values = estimates.iter().map(|e| {
+        let std = e
+            .std
+            .map_or_else(String::new, |std| format!(" ± {}", significant(std, 2)));
+        let unit = if e.unit == "1" { "" } else { &e.unit };
+        let said = format!("{} = {}{std} {unit}", e.name, number(e.value));
+        said.trim_end().to_owned()
+    });
+    values.collect::<Vec<String>>().join(", ")
 }
 
 /// Estimates as JSON.

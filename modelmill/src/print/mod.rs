@@ -13,9 +13,10 @@ mod identification;
 mod interpretation;
 pub(crate) mod laws;
 mod next_step;
+mod proposal;
 #[cfg(feature = "import")]
 mod reduction;
-mod runs;
+pub(crate) mod runs;
 mod spelling;
 mod summary;
 pub mod tables;

@@ -1,19 +1,24 @@
 //! Differences between runs of one machine, as JSON for scripts and as text for people.
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{CommandName, Message, OptionName, Remedy};
 use modelmill_identify::ParameterInfo;
 use serde_json::{Value, json};
 
 use crate::print::RemedySpelling;
 use crate::runs::{
-    ChangePoint, FittedValue, PhysicalChange, RunChange, RunReport, RunValue, RunsComparison, SharedFit,
+    ChangePoint, FittedValue, PhysicalChange, RunChange, RunReport, RunValue, RunVerdict, RunsComparison, SharedFit,
+    UndecidedDrive, UndecidedReason,
 };
 use crate::text::TerminalStyle;
-use crate::text::table::{ColumnAlignment, count, table, with_deviation};
+use crate::text::table::{ColumnAlignment, count, percent, table, with_deviation};
 
 impl RunsComparison {
     /// All differences as one JSON object; values in SI units.
     ///
-    /// - `together`: base parameters of one fit to all runs; `runs`: those of each run fitted separately
+    /// - `together`: base parameters of one fit to all runs; `runs`: those of each run fitted separately, with its
+    ///   `verdict` relative to the first (`changed`, `different`, `unchanged`, `cannot_tell`; null for the first), and
+    ///   the drives whose forces cannot show a change (`undecided`)
     /// - `moved`: base parameters that differ between the first run and another, in standard deviations (`sigmas`)
     /// - `changes`: physical changes of a run relative to the first
     /// - `change_points`: permanent changes; they are searched for if there are at least four runs
@@ -29,11 +34,14 @@ impl RunsComparison {
         let unread = self.unread.iter();
         let unread = unread.map(|one| json!({ "file": one.file, "says": one.error.spell(spelling) }));
         // Each run with its own fit.
-        let runs = self.runs.iter().map(|run| {
+        let runs = self.runs.iter().enumerate().map(|(k, run)| {
             json!({
                 "file": run.file,
                 "samples": run.samples,
                 "parameters": self.parameters_json(&run.alone),
+                "verdict": (k > 0).then(|| run.verdict().keyword()),
+                "undecided": run.undecided.iter().map(undecided_json).collect::<Vec<_>>(),
+                "says": (k > 0).then(|| verdict_text(run).spell(spelling)),
             })
         });
         json!({
@@ -124,7 +132,7 @@ impl RunsComparison {
     fn moved_parameter_json(&self, run: usize, k: usize) -> Value {
         // Both values are from separate fits, so their errors are independent.
         let (before, now) = (self.runs[0].alone[k], self.runs[run].alone[k]);
-        let deviation = before.difference_deviation(now);
+        let deviation = self.runs[run].difference_deviation(&self.runs[0], k);
         json!({
             "parameter": self.parameters[k].name,
             "sigmas": (now.value - before.value).abs() / deviation,
@@ -161,10 +169,10 @@ impl RunsComparison {
             lines.extend(first.changes.iter().map(|one| format!("  {}", one.says)));
         }
         if later.len() > MOST_DETAILED_RUNS {
-            write_many_runs(later, &mut lines, style);
+            write_many_runs(later, &mut lines, style, spelling);
         } else {
             for run in later {
-                self.write_run(first, run, &mut lines, style);
+                self.write_run(first, run, &mut lines, style, spelling);
             }
             self.write_change_points(&mut lines, style);
         }
@@ -179,18 +187,19 @@ impl RunsComparison {
     }
 
     /// A run compared with the first one.
-    fn write_run(&self, first: &RunReport, run: &RunReport, lines: &mut Vec<String>, style: TerminalStyle) {
+    fn write_run(
+        &self,
+        first: &RunReport,
+        run: &RunReport,
+        lines: &mut Vec<String>,
+        style: TerminalStyle,
+        spelling: &dyn RemedySpelling,
+    ) {
         lines.push(String::new());
         lines.push(style.bold(&run.file));
         write_changes(&run.changes, lines);
-        // A contact within a run is no change of the machine.
-        let is_event = |one: &RunChange| matches!(one.change, PhysicalChange::ContactEvent { .. });
-        if run.changes.iter().all(is_event) {
-            let other = if run.changes.is_empty() { "" } else { "other " };
-            lines.push(format!(
-                "  No {other}change found that is larger than noise and model error."
-            ));
-        }
+        let verdict = verdict_text(run).spell(spelling);
+        lines.extend((!verdict.is_empty()).then(|| format!("  {verdict}")));
         if !run.moved.is_empty() {
             lines.push("  Base parameters that changed (each run fitted separately):".to_owned());
             // Parameters before and now, with the standard deviation of the difference.
@@ -249,10 +258,11 @@ impl RunsComparison {
     fn moved_parameter_row(&self, first: &RunReport, run: &RunReport, k: usize) -> Vec<String> {
         let (before, now) = (first.alone[k], run.alone[k]);
         let info = &self.parameters[k];
-        let [value, deviation] = with_deviation(now.value, before.difference_deviation(now));
+        let difference = run.difference_deviation(first, k);
+        let [value, deviation] = with_deviation(now.value, difference);
         vec![
             info.name.clone(),
-            with_deviation(before.value, before.difference_deviation(now))[0].clone(),
+            with_deviation(before.value, difference)[0].clone(),
             value,
             deviation,
             info.unit.clone(),
@@ -263,6 +273,100 @@ impl RunsComparison {
 
 /// Up to this number of later runs each run is listed with its base parameters; beyond, only changes are listed.
 const MOST_DETAILED_RUNS: usize = 12;
+
+/// The sentences on a run besides those on its changes: that nothing changed, that the cause is unknown, or that the
+/// runs cannot show it. Empty if changes say all.
+pub(crate) fn verdict_text(run: &RunReport) -> Message {
+    let other = if run.changes.is_empty() { "" } else { "other " };
+    let unknown = undecided_text(&run.undecided);
+    match run.verdict() {
+        // Changes on some drives say nothing of drives without knowledge.
+        RunVerdict::Changed if run.undecided.is_empty() => Message::default(),
+        RunVerdict::Changed => message!("For some drives the runs cannot show a change. {}", unknown),
+        RunVerdict::CannotTell => message!("Cannot tell whether anything changed. {}", unknown),
+        RunVerdict::DifferentWithoutCause => message!(
+            "The runs differ, but no {other}single change explains how: the base parameters below differ by more than noise and \
+             model error. The model may lack an effect that depends on the motion. Find it with {}, then compare the runs again.{}",
+            Remedy::command(CommandName::Diagnose),
+            if run.undecided.is_empty() {
+                Message::default()
+            } else {
+                message!(" {}", unknown)
+            }
+        ),
+        RunVerdict::Unchanged if run.undecided.is_empty() => {
+            format!("No {other}change found that is larger than noise and model error.").into()
+        }
+        RunVerdict::Unchanged => message!(
+            "No {other}change found on the other drives that is larger than noise and model error. {}",
+            unknown
+        ),
+    }
+}
+
+/// What the runs cannot show, why, and what to do.
+fn undecided_text(undecided: &[UndecidedDrive]) -> Message {
+    let mut told = Vec::new();
+    let named = |is: &dyn Fn(UndecidedReason) -> bool| -> Vec<&UndecidedDrive> {
+        undecided.iter().filter(|one| is(one.reason)).collect()
+    };
+    // Drives with the same reason share a sentence.
+    let list = |some: &[&UndecidedDrive]| {
+        let names = some.iter().map(|one| {
+            let part = match one.reason {
+                UndecidedReason::UnexplainedForce { share } => format!(" ({})", percent(Some(share))),
+                UndecidedReason::SmallestChange { share } if share.is_finite() => {
+                    format!(" ({})", percent(Some(share)))
+                }
+                _ => String::new(),
+            };
+            format!("{}{part}", one.drive)
+        });
+        names.collect::<Vec<_>>().join(", ")
+    };
+    if let Some(UndecidedReason::TooFewEquations { equations, parameters }) = undecided.first().map(|one| one.reason) {
+        return message!(
+            "A run has {equations} equations for {parameters} base parameters, which is too few. Record longer runs, or keep more \
+             samples ({}).",
+            Remedy::option(OptionName::Decimate)
+        );
+    }
+    let unexplained = named(&|one| matches!(one, UndecidedReason::UnexplainedForce { .. }));
+    if !unexplained.is_empty() {
+        told.push(message!(
+            "The model leaves most of the force of {} unexplained, so that parameters fitted to it mean nothing. Find what is wrong \
+             with {}, then compare the runs again.",
+            list(&unexplained),
+            Remedy::command(CommandName::Diagnose)
+        ));
+    }
+    let standing = named(&|one| matches!(one, UndecidedReason::Standstill));
+    if !standing.is_empty() {
+        told.push(message!(
+            "At standstill friction may have any value: {} hardly moves in one of the runs. Record runs in which it moves.",
+            list(&standing)
+        ));
+    }
+    let insensitive = named(&|one| matches!(one, UndecidedReason::SmallestChange { .. }));
+    if !insensitive.is_empty() {
+        told.push(message!(
+            "Even a change of most of its force would be within noise and model error at {}. Record longer or faster motions.",
+            list(&insensitive)
+        ));
+    }
+    Message::join(told, " ")
+}
+
+/// A drive whose forces cannot show a change, as JSON: the reason with its number.
+fn undecided_json(one: &UndecidedDrive) -> Value {
+    let share = match one.reason {
+        UndecidedReason::UnexplainedForce { share } | UndecidedReason::SmallestChange { share } => {
+            Some(share).filter(|share| share.is_finite())
+        }
+        UndecidedReason::TooFewEquations { .. } | UndecidedReason::Standstill => None,
+    };
+    json!({ "drive": one.drive, "reason": one.reason.keyword(), "share": share })
+}
 
 /// Adds one line for each change, with the changes that explain the runs equally well.
 fn write_changes(changes: &[RunChange], lines: &mut Vec<String>) {
@@ -277,17 +381,20 @@ fn write_changes(changes: &[RunChange], lines: &mut Vec<String>) {
     }
 }
 
-/// Many runs: only those with changes are listed, the others are counted.
-fn write_many_runs(later: &[RunReport], lines: &mut Vec<String>, style: TerminalStyle) {
-    let unchanged = later.iter().filter(|run| run.changes.is_empty()).count();
+/// Many runs: only those with another verdict than "no change" are listed, the others are counted.
+fn write_many_runs(later: &[RunReport], lines: &mut Vec<String>, style: TerminalStyle, spelling: &dyn RemedySpelling) {
+    let is_quiet = |run: &&RunReport| run.changes.is_empty() && run.verdict() == RunVerdict::Unchanged;
+    let unchanged = later.iter().filter(is_quiet).count();
     lines.push(String::new());
     lines.push(format!(
         "{unchanged} of {} later runs show no change relative to the first run",
         later.len()
     ));
-    for run in later.iter().filter(|run| !run.changes.is_empty()) {
+    for run in later.iter().filter(|run| !is_quiet(run)) {
         lines.push(style.bold(&run.file));
         write_changes(&run.changes, lines);
+        let verdict = verdict_text(run).spell(spelling);
+        lines.extend((!verdict.is_empty()).then(|| format!("  {verdict}")));
     }
 }
 
@@ -373,6 +480,65 @@ fn write_shared_fit(fit: &SharedFit, lines: &mut Vec<String>, style: TerminalSty
         let unknown: Vec<String> = unknown.map(|one| format!("{} of {}", one.name, one.quantity)).collect();
         if !unknown.is_empty() {
             lines.push(format!("    not identifiable: {}", unknown.join(", ")));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::print::LibrarySpelling;
+    use crate::runs::ChangeEstimate;
+
+    /// A report with given numbers of moved parameters and of undecided drives of two.
+    fn report(moved: usize, undecided: usize, changes: Vec<RunChange>) -> RunReport {
+        RunReport {
+            file: "later.csv".to_owned(),
+            samples: 100,
+            alone: Vec::new(),
+            moved: (0..moved).collect(),
+            drives: 2,
+            undecided: (0..undecided)
+                .map(|d| UndecidedDrive {
+                    drive: format!("joint{d}"),
+                    reason: UndecidedReason::UnexplainedForce { share: 0.94 },
+                })
+                .collect(),
+            difference_factor: 1.0,
+            changes,
+        }
+    }
+
+    /// No sentence denies a change above a table of moved parameters, or where nothing can be known.
+    #[test]
+    fn no_sentence_contradicts_the_table_below_it() {
+        let offset = RunChange {
+            change: PhysicalChange::Offset {
+                drive: "joint0".to_owned(),
+                force: ChangeEstimate {
+                    value: 2.0,
+                    deviation: 0.1,
+                },
+            },
+            gain: 400.0,
+            unit: "N m",
+            rivals: Vec::new(),
+            drive_weights: Vec::new(),
+            says: "a constant force".to_owned(),
+        };
+        for moved in [0, 3] {
+            for undecided in 0..=2 {
+                for changes in [Vec::new(), vec![offset.clone()]] {
+                    let is_changed = !changes.is_empty();
+                    let one = report(moved, undecided, changes);
+                    let says = verdict_text(&one).spell(&LibrarySpelling);
+                    let denies = says.contains("No change found") || says.contains("No other change found");
+                    assert_eq!(denies, !is_changed && moved == 0 && undecided < 2, "{says}");
+                    let is_unknown = !is_changed && undecided == 2;
+                    assert_eq!(says.contains("Cannot tell"), is_unknown, "{says}");
+                    assert_eq!(says.contains("94.0 %"), undecided > 0, "{says}");
+                }
+            }
         }
     }
 }

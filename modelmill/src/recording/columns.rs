@@ -2,14 +2,16 @@
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{Message, OptionName, Remedy};
+use modelmill_identify::RecordingNote;
 use modelmill_identify::{ComputedColumn, NonFinitePolicy, ReadOptions};
-use modelmill_spec::{ColumnFault, ColumnQuantity, ColumnSum, read_column};
+use modelmill_spec::{ColumnFault, ColumnQuantity, ColumnSum, read_column, split_header_unit, unit_factor};
 
 use super::options::RecordingOptions;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 
-/// Options for reading a recording with the columns `header`; `file` is its name in messages.
+/// Options for reading a recording with the columns `header`, and notes on the assignment; `file` is its name in
+/// messages.
 ///
 /// Fails when a mapping is not possible for this model, or uses columns that do not exist.
 pub(crate) fn read_options(
@@ -17,7 +19,7 @@ pub(crate) fn read_options(
     args: &RecordingOptions,
     header: &[String],
     file: &str,
-) -> Outcome<ReadOptions> {
+) -> Outcome<(ReadOptions, Vec<RecordingNote>)> {
     let mechanism = &model.derivation.mechanism;
     let known = mechanism.columns();
     // Options of the user come first, since they override the model file.
@@ -34,6 +36,15 @@ pub(crate) fn read_options(
             faults.push(Error::options(message!(
                 "{}: `{ours}` is mapped twice; give each name one mapping",
                 map(ours, "...")
+            )));
+            continue;
+        }
+        // A rate replaces the times of the file.
+        if ours == "t" && args.rate.is_some() {
+            faults.push(Error::options(message!(
+                "{}: the times also follow from {}; give one of the two",
+                map(ours, text),
+                Remedy::option(OptionName::Rate)
             )));
             continue;
         }
@@ -57,7 +68,7 @@ pub(crate) fn read_options(
     }
     // Mappings of the model file follow; those of the user have priority.
     for (ours, text) in &mechanism.recording.columns {
-        if args.columns.iter().any(|(mine, _)| mine == ours) {
+        if args.columns.iter().any(|(mine, _)| mine == ours) || (ours == "t" && args.rate.is_some()) {
             continue;
         }
         // Names that the model does not read are ignored in its own list.
@@ -65,7 +76,6 @@ pub(crate) fn read_options(
             continue;
         };
         match parse_column_sum(model, text, quantity, header) {
-            Ok(sum) if mapping.is_conflicting(&sum) => {}
             Ok(sum) => mapping.add(ours, sum),
             // A recording may use the names of the model, or lack optional columns.
             Err(ColumnFault::Missing { .. }) if header.contains(ours) || is_optional(ours, quantity) => {}
@@ -79,6 +89,18 @@ pub(crate) fn read_options(
             }
         }
     }
+    // A column `q1 [deg]` has the name `q1` of the model and a unit.
+    for (ours, quantity) in &known {
+        let is_named = header.contains(ours) || mapping.has(ours) || (ours == "t" && args.rate.is_some());
+        let is_unit_only = |name: &String| split_header_unit(name).is_some_and(|(base, _)| base == ours);
+        if is_named || header.iter().filter(|name| is_unit_only(name)).count() != 1 {
+            continue;
+        }
+        if let Ok(sum) = parse_column_sum(model, ours, *quantity, header) {
+            mapping.add(ours, sum);
+        }
+    }
+    let notes = mapping.notes(&known, &mechanism.recording.torque, file);
     // Motor torques are scaled to the drive, their variances by the square.
     for (drive, factor) in &mechanism.recording.torque {
         mapping.scale(drive, *factor, header);
@@ -88,7 +110,7 @@ pub(crate) fn read_options(
         return Err(fault);
     }
     // Only columns that the model needs are read.
-    Ok(ReadOptions {
+    let options = ReadOptions {
         renames: mapping.renames,
         computed: mapping.computed,
         not_finite: if args.skip_bad_samples {
@@ -99,8 +121,10 @@ pub(crate) fn read_options(
         wanted: Some(known.into_iter().map(|(name, _)| name).collect()),
         may_be_missing: optional_forces(model),
         time_interval: args.between,
+        rate: args.rate,
         ..ReadOptions::default()
-    })
+    };
+    Ok((options, notes))
 }
 
 /// Forces with samples that may be missing. None if drives share rows, since their forces are added before samples are
@@ -145,9 +169,9 @@ struct ColumnMapping {
 impl ColumnMapping {
     /// Adds an assignment: a rename if the sum is a single column without factor and offset.
     fn add(&mut self, ours: &str, sum: ColumnSum) {
-        // A rename keeps the numbers of the file unchanged.
+        // A rename keeps the numbers of the file unchanged. A second name for one column is a copy of it.
         match sum.terms.as_slice() {
-            [(theirs, factor)] if factor.total_cmp(&1.0).is_eq() && sum.offset == 0.0 => {
+            [(theirs, factor)] if factor.total_cmp(&1.0).is_eq() && sum.offset == 0.0 && !self.is_renamed(theirs) => {
                 self.renames.push((ours.to_owned(), theirs.clone()));
             }
             _ => self.computed.push(ComputedColumn {
@@ -156,6 +180,61 @@ impl ColumnMapping {
                 offset: sum.offset,
             }),
         }
+    }
+
+    /// Whether a column of the file already has another name.
+    fn is_renamed(&self, theirs: &str) -> bool {
+        self.renames.iter().any(|(_, other)| other == theirs)
+    }
+
+    /// Whether a name of the model has a column.
+    fn has(&self, ours: &str) -> bool {
+        let is_renamed = self.renames.iter().any(|(name, _)| name == ours);
+        is_renamed || self.computed.iter().any(|one| one.name == ours)
+    }
+
+    /// The only column that a name of the model is read from; `None` for sums.
+    fn single_columns(&self) -> impl Iterator<Item = (&str, &str)> {
+        let computed = self.computed.iter().filter_map(|one| match one.terms.as_slice() {
+            [(theirs, _)] => Some((one.name.as_str(), theirs.as_str())),
+            _ => None,
+        });
+        let renames = self
+            .renames
+            .iter()
+            .map(|(ours, theirs)| (ours.as_str(), theirs.as_str()));
+        renames.chain(computed)
+    }
+
+    /// Notes on columns that two names share, and on units that do not fit.
+    fn notes(&self, known: &[(String, ColumnQuantity)], torque: &[(String, f64)], file: &str) -> Vec<RecordingNote> {
+        let mut notes = Vec::new();
+        let all: Vec<(&str, &str)> = self.single_columns().collect();
+        for (k, (ours, theirs)) in all.iter().enumerate() {
+            if let Some((other, _)) = all[..k].iter().find(|(_, earlier)| earlier == theirs) {
+                notes.push(RecordingNote::info(format!(
+                    "`{other}` and `{ours}` are both read from the column `{theirs}` of {file}."
+                )));
+            }
+        }
+        // A motor current becomes a torque by the constant in the model file.
+        for (ours, theirs) in self
+            .renames
+            .iter()
+            .filter(|(ours, _)| !torque.iter().any(|(drive, _)| drive == ours))
+        {
+            let unit = split_header_unit(theirs).map(|(_, unit)| unit);
+            if let (Some(unit), Some(quantity)) = (unit, quantity_of(known, ours))
+                && unit_factor(unit, quantity).is_none()
+            {
+                notes.push(RecordingNote::warning(format!(
+                    "The column `{theirs}` of {file} has the unit {unit}, which is no unit of `{ours}`; its numbers are used as \
+                     they are. Give the factor to the SI unit in the model file: `[recording.torque]` for a drive, \
+                     `[recording.columns]` for any other column."
+                )));
+            }
+        }
+        notes
     }
 
     /// Multiplies the values of a column of the model by a factor.
@@ -178,11 +257,6 @@ impl ColumnMapping {
             terms: vec![(theirs, factor)],
             offset: 0.0,
         });
-    }
-
-    /// Whether the user has assigned the only column of a sum to another name.
-    fn is_conflicting(&self, sum: &ColumnSum) -> bool {
-        sum.terms.len() == 1 && self.renames.iter().any(|(_, theirs)| *theirs == sum.terms[0].0)
     }
 }
 

@@ -7,6 +7,7 @@ mod contents;
 pub(crate) mod free;
 mod leverage;
 mod options;
+mod proposal;
 mod smoother;
 mod thresholds;
 
@@ -17,22 +18,28 @@ use modelmill_boundary::files::MemoryFiles;
 use modelmill_boundary::message;
 use modelmill_boundary::text::{Message, OptionName, OptionSetting, Remedy};
 use modelmill_identify::diagnose::{Disturbance, EstimatedQuantity};
-use modelmill_identify::{PositionFault, RecordingFiles, RecordingNote, SignalRecording as Raw};
+use modelmill_identify::{PositionFault, RecordingFiles, RecordingNote, SignalRecording as Raw, UnwrappedAngle};
 
-use crate::audit;
+use crate::audit::{self, ForceDelayAudit};
 use crate::error::{Error, Outcome};
+use crate::faults::{
+    ColumnOperation, FaultSubject, RecordingFaultKind, SilentInterval, SuspectedFault, find_fault, silent_intervals,
+};
 use crate::host::kinds_of_files;
 use crate::model::Model;
+use crate::progress::SilentProgress;
 use crate::segment::{RecordingSegment, variances};
 use crate::text::table::significant;
 
 use columns::read_options;
 use leverage::DriveLeverage;
+use thresholds::DELAY_LEAST_SHARE_OF_GAIN;
 
 pub use contents::{ColumnInfo, RecordingContents, TableInfo};
 pub use modelmill_identify::{DerivativeSource, MAX_FILTER_ORDER, has_recording_extension};
 pub use modelmill_identify::{PreparedRun, SmoothingMethod, StatePreparation};
 pub use options::RecordingOptions;
+pub use proposal::{ColumnProposal, ProposedColumn};
 
 /// Reads a recording with the columns that a model needs, completes free bodies and repairs faults of sensors.
 ///
@@ -40,13 +47,18 @@ pub use options::RecordingOptions;
 fn read_raw(model: &Model, file: &RecordingFiles, reading: &RecordingOptions) -> Outcome<Raw> {
     let name = file.name();
     // Names of the file are needed to resolve the mapping.
-    let options = read_options(model, reading, &file.names()?, name)?;
+    let (options, notes) = read_options(model, reading, &file.names()?, name)?;
+    for note in &notes {
+        model.host().note(note);
+    }
     let mut raw = model
         .host()
         .run_job(&format!("reading {name}"), 0, |_| file.read(&options))??;
     for note in free::complete(model, &mut raw)? {
         model.host().note(&note);
     }
+    // Turns are added before anything is compared with its neighbours.
+    raw.unwrap_angles(&model.active_coordinate_types());
     // Force peaks near singular poses are no outliers.
     let leverage = DriveLeverage::new(model, &raw);
     raw.repair(
@@ -55,6 +67,7 @@ fn read_raw(model: &Model, file: &RecordingFiles, reading: &RecordingOptions) ->
         reading.skip_bad_samples,
         &|drive, sample| leverage.is_peak(drive, sample),
     );
+    raw.set_late_rates_aside(&model.active_coordinates());
     Ok(raw)
 }
 
@@ -65,10 +78,15 @@ fn prepare_segments(model: &Model, raw: &Raw, reading: &RecordingOptions) -> Out
     let delay = model.derivation.mechanism.force_delay;
     let mut data = prepare(model, raw, reading, delay)?;
     note_idle_options(&mut data, reading);
+    emit_notes(model, &data);
+    Ok(data)
+}
+
+/// Passes the notes of all segments to the listener.
+fn emit_notes(model: &Model, data: &[RecordingSegment]) {
     for note in data.iter().flat_map(RecordingSegment::notes) {
         model.host().note(note);
     }
-    Ok(data)
 }
 
 /// The prepared segments of a recording, without compensation of a delay.
@@ -180,8 +198,12 @@ fn prepare(model: &Model, recording: &Raw, args: &RecordingOptions, delay: f64) 
     }
     // Faults of positions count as disturbances of every segment.
     let faults: Vec<Disturbance> = if is_examined {
+        let unwrapped = recording.unwrapped_angles().iter();
+        let unwrapped = unwrapped.map(|angle| wrapped_angle(recording.file(), angle));
         (recording.position_faults(&model.active_coordinates()).into_iter())
             .map(|fault| position_fault(model, recording.file(), &fault))
+            .chain(unwrapped)
+            .chain(late_rates_fault(recording))
             .collect()
     } else {
         Vec::new()
@@ -198,6 +220,51 @@ fn prepare(model: &Model, recording: &Raw, args: &RecordingOptions, delay: f64) 
         })
     });
     with_variance.collect()
+}
+
+/// An angle to which full turns were added, as a disturbance for the diagnosis.
+fn wrapped_angle(file: &str, angle: &UnwrappedAngle) -> Disturbance {
+    Disturbance {
+        kind: RecordingFaultKind::Wrapped.name().to_owned(),
+        at: vec![angle.coordinate.clone()],
+        estimates: vec![EstimatedQuantity::new("jumps", angle.jumps as f64, "")],
+        recordings: vec![file.to_owned()],
+        interval: None,
+        description: Some(format!(
+            "the angle {} in {file} is wrapped: full turns were added at its {}",
+            angle.coordinate,
+            count_of_jumps(angle.jumps)
+        )),
+    }
+}
+
+/// A number of jumps in words.
+fn count_of_jumps(jumps: usize) -> String {
+    if jumps == 1 {
+        "jump".to_owned()
+    } else {
+        format!("{jumps} jumps")
+    }
+}
+
+/// Rates that lag the positions as a disturbance for the diagnosis; `None` without any.
+fn late_rates_fault(recording: &Raw) -> Option<Disturbance> {
+    let late = recording.late_rates();
+    let (_, longest) = late.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let names: Vec<&str> = late.iter().map(|(name, _)| name.as_str()).collect();
+    Some(Disturbance {
+        kind: "late_rates".to_owned(),
+        at: late.iter().map(|(name, _)| name.clone()).collect(),
+        estimates: vec![EstimatedQuantity::new("delay", *longest, "s")],
+        recordings: vec![recording.file().to_owned()],
+        interval: None,
+        description: Some(format!(
+            "the recorded rates of `{}` in {} lag the positions by up to {} ms, as after a low-pass, and are not used",
+            names.join("`, `"),
+            recording.file(),
+            significant(1e3 * longest, 2)
+        )),
+    })
 }
 
 /// A fault of the positions as a disturbance for the diagnosis.
@@ -309,10 +376,14 @@ pub struct PreparedRecording {
     raw: Arc<Raw>,
     /// The options with which it was prepared, including automatic choices.
     reading: RecordingOptions,
+    /// The options as they were requested.
+    requested: RecordingOptions,
+    /// The suspected fault of the recording that explains it best.
+    suspect: Option<SuspectedFault>,
 }
 
 impl Model {
-    /// Reads a recording (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2), computes positions, rates and accelerations from
+    /// Reads a recording (CSV, Parquet, MATLAB, HDF5, MCAP, ROS bags), computes positions, rates and accelerations from
     /// it (filtered, differentiated and decimated as needed), and checks it. Its notes list these steps and all
     /// suspicious signals.
     ///
@@ -353,7 +424,7 @@ impl Model {
             let mut others = kinds.filter_map(|(path, kind)| Some((path.display(), kind?)));
             others.next().map_or(failure, |(path, kind)| {
                 Error::input(format!(
-                    "{path} is {kind}; a recording is expected (CSV, Parquet, MATLAB, HDF5, MCAP or rosbag2), with a column \
+                    "{path} is {kind}; a recording is expected (CSV, Parquet, MATLAB, HDF5, MCAP or ROS bags), with a column \
                      `t` and one for each coordinate and drive"
                 ))
             })
@@ -401,19 +472,104 @@ impl PreparedRecording {
                 segments: prepare_segments(model, &raw, reading)?,
                 raw,
                 reading: reading.clone(),
+                requested: reading.clone(),
+                suspect: None,
             });
         }
-        let (reading, note) = resolve_reading(model, &raw, reading)?;
-        let mut stretches = prepare_segments(model, &raw, &reading)?;
-        if let (Some(note), Some(first)) = (note, stretches.first_mut()) {
-            first.note(model, note);
+        let mut prepared = Self::prepare(model, raw, reading)?;
+        // Forces that were not measured would spoil the choice of the preparation and every fit.
+        let silent: Vec<SilentInterval> = (prepared.segments.iter())
+            .flat_map(|one| silent_intervals(model, one))
+            .collect();
+        if !silent.is_empty() {
+            let mut raw = (*prepared.raw).clone();
+            for one in &silent {
+                let [from, to] = one.reach;
+                for drive in &one.drives {
+                    raw.leave_out_samples(drive, &|t| (from..=to).contains(&t));
+                }
+            }
+            prepared = Self::prepare(model, Arc::new(raw), reading)?;
+            if let Some(first) = prepared.segments.first_mut() {
+                first.run.notes.extend(silent.iter().map(SilentInterval::note));
+                first.faults.extend(silent.iter().map(SilentInterval::disturbance));
+            }
         }
-        audit::examine(model, &mut stretches, reading.leave_out_events);
+        emit_notes(model, &prepared.segments);
+        prepared.examine(model);
+        Ok(prepared)
+    }
+
+    /// Makes open choices and prepares a recording, without passing notes to the listener.
+    fn prepare(model: &Model, raw: Arc<Raw>, requested: &RecordingOptions) -> Outcome<Self> {
+        let (reading, note) = resolve_reading(model, &raw, requested)?;
+        let delay = model.derivation.mechanism.force_delay;
+        let mut segments = prepare(model, &raw, &reading, delay)?;
+        note_idle_options(&mut segments, &reading);
+        if let (Some(note), Some(first)) = (note, segments.first_mut()) {
+            first.run.notes.push(note);
+        }
         Ok(Self {
-            segments: stretches,
+            segments,
             raw,
             reading,
+            requested: requested.clone(),
+            suspect: None,
         })
+    }
+
+    /// Looks for faults that make the numbers meaningless; without one also for delays, contacts and pushes.
+    fn examine(&mut self, model: &Model) {
+        let source = self.reading.preparation.source;
+        let suspect = find_fault(&FaultSubject {
+            model,
+            raw: &self.raw,
+            segments: &self.segments,
+            uses_recorded_derivatives: source == DerivativeSource::RecordedFirst,
+            has_mapping: !self.requested.columns.is_empty() || !model.derivation.mechanism.recording.columns.is_empty(),
+        });
+        let of_segment = |one: &RecordingSegment| ForceDelayAudit::from_segment(model, one);
+        let delays: Vec<Option<ForceDelayAudit>> = self.segments.iter().map(of_segment).collect();
+        // Forces that are delayed by a large part of a period resemble those of another drive, or of another sign.
+        let delay_gain = delays
+            .iter()
+            .flatten()
+            .map(ForceDelayAudit::log_gain)
+            .fold(0.0, f64::max);
+        self.suspect = suspect.filter(|fault| {
+            let may_be_delay =
+                [RecordingFaultKind::ExchangedColumns, RecordingFaultKind::WrongSign].contains(&fault.kind);
+            !may_be_delay || delay_gain < DELAY_LEAST_SHARE_OF_GAIN * fault.fit_gain.max(1.0)
+        });
+        if let (Some(fault), Some(first)) = (&self.suspect, self.segments.first_mut()) {
+            first.note(model, RecordingNote::warning(fault.note_text()));
+            first.faults.push(fault.disturbance());
+            return;
+        }
+        for (one, delays) in self.segments.iter_mut().zip(delays) {
+            for note in audit::examine_forces(model, one, delays.as_ref()) {
+                one.note(model, note);
+            }
+            audit::examine_events(model, one, self.reading.leave_out_events);
+        }
+    }
+
+    /// The suspected fault of the recording that explains it best.
+    pub fn suspected_fault(&self) -> Option<&SuspectedFault> {
+        self.suspect.as_ref()
+    }
+
+    /// The recording as it would be after operations on its columns, prepared and examined again for a model. Its notes
+    /// stay in it and are not passed to the listener.
+    ///
+    /// Fails if it cannot be prepared then.
+    pub(crate) fn corrected(&self, model: &Model, operations: &[ColumnOperation]) -> Outcome<Self> {
+        let mut raw = (*self.raw).clone();
+        for operation in operations {
+            operation.apply(&mut raw);
+        }
+        let silent = model.host().clone().with_progress(Arc::new(SilentProgress));
+        Self::new(&model.clone().with_host(&silent), raw, &self.requested)
     }
 
     /// The same recording with other segments.
@@ -422,6 +578,8 @@ impl PreparedRecording {
             segments: stretches,
             raw: self.raw.clone(),
             reading: self.reading.clone(),
+            requested: self.requested.clone(),
+            suspect: self.suspect.clone(),
         }
     }
 
@@ -434,6 +592,11 @@ impl PreparedRecording {
     /// model. `None` if there is no such column, or if it has values that are not finite.
     pub fn raw_column(&self, name: &str) -> Option<&[f64]> {
         self.raw.column(name).ok()
+    }
+
+    /// Where its rates and accelerations were taken from.
+    pub(crate) fn derivative_source(&self) -> DerivativeSource {
+        self.reading.preparation.source
     }
 
     /// The notes of all segments.

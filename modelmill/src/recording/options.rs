@@ -20,4 +20,6 @@ pub struct RecordingOptions {
     pub leave_out_events: bool,
     /// Read only the samples between these times, s.
     pub between: Option<(f64, f64)>,
+    /// Sampling rate of recordings without a column of times, Hz. The times of the samples follow from it.
+    pub rate: Option<f64>,
 }

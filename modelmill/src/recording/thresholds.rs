@@ -22,3 +22,9 @@ pub(super) const SMOOTHING_LEAST_GAIN: f64 = 0.005;
 
 /// Residuals that differ by less than this share (1) are called equal in the note on the choice. By judgement.
 pub(super) const SAME_RESIDUAL_TOLERANCE: f64 = 1e-3;
+
+// --- Delays and wrong columns
+
+/// Exchanged columns and wrong signs are not suspected if a delay lowers the errors by at least this share of the sum of
+/// logarithms by which the correction of the columns does (1). By judgement.
+pub(super) const DELAY_LEAST_SHARE_OF_GAIN: f64 = 0.7;

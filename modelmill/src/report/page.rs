@@ -101,7 +101,7 @@ fn summary(findings: &DiagnosisFindings) -> String {
         DiagnosisVerdict::Unexplained => ("unexplained", "error is not explained"),
     };
     // The same sentences as in the text output.
-    let says = words::verdict(diagnosis, &findings.before.model.drives(), findings.validation);
+    let says = findings.verdict_text();
     // Tiles: verdict, error before and after, noise.
     let mut tiles = vec![("verdict", word.to_owned())];
     if let (Some(first), Some(last)) = (diagnosis.steps.first(), diagnosis.steps.last()) {

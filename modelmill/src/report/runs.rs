@@ -11,7 +11,8 @@ use super::page::end;
 use super::tables::{TableCell, table};
 use super::units::typographic_unit;
 use crate::print::RemedySpelling;
-use crate::runs::{FittedValue, RunChange, RunsComparison, SharedFit};
+use crate::print::runs::verdict_text;
+use crate::runs::{FittedValue, RunChange, RunReport, RunVerdict, RunsComparison, SharedFit};
 use crate::text::svg::escape;
 use crate::text::table::{count, significant};
 
@@ -28,7 +29,11 @@ pub fn runs_page(compared: &RunsComparison, spelling: &dyn RemedySpelling) -> St
     // The sections in the order in which a user needs them, each with its id and title.
     let mut sections = vec![
         ("when", "Lasting changes", points(compared)),
-        ("against", "Each run compared with the first", changes_table(compared)),
+        (
+            "against",
+            "Each run compared with the first",
+            changes_table(compared, spelling),
+        ),
     ];
     // The joint fit exists only if it was requested.
     if let Some(shared) = &compared.shared {
@@ -47,10 +52,13 @@ pub fn runs_page(compared: &RunsComparison, spelling: &dyn RemedySpelling) -> St
 fn summary(compared: &RunsComparison) -> String {
     let later = compared.runs.len() - 1;
     // The first run is the reference.
-    let changed = compared.runs.iter().skip(1);
-    let changed = changed.filter(|run| !run.changes.is_empty()).count();
+    let later_runs = || compared.runs.iter().skip(1);
+    let with_verdict = |verdict: RunVerdict| later_runs().filter(|run| run.verdict() == verdict).count();
+    let changed =
+        later_runs().filter(|run| !run.changes.is_empty()).count() + with_verdict(RunVerdict::DifferentWithoutCause);
+    let unknown = with_verdict(RunVerdict::CannotTell);
     // The colour of the verdict.
-    let class = if changed == 0 && compared.points.is_empty() {
+    let class = if changed == 0 && unknown == 0 && compared.points.is_empty() {
         "adequate"
     } else {
         "missing"
@@ -65,6 +73,9 @@ fn summary(compared: &RunsComparison) -> String {
         "{changed} of {later} later runs differ from {} by more than noise and model error.",
         compared.runs[0].file
     );
+    if unknown > 0 {
+        let _ = write!(says, " {unknown} of {later} cannot show a change.");
+    }
     format!("<p class=\"verdict {class}\">{}</p>\n", escape(&says))
 }
 
@@ -139,15 +150,32 @@ fn value(fitted: Option<FittedValue>) -> TableCell {
     }
 }
 
-/// Runs that differ from the first one, with their changes.
-fn changes_table(compared: &RunsComparison) -> String {
+/// Runs that differ from the first one or cannot be compared, with their changes and verdicts.
+fn changes_table(compared: &RunsComparison, spelling: &dyn RemedySpelling) -> String {
+    let is_quiet = |k: usize, run: &RunReport| {
+        run.changes.is_empty() && (k == 0 || run.verdict() == RunVerdict::Unchanged && run.undecided.is_empty())
+    };
     let rows: Vec<Vec<TableCell>> = (compared.runs.iter().enumerate())
-        .filter(|(_, run)| !run.changes.is_empty())
+        .filter(|(k, run)| !is_quiet(*k, run))
         .map(|(k, run)| {
+            let mut html = if run.changes.is_empty() {
+                String::new()
+            } else {
+                changes_list(&run.changes)
+            };
+            // The first run is compared with nothing.
+            let verdict = if k > 0 {
+                verdict_text(run).spell(spelling)
+            } else {
+                String::new()
+            };
+            if !verdict.is_empty() {
+                let _ = write!(html, "<p>{}</p>", escape(&verdict));
+            }
             vec![
                 TableCell::number(&format!("{}", k + 1), k as f64),
                 TableCell::text(&run.file),
-                TableCell::html(changes_list(&run.changes)),
+                TableCell::html(html),
             ]
         })
         .collect();

@@ -147,6 +147,8 @@ pub struct RunChange {
     pub unit: &'static str,
     /// Names of other changes that explain the difference between the runs nearly as well.
     pub rivals: Vec<String>,
+    /// Weight of each drive in what determines a load; empty for other changes. The sum is 1.
+    pub drive_weights: Vec<f64>,
     /// The change as text.
     pub says: String,
 }
@@ -234,7 +236,28 @@ pub(crate) fn identified_change(
         change: what,
         gain: found.gain,
         rivals: found.rivals.iter().map(|k| name(model, &possible[*k].kind)).collect(),
+        drive_weights: Vec::new(),
     }
+}
+
+/// The change of a clock that recorded rates show.
+pub(crate) fn clock_change(factor: ChangeEstimate) -> RunChange {
+    RunChange {
+        says: clock_text(factor),
+        change: PhysicalChange::Clock { factor },
+        gain: ((factor.value - 1.0) / factor.deviation).powi(2),
+        unit: "1",
+        rivals: Vec::new(),
+        drive_weights: Vec::new(),
+    }
+}
+
+/// A changed clock as a clause.
+fn clock_text(factor: ChangeEstimate) -> String {
+    format!(
+        "the time base: this run was {} times as fast as its time stamps state",
+        factor.text("")
+    )
 }
 
 /// The change of a contact or push within a run.
@@ -251,6 +274,7 @@ pub(crate) fn event(model: &Model, event: &ContactEvent) -> RunChange {
         change: what,
         gain: 0.0,
         rivals: Vec::new(),
+        drive_weights: Vec::new(),
     }
 }
 
@@ -389,7 +413,7 @@ pub(crate) fn name(model: &Model, kind: &ChangeKind) -> String {
 }
 
 /// The change as a clause, with its values.
-fn change_text(model: &Model, what: &PhysicalChange) -> String {
+pub(crate) fn change_text(model: &Model, what: &PhysicalChange) -> String {
     let unit = |name: &str| {
         let at = model.drives().iter().position(|drive| drive == name);
         at.map_or("", |d| model.force_unit(d))
@@ -447,10 +471,7 @@ fn change_text(model: &Model, what: &PhysicalChange) -> String {
             "measured force of {drive} scaled by {}: its sensor, torque constant or gear",
             factor.text("")
         ),
-        PhysicalChange::Clock { factor } => format!(
-            "the time base: this run was {} times as fast as its time stamps state",
-            factor.text("")
-        ),
+        PhysicalChange::Clock { factor } => clock_text(*factor),
         PhysicalChange::ContactEvent {
             drives,
             interval: [from, to],

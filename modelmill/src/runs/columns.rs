@@ -1,6 +1,7 @@
 //! The columns of a segment: those of the base parameters, and those of everything that may have changed.
 
 use modelmill_codegen::ModelEvaluator;
+use modelmill_identify::PreparedRun;
 use modelmill_identify::diagnose::ForceColumn;
 use nalgebra::DVector;
 
@@ -13,6 +14,34 @@ use crate::segment::RecordingSegment;
 
 /// Step of the central differences: fraction of a clock's rate, or rad or m of an encoder's zero.
 const TURNED: f64 = 1e-3;
+
+/// Powers of the clock's factor by which the derivatives of a coordinate scale. Derivatives of positions scale once and
+/// twice; what was recorded does not depend on time stamps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct TimeScaling {
+    /// Power for rates: 0 or 1.
+    pub(crate) rates: i32,
+    /// Power for accelerations: 0 to 2.
+    pub(crate) accelerations: i32,
+}
+
+impl TimeScaling {
+    /// The time base is known, so that nothing scales.
+    pub(crate) const KNOWN: Self = Self {
+        rates: 0,
+        accelerations: 0,
+    };
+
+    /// Multiplies the derivatives of a coordinate by powers of a factor.
+    pub(crate) fn scale_coordinate(self, run: &mut PreparedRun, coordinate: usize, factor: f64) {
+        for (columns, power) in [(&mut run.qd, self.rates), (&mut run.qdd, self.accelerations)] {
+            let by = factor.powi(power);
+            for x in columns.get_mut(coordinate).into_iter().flatten() {
+                *x *= by;
+            }
+        }
+    }
+}
 
 /// The rows of one segment, drive by drive.
 pub(crate) struct SegmentRows {
@@ -59,7 +88,7 @@ impl SegmentRows {
     }
 
     /// All columns. `values` are the base parameters with which the columns of scales, clocks and encoders' zeros
-    /// are computed.
+    /// are computed, and `scaling` has the derivatives of each coordinate that depend on the clock.
     ///
     /// Fails as [`Self::base_columns`] does.
     pub(crate) fn all_columns(
@@ -67,11 +96,12 @@ impl SegmentRows {
         stretch: &RecordingSegment,
         payloads: &PayloadColumns,
         values: &DVector<f64>,
+        scaling: &[TimeScaling],
     ) -> Outcome<Self> {
         let mut laid = Self::base_columns(model, stretch)?;
         let mut further = payload_columns(model, stretch, payloads)?;
         further.extend(drive_columns(model, stretch, laid.samples())?);
-        further.extend(prediction_columns(model, stretch, &laid, values)?);
+        further.extend(prediction_columns(model, stretch, &laid, values, scaling)?);
         for column in &mut further {
             clear_uncounted(column, &laid.counts);
         }
@@ -182,12 +212,13 @@ fn clear_uncounted(column: &mut ForceColumn, counts: &[Vec<bool>]) {
 }
 
 /// Columns that are computed from predicted forces: a scale of each drive; a clock that is slow by a fraction, so
-/// that rates and accelerations become larger by once and twice that fraction; and another zero of each encoder.
+/// that derivatives of positions become larger by once and twice that fraction; and another zero of each encoder.
 fn prediction_columns(
     model: &Model,
     stretch: &RecordingSegment,
     laid: &SegmentRows,
     values: &DVector<f64>,
+    scaling: &[TimeScaling],
 ) -> Outcome<Vec<ForceColumn>> {
     let n = laid.forces.len();
     let mut columns = Vec::new();
@@ -228,15 +259,11 @@ fn prediction_columns(
         };
         Ok(ForceColumn::new(pairs.map(of_drive).collect()))
     };
-    let scaled = |values: &mut [Vec<f64>], factor: f64| {
-        for x in values.iter_mut().flatten() {
-            *x *= factor;
-        }
-    };
-    // Clock: rates scale once, accelerations twice.
+    // Clock: recorded derivatives stay, computed ones scale.
     columns.push(slope(&|turned, part| {
-        scaled(&mut turned.run.qd, 1.0 + part);
-        scaled(&mut turned.run.qdd, (1.0 + part).powi(2));
+        for (coordinate, scaling) in scaling.iter().enumerate() {
+            scaling.scale_coordinate(&mut turned.run, coordinate, 1.0 + part);
+        }
     })?);
     // Zeros: positions are shifted, one coordinate after the other.
     for coordinate in 0..stretch.run.q.len() {

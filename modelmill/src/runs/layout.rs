@@ -32,6 +32,11 @@ impl RunColumnLayout {
         self.base + TEN * frame
     }
 
+    /// The columns of base parameters, and of friction and constant forces of all drives.
+    pub(crate) fn model_and_drives(self) -> Vec<usize> {
+        (0..self.base).chain(self.friction(0)..self.scale(0)).collect()
+    }
+
     /// Dry friction of a drive; viscous friction is the next column.
     pub(crate) fn friction(self, drive: usize) -> usize {
         self.payload(self.payloads) + 2 * drive

@@ -5,24 +5,32 @@
 //! friction of a drive, of the offset or scale of its force, of the clock, and of the zeros of encoders. The model file
 //! needs no parameters for loads. For each body, the columns of a load with ten inertial parameters are derived from
 //! the model.
+//!
+//! A clock is an exception where rates were recorded: it follows from these and the positions without forces, and the
+//! motion is corrected before anything else. Where the forces could not show a change, no verdict is given.
 
 mod changes;
 mod columns;
+mod differences;
 mod layout;
 pub(crate) mod payload;
+mod payload_scale;
 mod per_run;
 mod points;
 mod rows;
+mod standstill;
 mod sums;
 mod thresholds;
+mod time_base;
+mod verdict;
 
 use std::borrow::Borrow;
 
 use modelmill_boundary::message;
 use modelmill_identify::changes::{
-    ChangeHypotheses, NormalEquations, RunPair, SelectedChange, search_changes, within_run_spread,
+    ChangeHypotheses, NormalEquations, RunPair, SelectedChange, fit_blocks, search_changes, search_sensitivity,
+    within_run_spread,
 };
-use modelmill_identify::diagnose::ForceColumn;
 use modelmill_identify::{ParameterInfo, RecordingNote};
 use nalgebra::DVector;
 
@@ -33,14 +41,22 @@ use crate::recording::PreparedRecording;
 use crate::segment::RecordingSegment;
 
 pub use changes::{ChangeEstimate, NamedEstimate, PhysicalChange, RunChange};
-use changes::{ChangeHypothesis, centre};
+use changes::{ChangeHypothesis, ChangeKind, centre};
+use columns::TimeScaling;
+pub(crate) use differences::{RecordingDifference, differences};
 use layout::RunColumnLayout;
 use payload::PayloadColumns;
+use payload_scale::{DriveScales, compare_drive_scales};
 pub use per_run::{KnownLoad, PerRunSelection, RunValue, SharedFit};
 pub use points::{ChangePoint, ParameterStep};
-use rows::{MeasuredMoments, RunRows, WhitenedRun};
+use rows::{MeasuredMoments, RunRows, UnexplainedShares, WhitenedRun};
 pub use sums::{ReferenceFit, RunSums};
-use thresholds::{CHANGE_LEAST_FORCE_SHARE, PARAMETER_CHANGE_SIGMAS, PUSH_MARGIN_SHARE, SHORTEST_PUSH_S};
+use thresholds::{
+    CHANGE_LEAST_FORCE_SHARE, CHANGE_VALUE_SIGMAS, PARAMETER_CHANGE_SIGMAS, PUSH_MARGIN_SHARE, SHORTEST_PUSH_S,
+};
+use time_base::{TimeBase, correct_clock, time_scaling};
+use verdict::{RunKnowledge, undecided_reasons};
+pub use verdict::{RunVerdict, UndecidedDrive, UndecidedReason};
 
 /// A fitted value with its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,12 +82,27 @@ pub struct RunReport {
     pub file: String,
     /// Number of samples that were used, after decimation.
     pub samples: usize,
-    /// Base parameters fitted to this run alone.
+    /// Base parameters fitted to this run alone, with standard deviations that include the scatter between its parts.
     pub alone: Vec<FittedValue>,
-    /// Indices of base parameters that differ from those of the first run by more than four standard deviations.
+    /// Indices of base parameters that differ from those of the first run by more than six standard deviations of
+    /// [`RunReport::difference_deviation`].
     pub moved: Vec<usize>,
+    /// Number of drives.
+    pub drives: usize,
+    /// Drives whose forces cannot show a change relative to the first run.
+    pub undecided: Vec<UndecidedDrive>,
+    /// Factor by which differences of parameters are less certain than the two fits, since the model does not fit
+    /// parts of one run with the same parameters; 1 if it does.
+    pub difference_factor: f64,
     /// Changes relative to the first run, the largest first, and events within this run.
     pub changes: Vec<RunChange>,
+}
+
+impl RunReport {
+    /// The standard deviation of the difference of a base parameter from that of the first run.
+    pub fn difference_deviation(&self, first: &Self, parameter: usize) -> f64 {
+        self.difference_factor * first.alone[parameter].difference_deviation(self.alone[parameter])
+    }
 }
 
 /// A run without a result.
@@ -159,7 +190,7 @@ impl Model {
             let first = first.map_err(|unread| unread.error)?;
             let first = first.borrow();
             let before = bench.analyse_run(first, None)?;
-            let mut all = vec![bench.run_report(&before, &before)];
+            let mut all = vec![bench.run_report(&before)];
             let mut notes: Vec<RecordingNote> = first.notes().cloned().collect();
             let mut wholes = vec![before.white.total()];
             let mut withins = vec![before.within];
@@ -172,15 +203,13 @@ impl Model {
                     let recording = recording.borrow();
                     notes.extend(recording.notes().cloned());
                     let file = recording.file().to_owned();
-                    let run = bench.analyse_run(recording, Some(&before.values));
+                    let run = bench.analyse_run(recording, Some(before.reference()));
                     run.map_err(|error| UnreadRun { file, error })
                 });
                 job.step(1)?;
                 match looked_at {
                     Ok(run) => {
-                        let mut one = bench.run_report(&run, &before);
-                        one.changes.extend(bench.changes(&before, &run));
-                        all.push(one);
+                        all.push(bench.compare_with_first(&before, &all[0], &run));
                         wholes.push(run.white.total());
                         withins.push(run.within);
                         shared.add_run(&run.file, &run.white);
@@ -199,10 +228,21 @@ impl Model {
             // Stage 3: permanent changes over the order of the runs, and the fit of all runs together.
             let base: Vec<usize> = (0..layout.base).collect();
             let alone: Vec<&[FittedValue]> = all.iter().map(|run| &run.alone[..]).collect();
-            let points = points::find_change_points(&bench, &alone, &wholes, &withins, &before.sizes, &before.values);
+            let points = points::find_change_points(&bench, &alone, &wholes, &withins, &before);
             let mut together = NormalEquations::new(layout.base);
             for whole in &wholes {
                 together.merge(&whole.select_columns(&base));
+            }
+            let shared = shared.answer()?;
+            // Forces whose true scale is known weigh loads truly, and as uncertainly as their scale.
+            let gains = shared.as_ref().map_or(&[][..], |fit| &fit.gains);
+            for change in all
+                .iter_mut()
+                .flat_map(|run| &mut run.changes)
+                .filter(|_| !gains.is_empty())
+            {
+                payload_scale::apply_gains(&mut change.change, &change.drive_weights, gains);
+                change.says = changes::change_text(self, &change.change);
             }
             Ok(RunsComparison {
                 model: self.name.clone(),
@@ -211,7 +251,7 @@ impl Model {
                 points,
                 runs: all,
                 unread,
-                shared: shared.answer()?,
+                shared,
                 notes,
             })
         })?
@@ -264,6 +304,42 @@ pub(crate) struct RunStatistics {
     within: f64,
     /// Sums over the rows as measured.
     sizes: MeasuredMoments,
+    /// Shares of the forces that the model leaves unexplained.
+    unexplained: UnexplainedShares,
+    /// Whether each drive stands nearly all the time.
+    stands: Vec<bool>,
+    /// Recorded rates compared with positions.
+    time_base: TimeBase,
+    /// The changed clock, if recorded rates show it. The motion is corrected by it.
+    clock: Option<ChangeEstimate>,
+}
+
+/// What later runs need of the first.
+#[derive(Clone, Copy)]
+pub(crate) struct ReferenceRun<'a> {
+    /// Its base parameters.
+    values: &'a DVector<f64>,
+    /// Its time base, if clocks are compared.
+    time_base: Option<&'a TimeBase>,
+}
+
+impl RunStatistics {
+    /// The run as the reference of later ones.
+    fn reference(&self) -> ReferenceRun<'_> {
+        ReferenceRun {
+            values: &self.values,
+            time_base: Some(&self.time_base),
+        }
+    }
+
+    /// What is known of the run.
+    fn knowledge(&self) -> RunKnowledge<'_> {
+        RunKnowledge {
+            unexplained: &self.unexplained,
+            stands: &self.stands,
+            equations: self.white.blocks.iter().map(|block| block.rows).sum(),
+        }
+    }
 }
 
 /// Events of measured forces; events that follow each other at once are merged.
@@ -324,12 +400,56 @@ impl<'a> RunAnalyser<'a> {
         }
     }
 
-    /// The sums of a run, without its contacts and pushes. `values` are the base parameters of the first run,
-    /// `None` for the first run itself.
-    fn analyse_run(&self, recording: &PreparedRecording, values: Option<&DVector<f64>>) -> Outcome<RunStatistics> {
+    /// The sums of a run, without its contacts and pushes and without standstill. `reference` is the first run, `None`
+    /// for the first run itself.
+    fn analyse_run(
+        &self,
+        recording: &PreparedRecording,
+        reference: Option<ReferenceRun<'_>>,
+    ) -> Outcome<RunStatistics> {
         let mut stretches = recording.segments.clone();
+        // Stage 1: the clock, where recorded rates show it.
+        let mut scaling = time_scaling(self.model, recording);
+        let time_base = TimeBase::of_recording(self.model, recording);
+        let first = reference.map_or(Some(&time_base), |one| one.time_base);
+        let (is_clock_known, clock) = first.map_or((false, None), |first| first.changed_clock(&time_base));
+        if let Some(clock) = clock {
+            correct_clock(&mut stretches, &scaling, clock.value);
+        }
+        if is_clock_known {
+            scaling.fill(TimeScaling::KNOWN);
+        }
+        // Stage 2: contacts and standstill, whose forces show nothing of the machine.
+        let told = self.exclude_contacts(&mut stretches);
+        let stands = standstill::exclude_uncertain_friction(self.model, &mut stretches)?;
+        // Stage 3: the sums.
+        let values = reference.map(|one| one.values);
+        let rows = RunRows::new(self.model, &stretches, self.payloads, &scaling, values)?;
+        let white = rows.whitened_run()?;
+        let values = rows.values.clone();
+        let sizes = rows.sizes();
+        Ok(RunStatistics {
+            file: recording.file().to_owned(),
+            samples: stretches
+                .iter()
+                .map(|one| one.samples().div_ceil(one.decimation()))
+                .sum(),
+            events: told,
+            within: within_run_spread(&white.blocks, &self.search),
+            white,
+            values,
+            unexplained: sizes.unexplained_shares(&self.layout.model_and_drives())?,
+            sizes,
+            stands,
+            time_base,
+            clock,
+        })
+    }
+
+    /// Excludes contacts and pushes from the forces of a run, and returns those that last.
+    fn exclude_contacts(&self, stretches: &mut [RecordingSegment]) -> Vec<RunChange> {
         let mut told = Vec::new();
-        for stretch in &mut stretches {
+        for stretch in stretches {
             let found = events::events(self.model, stretch).unwrap_or_default();
             let found = merged_contact_events(found, stretch);
             // The start and the end of a push hardly exceed the usual residual, so that its interval is widened.
@@ -346,64 +466,131 @@ impl<'a> RunAnalyser<'a> {
             let lasting = found.iter().filter(|event| event.to - event.from >= SHORTEST_PUSH_S);
             told.extend(lasting.map(|event| changes::event(self.model, event)));
         }
-        let rows = RunRows::new(self.model, &stretches, self.payloads, values)?;
-        let white = rows.whitened_run()?;
-        Ok(RunStatistics {
-            file: recording.file().to_owned(),
-            samples: stretches
-                .iter()
-                .map(|one| one.samples().div_ceil(one.decimation()))
-                .sum(),
-            events: told,
-            within: within_run_spread(&white.blocks, &self.search),
-            white,
-            values: rows.values.clone(),
-            sizes: rows.sizes(),
-        })
+        told
     }
 
-    /// The report of a run fitted alone: values, changed parameters and events. `before` is the first run.
-    fn run_report(&self, run: &RunStatistics, before: &RunStatistics) -> RunReport {
+    /// The report of a run fitted alone: values and events.
+    fn run_report(&self, run: &RunStatistics) -> RunReport {
         let base: Vec<usize> = (0..self.layout.base).collect();
-        let of = |run: &RunStatistics| fit_parameters(self.model, &run.white.total().select_columns(&base));
-        let (alone, reference) = (of(run), of(before));
-        // Only parameters that both runs determine can be compared.
-        let differs = |(a, b): (&FittedValue, &FittedValue)| {
-            let is_known = a.deviation.is_some() && b.deviation.is_some();
-            is_known && (a.value - b.value).abs() > PARAMETER_CHANGE_SIGMAS * a.difference_deviation(*b)
-        };
-        let pairs = alone.iter().zip(&reference).map(differs);
-        let moved = pairs.enumerate().filter_map(|(k, d)| d.then_some(k)).collect();
+        let blocks: Vec<NormalEquations> = run.white.blocks.iter().map(|one| one.select_columns(&base)).collect();
+        let fit = fit_blocks(&blocks);
         RunReport {
             file: run.file.clone(),
             samples: run.samples,
-            alone,
-            moved,
+            alone: merge_known(self.model, |i| FittedValue {
+                value: fit.values[i],
+                deviation: fit.deviations[i],
+            }),
+            moved: Vec::new(),
+            drives: self.layout.drives,
+            undecided: Vec::new(),
+            difference_factor: 1.0,
             changes: run.events.clone(),
         }
     }
 
-    /// Changes of a run relative to the first, the largest first; those that hardly move any drive are left out.
-    fn changes(&self, before: &RunStatistics, run: &RunStatistics) -> Vec<RunChange> {
-        self.identified_changes(&self.find_changes(before, run), &before.values)
+    /// The report of a later run: its changes relative to the first, the parameters that moved, and the drives that
+    /// could not show a change. `first` is the report of the first run.
+    fn compare_with_first(&self, before: &RunStatistics, first: &RunReport, run: &RunStatistics) -> RunReport {
+        let mut report = self.run_report(run);
+        let PairFindings {
+            found,
+            scales,
+            reasons,
+            difference_factor,
+        } = self.compare_pair(before, run);
+        report.difference_factor = difference_factor;
+        report.undecided = (self.model.drives().into_iter().zip(&reasons))
+            .filter_map(|(drive, reason)| {
+                Some(UndecidedDrive {
+                    drive,
+                    reason: (*reason)?,
+                })
+            })
+            .collect();
+        report.changes.extend(run.clock.map(changes::clock_change));
+        let mut identified = self.identified_changes(&found, &before.values);
+        for (one, scales) in identified.iter_mut().zip(scales) {
+            one.drive_weights = scales.map_or_else(Vec::new, |scales| scales.weights);
+        }
+        report.changes.extend(identified);
+        // Fits that do not describe the forces have no parameters to compare.
+        if reasons
+            .iter()
+            .any(|reason| !reason.is_some_and(verdict::UndecidedReason::spoils_fit))
+        {
+            // Only parameters that both runs determine can be compared.
+            let differs = |k: &usize| {
+                let (a, b) = (&report.alone[*k], &first.alone[*k]);
+                let is_known = a.deviation.is_some() && b.deviation.is_some();
+                is_known && (a.value - b.value).abs() > PARAMETER_CHANGE_SIGMAS * report.difference_deviation(first, *k)
+            };
+            report.moved = (0..report.alone.len()).filter(differs).collect();
+        }
+        report
     }
 
-    /// The same before they are described.
-    fn find_changes(&self, before: &RunStatistics, run: &RunStatistics) -> Vec<SelectedChange> {
+    /// Indices of the hypotheses that the scale of a drive changed, drive by drive.
+    fn scale_hypotheses(&self) -> Vec<usize> {
+        let is_scale = |one: &&(usize, &ChangeHypothesis)| matches!(one.1.kind, ChangeKind::Scale(_));
+        let all: Vec<(usize, &ChangeHypothesis)> = self.possible.iter().enumerate().collect();
+        all.iter().filter(is_scale).map(|(k, _)| *k).collect()
+    }
+
+    /// Changes of a run relative to the first, without those on drives whose forces show nothing.
+    fn compare_pair(&self, before: &RunStatistics, run: &RunStatistics) -> PairFindings {
         let runs = RunPair {
             reference: before.white.blocks.clone(),
             later: run.white.blocks.clone(),
             within_run_spread: before.within.max(run.within),
         };
-        self.significant_changes(&runs, &run.sizes)
+        let sensitivity = search_sensitivity(&runs, &self.search, &self.scale_hypotheses());
+        let knowledge = [before.knowledge(), run.knowledge()];
+        let reasons = undecided_reasons(knowledge.each_ref(), self.layout.base, &sensitivity);
+        let believed = reasons
+            .iter()
+            .map(|one| !one.is_some_and(verdict::UndecidedReason::spoils_fit));
+        let believed: Vec<bool> = believed.collect();
+        let mut found = self.significant_changes(&runs, &run.sizes, &believed);
+        // A drive that stands may have any friction.
+        let stands = |d: usize| before.stands[d] || run.stands[d];
+        found.retain(|one| !matches!(self.possible[one.candidate].kind, ChangeKind::Friction(d) if stands(d)));
+        let scales = self.widen_loads(&mut found, [&before.white.drives, &run.white.drives]);
+        PairFindings {
+            found,
+            scales,
+            difference_factor: (sensitivity.min_gain / sensitivity.min_gain_of_noise).max(1.0).sqrt(),
+            reasons,
+        }
     }
 
-    /// Changes that a search finds, without those that hardly move any drive.
-    fn significant_changes(&self, runs: &RunPair, sizes: &MeasuredMoments) -> Vec<SelectedChange> {
+    /// Adds to loads the uncertainty of scales of forces that disagree. `drives` are the sums of both runs drive by drive.
+    fn widen_loads(&self, found: &mut [SelectedChange], drives: [&[NormalEquations]; 2]) -> Vec<Option<DriveScales>> {
+        let columns = |one: &SelectedChange| self.possible[one.candidate].candidate.columns.clone();
+        let all: Vec<Vec<usize>> = found.iter().map(columns).collect();
+        let mut scales = Vec::new();
+        for (k, one) in found.iter_mut().enumerate() {
+            let is_load = matches!(self.possible[one.candidate].kind, ChangeKind::Payload(_));
+            let others = all.iter().enumerate().filter(|(other, _)| *other != k);
+            let others: Vec<usize> = others.flat_map(|(_, columns)| columns).copied().collect();
+            scales.push(is_load.then(|| {
+                let scales = compare_drive_scales(drives, self.layout, &all[k], &one.values, &others);
+                payload_scale::widen_covariance(one, &scales);
+                scales
+            }));
+        }
+        scales
+    }
+
+    /// Changes that a search finds, without those that hardly move any drive whose force is `believed`, and those whose
+    /// values are within their uncertainty.
+    fn significant_changes(&self, runs: &RunPair, sizes: &MeasuredMoments, believed: &[bool]) -> Vec<SelectedChange> {
         let mut found = search_changes(runs, &self.search);
         found.retain(|one| {
             let columns = &self.possible[one.candidate].candidate.columns;
-            sizes.force_fraction(columns, &one.values) > CHANGE_LEAST_FORCE_SHARE
+            let fractions = sizes.force_fractions(columns, &one.values);
+            let mut moved = fractions.iter().zip(believed);
+            moved.any(|(part, believed)| *believed && *part > CHANGE_LEAST_FORCE_SHARE) && has_certain_value(one)
         });
         found
     }
@@ -416,64 +603,23 @@ impl<'a> RunAnalyser<'a> {
     }
 }
 
-/// A change between two recordings, with its force.
-pub(crate) struct RecordingDifference {
-    /// The recording of the reference.
-    pub(crate) first: String,
-    /// The later one.
-    pub(crate) later: String,
-    /// The change.
-    pub(crate) changed: RunChange,
-    /// The force of the change along all recordings, zero except in the later one.
-    pub(crate) force: ForceColumn,
+/// A run compared with the first.
+struct PairFindings {
+    /// The changes, the largest first.
+    found: Vec<SelectedChange>,
+    /// For each of them that is a load, what the drives weigh.
+    scales: Vec<Option<DriveScales>>,
+    /// For each drive the reason why its forces cannot show a change.
+    reasons: Vec<Option<UndecidedReason>>,
+    /// As [`RunReport::difference_factor`].
+    difference_factor: f64,
 }
 
-/// Changes of later recordings relative to the first, with the forces that they cause.
-pub(crate) fn differences(model: &Model, recordings: &[&PreparedRecording]) -> Outcome<Vec<RecordingDifference>> {
-    let [first, later @ ..] = recordings else {
-        return Ok(Vec::new());
-    };
-    let payloads = PayloadColumns::new(model)?;
-    let bench = RunAnalyser::new(model, &payloads);
-    let before = bench.analyse_run(first, None)?;
-    // Forces are placed within the samples of all recordings.
-    let samples = |one: &PreparedRecording| -> usize { one.segments.iter().map(|one| one.time().len()).sum() };
-    let total: usize = recordings.iter().map(|one| samples(one)).sum();
-    let mut start = samples(first);
-    let mut differences = Vec::new();
-    for recording in later {
-        let run = bench.analyse_run(recording, Some(&before.values))?;
-        let end = start + samples(recording);
-        let found = bench.find_changes(&before, &run);
-        let rows = match found[..] {
-            [] => None,
-            _ => Some(RunRows::new(
-                model,
-                &recording.segments,
-                &payloads,
-                Some(&before.values),
-            )?),
-        };
-        for (one, changed) in found.iter().zip(bench.identified_changes(&found, &before.values)) {
-            let Some(rows) = &rows else { continue };
-            let own = rows.force(&bench.possible[one.candidate].candidate.columns, &one.values)?;
-            let along_all = |values: Vec<f64>| {
-                let mut all = vec![0.0; total];
-                if values.len() == end - start {
-                    all[start..end].copy_from_slice(&values);
-                }
-                all
-            };
-            differences.push(RecordingDifference {
-                first: first.file().to_owned(),
-                later: recording.file().to_owned(),
-                changed,
-                force: ForceColumn::new(own.into_iter().map(along_all).collect()),
-            });
-        }
-        start = end;
-    }
-    Ok(differences)
+/// Whether one of the values of a change is far from zero, or none is determined individually.
+fn has_certain_value(one: &SelectedChange) -> bool {
+    let mut known = (0..one.values.len()).filter(|i| one.determined[*i]).peekable();
+    let is_certain = |i: usize| one.values[i].abs() > CHANGE_VALUE_SIGMAS * one.covariance[(i, i)].max(0.0).sqrt();
+    known.peek().is_none() || known.any(is_certain)
 }
 
 /// Base parameters from normal equations of rows with variance 1; parameters known from the file keep their values.

@@ -26,17 +26,18 @@ pub(crate) struct PayloadColumns {
 impl PayloadColumns {
     /// The columns for all frames that carry parts or lumped masses.
     pub(crate) fn new(model: &Model) -> Outcome<Self> {
-        // The base frame has the index 0 and cannot carry a load.
+        Self::of_frames(model, &loaded_frames(&model.derivation.mechanism))
+    }
+
+    /// The columns for the last bodies only: those that carry no other body, such as the flange of an arm.
+    pub(crate) fn of_last_bodies(model: &Model) -> Outcome<Self> {
+        Self::of_frames(model, &last_frames(&model.derivation.mechanism))
+    }
+
+    /// The columns for some frames.
+    fn of_frames(model: &Model, frames: &[FrameIdx]) -> Outcome<Self> {
         let mechanism = &model.derivation.mechanism;
-        let mut frames: Vec<FrameIdx> = Vec::new();
-        let parts = mechanism.parts.iter().map(|part| part.frame);
-        for frame in parts.chain(mechanism.lumped_masses.iter().map(|mass| mass.frame)) {
-            if frame.0 > 0 && !frames.contains(&frame) {
-                frames.push(frame);
-            }
-        }
-        frames.sort_by_key(|frame| frame.0);
-        let (variant, own) = with_bodies(mechanism, &frames);
+        let (variant, own) = with_bodies(mechanism, frames);
         // Only products of a single new parameter are derived.
         let is_wanted = |product: &modelmill_codegen::ParameterMonomial| matches!(product.0[..], [(p, 1)] if p >= own);
         let derivation = derive_columns(&variant, &is_wanted).map_err(|error| Error::derivation(&model.path, error))?;
@@ -59,6 +60,36 @@ impl PayloadColumns {
             derivation,
         })
     }
+}
+
+/// Frames that carry parts or lumped masses, without the base, in their order.
+fn loaded_frames(mechanism: &Mechanism) -> Vec<FrameIdx> {
+    let mut frames: Vec<FrameIdx> = Vec::new();
+    let parts = mechanism.parts.iter().map(|part| part.frame);
+    for frame in parts.chain(mechanism.lumped_masses.iter().map(|mass| mass.frame)) {
+        // The base frame has the index 0 and cannot carry a load.
+        if frame.0 > 0 && !frames.contains(&frame) {
+            frames.push(frame);
+        }
+    }
+    frames.sort_by_key(|frame| frame.0);
+    frames
+}
+
+/// Those of them on which no other of them stands.
+fn last_frames(mechanism: &Mechanism) -> Vec<FrameIdx> {
+    let all = loaded_frames(mechanism);
+    let carries = |lower: FrameIdx| {
+        all.iter().any(|frame| {
+            let mut at = *frame;
+            // The parent of the base is the base itself.
+            while at.0 > 0 && at != lower {
+                at = mechanism.frames[at.0].parent;
+            }
+            at == lower && *frame != lower
+        })
+    };
+    all.iter().copied().filter(|frame| !carries(*frame)).collect()
 }
 
 /// The mechanism with a further body on each of some frames, and the index of the first of their parameters.

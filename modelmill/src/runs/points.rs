@@ -2,11 +2,8 @@
 
 use modelmill_identify::changes::{NormalEquations, RunPair, UncertainValue, change_points, weighted_mean};
 
-use nalgebra::DVector;
-
-use crate::runs::rows::MeasuredMoments;
-use crate::runs::thresholds::CHANGE_POINT_RUNS;
-use crate::runs::{FittedValue, RunAnalyser, RunChange};
+use crate::runs::thresholds::{CHANGE_POINT_RUNS, MOST_UNEXPLAINED_SHARE};
+use crate::runs::{FittedValue, RunAnalyser, RunChange, RunStatistics};
 
 /// A permanent change of one parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,15 +36,17 @@ pub struct ChangePoint {
 }
 
 /// Change points over the runs. `runs` are the base parameters of each run fitted alone, `wholes` their sums, and
-/// `within` the differences between the parts of each. `sizes` and `values` are those of the reference run.
+/// `within` the differences between the parts of each. `before` is the reference run.
 pub(crate) fn find_change_points(
     bench: &RunAnalyser<'_>,
     runs: &[&[FittedValue]],
     wholes: &[NormalEquations],
     within: &[f64],
-    sizes: &MeasuredMoments,
-    values: &DVector<f64>,
+    before: &RunStatistics,
 ) -> Vec<ChangePoint> {
+    let believed: Vec<bool> = (before.unexplained.0.iter())
+        .map(|share| *share <= MOST_UNEXPLAINED_SHARE)
+        .collect();
     let parameters: Vec<usize> = (0..bench.model.base.len())
         .filter(|k| !bench.model.is_known(*k))
         .collect();
@@ -87,7 +86,10 @@ pub(crate) fn find_change_points(
         ChangePoint {
             run: at,
             steps: own,
-            changes: bench.identified_changes(&bench.significant_changes(&both, sizes), values),
+            changes: bench.identified_changes(
+                &bench.significant_changes(&both, &before.sizes, &believed),
+                &before.values,
+            ),
         }
     };
     bounds.windows(3).map(point).collect()

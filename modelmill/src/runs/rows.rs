@@ -9,7 +9,7 @@ use nalgebra::DVector;
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
-use crate::runs::columns::SegmentRows;
+use crate::runs::columns::{SegmentRows, TimeScaling};
 use crate::runs::layout::RunColumnLayout;
 use crate::runs::payload::PayloadColumns;
 use crate::runs::thresholds::NOISE_FLOOR_SHARE;
@@ -32,6 +32,8 @@ pub(crate) struct RunRows<'a> {
     payloads: &'a PayloadColumns,
     /// The segments in pieces.
     pieces: Vec<RecordingSegment>,
+    /// The derivatives of each coordinate that depend on the clock.
+    scaling: Vec<TimeScaling>,
     /// Columns of all pieces, if they are kept.
     kept: Option<Vec<SegmentRows>>,
     /// Base parameters with which the columns of scales and clocks are computed: those of the first run.
@@ -70,6 +72,7 @@ impl<'a> RunRows<'a> {
         model: &'a Model,
         segments: &[RecordingSegment],
         payloads: &'a PayloadColumns,
+        scaling: &[TimeScaling],
         values: Option<&DVector<f64>>,
     ) -> Outcome<Self> {
         let layout = RunColumnLayout::new(model, payloads);
@@ -89,6 +92,7 @@ impl<'a> RunRows<'a> {
             model,
             payloads,
             pieces,
+            scaling: scaling.to_vec(),
             kept: None,
             values,
             sums: Vec::new(),
@@ -109,7 +113,7 @@ impl<'a> RunRows<'a> {
 
     /// All columns of a piece.
     fn segment_rows(&self, piece: &RecordingSegment) -> Outcome<SegmentRows> {
-        SegmentRows::all_columns(self.model, piece, self.payloads, &self.values)
+        SegmentRows::all_columns(self.model, piece, self.payloads, &self.values, &self.scaling)
     }
 
     /// Calls `look` with the columns of each piece.
@@ -181,13 +185,15 @@ impl<'a> RunRows<'a> {
             for (drive, noise) in noise.iter().enumerate().filter(|(_, n)| n.standard_deviation > 0.0) {
                 // The filter restarts after each gap.
                 for some in laid.pieces(drive) {
-                    let start = before + some.start;
-                    whiten(laid, drive, some, noise, columns, |i, z, y| {
+                    // Blocks are consecutive in time, the same part of the run for all drives.
+                    let blocks = RowBlocks {
+                        first: before + some.start,
+                        length,
+                    };
+                    whiten(laid, drive, some, noise, columns, blocks, |block, z, y| {
                         let mut sums = NormalEquations::new(columns);
                         sums.add_rows(z, y);
-                        // Blocks are consecutive in time, the same part of the run for all drives.
-                        let block = BLOCKS * (start + i) / length.max(1);
-                        white.blocks[block.min(BLOCKS - 1)].merge(&sums);
+                        white.blocks[block].merge(&sums);
                         white.drives[drive].merge(&sums);
                         let z = z[..layout.base].iter();
                         let z: Vec<&[f64]> = z.map(|column| column.unwrap_or(&zeros[..y.len()])).collect();
@@ -225,8 +231,25 @@ impl MeasuredMoments {
         Ok(sums.iter().map(part).collect())
     }
 
-    /// The rms force of some columns relative to the drive's force, on the drive where this is largest.
-    pub(crate) fn force_fraction(&self, columns: &[usize], values: &DVector<f64>) -> f64 {
+    /// Shares of the forces that remain with the best values of some columns: base parameters, and effects of the drives
+    /// that the model may lack. With as many columns as rows nothing remains, so that columns are counted.
+    pub(crate) fn unexplained_shares(&self, columns: &[usize]) -> Outcome<UnexplainedShares> {
+        let sums: Vec<NormalEquations> = self.0.iter().map(|one| one.select_columns(columns)).collect();
+        let values = weighted_least_squares(&sums)?;
+        let own = columns.len() as f64 / sums.len().max(1) as f64;
+        let share = |one: &NormalEquations| {
+            // A drive without force or without rows shows nothing.
+            if one.total <= 0.0 {
+                return 1.0;
+            }
+            let counted = one.rows as f64 / (one.rows as f64 - own).max(1.0);
+            (counted * one.residual_squares(&values) / one.total).sqrt().min(1.0)
+        };
+        Ok(UnexplainedShares(sums.iter().map(share).collect()))
+    }
+
+    /// The rms force of some columns relative to the force of each drive.
+    pub(crate) fn force_fractions(&self, columns: &[usize], values: &DVector<f64>) -> Vec<f64> {
         let of_drive = |sums: &NormalEquations| {
             let force = values.dot(&(sums.select_columns(columns).gram * values));
             if sums.total > 0.0 {
@@ -235,9 +258,13 @@ impl MeasuredMoments {
                 0.0
             }
         };
-        self.0.iter().map(of_drive).fold(0.0, f64::max)
+        self.0.iter().map(of_drive).collect()
     }
 }
+
+/// For each drive the share of its rms force that no parameters explain (1).
+#[derive(Clone, Debug)]
+pub(crate) struct UnexplainedShares(pub(crate) Vec<f64>);
 
 /// The name of a drive.
 fn drive_name(model: &Model, drive: usize) -> String {
@@ -247,27 +274,54 @@ fn drive_name(model: &Model, drive: usize) -> String {
 /// Number of rows that are processed at once.
 const TOGETHER: usize = 256;
 
-/// Calls `show` with whitened rows of a range of samples, column by column, in groups of [`TOGETHER`] rows, with
-/// the index of the first.
+/// The blocks of consecutive rows of a range.
+#[derive(Clone, Copy)]
+struct RowBlocks {
+    /// Index of the first row of the range within the run.
+    first: usize,
+    /// Number of rows of the run.
+    length: usize,
+}
+
+impl RowBlocks {
+    /// The block of a row of the range, and the first row of the range that belongs to a later block.
+    fn find_block(self, row: usize) -> (usize, usize) {
+        let length = self.length.max(1);
+        let block = (BLOCKS * (self.first + row) / length).min(BLOCKS - 1);
+        let end = ((block + 1) * length).div_ceil(BLOCKS);
+        // The last block also has rows that rounding has left.
+        let end = if block == BLOCKS - 1 { usize::MAX } else { end };
+        (block, end.saturating_sub(self.first))
+    }
+}
+
+/// Calls `show` with whitened rows of a range of samples, column by column, in groups of at most [`TOGETHER`] rows
+/// that belong to one block, with the index of the block.
 fn whiten(
     laid: &SegmentRows,
     drive: usize,
     some: Range<usize>,
     noise: &AutoregressiveNoise,
     columns: usize,
+    blocks: RowBlocks,
     mut show: impl FnMut(usize, &[Option<&[f64]>], &[f64]) -> Outcome,
 ) -> Outcome {
     // The same filter is applied to force and columns.
     let white = |values: &[f64]| noise.whiten(&values[some.clone()]);
     let y = white(&laid.forces[drive]);
     let z: Vec<Option<Vec<f64>>> = (0..columns).map(|k| laid.column(k, drive).map(white)).collect();
-    for start in (0..y.len()).step_by(TOGETHER) {
-        let rows = start..(start + TOGETHER).min(y.len());
+    let mut start = 0;
+    while start < y.len() {
+        // The block is that of each row. With that of a group, a short run would lie in one block, and nothing would
+        // remain when this is left out.
+        let (block, block_end) = blocks.find_block(start);
+        let rows = start..(start + TOGETHER).min(y.len()).min(block_end);
+        start = rows.end;
         let z: Vec<Option<&[f64]>> = z
             .iter()
             .map(|column| column.as_ref().map(|column| &column[rows.clone()]))
             .collect();
-        show(start, &z, &y[rows])?;
+        show(block, &z, &y[rows])?;
     }
     Ok(())
 }

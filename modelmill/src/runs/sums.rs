@@ -17,7 +17,9 @@ use crate::recording::PreparedRecording;
 use crate::runs::layout::RunColumnLayout;
 use crate::runs::payload::PayloadColumns;
 use crate::runs::rows::{MeasuredMoments, RunRows};
-use crate::runs::{FittedValue, RunAnalyser, RunChange, changes, merge_known};
+use crate::runs::standstill::exclude_uncertain_friction;
+use crate::runs::time_base::time_scaling;
+use crate::runs::{FittedValue, ReferenceRun, RunAnalyser, RunChange, changes, merge_known};
 
 /// The reference of a fleet, which is a group of machines with the same model. It contains base parameters from
 /// reference runs. With these parameters, normal equations of all other runs are computed so that they can be added and
@@ -60,17 +62,18 @@ impl ReferenceFit {
     ///
     /// Fails without runs, and when a run cannot be fitted.
     pub fn from_reference_runs(model: &Model, reference: &[&PreparedRecording]) -> Outcome<Self> {
-        let stretches: Vec<_> = (reference.iter())
+        let mut stretches: Vec<_> = (reference.iter())
             .flat_map(|one| one.segments.iter().cloned())
             .collect();
-        if stretches.is_empty() {
+        let Some(first) = reference.first().filter(|_| !stretches.is_empty()) else {
             return Err(Error::options(
                 "there is no reference run; give one or more recordings of machines without faults",
             ));
-        }
+        };
+        exclude_uncertain_friction(model, &mut stretches)?;
         let payloads = PayloadColumns::new(model)?;
         // All reference runs are treated as one run.
-        let rows = RunRows::new(model, &stretches, &payloads, None)?;
+        let rows = RunRows::new(model, &stretches, &payloads, &time_scaling(model, first), None)?;
         let values = rows.values.clone();
         let sizes = rows.sizes();
         Ok(Self {
@@ -140,7 +143,12 @@ impl ReferenceFit {
     ///
     /// Fails when a force was not measured, or the recording cannot be evaluated.
     pub fn sums(&self, recording: &PreparedRecording) -> Outcome<RunSums> {
-        let run = self.analyser().analyse_run(recording, Some(&self.values))?;
+        let reference = ReferenceRun {
+            values: &self.values,
+            // Clocks of machines differ from those of the reference runs anyway.
+            time_base: None,
+        };
+        let run = self.analyser().analyse_run(recording, Some(reference))?;
         Ok(RunSums {
             samples: run.samples,
             total: run.white.total(),
@@ -187,7 +195,8 @@ impl ReferenceFit {
             later: later.to_vec(),
             within_run_spread: within,
         };
-        bench.identified_changes(&bench.significant_changes(&runs, &self.sizes), &self.values)
+        let believed = vec![true; bench.layout.drives];
+        bench.identified_changes(&bench.significant_changes(&runs, &self.sizes, &believed), &self.values)
     }
 
     /// For every possible change, how much it alone explains of the difference between a later run and those before.

@@ -2,9 +2,58 @@
 //! what it bounds, its unit, and how it was chosen. Numbers that only set an accuracy or a grid stay where they are
 //! used.
 
-/// A base parameter has changed if its difference from the first run exceeds this many standard deviations. By
+/// A base parameter has changed if its difference from the first run exceeds this many standard deviations, which
+/// include the scatter between blocks. Of 29 pairs of runs of a simulated UR5 without any change, with quick, slow and
+/// pausing motions, none has one beyond.
+pub(super) const PARAMETER_CHANGE_SIGMAS: f64 = 6.0;
+
+/// A change must have a value of more than this many standard deviations, which include the scatter between blocks. By
+/// judgement: less than for noise alone (12), since the scatter contains errors of the model.
+pub(super) const CHANGE_VALUE_SIGMAS: f64 = 5.0;
+
+/// The model leaves too much of a drive's rms force unexplained for a comparison if it is more than this share (1). By
+/// judgement: rigid models of real arms without friction leave up to 0.47.
+pub(super) const MOST_UNEXPLAINED_SHARE: f64 = 0.5;
+
+/// A drive could not show a change if only one of more than this share of its rms force (1) would be reported. By
 /// judgement.
-pub(super) const PARAMETER_CHANGE_SIGMAS: f64 = 4.0;
+pub(super) const UNDETECTABLE_FORCE_SHARE: f64 = 0.5;
+
+/// Two runs cannot be compared with fewer equations than this many for each base parameter. By judgement.
+pub(super) const ROWS_PER_PARAMETER: f64 = 2.0;
+
+/// A drive is at standstill below this share of its usual largest speed (1). A simulated UR5 whose joints stick between
+/// samples is identified exactly with it.
+pub(super) const RUN_STANDSTILL_SHARE: f64 = 0.03;
+
+/// The usual largest speed is this quantile of the speeds (1). By judgement.
+pub(super) const TOP_SPEED_QUANTILE: f64 = 0.98;
+
+/// A drive that moves in less than this share of the equations (1) stands, and keeps all of them. By judgement.
+pub(super) const STANDING_FEWEST_MOVING_SHARE: f64 = 0.1;
+
+/// A rate is noise if it reverses more often than this many times per period of the cut-off (1). White noise of
+/// positions reverses 1.5 times, and a motion twice per period of its own.
+pub(super) const NOISE_REVERSALS_PER_CUTOFF: f64 = 1.2;
+
+/// Rates below this are rounding, rad/s or m/s. By judgement: no drive moves by less than 0.1 mm a day.
+pub(super) const ROUNDING_RATE: f64 = 1e-9;
+
+/// Cut-off that is assumed for recorded rates, as a share of the sampling rate (1). By judgement.
+pub(super) const RECORDED_CUTOFF_SHARE: f64 = 0.1;
+
+/// Largest number of windows of a run in which recorded rates are compared with positions. By judgement.
+pub(super) const TIME_BASE_WINDOWS: usize = 8;
+
+/// Fewest samples of such a window. By judgement.
+pub(super) const TIME_BASE_FEWEST_SAMPLES: usize = 60;
+
+/// A time base is reported as changed if its factor differs from 1 by more than this (1). By judgement: drifts of real
+/// clocks are below 1e-4.
+pub(super) const TIME_BASE_LEAST_ERROR: f64 = 1e-3;
+
+/// A time base is reported as changed if its factor differs from 1 by this many standard deviations. By judgement.
+pub(super) const TIME_BASE_SIGMAS: f64 = 5.0;
 
 /// A change must move one of the drives by more than this share of its rms force (1): smaller changes are within the
 /// errors of any model. By judgement.

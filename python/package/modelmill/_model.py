@@ -81,6 +81,8 @@ class ReadingOptions(TypedDict, total=False):
         Leave out the forces during contacts and pushes.
     between : (float, float)
         Read only the samples between these times, s.
+    rate : float
+        Sampling rate of recordings without a column of times, Hz.
     """
 
     columns: Mapping[str, str]
@@ -95,6 +97,7 @@ class ReadingOptions(TypedDict, total=False):
     skip_bad_samples: bool
     leave_out_events: bool
     between: tuple[float, float] | None
+    rate: float | None
 
 
 _READING: dict[str, Any] = {
@@ -110,6 +113,7 @@ _READING: dict[str, Any] = {
     "skip_bad_samples": False,
     "leave_out_events": False,
     "between": None,
+    "rate": None,
 }
 
 
@@ -139,7 +143,7 @@ def _pair(of: Callable[[Any], Any]) -> Callable[[Any], Any]:
 
 
 _TYPES: list[tuple[tuple[str, ...], str, Callable[[Any], Any]]] = [
-    (("cutoff_hz", "period", "band_hz"), "a number", float),
+    (("cutoff_hz", "period", "band_hz", "rate"), "a number", float),
     (("order", "decimate"), "an integer", index),
     (("trim",), "a number of samples, or two of them", _pair(index)),
     (("between",), "two times in s", _pair(float)),
@@ -659,7 +663,7 @@ class Model:
         Parameters
         ----------
         data
-            A path (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2), a tuple of paths that are joined on time, or a table: a dict of
+            A path (CSV, Parquet, MATLAB, HDF5, MCAP, ROS bags), a tuple of paths that are joined on time, or a table: a dict of
             arrays, a table of pandas or polars, anything with ``__arrow_c_stream__``. It needs ``t`` (s), one column for each
             coordinate (rad or m) and one for each drive (N or N m); ``columns`` gives other names and units.
         name : str, optional

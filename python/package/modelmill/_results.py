@@ -303,6 +303,14 @@ class Diagnosis(Result):
         ]
 
     @property
+    def possible(self) -> list[Effect]:
+        """Effects with a probability below 0.5; the model is not said to lack them."""
+        return [
+            Effect(one["kind"], one["at"], one["estimates"], one.get("probability"), one.get("indistinguishable_from", []))
+            for one in self._object.get("possible", [])
+        ]
+
+    @property
     def candidates(self) -> list[dict[str, Any]]:
         """All effects that were tried, and why each was rejected."""
         candidates: list[dict[str, Any]] = self._object["candidates"]
@@ -313,6 +321,12 @@ class Diagnosis(Result):
         """Disturbances in the recordings, such as outliers; they are not model errors."""
         disturbances: list[dict[str, Any]] = self._object["disturbances"]
         return disturbances
+
+    @property
+    def corrected(self) -> list[dict[str, Any]]:
+        """Faults of the recordings that were corrected hypothetically, and what to do; all findings hold for the corrected ones."""
+        corrected: list[dict[str, Any]] = self._object.get("corrected", [])
+        return corrected
 
     @property
     def budget(self) -> dict[str, dict[str, Any]]:

@@ -7,7 +7,7 @@ mod story;
 use std::path::{Path, PathBuf};
 
 use modelmill::compare::ModelComparison;
-use modelmill::diagnose::{DiagnosisFindings, DiagnosisOptions, FixedParameters, words};
+use modelmill::diagnose::{DiagnosisFindings, DiagnosisOptions, FixedParameters};
 use modelmill::print::{StepSpelling, edit};
 use modelmill::recording::{PreparedRecording, RecordingOptions};
 use modelmill::report::page;
@@ -211,5 +211,5 @@ impl TourComparison {
 
 /// The verdict of a diagnosis in words.
 fn verdict(findings: &DiagnosisFindings) -> String {
-    words::verdict(&findings.diagnosis, findings.channels(), findings.validation)
+    findings.verdict_text()
 }

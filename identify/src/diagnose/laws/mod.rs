@@ -26,7 +26,7 @@ pub use shapes::{LawShape, LawVariable};
 
 use super::bench::{EffectSelector, SelectedEffect};
 use super::pool::{FitScope, dot};
-use super::problem::{CandidateNature, ColumnProvider, LocatedEffect};
+use super::problem::{ColumnProvider, LocatedEffect};
 use super::thresholds::{
     LAW_HOPEFUL_PART, LAW_INDEPENDENT_COLUMNS, LAW_LEAST_NOISE_RATIO, LAW_LEAST_REPEATABLE_SHARE,
     LAW_LEAST_SHARE_ALONE, LAW_MOST_CHANCE, LAW_SAME_SHARE, LEAST_GAIN, MAX_NEAR_TIES, MIN_DISTINCTION,
@@ -328,7 +328,7 @@ fn without_motion(site: LawSite) -> LawSite {
 fn drop_effects_on(bench: &EffectSelector<'_>, picks: &[SelectedEffect], open: &[usize]) -> Vec<SelectedEffect> {
     let stays = |pick: &&SelectedEffect| {
         let channels = bench.affected_channels(std::slice::from_ref(*pick));
-        bench.candidate(pick).nature == CandidateNature::Disturbance || channels.iter().all(|d| !open.contains(d))
+        bench.candidate(pick).nature.is_disturbance() || channels.iter().all(|d| !open.contains(d))
     };
     picks.iter().filter(stays).cloned().collect()
 }

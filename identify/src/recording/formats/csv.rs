@@ -1,24 +1,23 @@
-//! Recordings as CSV text: one header line, then one line per sample. Fields are separated by commas, semicolons or
-//! tabs.
+//! Recordings as text: one line per sample, usually below a line of names. Fields are separated by commas, semicolons,
+//! tabs or blanks.
 //!
-//! A UTF-8 byte order mark, CR LF and blank lines are accepted.
+//! A UTF-8 byte order mark, CR LF, blank lines and comment lines are accepted. The layout is decided by the first lines
+//! (`text_layout`), numbers and time stamps are parsed by `text_fields`.
 
 use std::cell::Cell;
-use std::io::{self, BufRead, BufReader, Cursor, Read};
+use std::io::{self, BufReader, Cursor, Read};
 use std::rc::Rc;
-
-use modelmill_boundary::text::csv_name;
 
 use crate::recording::column::SampleField;
 use crate::recording::error::RecordingFault;
+use crate::recording::formats::text_fields::TextFieldParser;
+use crate::recording::formats::text_layout::{COMMENT_MARKS, TextLayout, TextSeparator};
 use crate::recording::formats::{RecordingFormat, RecordingInput, TableInfo};
 use crate::recording::intake::{IntakeFlow, SampleIntake};
 use crate::recording::notes::RecordingNote;
 use crate::recording::tables::{ColumnInfo, likely_time_column};
 use crate::recording::{ReadOptions, SignalRecording};
 
-/// Longest header line in bytes; a file with a longer one is not a recording.
-const LONGEST_HEADER: u64 = 1 << 20;
 /// Most bytes of a record in memory; a record has several lines if a field is quoted.
 const LONGEST_RECORD: usize = 64 << 20;
 
@@ -49,29 +48,38 @@ impl RecordingFormat for CsvFormat {
     }
 
     fn names(&self, input: RecordingInput<'_>) -> Result<Vec<String>, RecordingFault> {
-        let (mut reader, _, header_line) = open(input.stream(), Rc::default())?;
-        names(&mut reader, header_line)
+        let (_, layout) = open(input.stream(), Rc::default())?;
+        Ok(layout.names)
     }
 
     fn tables(&self, input: RecordingInput<'_>) -> Result<Vec<TableInfo>, RecordingFault> {
         let mut stream = input.stream();
         // The complete text is read to count its samples.
-        let (mut reader, _, header_line) = open(&mut stream, Rc::default())?;
-        let names = names(&mut reader, header_line)?;
-        let time = likely_time_column(&names).and_then(|time| names.iter().position(|name| name == time));
+        let (mut reader, layout) = open(&mut stream, Rc::default())?;
+        let names = layout.names;
+        let time = likely_time_column(&names)
+            .and_then(|(time, factor)| Some((names.iter().position(|name| name == time)?, factor)));
         let mut record = csv::ByteRecord::new();
+        let mut fields = TextFieldParser::new(names.len());
         let (mut samples, mut span) = (0, None);
         // The first sample decides whether a column has text.
         let mut kinds = vec!["number"; names.len()];
         while reader.read_byte_record(&mut record).map_err(unreadable)? {
             samples += 1;
-            for (kind, field) in kinds.iter_mut().zip(&record) {
-                if samples == 1 && parse(field) == SampleField::Text {
+            for (place, (kind, field)) in kinds.iter_mut().zip(&record).enumerate() {
+                if samples > 1 {
+                    break;
+                }
+                if fields.parse(field, place) == SampleField::Text {
                     *kind = "text";
+                } else if fields.first_stamp(place).is_some() {
+                    *kind = "time";
                 }
             }
             // The last time that is a number ends the range.
-            if let Some(SampleField::Number(t)) = time.and_then(|place| record.get(place)).map(parse) {
+            let now = time.and_then(|(place, _)| Some(fields.parse(record.get(place)?, place)));
+            if let (Some(SampleField::Number(t)), Some((_, factor))) = (now, time) {
+                let t = factor * t;
                 span = Some((span.map_or(t, |(first, _)| first), t));
             }
         }
@@ -85,7 +93,8 @@ impl RecordingFormat for CsvFormat {
             columns: names.into_iter().zip(kinds).map(info).collect(),
             samples,
             time: span,
-            remark: None,
+            remark: (!layout.has_names)
+                .then(|| "it has no line of names: columns are called by their numbers".to_owned()),
         }])
     }
 }
@@ -94,14 +103,21 @@ impl RecordingFormat for CsvFormat {
 fn read(stream: impl Read, file: &str, options: &ReadOptions) -> Result<SignalRecording, RecordingFault> {
     // Bytes since the last record, which limits the memory of a quoted field.
     let since = Rc::new(Cell::new(0));
-    let (mut reader, separator, header_line) = open(stream, since.clone())?;
-    let theirs = names(&mut reader, header_line)?;
-    let mut intake = SampleIntake::new(theirs, options)?;
+    let (mut reader, layout) = open(stream, since.clone())?;
+    let names = layout.names.clone();
+    let mut fields = TextFieldParser::new(names.len());
+    let mut intake = SampleIntake::new(layout.names, options)?;
     // Another separator than a comma is reported.
-    if separator != b',' {
-        let name = if separator == b';' { "semicolons" } else { "tabs" };
+    if layout.separator != TextSeparator::Comma {
         intake.note(RecordingNote::info(format!(
-            "The columns of {file} are separated by {name}."
+            "The columns of {file} are separated by {}.",
+            layout.separator.name()
+        )));
+    }
+    if !layout.has_names {
+        intake.note(RecordingNote::info(format!(
+            "{file} has no line of names: its columns are called `column_1` to `column_{}`.",
+            names.len()
         )));
     }
     // Records are parsed into fields, and only needed ones into numbers.
@@ -125,7 +141,7 @@ fn read(stream: impl Read, file: &str, options: &ReadOptions) -> Result<SignalRe
         sample.clear();
         sample.extend(record.iter().enumerate().map(|(place, text)| {
             if intake.is_place_needed(place) {
-                parse(text)
+                fields.parse(text, place)
             } else {
                 SampleField::Number(0.0)
             }
@@ -139,38 +155,30 @@ fn read(stream: impl Read, file: &str, options: &ReadOptions) -> Result<SignalRe
             break;
         }
     }
+    for (place, name) in names.iter().enumerate() {
+        if let Some(zero) = fields.first_stamp(place) {
+            intake.note(RecordingNote::info(format!(
+                "`{name}` of {file} has time stamps: it is read as seconds since the first one."
+            )));
+            intake.set_zero(place, zero);
+        }
+    }
     intake.finish(file)
 }
 
-/// Opens a stream: returns a reader before the header, the separator, and the line of the header. `since` counts the
-/// bytes that are read.
-fn open(stream: impl Read, since: Rc<Cell<usize>>) -> Result<(csv::Reader<impl Read>, u8, u64), RecordingFault> {
-    // The header is read first, because it decides the separator.
+/// Opens a stream: returns a reader of its samples, and the layout. `since` counts the bytes that are read.
+fn open(stream: impl Read, since: Rc<Cell<usize>>) -> Result<(csv::Reader<impl Read>, TextLayout), RecordingFault> {
+    // The first lines are read first, because they decide the layout.
     let mut stream = BufReader::with_capacity(1 << 16, stream);
-    let (header, first_lines) = read_header(&mut stream)?;
-    let separator = find_separator(&header)?;
-    // Blank lines before the header count as lines.
-    let blank = first_lines.len() - first_lines.trim_ascii_start().len();
-    let header_line = 1 + newlines(&first_lines[..blank]);
-    // The bytes of the header are read again by the CSV reader.
-    let lines_of_text = LineFeedReader::new(Cursor::new(first_lines).chain(stream), since);
+    let (layout, first_lines) = TextLayout::read(&mut stream)?;
+    // Their bytes are read again by the reader of samples.
+    let plain = PlainLineReader::new(Cursor::new(first_lines).chain(stream), since, &layout);
     let reader = csv::ReaderBuilder::new()
-        .delimiter(separator)
+        .delimiter(layout.separator.byte())
+        .has_headers(false)
         .flexible(true)
-        .trim(csv::Trim::Headers)
-        .from_reader(lines_of_text);
-    Ok((reader, separator, header_line))
-}
-
-/// Names of the columns from the header at `line`.
-fn names(reader: &mut csv::Reader<impl Read>, line: u64) -> Result<Vec<String>, RecordingFault> {
-    let header = reader.headers().map_err(unreadable)?;
-    // A name with a line end means that a quote was not closed.
-    if header.iter().any(|name| name.contains('\n')) {
-        return Err(RecordingFault::OpenQuote { line });
-    }
-    let names = header.iter().map(|name| csv_name(name).to_owned());
-    Ok(names.collect())
+        .from_reader(plain);
+    Ok((reader, layout))
 }
 
 /// The line in which a quote opens a field that continues in later lines and contains samples: it extends to the end
@@ -192,158 +200,125 @@ fn newlines(bytes: &[u8]) -> u64 {
     bytes.split(|byte| *byte == b'\n').count() as u64 - 1
 }
 
-/// Parses a field; an empty one counts as not finite.
-fn parse(bytes: &[u8]) -> SampleField {
-    let bytes = bytes.trim_ascii();
-    if bytes.is_empty() {
-        return SampleField::NotFinite;
-    }
-    match std::str::from_utf8(bytes)
-        .ok()
-        .and_then(|text| text.parse::<f64>().ok())
-    {
-        Some(number) => SampleField::finite(number),
-        None => SampleField::Text,
-    }
-}
-
-/// The same text with LF at the end of every line, including the last one. The CSV reader counts a line at its LF
-/// only.
-struct LineFeedReader<R> {
+/// The same text with only samples in it: lines before them and comments become blank lines, so that lines count as in
+/// the file. Every line ends with LF, including the last one, because the CSV reader counts a line at its LF only.
+struct PlainLineReader<R> {
     /// The original stream.
     inner: R,
-    /// The last byte that was passed on.
-    last: u8,
+    /// Bytes as they were read.
+    raw: Vec<u8>,
+    /// Bytes to pass on, and how many of them were passed on.
+    ready: (Vec<u8>, usize),
     /// Whether the stream has ended.
-    ended: bool,
+    has_ended: bool,
     /// Bytes since the last complete record.
     since: Rc<Cell<usize>>,
+    /// Lines that are still to be left out at the start.
+    lines_before: u64,
+    /// Whether runs of blanks become one tab.
+    joins_blanks: bool,
+    /// Whether tabs at the start of a line separate fields.
+    keeps_tabs: bool,
+    /// The place in the current line.
+    place: LinePlace,
 }
 
-impl<R: Read> LineFeedReader<R> {
+/// Where a reader is in a line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum LinePlace {
+    /// Before its first character that is no blank.
+    Start,
+    /// In a sample.
+    Sample,
+    /// In a sample, behind blanks that separate fields if another one follows.
+    Blanks,
+    /// In a comment.
+    Comment,
+}
+
+impl<R: Read> PlainLineReader<R> {
     /// Wraps a stream; `since` is set to zero by the user after each record.
-    fn new(inner: R, since: Rc<Cell<usize>>) -> Self {
+    fn new(inner: R, since: Rc<Cell<usize>>, layout: &TextLayout) -> Self {
         Self {
-            since,
             inner,
-            last: b'\n',
-            ended: false,
+            raw: vec![0; 1 << 16],
+            ready: (Vec::new(), 0),
+            has_ended: false,
+            since,
+            lines_before: layout.lines_before,
+            joins_blanks: layout.separator == TextSeparator::Blanks,
+            keeps_tabs: layout.separator == TextSeparator::Tab,
+            place: LinePlace::Start,
         }
+    }
+
+    /// Takes one byte of the text.
+    fn push(&mut self, byte: u8) {
+        if byte == b'\n' {
+            self.lines_before = self.lines_before.saturating_sub(1);
+            self.place = LinePlace::Start;
+            self.ready.0.push(byte);
+            return;
+        }
+        if byte == b'\r' || self.lines_before > 0 || self.place == LinePlace::Comment {
+            return;
+        }
+        let is_blank = byte == b' ' || byte == b'\t';
+        if self.place == LinePlace::Start {
+            // Blanks at the start of a line are no field; tabs are, if they separate fields.
+            if is_blank && !(byte == b'\t' && self.keeps_tabs) {
+                return;
+            }
+            if COMMENT_MARKS.contains(&char::from(byte)) {
+                self.place = LinePlace::Comment;
+                return;
+            }
+            self.place = LinePlace::Sample;
+        }
+        if self.joins_blanks && is_blank {
+            self.place = LinePlace::Blanks;
+            return;
+        }
+        if self.place == LinePlace::Blanks {
+            self.ready.0.push(b'\t');
+            self.place = LinePlace::Sample;
+        }
+        self.ready.0.push(byte);
     }
 }
 
-impl<R: Read> Read for LineFeedReader<R> {
+impl<R: Read> Read for PlainLineReader<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        if buffer.is_empty() || self.ended {
-            return Ok(0);
-        }
-        // A buffer of CR only would have no bytes left, so reading is repeated.
-        loop {
-            let have = self.inner.read(buffer)?;
-            self.since.set(self.since.get() + have);
+        // A block of comments would have no bytes left, so reading is repeated.
+        while self.ready.1 == self.ready.0.len() && !self.has_ended {
+            self.ready = (std::mem::take(&mut self.ready.0), 0);
+            self.ready.0.clear();
+            let mut raw = std::mem::take(&mut self.raw);
+            let read = self.inner.read(&mut raw);
+            let have = read.as_ref().map_or(0, |n| *n);
+            raw[..have].iter().for_each(|byte| self.push(*byte));
+            self.raw = raw;
+            read?;
+            self.since.set(self.since.get() + self.ready.0.len());
             // An open quote would otherwise read the rest of the file into memory.
             if self.since.get() > LONGEST_RECORD {
                 return Err(io::Error::other(
                     "a line, or a text from one quote to the next, takes more than 64 MB",
                 ));
             }
-            // At the end, a missing line feed is added once.
             if have == 0 {
-                self.ended = true;
-                if self.last == b'\n' {
-                    return Ok(0);
-                }
-                buffer[0] = b'\n';
-                return Ok(1);
-            }
-            // Remove the carriage returns in place.
-            let mut kept = 0;
-            for i in 0..have {
-                if buffer[i] != b'\r' {
-                    buffer[kept] = buffer[i];
-                    kept += 1;
+                self.has_ended = true;
+                // A missing line feed is added once.
+                if self.place != LinePlace::Start {
+                    self.ready.0.push(b'\n');
                 }
             }
-            // Returning zero would mean the end of the text.
-            if kept > 0 {
-                self.last = buffer[kept - 1];
-                return Ok(kept);
-            }
         }
-    }
-}
-
-/// The header as text without byte order mark, and the bytes from the start of the stream to its end.
-fn read_header(stream: &mut impl BufRead) -> Result<(String, Vec<u8>), RecordingFault> {
-    let mut bytes = Vec::new();
-    let unreadable = |error: io::Error| RecordingFault::Unreadable {
-        reason: error.to_string(),
-    };
-    // Blank lines before the header are kept, so that lines count as in the file.
-    let mut limited = stream.take(LONGEST_HEADER);
-    while bytes.trim_ascii().is_empty() {
-        if limited.read_until(b'\n', &mut bytes).map_err(unreadable)? == 0 {
-            return Err(RecordingFault::Empty);
-        }
-    }
-    // Recognise other formats and encodings by their bytes.
-    let looks_like = match bytes.as_slice() {
-        [b'P', b'A', b'R', b'1', ..] => Some("a Parquet file"),
-        [0xFF, 0xFE, ..] | [0xFE, 0xFF, ..] => Some("UTF-16 text"),
-        [b'P', b'K', 3, 4, ..] => Some("a spreadsheet or ZIP archive"),
-        [b'M', b'A', b'T', b'L', b'A', b'B', ..] => Some("a MATLAB file"),
-        _ if bytes.contains(&0) => Some("binary data"),
-        line if line.trim_ascii().contains(&b'\r') => Some("text with lone carriage returns as line ends"),
-        _ if bytes.len() as u64 == LONGEST_HEADER => Some("a file whose first line is longer than 1 MB"),
-        _ => None,
-    };
-    if let Some(looks_like) = looks_like {
-        return Err(RecordingFault::NotCsv { looks_like });
-    }
-    // Remove the byte order mark.
-    let text = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&bytes).to_vec();
-    let Ok(header) = std::str::from_utf8(&text) else {
-        return Err(RecordingFault::NotCsv {
-            looks_like: "text in another encoding than UTF-8",
-        });
-    };
-    let header = header.trim().to_owned();
-    if header.is_empty() {
-        return Err(RecordingFault::Empty);
-    }
-    Ok((header, text))
-}
-
-/// The separator of a header line; fails when it is not clear, or when the line consists of numbers.
-fn find_separator(header: &str) -> Result<u8, RecordingFault> {
-    // Separators between quotes do not count, unless a quote is not closed.
-    let parts: Vec<&str> = header.split('"').collect();
-    let step = if parts.len().is_multiple_of(2) { 1 } else { 2 };
-    // The separators that occur outside of quotes.
-    let present: Vec<u8> = [b',', b';', b'\t']
-        .into_iter()
-        .filter(|s| {
-            let mut outside = parts.iter().step_by(step);
-            outside.any(|part| part.as_bytes().contains(s))
-        })
-        .collect();
-    let is_number = |text: &str| text.trim().trim_matches('"').parse::<f64>().is_ok();
-    // Exactly one kind of separator must occur.
-    match present.as_slice() {
-        [separator] => {
-            let mut fields = header.split(char::from(*separator));
-            if fields.all(is_number) {
-                Err(RecordingFault::NoHeader)
-            } else {
-                Ok(*separator)
-            }
-        }
-        [] if is_number(header) => Err(RecordingFault::NoHeader),
-        // A single column is unusual, but its name is clear.
-        [] if !header.contains([' ', '|', ':']) => Ok(b','),
-        _ => Err(RecordingFault::UnclearSeparator {
-            header: header.chars().take(80).collect(),
-        }),
+        let rest = &self.ready.0[self.ready.1..];
+        let n = rest.len().min(buffer.len());
+        buffer[..n].copy_from_slice(&rest[..n]);
+        self.ready.1 += n;
+        Ok(n)
     }
 }
 

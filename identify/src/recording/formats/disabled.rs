@@ -48,6 +48,14 @@ pub(crate) const ROSBAG2: DisabledFormat = DisabledFormat {
     feature: "logs",
 };
 
+#[cfg(not(feature = "logs"))]
+pub(crate) const ROSBAG1: DisabledFormat = DisabledFormat {
+    name: "a bag of ROS 1",
+    extensions: &["bag"],
+    signatures: &[b"#ROSBAG V"],
+    feature: "logs",
+};
+
 impl DisabledFormat {
     fn fault(&self) -> RecordingFault {
         RecordingFault::Format {

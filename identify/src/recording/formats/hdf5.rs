@@ -96,6 +96,9 @@ fn open(input: RecordingInput<'_>) -> Result<File, RecordingFault> {
         RecordingInput::File(stream) => ReadSeekSource::new(stream)
             .map_err(Error::from)
             .and_then(File::from_source),
+        // Only Parquet files are read as a data set.
+        #[cfg(feature = "parquet")]
+        RecordingInput::DataSet(_) => File::from_bytes(Vec::new()),
         RecordingInput::Bytes(bytes) => File::from_bytes(bytes.to_vec()),
         RecordingInput::Stream(stream) => ReadSeekSource::new(Cursor::new(read_all(stream)?))
             .map_err(Error::from)

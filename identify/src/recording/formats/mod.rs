@@ -9,6 +9,8 @@ mod csv;
 mod disabled;
 #[cfg(feature = "hdf5")]
 mod hdf5;
+#[cfg(feature = "parquet")]
+mod lerobot;
 mod matlab;
 mod matlab_arrays;
 #[cfg(feature = "logs")]
@@ -17,11 +19,20 @@ mod packing;
 #[cfg(feature = "parquet")]
 mod parquet;
 #[cfg(feature = "parquet")]
+mod parquet_columns;
+#[cfg(feature = "parquet")]
 mod parquet_pages;
+#[cfg(feature = "parquet")]
+mod parquet_values;
 #[cfg(feature = "logs")]
 mod rosbag;
 #[cfg(feature = "logs")]
+mod rosbag1;
+#[cfg(feature = "logs")]
 mod sqlite;
+mod text_fields;
+mod text_layout;
+mod text_time;
 
 use std::fs::File;
 use std::io::{Cursor, Read, Seek};
@@ -29,9 +40,13 @@ use std::io::{Cursor, Read, Seek};
 use crate::recording::error::RecordingFault;
 use crate::recording::tables::TableInfo;
 use crate::recording::{ReadOptions, SignalRecording};
+#[cfg(feature = "parquet")]
+pub(crate) use lerobot::DataSetFiles;
+#[cfg(feature = "parquet")]
+pub(crate) use parquet::ParquetFormat;
 
 /// All formats, in the order in which their signatures are compared. Text is last and accepts everything.
-pub(crate) const FORMATS: [&dyn RecordingFormat; 8] = [
+pub(crate) const FORMATS: [&dyn RecordingFormat; 9] = [
     #[cfg(feature = "parquet")]
     &parquet::ParquetFormat,
     #[cfg(not(feature = "parquet"))]
@@ -49,6 +64,10 @@ pub(crate) const FORMATS: [&dyn RecordingFormat; 8] = [
     &rosbag::Rosbag2Format,
     #[cfg(not(feature = "logs"))]
     &disabled::ROSBAG2,
+    #[cfg(feature = "logs")]
+    &rosbag1::Rosbag1Format,
+    #[cfg(not(feature = "logs"))]
+    &disabled::ROSBAG1,
     &packing::CompressedFormat(packing::CompressionMethod::Gzip),
     &packing::CompressedFormat(packing::CompressionMethod::Zstd),
     &csv::CsvFormat,
@@ -110,6 +129,9 @@ pub(crate) fn format_of(first: &[u8]) -> &'static dyn RecordingFormat {
 pub(crate) enum RecordingInput<'a> {
     /// A file, positioned at its start.
     File(File),
+    /// The files of a data set with their description.
+    #[cfg(feature = "parquet")]
+    DataSet(&'a DataSetFiles),
     /// Bytes in memory.
     Bytes(&'a [u8]),
     /// A stream that can be read only once, such as a pipe.
@@ -126,6 +148,9 @@ impl<'a> RecordingInput<'a> {
     pub(crate) fn stream(self) -> Box<dyn Read + 'a> {
         match self {
             Self::File(file) => Box::new(file),
+            // Only the format of data sets gets them, and it does not read them as streams.
+            #[cfg(feature = "parquet")]
+            Self::DataSet(_) => Box::new(std::io::empty()),
             Self::Bytes(bytes) => Box::new(bytes),
             Self::Stream(stream) => stream,
         }
@@ -135,6 +160,8 @@ impl<'a> RecordingInput<'a> {
     pub(crate) fn seekable(self) -> Result<Box<dyn ReadSeek + 'a>, RecordingFault> {
         Ok(match self {
             Self::File(file) => Box::new(file),
+            #[cfg(feature = "parquet")]
+            Self::DataSet(_) => Box::new(Cursor::new(&[])),
             Self::Bytes(bytes) => Box::new(Cursor::new(bytes)),
             Self::Stream(stream) => Box::new(Cursor::new(read_all(stream)?)),
         })

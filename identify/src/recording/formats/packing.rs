@@ -1,4 +1,4 @@
-//! Decompression of gzip, zstd, brotli and lz4. Compressed bytes go in, bytes come out, never more than requested.
+//! Decompression of gzip, zstd, brotli, bzip2 and lz4. Compressed bytes go in, bytes come out, never more than requested.
 //!
 //! A compressed file, such as `run.csv.gz`, is read as the file in it.
 
@@ -41,7 +41,10 @@ pub(super) enum CompressionMethod {
     /// Brotli, in Parquet files.
     #[cfg(feature = "parquet")]
     Brotli,
-    /// LZ4 frames, in MCAP files.
+    /// bzip2, in bags of ROS 1.
+    #[cfg(feature = "logs")]
+    Bzip2,
+    /// LZ4 frames, in MCAP files and bags of ROS 1.
     #[cfg(any(feature = "parquet", feature = "logs"))]
     Lz4,
 }
@@ -54,6 +57,8 @@ impl CompressionMethod {
             Self::Zstd => Box::new(ZstdReader::new(packed)),
             #[cfg(feature = "parquet")]
             Self::Brotli => Box::new(brotli_decompressor::Decompressor::new(packed, 1 << 16)),
+            #[cfg(feature = "logs")]
+            Self::Bzip2 => Box::new(bzip2_rs::DecoderReader::new(packed)),
             #[cfg(any(feature = "parquet", feature = "logs"))]
             Self::Lz4 => Box::new(lz4_flex::frame::FrameDecoder::new(packed)),
         }
@@ -80,6 +85,8 @@ impl CompressionMethod {
             Self::Zstd => "a file compressed by zstd",
             #[cfg(feature = "parquet")]
             Self::Brotli => "a file compressed by brotli",
+            #[cfg(feature = "logs")]
+            Self::Bzip2 => "a file compressed by bzip2",
             #[cfg(any(feature = "parquet", feature = "logs"))]
             Self::Lz4 => "a file compressed by lz4",
         }
@@ -275,9 +282,11 @@ impl RecordingFormat for CompressedFormat {
                 first.starts_with(&[0x28, 0xB5, 0x2F, 0xFD])
                     || (first.len() > 3 && first[0] >> 4 == 5 && first[1..4] == [0x2A, 0x4D, 0x18])
             }
-            // Only pages of Parquet and chunks of MCAP are compressed in these ways.
+            // Only pages of Parquet and chunks of logs are compressed in these ways.
             #[cfg(feature = "parquet")]
             CompressionMethod::Brotli => false,
+            #[cfg(feature = "logs")]
+            CompressionMethod::Bzip2 => false,
             #[cfg(any(feature = "parquet", feature = "logs"))]
             CompressionMethod::Lz4 => false,
         }

@@ -1,14 +1,14 @@
-//! Recordings as Parquet files: columns of numbers and times that are not repeated, read in batches of samples.
+//! Recordings as Parquet files: columns of numbers and times, and lists of them, read in batches of samples.
 //!
 //! Time stamps and times of day become seconds since the first one, exactly, before they are rounded to a float.
 
+use std::fs::File;
 use std::io;
 use std::sync::Arc;
 
 use bytes::Bytes;
-use parquet::basic::{Compression, ConvertedType, LogicalType, TimeUnit, Type};
-use parquet::column::reader::{ColumnReader, ColumnReaderImpl, get_column_reader};
-use parquet::data_type::DataType;
+use parquet::basic::{Compression, Type};
+use parquet::column::reader::{ColumnReader, get_column_reader};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::RowGroupMetaData;
 use parquet::file::reader::{ChunkReader, FileReader, Length, RowGroupReader, SerializedFileReader};
@@ -17,12 +17,16 @@ use parquet::schema::types::{ColumnDescPtr, ColumnDescriptor};
 
 use crate::recording::column::SampleField;
 use crate::recording::error::RecordingFault;
+use crate::recording::formats::lerobot::{DataSetFiles, EPISODE, ElementNames, EpisodeClock};
 use crate::recording::formats::packing::CompressionMethod;
+use crate::recording::formats::parquet_columns::{ParquetColumns, ParquetLeaf};
 use crate::recording::formats::parquet_pages::{self, PageGrowth, UnpackedPages};
+use crate::recording::formats::parquet_values::{BatchPlace, ParquetValueKind, read_batch};
 use crate::recording::formats::{RecordingFormat, RecordingInput, TableInfo, read_all};
 use crate::recording::intake::{IntakeFlow, SampleIntake};
 use crate::recording::notes::RecordingNote;
 use crate::recording::tables::{ColumnInfo, find_time_range};
+use crate::recording::thresholds::EPISODE_GAP_STEPS;
 use crate::recording::{ReadOptions, SignalRecording};
 
 /// Most samples that are read at once.
@@ -56,114 +60,257 @@ impl RecordingFormat for ParquetFormat {
     ) -> Result<SignalRecording, RecordingFault> {
         // A file on disk is read in parts; bytes and streams are in memory.
         match input {
-            RecordingInput::File(stream) => read(stream, file, options),
-            RecordingInput::Bytes(bytes) => read(Bytes::copy_from_slice(bytes), file, options),
-            RecordingInput::Stream(stream) => read(Bytes::from(read_all(stream)?), file, options),
+            RecordingInput::File(stream) => read(&ParquetSource::single(stream), file, options),
+            RecordingInput::DataSet(set) => read(&ParquetSource::data_set(set)?, file, options),
+            RecordingInput::Bytes(bytes) => read(&ParquetSource::single(Bytes::copy_from_slice(bytes)), file, options),
+            RecordingInput::Stream(stream) => {
+                read(&ParquetSource::single(Bytes::from(read_all(stream)?)), file, options)
+            }
         }
     }
 
     fn names(&self, input: RecordingInput<'_>) -> Result<Vec<String>, RecordingFault> {
         match input {
-            RecordingInput::File(stream) => names_of(stream),
-            RecordingInput::Bytes(bytes) => names_of(Bytes::copy_from_slice(bytes)),
-            RecordingInput::Stream(stream) => names_of(Bytes::from(read_all(stream)?)),
+            RecordingInput::File(stream) => names_of(&ParquetSource::single(stream)),
+            RecordingInput::DataSet(set) => names_of(&ParquetSource::data_set(set)?),
+            RecordingInput::Bytes(bytes) => names_of(&ParquetSource::single(Bytes::copy_from_slice(bytes))),
+            RecordingInput::Stream(stream) => names_of(&ParquetSource::single(Bytes::from(read_all(stream)?))),
         }
     }
 
     fn tables(&self, input: RecordingInput<'_>) -> Result<Vec<TableInfo>, RecordingFault> {
         match input {
-            RecordingInput::File(stream) => tables_of(SharedChunkReader(Arc::new(stream))),
-            RecordingInput::Bytes(bytes) => tables_of(SharedChunkReader(Arc::new(Bytes::copy_from_slice(bytes)))),
-            RecordingInput::Stream(stream) => tables_of(SharedChunkReader(Arc::new(Bytes::from(read_all(stream)?)))),
+            RecordingInput::File(stream) => tables_of(&ParquetSource::single(stream)),
+            RecordingInput::DataSet(set) => tables_of(&ParquetSource::data_set(set)?),
+            RecordingInput::Bytes(bytes) => tables_of(&ParquetSource::single(Bytes::copy_from_slice(bytes))),
+            RecordingInput::Stream(stream) => tables_of(&ParquetSource::single(Bytes::from(read_all(stream)?))),
         }
     }
 }
 
-/// Reads the columns that are needed.
-fn read(
-    stream: impl ChunkReader + 'static,
+/// One file, or the files of a data set, which are read one after another.
+struct ParquetSource<R> {
+    /// The files, at least one.
+    files: Vec<Arc<R>>,
+    /// Names of elements of lists.
+    elements: ElementNames,
+}
+
+impl<R> ParquetSource<R> {
+    /// A file on its own.
+    fn single(stream: R) -> Self {
+        Self {
+            files: vec![Arc::new(stream)],
+            elements: ElementNames::default(),
+        }
+    }
+}
+
+impl ParquetSource<File> {
+    /// The files of a data set. Fails when a handle cannot be shared.
+    fn data_set(set: &DataSetFiles) -> Result<Self, RecordingFault> {
+        let files = set.files.iter().map(|file| Ok(Arc::new(file.try_clone()?)));
+        let files = files.collect::<io::Result<Vec<_>>>();
+        Ok(Self {
+            files: files.map_err(|error| RecordingFault::Unreadable {
+                reason: error.to_string(),
+            })?,
+            elements: set.names.clone(),
+        })
+    }
+}
+
+impl<R: ChunkReader + 'static> ParquetSource<R> {
+    /// An open file of the source with its columns.
+    fn open(
+        &self,
+        file: usize,
+    ) -> Result<(SerializedFileReader<SharedChunkReader<R>>, ParquetColumns), RecordingFault> {
+        let bytes = &self.files[file];
+        let reader = SerializedFileReader::new(SharedChunkReader(bytes.clone())).map_err(parquet_fault)?;
+        let columns = ParquetColumns::new(bytes, &reader, &self.elements)?;
+        Ok((reader, columns))
+    }
+}
+
+/// Reads the columns that are needed, from all files.
+fn read<R: ChunkReader + 'static>(
+    source: &ParquetSource<R>,
     file: &str,
     options: &ReadOptions,
 ) -> Result<SignalRecording, RecordingFault> {
-    // The stream is shared between the checks of pages and the reader.
-    let bytes = Arc::new(stream);
-    let reader = SerializedFileReader::new(SharedChunkReader(bytes.clone())).map_err(parquet_fault)?;
-    let schema = reader.metadata().file_metadata().schema_descr_ptr();
-    let width = schema.num_columns();
-    let mut intake = SampleIntake::new(names(&reader), options)?;
-    // The meaning of the numbers in each column.
-    let mut kinds: Vec<ParquetValueKind> = (0..width)
-        .map(|i| ParquetValueKind::from_column(&schema.column(i)))
-        .collect();
+    let (_, columns) = source.open(0)?;
+    let names = columns.names.clone();
+    let mut intake = SampleIntake::new(names.clone(), options)?;
     // Columns of time stamps are reported, because their values change.
-    for (i, kind) in kinds.iter().enumerate() {
-        if intake.is_place_needed(i) && matches!(kind, ParquetValueKind::Ticks { .. }) {
+    for leaf in &columns.leaves {
+        if intake.is_place_needed(leaf.first) && matches!(leaf.kind, ParquetValueKind::Ticks { .. }) {
             intake.note(RecordingNote::info(format!(
                 "`{}` of {file} has time stamps: it is read as seconds since the first one.",
-                schema.column(i).path().string()
+                leaf.name
             )));
         }
     }
-    // Columns without numbers are not read, but reported as text if they are needed.
-    let is_read = |i: usize| intake.is_place_needed(i) && !matches!(kinds[i], ParquetValueKind::Unusable);
-    let wanted: Vec<bool> = (0..width).map(is_read).collect();
-    // The size of a batch keeps the number of fields in memory small.
-    let n_read = wanted.iter().filter(|is_read| **is_read).count();
-    let most = (FIELDS / n_read.max(1)).clamp(1, BATCH);
-    let mut sample = vec![SampleField::Number(0.0); width];
-    let mut row = 0;
-    // Each group of rows is checked before anything in it is decompressed.
-    for group in 0..reader.num_row_groups() {
-        check_pages(bytes.as_ref(), reader.metadata().row_group(group), &wanted)?;
-        let group = reader.get_row_group(group).map_err(parquet_fault)?;
-        let mut columns = Vec::new();
-        for i in 0..width {
-            columns.push(if wanted[i] {
-                Some(column_reader(&bytes, &*group, i, &schema.column(i))?)
-            } else {
-                None
+    let mut progress = ReadProgress {
+        row: 0,
+        episodes: EpisodeClock::new(&names),
+        columns,
+    };
+    for k in 0..source.files.len() {
+        // The first stamps are kept over all files, so that their times have one zero.
+        let (reader, columns) = source.open(k)?;
+        if columns.names != names {
+            return Err(RecordingFault::Format {
+                format: "a data set of Parquet files",
+                message: format!(
+                    "file {} has other columns, or lists of another length, than the first one; read such files separately",
+                    k + 1
+                ),
             });
         }
-        // Read a batch of every needed column, then pass its samples to the intake.
-        let mut left = usize::try_from(group.metadata().num_rows()).unwrap_or(0);
-        while left > 0 {
-            let n = left.min(most);
-            let mut fields: Vec<Vec<SampleField>> = Vec::with_capacity(width);
-            for (column, kind) in columns.iter_mut().zip(&mut kinds) {
-                fields.push(match column {
-                    Some(column) => read_batch(column, kind, n)?,
-                    None => Vec::new(),
-                });
-            }
-            for k in 0..n {
-                row += 1;
-                // Fields of columns that are not read are zeros if they are not needed, otherwise text.
-                for (i, field) in sample.iter_mut().enumerate() {
-                    *field = match fields[i].get(k) {
-                        Some(field) => *field,
-                        // A column that is not needed.
-                        None if columns[i].is_none() && !intake.is_place_needed(i) => SampleField::Number(0.0),
-                        None => SampleField::Text,
-                    };
-                }
-                // The text of a field for messages.
-                let text = |i: usize| match sample[i] {
-                    SampleField::Text => "a value of another type".to_owned(),
-                    _ => "null or NaN".to_owned(),
-                };
-                if intake.take_sample(row, &sample, &text)? == IntakeFlow::Stop {
-                    return intake.finish(file);
-                }
-            }
-            left -= n;
+        if progress.read_file(&source.files[k], &reader, &mut intake)? == IntakeFlow::Stop {
+            break;
+        }
+    }
+    if let Some(clock) = progress.episodes.filter(|clock| clock.episodes > 1) {
+        intake.note(RecordingNote::info(format!(
+            "{file} has {} episodes: they are read one after another, with {EPISODE_GAP_STEPS} sample intervals between them.",
+            clock.episodes
+        )));
+    }
+    for leaf in &progress.columns.leaves {
+        if let ParquetValueKind::Ticks {
+            per_second,
+            first: Some(first),
+        } = leaf.kind
+        {
+            // Ticks are milliseconds, microseconds or nanoseconds.
+            let nanoseconds = if per_second < 1e4 {
+                1_000_000
+            } else if per_second < 1e7 {
+                1000
+            } else {
+                1
+            };
+            intake.set_zero(leaf.first, first.wrapping_mul(nanoseconds));
         }
     }
     intake.finish(file)
 }
 
+/// What was read so far.
+struct ReadProgress {
+    /// Number of samples.
+    row: u64,
+    /// The times of episodes, if there are any.
+    episodes: Option<EpisodeClock>,
+    /// The columns, with the first stamps of all files.
+    columns: ParquetColumns,
+}
+
+impl ReadProgress {
+    /// Reads the samples of a file.
+    fn read_file<R: ChunkReader + 'static>(
+        &mut self,
+        bytes: &Arc<R>,
+        reader: &SerializedFileReader<SharedChunkReader<R>>,
+        intake: &mut SampleIntake<'_>,
+    ) -> Result<IntakeFlow, RecordingFault> {
+        // Leaves without numbers are not read, but reported as text if they are needed.
+        let episode = self.episodes.as_ref().map(EpisodeClock::place);
+        let is_needed = |leaf: &ParquetLeaf| {
+            let mut places = leaf.first..leaf.first + leaf.width;
+            places.any(|place| intake.is_place_needed(place) || episode == Some(place))
+        };
+        let is_read = |leaf: &ParquetLeaf| is_needed(leaf) && !matches!(leaf.kind, ParquetValueKind::Unusable);
+        let wanted: Vec<bool> = self.columns.leaves.iter().map(is_read).collect();
+        // The size of a batch keeps the number of fields in memory small.
+        let leaves = self.columns.leaves.iter().zip(&wanted);
+        let n_read: usize = leaves
+            .filter(|(_, is_read)| **is_read)
+            .map(|(leaf, _)| leaf.width)
+            .sum();
+        let most = (FIELDS / n_read.max(1)).clamp(1, BATCH);
+        let schema = reader.metadata().file_metadata().schema_descr_ptr();
+        // Each group of rows is checked before anything in it is decompressed.
+        for group in 0..reader.num_row_groups() {
+            check_pages(bytes.as_ref(), reader.metadata().row_group(group), &wanted)?;
+            let group = reader.get_row_group(group).map_err(parquet_fault)?;
+            let mut readers = Vec::new();
+            for (i, is_read) in wanted.iter().enumerate() {
+                readers.push(if *is_read {
+                    Some(column_reader(bytes, &*group, i, &schema.column(i))?)
+                } else {
+                    None
+                });
+            }
+            // Read a batch of every needed leaf, then pass its samples to the intake.
+            let mut left = usize::try_from(group.metadata().num_rows()).unwrap_or(0);
+            while left > 0 {
+                let n = left.min(most);
+                let mut fields: Vec<Vec<SampleField>> = Vec::with_capacity(wanted.len());
+                for (reader, leaf) in readers.iter_mut().zip(&mut self.columns.leaves) {
+                    let place = BatchPlace {
+                        name: &leaf.name,
+                        row: self.row,
+                        list: leaf.list,
+                    };
+                    fields.push(match reader {
+                        Some(reader) => read_batch(reader, &mut leaf.kind, n, place)?,
+                        None => Vec::new(),
+                    });
+                }
+                if self.take_batch(n, &fields, intake)? == IntakeFlow::Stop {
+                    return Ok(IntakeFlow::Stop);
+                }
+                left -= n;
+            }
+        }
+        Ok(IntakeFlow::Go)
+    }
+
+    /// Passes the next `n` samples to the intake; `fields` has those of each leaf, or none if it is not read.
+    fn take_batch(
+        &mut self,
+        n: usize,
+        fields: &[Vec<SampleField>],
+        intake: &mut SampleIntake<'_>,
+    ) -> Result<IntakeFlow, RecordingFault> {
+        let mut sample = vec![SampleField::Number(0.0); self.columns.names.len()];
+        for k in 0..n {
+            self.row += 1;
+            for (leaf, fields) in self.columns.leaves.iter().zip(fields) {
+                for j in 0..leaf.width {
+                    let place = leaf.first + j;
+                    // Fields that are not read are zeros if they are not needed, otherwise text.
+                    sample[place] = match fields.get(k * leaf.width + j) {
+                        Some(field) => *field,
+                        None if intake.is_place_needed(place) => SampleField::Text,
+                        None => SampleField::Number(0.0),
+                    };
+                }
+            }
+            if let Some(clock) = &mut self.episodes
+                && clock.shift_sample(&mut sample)
+            {
+                intake.skip_samples(EPISODE_GAP_STEPS);
+            }
+            // The text of a field for messages.
+            let text = |i: usize| match sample[i] {
+                SampleField::Text => "a value of another type".to_owned(),
+                _ => "null or NaN".to_owned(),
+            };
+            if intake.take_sample(self.row, &sample, &text)? == IntakeFlow::Stop {
+                return Ok(IntakeFlow::Stop);
+            }
+        }
+        Ok(IntakeFlow::Go)
+    }
+}
+
 /// The reader of a column of a row group. For compressions without a decoder in the library, pages are read as if
 /// they were uncompressed, and decompressed afterwards.
-fn column_reader<R: ChunkReader + 'static>(
+pub(super) fn column_reader<R: ChunkReader + 'static>(
     bytes: &Arc<R>,
     group: &dyn RowGroupReader,
     i: usize,
@@ -190,7 +337,11 @@ fn column_reader<R: ChunkReader + 'static>(
 }
 
 /// Fails when the pages of a row group would need too much memory. Nothing is decompressed for this, except gzip.
-fn check_pages<R: ChunkReader>(bytes: &R, group: &RowGroupMetaData, wanted: &[bool]) -> Result<(), RecordingFault> {
+pub(super) fn check_pages<R: ChunkReader>(
+    bytes: &R,
+    group: &RowGroupMetaData,
+    wanted: &[bool],
+) -> Result<(), RecordingFault> {
     let refused = |error: io::Error| parquet_fault(ParquetError::General(error.to_string()));
     let mut sum = 0;
     // The largest pages of all needed columns are added.
@@ -220,7 +371,7 @@ fn check_pages<R: ChunkReader>(bytes: &R, group: &RowGroupMetaData, wanted: &[bo
 }
 
 /// A stream that is shared by the checks of pages and the reader.
-struct SharedChunkReader<R>(Arc<R>);
+pub(super) struct SharedChunkReader<R>(Arc<R>);
 
 impl<R> Clone for SharedChunkReader<R> {
     fn clone(&self) -> Self {
@@ -247,25 +398,65 @@ impl<R: ChunkReader> ChunkReader for SharedChunkReader<R> {
     }
 }
 
-/// The single table of a file.
-fn tables_of(stream: SharedChunkReader<impl ChunkReader + 'static>) -> Result<Vec<TableInfo>, RecordingFault> {
-    let reader = SerializedFileReader::new(stream.clone()).map_err(parquet_fault)?;
+/// The single table of a file or of a data set.
+fn tables_of<R: ChunkReader + 'static>(source: &ParquetSource<R>) -> Result<Vec<TableInfo>, RecordingFault> {
+    let (mut reader, columns) = source.open(0)?;
     let schema = reader.metadata().file_metadata().schema_descr_ptr();
-    let info = |column: &ColumnDescPtr| ColumnInfo {
-        name: column.path().string(),
-        kind: kind_of(column),
+    let mut infos = Vec::new();
+    for (leaf, column) in columns.leaves.iter().zip(schema.columns()) {
+        let kind = if matches!(leaf.kind, ParquetValueKind::Unusable) {
+            "no number".to_owned()
+        } else {
+            kind_of(column)
+        };
+        infos.extend(
+            columns.names[leaf.first..leaf.first + leaf.width]
+                .iter()
+                .map(|name| ColumnInfo {
+                    name: name.clone(),
+                    kind: kind.clone(),
+                }),
+        );
+    }
+    let mut samples = 0;
+    for k in 0..source.files.len() {
+        if k > 0 {
+            reader = source.open(k)?.0;
+        }
+        samples += usize::try_from(reader.metadata().file_metadata().num_rows()).unwrap_or(0);
+    }
+    // The time column is read completely for its range.
+    let read_one = |name: &str| read(source, "", &ReadOptions::single_column(name)).ok();
+    let episodes = if columns.names.iter().any(|name| name == EPISODE) {
+        read_one(EPISODE).and_then(|recording| count_changes(recording.column(EPISODE).ok()?))
+    } else {
+        None
     };
-    let rows = reader.metadata().file_metadata().num_rows();
-    let names = names(&reader);
+    let several = episodes.filter(|n| *n > 1);
     Ok(vec![TableInfo {
         name: String::new(),
         kind: String::new(),
-        columns: schema.columns().iter().map(info).collect(),
-        samples: usize::try_from(rows).unwrap_or(0),
-        // The time column is read completely for its range.
-        time: find_time_range(&names, |name| read(stream, "", &ReadOptions::single_column(name)).ok()),
-        remark: None,
+        columns: infos,
+        samples,
+        // Each episode has times of its own.
+        time: if several.is_some() {
+            None
+        } else {
+            find_time_range(&columns.names, read_one)
+        },
+        remark: several.map(|n| format!("it has {n} episodes, each with times of its own")),
     }])
+}
+
+/// Number of runs of equal values; `None` without any.
+fn count_changes(values: &[f64]) -> Option<usize> {
+    values.first()?;
+    Some(
+        1 + values
+            .windows(2)
+            .filter(|pair| pair[0].total_cmp(&pair[1]).is_ne())
+            .count(),
+    )
 }
 
 /// Type of a column, in the words that other formats use.
@@ -286,184 +477,12 @@ fn kind_of(column: &ColumnDescriptor) -> String {
 }
 
 /// Names of the columns; names of nested ones contain points.
-fn names_of(stream: impl ChunkReader + 'static) -> Result<Vec<String>, RecordingFault> {
-    Ok(names(&SerializedFileReader::new(stream).map_err(parquet_fault)?))
-}
-
-/// Names of the columns of an open file, by their paths.
-fn names<R: ChunkReader + 'static>(reader: &SerializedFileReader<R>) -> Vec<String> {
-    let schema = reader.metadata().file_metadata().schema_descr();
-    let columns = schema.columns().iter();
-    columns.map(|column| column.path().string()).collect()
-}
-
-/// The meaning of the numbers of a column.
-enum ParquetValueKind {
-    /// Numbers without a conversion.
-    Numbers,
-    /// Integers without a sign, which use all bits of their type.
-    Unsigned,
-    /// Times as integers; the first one becomes zero.
-    Ticks {
-        /// Ticks per second.
-        per_second: f64,
-        /// The first value, once it has been read.
-        first: Option<i64>,
-    },
-    /// Integers with this many decimal places.
-    Decimal(i32),
-    /// Texts, lists, and anything else that is not a number.
-    Unusable,
-}
-
-impl ParquetValueKind {
-    /// The meaning from the types in the schema; the logical type takes precedence over the older converted type.
-    fn from_column(column: &ColumnDescriptor) -> Self {
-        let ticks = |per_second| Self::Ticks {
-            per_second,
-            first: None,
-        };
-        // Texts are not numbers, and a few bytes of a dictionary may expand to very long ones.
-        let is_text = matches!(column.physical_type(), Type::BYTE_ARRAY | Type::FIXED_LEN_BYTE_ARRAY);
-        // Repeated fields have no value per sample.
-        if column.max_rep_level() > 0 || is_text {
-            return Self::Unusable;
-        }
-        match column.logical_type_ref() {
-            Some(LogicalType::Timestamp(stamp)) => return ticks(per_second(stamp.unit)),
-            Some(LogicalType::Time(time)) => return ticks(per_second(time.unit)),
-            Some(LogicalType::Decimal(decimal)) => return Self::Decimal(decimal.scale),
-            Some(LogicalType::Integer(whole)) if !whole.is_signed => return Self::Unsigned,
-            _ => {}
-        }
-        match column.converted_type() {
-            ConvertedType::TIMESTAMP_MILLIS | ConvertedType::TIME_MILLIS => ticks(1e3),
-            ConvertedType::TIMESTAMP_MICROS | ConvertedType::TIME_MICROS => ticks(1e6),
-            ConvertedType::DECIMAL => Self::Decimal(column.type_scale()),
-            ConvertedType::UINT_8 | ConvertedType::UINT_16 | ConvertedType::UINT_32 | ConvertedType::UINT_64 => {
-                Self::Unsigned
-            }
-            _ => Self::Numbers,
-        }
-    }
-
-    /// Converts an integer: ticks to seconds, decimals to their value.
-    fn convert_integer(&mut self, value: i64) -> f64 {
-        match self {
-            // Differences of ticks in a recording are far below 2^53, so that floats are exact.
-            Self::Ticks { per_second, first } => value.wrapping_sub(*first.get_or_insert(value)) as f64 / *per_second,
-            Self::Decimal(scale) => value as f64 / 10.0_f64.powi(*scale),
-            Self::Unsigned => value.cast_unsigned() as f64,
-            Self::Numbers | Self::Unusable => value as f64,
-        }
-    }
-
-    /// Converts an integer of four bytes.
-    fn convert_short_integer(&mut self, value: i32) -> f64 {
-        match self {
-            // The sign bit belongs to the value, so it must be removed before the conversion.
-            Self::Unsigned => f64::from(value.cast_unsigned()),
-            _ => self.convert_integer(i64::from(value)),
-        }
-    }
-}
-
-/// Ticks per second of a unit.
-fn per_second(unit: TimeUnit) -> f64 {
-    match unit {
-        TimeUnit::MILLIS => 1e3,
-        TimeUnit::MICROS => 1e6,
-        TimeUnit::NANOS => 1e9,
-    }
-}
-
-/// Reads the next `n` fields of a column.
-fn read_batch(
-    column: &mut ColumnReader,
-    kind: &mut ParquetValueKind,
-    n: usize,
-) -> Result<Vec<SampleField>, RecordingFault> {
-    match column {
-        ColumnReader::BoolColumnReader(reader) => {
-            read_values(reader, n, |value| SampleField::Number(f64::from(u8::from(*value))))
-        }
-        ColumnReader::Int32ColumnReader(reader) => read_values(reader, n, |value| {
-            SampleField::finite(kind.convert_short_integer(*value))
-        }),
-        ColumnReader::Int64ColumnReader(reader) => {
-            read_values(reader, n, |value| SampleField::finite(kind.convert_integer(*value)))
-        }
-        // Times of 12 bytes are converted to nanoseconds.
-        ColumnReader::Int96ColumnReader(reader) => {
-            let mut ticks = ParquetValueKind::Ticks {
-                per_second: 1e9,
-                first: match kind {
-                    ParquetValueKind::Ticks { first, .. } => *first,
-                    _ => None,
-                },
-            };
-            let fields = read_values(reader, n, |value| {
-                SampleField::finite(ticks.convert_integer(value.to_nanos()))
-            });
-            // The first value must be kept for the next batch.
-            *kind = ticks;
-            fields
-        }
-        ColumnReader::FloatColumnReader(reader) => {
-            read_values(reader, n, |value| SampleField::finite(f64::from(*value)))
-        }
-        ColumnReader::DoubleColumnReader(reader) => read_values(reader, n, |value| SampleField::finite(*value)),
-        // Columns of texts are never read.
-        ColumnReader::ByteArrayColumnReader(_) | ColumnReader::FixedLenByteArrayColumnReader(_) => {
-            Ok(vec![SampleField::Text; n])
-        }
-    }
-}
-
-/// Reads the next `n` values of a column, including nulls.
-///
-/// Fails when the column ends before the others.
-fn read_values<T: DataType>(
-    reader: &mut ColumnReaderImpl<T>,
-    n: usize,
-    mut field: impl FnMut(&T::T) -> SampleField,
-) -> Result<Vec<SampleField>, RecordingFault> {
-    let mut fields = Vec::with_capacity(n);
-    // A call may return fewer records than requested.
-    while fields.len() < n {
-        let (mut levels, mut values) = (Vec::new(), Vec::new());
-        let wanted = n - fields.len();
-        let (records, n_values, n_levels) = reader
-            .read_records(wanted, Some(&mut levels), None, &mut values)
-            .map_err(parquet_fault)?;
-        if records == 0 {
-            return Err(RecordingFault::Format {
-                format: "a Parquet file",
-                message: "a column ends before the others do; write the file again".to_owned(),
-            });
-        }
-        // Without nulls there is one value for each record.
-        if n_values == records || n_levels == 0 {
-            fields.extend(values.iter().map(&mut field));
-            continue;
-        }
-        // Otherwise the definition levels state which records have a value.
-        let most = levels.iter().copied().max().unwrap_or(0);
-        let mut values = values.iter();
-        fields.extend(levels.iter().map(|level| {
-            // Fewer values than levels: the highest level is that of a value, unless all are null.
-            if *level == most && n_values > 0 {
-                values.next().map_or(SampleField::NotFinite, &mut field)
-            } else {
-                SampleField::NotFinite
-            }
-        }));
-    }
-    Ok(fields)
+fn names_of<R: ChunkReader + 'static>(source: &ParquetSource<R>) -> Result<Vec<String>, RecordingFault> {
+    Ok(source.open(0)?.1.names)
 }
 
 /// The fault of a file that the library cannot read.
-fn parquet_fault(error: ParquetError) -> RecordingFault {
+pub(super) fn parquet_fault(error: ParquetError) -> RecordingFault {
     let says = match error {
         ParquetError::General(says) | ParquetError::NYI(says) | ParquetError::EOF(says) => says,
         other => other.to_string(),

@@ -113,6 +113,21 @@ impl RosNumberType {
 /// Fails when a definition is missing or a line cannot be parsed.
 pub(super) fn parse_definition(name: &str, text: &str, ros: RosVersion) -> Result<Rc<RosMessageDefinition>, String> {
     let own = short_type_name(name);
+    // Older logs have no definitions at all; an empty text defines nothing.
+    if is_definition_missing(text) {
+        // The common types are those of ROS 2; ROS 1 has other ones with the same names.
+        if ros == RosVersion::One && own != "std_msgs/Empty" {
+            return Err(format!(
+                "the file does not define `{own}`; record it again, or convert it with a program that has its type"
+            ));
+        }
+        let mut reader = RosDefinitionParser {
+            texts: BTreeMap::new(),
+            done: BTreeMap::new(),
+            ros,
+        };
+        return reader.parse_message(&own, 0);
+    }
     let mut texts = BTreeMap::new();
     // Split the text at the lines of `=` into one list of lines per type.
     let (mut current, mut lines) = (own.clone(), Vec::new());
@@ -136,6 +151,11 @@ pub(super) fn parse_definition(name: &str, text: &str, ros: RosVersion) -> Resul
         ros,
     };
     reader.parse_message(&own, 0)
+}
+
+/// Whether a log has no definition of a type, so that the one of a common type is used.
+pub(super) fn is_definition_missing(text: &str) -> bool {
+    text.trim().is_empty()
 }
 
 /// The name without `/msg/`, as `package/Name`.
@@ -165,13 +185,16 @@ impl RosDefinitionParser<'_> {
         }
         // A type that the file does not define may be a common one.
         let Some(lines) = self.texts.get(name).cloned() else {
-            return match well_known_definition(name) {
+            return match common_definition(name) {
                 Some(text) => {
                     let lines = text.lines().collect();
                     self.texts.insert(name.to_owned(), lines);
                     self.parse_message(name, depth)
                 }
-                None => Err(format!("the file does not define `{name}`")),
+                None => Err(format!(
+                    "the file does not define `{name}`, and it is not one of the common types; convert the log to MCAP where \
+                     this type is installed (`ros2 bag convert`), so that the file has its definition"
+                )),
             };
         };
         let mut fields = Vec::new();
@@ -251,58 +274,36 @@ impl RosDefinitionParser<'_> {
     }
 }
 
-/// Definitions of common types, for files without definitions, as rosbag2 wrote them until 2023.
-fn well_known_definition(name: &str) -> Option<&'static str> {
-    let found = WELL_KNOWN.iter().find(|(known, _)| *known == name);
-    found.map(|(_, text)| *text)
+/// Definitions of common types, for files without definitions, as rosbag2 wrote them from Foxy to Humble.
+const COMMON_TYPES: &str = include_str!("common_types.msg");
+
+/// The definition of a common type of ROS 2 by its name, without those of the messages in it.
+fn common_definition(name: &str) -> Option<&'static str> {
+    // Each definition follows a line with the name of its type.
+    let mut sections = COMMON_TYPES.split("\nMSG: ").skip(1);
+    sections.find_map(|section| section.strip_prefix(name)?.strip_prefix('\n'))
 }
 
-/// Common types and the texts of their definitions.
-const WELL_KNOWN: [(&str, &str); 22] = [
-    ("std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id"),
-    ("std_msgs/Bool", "bool data"),
-    ("std_msgs/Int32", "int32 data"),
-    ("std_msgs/Int64", "int64 data"),
-    ("std_msgs/UInt32", "uint32 data"),
-    ("std_msgs/UInt64", "uint64 data"),
-    ("std_msgs/Float32", "float32 data"),
-    ("std_msgs/Float64", "float64 data"),
-    ("std_msgs/String", "string data"),
-    (
-        "std_msgs/MultiArrayDimension",
-        "string label\nuint32 size\nuint32 stride",
-    ),
-    (
-        "std_msgs/MultiArrayLayout",
-        "MultiArrayDimension[] dim\nuint32 data_offset",
-    ),
-    ("std_msgs/Float32MultiArray", "MultiArrayLayout layout\nfloat32[] data"),
-    ("std_msgs/Float64MultiArray", "MultiArrayLayout layout\nfloat64[] data"),
-    (
-        "sensor_msgs/JointState",
-        "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort",
-    ),
-    ("geometry_msgs/Vector3", "float64 x\nfloat64 y\nfloat64 z"),
-    ("geometry_msgs/Quaternion", "float64 x\nfloat64 y\nfloat64 z\nfloat64 w"),
-    ("geometry_msgs/Wrench", "Vector3 force\nVector3 torque"),
-    ("geometry_msgs/WrenchStamped", "std_msgs/Header header\nWrench wrench"),
-    (
-        "sensor_msgs/Imu",
-        "std_msgs/Header header\ngeometry_msgs/Quaternion orientation\nfloat64[9] orientation_covariance\n\
-         geometry_msgs/Vector3 angular_velocity\nfloat64[9] angular_velocity_covariance\n\
-         geometry_msgs/Vector3 linear_acceleration\nfloat64[9] linear_acceleration_covariance",
-    ),
-    (
-        "trajectory_msgs/JointTrajectoryPoint",
-        "float64[] positions\nfloat64[] velocities\nfloat64[] accelerations\nfloat64[] effort\n\
-         builtin_interfaces/Duration time_from_start",
-    ),
-    (
-        "control_msgs/InterfaceValue",
-        "string[] interface_names\nfloat64[] values",
-    ),
-    (
-        "control_msgs/DynamicJointState",
-        "std_msgs/Header header\nstring[] joint_names\nInterfaceValue[] interface_values",
-    ),
-];
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every common type is complete: the types of its fields are common too.
+    #[test]
+    fn common_types_are_defined_without_a_file() {
+        let names: Vec<&str> = COMMON_TYPES
+            .lines()
+            .filter_map(|line| line.strip_prefix("MSG: "))
+            .collect();
+        assert!(names.len() > 80, "{}", names.len());
+        for name in names {
+            let parsed = parse_definition(name, "", RosVersion::Two);
+            assert!(parsed.is_ok(), "{name}: {parsed:?}");
+        }
+        let state = parse_definition("sensor_msgs/msg/JointState", " \n", RosVersion::Two).unwrap();
+        let fields: Vec<&str> = state.fields.iter().map(|(name, _)| name.as_str()).collect();
+        assert_eq!(fields, ["header", "name", "position", "velocity", "effort"]);
+        let unknown = parse_definition("lab_msgs/msg/Torques", "", RosVersion::Two).unwrap_err();
+        assert!(unknown.contains("`lab_msgs/Torques`"), "{unknown}");
+    }
+}

@@ -11,6 +11,8 @@ use super::definition::{RosFieldType, RosMessageDefinition, RosNumberType, RosVe
 const MOST_ELEMENTS: usize = 256;
 /// Longest list of messages within a message.
 const MOST_MESSAGES: usize = 4096;
+/// Most bytes behind a message that only fill it up.
+const MOST_PADDING: usize = 3;
 /// Stands for the length of a list that is skipped.
 const SKIPPED_LENGTH: u32 = u32::MAX;
 
@@ -34,18 +36,26 @@ pub(super) struct RosMessageReader {
     ros: RosVersion,
     /// Index of the field with the time of the message.
     stamp: Option<usize>,
+    /// Whether the definition is that of a common type and not from the file. A message must then have no other bytes,
+    /// because the type may have changed since.
+    is_common: bool,
 }
 
 impl RosMessageReader {
     /// Finds the field of the time: `stamp`, or a `header` that contains it.
-    pub(super) fn new(definition: Rc<RosMessageDefinition>, ros: RosVersion) -> Self {
+    pub(super) fn new(definition: Rc<RosMessageDefinition>, ros: RosVersion, is_common: bool) -> Self {
         let is_time =
             |field: &(String, RosFieldType)| matches!(field, (name, RosFieldType::Time { .. }) if name == "stamp");
         let stamp = definition.fields.iter().position(|field| match field {
             (name, RosFieldType::Message(header)) if name == "header" => header.fields.iter().any(is_time),
             other => is_time(other),
         });
-        Self { definition, ros, stamp }
+        Self {
+            definition,
+            ros,
+            stamp,
+            is_common,
+        }
     }
 
     /// Reads a message into `content`, whose earlier contents are dropped.
@@ -71,6 +81,13 @@ impl RosMessageReader {
             } else {
                 numbers_of(kind, name, &mut bytes, content)?;
             }
+        }
+        if self.is_common && bytes.rest() > MOST_PADDING {
+            return Err(format!(
+                "{} bytes of it are left over, so its type differs from the common one of this name; convert the log to MCAP \
+                 where this type is installed (`ros2 bag convert`)",
+                bytes.rest()
+            ));
         }
         Ok(())
     }
@@ -298,6 +315,11 @@ impl<'a> RosByteReader<'a> {
             ros,
             first_time: None,
         })
+    }
+
+    /// Number of bytes that were not read.
+    fn rest(&self) -> usize {
+        self.all.len().saturating_sub(self.at)
     }
 
     /// The next `n` bytes; fails when there are fewer.

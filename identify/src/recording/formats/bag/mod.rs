@@ -155,7 +155,8 @@ impl<'a> BagCollector<'a> {
         // A topic that cannot be read is kept with the reason and reported only if it is listed.
         let reader = ros.and_then(|ros| {
             let definition = definition::parse_definition(kind, encoding.text, ros)?;
-            Ok(RosMessageReader::new(definition, ros))
+            let is_common = definition::is_definition_missing(encoding.text);
+            Ok(RosMessageReader::new(definition, ros, is_common))
         });
         let name = name.strip_prefix('/').unwrap_or(name);
         self.topics.push(BagTopic {

@@ -1,0 +1,226 @@
+//! Changes in time: something that begins at a time of a recording and lasts to its end or for an interval, such as a
+//! grasped payload, another scale of a force signal, or a jump of its zero. Input: the problem, the columns of a set of
+//! effects and the shapes of possible changes. Output: candidates with the times at which they fit best.
+//!
+//! A residual that follows the time and not the state is no noise, whatever its size. So such changes compete with
+//! effects in the search. A model that is valid for a part of a recording only is not adequate for all of it.
+//!
+//! 1. `products` - inner products of all columns, block by block, so that any time profile is fitted without reading
+//!    samples again.
+//! 2. `profile` - time profiles: a step, an interval, and slow changes that a step must exceed.
+//! 3. `residual` - what remains after the search and follows the time.
+
+mod products;
+mod profile;
+mod residual;
+
+use super::column::ForceColumn;
+use super::problem::{
+    CandidateEffect, CandidateNature, ColumnChoice, ColumnSource, DiagnosisProblem, EffectParameter, LocatedEffect,
+    SignConstraint,
+};
+use super::thresholds::{CHANGE_LEAST_ADVANTAGE, CHANGE_LEAST_SHARE, INTERVAL_LEAST_ADVANTAGE, SIMPLER_CHANGE_SHARE};
+use products::BlockProducts;
+use profile::{TimeProfile, slow_profiles};
+pub use residual::{ResidualCharacter, TimeResidual};
+pub(crate) use residual::{standstill_samples, time_residual};
+
+/// The force of a possible change, from the time on at which it begins.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ChangeForce {
+    /// Known columns, one for each parameter.
+    Columns(Vec<ForceColumn>),
+    /// The fitted force of a channel, by its index: the scale of its signal changes.
+    FittedForce(usize),
+}
+
+/// A change that may begin at any time of a recording.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ChangeShape {
+    /// Kind and place.
+    pub effect: LocatedEffect,
+    /// Its parameters, one per column.
+    pub parameters: Vec<EffectParameter>,
+    /// Its force per unit of the parameters.
+    pub force: ChangeForce,
+}
+
+/// When a change acts in a recording.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ChangeInterval {
+    /// The recording.
+    pub recording: String,
+    /// Begin and end, s; a change that lasts ends with the recording.
+    pub interval: [f64; 2],
+    /// Whether it lasts to the end of the recording.
+    pub lasts: bool,
+}
+
+/// A change that was found, as a candidate of the search.
+#[derive(Clone, Debug)]
+pub(crate) struct FoundChange {
+    /// The candidate.
+    pub(crate) candidate: CandidateEffect,
+    /// When it acts.
+    pub(crate) intervals: Vec<ChangeInterval>,
+    /// Weighted squares that it explains in all recordings.
+    explained: f64,
+}
+
+/// Changes that explain more of the residual of a set than slow changes of the same shape do. `set` are the columns of
+/// the base and of the effects of the set.
+pub(crate) fn find_changes(problem: &DiagnosisProblem, set: &[&ForceColumn]) -> Vec<FoundChange> {
+    if problem.change_shapes.is_empty() {
+        return Vec::new();
+    }
+    let Some(products) = BlockProducts::new(problem, set) else {
+        return Vec::new();
+    };
+    let mut found: Vec<FoundChange> = Vec::new();
+    for (k, shape) in problem.change_shapes.iter().enumerate() {
+        let Some(change) = find_change(problem, &products, k, shape) else {
+            continue;
+        };
+        // Of two shapes with the same kind and place the one with fewer columns comes first: it is kept if it explains
+        // nearly as much.
+        let same = found
+            .iter_mut()
+            .find(|other| other.candidate.effect == change.candidate.effect);
+        match same {
+            Some(other) if other.explained < SIMPLER_CHANGE_SHARE * change.explained => *other = change,
+            Some(_) => {}
+            None => found.push(change),
+        }
+    }
+    found
+}
+
+/// Possible changes of each force signal: a jump of its zero and another scale. `units` are those of the forces,
+/// `[channel]`.
+pub fn signal_changes(problem: &DiagnosisProblem, units: &[String]) -> Vec<ChangeShape> {
+    let channels = problem.layout.channels.iter().enumerate();
+    // Without a signal there is nothing to change.
+    let with_signal = channels.filter(|(d, _)| !problem.is_idle(*d));
+    let shape = |kind: &str, at: &String, symbol: &str, unit: &str, force: ChangeForce| ChangeShape {
+        effect: LocatedEffect {
+            kind: kind.to_owned(),
+            at: vec![at.clone()],
+        },
+        parameters: vec![EffectParameter {
+            symbol: symbol.to_owned(),
+            unit: unit.to_owned(),
+            sign: SignConstraint::Any,
+        }],
+        force,
+    };
+    let shapes = with_signal.flat_map(|(d, name)| {
+        let mut constant = ForceColumn(vec![None; problem.layout.channels.len()]);
+        constant.0[d] = Some(vec![1.0; problem.layout.samples()]);
+        [
+            shape(
+                "offset_step",
+                name,
+                "F0",
+                &units[d],
+                ChangeForce::Columns(vec![constant]),
+            ),
+            shape("gain_change", name, "gain", "1", ChangeForce::FittedForce(d)),
+        ]
+    });
+    shapes.collect()
+}
+
+/// The change of one shape with its times in all recordings; `None` if no recording shows it.
+fn find_change(
+    problem: &DiagnosisProblem,
+    products: &BlockProducts<'_>,
+    k: usize,
+    shape: &ChangeShape,
+) -> Option<FoundChange> {
+    let mut parameters = Vec::new();
+    let mut columns = Vec::new();
+    let mut intervals = Vec::new();
+    let mut explained = 0.0;
+    let times = problem.layout.times();
+    for (r, recording) in products.recordings.iter().enumerate() {
+        let Some((gain, profile)) = best_profile(products, k, r) else {
+            continue;
+        };
+        explained += gain;
+        let samples = products.refine_times(k, r, &profile);
+        let last = recording.samples.end - 1;
+        intervals.push(ChangeInterval {
+            recording: recording.name.clone(),
+            interval: [times[samples.start], times[(samples.end).min(last)]],
+            lasts: samples.end > last,
+        });
+        // Each recording has its own parameters, since the change begins anew there.
+        for (parameter, column) in shape.parameters.iter().zip(products.shape_columns(k)) {
+            parameters.push(EffectParameter {
+                symbol: format!("change of {} in {}", parameter.symbol, recording.name),
+                ..parameter.clone()
+            });
+            columns.push(within(column, &samples));
+        }
+    }
+    (!columns.is_empty()).then(|| FoundChange {
+        candidate: CandidateEffect {
+            effect: shape.effect.clone(),
+            // The time of each change is searched.
+            searched_constants: intervals.len(),
+            parameters,
+            is_part_of_load: false,
+            refines: None,
+            nature: CandidateNature::ChangeInTime,
+            is_per_run: true,
+            source: ColumnSource::Columns(vec![ColumnChoice {
+                constants: Vec::new(),
+                columns,
+            }]),
+        },
+        intervals,
+        explained,
+    })
+}
+
+/// The step or interval of a shape that explains most in a recording, with the squares that it explains; `None` if it explains too little, or hardly more
+/// than a slow change.
+fn best_profile(products: &BlockProducts<'_>, shape: usize, recording: usize) -> Option<(f64, TimeProfile)> {
+    let blocks = products.recordings[recording].blocks.len();
+    // The level of the recording is free, since the other recordings may have changes too.
+    let level = vec![1.0; blocks];
+    let reduced = products.reduce_blocks(shape, recording);
+    let of_level = reduced.explained_squares(&[&level]);
+    let explained = |values: &[f64]| reduced.explained_squares(&[&level, values]) - of_level;
+    let best = |profiles: &mut dyn Iterator<Item = TimeProfile>| {
+        let scored = profiles.map(|profile| (explained(&profile.values(blocks)), profile));
+        scored.max_by(|a, b| a.0.total_cmp(&b.0))
+    };
+    let (gain, step) = best(&mut TimeProfile::steps(blocks))?;
+    let total = products.residual_squares(shape, recording);
+    let slow = slow_profiles(blocks).map(|values| explained(&values));
+    let slow = slow.into_iter().fold(0.0, f64::max);
+    let is_enough = |gain: f64| gain > CHANGE_LEAST_SHARE * total && gain > CHANGE_LEAST_ADVANTAGE * slow;
+    // An interval has a second time, so that it must explain clearly more than a step.
+    let interval = best(&mut TimeProfile::intervals(blocks));
+    match interval {
+        Some((of_interval, interval)) if of_interval > INTERVAL_LEAST_ADVANTAGE * gain && is_enough(of_interval) => {
+            Some((of_interval, interval))
+        }
+        _ => is_enough(gain).then_some((gain, step)),
+    }
+}
+
+/// A column within some samples, zero elsewhere.
+fn within(column: &ForceColumn, samples: &std::ops::Range<usize>) -> ForceColumn {
+    let cut = |values: &Vec<f64>| -> Vec<f64> {
+        let values = values.iter().enumerate();
+        values
+            .map(|(i, x)| if samples.contains(&i) { *x } else { 0.0 })
+            .collect()
+    };
+    ForceColumn(column.0.iter().map(|values| values.as_ref().map(cut)).collect())
+}
+
+#[cfg(test)]
+mod tests;

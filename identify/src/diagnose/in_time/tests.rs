@@ -1,0 +1,99 @@
+use super::super::problem::{SampleLayout, SampleSegment};
+use super::*;
+use crate::test_noise::TestNoise;
+
+/// Two recordings of 20 s at 50 Hz of one drive, whose force is 3 N per unit of a column plus noise of 0.2 N.
+fn problem(seed: u64, change: impl Fn(usize, f64, f64) -> f64) -> DiagnosisProblem {
+    let mut noise = TestNoise::new(seed);
+    let segment = |name: &str, is_check: bool| SampleSegment {
+        name: name.to_owned(),
+        samples: 1000,
+        start: 100.0,
+        step: 0.02,
+        recorded_step: 0.02,
+        is_check,
+    };
+    let time = |i: usize| 0.02 * (i % 1000) as f64;
+    let column: Vec<f64> = (0..2000)
+        .map(|i| (1.9 * time(i)).sin() + 0.6 * (4.1 * time(i) + 1.0).cos() + 0.4)
+        .collect();
+    let force = |i: usize| {
+        let plain = 3.0 * column[i];
+        plain + change(i / 1000, time(i), plain) + 0.2 * noise.normal()
+    };
+    let measured: Vec<f64> = (0..2000).map(force).collect();
+    let mut problem = DiagnosisProblem {
+        layout: SampleLayout {
+            channels: vec!["a".into()],
+            segments: vec![segment("one", false), segment("two", true)],
+            left_out: Vec::new(),
+        },
+        measured: ForceColumn(vec![Some(measured)]),
+        base: vec![
+            ForceColumn(vec![Some(column)]),
+            ForceColumn(vec![Some(vec![1.0; 2000])]),
+        ],
+        noise: vec![0.2],
+        idle: vec![false],
+        removed: vec![0.0],
+        ..DiagnosisProblem::default()
+    };
+    problem.change_shapes = signal_changes(&problem, &["N".to_owned()]);
+    problem
+}
+
+fn found(problem: &DiagnosisProblem) -> Vec<FoundChange> {
+    find_changes(problem, &problem.base.iter().collect::<Vec<_>>())
+}
+
+/// The change with the kind, with its time in the first recording that has it.
+fn interval_of(found: &[FoundChange], kind: &str) -> Option<(String, [f64; 2], bool)> {
+    let of_kind = found.iter().find(|one| one.candidate.effect.kind == kind)?;
+    let first = &of_kind.intervals[0];
+    Some((first.recording.clone(), first.interval, first.lasts))
+}
+
+#[test]
+fn a_step_is_found_at_its_time() {
+    for seed in 0..10 {
+        let scaled = problem(
+            seed,
+            |run, t, force| if run == 1 && t >= 12.34 { 0.15 * force } else { 0.0 },
+        );
+        let (recording, [from, _], lasts) = interval_of(&found(&scaled), "gain_change").unwrap();
+        assert_eq!((recording.as_str(), lasts), ("two", true), "seed {seed}");
+        // The force is small about that time, so that its scale shows late.
+        assert!((from - 112.34).abs() < 0.6, "seed {seed}: {from}");
+        let jumped = problem(seed, |run, t, _| if run == 0 && t >= 7.5 { 0.5 } else { 0.0 });
+        let (recording, [from, _], _) = interval_of(&found(&jumped), "offset_step").unwrap();
+        assert_eq!(recording, "one");
+        assert!((from - 107.5).abs() < 0.4, "seed {seed}: {from}");
+    }
+}
+
+#[test]
+fn an_interval_has_an_end() {
+    for seed in 0..10 {
+        let between = problem(
+            seed,
+            |run, t, _| if run == 0 && (6.0..9.0).contains(&t) { 1.0 } else { 0.0 },
+        );
+        let (_, [from, to], lasts) = interval_of(&found(&between), "offset_step").unwrap();
+        assert!(
+            !lasts && (from - 106.0).abs() < 0.2 && (to - 109.0).abs() < 0.2,
+            "{from} {to}"
+        );
+    }
+}
+
+/// Noise has no steps, and a zero that drifts evenly or comes to rest has none either.
+#[test]
+fn noise_and_drift_are_no_steps() {
+    for seed in 0..20 {
+        assert!(found(&problem(seed, |_, _, _| 0.0)).is_empty(), "seed {seed}");
+        let drifting = problem(seed, |_, t, _| 0.05 * t);
+        assert_eq!(interval_of(&found(&drifting), "offset_step"), None, "seed {seed}");
+        let warming = problem(seed, |_, t, _| (-t / 4.0).exp());
+        assert_eq!(interval_of(&found(&warming), "offset_step"), None, "seed {seed}");
+    }
+}

@@ -1,0 +1,202 @@
+//! Hypothetical corrections before a diagnosis: recordings with faults that make all numbers meaningless go in, the same
+//! recordings as they would be without these faults come out, with the list of what was corrected.
+//!
+//! Decision: a fault that one recording shows clearly is corrected in the other recordings as well if it explains them
+//! better, since one machine and one logger made them.
+
+use modelmill_identify::diagnose::{DiagnosisVerdict, Disturbance};
+
+use crate::error::Outcome;
+use crate::faults::{FaultCorrection, RecordingFaultKind, SuspectedFault, correction_score, with_gravity};
+use crate::model::Model;
+use crate::recording::PreparedRecording;
+
+use super::findings::DiagnosisFindings;
+use super::thresholds::{CORRECTION_ROUNDS, SHARED_FAULT_LEAST_SCORE};
+use super::words;
+
+/// Recordings after hypothetical corrections.
+pub(super) struct CorrectedRecordings {
+    /// The model, with another direction of gravity if that was corrected.
+    pub(super) model: Model,
+    /// The fitted recordings.
+    pub(super) fit: Vec<PreparedRecording>,
+    /// The validation runs.
+    pub(super) check: Vec<PreparedRecording>,
+    /// What was corrected.
+    pub(super) corrected: Vec<SuspectedFault>,
+    /// Faults that remain, since several explain a recording equally well.
+    pub(super) unresolved: Vec<SuspectedFault>,
+}
+
+impl CorrectedRecordings {
+    /// Corrects faults as long as some are found; `None` if the recordings have none.
+    ///
+    /// Fails if a corrected recording cannot be prepared.
+    pub(super) fn new(
+        model: &Model,
+        fit: &[&PreparedRecording],
+        check: &[&PreparedRecording],
+    ) -> Outcome<Option<Self>> {
+        if !fit.iter().chain(check).any(|one| one.suspected_fault().is_some()) {
+            return Ok(None);
+        }
+        let copies = |all: &[&PreparedRecording]| all.iter().map(|one| (*one).clone()).collect();
+        let mut all = Self {
+            model: model.clone(),
+            fit: copies(fit),
+            check: copies(check),
+            corrected: Vec::new(),
+            unresolved: Vec::new(),
+        };
+        // Several faults may be present, and one may hide another.
+        for _ in 0..CORRECTION_ROUNDS {
+            let Some(fault) = all.next_fault() else { break };
+            let Some(correction) = fault.correction.clone() else {
+                break;
+            };
+            let known = all.corrected.iter().any(|one| one.clause == fault.clause);
+            match correction {
+                // The same fault once more would undo its correction.
+                _ if known => break,
+                FaultCorrection::Gravity(gravity) => all.correct_gravity(fault, gravity)?,
+                FaultCorrection::Columns(_) => all.correct_columns(fault, &correction)?,
+            }
+        }
+        let left = all
+            .fit
+            .iter()
+            .chain(&all.check)
+            .filter_map(PreparedRecording::suspected_fault);
+        all.unresolved = merge_faults(left.cloned());
+        Ok(Some(all))
+    }
+
+    /// The first fault that is found, with all recordings that have it. One that several faults explain comes first,
+    /// since nothing can be corrected then.
+    fn next_fault(&self) -> Option<SuspectedFault> {
+        let found = self
+            .fit
+            .iter()
+            .chain(&self.check)
+            .filter_map(PreparedRecording::suspected_fault);
+        let merged = merge_faults(found.cloned());
+        let unclear = merged.iter().position(|fault| !fault.is_correctable());
+        merged.into_iter().nth(unclear.unwrap_or(0))
+    }
+
+    /// Prepares all recordings again for the model with another direction of gravity.
+    fn correct_gravity(&mut self, mut fault: SuspectedFault, gravity: [f64; 3]) -> Outcome {
+        self.model = with_gravity(&self.model, gravity)?;
+        fault.recordings = self
+            .fit
+            .iter()
+            .chain(&self.check)
+            .map(|one| one.file().to_owned())
+            .collect();
+        for one in self.fit.iter_mut().chain(&mut self.check) {
+            *one = one.corrected(&self.model, &[])?;
+        }
+        self.corrected.push(fault);
+        Ok(())
+    }
+
+    /// Corrects columns of the recordings that have a fault, and of those that it explains better.
+    fn correct_columns(&mut self, mut fault: SuspectedFault, correction: &FaultCorrection) -> Outcome {
+        let FaultCorrection::Columns(operations) = correction else {
+            return Ok(());
+        };
+        for one in self.fit.iter_mut().chain(&mut self.check) {
+            let has_it = fault.recordings.iter().any(|file| file == one.file());
+            if !has_it && one.suspected_fault().is_some() {
+                continue;
+            }
+            // A recording that cannot be prepared with the correction does not have the fault.
+            let corrected = match one.corrected(&self.model, operations) {
+                Ok(corrected) => corrected,
+                Err(_) if !has_it => continue,
+                Err(error) => return Err(error),
+            };
+            if !has_it {
+                let score = correction_score(&self.model, &one.segments, &corrected.segments);
+                if score.is_none_or(|score| score < SHARED_FAULT_LEAST_SCORE) {
+                    continue;
+                }
+                fault.recordings.push(one.file().to_owned());
+            }
+            *one = corrected;
+        }
+        self.corrected.push(fault);
+        Ok(())
+    }
+}
+
+/// Faults with the same clause as one, with all their recordings.
+fn merge_faults(all: impl Iterator<Item = SuspectedFault>) -> Vec<SuspectedFault> {
+    let mut merged: Vec<SuspectedFault> = Vec::new();
+    for fault in all {
+        match merged.iter_mut().find(|one| one.clause == fault.clause) {
+            Some(one) => one.recordings.extend(fault.recordings),
+            None => merged.push(fault),
+        }
+    }
+    merged
+}
+
+impl DiagnosisFindings {
+    /// The verdict with figures, as sentences. It starts with faults of the recordings, which are corrected or leave
+    /// nothing else to state.
+    pub fn verdict_text(&self) -> String {
+        let says = if self.unresolved.is_empty() {
+            words::verdict(&self.diagnosis, self.channels(), self.validation)
+        } else {
+            words::unresolved_text(&self.unresolved)
+        };
+        if self.corrected.is_empty() {
+            return says;
+        }
+        // The sentence goes on after the corrections.
+        let mut letters = says.chars();
+        let first = letters.next().map(|letter| letter.to_lowercase().to_string());
+        words::corrected_text(&self.corrected) + &first.unwrap_or_default() + letters.as_str()
+    }
+
+    /// Adds what was corrected. Where a fault remains, nothing else is claimed.
+    pub(super) fn add_corrections(&mut self, corrected: Vec<SuspectedFault>, unresolved: Vec<SuspectedFault>) {
+        if !unresolved.is_empty() {
+            let diagnosis = &mut self.diagnosis;
+            diagnosis.effects.clear();
+            diagnosis.steps.truncate(1);
+            diagnosis.verdict = DiagnosisVerdict::Unexplained;
+            diagnosis.disturbances.retain(is_recording_fault);
+            self.missing.clear();
+            self.laws.clear();
+            self.entries.clear();
+            self.edited = None;
+            self.after = Err(modelmill_boundary::text::Message::new());
+            self.with_nominal = None;
+        }
+        self.corrected = corrected;
+        self.unresolved = unresolved;
+    }
+
+    /// Makes the verdict the cautious one if the model explains everything but a recording was at fault.
+    pub(super) fn respect_faults(&mut self) {
+        let dead = |one: &Disturbance| one.kind == RecordingFaultKind::DeadChannel.name();
+        let is_at_fault = !self.corrected.is_empty() || self.diagnosis.disturbances.iter().any(dead);
+        if is_at_fault && self.diagnosis.verdict == DiagnosisVerdict::Adequate {
+            self.diagnosis.verdict = DiagnosisVerdict::Unexplained;
+        }
+    }
+
+    /// All disturbances: faults that were corrected hypothetically, then all others.
+    pub fn disturbances(&self) -> Vec<Disturbance> {
+        let corrected = self.corrected.iter().map(SuspectedFault::disturbance);
+        corrected.chain(self.diagnosis.disturbances.iter().cloned()).collect()
+    }
+}
+
+/// Whether a disturbance is an entry of the list of faults of recordings.
+fn is_recording_fault(one: &Disturbance) -> bool {
+    RecordingFaultKind::ALL.iter().any(|kind| kind.name() == one.kind)
+}

@@ -1,0 +1,364 @@
+//! Errors of the model under hypothetical corrections of a recording. A recording goes in; for each correction the
+//! error of every drive comes out, once with all parameters fitted and once with the nominal values of the file.
+//!
+//! For each change of the motion the regressor is evaluated once, and its inner products with all measured forces are
+//! kept. Every change of the forces (sign, unit, exchange) then costs a small system of equations only.
+
+use modelmill_codegen::{ModelEvaluator, MotionStates};
+use nalgebra::{DMatrix, DVector};
+
+use super::correction::{ForceChange, MotionChange};
+use super::thresholds::{BENCH_FEWEST_SAMPLES, FIT_ERROR_FLOOR, NOMINAL_ERROR_CAP, NOMINAL_ERROR_FLOOR};
+use crate::model::Model;
+use crate::segment::RecordingSegment;
+
+/// Most rows over all drives, spread over the recording.
+const ROWS: usize = 3600;
+/// Most samples for each drive.
+const SAMPLES: usize = 900;
+/// Columns in addition to those of the model for each drive: rate, its sign, an offset, and acceleration, in this
+/// order. A model that lacks friction would otherwise put it elsewhere.
+const MORE: usize = 4;
+/// Those of them that are fitted with nominal values: an inertia of the drive would take the place of that of bodies.
+const MORE_WITH_NOMINAL: usize = 3;
+/// Ridge on the diagonal of scaled normal equations.
+const RIDGE: f64 = 1e-10;
+/// Number of times the weights of the drives are set to their errors.
+const ROUNDS: usize = 4;
+
+/// Positions, rates and accelerations, `[order][coordinate][sample]`, SI units.
+pub(super) type MotionColumns = [Vec<Vec<f64>>; 3];
+
+/// Samples of a recording at which hypotheses are compared.
+pub(super) struct FaultBench<'a> {
+    /// The model.
+    pub(super) model: &'a Model,
+    /// Motion at the samples.
+    motion: MotionColumns,
+    /// Measured forces, `[drive][sample]`.
+    forces: Vec<Vec<f64>>,
+    /// Nominal values of the base parameters; `None` if the file has too few.
+    nominal: Option<Vec<f64>>,
+}
+
+/// Relative errors (1) of the drives under a hypothesis; drives without force are `None`.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct HypothesisErrors {
+    /// With all parameters fitted.
+    pub(super) fit: Vec<Option<f64>>,
+    /// With nominal values of the bodies, and friction and an offset of each drive fitted, relative to the error with
+    /// friction and offset alone: below 1 if the nominal values explain something.
+    pub(super) nominal: Option<Vec<Option<f64>>>,
+}
+
+impl HypothesisErrors {
+    /// Errors of a mechanism that cannot reach the poses: as large as the forces.
+    pub(super) fn out_of_reach(bench: &FaultBench<'_>) -> Self {
+        let all = |size: f64| vec![Some(size); bench.forces.len()];
+        Self {
+            fit: all(1.0),
+            nominal: bench.nominal.as_ref().map(|_| all(NOMINAL_ERROR_CAP)),
+        }
+    }
+
+    /// Sum over the drives of the logarithms by which the fitted error is smaller than `before`.
+    pub(super) fn fit_gain(&self, before: &Self) -> f64 {
+        log_gain(&before.fit, &self.fit, |error| error.max(FIT_ERROR_FLOOR))
+    }
+
+    /// The same with nominal values; 0 if the file has too few.
+    pub(super) fn nominal_gain(&self, before: &Self) -> f64 {
+        let bounded = |error: f64| error.clamp(NOMINAL_ERROR_FLOOR, NOMINAL_ERROR_CAP);
+        match (&before.nominal, &self.nominal) {
+            (Some(before), Some(after)) => log_gain(before, after, bounded),
+            _ => 0.0,
+        }
+    }
+
+    /// Geometric mean of the fitted errors over the drives.
+    pub(super) fn mean_fit(&self) -> f64 {
+        geometric_mean(&self.fit)
+    }
+
+    /// Geometric mean of the errors with nominal values over the drives.
+    pub(super) fn mean_nominal(&self) -> Option<f64> {
+        self.nominal.as_deref().map(geometric_mean)
+    }
+}
+
+/// Sum of the logarithms of `before / after` over the drives that have both.
+fn log_gain(before: &[Option<f64>], after: &[Option<f64>], bounded: impl Fn(f64) -> f64) -> f64 {
+    let pairs = before.iter().zip(after);
+    pairs
+        .filter_map(|(before, after)| Some((bounded((*before)?) / bounded((*after)?)).ln()))
+        .sum()
+}
+
+/// Geometric mean of the errors that exist.
+fn geometric_mean(errors: &[Option<f64>]) -> f64 {
+    let logarithms: Vec<f64> = errors.iter().flatten().map(|e| e.max(f64::MIN_POSITIVE).ln()).collect();
+    (logarithms.iter().sum::<f64>() / logarithms.len().max(1) as f64).exp()
+}
+
+impl<'a> FaultBench<'a> {
+    /// The samples of all segments of a recording at which all forces were measured; `None` if there are too few.
+    pub(super) fn new(model: &'a Model, segments: &[RecordingSegment]) -> Option<Self> {
+        let drives = model.drives().len();
+        let total: usize = segments.iter().map(RecordingSegment::samples).sum();
+        let wanted = (ROWS / drives.max(1)).clamp(BENCH_FEWEST_SAMPLES, SAMPLES);
+        let every = (total / wanted).max(1);
+        let n_coordinates = model.active_coordinates().len();
+        let mut motion: MotionColumns = std::array::from_fn(|_| vec![Vec::new(); n_coordinates]);
+        let mut forces = vec![Vec::new(); drives];
+        for run in segments.iter().map(|one| &one.run) {
+            let measured = run.force.as_deref()?;
+            let samples = (0..run.samples()).step_by(every);
+            for k in samples.filter(|k| (0..drives).all(|d| run.is_force_measured(d, *k))) {
+                for (to, from) in motion.iter_mut().zip([&run.q, &run.qd, &run.qdd]) {
+                    to.iter_mut().zip(from).for_each(|(to, from)| to.push(from[k]));
+                }
+                forces.iter_mut().zip(measured).for_each(|(to, from)| to.push(from[k]));
+            }
+        }
+        let is_enough = forces.first().is_some_and(|force| force.len() >= BENCH_FEWEST_SAMPLES);
+        is_enough.then(|| Self {
+            model,
+            motion,
+            forces,
+            nominal: nominal_values(model),
+        })
+    }
+
+    /// Number of samples.
+    pub(super) fn samples(&self) -> usize {
+        self.forces.first().map_or(0, Vec::len)
+    }
+
+    /// Largest magnitude of a coordinate.
+    pub(super) fn largest_position(&self, coordinate: usize) -> f64 {
+        self.motion[0][coordinate].iter().fold(0.0, |most, q| most.max(q.abs()))
+    }
+
+    /// The measured forces, `[drive][sample]`.
+    pub(super) fn forces(&self) -> &[Vec<f64>] {
+        &self.forces
+    }
+
+    /// Nominal values of the base parameters; `None` if the file has too few.
+    pub(super) fn nominal(&self) -> Option<&[f64]> {
+        self.nominal.as_deref()
+    }
+
+    /// The same samples for another model of the machine.
+    pub(super) fn with_model<'b>(&self, model: &'b Model) -> FaultBench<'b> {
+        FaultBench {
+            model,
+            motion: self.motion.clone(),
+            forces: self.forces.clone(),
+            nominal: nominal_values(model),
+        }
+    }
+
+    /// The motion after a change.
+    fn changed_motion(&self, change: &MotionChange) -> MotionColumns {
+        let mut motion = self.motion.clone();
+        for (order, columns) in motion.iter_mut().enumerate() {
+            change.apply(order, columns);
+        }
+        motion
+    }
+
+    /// Calls a function with the states after a change.
+    pub(super) fn with_states<R>(&self, change: &MotionChange, evaluate: impl FnOnce(&MotionStates<'_>) -> R) -> R {
+        let motion = self.changed_motion(change);
+        evaluate(&MotionStates {
+            q: slices(&motion[0]),
+            qd: slices(&motion[1]),
+            qdd: slices(&motion[2]),
+            load: slices(&self.forces),
+        })
+    }
+
+    /// The rows of the model after a change of the motion; `None` if a pose has no solution.
+    pub(super) fn rows(&self, change: &MotionChange) -> Option<HypothesisRows> {
+        let n = self.forces.len();
+        let (model_rows, drives) = self.with_states(change, |states| {
+            let evaluator = ModelEvaluator::new(&self.model.derivation);
+            let rows = evaluator.regressor(states).ok()?;
+            let drives = evaluator.drive_motion(states).ok()?;
+            Some((rows, drives))
+        })?;
+        let accelerations = drive_accelerations(&drives, n, &self.changed_motion(change)[2]);
+        let samples = self.samples();
+        let base = model_rows.ncols();
+        let mut channels = Vec::with_capacity(n);
+        for d in 0..n {
+            let mut rows = DMatrix::zeros(samples, base + MORE);
+            for i in 0..samples {
+                for k in 0..base {
+                    rows[(i, k)] = model_rows[(i * n + d, k)];
+                }
+                let rate = drives[n + d][i];
+                let sign = if rate == 0.0 { 0.0 } else { rate.signum() };
+                for (k, value) in [rate, sign, 1.0, accelerations[d][i]].into_iter().enumerate() {
+                    rows[(i, base + k)] = value;
+                }
+            }
+            if rows.iter().any(|x| !x.is_finite()) {
+                return None;
+            }
+            channels.push(ChannelMoments::new(&rows, &self.forces));
+        }
+        Some(HypothesisRows { channels, base })
+    }
+
+    /// The errors with the forces after a change.
+    pub(super) fn errors(&self, rows: &HypothesisRows, change: &ForceChange) -> HypothesisErrors {
+        HypothesisErrors {
+            fit: rows.fit_errors(change),
+            nominal: self.nominal.as_ref().map(|values| rows.nominal_errors(change, values)),
+        }
+    }
+}
+
+/// Columns as slices.
+fn slices(columns: &[Vec<f64>]) -> Vec<&[f64]> {
+    columns.iter().map(Vec::as_slice).collect()
+}
+
+/// The nominal values of a model; `None` if bodies lack most of them.
+fn nominal_values(model: &Model) -> Option<Vec<f64>> {
+    let bodies: Vec<usize> = (0..model.base.len()).filter(|k| !model.is_effect(*k)).collect();
+    let known = bodies
+        .iter()
+        .filter(|k| model.has_nominal(**k) || model.is_known(**k))
+        .count();
+    (!bodies.is_empty() && 2 * known > bodies.len()).then(|| model.nominal.clone())
+}
+
+/// Accelerations of the drives, without the part that comes from a changing Jacobian: `drive_motion` gives positions
+/// and rates of the `n` drives, then their Jacobian row by row.
+fn drive_accelerations(drives: &[Vec<f64>], n: usize, accelerations: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let columns = accelerations.len();
+    let jacobian = &drives[2 * n..];
+    let one = |d: usize| {
+        let samples = drives.first().map_or(0, Vec::len);
+        let at = |i: usize| {
+            (0..columns)
+                .map(|k| jacobian[d * columns + k][i] * accelerations[k][i])
+                .sum()
+        };
+        (0..samples).map(at).collect()
+    };
+    (0..n).map(one).collect()
+}
+
+/// The rows of a model after a change of the motion, as inner products.
+pub(super) struct HypothesisRows {
+    /// By drive.
+    channels: Vec<ChannelMoments>,
+    /// Number of base parameters.
+    base: usize,
+}
+
+/// Inner products of the columns of one drive.
+struct ChannelMoments {
+    /// The columns among themselves.
+    normal: DMatrix<f64>,
+    /// The columns with the force of each drive.
+    right: Vec<DVector<f64>>,
+    /// Sum of squares of each force.
+    squares: Vec<f64>,
+}
+
+impl ChannelMoments {
+    /// The inner products of the rows of a drive with the forces of all drives.
+    fn new(rows: &DMatrix<f64>, forces: &[Vec<f64>]) -> Self {
+        let vector = |force: &Vec<f64>| DVector::from_column_slice(force);
+        Self {
+            normal: rows.tr_mul(rows),
+            right: forces.iter().map(|force| rows.tr_mul(&vector(force))).collect(),
+            squares: forces.iter().map(|force| vector(force).norm_squared()).collect(),
+        }
+    }
+}
+
+impl HypothesisRows {
+    /// Relative error of each drive with all parameters fitted. Drives are weighted by their errors, so that a small
+    /// drive counts as much as a large one.
+    fn fit_errors(&self, change: &ForceChange) -> Vec<Option<f64>> {
+        let n = self.channels.len();
+        let columns = self.base + MORE * n;
+        // Place of a column of a drive among all columns.
+        let place = |d: usize, k: usize| if k < self.base { k } else { k + MORE * d };
+        let squares: Vec<f64> = (0..n).map(|d| change.squares(d, &self.channels[d].squares)).collect();
+        let mut errors: Vec<Option<f64>> = squares.iter().map(|s| (*s > 0.0).then_some(1.0)).collect();
+        for _ in 0..ROUNDS {
+            let mut normal = DMatrix::zeros(columns, columns);
+            let mut right = DVector::zeros(columns);
+            for (d, channel) in self.channels.iter().enumerate() {
+                let Some(error) = errors[d] else { continue };
+                let weight = 1.0 / (squares[d] * error.max(FIT_ERROR_FLOOR).powi(2));
+                let (source, factor) = change.source(d);
+                for j in 0..channel.normal.ncols() {
+                    right[place(d, j)] += weight * factor * channel.right[source][j];
+                    for i in 0..channel.normal.nrows() {
+                        normal[(place(d, i), place(d, j))] += weight * channel.normal[(i, j)];
+                    }
+                }
+            }
+            let Some(values) = solve_scaled(normal, &right) else {
+                return errors;
+            };
+            for (d, channel) in self.channels.iter().enumerate() {
+                let own = DVector::from_fn(channel.normal.ncols(), |k, _| values[place(d, k)]);
+                let (source, factor) = change.source(d);
+                let left =
+                    squares[d] - 2.0 * factor * own.dot(&channel.right[source]) + own.dot(&(&channel.normal * &own));
+                if let Some(error) = &mut errors[d] {
+                    *error = (left.max(0.0) / squares[d]).sqrt();
+                }
+            }
+        }
+        errors
+    }
+
+    /// Error of each drive with nominal values of the base parameters, and friction and an offset fitted, relative to
+    /// the error with friction and offset alone.
+    fn nominal_errors(&self, change: &ForceChange, nominal: &[f64]) -> Vec<Option<f64>> {
+        let one = |(d, channel): (usize, &ChannelMoments)| {
+            let (source, factor) = change.source(d);
+            let squares = change.squares(d, &channel.squares);
+            let mut own = DVector::zeros(self.base + MORE);
+            own.rows_mut(0, self.base).copy_from_slice(nominal);
+            // Inner products of the residual of the nominal values.
+            let products = &channel.normal * &own;
+            let left = squares - 2.0 * factor * own.dot(&channel.right[source]) + own.dot(&products);
+            let right = &channel.right[source] * factor - products;
+            let (first, many) = (self.base, MORE_WITH_NOMINAL);
+            let normal = channel.normal.view((first, first), (many, many)).into_owned();
+            let unexplained = |left: f64, right: &DVector<f64>| {
+                let right = right.rows(first, many).into_owned();
+                let explained = solve_scaled(normal.clone(), &right).map_or(0.0, |values| values.dot(&right));
+                (left - explained).max(0.0)
+            };
+            let alone = unexplained(squares, &(&channel.right[source] * factor));
+            let floor = FIT_ERROR_FLOOR * FIT_ERROR_FLOOR * squares;
+            (squares > 0.0).then(|| (unexplained(left, &right) / alone.max(floor)).sqrt())
+        };
+        self.channels.iter().enumerate().map(one).collect()
+    }
+}
+
+/// Solves normal equations whose columns are scaled to one, with a very small ridge; `None` if a number is not finite.
+pub(super) fn solve_scaled(mut normal: DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
+    let scale = normal.diagonal().map(|x| if x > 0.0 { x.sqrt().recip() } else { 0.0 });
+    for j in 0..scale.len() {
+        for i in 0..scale.len() {
+            normal[(i, j)] *= scale[i] * scale[j];
+        }
+        normal[(j, j)] += RIDGE;
+    }
+    let solved = normal.cholesky()?.solve(&right.component_mul(&scale));
+    Some(solved.component_mul(&scale))
+}

@@ -1,0 +1,115 @@
+//! Exchanged columns: of two forces, of two coordinates, or of two coordinates with the forces of their drives.
+
+use modelmill_boundary::message;
+use modelmill_boundary::text::{OptionName, OptionSetting};
+use modelmill_spec::DriveKind;
+
+use super::bench::FaultBench;
+use super::correction::{ColumnOperation, ForceChange, MotionChange};
+use super::{FaultHypothesis, FaultSubject, RecordingFaultEntry, RecordingFaultKind};
+
+/// The entry for forces.
+pub(super) struct ExchangedForces;
+/// The entry for coordinates, alone and with the forces of their drives.
+pub(super) struct ExchangedCoordinates;
+
+/// The options that read two names from each other's columns.
+fn exchange_maps(subject: &FaultSubject<'_>, one: &str, other: &str) -> Vec<OptionSetting> {
+    let columns = ["", "_d", "_dd"].map(|suffix| [format!("{one}{suffix}"), format!("{other}{suffix}")]);
+    // Columns that the recording lacks need no option.
+    let present = columns
+        .into_iter()
+        .filter(|pair| pair.iter().all(|name| subject.raw.has_column(name)));
+    let maps = present.flat_map(|[a, b]| [format!("{a}={b}"), format!("{b}={a}")]);
+    maps.map(|map| OptionSetting::new(OptionName::Columns, map)).collect()
+}
+
+impl RecordingFaultEntry for ExchangedForces {
+    fn hypotheses(&self, subject: &FaultSubject<'_>, bench: &FaultBench<'_>) -> Vec<FaultHypothesis> {
+        let drives = subject.model.drives();
+        let n = bench.forces().len();
+        // Forces of different units, N and N m, have columns that differ too much to be confused.
+        let pairs = (0..n).flat_map(|a| (a + 1..n).map(move |b| (a, b)));
+        pairs
+            .filter(|(a, b)| subject.model.force_unit(*a) == subject.model.force_unit(*b))
+            .map(|(a, b)| FaultHypothesis {
+                kind: RecordingFaultKind::ExchangedColumns,
+                at: vec![drives[a].clone(), drives[b].clone()],
+                clause: format!("the forces of `{}` and `{}` are exchanged", drives[a], drives[b]),
+                advice: message!(
+                    "check which column is which, and exchange them ({})",
+                    subject.column_remedy(exchange_maps(subject, &drives[a], &drives[b]))
+                ),
+                motion: MotionChange::None,
+                forces: ForceChange(vec![(a, b, 1.0), (b, a, 1.0)]),
+                operations: vec![ColumnOperation::exchange(&drives[a], &drives[b])],
+                is_implausible_now: false,
+            })
+            .collect()
+    }
+}
+
+impl RecordingFaultEntry for ExchangedCoordinates {
+    fn hypotheses(&self, subject: &FaultSubject<'_>, _: &FaultBench<'_>) -> Vec<FaultHypothesis> {
+        let names = subject.model.active_coordinate_types();
+        let joints = subject.model.joint_coordinates();
+        let mechanism = &subject.model.derivation.mechanism;
+        // The drive that acts on a coordinate itself, if there is one.
+        let drive_of = |name: &str| {
+            let is_its =
+                |kind: DriveKind| matches!(kind, DriveKind::Joint(k) if mechanism.coordinates[k.0].name == name);
+            mechanism
+                .drives
+                .iter()
+                .position(|drive| drive.is_driven && is_its(drive.kind))
+        };
+        let mut hypotheses = Vec::new();
+        for (k, a) in joints.iter().enumerate() {
+            for b in &joints[k + 1..] {
+                let [(one, is_angle), (other, is_other_angle)] = [&names[*a], &names[*b]];
+                // Only coordinates of one kind can be exchanged.
+                if is_angle != is_other_angle {
+                    continue;
+                }
+                let maps = exchange_maps(subject, one, other);
+                hypotheses.push(FaultHypothesis {
+                    kind: RecordingFaultKind::ExchangedColumns,
+                    at: vec![one.clone(), other.clone()],
+                    clause: format!("the coordinates `{one}` and `{other}` are exchanged"),
+                    advice: message!(
+                        "check which column is which, and exchange them ({})",
+                        subject.column_remedy(maps.clone())
+                    ),
+                    motion: MotionChange::Exchange(*a, *b),
+                    forces: ForceChange::default(),
+                    operations: vec![ColumnOperation::exchange(one, other)],
+                    is_implausible_now: false,
+                });
+                // The order of two joints may be exchanged as a whole.
+                if let (Some(c), Some(d)) = (drive_of(one), drive_of(other)) {
+                    // Drives have names of their own, which need not be those of the coordinates.
+                    let [force, other_force] = [c, d].map(|k| mechanism.drives[k].name.clone());
+                    let mut all = maps;
+                    all.extend(exchange_maps(subject, &force, &other_force));
+                    hypotheses.push(FaultHypothesis {
+                        kind: RecordingFaultKind::ExchangedColumns,
+                        at: vec![one.clone(), other.clone(), force.clone(), other_force.clone()],
+                        clause: format!(
+                            "the coordinates `{one}` and `{other}` are exchanged, and so are the forces of `{force}` and \
+                             `{other_force}`"
+                        ),
+                        advice: message!("check which column is which, and exchange them ({})", subject.column_remedy(all)),
+                        motion: MotionChange::Exchange(*a, *b),
+                        forces: ForceChange(vec![(c, d, 1.0), (d, c, 1.0)]),
+                        operations: vec![
+                            ColumnOperation::exchange(one, other),
+                            ColumnOperation::exchange(&force, &other_force),
+                        ],
+                        is_implausible_now: false,
+                    });
+                }
+            }
+        }
+        hypotheses
+    }
+}

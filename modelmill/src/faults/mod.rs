@@ -1,0 +1,234 @@
+//! Faults of recordings that make all numbers meaningless: time base, units, signs, exchanged columns, direction of
+//! gravity, dead channels. A prepared recording goes in; faults come out, each with what was found, what to do, and the
+//! operation that corrects it.
+//!
+//! The faults are entries of one list. An entry proposes hypotheses. All hypotheses are judged alike: by the fall of
+//! the error of the model, with all parameters fitted and with nominal values. A hypothesis must be decisive, and no
+//! other one may explain the recording equally well.
+//!
+//! Decision: a fault is only reported where a recording is read, and corrected nowhere but in a diagnosis, which states
+//! it first. Exceptions are wrapped angles and forces that were not measured: they are mended with a note.
+
+mod angle_units;
+mod bench;
+mod correction;
+mod exchanged;
+mod force_units;
+mod gravity;
+mod judge;
+mod length_units;
+mod signs;
+mod silent;
+mod thresholds;
+mod time_base;
+
+use modelmill_boundary::text::{Message, OptionName, OptionSetting, Remedy, RemedySpelling};
+use modelmill_identify::SignalRecording;
+use modelmill_identify::diagnose::Disturbance;
+
+use crate::model::Model;
+use crate::segment::RecordingSegment;
+
+use bench::FaultBench;
+pub(crate) use correction::{ColumnOperation, FaultCorrection};
+use correction::{ForceChange, MotionChange};
+pub(crate) use gravity::with_gravity;
+pub(crate) use judge::{correction_score, find_fault};
+pub(crate) use silent::{SilentInterval, silent_intervals};
+
+/// Kinds of faults of recordings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum RecordingFaultKind {
+    /// The time is in another unit.
+    TimeBase,
+    /// A column is in another unit.
+    Units,
+    /// Two columns are exchanged.
+    ExchangedColumns,
+    /// A column has the opposite sign.
+    WrongSign,
+    /// Gravity has another direction than in the model file.
+    GravityDirection,
+    /// An angle jumps by full turns.
+    Wrapped,
+    /// A force reads zero although the model predicts one.
+    DeadChannel,
+    /// A force stays at one value although the model predicts another.
+    FrozenForce,
+    /// Brakes hold the joints, and the drives are off.
+    Brakes,
+}
+
+impl RecordingFaultKind {
+    /// All kinds.
+    pub const ALL: [Self; 9] = [
+        Self::TimeBase,
+        Self::Units,
+        Self::ExchangedColumns,
+        Self::WrongSign,
+        Self::GravityDirection,
+        Self::Wrapped,
+        Self::DeadChannel,
+        Self::FrozenForce,
+        Self::Brakes,
+    ];
+
+    /// Its name in JSON and in scripts.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::TimeBase => "time_base",
+            Self::Units => "units",
+            Self::ExchangedColumns => "exchanged_columns",
+            Self::WrongSign => "wrong_sign",
+            Self::GravityDirection => "gravity_direction",
+            Self::Wrapped => "wrapped",
+            Self::DeadChannel => "dead_channel",
+            Self::FrozenForce => "frozen_force",
+            Self::Brakes => "brakes",
+        }
+    }
+}
+
+/// A suspected fault of a recording.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SuspectedFault {
+    /// Its kind.
+    pub kind: RecordingFaultKind,
+    /// The coordinates, drives or columns that have it.
+    pub at: Vec<String>,
+    /// Files of the recordings that have it.
+    pub recordings: Vec<String>,
+    /// What was found, as a clause: `the force of joint3 has the wrong sign`.
+    pub clause: String,
+    /// What to do, as a sentence.
+    pub advice: Message,
+    /// Errors of the best fit as it is and after the correction, as a sentence; empty if they show nothing.
+    pub evidence: String,
+    /// Sum over the drives of the logarithms by which the fitted errors fall with the correction.
+    pub(crate) fit_gain: f64,
+    /// What corrects it; `None` if several faults explain the recording equally well.
+    pub(crate) correction: Option<FaultCorrection>,
+}
+
+impl SuspectedFault {
+    /// The fault as a disturbance in the results of a diagnosis.
+    pub(crate) fn disturbance(&self) -> Disturbance {
+        Disturbance {
+            kind: self.kind.name().to_owned(),
+            at: self.at.clone(),
+            estimates: Vec::new(),
+            recordings: self.recordings.clone(),
+            interval: None,
+            description: Some(self.clause.replace('`', "")),
+        }
+    }
+
+    /// The fault with its advice as JSON.
+    pub fn json(&self, spelling: &dyn RemedySpelling) -> serde_json::Value {
+        serde_json::json!({
+            "kind": self.kind.name(),
+            "at": self.at,
+            "recordings": self.recordings,
+            "says": self.clause,
+            "todo": self.advice.spell(spelling),
+        })
+    }
+
+    /// Whether it can be corrected hypothetically.
+    pub fn is_correctable(&self) -> bool {
+        self.correction.is_some()
+    }
+}
+
+/// Whether a disturbance is a suspected fault that makes all other findings doubtful until it is corrected.
+pub(crate) fn is_suspicion(one: &Disturbance) -> bool {
+    const SUSPICIONS: [RecordingFaultKind; 4] = [
+        RecordingFaultKind::ExchangedColumns,
+        RecordingFaultKind::WrongSign,
+        RecordingFaultKind::Units,
+        RecordingFaultKind::GravityDirection,
+    ];
+    // A time base differs between recordings too, with both of them named, and is no suspicion then.
+    let is_clock = one.kind == RecordingFaultKind::TimeBase.name() && one.at == ["t"] && one.estimates.is_empty();
+    is_clock || SUSPICIONS.iter().any(|kind| kind.name() == one.kind)
+}
+
+/// A recording whose faults are searched: as it was read, and prepared.
+pub(crate) struct FaultSubject<'a> {
+    /// The model.
+    pub(crate) model: &'a Model,
+    /// The recording as it was read.
+    pub(crate) raw: &'a SignalRecording,
+    /// Its segments as they were prepared.
+    pub(crate) segments: &'a [RecordingSegment],
+    /// Whether recorded derivatives are used.
+    pub(crate) uses_recorded_derivatives: bool,
+    /// Whether columns have other names or formulas in the file.
+    pub(crate) has_mapping: bool,
+}
+
+impl FaultSubject<'_> {
+    /// The options that read columns in another way. Where the file has other names, only the option itself is named,
+    /// since its value depends on the present one.
+    fn column_remedy(&self, maps: impl IntoIterator<Item = OptionSetting>) -> Remedy {
+        if self.has_mapping {
+            Remedy::option(OptionName::Columns)
+        } else {
+            Remedy::options(maps)
+        }
+    }
+
+    /// Whether the derivative of a coordinate of an order, 1 or 2, is recorded and used.
+    fn is_recorded(&self, coordinate: &str, order: usize) -> bool {
+        let suffix = if order == 1 { "_d" } else { "_dd" };
+        self.uses_recorded_derivatives && self.raw.has_column(&format!("{coordinate}{suffix}"))
+    }
+}
+
+/// A possible fault with what it would change.
+struct FaultHypothesis {
+    /// Its kind.
+    kind: RecordingFaultKind,
+    /// Where it is.
+    at: Vec<String>,
+    /// What would be the case, as a clause.
+    clause: String,
+    /// What to do about it, as a sentence without the full stop.
+    advice: Message,
+    /// Its correction of sampled motion.
+    motion: MotionChange,
+    /// Its correction of sampled forces.
+    forces: ForceChange,
+    /// Its correction of the recording.
+    operations: Vec<ColumnOperation>,
+    /// Whether the numbers are implausible as they are, whatever the model.
+    is_implausible_now: bool,
+}
+
+/// An entry of the list of faults.
+trait RecordingFaultEntry: Sync {
+    /// The hypotheses for a recording.
+    fn hypotheses(&self, subject: &FaultSubject<'_>, bench: &FaultBench<'_>) -> Vec<FaultHypothesis>;
+}
+
+/// The list of faults that are corrected by an operation on columns.
+const ENTRIES: [&dyn RecordingFaultEntry; 8] = [
+    &time_base::TimeUnit,
+    &angle_units::AngleUnit,
+    &length_units::LengthUnit,
+    &force_units::ForceUnit,
+    &signs::ForceSign,
+    &signs::CoordinateSign,
+    &exchanged::ExchangedForces,
+    &exchanged::ExchangedCoordinates,
+];
+
+/// Names in words: `a`, `a and b`, `a, b and c`, each in backquotes.
+fn name_list(names: &[String]) -> String {
+    let quoted: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
+    match quoted.as_slice() {
+        [] => String::new(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}
