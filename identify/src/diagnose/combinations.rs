@@ -77,7 +77,13 @@ impl EffectSelector<'_> {
 
     /// Sets with the same kinds at all drives: the accepted set with one kind, or with two kinds, at every drive that
     /// does not have it yet; and the accepted set with two kinds at one drive, the best two for each drive.
-    pub(crate) fn alike_sets(&self, accepted: &[SelectedEffect], table: &ProjectedGram) -> Vec<ScoredEffectSet> {
+    /// Members that do not lower the criterion are left out.
+    pub(crate) fn alike_sets(
+        &self,
+        accepted: &[SelectedEffect],
+        table: &ProjectedGram,
+        worth: f64,
+    ) -> Vec<ScoredEffectSet> {
         let kinds: Vec<Vec<&SelectedEffect>> = self.simple_kinds_at_drives(accepted).into_values().collect();
         let mut sets = Vec::new();
         let mut best_at_drive: BTreeMap<&str, ScoredEffectSet> = BTreeMap::new();
@@ -108,8 +114,60 @@ impl EffectSelector<'_> {
                 }
             }
         }
-        sets.extend(best_at_drive.into_values());
-        sets
+        let few = sets.into_iter().filter_map(|set| self.drop_weak_members(table, accepted.len(), set, worth));
+        few.chain(best_at_drive.into_values()).collect()
+    }
+
+    /// A set without those members from `first` on that do not lower the criterion. `None` if fewer than two of them
+    /// remain.
+    fn drop_weak_members(
+        &self,
+        table: &ProjectedGram,
+        first: usize,
+        mut set: ScoredEffectSet,
+        worth: f64,
+    ) -> Option<ScoredEffectSet> {
+        loop {
+            let own = criterion(self.problem, &set, worth);
+            let weak = self.weakest_by_place(&set.picks, first, |without, _| {
+                let less = criterion(self.problem, &self.fit_from_gram(table, without.to_vec()), worth);
+                (less <= own).then_some(-less)
+            });
+            if weak.is_empty() {
+                return Some(set);
+            }
+            let kept = without_members(&set.picks, &weak);
+            if kept.len() < first + 2 {
+                return None;
+            }
+            set = self.fit_from_gram(table, kept);
+        }
+    }
+
+    /// The weakest of the dispensable members of each place, by index, weakest first. `strength` gets the set without a member and the
+    /// member; it returns a strength, smaller for weaker members, or `None` for a member that is needed. Members of
+    /// one place may replace each other, so that only one of them goes at a time.
+    fn weakest_by_place(
+        &self,
+        picks: &[SelectedEffect],
+        first: usize,
+        strength: impl Fn(&[SelectedEffect], SelectedEffect) -> Option<f64>,
+    ) -> Vec<usize> {
+        let mut weakest: BTreeMap<&[String], (f64, usize)> = BTreeMap::new();
+        for i in first..picks.len() {
+            let mut without = picks.to_vec();
+            let pick = without.remove(i);
+            let Some(strength) = strength(&without, pick) else {
+                continue;
+            };
+            let of_place = weakest.entry(&self.candidate(&picks[i]).effect.at).or_insert((strength, i));
+            if strength < of_place.0 {
+                *of_place = (strength, i);
+            }
+        }
+        let mut weakest: Vec<(f64, usize)> = weakest.into_values().collect();
+        weakest.sort_by(|a, b| a.0.total_cmp(&b.0));
+        weakest.into_iter().map(|(_, i)| i).collect()
     }
 
     /// Effects at single drives that the accepted set does not have, by kind: those with one estimated number and
@@ -141,12 +199,11 @@ impl EffectSelector<'_> {
         // Each round removes at least one member.
         while !trial.is_possible() {
             let wrong = [trial.wrong_sign.as_slice(), trial.cancelling.as_slice()].concat();
-            if wrong.iter().all(|i| *i < first) {
+            let wrong: Vec<usize> = wrong.into_iter().filter(|i| *i >= first).collect();
+            if wrong.is_empty() {
                 return None;
             }
-            let picks = trial.picks.iter().enumerate();
-            let kept = picks.filter(|(i, _)| *i < first || !wrong.contains(i));
-            let kept: Vec<SelectedEffect> = kept.map(|(_, pick)| pick.clone()).collect();
+            let kept = without_members(&trial.picks, &wrong);
             if kept.len() < first + 2 {
                 return None;
             }
@@ -156,31 +213,35 @@ impl EffectSelector<'_> {
     }
 
     /// A set without those members that the accepted set does not have and that are not supported by evidence, the
-    /// weakest first; at least one further member stays.
+    /// weakest of each place first; at least one further member stays.
     pub(crate) fn drop_unsupported_members(
         &self,
         accepted: &[SelectedEffect],
-        mut picks: Vec<SelectedEffect>,
+        picks: Vec<SelectedEffect>,
     ) -> Vec<SelectedEffect> {
-        loop {
-            let is_further = |pick: &SelectedEffect| accepted.iter().all(|p| p.candidate != pick.candidate);
-            let further: Vec<usize> = (0..picks.len()).filter(|i| is_further(&picks[*i])).collect();
-            if further.len() < 2 {
-                return picks;
+        // Members of the accepted set come first.
+        let is_further = |pick: &SelectedEffect| accepted.iter().all(|p| p.candidate != pick.candidate);
+        let (further, mut picks): (Vec<SelectedEffect>, Vec<SelectedEffect>) = picks.into_iter().partition(is_further);
+        let first = picks.len();
+        picks.extend(further);
+        while picks.len() > first + 1 {
+            let mut weak = self.weakest_by_place(&picks, first, |without, pick| {
+                let evidence = self.evidence(without, &picks, &self.affected_channels(&[pick]));
+                (!evidence.is_sufficient()).then_some(evidence.gain)
+            });
+            if weak.is_empty() {
+                break;
             }
-            let mut weakest: Option<(f64, usize)> = None;
-            for i in further {
-                let mut without = picks.clone();
-                let pick = without.remove(i);
-                let evidence = self.evidence(&without, &picks, &self.affected_channels(&[pick]));
-                if !evidence.is_sufficient() && weakest.is_none_or(|(gain, _)| evidence.gain < gain) {
-                    weakest = Some((evidence.gain, i));
-                }
-            }
-            let Some((_, i)) = weakest else {
-                return picks;
-            };
-            picks.remove(i);
+            weak.truncate(picks.len() - first - 1);
+            picks = without_members(&picks, &weak);
         }
+        picks
     }
+}
+
+/// A set without some members.
+fn without_members(picks: &[SelectedEffect], members: &[usize]) -> Vec<SelectedEffect> {
+    let picks = picks.iter().enumerate();
+    let kept = picks.filter(|(i, _)| !members.contains(i));
+    kept.map(|(_, pick)| pick.clone()).collect()
 }

@@ -83,7 +83,7 @@ pub use problem::{
 };
 pub use rejection::RejectionReason;
 pub use support::EffectSupport;
-pub use thresholds::FORCE_ROUNDING;
+pub use thresholds::{FORCE_ROUNDING, LACKING_LEAST_PROBABILITY};
 pub use tilt::{ForceSensitivity, TiltCandidate};
 
 use bench::{EffectSelector, SelectedEffect};

@@ -1,8 +1,9 @@
 //! Effects of the last set with their alternatives and probabilities, and those that are set aside since they are less
 //! likely than not.
 //!
-//! Decision: an effect with a probability below one half is reported as possible. It stands in no verdict, is added to no
-//! model, and the residual that it would explain counts as residual.
+//! Decision: an effect is reported as possible if it and its alternatives together have a probability below one half.
+//! It stands in no verdict, is added to no model, and the residual that it would explain counts as residual. If one of
+//! several indistinguishable effects is present, each of them may be less likely than not; then the group is reported.
 
 use super::aliases::EffectAlias;
 use super::bench::{EffectSelector, SelectedEffect};
@@ -36,12 +37,12 @@ impl EffectSelector<'_> {
 }
 
 impl AssessedEffects {
-    /// Removes the effects that are less likely than not and returns them. Disturbances of the recordings stay.
+    /// Removes the effects that are less likely than not, even together with their alternatives, and returns them. Disturbances of the recordings stay.
     pub(crate) fn set_aside_unlikely(&mut self, bench: &EffectSelector<'_>) -> Vec<IdentifiedEffect> {
         let all = self.identified_effects(bench);
         let is_unlikely = |pick: &SelectedEffect| {
             let mut found = all.iter().filter(|found| found.candidate == pick.candidate);
-            found.any(|found| found.probability < LACKING_LEAST_PROBABILITY)
+            found.any(|found| found.support.group_probability() < LACKING_LEAST_PROBABILITY)
         };
         let keep: Vec<bool> = self.picks.iter().map(|pick| !is_unlikely(pick)).collect();
         let mut kept = keep.iter();
@@ -50,7 +51,7 @@ impl AssessedEffects {
         self.aliases.retain(|_| *kept.next().unwrap_or(&true));
         let mut kept = keep.iter();
         self.support.retain(|_| *kept.next().unwrap_or(&true));
-        let is_set_aside = |found: &IdentifiedEffect| found.probability < LACKING_LEAST_PROBABILITY;
+        let is_set_aside = |found: &IdentifiedEffect| found.support.group_probability() < LACKING_LEAST_PROBABILITY;
         all.into_iter().filter(is_set_aside).collect()
     }
 

@@ -17,6 +17,8 @@ use super::thresholds::{
 const BEAM: usize = 6;
 /// Sets of one size that are tested on validation data before the search stops.
 const TESTED: usize = 10;
+/// Members by which a set may exceed the accepted one to be improved by exchanges.
+const MOST_EXCHANGED: usize = 3;
 /// Largest number of effects in a set.
 const MOST: usize = 40;
 
@@ -347,7 +349,7 @@ impl EffectSelector<'_> {
                 .collect::<Vec<ScoredEffectSet>>(),
         );
         // Stage 3: the same kinds at all drives, and pairs of kinds at one drive.
-        for trial in self.alike_sets(accepted, &table) {
+        for trial in self.alike_sets(accepted, &table, worth) {
             if known.insert(candidate_indices(&trial.picks)) {
                 trials.push(trial);
             }
@@ -379,6 +381,10 @@ impl EffectSelector<'_> {
         let table = self.projected_gram(&all);
         // Stage 4: exchange every member of the best sets for every other candidate, as long as a set gets better.
         for k in 0..trials.len().min(BEAM) {
+            // The members of a large set are exchanged once it is accepted, and only for similar ones.
+            if trials[k].picks.len() > accepted.len() + MOST_EXCHANGED {
+                continue;
+            }
             // Repeat as long as any exchange improves the set.
             let mut best = trials[k].clone();
             loop {

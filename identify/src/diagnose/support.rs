@@ -36,6 +36,11 @@ pub struct EffectSupport {
 impl EffectSupport {
     /// Probability that the effect is present, 0 to 1: monotone in each quantity.
     pub fn probability(&self) -> f64 {
+        (self.share * self.group_probability()).min(PROBABILITY_MOST)
+    }
+
+    /// Probability that the effect or one of its alternatives is present, 0 to 1.
+    pub fn group_probability(&self) -> f64 {
         let [least_t, most_t] = SUPPORT_T_RANGE;
         let [least_gain, most_gain] = SUPPORT_GAIN_RANGE;
         // In white noise nothing else could explain the gain.
@@ -48,7 +53,7 @@ impl EffectSupport {
             + ODDS_PER_T * (self.t.clamp(least_t, most_t) / SUPPORT_T_REFERENCE).ln()
             + ODDS_PER_GAIN * (self.gain.clamp(least_gain, most_gain) / SUPPORT_GAIN_REFERENCE).ln()
             - ODDS_PER_UNEXPLAINED * self.unexplained.max(0.0).ln_1p();
-        (self.share / (1.0 + (-log_odds).exp())).min(PROBABILITY_MOST)
+        (1.0 / (1.0 + (-log_odds).exp())).min(PROBABILITY_MOST)
     }
 }
 

@@ -276,12 +276,14 @@ pub(crate) fn find_series(time: &[f64], signals: &[&[f64]], positions: &[&[f64]]
 }
 
 /// Whether a signal could continue at its end with its start: the difference is at most a few of its steps, and so
-/// small beside its range that it is no part of the motion.
+/// small beside its range that it is no part of the motion. A signal that crosses most of its range in one step is noise
+/// about a constant.
 fn is_closed(values: &[f64]) -> bool {
     let largest = values.windows(2).map(|w| (w[1] - w[0]).abs()).fold(0.0, f64::max);
     let [low, high] = [f64::min, f64::max].map(|choose| values.iter().copied().fold(values[0], choose));
     let apart = (values[values.len() - 1] - values[0]).abs();
-    apart <= SERIES_CLOSED_STEPS * largest && apart <= SERIES_CLOSED_SHARE * (high - low)
+    let is_noise = largest > 0.5 * (high - low);
+    apart <= SERIES_CLOSED_STEPS * largest && (is_noise || apart <= SERIES_CLOSED_SHARE * (high - low))
 }
 
 /// The period near the given one, and the number of significant harmonics; `None` if their residual is not noise.

@@ -30,6 +30,16 @@ pub(crate) fn examine_forces(
     data: &RecordingSegment,
     delays: Option<&ForceDelayAudit>,
 ) -> Vec<RecordingNote> {
+    let file = &data.run.file;
+    let before_gear = nominal_forces::gear_note(&model.derivation.mechanism, &gear_factors(model, data), file);
+    // A delay is reported only if nothing else is suspicious.
+    let found = before_gear.or_else(|| delays.and_then(|late| late.delay_note(file)));
+    found.into_iter().collect()
+}
+
+/// For each drive the factor by which its force is smaller than with the nominal values, with its sign, if that is
+/// typical of a gear; empty for recordings that are too short or without forces.
+pub(crate) fn gear_factors(model: &Model, data: &RecordingSegment) -> Vec<Option<f64>> {
     let n = data.samples();
     let Some(forces) = data.run.force.as_deref().filter(|_| n > AUDIT_FEWEST_SAMPLES) else {
         return Vec::new();
@@ -42,16 +52,13 @@ pub(crate) fn examine_forces(
         return Vec::new();
     };
     let expected = regressor * DVector::from_column_slice(&model.nominal);
-    // Rows are interleaved by drive.
-    let of_drive = |d: usize| expected.iter().skip(d).step_by(forces.len()).copied().collect();
-    let expected: Vec<Vec<f64>> = (0..forces.len()).map(of_drive).collect();
-    let pick = |force: &Vec<f64>| samples.iter().map(|k| force[*k]).collect();
-    let measured: Vec<Vec<f64>> = forces.iter().map(pick).collect();
-    let file = &data.run.file;
-    let before_gear = nominal_forces::gear_note(&model.derivation.mechanism, &measured, &expected, file);
-    // A delay is reported only if nothing else is suspicious.
-    let found = before_gear.or_else(|| delays.and_then(|late| late.delay_note(file)));
-    found.into_iter().collect()
+    let of_drive = |d: usize| {
+        // Rows are interleaved by drive.
+        let expected: Vec<f64> = expected.iter().skip(d).step_by(forces.len()).copied().collect();
+        let measured: Vec<f64> = samples.iter().map(|k| forces[d][*k]).collect();
+        nominal_forces::gear_factor(&measured, &expected)
+    };
+    (0..forces.len()).map(of_drive).collect()
 }
 
 /// Adds notes on contacts and pushes. With `leave_out`, forces during these are excluded.

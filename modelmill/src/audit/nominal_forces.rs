@@ -16,22 +16,17 @@ fn correlation_and_ratio(one: &[f64], other: &[f64]) -> (f64, f64) {
 
 /// The factor by which a measured force is smaller than the nominal one, as a motor torque before its gear or a motor
 /// current is, with its sign; `None` if they agree or are unrelated.
-fn gear_factor(measured: &[f64], nominal: &[f64]) -> Option<f64> {
+pub(super) fn gear_factor(measured: &[f64], nominal: &[f64]) -> Option<f64> {
     let (correlation, ratio) = correlation_and_ratio(measured, nominal);
     let is_clear = correlation.is_finite() && correlation.abs() >= NOMINAL_LEAST_CORRELATION;
     (is_clear && GEAR_RATIOS.contains(&ratio.recip())).then(|| correlation.signum() / ratio)
 }
 
-/// The note on drives whose forces are smaller than the nominal ones by a factor typical of a gear; `None` without any.
-/// Forces are `[drive][sample]`.
-pub(super) fn gear_note(
-    mechanism: &Mechanism,
-    measured: &[Vec<f64>],
-    nominal: &[Vec<f64>],
-    file: &str,
-) -> Option<RecordingNote> {
-    let found: Vec<(&ModelDrive, f64)> = (mechanism.drives.iter().zip(measured).zip(nominal))
-        .filter_map(|((drive, measured), nominal)| Some((drive, gear_factor(measured, nominal)?)))
+/// The note on drives whose forces are smaller than the nominal ones by a factor typical of a gear, given one factor per
+/// drive; `None` without any.
+pub(super) fn gear_note(mechanism: &Mechanism, factors: &[Option<f64>], file: &str) -> Option<RecordingNote> {
+    let found: Vec<(&ModelDrive, f64)> = (mechanism.drives.iter().zip(factors))
+        .filter_map(|(drive, factor)| Some((drive, (*factor)?)))
         .collect();
     (!found.is_empty()).then(|| RecordingNote::warning(column_query_text(&found, file)))
 }

@@ -2,7 +2,7 @@
 //! values of a diagnosis, output is English text without line breaks.
 
 use modelmill_identify::diagnose::{
-    DiagnosisVerdict, Disturbance, FORCE_ROUNDING, LocatedEffect, ModelDiagnosis, RejectionReason, ResidualCharacter,
+    DiagnosisVerdict, Disturbance, FORCE_ROUNDING, IdentifiedEffect, LACKING_LEAST_PROBABILITY, LocatedEffect, ModelDiagnosis, RejectionReason, ResidualCharacter,
     SelectionStep, TimeResidual,
 };
 
@@ -55,13 +55,32 @@ pub fn effect(effect: &LocatedEffect) -> String {
 
 /// Effects as a list for a sentence: `x, y and z`.
 pub fn effects(effects: &[LocatedEffect]) -> String {
-    let all: Vec<String> = effects.iter().map(effect).collect();
-    // The last effect is joined by `and`.
-    match all.as_slice() {
+    joined_by_and(&effects.iter().map(effect).collect::<Vec<_>>())
+}
+
+/// Names as a list whose last entry is joined by `and`.
+fn joined_by_and(names: &[String]) -> String {
+    match names {
         [] => "nothing".to_owned(),
         [one] => one.clone(),
         [first @ .., last] => format!("{} and {last}", first.join(", ")),
     }
+}
+
+/// Effects that were found, as a list for a sentence. One that is less likely than not is named with its alternatives.
+fn found_effects(found: &[IdentifiedEffect]) -> String {
+    let name = |one: &IdentifiedEffect| {
+        let others: Vec<String> = one.indistinguishable_from.iter().map(effect).collect();
+        match others.as_slice() {
+            [first @ .., last] if one.probability < LACKING_LEAST_PROBABILITY => {
+                let before: Vec<&str> = first.iter().map(|other| other.as_str()).collect();
+                let before = if before.is_empty() { String::new() } else { format!(", {}", before.join(", ")) };
+                format!("one of {}{before} or {last}, which the recordings do not distinguish", effect(&one.effect))
+            }
+            _ => effect(&one.effect),
+        }
+    };
+    joined_by_and(&found.iter().map(name).collect::<Vec<_>>())
 }
 
 /// The effects that a step of the selection added and dropped.
@@ -139,7 +158,7 @@ pub fn verdict(diagnosis: &ModelDiagnosis, channels: &[String], judged: Validati
         return String::new();
     };
     let noise = noise_floor_text(diagnosis);
-    let found: Vec<LocatedEffect> = diagnosis.effects.iter().map(|f| f.effect.clone()).collect();
+    let found = &diagnosis.effects;
     // The first step is the model as it is, the last one has all effects.
     let falls = error_reduction_text(first, last, channels, judged);
     let them = if found.len() == 1 { "it" } else { "them" };
@@ -150,8 +169,11 @@ pub fn verdict(diagnosis: &ModelDiagnosis, channels: &[String], judged: Validati
             adequate_text(last.check, &noise, judged)
         }
         DiagnosisVerdict::Adequate => adequate_text(last.check, &noise, judged),
-        DiagnosisVerdict::MissingEffect => format!("The model lacks {}. With {them} {falls}. {noise}", effects(&found)),
-        DiagnosisVerdict::Unexplained => unexplained_verdict(diagnosis, channels, judged, &found, &falls),
+        DiagnosisVerdict::MissingEffect => format!(
+            "The model lacks {}. With {them} {falls}. {noise}",
+            found_effects(found)
+        ),
+        DiagnosisVerdict::Unexplained => unexplained_verdict(diagnosis, channels, judged, found, &falls),
     };
     // Suspicions come first, since they may make the verdict wrong.
     let all = [first_checks(diagnosis), Some(says), disturbances(diagnosis)];
@@ -164,7 +186,7 @@ fn unexplained_verdict(
     diagnosis: &ModelDiagnosis,
     channels: &[String],
     judged: ValidationMethod,
-    found: &[LocatedEffect],
+    found: &[IdentifiedEffect],
     falls: &str,
 ) -> String {
     let noise = noise_floor_text(diagnosis);
@@ -198,7 +220,7 @@ fn unexplained_verdict(
             let them = if found.len() == 1 { "it" } else { "them" };
             vec![format!(
                 "The model lacks {}. With {them} {falls}. {noise}",
-                effects(found)
+                found_effects(found)
             )]
         }
     };

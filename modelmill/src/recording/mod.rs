@@ -541,6 +541,10 @@ impl PreparedRecording {
                 [RecordingFaultKind::ExchangedColumns, RecordingFaultKind::WrongSign].contains(&fault.kind);
             !may_be_delay || delay_gain < DELAY_LEAST_SHARE_OF_GAIN * fault.fit_gain.max(1.0)
         });
+        // Forces before a gear have a sign beside their factor, which the note on the gear states for each drive.
+        if self.suspect.as_ref().is_some_and(|fault| self.is_sign_of_gears(model, fault)) {
+            self.suspect = None;
+        }
         if let (Some(fault), Some(first)) = (&self.suspect, self.segments.first_mut()) {
             first.note(model, RecordingNote::warning(fault.note_text()));
             first.faults.push(fault.disturbance());
@@ -557,6 +561,17 @@ impl PreparedRecording {
     /// The suspected fault of the recording that explains it best.
     pub fn suspected_fault(&self) -> Option<&SuspectedFault> {
         self.suspect.as_ref()
+    }
+
+    /// Whether a fault is a wrong sign of forces that are smaller than the nominal ones by a factor typical of a gear.
+    fn is_sign_of_gears(&self, model: &Model, fault: &SuspectedFault) -> bool {
+        let (drives, first) = (model.drives(), self.segments.first());
+        let factors = || first.map_or_else(Vec::new, |first| audit::gear_factors(model, first));
+        fault.kind == RecordingFaultKind::WrongSign && {
+            let geared: Vec<bool> = factors().iter().map(Option::is_some).collect();
+            let is_geared = |at: &String| drives.iter().zip(&geared).any(|(drive, geared)| drive == at && *geared);
+            fault.at.iter().all(is_geared)
+        }
     }
 
     /// The recording as it would be after operations on its columns, prepared and examined again for a model. Its notes

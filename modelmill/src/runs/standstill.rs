@@ -62,7 +62,9 @@ fn is_rate_noise(segment: &RecordingSegment, rate: &[f64], bound: f64) -> bool {
     let reversals = moving.windows(2).filter(|pair| pair[0] * pair[1] < 0.0).count();
     // The rate of a constant position is rounding, which may reverse slowly.
     let is_zero = rate.iter().all(|rate| rate.abs() < ROUNDING_RATE);
-    is_zero || reversals as f64 > NOISE_REVERSALS_PER_CUTOFF * cutoff * duration
+    // A Fourier series ends where the motion ends, so that the motion itself may reverse as fast as its last harmonic.
+    let is_series = segment.run.prepared.period.is_some();
+    is_zero || !is_series && reversals as f64 > NOISE_REVERSALS_PER_CUTOFF * cutoff * duration
 }
 
 /// The usual largest speed: single wrong samples do not raise it.
