@@ -114,7 +114,9 @@ impl EffectSelector<'_> {
                 }
             }
         }
-        let few = sets.into_iter().filter_map(|set| self.drop_weak_members(table, accepted.len(), set, worth));
+        let few = sets
+            .into_iter()
+            .filter_map(|set| self.drop_weak_members(table, accepted.len(), set, worth));
         few.chain(best_at_drive.into_values()).collect()
     }
 
@@ -160,7 +162,9 @@ impl EffectSelector<'_> {
             let Some(strength) = strength(&without, pick) else {
                 continue;
             };
-            let of_place = weakest.entry(&self.candidate(&picks[i]).effect.at).or_insert((strength, i));
+            let of_place = weakest
+                .entry(&self.candidate(&picks[i]).effect.at)
+                .or_insert((strength, i));
             if strength < of_place.0 {
                 *of_place = (strength, i);
             }

@@ -2,8 +2,8 @@
 //! values of a diagnosis, output is English text without line breaks.
 
 use modelmill_identify::diagnose::{
-    DiagnosisVerdict, Disturbance, FORCE_ROUNDING, IdentifiedEffect, LACKING_LEAST_PROBABILITY, LocatedEffect, ModelDiagnosis, RejectionReason, ResidualCharacter,
-    SelectionStep, TimeResidual,
+    DiagnosisVerdict, Disturbance, FORCE_ROUNDING, IdentifiedEffect, LACKING_LEAST_PROBABILITY, LocatedEffect,
+    ModelDiagnosis, RejectionReason, ResidualCharacter, SelectionStep, TimeResidual,
 };
 
 use crate::faults::{SuspectedFault, is_suspicion};
@@ -73,9 +73,8 @@ fn found_effects(found: &[IdentifiedEffect]) -> String {
         let others: Vec<String> = one.indistinguishable_from.iter().map(effect).collect();
         match others.as_slice() {
             [first @ .., last] if one.probability < LACKING_LEAST_PROBABILITY => {
-                let before: Vec<&str> = first.iter().map(|other| other.as_str()).collect();
-                let before = if before.is_empty() { String::new() } else { format!(", {}", before.join(", ")) };
-                format!("one of {}{before} or {last}, which the recordings do not distinguish", effect(&one.effect))
+                let before = [&[effect(&one.effect)], first].concat().join(", ");
+                format!("one of {before} or {last}, which the recordings do not distinguish")
             }
             _ => effect(&one.effect),
         }
@@ -169,10 +168,9 @@ pub fn verdict(diagnosis: &ModelDiagnosis, channels: &[String], judged: Validati
             adequate_text(last.check, &noise, judged)
         }
         DiagnosisVerdict::Adequate => adequate_text(last.check, &noise, judged),
-        DiagnosisVerdict::MissingEffect => format!(
-            "The model lacks {}. With {them} {falls}. {noise}",
-            found_effects(found)
-        ),
+        DiagnosisVerdict::MissingEffect => {
+            format!("The model lacks {}. With {them} {falls}. {noise}", found_effects(found))
+        }
         DiagnosisVerdict::Unexplained => unexplained_verdict(diagnosis, channels, judged, found, &falls),
     };
     // Suspicions come first, since they may make the verdict wrong.

@@ -542,7 +542,11 @@ impl PreparedRecording {
             !may_be_delay || delay_gain < DELAY_LEAST_SHARE_OF_GAIN * fault.fit_gain.max(1.0)
         });
         // Forces before a gear have a sign beside their factor, which the note on the gear states for each drive.
-        if self.suspect.as_ref().is_some_and(|fault| self.is_sign_of_gears(model, fault)) {
+        if self
+            .suspect
+            .as_ref()
+            .is_some_and(|fault| self.is_sign_of_gears(model, fault))
+        {
             self.suspect = None;
         }
         if let (Some(fault), Some(first)) = (&self.suspect, self.segments.first_mut()) {
