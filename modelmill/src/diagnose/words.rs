@@ -15,6 +15,8 @@ use super::thresholds::{HARDLY_LOWER, NOISE_FREE_ROUNDINGS};
 const CHANGES_IN_TIME: [&str; 3] = ["payload_change", "gain_change", "offset_step"];
 /// Intervals that a sentence lists at most.
 const MOST_INTERVALS: usize = 4;
+/// Places from which on a kind is named once with all of them.
+const GROUP_FEWEST_PLACES: usize = 3;
 
 /// The data on which errors are evaluated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,30 +70,87 @@ fn joined_by_and(names: &[String]) -> String {
 }
 
 /// Effects that were found, as a list for a sentence. One that is less likely than not is named with its alternatives.
-fn found_effects(found: &[IdentifiedEffect]) -> String {
-    let name = |one: &IdentifiedEffect| {
-        let others: Vec<String> = one.indistinguishable_from.iter().map(effect).collect();
-        match others.as_slice() {
-            [first @ .., last] if one.probability < LACKING_LEAST_PROBABILITY => {
-                let before = [&[effect(&one.effect)], first].concat().join(", ");
-                format!("one of {before} or {last}, which the recordings do not distinguish")
-            }
-            _ => effect(&one.effect),
-        }
-    };
-    joined_by_and(&found.iter().map(name).collect::<Vec<_>>())
+fn found_effects(found: &[IdentifiedEffect], channels: &[String]) -> String {
+    let is_ambiguous =
+        |one: &&IdentifiedEffect| one.probability < LACKING_LEAST_PROBABILITY && !one.indistinguishable_from.is_empty();
+    let (ambiguous, clear): (Vec<&IdentifiedEffect>, Vec<&IdentifiedEffect>) = found.iter().partition(is_ambiguous);
+    let clear: Vec<LocatedEffect> = clear.iter().map(|one| one.effect.clone()).collect();
+    let mut names = grouped_effects(&clear, channels);
+    names.extend(ambiguous.iter().map(|one| {
+        let all: Vec<String> = [&one.effect]
+            .into_iter()
+            .chain(&one.indistinguishable_from)
+            .map(effect)
+            .collect();
+        let (last, first) = all.split_last().unwrap_or((&all[0], &[]));
+        format!(
+            "one of {} or {last}, which the recordings do not distinguish",
+            first.join(", ")
+        )
+    }));
+    joined_by_and(&names)
 }
 
-/// The effects that a step of the selection added and dropped.
-pub fn rung(rung: &SelectionStep) -> String {
+/// Names of effects for a sentence or a table; a kind at several drives is named once, with all of them. `channels` are
+/// the names of the drives.
+fn grouped_effects(effects: &[LocatedEffect], channels: &[String]) -> Vec<String> {
+    let mut groups: Vec<(&str, Vec<&str>)> = Vec::new();
+    let mut names = Vec::new();
+    for one in effects {
+        let of_kind = || {
+            effects
+                .iter()
+                .filter(|other| other.kind == one.kind && other.at.len() == 1)
+        };
+        let [place] = one.at.as_slice() else {
+            names.push(effect(one));
+            continue;
+        };
+        if of_kind().count() < GROUP_FEWEST_PLACES {
+            names.push(effect(one));
+        } else if let Some((_, places)) = groups.iter_mut().find(|(kind, _)| *kind == one.kind) {
+            places.push(place);
+        } else {
+            groups.push((&one.kind, vec![place]));
+        }
+    }
+    // Kinds at the same places share them.
+    let mut shared: Vec<(Vec<String>, Vec<&str>)> = Vec::new();
+    for (name, places) in groups {
+        match shared.iter_mut().find(|(_, others)| *others == places) {
+            Some((kinds, _)) => kinds.push(kind(name)),
+            None => shared.push((vec![kind(name)], places)),
+        }
+    }
+    let shared = shared
+        .into_iter()
+        .map(|(kinds, places)| format!("{} {}", joined_by_and(&kinds), place_list(&places, channels)));
+    shared.chain(names).collect()
+}
+
+/// Places in brackets, or that these are all drives.
+fn place_list(places: &[&str], channels: &[String]) -> String {
+    let are_all_drives = places.len() >= GROUP_FEWEST_PLACES
+        && places.len() == channels.len()
+        && channels.iter().all(|channel| places.contains(&channel.as_str()));
+    if are_all_drives {
+        format!("(all {} drives)", channels.len())
+    } else {
+        format!("({})", places.join(", "))
+    }
+}
+
+/// The effects that a step of the selection added and dropped; `channels` are the names of the drives.
+pub fn rung(rung: &SelectionStep, channels: &[String]) -> String {
     // The first step is the model of the file.
     if rung.added.is_empty() && rung.dropped.is_empty() {
         return "the given model".to_owned();
     }
     // Signs show what was added and what became unnecessary.
     let mut says = Vec::new();
-    says.extend(rung.added.iter().map(|one| format!("+ {}", effect(one))));
-    says.extend(rung.dropped.iter().map(|one| format!("− {}", effect(one))));
+    let named = |effects: &[LocatedEffect]| grouped_effects(effects, channels);
+    says.extend(named(&rung.added).iter().map(|name| format!("+ {name}")));
+    says.extend(named(&rung.dropped).iter().map(|name| format!("− {name}")));
     says.join(" ")
 }
 
@@ -169,12 +228,15 @@ pub fn verdict(diagnosis: &ModelDiagnosis, channels: &[String], judged: Validati
         }
         DiagnosisVerdict::Adequate => adequate_text(last.check, &noise, judged),
         DiagnosisVerdict::MissingEffect => {
-            format!("The model lacks {}. With {them} {falls}. {noise}", found_effects(found))
+            format!(
+                "The model lacks {}. With {them} {falls}. {noise}",
+                found_effects(found, channels)
+            )
         }
         DiagnosisVerdict::Unexplained => unexplained_verdict(diagnosis, channels, judged, found, &falls),
     };
     // Suspicions come first, since they may make the verdict wrong.
-    let all = [first_checks(diagnosis), Some(says), disturbances(diagnosis)];
+    let all = [first_checks(diagnosis), Some(says), disturbances(diagnosis, channels)];
     all.into_iter().flatten().collect::<Vec<_>>().join(" ")
 }
 
@@ -189,16 +251,24 @@ fn unexplained_verdict(
 ) -> String {
     let noise = noise_floor_text(diagnosis);
     // Drives with a residual that a model could explain.
-    let sits: Vec<String> = (diagnosis.unexplained.iter())
-        .map(|d| {
-            format!(
-                "{} ({:.0} % of the squared residual is repeatable)",
-                channels[*d],
-                100.0 * diagnosis.repeatable_share[*d]
-            )
-        })
-        .collect();
-    let sits = sits.join(" and ");
+    let shares = diagnosis.unexplained.iter().enumerate().map(|(i, d)| {
+        let what = if i == 0 {
+            " of the squared residual is repeatable"
+        } else {
+            ""
+        };
+        format!(
+            "{} ({:.0} %{what})",
+            channels[*d],
+            100.0 * diagnosis.repeatable_share[*d]
+        )
+    });
+    let shares: Vec<String> = shares.collect();
+    let sits = if shares.is_empty() {
+        String::new()
+    } else {
+        joined_by_and(&shares)
+    };
     let error = diagnosis
         .steps
         .last()
@@ -218,7 +288,7 @@ fn unexplained_verdict(
             let them = if found.len() == 1 { "it" } else { "them" };
             vec![format!(
                 "The model lacks {}. With {them} {falls}. {noise}",
-                found_effects(found)
+                found_effects(found, channels)
             )]
         }
     };
@@ -378,7 +448,7 @@ pub(crate) fn has_suspicion(diagnosis: &ModelDiagnosis) -> bool {
 }
 
 /// Disturbances of the recordings by name, each kind once with all its places; `None` without any.
-fn disturbances(diagnosis: &ModelDiagnosis) -> Option<String> {
+fn disturbances(diagnosis: &ModelDiagnosis, channels: &[String]) -> Option<String> {
     // Kinds in the order of their first disturbance.
     let mut kinds: Vec<(&str, Vec<&str>)> = Vec::new();
     for one in diagnosis.disturbances.iter().filter(|d| !is_suspicion(d)) {
@@ -397,7 +467,7 @@ fn disturbances(diagnosis: &ModelDiagnosis) -> Option<String> {
             at.retain(|place| seen.insert(*place));
             match at.as_slice() {
                 [] => kind(name),
-                at => format!("{} ({})", kind(name), at.join(", ")),
+                at => format!("{} {}", kind(name), place_list(at, channels)),
             }
         })
         .collect();

@@ -175,7 +175,13 @@ impl DiagnosisFindings {
         lines.push(style.bold("Error after each added effect, relative to the force (nrms)"));
         // Errors after each step, on fitted and on validation data.
         let rows: Vec<Vec<String>> = (diagnosis.steps.iter())
-            .map(|rung| vec![words::rung(rung), percent(Some(rung.fit)), percent(Some(rung.check))])
+            .map(|rung| {
+                vec![
+                    words::rung(rung, self.channels()),
+                    percent(Some(rung.fit)),
+                    percent(Some(rung.check)),
+                ]
+            })
             .collect();
         lines.extend(table(
             2,

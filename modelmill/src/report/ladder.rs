@@ -1,10 +1,8 @@
 //! Picture of the error after each added effect, on the fitted and on the validation runs, on a logarithmic
 //! axis with the noise of the forces.
 
-use modelmill_identify::diagnose::SelectionStep;
-
 use super::draw::{PlotAxis, SvgPicture, WIDTH};
-use crate::diagnose::words::{self, ValidationMethod};
+use crate::diagnose::{DiagnosisFindings, words};
 use crate::text::table::percent;
 
 /// Smallest height of a step.
@@ -18,8 +16,10 @@ const LEFT: f64 = 290.0;
 /// Largest number of letters of a line of a label.
 const LETTERS: usize = 38;
 
-/// The picture as SVG; `noise` is relative to the force.
-pub(crate) fn picture(ladder: &[SelectionStep], noise: f64, judged: ValidationMethod) -> String {
+/// The picture as SVG.
+pub(crate) fn picture(findings: &DiagnosisFindings) -> String {
+    let diagnosis = &findings.diagnosis;
+    let (ladder, noise, judged) = (&diagnosis.steps, diagnosis.noise_floor, findings.validation);
     // The axis covers all errors and the noise.
     let errors = ladder.iter().flat_map(|rung| [rung.fit, rung.check]);
     let all: Vec<f64> = errors.chain([noise]).filter(|e| *e > 0.0).collect();
@@ -30,7 +30,7 @@ pub(crate) fn picture(ladder: &[SelectionStep], noise: f64, judged: ValidationMe
     }
     let labels: Vec<Vec<String>> = ladder
         .iter()
-        .map(|rung| words::lines(&words::rung(rung), LETTERS))
+        .map(|rung| words::lines(&words::rung(rung, findings.channels()), LETTERS))
         .collect();
     // All rows have the height of the longest label.
     let longest = labels.iter().map(Vec::len).max().unwrap_or(1);

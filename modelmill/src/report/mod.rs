@@ -28,8 +28,7 @@ pub use tables::{TableCell, table};
 
 /// Picture (SVG) of the error after each added effect, on the fitted and on the validation runs, with the noise.
 pub fn ladder(findings: &DiagnosisFindings) -> String {
-    let diagnosis = &findings.diagnosis;
-    ladder::picture(&diagnosis.steps, diagnosis.noise_floor, findings.validation)
+    ladder::picture(findings)
 }
 
 /// The key of the colours: the model before and after the effects.

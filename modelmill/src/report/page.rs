@@ -128,14 +128,13 @@ fn summary(findings: &DiagnosisFindings) -> String {
 /// Errors after each added effect, as picture and table, and errors of each drive.
 fn ladder_section(findings: &DiagnosisFindings) -> String {
     // The picture shows the steps, the table has the numbers.
-    let diagnosis = &findings.diagnosis;
     format!(
         "<figure class=\"still\"><figcaption><b>Error relative to the force</b> <span class=\"key c-fit\">fit</span> \
          <span class=\"key c-after\">{}</span></figcaption>\n{}</figure>\n{}\n\
          <p>All errors are nrms: rms of measured minus calculated force, divided by rms of the measured force. Each step was \
          tested {}.</p>\n{}",
         findings.validation.phrase(),
-        ladder::picture(&diagnosis.steps, diagnosis.noise_floor, findings.validation),
+        ladder::picture(findings),
         tables::ladder(findings),
         findings.validation.phrase(),
         tables::drives(findings)

@@ -80,7 +80,7 @@ pub(crate) fn ladder(findings: &DiagnosisFindings) -> String {
                 None => TableCell::text(""),
             };
             vec![
-                TableCell::text(&words::rung(rung)),
+                TableCell::text(&words::rung(rung, findings.channels())),
                 percents(rung.fit),
                 percents(rung.check),
                 of(&|| evidence.map(|e| (percent(Some(e.gain)), e.gain))),

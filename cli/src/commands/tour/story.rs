@@ -1,7 +1,7 @@
 //! Text of the tour: paragraphs, tables and figures in the order in which they are printed.
 
 use modelmill::Model;
-use modelmill::diagnose::{DiagnosisFindings, SelectionStep, words};
+use modelmill::diagnose::{DiagnosisFindings, words};
 use modelmill::print::tables;
 use modelmill::text::TerminalStyle;
 use modelmill::text::table::{ColumnAlignment, count, percent, table};
@@ -211,8 +211,7 @@ impl TourText {
     /// Errors after each added effect, and the identified parameters.
     pub(super) fn ladder(&mut self, findings: &DiagnosisFindings) {
         self.heading("5  Identify again: the error falls");
-        let diagnosis = &findings.diagnosis;
-        self.bars(&diagnosis.steps, diagnosis.noise_floor);
+        self.bars(findings);
         if let Ok(after) = &findings.after
             && let Some(result) = &after.identified
         {
@@ -230,7 +229,9 @@ impl TourText {
     }
 
     /// Errors on the validation run as logarithmic bars, down to the noise floor.
-    fn bars(&mut self, ladder: &[SelectionStep], noise: f64) {
+    fn bars(&mut self, findings: &DiagnosisFindings) {
+        let (ladder, noise) = (&findings.diagnosis.steps, findings.diagnosis.noise_floor);
+        let channels = findings.channels();
         let largest = ladder.iter().map(|rung| rung.check).fold(noise, f64::max);
         // The axis includes the noise floor, if it is above zero.
         let least = ladder.iter().map(|rung| rung.check);
@@ -246,7 +247,7 @@ impl TourText {
             }
         };
         let name = words::floor_label(noise).to_owned();
-        let rungs = ladder.iter().map(|rung| (words::rung(rung), rung.check));
+        let rungs = ladder.iter().map(|rung| (words::rung(rung, channels), rung.check));
         for (name, error) in rungs.chain([(name, noise)]) {
             let bar = bar(share(error), 1.0, BAR);
             // Green: within 30 % of the noise floor, so nothing is left to explain.
@@ -282,7 +283,7 @@ impl TourText {
         );
         self.paragraph(&verdict(findings));
         let diagnosis = &findings.diagnosis;
-        self.bars(&diagnosis.steps, diagnosis.noise_floor);
+        self.bars(findings);
         for found in &diagnosis.effects {
             let kinds = &findings.before.model.loaded.kinds;
             if let Some(kind) = kinds.iter().find(|k| k.name == found.effect.kind) {
