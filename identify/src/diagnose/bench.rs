@@ -180,7 +180,7 @@ impl<'a> EffectSelector<'a> {
         for (d, values) in rest.iter().enumerate() {
             let noise = self.problem.noise[d].powi(2);
             let rounding = measured.0[d].as_deref().map_or(0.0, size) * 1e-14;
-            let variance = size(values).max(noise).max(rounding);
+            let variance = self.pool.mean_square(d, values).max(noise).max(rounding);
             self.weights[d] = if variance > 0.0 { 1.0 / variance } else { 1.0 };
         }
         self.base_set = self.conditioning_set(&[]);
@@ -192,8 +192,9 @@ impl<'a> EffectSelector<'a> {
         for d in channels {
             let mut start = 0;
             for segment in &self.problem.layout.segments {
-                worth += effective_samples(&rest[*d][start..start + segment.samples]);
-                start += segment.samples;
+                let end = start + segment.samples;
+                worth += effective_samples(&self.pool.counted_values(*d, &rest[*d], start..end));
+                start = end;
             }
         }
         worth.max(2.0)

@@ -202,7 +202,7 @@ impl EffectSelector<'_> {
         let mut trial = self.fit_from_gram(table, picks);
         // Each round removes at least one member.
         while !trial.is_possible() {
-            let wrong = [trial.wrong_sign.as_slice(), trial.cancelling.as_slice()].concat();
+            let wrong = [&trial.wrong_sign[..], &trial.cancelling, &trial.implausible].concat();
             let wrong: Vec<usize> = wrong.into_iter().filter(|i| *i >= first).collect();
             if wrong.is_empty() {
                 return None;

@@ -151,7 +151,7 @@ impl EffectSelector<'_> {
                 }
             }
             // Split the mean square of the residual into the repeatable part and noise.
-            let left = size(rest);
+            let left = self.pool.mean_square(d, rest);
             let model = left * again[d];
             let force = problem.measured_force(d);
             let removed = problem.removed.get(d).copied().unwrap_or(0.0);
@@ -178,7 +178,7 @@ impl EffectSelector<'_> {
     /// is white.
     fn coloured_noise(&self, channel: usize, rest: &[f64], again: f64) -> Option<Disturbance> {
         let layout = &self.problem.layout;
-        let variance = dot(rest, rest) / rest.len().max(1) as f64;
+        let variance = self.pool.mean_square(channel, rest);
         if is_white(self.problem, channel, variance * (1.0 - again)) {
             return None;
         }

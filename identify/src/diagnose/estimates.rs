@@ -15,7 +15,8 @@ impl EffectSelector<'_> {
         let rest = self.residual(picks, &factors);
         let mut weights = self.weights.clone();
         for (d, weight) in weights.iter_mut().enumerate() {
-            *weight *= self.effective_equations(&rest, &[d]) / rest[d].len().max(1) as f64;
+            let counted = self.pool.counted_samples(d, &(0..rest[d].len()));
+            *weight *= self.effective_equations(&rest, &[d]) / counted.max(1) as f64;
         }
         let gram = self.pool.gram(&which, &weights, on);
         let n = gram.nrows();

@@ -216,7 +216,7 @@ impl EffectSelector<'_> {
     fn squares_over_noise(&self, rest: &[Vec<f64>], channels: &[usize]) -> f64 {
         let of = |d: &usize| {
             let noise = self.problem.noise[*d].powi(2).max(f64::MIN_POSITIVE);
-            dot(&rest[*d], &rest[*d]) / rest[*d].len().max(1) as f64 / noise
+            self.pool.mean_square(*d, &rest[*d]) / noise
         };
         channels.iter().map(of).sum::<f64>() / channels.len().max(1) as f64
     }

@@ -503,9 +503,8 @@ impl EffectSelector<'_> {
     /// Whether the residual of a channel is more than noise: a part of it is repeatable, and that share would be enough
     /// to add an effect. `again` is the repeatable share.
     fn is_unexplained(&self, channel: usize, rest: &[f64], again: f64) -> bool {
-        let squares = dot(rest, rest) / rest.len().max(1) as f64;
         let noise = self.problem.noise[channel].powi(2);
-        squares > noise && again > LEAST_GAIN
+        self.pool.mean_square(channel, rest) > noise && again > LEAST_GAIN
     }
 
     /// Share of the squared error of the unchanged model that each candidate explains alone, `[candidate]`, 0 to 1.
@@ -556,7 +555,8 @@ impl EffectSelector<'_> {
         let split = layout.fit_samples();
         let rest = self.full_residual(picks);
         let channels = 0..rest.len();
-        let forces: Vec<Vec<f64>> = channels.clone().map(|d| self.problem.measured_force(d)).collect();
+        let mut forces: Vec<Vec<f64>> = channels.clone().map(|d| self.problem.measured_force(d)).collect();
+        self.zero_left_out(&mut forces);
         let norm = |part: &[f64]| dot(part, part);
         let squares = |of: &[Vec<f64>], range: std::ops::Range<usize>| -> Vec<f64> {
             of.iter().map(|all| norm(&all[range.clone()])).collect()
@@ -589,12 +589,17 @@ impl EffectSelector<'_> {
         let (factors, _) = self.fit(picks, FitScope::Fit);
         let columns = self.columns(picks);
         let mut rest = (self.pool).full_residual(self.measured, &columns, factors.as_slice());
-        for (rest, out) in rest.iter_mut().zip(&self.problem.left_out) {
-            for (r, _) in rest.iter_mut().zip(out).filter(|(_, out)| **out) {
-                *r = 0.0;
+        self.zero_left_out(&mut rest);
+        rest
+    }
+
+    /// Sets the samples that are left out of the diagnosis to zero, `[channel][sample]`.
+    fn zero_left_out(&self, values: &mut [Vec<f64>]) {
+        for (values, out) in values.iter_mut().zip(&self.problem.left_out) {
+            for (value, _) in values.iter_mut().zip(out).filter(|(_, out)| **out) {
+                *value = 0.0;
             }
         }
-        rest
     }
 
     /// Whether a change raises the squared residual over all samples, reversals included, in the fit and in the

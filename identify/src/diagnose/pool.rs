@@ -113,6 +113,28 @@ impl<'a> ColumnPool<'a> {
         out[from..to].iter().map(|i| a[*i] * b[*i]).sum()
     }
 
+    /// Number of samples of a channel in a range that are not excluded.
+    pub(crate) fn counted_samples(&self, channel: usize, range: &Range<usize>) -> usize {
+        let out = self.left_out.get(channel).map_or(&[][..], Vec::as_slice);
+        let from = out.partition_point(|i| *i < range.start);
+        let to = out.partition_point(|i| *i < range.end);
+        range.len() - (to - from)
+    }
+
+    /// Mean square of a series over all samples of a channel that are not excluded; excluded ones must be zero.
+    pub(crate) fn mean_square(&self, channel: usize, values: &[f64]) -> f64 {
+        dot(values, values) / self.counted_samples(channel, &(0..values.len())).max(1) as f64
+    }
+
+    /// The values of a range that are not excluded.
+    pub(crate) fn counted_values(&self, channel: usize, values: &[f64], range: Range<usize>) -> Vec<f64> {
+        let out = self.left_out.get(channel).map_or(&[][..], Vec::as_slice);
+        let from = out.partition_point(|i| *i < range.start);
+        let mut out = out[from..].iter().peekable();
+        let is_counted = |i: &usize| out.next_if(|excluded| *excluded == i).is_none();
+        range.filter(is_counted).map(|i| values[i]).collect()
+    }
+
     /// Range of all samples.
     pub(crate) fn all_samples(&self) -> Range<usize> {
         0..self.check.end

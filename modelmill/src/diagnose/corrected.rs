@@ -6,8 +6,10 @@
 
 use modelmill_identify::diagnose::{DiagnosisVerdict, Disturbance};
 
-use crate::error::Outcome;
-use crate::faults::{FaultCorrection, RecordingFaultKind, SuspectedFault, correction_score, with_gravity};
+use crate::error::{Error, Outcome};
+use crate::faults::{
+    ColumnOperation, FaultCorrection, RecordingFaultKind, SuspectedFault, correction_score, with_gravity,
+};
 use crate::model::Model;
 use crate::recording::PreparedRecording;
 
@@ -25,7 +27,7 @@ pub(super) struct CorrectedRecordings {
     pub(super) check: Vec<PreparedRecording>,
     /// What was corrected.
     pub(super) corrected: Vec<SuspectedFault>,
-    /// Faults that remain, since several explain a recording equally well.
+    /// Faults that remain: several explain a recording equally well, or the correction of one fails.
     pub(super) unresolved: Vec<SuspectedFault>,
 }
 
@@ -55,12 +57,20 @@ impl CorrectedRecordings {
             let Some(correction) = fault.correction.clone() else {
                 break;
             };
-            let known = all.corrected.iter().any(|one| one.clause == fault.clause);
+            // The same fault of another recording may have been hidden.
+            let is_same = |one: &SuspectedFault| {
+                one.clause == fault.clause && fault.recordings.iter().any(|file| one.recordings.contains(file))
+            };
+            let known = all.corrected.iter().any(is_same);
             match correction {
-                // The same fault once more would undo its correction.
+                // The same fault of a recording once more would undo its correction.
                 _ if known => break,
                 FaultCorrection::Gravity(gravity) => all.correct_gravity(fault, gravity)?,
-                FaultCorrection::Columns(_) => all.correct_columns(fault, &correction)?,
+                FaultCorrection::Columns(operations) => {
+                    if !all.correct_columns(fault, &operations)? {
+                        break;
+                    }
+                }
             }
         }
         let left = all
@@ -101,12 +111,13 @@ impl CorrectedRecordings {
         Ok(())
     }
 
-    /// Corrects columns of the recordings that have a fault, and of those that it explains better.
-    fn correct_columns(&mut self, mut fault: SuspectedFault, correction: &FaultCorrection) -> Outcome {
-        let FaultCorrection::Columns(operations) = correction else {
-            return Ok(());
-        };
-        for one in self.fit.iter_mut().chain(&mut self.check) {
+    /// Corrects columns of the recordings that have a fault, and of those that it explains better. `false` if one that has
+    /// it cannot be prepared then, so that the fault stays.
+    ///
+    /// Fails when the job is cancelled.
+    fn correct_columns(&mut self, mut fault: SuspectedFault, operations: &[ColumnOperation]) -> Outcome<bool> {
+        let mut all: Vec<PreparedRecording> = self.fit.iter().chain(&self.check).cloned().collect();
+        for one in &mut all {
             let has_it = fault.recordings.iter().any(|file| file == one.file());
             if !has_it && one.suspected_fault().is_some() {
                 continue;
@@ -114,8 +125,9 @@ impl CorrectedRecordings {
             // A recording that cannot be prepared with the correction does not have the fault.
             let corrected = match one.corrected(&self.model, operations) {
                 Ok(corrected) => corrected,
-                Err(_) if !has_it => continue,
-                Err(error) => return Err(error),
+                Err(Error::Cancelled) => return Err(Error::Cancelled),
+                Err(_) if has_it => return Ok(false),
+                Err(_) => continue,
             };
             if !has_it {
                 let score = correction_score(&self.model, &one.segments, &corrected.segments);
@@ -126,8 +138,13 @@ impl CorrectedRecordings {
             }
             *one = corrected;
         }
-        self.corrected.push(fault);
-        Ok(())
+        self.check = all.split_off(self.fit.len());
+        self.fit = all;
+        match self.corrected.iter_mut().find(|one| one.clause == fault.clause) {
+            Some(one) => one.recordings.extend(fault.recordings),
+            None => self.corrected.push(fault),
+        }
+        Ok(true)
     }
 }
 
@@ -169,6 +186,16 @@ impl DiagnosisFindings {
             diagnosis.steps.truncate(1);
             diagnosis.verdict = DiagnosisVerdict::Unexplained;
             diagnosis.disturbances.retain(is_recording_fault);
+            diagnosis.possible_effects.clear();
+            diagnosis.undetermined_effects.clear();
+            diagnosis.candidates.clear();
+            diagnosis.time_residuals.clear();
+            diagnosis.unexplained.clear();
+            diagnosis.laws.clear();
+            self.possible.clear();
+            self.undecided.clear();
+            self.off_nominal.clear();
+            self.regions.clear();
             self.missing.clear();
             self.laws.clear();
             self.entries.clear();

@@ -54,8 +54,9 @@ pub(crate) struct DiagnosisSolution {
 impl DiagnosisSolution {
     /// Sum of the squared residuals of all drives, each relative to the squared force of the drive (1).
     pub(crate) fn mean_square_residual(&self) -> f64 {
-        let parts = self.diagnosis.budgets.iter().map(|budget| {
-            let squares = budget.noise.powi(2) + budget.model.powi(2);
+        let parts = self.diagnosis.budgets.iter().zip(&self.diagnosis.residual);
+        let parts = parts.map(|(budget, rest)| {
+            let squares = rest.iter().map(|r| r * r).sum::<f64>() / rest.len().max(1) as f64;
             squares / budget.force.powi(2).max(f64::MIN_POSITIVE)
         });
         parts.sum()

@@ -224,9 +224,9 @@ pub fn verdict(diagnosis: &ModelDiagnosis, channels: &[String], judged: Validati
     let says = match diagnosis.verdict {
         // After a correction the verdict stays cautious, although nothing is left to explain.
         DiagnosisVerdict::Unexplained if found.is_empty() && is_all_explained(diagnosis) => {
-            adequate_text(last.check, &noise, judged)
+            adequate_text(diagnosis, last.check, judged)
         }
-        DiagnosisVerdict::Adequate => adequate_text(last.check, &noise, judged),
+        DiagnosisVerdict::Adequate => adequate_text(diagnosis, last.check, judged),
         DiagnosisVerdict::MissingEffect => {
             format!(
                 "The model lacks {}. With {them} {falls}. {noise}",
@@ -274,13 +274,19 @@ fn unexplained_verdict(
         .last()
         .map(|last| percent(Some(last.check)))
         .unwrap_or_default();
+    // Effects that are less likely than not are listed as possible.
+    let (clearly, explains) = if diagnosis.possible_effects.is_empty() {
+        ("", "explains")
+    } else {
+        ("clearly ", "clearly explains")
+    };
     let mut says = match (found, sits.is_empty()) {
         ([], true) => vec![format!(
             "The model does not explain all of the recordings: the error {} is {error} of the force. {noise}",
             judged.phrase()
         )],
         ([], false) => vec![format!(
-            "The model lacks something that no effect of the library explains, on {sits}. The error {} is {error} of the force. \
+            "The model lacks something that no effect of the library {explains}, on {sits}. The error {} is {error} of the force. \
              {noise}",
             judged.phrase()
         )],
@@ -294,7 +300,7 @@ fn unexplained_verdict(
     };
     if !found.is_empty() && !sits.is_empty() {
         says.push(format!(
-            "A part of the residual is not explained by any effect of the library, on {sits}."
+            "A part of the residual is not {clearly}explained by any effect of the library, on {sits}."
         ));
     }
     // Changes in time are listed with the disturbances; here only what follows for the model.
@@ -304,7 +310,7 @@ fn unexplained_verdict(
         .collect();
     if !changes.is_empty() {
         says.push(format!(
-            "Something changes during a recording: {}. One model cannot hold before and after: cut the recording there.",
+            "Something changes during a recording: {}. No single model is valid before and after it: cut the recording there.",
             changes.join("; ")
         ));
     }
@@ -368,11 +374,17 @@ fn is_change_in_time(one: &Disturbance) -> bool {
 }
 
 /// The sentences of a model that lacks nothing.
-fn adequate_text(error: f64, noise: &str, judged: ValidationMethod) -> String {
+fn adequate_text(diagnosis: &ModelDiagnosis, error: f64, judged: ValidationMethod) -> String {
+    let lowers = if diagnosis.possible_effects.is_empty() {
+        "No effect of the library lowers this error."
+    } else {
+        "No effect of the library clearly lowers this error."
+    };
     format!(
-        "The model is adequate: its error {} is {} of the force. {noise} No effect of the library lowers this error.",
+        "The model is adequate: its error {} is {} of the force. {} {lowers}",
         judged.phrase(),
-        percent(Some(error))
+        percent(Some(error)),
+        noise_floor_text(diagnosis)
     )
 }
 

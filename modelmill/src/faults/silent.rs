@@ -4,6 +4,8 @@
 //! A candidate is an interval in which a force has no signal but white noise. It counts only if a fit to the rest of
 //! the recording predicts another force there.
 
+use std::ops::Range;
+
 use modelmill_boundary::message;
 use modelmill_identify::RecordingNote;
 use modelmill_identify::diagnose::{Disturbance, white_noise};
@@ -359,7 +361,18 @@ impl<'a> SilenceFit<'a> {
         }
         match (stands, is_zero) {
             // Dry friction may hold a joint without any force.
-            (true, true) => (mean(&f64::abs) > self.dry[d]).then_some((RecordingFaultKind::Brakes, size)),
+            (true, true) if mean(&f64::abs) <= self.dry[d] => None,
+            // Brakes hold all joints.
+            (true, true)
+                if data
+                    .run
+                    .q
+                    .iter()
+                    .all(|q| travel_share(q, &one.range) <= SILENCE_STANDSTILL_SHARE) =>
+            {
+                Some((RecordingFaultKind::Brakes, size))
+            }
+            (true, true) => Some((RecordingFaultKind::DeadChannel, size)),
             // At standstill friction may take any part of the force.
             (true, false) => None,
             (false, true) => Some((RecordingFaultKind::DeadChannel, size)),
@@ -377,13 +390,17 @@ fn moved_share(model: &Model, data: &RecordingSegment, one: &FlatInterval) -> f6
         DriveKind::Joint(i) => names.iter().position(|name| *name == mechanism.coordinates[i.0].name),
         DriveKind::Linear { .. } => None,
     };
+    match own {
+        Some(i) => travel_share(&data.run.q[i], &one.range),
+        None => (data.run.q.iter()).fold(0.0, |most, q| most.max(travel_share(q, &one.range))),
+    }
+}
+
+/// The share of its travel by which a coordinate moves during an interval, 0 to 1.
+fn travel_share(q: &[f64], range: &Range<usize>) -> f64 {
     let travel = |q: &[f64]| {
         let low = q.iter().copied().fold(f64::INFINITY, f64::min);
         q.iter().copied().fold(f64::NEG_INFINITY, f64::max) - low
     };
-    let share = |q: &Vec<f64>| travel(&q[one.range.clone()]) / travel(q).max(f64::MIN_POSITIVE);
-    match own {
-        Some(i) => share(&data.run.q[i]),
-        None => data.run.q.iter().map(share).fold(0.0, f64::max),
-    }
+    travel(&q[range.clone()]) / travel(q).max(f64::MIN_POSITIVE)
 }

@@ -24,6 +24,7 @@ impl DiagnosisFindings {
     /// - `disturbances`: faults of the recordings, with estimates and times (`interval`, s)
     /// - `corrected`: faults of the recordings that were corrected hypothetically, with what to do about them (`todo`);
     ///   all other findings hold for the corrected recordings
+    /// - `unresolved`: faults of the recordings that could not be corrected; nothing else is stated then
     /// - `steps`: errors after each added effect, on fitted (`fit`) and validation data (`check`)
     /// - `effects`: missing effects with estimates, probability, what supports them, and alternatives
     /// - `possible`: the same for effects with a probability below 0.5, which the model is not said to lack
@@ -117,6 +118,7 @@ impl DiagnosisFindings {
             "budget": budget,
             "disturbances": disturbances,
             "corrected": self.corrected.iter().map(|fault| fault.json(spelling)).collect::<Vec<_>>(),
+            "unresolved": self.unresolved.iter().map(|fault| fault.json(spelling)).collect::<Vec<_>>(),
             "steps": steps(&diagnosis.steps),
             "effects": described(&self.missing),
             "possible": described(&self.possible),

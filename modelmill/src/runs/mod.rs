@@ -514,11 +514,8 @@ impl<'a> RunAnalyser<'a> {
             one.drive_weights = scales.map_or_else(Vec::new, |scales| scales.weights);
         }
         report.changes.extend(identified);
-        // Fits that do not describe the forces have no parameters to compare.
-        if reasons
-            .iter()
-            .any(|reason| !reason.is_some_and(verdict::UndecidedReason::spoils_fit))
-        {
+        // Where no drive can show a change, there are no parameters to compare.
+        if reasons.iter().any(Option::is_none) {
             // Only parameters that both runs determine can be compared.
             let differs = |k: &usize| {
                 let (a, b) = (&report.alone[*k], &first.alone[*k]);

@@ -88,11 +88,10 @@ fn scatter_of_factors(factors: &[Option<(f64, f64)>]) -> DriveScales {
     DriveScales { weights, scatter }
 }
 
-/// Adds the scatter of the scales to the covariance of a load.
+/// Adds the scatter of the scales to the covariance of a load. A wrong scale changes all values of a load by one factor,
+/// so that quotients such as its centre keep their deviations.
 pub(crate) fn widen_covariance(load: &mut SelectedChange, scales: &DriveScales) {
-    for (i, value) in load.values.iter().enumerate() {
-        load.covariance[(i, i)] += (scales.scatter * value).powi(2);
-    }
+    load.covariance += scales.scatter.powi(2) * &load.values * load.values.transpose();
 }
 
 /// Corrects a load by the factors of the force signals that a known load determines, and adds their uncertainty to it.

@@ -364,7 +364,8 @@ impl<'a> BlockProducts<'a> {
     /// Weighs channels by the variance of their residual, but not below that of their noise.
     fn set_weights(&mut self, rest: &[Vec<f64>]) {
         for (d, rest) in rest.iter().enumerate() {
-            let variance = dot(rest, rest) / rest.len().max(1) as f64;
+            let counted = self.excluded[d].iter().filter(|out| !**out).count();
+            let variance = dot(rest, rest) / counted.max(1) as f64;
             let variance = variance.max(self.problem.noise[d].powi(2));
             self.weights[d] = if variance > 0.0 { variance.recip() } else { 1.0 };
         }

@@ -139,7 +139,11 @@ fn loud_intervals(problem: &DiagnosisProblem, rest: &[f64]) -> Option<(Vec<Chang
         let place = move |k: usize| start + k * part.len() / count;
         (0..count).map(move |k| place(k)..place(k + 1))
     });
-    let windows: Vec<Range<usize>> = windows.collect();
+    // Windows in which the drive hardly moves tell nothing.
+    let counted = |range: &Range<usize>| rest[range.clone()].iter().filter(|r| **r != 0.0).count();
+    let windows: Vec<Range<usize>> = windows
+        .filter(|window| counted(window) as f64 >= 0.5 * WINDOW_FEWEST_SAMPLES)
+        .collect();
     if windows.len() < FEWEST_WINDOWS {
         return None;
     }
@@ -158,9 +162,9 @@ fn loud_intervals(problem: &DiagnosisProblem, rest: &[f64]) -> Option<(Vec<Chang
         .filter(|k| powers[*k] > LOUD_LEAST_RATIO * usual)
         .collect();
     let of_loud: f64 = loud.iter().map(|k| squares[*k]).sum();
-    let samples: usize = loud.iter().map(|k| windows[*k].len()).sum();
+    let samples: usize = loud.iter().map(|k| counted(&windows[*k])).sum();
     let is_loud = of_loud > LOUD_LEAST_SHARE * squares.iter().sum::<f64>()
-        && (samples as f64) < LOUD_MOST_DURATION * rest.len() as f64;
+        && (samples as f64) < LOUD_MOST_DURATION * counted(&(0..rest.len())) as f64;
     if !is_loud {
         return None;
     }
@@ -171,12 +175,12 @@ fn loud_intervals(problem: &DiagnosisProblem, rest: &[f64]) -> Option<(Vec<Chang
         .flat_map(|s| std::iter::repeat_n(&s.name, s.samples));
     let names: Vec<&String> = names.collect();
     let mut intervals: Vec<ChangeInterval> = Vec::new();
-    let mut before = None;
+    let mut end = None;
     for k in loud {
         let [from, to] = [windows[k].start, windows[k].end - 1].map(|i| times[i]);
         // Neighbouring windows of one recording are one interval.
         match intervals.last_mut() {
-            Some(last) if before == Some(k.wrapping_sub(1)) && last.recording == *names[windows[k].start] => {
+            Some(last) if end == Some(windows[k].start) && last.recording == *names[windows[k].start] => {
                 last.interval[1] = to;
             }
             _ => intervals.push(ChangeInterval {
@@ -185,7 +189,7 @@ fn loud_intervals(problem: &DiagnosisProblem, rest: &[f64]) -> Option<(Vec<Chang
                 lasts: false,
             }),
         }
-        before = Some(k);
+        end = Some(windows[k].end);
     }
     Some((intervals, (of_loud / samples.max(1) as f64).sqrt()))
 }
