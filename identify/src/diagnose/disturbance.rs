@@ -107,14 +107,23 @@ impl EffectSelector<'_> {
             }
             let constants = pick.constants.iter();
             let constants = constants.map(|(name, value)| EstimatedQuantity::new(name, *value, ""));
-            found.push(Disturbance {
+            let of = |estimates: Vec<EstimatedQuantity>, interval: Option<&ChangeInterval>| Disturbance {
                 kind: candidate.effect.kind.clone(),
                 at: candidate.effect.at.clone(),
-                estimates: estimates.chain(constants).collect(),
-                recordings: intervals.iter().map(|one| one.recording.clone()).collect(),
-                interval: intervals.first().map(|one| one.interval),
+                estimates,
+                recordings: interval.map(|one| one.recording.clone()).into_iter().collect(),
+                interval: interval.map(|one| one.interval),
                 description: None,
-            });
+            };
+            if intervals.is_empty() {
+                found.push(of(estimates.chain(constants).collect(), None));
+                continue;
+            }
+            // Each recording has its own time, and parameters of its own that follow each other.
+            let estimates: Vec<EstimatedQuantity> = estimates.collect();
+            let parameters = estimates.len() / intervals.len();
+            let own = estimates.chunks(parameters.max(1)).zip(intervals);
+            found.extend(own.map(|(own, interval)| of(own.to_vec(), Some(interval))));
         }
         found
     }

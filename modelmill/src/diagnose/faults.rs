@@ -5,7 +5,7 @@
 use modelmill_identify::changes::NormalEquations;
 use modelmill_identify::diagnose::{DiagnosisProblem, Disturbance, EstimatedQuantity, quantisation_step};
 
-use crate::error::Outcome;
+use crate::error::{Error, Outcome};
 use crate::model::Model;
 use crate::recording::PreparedRecording;
 use crate::runs::{PhysicalChange, RecordingDifference, differences};
@@ -16,12 +16,17 @@ use super::thresholds::{
 use crate::regressors::SegmentList;
 
 /// Differences of later recordings from the first one; none if they cannot be compared.
-pub(crate) fn run_differences(model: &Model, recordings: &[&PreparedRecording]) -> Vec<RecordingDifference> {
+///
+/// Fails when the job is cancelled.
+pub(crate) fn run_differences(model: &Model, recordings: &[&PreparedRecording]) -> Outcome<Vec<RecordingDifference>> {
     // A single recording has nothing to compare.
     if recordings.len() < 2 {
-        return Vec::new();
+        return Ok(Vec::new());
     }
-    differences(model, recordings).unwrap_or_default()
+    match differences(model, recordings) {
+        Err(Error::Cancelled) => Err(Error::Cancelled),
+        compared => Ok(compared.unwrap_or_default()),
+    }
 }
 
 /// Subtracts known faults from the measured forces of a problem, and adds them to its disturbances.

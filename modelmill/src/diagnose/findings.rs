@@ -273,7 +273,7 @@ impl Model {
         // Differences between recordings are found first, since they would look like effects.
         let between = (self.host()).run_job("comparing the recordings with each other", 0, |_| {
             faults::run_differences(self, &recordings)
-        })?;
+        })??;
         let find = |between: &[RecordingDifference]| {
             let asked = DiagnosisQuery {
                 fixed: held,

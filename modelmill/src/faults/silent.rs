@@ -372,10 +372,9 @@ impl<'a> SilenceFit<'a> {
             {
                 Some((RecordingFaultKind::Brakes, size))
             }
-            (true, true) => Some((RecordingFaultKind::DeadChannel, size)),
             // At standstill friction may take any part of the force.
             (true, false) => None,
-            (false, true) => Some((RecordingFaultKind::DeadChannel, size)),
+            (_, true) => Some((RecordingFaultKind::DeadChannel, size)),
             (false, false) => Some((RecordingFaultKind::FrozenForce, size)),
         }
     }

@@ -64,11 +64,13 @@ pub(crate) fn differences(model: &Model, recordings: &[&PreparedRecording]) -> O
         for one in found {
             let Some(rows) = &rows else { continue };
             let own = rows.force(&one.columns, &one.values)?;
+            // Another decimation would give other samples.
+            if own.iter().any(|values| values.len() != end - start) {
+                continue;
+            }
             let along_all = |values: Vec<f64>| {
                 let mut all = vec![0.0; total];
-                if values.len() == end - start {
-                    all[start..end].copy_from_slice(&values);
-                }
+                all[start..end].copy_from_slice(&values);
                 all
             };
             differences.push(RecordingDifference {

@@ -48,6 +48,7 @@ use layout::RunColumnLayout;
 use payload::PayloadColumns;
 use payload_scale::{DriveScales, compare_drive_scales};
 pub use per_run::{KnownLoad, PerRunSelection, RunValue, SharedFit};
+use points::DriveDoubts;
 pub use points::{ChangePoint, ParameterStep};
 use rows::{MeasuredMoments, RunRows, UnexplainedShares, WhitenedRun};
 pub use sums::{ReferenceFit, RunSums};
@@ -194,6 +195,7 @@ impl Model {
             let mut notes: Vec<RecordingNote> = first.notes().cloned().collect();
             let mut wholes = vec![before.white.total()];
             let mut withins = vec![before.within];
+            let mut doubts = DriveDoubts::new(&before);
             let mut unread = Vec::new();
             shared.add_run(&before.file, &before.white);
             job.step(1)?;
@@ -210,6 +212,7 @@ impl Model {
                 match looked_at {
                     Ok(run) => {
                         all.push(bench.compare_with_first(&before, &all[0], &run));
+                        doubts.add(&run);
                         wholes.push(run.white.total());
                         withins.push(run.within);
                         shared.add_run(&run.file, &run.white);
@@ -228,7 +231,7 @@ impl Model {
             // Stage 3: permanent changes over the order of the runs, and the fit of all runs together.
             let base: Vec<usize> = (0..layout.base).collect();
             let alone: Vec<&[FittedValue]> = all.iter().map(|run| &run.alone[..]).collect();
-            let points = points::find_change_points(&bench, &alone, &wholes, &withins, &before);
+            let points = points::find_change_points(&bench, &alone, &wholes, &withins, &before, &doubts);
             let mut together = NormalEquations::new(layout.base);
             for whole in &wholes {
                 together.merge(&whole.select_columns(&base));
@@ -549,9 +552,7 @@ impl<'a> RunAnalyser<'a> {
             .map(|one| !one.is_some_and(verdict::UndecidedReason::spoils_fit));
         let believed: Vec<bool> = believed.collect();
         let mut found = self.significant_changes(&runs, &run.sizes, &believed);
-        // A drive that stands may have any friction.
-        let stands = |d: usize| before.stands[d] || run.stands[d];
-        found.retain(|one| !matches!(self.possible[one.candidate].kind, ChangeKind::Friction(d) if stands(d)));
+        self.drop_unknown_friction(&mut found, |d| before.stands[d] || run.stands[d]);
         let scales = self.widen_loads(&mut found, [&before.white.drives, &run.white.drives]);
         PairFindings {
             found,
@@ -559,6 +560,11 @@ impl<'a> RunAnalyser<'a> {
             difference_factor: (sensitivity.min_gain / sensitivity.min_gain_of_noise).max(1.0).sqrt(),
             reasons,
         }
+    }
+
+    /// Drops changes of the friction of drives that stand: it may have any value there.
+    fn drop_unknown_friction(&self, found: &mut Vec<SelectedChange>, stands: impl Fn(usize) -> bool) {
+        found.retain(|one| !matches!(self.possible[one.candidate].kind, ChangeKind::Friction(d) if stands(d)));
     }
 
     /// Adds to loads the uncertainty of scales of forces that disagree. `drives` are the sums of both runs drive by drive.

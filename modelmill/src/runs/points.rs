@@ -35,18 +35,47 @@ pub struct ChangePoint {
     pub changes: Vec<RunChange>,
 }
 
+/// Drives whose forces show nothing, or whose friction is unknown, in at least one of the runs.
+pub(crate) struct DriveDoubts {
+    /// Whether the model describes the force of each drive.
+    believed: Vec<bool>,
+    /// Whether each drive stands nearly all the time.
+    stands: Vec<bool>,
+}
+
+impl DriveDoubts {
+    /// The doubts of one run.
+    pub(crate) fn new(run: &RunStatistics) -> Self {
+        let shares = run.unexplained.0.iter();
+        Self {
+            believed: shares.map(|share| *share <= MOST_UNEXPLAINED_SHARE).collect(),
+            stands: run.stands.clone(),
+        }
+    }
+
+    /// Adds the doubts of another run.
+    pub(crate) fn add(&mut self, run: &RunStatistics) {
+        let other = Self::new(run);
+        for (one, other) in self.believed.iter_mut().zip(other.believed) {
+            *one &= other;
+        }
+        for (one, other) in self.stands.iter_mut().zip(other.stands) {
+            *one |= other;
+        }
+    }
+}
+
 /// Change points over the runs. `runs` are the base parameters of each run fitted alone, `wholes` their sums, and
-/// `within` the differences between the parts of each. `before` is the reference run.
+/// `within` the differences between the parts of each. `before` is the reference run, and `doubts` are those of all
+/// runs.
 pub(crate) fn find_change_points(
     bench: &RunAnalyser<'_>,
     runs: &[&[FittedValue]],
     wholes: &[NormalEquations],
     within: &[f64],
     before: &RunStatistics,
+    doubts: &DriveDoubts,
 ) -> Vec<ChangePoint> {
-    let believed: Vec<bool> = (before.unexplained.0.iter())
-        .map(|share| *share <= MOST_UNEXPLAINED_SHARE)
-        .collect();
     let parameters: Vec<usize> = (0..bench.model.base.len())
         .filter(|k| !bench.model.is_known(*k))
         .collect();
@@ -83,13 +112,12 @@ pub(crate) fn find_change_points(
             later: wholes[at..end].to_vec(),
             within_run_spread: median(&within[start..end]),
         };
+        let mut found = bench.significant_changes(&both, &before.sizes, &doubts.believed);
+        bench.drop_unknown_friction(&mut found, |drive| doubts.stands[drive]);
         ChangePoint {
             run: at,
             steps: own,
-            changes: bench.identified_changes(
-                &bench.significant_changes(&both, &before.sizes, &believed),
-                &before.values,
-            ),
+            changes: bench.identified_changes(&found, &before.values),
         }
     };
     bounds.windows(3).map(point).collect()
