@@ -139,8 +139,8 @@ pub struct ErrorLocations {
     pub regions: Vec<ErrorRegion>,
     /// Drives whose error is rounding and was not located.
     pub rounding: Vec<String>,
-    /// How the residuals depend on the rates of their drives, drive by drive: forms of friction that are spread over all
-    /// samples, so that no region shows them. Empty if there is no significant and material dependence.
+    /// How the residuals depend on the rates of their drives, drive by drive: forms of friction that are spread over
+    /// all samples, so that no region shows them. Empty if there is no significant and material dependence.
     pub by_rate: Vec<RateDependence>,
 }
 

@@ -72,29 +72,29 @@ pub struct RateDependence {
     /// What the residual depends on.
     pub term: RateTerm,
     /// Its size, in `unit`. For `Sign`, half of the difference between positive and negative rate; for `Rate` the
-    /// slope; for `Load` the slope over the magnitude of the calculated force; for `Hysteresis` the part that follows the
-    /// sign of the rate while the speed rises, minus that while it falls.
+    /// slope; for `Load` the slope over the magnitude of the calculated force; for `Hysteresis` the part that follows
+    /// the sign of the rate while the speed rises, minus that while it falls.
     pub value: f64,
     /// Standard deviation of `value`, for autocorrelated residuals, in `unit`.
     pub std: f64,
     /// Unit of `value`: that of the force, the force per rate, or `1`.
     pub unit: String,
-    /// Mean square of the term divided by that of the residual, of the samples at which the drive moves; at most what all
-    /// terms explain together.
+    /// Mean square of the term divided by that of the residual, of the samples at which the drive moves; at most what
+    /// all terms explain together.
     pub share: f64,
     /// The residual at positive and negative rate; for `Sign` only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub levels: Option<ResidualLevels>,
-    /// If the motion cannot distinguish `Sign` from `Rate`: the value of the other one alone, in its unit, which explains
-    /// the residual equally well.
+    /// If the motion cannot distinguish `Sign` from `Rate`: the value of the other one alone, in its unit, which
+    /// explains the residual equally well.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub alternative: Option<f64>,
     /// Description in one sentence, without a full stop.
     pub says: String,
 }
 
-/// The residual at positive and at negative rate, at the mean position and load, in the unit of the force. If it follows
-/// the rate, too, these are the limits at zero rate.
+/// The residual at positive and at negative rate, at the mean position and load, in the unit of the force. If it
+/// follows the rate, too, these are the limits at zero rate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ResidualLevels {
     /// At positive rate.
@@ -317,8 +317,8 @@ struct RateFit {
 }
 
 impl RateFit {
-    /// Fits the residual; `None` if there are too few samples. `unexplained` is the squared residual that remains without
-    /// any term.
+    /// Fits the residual; `None` if there are too few samples. `unexplained` is the squared residual that remains
+    /// without any term.
     fn new(columns: &RateColumns, terms: &[RateTerm], unexplained: f64) -> Option<Self> {
         let regressor = columns.regressor(terms);
         let solution = solve(&regressor, &columns.residual)?;
@@ -430,8 +430,8 @@ fn significant_fit(columns: &RateColumns) -> Option<RateFit> {
     None
 }
 
-/// If a fit has only one of sign and rate: the coefficient of the other one in its place, if it explains the residual as
-/// well.
+/// If a fit has only one of sign and rate: the coefficient of the other one in its place, if it explains the residual
+/// as well.
 fn equal_alternative(columns: &RateColumns, fit: &RateFit) -> Option<f64> {
     let has = |term| fit.terms.contains(&term);
     let (one, other) = match (has(RateTerm::Sign), has(RateTerm::Rate)) {
@@ -500,19 +500,19 @@ fn sentence(one: &RateDependence, force_unit: &str, has_rate: bool) -> String {
                 )
             });
             format!(
-                "The residual of {channel} is proportional to its rate: {} {unit} ({std} {unit}; {share}), as {cause}\
-                 {alternative}",
+                "The residual of {channel} follows its rate with a slope of {} {unit} ({std} {unit}; {share}), as \
+                 {cause}{alternative}",
                 with_sign(one.value)
             )
         }
         RateTerm::Load => format!(
-            "The part of the residual of {channel} that follows the sign of its rate changes by {} {force_unit} for each \
-             {force_unit} of calculated force ({std}; {share}), as load-dependent friction does",
+            "The part of the residual of {channel} that follows the sign of its rate changes by {} {force_unit} for \
+             each {force_unit} of calculated force ({std}; {share}), as load-dependent friction does",
             with_sign(one.value)
         ),
         RateTerm::Hysteresis => format!(
-            "The part of the residual of {channel} that follows the sign of its rate is {size} {unit} {} while the speed \
-             rises than while it falls ({std} {unit}; {share}), as friction with hysteresis does",
+            "The part of the residual of {channel} that follows the sign of its rate is {size} {unit} {} while the \
+             speed rises than while it falls ({std} {unit}; {share}), as friction with hysteresis does",
             if is_missing { "larger" } else { "smaller" }
         ),
     }
