@@ -55,10 +55,10 @@ pub use estimate::{
     LeastSquares, LeastSquaresError, NullDirection, ParameterUncertainty, RANK_TOLERANCE, RFactor, RegressionSolution,
 };
 pub use figures::{
-    BandError, ChannelFigures, ErrorAccumulator, ErrorFigures, ErrorRegion, EstimatorOutput, FiguresError,
+    BandError, ChannelFigures, DriveResidual, ErrorAccumulator, ErrorFigures, ErrorRegion, EstimatorOutput, FiguresError,
     FilteredChannelFigures, FilteredFigures, FitFault, FitFile, FitFileError, FitParameter, LocateOptions,
-    ParameterInfo, ParameterStatus, TIME_COLUMN, TRIMMED_PART, add_filtered_forces, compare_forces, fit_parameters,
-    locate_errors,
+    ParameterInfo, ParameterStatus, RateDependence, RateTerm, ResidualLevels, TIME_COLUMN, TRIMMED_PART,
+    add_filtered_forces, compare_forces, find_rate_dependence, fit_parameters, locate_errors,
 };
 pub use motion::{
     DECIMATION_PASSBAND, DerivativeSource, PreparationChoices, PreparationRecord, PreparedRun, RunRepeatability,

@@ -196,10 +196,18 @@ pub fn decimation_passband(data: &RecordingSegment) -> f64 {
 ///
 /// Fails when a pose has no solution.
 pub fn drive_rates(model: &Model, data: &RecordingSegment) -> Outcome<Vec<Vec<f64>>> {
+    let [_, rates] = drive_motion(model, data)?;
+    Ok(rates)
+}
+
+/// Positions and rates of the drives, each `[drive][sample]`, rad or m and rad/s or m/s, not decimated.
+///
+/// Fails when a pose has no solution.
+pub fn drive_motion(model: &Model, data: &RecordingSegment) -> Outcome<[Vec<Vec<f64>>; 2]> {
     let evaluator = ModelEvaluator::new(&model.derivation);
     let mut positions = columns(model, data, |states| evaluator.drive_motion(states))?;
     // Columns are ordered: positions, rates, Jacobian.
     let mut rates = positions.split_off(model.derivation.mechanism.drives.len());
     rates.truncate(positions.len());
-    Ok(rates)
+    Ok([positions, rates])
 }

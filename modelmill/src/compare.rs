@@ -1,8 +1,9 @@
-//! `compare`: errors of a model along recordings, and the ranges of variables in which they are large.
+//! `compare`: errors of a model along recordings, the ranges of variables in which they are large, and how they depend
+//! on the rates of the drives.
 
 use modelmill_identify::{
-    BandError, ErrorAccumulator, ErrorFigures, ErrorRegion, FilteredFigures, LocateOptions, RecordingNote, TIME_COLUMN,
-    add_filtered_forces, locate_errors,
+    BandError, DriveResidual, ErrorAccumulator, ErrorFigures, ErrorRegion, FilteredFigures, LocateOptions,
+    RateDependence, RecordingNote, TIME_COLUMN, add_filtered_forces, find_rate_dependence, locate_errors,
 };
 
 use crate::along::{self, interleave, variables};
@@ -132,12 +133,15 @@ fn comparison(model: &Model) -> ErrorAccumulator {
 /// not depend on the mechanism.
 pub const ROUNDING: f64 = 1e-6;
 
-/// Ranges of variables in which the error of a model is large.
+/// Ranges of variables in which the error of a model is large, and how it depends on the rates of the drives.
 pub struct ErrorLocations {
     /// Ranges of a variable whose share of the squared error is larger than their share of the samples.
     pub regions: Vec<ErrorRegion>,
     /// Drives whose error is rounding and was not located.
     pub rounding: Vec<String>,
+    /// How the residuals depend on the rates of their drives, drive by drive: forms of friction that are spread over
+    /// all samples, so that no region shows them. Empty if there is no significant and material dependence.
+    pub by_rate: Vec<RateDependence>,
 }
 
 /// Ranges of coordinates, rates, loads and time in which the error is large: their share of the squared error is larger
@@ -166,6 +170,7 @@ pub fn error_locations(
         return Ok(ErrorLocations {
             regions: Vec::new(),
             rounding,
+            by_rate: Vec::new(),
         });
     }
     let errors_of = |k: usize, d: usize| -> Vec<f64> {
@@ -216,7 +221,50 @@ pub fn error_locations(
         locate_errors(&errors, &variables, &LocateOptions::default())
     })?;
     regions.extend(in_time);
-    Ok(ErrorLocations { regions, rounding })
+    Ok(ErrorLocations {
+        regions,
+        rounding,
+        by_rate: residuals_by_rate(model, data, measured, forces, &drives)?,
+    })
+}
+
+/// How the residuals of some drives, given by index and name, depend on their rates.
+///
+/// Fails when a pose has no solution.
+fn residuals_by_rate(
+    model: &Model,
+    data: &[RecordingSegment],
+    measured: &[Vec<Vec<f64>>],
+    forces: &[Vec<Vec<f64>>],
+    drives: &[(usize, String)],
+) -> Outcome<Vec<RateDependence>> {
+    let motions = data
+        .iter()
+        .map(|one| along::drive_motion(model, one))
+        .collect::<Outcome<Vec<_>>>()?;
+    let times: Vec<Vec<f64>> = data.iter().map(RecordingSegment::time).collect();
+    let mut dependences = Vec::new();
+    for (d, drive) in drives {
+        let segments = data.iter().enumerate().map(|(k, one)| {
+            // Positions and rates are not filtered: every n-th value keeps their signs.
+            let pick = |values: &[f64]| values.iter().copied().step_by(one.decimation()).collect();
+            let [positions, rates] = &motions[k];
+            let pairs = measured[k][*d].iter().zip(&forces[k][*d]);
+            let residual: Vec<f64> = pairs.map(|(y, m)| y - m).collect();
+            let excluded = (0..residual.len()).map(|kept| one.has_excluded_input(*d, kept));
+            DriveResidual {
+                time: times[k].clone(),
+                load: forces[k][*d].clone(),
+                position: pick(&positions[*d]),
+                rate: pick(&rates[*d]),
+                excluded: excluded.collect(),
+                residual,
+            }
+        });
+        let segments: Vec<DriveResidual> = segments.collect();
+        dependences.extend(find_rate_dependence(drive, model.force_unit(*d), &segments));
+    }
+    Ok(dependences)
 }
 
 /// Whether the error of a drive is rounding relative to its force; samples of all recordings count.

@@ -176,6 +176,7 @@ fn identify_and_compare_give_figures_by_channel() {
         assert!(number(region, "/range/0") < number(region, "/range/1"));
         assert!((0.0..=1.0).contains(&number(region, "/share")));
     }
+    assert!(compared["by_rate"].is_array(), "{compared}");
 }
 
 #[test]

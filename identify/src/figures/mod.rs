@@ -12,6 +12,7 @@ mod filtered;
 mod fit_error;
 mod fit_file;
 mod locate;
+mod residual_by_rate;
 mod thresholds;
 
 use std::fmt;
@@ -23,6 +24,7 @@ pub use filtered::{BandError, FilteredChannelFigures, FilteredFigures, add_filte
 pub use fit_error::{FitFault, FitFileError};
 pub use fit_file::{EstimatorOutput, FitFile, FitParameter, ParameterInfo, ParameterStatus, fit_parameters};
 pub use locate::{ErrorRegion, LocateOptions, TIME_COLUMN, locate_errors};
+pub use residual_by_rate::{DriveResidual, RateDependence, RateTerm, ResidualLevels, find_rate_dependence};
 pub use thresholds::TRIMMED_PART;
 
 /// Error figures of a comparison.

@@ -36,3 +36,31 @@ pub(super) const FEWEST_PARTS: usize = 2;
 
 /// Share of these parts in which the region must be dense (1). By judgement.
 pub(super) const DENSE_PARTS_LEAST_SHARE: f64 = 0.75;
+
+/// Below this share of its largest rate a drive is near standstill (1), where dry friction takes any value. By
+/// judgement, as in the diagnosis.
+pub(super) const NEAR_STANDSTILL_RATE_SHARE: f64 = 0.02;
+
+/// Least share of the squared residual of a drive that a dependence on its rate must explain (1). By judgement.
+pub(super) const RATE_TERM_LEAST_SHARE: f64 = 0.1;
+
+/// Least ratio of a dependence on the rate to its standard deviation (1). By judgement: above the usual 3, since the
+/// standard deviation itself is uncertain if there are few reversals.
+pub(super) const RATE_TERM_LEAST_SIGNIFICANCE: f64 = 4.0;
+
+/// Movements between two reversals that a drive must make: fewer show no repetition. By judgement.
+pub(super) const FEWEST_MOVEMENTS: usize = 4;
+
+/// Samples of a movement at least; shorter ones are not counted. By judgement.
+pub(super) const MOVEMENT_FEWEST_SAMPLES: usize = 5;
+
+/// Share of the movements in which the residual must agree with the dependence (1). By judgement.
+pub(super) const AGREEING_MOVEMENTS_LEAST_SHARE: f64 = 0.75;
+
+/// Below this share of its rms value an acceleration counts as zero: the speed neither rises nor falls (1). By
+/// judgement.
+pub(super) const STEADY_ACCELERATION_SHARE: f64 = 0.1;
+
+/// Dry and viscous friction are indistinguishable if the other one explains at least this share of what the better one
+/// explains (1). By judgement: for a sinusoidal motion it is 0.81.
+pub(super) const EQUAL_TERM_LEAST_SHARE: f64 = 0.95;

@@ -9,7 +9,7 @@ use crate::text::TerminalStyle;
 use crate::text::table::count;
 
 impl ModelComparison {
-    /// Errors, regions and notes as one JSON object; `parameters` is `nominal` or the file that the values come from.
+    /// Errors, regions, dependence on the rates and notes as one JSON object; `parameters` is `nominal` or the file that the values come from.
     pub fn json(&self, parameters: &str, spelling: &dyn RemedySpelling) -> Outcome<Value> {
         let mut object = json!({ "model": self.model, "parameters": parameters });
         let figures = serde_json::to_value(&self.figures);
@@ -18,12 +18,13 @@ impl ModelComparison {
         if let (Some(object), Some(figures)) = (object.as_object_mut(), figures.as_object()) {
             object.extend(figures.clone());
             object.insert("where".to_owned(), json!(self.places.regions));
+            object.insert("by_rate".to_owned(), json!(self.places.by_rate));
             object.insert("data".to_owned(), notes(&self.notes, spelling));
         }
         Ok(object)
     }
 
-    /// The comparison as text: figures of each drive, and the regions of the error.
+    /// The comparison as text: figures of each drive, the regions of the error, and how it depends on the rates.
     pub fn text(&self, parameters: &str, style: TerminalStyle) -> String {
         let mut lines = vec![style.bold(&format!(
             "{} with {parameters} parameters on {}",
@@ -37,6 +38,13 @@ impl ModelComparison {
         lines.push(String::new());
         lines.push(style.bold("Where the error is largest"));
         lines.extend(tables::places(&self.places));
+        let by_rate = tables::by_rate(&self.places);
+        if !by_rate.is_empty() {
+            lines.push(String::new());
+            lines.push(style.bold("How the residual depends on the rate of its drive"));
+            lines.extend(by_rate);
+            lines.push("  Try `diagnose`: it finds the effects that explain this.".to_owned());
+        }
         lines.join("\n")
     }
 }

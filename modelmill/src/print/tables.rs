@@ -1,4 +1,5 @@
-//! Tables of text for people: base parameters, error figures, and regions where the error is largest.
+//! Tables of text for people: base parameters, error figures, regions where the error is largest, and its dependence on
+//! the rates of the drives.
 
 use modelmill_identify::{ErrorFigures, FitParameter, ParameterStatus, TRIMMED_PART};
 
@@ -196,4 +197,10 @@ pub fn places(places: &ErrorLocations) -> Vec<String> {
         lines.push("  Nowhere in particular: no range of a coordinate, rate, load or time stands out.".to_owned());
     }
     lines
+}
+
+/// How the residuals depend on the rates of their drives, one sentence for each dependence; empty if they do not.
+pub fn by_rate(places: &ErrorLocations) -> Vec<String> {
+    let dependences = places.by_rate.iter();
+    dependences.map(|one| format!("  {}.", one.says)).collect()
 }

@@ -272,6 +272,7 @@ fn location(findings: &DiagnosisFindings) -> String {
             &findings.variables,
         ));
     }
+    html.push_str(&by_rate(&findings.places));
     // Regions of the residual are listed without pictures.
     if let Some(left) = &findings.residual_locations {
         html.push_str("<h3>Residual with the effects</h3>\n");
@@ -287,9 +288,23 @@ fn location(findings: &DiagnosisFindings) -> String {
             }
             html.push_str("</ul>\n");
         }
+        html.push_str(&by_rate(left));
     }
     html.push_str("<h3>Error maps</h3>\n");
     html.push_str(&maps::figures(&findings.before, after, &findings.variables));
+    html
+}
+
+/// How the error depends on the rates of the drives, as a list; empty if it does not.
+fn by_rate(places: &ErrorLocations) -> String {
+    if places.by_rate.is_empty() {
+        return String::new();
+    }
+    let mut html = String::from("<ul>\n");
+    for one in &places.by_rate {
+        let _ = writeln!(html, "<li>{}.</li>", escape(&one.says));
+    }
+    html.push_str("</ul>\n");
     html
 }
 

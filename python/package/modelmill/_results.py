@@ -165,6 +165,12 @@ class Comparison(Result):
         regions: list[dict[str, Any]] = self._object["where"]
         return regions
 
+    @property
+    def by_rate(self) -> list[dict[str, Any]]:
+        """How the residual of each drive depends on its rate, as friction does; empty if it does not."""
+        dependences: list[dict[str, Any]] = self._object["by_rate"]
+        return dependences
+
     def to_pandas(self) -> pd.DataFrame:
         """A row for each drive."""
         return frame({"drive": name, **figures} for name, figures in self.channels.items())
