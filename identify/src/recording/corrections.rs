@@ -181,7 +181,7 @@ mod tests {
             assert_eq!(read.unwrapped_angles().len(), 1);
             assert_eq!(read.notes().len(), 1);
         }
-        // Angles that never jump, lengths, and single wrong samples stay as they are.
+        // Angles that never jump and lengths stay as they are.
         let mut read = recording(truth);
         let before = read.clone();
         read.unwrap_angles(&[("q".to_owned(), true)]);
@@ -190,6 +190,24 @@ mod tests {
         let before = read.clone();
         read.unwrap_angles(&[("q".to_owned(), false)]);
         assert_eq!(read, before);
+    }
+
+    /// A single wrong sample is no full turn, unless it is off by one: that one continues the angle.
+    #[test]
+    fn single_samples_change_only_by_full_turns() {
+        let truth = |t: f64| 1.9 + 1.1 * (0.9 * t).sin();
+        // A full turn less stays within the range of one turn only at the largest angle.
+        let is_wrong = |t: f64| (t - 8.725).abs() < 1e-6;
+        let mut read = recording(|t| truth(t) + if is_wrong(t) { 3.0 } else { 0.0 });
+        let before = read.clone();
+        read.unwrap_angles(&[("q".to_owned(), true)]);
+        assert_eq!(read, before);
+        let mut read = recording(|t| truth(t) - if is_wrong(t) { 2.0 * PI } else { 0.0 });
+        read.unwrap_angles(&[("q".to_owned(), true)]);
+        let q = read.column("q").unwrap();
+        let is_true = |(i, q): (u32, &f64)| (q - truth(f64::from(i) * 0.005)).abs() < 1e-9;
+        assert!((0..).zip(q).all(is_true));
+        assert_eq!(read.unwrapped_angles()[0].jumps, 2);
     }
 
     #[test]

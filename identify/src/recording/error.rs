@@ -408,7 +408,10 @@ impl RecordingFault {
             } => {
                 let write_other_count = write_other_count(*count, "fields of the column are not numbers");
                 // A comma between two integers is most likely a decimal comma, in a file with points elsewhere.
-                let what = if looks_like_decimal_comma(text) {
+                let what = if has_unclear_comma(text) {
+                    "its comma may separate thousands or be the decimal sign, so write it with a decimal point or without \
+                     the comma"
+                } else if looks_like_decimal_comma(text) {
                     "other numbers of the file have a decimal point, so write decimals with a point"
                 } else if text.parse::<f64>().is_ok() {
                     "other fields have a decimal comma or are time stamps, so write all of them in one way"
@@ -506,6 +509,12 @@ fn write_other_count(count: usize, what: &str) -> String {
     } else {
         String::new()
     }
+}
+
+/// Whether the only comma of a number has three digits behind it, as between thousands.
+fn has_unclear_comma(text: &str) -> bool {
+    let is_number = looks_like_decimal_comma(text) && !text.starts_with('0');
+    is_number && text.split_once(',').is_some_and(|(_, after)| after.len() == 3)
 }
 
 /// Whether a text becomes a number if its only comma is replaced by a point.

@@ -229,6 +229,14 @@ impl<'a> SampleIntake<'a> {
         self.passed += samples;
     }
 
+    /// Declares fields of a column that were taken as numbers to be text; `first` describes them.
+    pub(crate) fn refuse_fields(&mut self, place: usize, first: ColumnDefect) {
+        let text = &mut self.columns[place].text;
+        let later = text.as_ref().map_or(0, |text| text.count);
+        let count = first.count + later;
+        *text = Some(ColumnDefect { count, ..first });
+    }
+
     /// States the first time stamp of a column, ns since 1970, from which its times are counted.
     pub(crate) fn set_zero(&mut self, place: usize, stamp: i64) {
         self.zeros.push((place, stamp));

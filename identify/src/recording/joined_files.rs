@@ -1,7 +1,8 @@
 //! Several files of one run: opened together, read one by one, and joined on their times.
 //!
 //! A file without times, such as one with a single variable, is joined row by row to a file that has as many samples
-//! and their times. A name in several files is unique with the name of its file: `forces.data`.
+//! and their times. A name in several files is unique with the name of its file: `forces.data`. Files of the same name
+//! are distinguished by their extension or their folder: `monday.run.tau`.
 
 use std::path::Path;
 
@@ -21,6 +22,8 @@ pub struct RecordingFiles {
     name: String,
     /// The open files, in the order of the user.
     files: Vec<RecordingFile>,
+    /// What stands before the names of the columns of each file where several files have them.
+    qualifiers: Vec<String>,
 }
 
 impl RecordingFiles {
@@ -39,6 +42,7 @@ impl RecordingFiles {
         let names: Vec<&str> = files.iter().map(RecordingFile::name).collect();
         Ok(Self {
             name: names.join("+"),
+            qualifiers: unique_qualifiers(&names),
             files,
         })
     }
@@ -48,6 +52,7 @@ impl RecordingFiles {
         let file = RecordingFile::from_table(name, columns)?;
         Ok(Self {
             name: file.name().to_owned(),
+            qualifiers: unique_qualifiers(&[file.name()]),
             files: vec![file],
         })
     }
@@ -85,8 +90,13 @@ impl RecordingFiles {
 
     /// The name of a column with that of its file before it.
     fn qualified_name(&self, file: usize, name: &str) -> String {
-        let stem = Path::new(self.files[file].name()).file_stem();
-        format!("{}.{name}", stem.unwrap_or_default().to_string_lossy())
+        format!("{}.{name}", self.qualifiers[file])
+    }
+
+    /// The name that a file uses for a column that is requested by its own name, or with the name of the file.
+    fn own_name<'a>(&self, file: usize, names: &'a [String], requested: &str) -> Option<&'a String> {
+        let find = |wanted: &str| names.iter().find(|name| *name == wanted);
+        find(requested).or_else(|| find(requested.strip_prefix(&self.qualifiers[file])?.strip_prefix('.')?))
     }
 
     /// Reads the files and joins them by their column `t`, or by the one that stands for it.
@@ -170,8 +180,14 @@ impl RecordingFiles {
         let all_timed = options.rate.is_some() || names.iter().all(has_time);
         let mut parts = Vec::new();
         for (k, (file, names)) in self.files.iter().zip(names).enumerate() {
-            let qualified: Vec<String> = names.iter().map(|name| self.qualified_name(k, name)).collect();
-            let mut own = options_for_file(options, names, &qualified);
+            let mut own = options_for_file(options, |name| self.own_name(k, names, name).cloned());
+            // A column of another file under the name of one of this file replaces it.
+            for name in replaced_names(options).filter(|name| names.contains(name)) {
+                let is_here = own.renames.iter().any(|(ours, theirs)| ours == name || theirs == name);
+                if !is_here && !own.computed.iter().any(|one| one.name == *name) {
+                    own.renames.push((self.qualified_name(k, name), name.clone()));
+                }
+            }
             if !all_timed {
                 own.time_interval = None;
             }
@@ -187,8 +203,14 @@ impl RecordingFiles {
         for (k, of_file) in names.iter().enumerate() {
             for name in of_file {
                 let is_time = time.contains(&name.as_str());
-                let twin = names[..k].iter().position(|others| others.contains(name));
-                if let (false, true, Some(twin)) = (is_time, options.is_column_needed(name), twin) {
+                if is_time || !options.is_column_needed(name) {
+                    continue;
+                }
+                // A name that the user gives to another column is not needed as itself.
+                if replaced_names(options).any(|other| other == name) && !is_source(options, name) {
+                    continue;
+                }
+                if let Some(twin) = names[..k].iter().position(|others| others.contains(name)) {
                     return Err(self.files[k].fault(RecordingFault::ColumnInTwoFiles {
                         name: name.clone(),
                         other: self.files[twin].name().to_owned(),
@@ -197,11 +219,22 @@ impl RecordingFiles {
                 }
             }
         }
+        // A column of one file may be called as one of another file is with the name of that file.
+        let terms = options.computed.iter().flat_map(|one| &one.terms);
+        let sources = (options.renames.iter().map(|(_, theirs)| theirs)).chain(terms.map(|(name, _)| name));
+        for name in sources.filter(|name| !time.contains(&name.as_str()) && options.is_column_needed(name)) {
+            let mut owners = (0..names.len()).filter_map(|k| Some((k, self.own_name(k, &names[k], name)?)));
+            if let (Some((first, _)), Some((second, own))) = (owners.next(), owners.next()) {
+                return Err(self.files[second].fault(RecordingFault::ColumnInTwoFiles {
+                    name: name.clone(),
+                    other: self.files[first].name().to_owned(),
+                    qualified: self.qualified_name(second, own),
+                }));
+            }
+        }
         // All terms of a sum must be in one file.
         for computed in options.computed.iter().filter(|one| one.name != "t") {
-            let is_in = |k: usize, name: &String| {
-                names[k].contains(name) || names[k].iter().any(|own| self.qualified_name(k, own) == *name)
-            };
+            let is_in = |k: usize, name: &String| self.own_name(k, &names[k], name).is_some();
             let is_complete = |k: usize| computed.terms.iter().all(|(name, _)| is_in(k, name));
             if !(0..names.len()).any(is_complete) {
                 return Err(self.fault(RecordingFault::SumAcrossFiles {
@@ -228,6 +261,19 @@ fn time_names(options: &ReadOptions) -> Vec<&str> {
     let terms = computed.flat_map(|one| one.terms.iter().map(|(name, _)| name.as_str()));
     let theirs = renamed.map(|(_, theirs)| theirs.as_str());
     theirs.chain(terms).chain(std::iter::once("t")).collect()
+}
+
+/// Names, other than the time, that the user gives to columns or sums of columns.
+fn replaced_names(options: &ReadOptions) -> impl Iterator<Item = &String> {
+    let renamed = options.renames.iter().map(|(ours, _)| ours);
+    let computed = options.computed.iter().map(|one| &one.name);
+    renamed.chain(computed).filter(|name| *name != "t")
+}
+
+/// Whether a column is requested by this name, for another name or for a sum.
+fn is_source(options: &ReadOptions, name: &String) -> bool {
+    let mut terms = options.computed.iter().flat_map(|one| &one.terms);
+    options.renames.iter().any(|(_, theirs)| theirs == name) || terms.any(|(term, _)| term == name)
 }
 
 /// The times of one of several files.
@@ -293,15 +339,37 @@ fn has_same_rows(one: &SignalRecording, other: &SignalRecording) -> bool {
     one.samples() == other.samples() && offsets(one) == offsets(other)
 }
 
-/// The options restricted to the columns of one file, whose names with that of the file are `qualified`.
-fn options_for_file(options: &ReadOptions, names: &[String], qualified: &[String]) -> ReadOptions {
-    let own_name = |name: &String| {
-        if names.contains(name) {
-            return Some(name.clone());
-        }
-        let place = qualified.iter().position(|other| other == name);
-        place.map(|place| names[place].clone())
-    };
+/// Unique names of files: the name without its extension, with it, or with folders before it, whatever is unique first.
+/// A file that is given twice gets its position.
+fn unique_qualifiers(names: &[&str]) -> Vec<String> {
+    let choices: Vec<Vec<String>> = names.iter().map(|name| qualifier_choices(name)).collect();
+    let mut all: Vec<String> = Vec::new();
+    for (k, own) in choices.iter().enumerate() {
+        let is_unique = |choice: &&String| {
+            let mut others = choices.iter().enumerate().filter(|(other, _)| *other != k);
+            others.all(|(_, others)| !others.contains(choice))
+        };
+        let numbered = || format!("{}_{}", own.first().map_or("", String::as_str), k + 1);
+        all.push(own.iter().find(is_unique).cloned().unwrap_or_else(numbered));
+    }
+    all
+}
+
+/// Possible names of a file before those of its columns, the shortest first.
+fn qualifier_choices(name: &str) -> Vec<String> {
+    let path = Path::new(name);
+    let text = |part: Option<&std::ffi::OsStr>| part.unwrap_or_default().to_string_lossy().into_owned();
+    let mut choices = vec![text(path.file_stem()), text(path.file_name())];
+    let mut before = String::new();
+    for folder in path.ancestors().skip(1).filter_map(Path::file_name) {
+        before = format!("{}.{before}", folder.to_string_lossy());
+        choices.extend([0, 1].map(|k| format!("{before}{}", choices[k])));
+    }
+    choices
+}
+
+/// The options restricted to the columns of one file; `own_name` returns the name in the file of a requested column.
+fn options_for_file(options: &ReadOptions, own_name: impl Fn(&str) -> Option<String>) -> ReadOptions {
     let mut own = options.clone();
     let renames = options.renames.iter();
     own.renames = renames
@@ -318,4 +386,92 @@ fn options_for_file(options: &ReadOptions, names: &[String], qualified: &[String
         })
         .collect();
     own
+}
+
+#[cfg(test)]
+mod tests {
+    use modelmill_boundary::files::MemoryFiles;
+
+    use super::*;
+
+    /// Two files of one name, each with a force; the second one has other positions.
+    fn same_names() -> RecordingFiles {
+        let text = |columns: &str, force: u32| {
+            let lines = (0..20).map(|k| format!("0.0{k:02},{k},{force}\n"));
+            format!("t,{columns}\n{}", lines.collect::<String>())
+        };
+        let files = MemoryFiles::default()
+            .with_file("monday/run.csv", text("q,tau", 1))
+            .with_file("sunday/run.csv", text("p,tau", 2));
+        RecordingFiles::open(&files, &["monday/run.csv".as_ref(), "sunday/run.csv".as_ref()]).unwrap()
+    }
+
+    /// Options that read a column as `tau`.
+    fn options(theirs: &str) -> ReadOptions {
+        ReadOptions {
+            renames: vec![("tau".to_owned(), theirs.to_owned())],
+            wanted: Some(["t", "q", "tau"].map(str::to_owned).to_vec()),
+            ..ReadOptions::default()
+        }
+    }
+
+    #[test]
+    fn columns_of_files_with_the_same_name_are_distinguished_by_folders() {
+        let files = same_names();
+        let fault = files.read(&options("tau")).unwrap_err().fault;
+        let RecordingFault::ColumnInTwoFiles { qualified, .. } = fault else {
+            panic!("{fault:?}");
+        };
+        assert_eq!(qualified, "sunday.run.tau");
+        let names = files.names().unwrap();
+        for (theirs, force) in [("monday.run.tau", 1.0), ("sunday.run.tau", 2.0)] {
+            assert!(names.contains(&theirs.to_owned()), "{names:?}");
+            let read = files.read(&options(theirs)).unwrap();
+            assert_eq!(read.column("tau").unwrap(), [force; 20], "{theirs}");
+        }
+    }
+
+    /// The column of the other file with the requested name is neither read nor a reason to refuse the files.
+    #[test]
+    fn a_requested_column_replaces_one_of_another_file() {
+        let files = MemoryFiles::default()
+            .with_file("one.csv", "t,q,motor\n0,1,5\n1,2,5\n")
+            .with_file("two.csv", "t,tau\n0,7\n1,7\n");
+        let files = RecordingFiles::open(&files, &["one.csv".as_ref(), "two.csv".as_ref()]).unwrap();
+        assert_eq!(files.read(&options("motor")).unwrap().column("tau").unwrap(), [5.0; 2]);
+        let all = ReadOptions {
+            wanted: None,
+            ..options("motor")
+        };
+        let read = files.read(&all).unwrap();
+        assert_eq!(read.column("tau").unwrap(), [5.0; 2]);
+        assert_eq!(read.column("two.tau").unwrap(), [7.0; 2]);
+    }
+
+    #[test]
+    fn a_column_that_two_files_may_mean_is_refused() {
+        let files = MemoryFiles::default()
+            .with_file("one.csv", "t,q,tau\n0,1,5\n1,2,5\n")
+            .with_file("two.csv", "t,one.tau\n0,7\n1,7\n");
+        let files = RecordingFiles::open(&files, &["one.csv".as_ref(), "two.csv".as_ref()]).unwrap();
+        let fault = files.read(&options("one.tau")).unwrap_err().fault;
+        let RecordingFault::ColumnInTwoFiles { qualified, .. } = fault else {
+            panic!("{fault:?}");
+        };
+        let read = files.read(&options(&qualified)).unwrap();
+        assert_eq!(read.column("tau").unwrap(), [7.0; 2]);
+    }
+
+    #[test]
+    fn qualifiers_are_short_and_unique() {
+        for (names, expected) in [
+            (vec!["a/angles.mat", "b/forces.mat"], vec!["angles", "forces"]),
+            (vec!["a/run.csv", "a/run.mat"], vec!["run.csv", "run.mat"]),
+            (vec!["x/a/run.csv", "x/b/run.csv"], vec!["a.run", "b.run"]),
+            (vec!["x/a/run.csv", "y/a/run.csv"], vec!["x.a.run", "y.a.run"]),
+            (vec!["run.csv", "run.csv"], vec!["run_1", "run_2"]),
+        ] {
+            assert_eq!(unique_qualifiers(&names), expected);
+        }
+    }
 }

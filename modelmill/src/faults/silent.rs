@@ -48,7 +48,7 @@ pub(crate) struct SilentInterval {
     pub(crate) file: String,
     /// The value at which the first drive is, with its unit.
     level: String,
-    /// The force that the model predicts for it, rms with unit.
+    /// The force that the model predicts for it, rms, with its unit and drive.
     predicted: String,
 }
 
@@ -65,11 +65,11 @@ impl SilentInterval {
         let when = format!("from {from} to {to} s of {}", self.file);
         match self.kind {
             RecordingFaultKind::Brakes => format!(
-                "{when} the joints stand and the {force} of {names} {reads} 0, as with brakes on: gravity would need {}",
+                "{when} the joints stand and the {force} of {names} {reads} 0, as with brakes on: gravity would require {}",
                 self.predicted
             ),
             RecordingFaultKind::DeadChannel => format!(
-                "the {force} of {names} {reads} 0 {when}, where the model predicts {} rms: the channel is dead",
+                "the {force} of {names} {reads} 0 {when}, where the model predicts {}: the channel is dead",
                 self.predicted
             ),
             _ => format!(
@@ -102,6 +102,11 @@ impl SilentInterval {
             self.clause()
         ))
     }
+}
+
+/// The force that the model predicts for a drive, rms.
+fn predicted_text(force: f64, unit: &str, drive: &str) -> String {
+    format!("{} {unit} rms on `{drive}`", significant(force, 3))
 }
 
 /// A candidate: a drive with the samples in which its force is constant except for noise.
@@ -184,7 +189,7 @@ fn find_intervals(model: &Model, data: &RecordingSegment) -> Option<Vec<SilentIn
                 reach,
                 file: run.file.clone(),
                 level: format!("{} {unit}", significant(one.level, 3)),
-                predicted: format!("{} {unit} on `{}`", significant(predicted, 3), drives[one.drive].name),
+                predicted: predicted_text(predicted, unit, &drives[one.drive].name),
             }),
         }
     }
@@ -402,4 +407,35 @@ fn travel_share(q: &[f64], range: &Range<usize>) -> f64 {
         q.iter().copied().fold(f64::NEG_INFINITY, f64::max) - low
     };
     travel(&q[range.clone()]) / travel(q).max(f64::MIN_POSITIVE)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn clauses_state_the_force_with_its_unit_and_reference() {
+        let clause = |kind: RecordingFaultKind| {
+            let interval = SilentInterval {
+                kind,
+                drives: vec!["a".to_owned()],
+                interval: [1.0, 2.0],
+                reach: [1.0, 2.0],
+                file: "run.csv".to_owned(),
+                level: "0 N m".to_owned(),
+                predicted: predicted_text(12.0, "N m", "a"),
+            };
+            interval.clause()
+        };
+        let dead = clause(RecordingFaultKind::DeadChannel);
+        assert!(
+            dead.ends_with("the model predicts 12.0 N m rms on `a`: the channel is dead"),
+            "{dead}"
+        );
+        let brakes = clause(RecordingFaultKind::Brakes);
+        assert!(
+            brakes.ends_with("gravity would require 12.0 N m rms on `a`"),
+            "{brakes}"
+        );
+    }
 }

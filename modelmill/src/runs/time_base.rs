@@ -8,7 +8,8 @@
 //! Here `s` is 1 for a true clock. `b` is a constant error of the rates, and `c` and `d` are delay and low-pass of the
 //! rates, which would otherwise change `s` with the frequency of the motion.
 //!
-//! Decision: only the ratio of two runs is used. A rate that is scaled wrongly in both runs is no change.
+//! Decision: only the ratio of two runs is used. A rate that is scaled wrongly in both runs is no change. A rate that was
+//! computed from positions and time stamps agrees with any clock, so it is not used.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -18,6 +19,14 @@ use crate::runs::changes::ChangeEstimate;
 use crate::runs::columns::TimeScaling;
 use crate::runs::thresholds::{TIME_BASE_FEWEST_SAMPLES, TIME_BASE_LEAST_ERROR, TIME_BASE_SIGMAS, TIME_BASE_WINDOWS};
 use crate::segment::RecordingSegment;
+
+/// A rate is a difference quotient if most of its samples differ from it by less than this share of the rms rate (1). By
+/// judgement: rounding to six digits gives 1e-4, and noise and delay of measured rates more than 1e-3.
+const QUOTIENT_TOLERANCE: f64 = 3e-4;
+
+/// Rates below this share of the rms rate (1) are not compared with difference quotients: at standstill both are 0. By
+/// judgement.
+const QUOTIENT_LEAST_RATE: f64 = 0.1;
 
 /// The slopes `s` of one run: for each coordinate those of all windows, with the weight of each.
 #[derive(Clone, Debug, Default)]
@@ -51,7 +60,7 @@ pub(crate) fn time_scaling(model: &Model, recording: &PreparedRecording) -> Vec<
 }
 
 impl TimeBase {
-    /// The slopes of a recording; coordinates without a recorded rate have none.
+    /// The slopes of a recording; coordinates without a measured rate have none.
     pub(crate) fn of_recording(model: &Model, recording: &PreparedRecording) -> Self {
         let slopes = |name: &String| {
             let rate = recording.raw_column(&format!("{name}_d"));
@@ -59,7 +68,7 @@ impl TimeBase {
             let [Some(time), Some(position), Some(rate)] = columns else {
                 return Vec::new();
             };
-            window_slopes(time, position, rate)
+            slopes_of_measured_rate(time, position, rate)
         };
         Self(model.active_coordinates().iter().map(slopes).collect())
     }
@@ -107,6 +116,40 @@ pub(crate) fn correct_clock(segments: &mut [RecordingSegment], scaling: &[TimeSc
             scaling.scale_coordinate(&mut segment.run, coordinate, factor);
         }
     }
+}
+
+/// The slopes of a run; none if the rate was computed from the positions.
+fn slopes_of_measured_rate(time: &[f64], position: &[f64], rate: &[f64]) -> Vec<WindowSlope> {
+    if is_difference_quotient(time, position, rate) {
+        Vec::new()
+    } else {
+        window_slopes(time, position, rate)
+    }
+}
+
+/// Whether a rate is a difference quotient of the positions over the time stamps, in one of the usual forms.
+fn is_difference_quotient(time: &[f64], position: &[f64], rate: &[f64]) -> bool {
+    let n = time.len().min(position.len()).min(rate.len());
+    let rms = (rate.iter().map(|v| v * v).sum::<f64>() / n.max(1) as f64).sqrt();
+    let moving: Vec<usize> = (1..n.saturating_sub(1))
+        .filter(|i| rate[*i].abs() > QUOTIENT_LEAST_RATE * rms)
+        .collect();
+    let quotient = |from: usize, to: usize| (position[to] - position[from]) / (time[to] - time[from]);
+    let forms: [&dyn Fn(usize) -> f64; 4] = [
+        &|i| quotient(i - 1, i),
+        &|i| quotient(i, i + 1),
+        &|i| quotient(i - 1, i + 1),
+        // The slope of a parabola through three samples.
+        &|i| {
+            let share = (time[i] - time[i - 1]) / (time[i + 1] - time[i - 1]);
+            share * quotient(i, i + 1) + (1.0 - share) * quotient(i - 1, i)
+        },
+    ];
+    forms.iter().any(|form| {
+        let is_equal = |i: &&usize| (rate[**i] - form(**i)).abs() < QUOTIENT_TOLERANCE * rms;
+        let equal = moving.iter().filter(is_equal).count();
+        !moving.is_empty() && 2 * equal > moving.len()
+    })
 }
 
 /// The slopes in equal windows of a run.
@@ -189,7 +232,7 @@ mod tests {
         let coarse = |x: f64, step: f64| (x / step).round() * step;
         let q: Vec<f64> = time.iter().map(|t| coarse(position(t / speed), 1e-4)).collect();
         let qd: Vec<f64> = time.iter().map(|t| coarse(rate(t / speed - 0.01), 1e-3)).collect();
-        TimeBase(vec![window_slopes(&time, &q, &qd)])
+        TimeBase(vec![slopes_of_measured_rate(&time, &q, &qd)])
     }
 
     #[test]
@@ -206,5 +249,36 @@ mod tests {
         }
         assert_eq!(signals(1.0, 3.0).changed_clock(&signals(1.0, 5.0)), (true, None));
         assert_eq!(signals(1.0, 3.0).changed_clock(&TimeBase::default()), (false, None));
+    }
+
+    /// Rates that a logger or a script computed from the time stamps follow any clock.
+    #[test]
+    fn rates_from_time_stamps_are_no_evidence_for_the_clock() {
+        let n = 4000;
+        let rounded = |x: f64| (x * 1e6).round() / 1e6;
+        // `gradient` as numpy computes it, and backward differences, over stamps with jitter.
+        let run = |speed: f64, is_central: bool, frequency: f64| {
+            let time: Vec<f64> = (0..n)
+                .map(|k| speed * 0.005 * (f64::from(k) + 0.1 * f64::from(k * 7 % 5)))
+                .collect();
+            let motion = |t: f64| (frequency * t).sin() + 0.4 * (2.3 * frequency * t).sin();
+            let q: Vec<f64> = time.iter().map(|t| rounded(motion(t / speed))).collect();
+            let last = q.len() - 1;
+            let slope = |i: usize, k: usize| (q[k] - q[i]) / (time[k] - time[i]);
+            let rate = |i: usize| {
+                if i == 0 || i == last || !is_central {
+                    let from = i.saturating_sub(1);
+                    return rounded(slope(from, from + 1));
+                }
+                let share = (time[i] - time[i - 1]) / (time[i + 1] - time[i - 1]);
+                rounded(share * slope(i, i + 1) + (1.0 - share) * slope(i - 1, i))
+            };
+            let qd: Vec<f64> = (0..=last).map(rate).collect();
+            TimeBase(vec![slopes_of_measured_rate(&time, &q, &qd)])
+        };
+        for is_central in [false, true] {
+            let [first, later] = [(1.0, 3.0), (1.02, 4.0)].map(|(speed, f)| run(speed, is_central, f));
+            assert_eq!(first.changed_clock(&later), (false, None), "{is_central}");
+        }
     }
 }

@@ -8,7 +8,7 @@ use std::cell::Cell;
 use std::io::{self, BufReader, Cursor, Read};
 use std::rc::Rc;
 
-use crate::recording::column::SampleField;
+use crate::recording::column::{ColumnDefect, SampleField};
 use crate::recording::error::RecordingFault;
 use crate::recording::formats::text_fields::TextFieldParser;
 use crate::recording::formats::text_layout::{COMMENT_MARKS, TextLayout, TextSeparator};
@@ -120,6 +120,8 @@ fn read(stream: impl Read, file: &str, options: &ReadOptions) -> Result<SignalRe
             names.len()
         )));
     }
+    // The first field of each column whose comma may be a decimal sign or separate thousands.
+    let mut unclear: Vec<Option<ColumnDefect>> = vec![None; names.len()];
     // Records are parsed into fields, and only needed ones into numbers.
     let mut record = csv::ByteRecord::new();
     let mut sample = Vec::new();
@@ -141,18 +143,29 @@ fn read(stream: impl Read, file: &str, options: &ReadOptions) -> Result<SignalRe
         sample.clear();
         sample.extend(record.iter().enumerate().map(|(place, text)| {
             if intake.is_place_needed(place) {
-                fields.parse(text, place)
+                let field = fields.parse(text, place);
+                if fields.unclear_fields(place) > 0 && unclear[place].is_none() {
+                    let text = quoted_field(text);
+                    unclear[place] = Some(ColumnDefect { line, text, count: 0 });
+                }
+                field
             } else {
+                fields.inspect(text);
                 SampleField::Number(0.0)
             }
         }));
-        // At most 60 characters of a field are quoted in messages.
-        let text = |place: usize| {
-            let bytes = record.get(place).unwrap_or_default().trim_ascii();
-            String::from_utf8_lossy(bytes).chars().take(60).collect()
-        };
+        let text = |place: usize| quoted_field(record.get(place).unwrap_or_default());
         if intake.take_sample(line, &sample, &text)? == IntakeFlow::Stop {
             break;
+        }
+    }
+    // Without any comma that is clearly decimal, a factor of 1000 would be a guess.
+    for (place, first) in unclear.into_iter().enumerate() {
+        if let Some(first) = first
+            && !fields.has_decimal_commas()
+        {
+            let count = fields.unclear_fields(place);
+            intake.refuse_fields(place, ColumnDefect { count, ..first });
         }
     }
     for (place, name) in names.iter().enumerate() {
@@ -164,6 +177,11 @@ fn read(stream: impl Read, file: &str, options: &ReadOptions) -> Result<SignalRe
         }
     }
     intake.finish(file)
+}
+
+/// A field in messages: at most 60 characters of it.
+fn quoted_field(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes.trim_ascii()).chars().take(60).collect()
 }
 
 /// Opens a stream: returns a reader of its samples, and the layout. `since` counts the bytes that are read.
@@ -334,5 +352,50 @@ fn unreadable(error: csv::Error) -> RecordingFault {
         other => RecordingFault::Unreadable {
             reason: format!("{other:?}"),
         },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Reads a text of columns that semicolons separate.
+    fn recording(text: &str, wanted: &[&str]) -> SignalRecording {
+        let options = ReadOptions {
+            wanted: Some(wanted.iter().map(|name| (*name).to_owned()).collect()),
+            ..ReadOptions::default()
+        };
+        read(text.as_bytes(), "run.csv", &options).unwrap()
+    }
+
+    #[test]
+    fn commas_that_may_separate_thousands_are_no_decimal_signs() {
+        for text in [
+            // Counts of an encoder, with thousands or a point elsewhere.
+            "t;q\n0;12,345\n1;12,346\n2;999\n",
+            "t;q\n0;12,345\n0.5;12,346\n",
+        ] {
+            let fault = recording(text, &["t", "q"]).column("q").unwrap_err();
+            assert!(fault.to_string().contains("`12,345`"), "{fault}");
+            assert!(fault.to_string().contains("thousands"), "{fault}");
+            assert!(recording(text, &["t", "q"]).column("t").is_ok());
+        }
+        let quoted = "t,q\n0,\"12,345\"\n1,\"-12,346\"\n";
+        assert!(recording(quoted, &["t", "q"]).column("q").is_err());
+    }
+
+    #[test]
+    fn decimal_commas_with_three_digits_are_read_if_any_field_shows_them() {
+        for text in [
+            "t;q\n0;12,345\n1;12,3\n",
+            "t;q\n0,000;12,345\n0,010;12,346\n",
+            // A column that is not needed shows it.
+            "t;q;tau\n0;12,345;0,5\n1;12,346;0,6\n",
+            "t;q\n0;12,345\n1;1234,567\n",
+        ] {
+            let read = recording(text, &["t", "q"]);
+            let first = read.column("q").unwrap()[0];
+            assert!((first - 12.345).abs() < 1e-12, "{text}");
+        }
     }
 }

@@ -3,12 +3,15 @@
 //! Version 2 has one file for each episode (`data/chunk-000/episode_000000.parquet`), version 3 several episodes in one
 //! file (`data/chunk-000/file-000.parquet`). All files of a folder are read as one recording with gaps of time between
 //! its episodes, because each episode counts its time from zero.
+//!
+//! Decision: files are opened one at a time. Data sets of version 2 have thousands of files, and systems allow a process
+//! some hundred open ones.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use indexmap::IndexMap;
-use modelmill_boundary::files::{FileSource, OpenFile, PathKind};
+use modelmill_boundary::files::{FileError, FileSource, OpenFile, PathKind};
 use serde_json::Value;
 
 use crate::recording::column::SampleField;
@@ -32,14 +35,15 @@ pub(crate) struct ElementNames(IndexMap<String, Vec<String>>);
 
 /// The files of a data set, and the names in its description.
 pub(crate) struct DataSetFiles {
-    /// Files of samples, in the order of their names.
-    pub(crate) files: Vec<File>,
+    /// Paths of the files of samples, in the order of their names; at least one.
+    pub(crate) paths: Vec<PathBuf>,
     /// Names of elements.
     pub(crate) names: ElementNames,
 }
 
 impl DataSetFiles {
-    /// Opens the folder of a data set, or a single file in one; `None` if the path leads to anything else.
+    /// Finds the files of a data set from its folder, or from a single file in it; `None` if the path leads to anything
+    /// else.
     ///
     /// Fails when the description is not valid, or a file cannot be opened.
     pub(crate) fn open(files: &dyn FileSource, path: &Path) -> Result<Option<Self>, RecordingFault> {
@@ -71,20 +75,29 @@ impl DataSetFiles {
         } else {
             vec![path.to_owned()]
         };
-        let mut opened = Vec::new();
-        for path in paths {
-            match files.open(&path, 0) {
-                Ok(OpenFile::File(file)) => opened.push(file),
+        // Each file is opened once and closed again: faults are reported early, and the source of files knows what is read.
+        for path in &paths {
+            match files.open(path, 0) {
+                Ok(OpenFile::File(_)) => {}
                 // Files in memory have no folder around them.
                 Ok(OpenFile::Memory(_)) => return Ok(None),
-                Err(error) => {
-                    return Err(RecordingFault::Unreadable {
-                        reason: format!("{}: {}", path.display(), error.fault),
-                    });
-                }
+                Err(error) => return Err(unreadable_file(&error)),
             }
         }
-        Ok(Some(Self { files: opened, names }))
+        Ok(Some(Self { paths, names }))
+    }
+
+    /// Opens the file at a position. Fails when it cannot be opened any more.
+    pub(super) fn open_file(&self, place: usize) -> Result<File, RecordingFault> {
+        let path = &self.paths[place];
+        File::open(path).map_err(|error| unreadable_file(&FileError::from_io_error(path, &error)))
+    }
+}
+
+/// The fault of a file of a data set that cannot be opened.
+fn unreadable_file(error: &FileError) -> RecordingFault {
+    RecordingFault::Unreadable {
+        reason: format!("{}: {}", error.path.display(), error.fault),
     }
 }
 
@@ -247,5 +260,53 @@ impl EpisodeClock {
             sample[clock.place] = SampleField::Number(shifted);
         }
         is_later
+    }
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use std::path::Path;
+    use std::process::Command;
+
+    use modelmill_boundary::files::DiskFiles;
+
+    use crate::{ReadOptions, RecordingFile};
+
+    /// The variable by which the test calls itself with few handles; its value is the folder.
+    const FOLDER: &str = "MODELMILL_TEST_OF_HANDLES";
+
+    #[test]
+    fn data_sets_may_have_more_files_than_a_process_may_open() {
+        const FILES: usize = 80;
+        if let Some(folder) = std::env::var_os(FOLDER) {
+            let set = RecordingFile::open(&DiskFiles::default(), Path::new(&folder)).unwrap();
+            assert_eq!(set.tables().unwrap()[0].samples, 25 * FILES);
+            let read = set.read(&ReadOptions::single_column("timestamp")).unwrap();
+            assert_eq!(read.samples(), 25 * FILES);
+            return;
+        }
+        let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/readers/lerobot-v2");
+        let folder = std::env::temp_dir().join(format!("modelmill-handles-{}", std::process::id()));
+        let chunk = folder.join("data/chunk-000");
+        std::fs::create_dir_all(&chunk).unwrap();
+        std::fs::create_dir_all(folder.join("meta")).unwrap();
+        std::fs::copy(fixtures.join("meta/info.json"), folder.join("meta/info.json")).unwrap();
+        for k in 0..FILES {
+            let episode = fixtures.join("data/chunk-000/episode_000000.parquet");
+            std::fs::copy(episode, chunk.join(format!("episode_{k:06}.parquet"))).unwrap();
+        }
+        let (_, module) = module_path!().split_once("::").unwrap();
+        let child = Command::new("sh")
+            .args(["-c", "ulimit -n 48 && exec \"$0\" --exact \"$1\""])
+            .arg(std::env::current_exe().unwrap())
+            .arg(format!(
+                "{module}::data_sets_may_have_more_files_than_a_process_may_open"
+            ))
+            .env(FOLDER, &folder)
+            .output()
+            .unwrap();
+        let text = String::from_utf8_lossy(&child.stdout).into_owned();
+        std::fs::remove_dir_all(&folder).unwrap();
+        assert!(child.status.success() && text.contains("1 passed"), "{text}");
     }
 }

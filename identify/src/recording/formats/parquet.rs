@@ -61,7 +61,7 @@ impl RecordingFormat for ParquetFormat {
         // A file on disk is read in parts; bytes and streams are in memory.
         match input {
             RecordingInput::File(stream) => read(&ParquetSource::single(stream), file, options),
-            RecordingInput::DataSet(set) => read(&ParquetSource::data_set(set)?, file, options),
+            RecordingInput::DataSet(set) => read(&ParquetSource::data_set(set), file, options),
             RecordingInput::Bytes(bytes) => read(&ParquetSource::single(Bytes::copy_from_slice(bytes)), file, options),
             RecordingInput::Stream(stream) => {
                 read(&ParquetSource::single(Bytes::from(read_all(stream)?)), file, options)
@@ -72,7 +72,7 @@ impl RecordingFormat for ParquetFormat {
     fn names(&self, input: RecordingInput<'_>) -> Result<Vec<String>, RecordingFault> {
         match input {
             RecordingInput::File(stream) => names_of(&ParquetSource::single(stream)),
-            RecordingInput::DataSet(set) => names_of(&ParquetSource::data_set(set)?),
+            RecordingInput::DataSet(set) => names_of(&ParquetSource::data_set(set)),
             RecordingInput::Bytes(bytes) => names_of(&ParquetSource::single(Bytes::copy_from_slice(bytes))),
             RecordingInput::Stream(stream) => names_of(&ParquetSource::single(Bytes::from(read_all(stream)?))),
         }
@@ -81,65 +81,73 @@ impl RecordingFormat for ParquetFormat {
     fn tables(&self, input: RecordingInput<'_>) -> Result<Vec<TableInfo>, RecordingFault> {
         match input {
             RecordingInput::File(stream) => tables_of(&ParquetSource::single(stream)),
-            RecordingInput::DataSet(set) => tables_of(&ParquetSource::data_set(set)?),
+            RecordingInput::DataSet(set) => tables_of(&ParquetSource::data_set(set)),
             RecordingInput::Bytes(bytes) => tables_of(&ParquetSource::single(Bytes::copy_from_slice(bytes))),
             RecordingInput::Stream(stream) => tables_of(&ParquetSource::single(Bytes::from(read_all(stream)?))),
         }
     }
 }
 
-/// One file, or the files of a data set, which are read one after another.
-struct ParquetSource<R> {
-    /// The files, at least one.
-    files: Vec<Arc<R>>,
+/// One file, or the files of a data set, which are opened and read one after another.
+struct ParquetSource<'a, R> {
+    /// Number of files, at least one.
+    n_files: usize,
+    /// Opens the file at a position.
+    open_file: Box<dyn Fn(usize) -> Result<Arc<R>, RecordingFault> + 'a>,
     /// Names of elements of lists.
     elements: ElementNames,
 }
 
-impl<R> ParquetSource<R> {
+/// An open file of a source.
+struct OpenParquet<R: ChunkReader> {
+    /// Its bytes.
+    bytes: Arc<R>,
+    /// Its reader.
+    reader: SerializedFileReader<SharedChunkReader<R>>,
+    /// Its columns.
+    columns: ParquetColumns,
+}
+
+impl<'a, R: 'a> ParquetSource<'a, R> {
     /// A file on its own.
     fn single(stream: R) -> Self {
+        let bytes = Arc::new(stream);
         Self {
-            files: vec![Arc::new(stream)],
+            n_files: 1,
+            open_file: Box::new(move |_| Ok(bytes.clone())),
             elements: ElementNames::default(),
         }
     }
 }
 
-impl ParquetSource<File> {
-    /// The files of a data set. Fails when a handle cannot be shared.
-    fn data_set(set: &DataSetFiles) -> Result<Self, RecordingFault> {
-        let files = set.files.iter().map(|file| Ok(Arc::new(file.try_clone()?)));
-        let files = files.collect::<io::Result<Vec<_>>>();
-        Ok(Self {
-            files: files.map_err(|error| RecordingFault::Unreadable {
-                reason: error.to_string(),
-            })?,
+impl<'a> ParquetSource<'a, File> {
+    /// The files of a data set.
+    fn data_set(set: &'a DataSetFiles) -> Self {
+        Self {
+            n_files: set.paths.len(),
+            open_file: Box::new(|place| Ok(Arc::new(set.open_file(place)?))),
             elements: set.names.clone(),
-        })
+        }
     }
 }
 
-impl<R: ChunkReader + 'static> ParquetSource<R> {
-    /// An open file of the source with its columns.
-    fn open(
-        &self,
-        file: usize,
-    ) -> Result<(SerializedFileReader<SharedChunkReader<R>>, ParquetColumns), RecordingFault> {
-        let bytes = &self.files[file];
+impl<R: ChunkReader + 'static> ParquetSource<'_, R> {
+    /// Opens the file at a position; it is closed when the result is dropped.
+    fn open(&self, place: usize) -> Result<OpenParquet<R>, RecordingFault> {
+        let bytes = (self.open_file)(place)?;
         let reader = SerializedFileReader::new(SharedChunkReader(bytes.clone())).map_err(parquet_fault)?;
-        let columns = ParquetColumns::new(bytes, &reader, &self.elements)?;
-        Ok((reader, columns))
+        let columns = ParquetColumns::new(&bytes, &reader, &self.elements)?;
+        Ok(OpenParquet { bytes, reader, columns })
     }
 }
 
 /// Reads the columns that are needed, from all files.
 fn read<R: ChunkReader + 'static>(
-    source: &ParquetSource<R>,
+    source: &ParquetSource<'_, R>,
     file: &str,
     options: &ReadOptions,
 ) -> Result<SignalRecording, RecordingFault> {
-    let (_, columns) = source.open(0)?;
+    let columns = source.open(0)?.columns;
     let names = columns.names.clone();
     let mut intake = SampleIntake::new(names.clone(), options)?;
     // Columns of time stamps are reported, because their values change.
@@ -156,10 +164,10 @@ fn read<R: ChunkReader + 'static>(
         episodes: EpisodeClock::new(&names),
         columns,
     };
-    for k in 0..source.files.len() {
+    for k in 0..source.n_files {
         // The first stamps are kept over all files, so that their times have one zero.
-        let (reader, columns) = source.open(k)?;
-        if columns.names != names {
+        let opened = source.open(k)?;
+        if opened.columns.names != names {
             return Err(RecordingFault::Format {
                 format: "a data set of Parquet files",
                 message: format!(
@@ -168,7 +176,7 @@ fn read<R: ChunkReader + 'static>(
                 ),
             });
         }
-        if progress.read_file(&source.files[k], &reader, &mut intake)? == IntakeFlow::Stop {
+        if progress.read_file(&opened, &mut intake)? == IntakeFlow::Stop {
             break;
         }
     }
@@ -212,10 +220,10 @@ impl ReadProgress {
     /// Reads the samples of a file.
     fn read_file<R: ChunkReader + 'static>(
         &mut self,
-        bytes: &Arc<R>,
-        reader: &SerializedFileReader<SharedChunkReader<R>>,
+        file: &OpenParquet<R>,
         intake: &mut SampleIntake<'_>,
     ) -> Result<IntakeFlow, RecordingFault> {
+        let OpenParquet { bytes, reader, .. } = file;
         // Leaves without numbers are not read, but reported as text if they are needed.
         let episode = self.episodes.as_ref().map(EpisodeClock::place);
         let is_needed = |leaf: &ParquetLeaf| {
@@ -399,8 +407,8 @@ impl<R: ChunkReader> ChunkReader for SharedChunkReader<R> {
 }
 
 /// The single table of a file or of a data set.
-fn tables_of<R: ChunkReader + 'static>(source: &ParquetSource<R>) -> Result<Vec<TableInfo>, RecordingFault> {
-    let (mut reader, columns) = source.open(0)?;
+fn tables_of<R: ChunkReader + 'static>(source: &ParquetSource<'_, R>) -> Result<Vec<TableInfo>, RecordingFault> {
+    let OpenParquet { reader, columns, .. } = source.open(0)?;
     let schema = reader.metadata().file_metadata().schema_descr_ptr();
     let mut infos = Vec::new();
     for (leaf, column) in columns.leaves.iter().zip(schema.columns()) {
@@ -418,12 +426,11 @@ fn tables_of<R: ChunkReader + 'static>(source: &ParquetSource<R>) -> Result<Vec<
                 }),
         );
     }
+    drop(reader);
     let mut samples = 0;
-    for k in 0..source.files.len() {
-        if k > 0 {
-            reader = source.open(k)?.0;
-        }
-        samples += usize::try_from(reader.metadata().file_metadata().num_rows()).unwrap_or(0);
+    for k in 0..source.n_files {
+        let rows = source.open(k)?.reader.metadata().file_metadata().num_rows();
+        samples += usize::try_from(rows).unwrap_or(0);
     }
     // The time column is read completely for its range.
     let read_one = |name: &str| read(source, "", &ReadOptions::single_column(name)).ok();
@@ -477,8 +484,8 @@ fn kind_of(column: &ColumnDescriptor) -> String {
 }
 
 /// Names of the columns; names of nested ones contain points.
-fn names_of<R: ChunkReader + 'static>(source: &ParquetSource<R>) -> Result<Vec<String>, RecordingFault> {
-    Ok(source.open(0)?.1.names)
+fn names_of<R: ChunkReader + 'static>(source: &ParquetSource<'_, R>) -> Result<Vec<String>, RecordingFault> {
+    Ok(source.open(0)?.columns.names)
 }
 
 /// The fault of a file that the library cannot read.

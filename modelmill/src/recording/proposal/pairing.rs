@@ -166,9 +166,9 @@ impl<'a> ColumnPairing<'a> {
             .to_owned(),
         ];
         let mut unit = stated_unit(&one.parts);
-        if one.parts.unit.is_none()
-            && let Some(by_step) = suggest_time_unit(&one.values)
-        {
+        let by_step = suggest_time_unit(&one.values).filter(|_| one.parts.unit.is_none());
+        let is_unit_guessed = by_step.is_some();
+        if let Some(by_step) = by_step {
             unit = Some(by_step.to_owned());
             reasons.push("unit by the size of its steps".to_owned());
         }
@@ -177,7 +177,7 @@ impl<'a> ColumnPairing<'a> {
             unit,
             is_reversed: false,
             reasons,
-            is_guess: !by_name,
+            is_guess: !by_name || is_unit_guessed,
         };
         if let Some(time) = self.ours.iter_mut().find(|one| one.role == SignalRole::Time) {
             time.pair = Some(pair);
@@ -270,7 +270,8 @@ impl<'a> ColumnPairing<'a> {
             let reason = if shift == 0 {
                 "by its name".to_owned()
             } else {
-                format!("by its name; the file counts joints from {}", 1 + shift)
+                // Numbers of the file are larger by one if the model counts from 0.
+                format!("by its name; the file counts joints from {}", u8::from(shift > 0))
             };
             self.ours[i].pair = Some(ColumnPair {
                 signal: j,
@@ -492,8 +493,8 @@ impl<'a> ColumnPairing<'a> {
             .filter(|i| self.ours[*i].role == SignalRole::Rate)
             .collect();
         for i in rates {
-            let position = self.ours[i].name.trim_end_matches("_d").to_owned();
-            let Some((_, position)) = motion.iter().find(|(name, _)| *name == position) else {
+            let position = position_of_rate(&self.ours[i].name);
+            let Some((_, position)) = motion.iter().find(|(name, _)| name == position) else {
                 continue;
             };
             let paired = self.ours[i].pair.as_ref().map(|pair| pair.signal);
@@ -519,7 +520,7 @@ impl<'a> ColumnPairing<'a> {
                             "`{}` is not the rate of `{}` by its numbers and is left out; the rate is computed from positions \
                              then.",
                             self.signals[signal].name,
-                            self.ours[i].name.trim_end_matches("_d")
+                            position_of_rate(&self.ours[i].name)
                         ));
                     }
                 }
@@ -557,7 +558,7 @@ impl<'a> ColumnPairing<'a> {
                         "`{}` is {:.3} times the rate of `{}` and is left out; check the units of both.",
                         self.signals[signal].name,
                         link.ratio,
-                        self.ours[i].name.trim_end_matches("_d")
+                        position_of_rate(&self.ours[i].name)
                     ));
                     return;
                 }
@@ -613,6 +614,11 @@ fn stated_unit(parts: &NameParts) -> Option<String> {
     (!is_si).then_some(unit)
 }
 
+/// The name of the position of a rate of the model. It may end in `_d` itself.
+fn position_of_rate(rate: &str) -> &str {
+    rate.strip_suffix("_d").unwrap_or(rate)
+}
+
 /// A share in percent.
 fn percent_text(share: f64) -> String {
     format!("{:.0} %", 100.0 * share)
@@ -656,4 +662,84 @@ fn model_columns(mechanism: &Mechanism) -> Vec<ModelColumn> {
             .any(|drive| drive.name == *name && !drive.is_driven)
     };
     columns.filter(|one| !undriven(&one.name)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A model of two links with other names.
+    fn model(names: [(&str, &str); 2]) -> Model {
+        let text = std::fs::read_to_string("../model-spec/models/two_link.toml").unwrap();
+        let text = names.iter().fold(text, |text, (old, new)| text.replace(old, new));
+        Model::from_text("arm.toml", &text).unwrap()
+    }
+
+    /// Columns by their names and numbers.
+    fn signals(columns: Vec<(&str, Vec<f64>)>) -> Vec<FileSignal> {
+        let columns = columns.into_iter();
+        columns
+            .map(|(name, values)| FileSignal::new(name.to_owned(), values))
+            .collect()
+    }
+
+    /// The pair of a name of the model.
+    fn pair<'a>(pairing: &'a ColumnPairing<'_>, name: &str) -> Option<&'a ColumnPair> {
+        pairing.ours.iter().find(|one| one.name == name)?.pair.as_ref()
+    }
+
+    #[test]
+    fn the_first_number_of_joints_is_that_of_the_file() {
+        for (names, columns, first) in [
+            ([("q1", "q0"), ("q2", "q1")], ["pos1", "pos2"], "from 1"),
+            ([("q1", "q1"), ("q2", "q2")], ["pos0", "pos1"], "from 0"),
+        ] {
+            let arm = model(names);
+            let columns = columns.map(|name| (name, Vec::new()));
+            let mut pairing = ColumnPairing::new(&arm, signals(columns.to_vec()));
+            pairing.pair_by_name(SignalRole::Position);
+            let reasons = &pair(&pairing, names[0].1).unwrap().reasons;
+            assert!(reasons[0].ends_with(first), "{reasons:?}");
+        }
+    }
+
+    #[test]
+    fn a_guessed_unit_of_time_is_a_guess() {
+        let arm = model([("q1", "q1"), ("q2", "q2")]);
+        let time: Vec<f64> = (0..500).map(|k| 0.9999 * f64::from(k)).collect();
+        let unit_of = |name: &str| {
+            let mut pairing = ColumnPairing::new(&arm, signals(vec![(name, time.clone())]));
+            pairing.pair_time();
+            let pair = pair(&pairing, "t").unwrap().clone();
+            (pair.unit, pair.is_guess)
+        };
+        assert_eq!(unit_of("time"), (Some("ms".to_owned()), true));
+        assert_eq!(unit_of("time_ms"), (Some("ms".to_owned()), false));
+        assert_eq!(unit_of("time [ms]"), (None, false));
+    }
+
+    #[test]
+    fn rates_of_names_that_end_like_rates_are_checked() {
+        let arm = model([("q1", "arm_d"), ("q2", "q2")]);
+        let time: Vec<f64> = (0..500).map(|k| 0.004 * f64::from(k)).collect();
+        let of = |f: &dyn Fn(f64) -> f64| -> Vec<f64> { time.iter().map(|t| f(*t)).collect() };
+        let position = of(&|t| (3.0 * t).sin());
+        for (rate, is_rate) in [(of(&|t| 3.0 * (3.0 * t).cos()), true), (position.clone(), false)] {
+            let columns = vec![
+                ("t", time.clone()),
+                ("arm_d", position.clone()),
+                ("arm_d_d", rate),
+                ("q2", of(&|t| (2.0 * t).sin())),
+            ];
+            let mut pairing = ColumnPairing::new(&arm, signals(columns));
+            pairing.pair_equal_names();
+            pairing.check_rates();
+            let reasons = pair(&pairing, "arm_d_d").map(|pair| pair.reasons[0].as_str());
+            assert_eq!(reasons.is_some_and(|reason| reason.contains("correlation")), is_rate);
+            assert_eq!(
+                pairing.remarks.iter().any(|says| says.contains("of `arm_d` by")),
+                !is_rate
+            );
+        }
+    }
 }

@@ -1,6 +1,6 @@
 //! Columns of a recording as signals: their numbers, which of them is the time, and which one is the rate of another.
 
-use super::thresholds::{RATE_LEAST_CORRELATION, STENCIL_SPAN, TIME_LEAST_SHARE};
+use super::thresholds::{LONGEST_LIKELY_STEP, RATE_LEAST_CORRELATION, STENCIL_SPAN, TIME_LEAST_SHARE};
 use super::words::{NameParts, SignalRole};
 
 /// A column of a recording.
@@ -63,15 +63,15 @@ pub(super) fn find_time(signals: &[FileSignal]) -> Option<usize> {
     })
 }
 
-/// The factor from a time to seconds that its steps suggest, with the unit; `None` for steps of less than a second.
+/// The unit that the steps of a time suggest; `None` for seconds.
 pub(super) fn suggest_time_unit(time: &[f64]) -> Option<&'static str> {
     let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
     steps.sort_by(f64::total_cmp);
-    // No robot is recorded once in a second or more.
+    // Limits lie between usual steps: a step of 1 ms is the most frequent one, so 1, 1000 and 1e6 would be undecided.
     match *steps.get(steps.len() / 2)? {
-        step if step < 1.0 => None,
-        step if step < 1e3 => Some("ms"),
-        step if step < 1e6 => Some("us"),
+        step if step < LONGEST_LIKELY_STEP => None,
+        step if step < 1e3 * LONGEST_LIKELY_STEP => Some("ms"),
+        step if step < 1e6 * LONGEST_LIKELY_STEP => Some("us"),
         _ => Some("ns"),
     }
 }
@@ -111,6 +111,20 @@ pub(super) fn find_rate_link(time: &[f64], signal: &[f64], rate: &[f64]) -> Opti
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Stamps with jitter, in each unit and at usual sampling rates.
+    #[test]
+    fn units_of_time_are_decided_far_from_usual_steps() {
+        for rate in [10.0, 50.0, 125.0, 500.0, 1000.0, 2000.0, 5000.0] {
+            for (unit, per_second) in [(None, 1.0), (Some("ms"), 1e3), (Some("us"), 1e6), (Some("ns"), 1e9)] {
+                for jitter in [-0.1, 0.1] {
+                    let step = per_second / rate * (1.0 + jitter);
+                    let time: Vec<f64> = (0..100).map(|k| step * f64::from(k)).collect();
+                    assert_eq!(suggest_time_unit(&time), unit, "{rate} Hz");
+                }
+            }
+        }
+    }
 
     #[test]
     fn rates_are_recognised_with_their_unit() {

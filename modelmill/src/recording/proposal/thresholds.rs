@@ -14,6 +14,10 @@ pub(super) const STENCIL_SPAN: f64 = 0.02;
 /// Least share of steps in which a time increases (1). By judgement.
 pub(super) const TIME_LEAST_SHARE: f64 = 0.9;
 
+/// Steps of a time up to this one are taken for seconds, s; the limits of smaller units follow from it. By judgement: no
+/// usual sampling rate is near 6.7 Hz or 6.7 kHz, but many logs have 10 Hz, 1 kHz or 5 kHz.
+pub(super) const LONGEST_LIKELY_STEP: f64 = 0.15;
+
 /// Least similarity of names that are paired without other evidence, from 0 to 1. By judgement.
 pub(super) const NAME_LEAST_SIMILARITY: f64 = 0.3;
 

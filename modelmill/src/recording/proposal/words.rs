@@ -127,7 +127,8 @@ const IDLE_WORDS: [&str; 14] = [
     "filtered",
 ];
 
-/// Units at the end of a name behind `_`, with the spelling of the tables of units.
+/// Units at the end of a name behind `_`, with the spelling of the tables of units. Those of one letter are units of
+/// forces.
 const UNIT_ENDINGS: [(&str, &str); 13] = [
     ("deg", "deg"),
     ("degree", "deg"),
@@ -170,20 +171,17 @@ impl NameParts {
         // A unit behind `_`, unless it is the complete name.
         if unit.is_none() && words.len() > 1 {
             let last = words.last().cloned().unwrap_or_default();
+            let others = role_words(&words[..words.len() - 1]).map(|(role, _)| *role);
+            // A letter may also identify the joint: `q_a` is a position.
+            let is_possible = last.len() > 1 || matches!(others, None | Some(SignalRole::Force));
             let found = UNIT_ENDINGS.iter().find(|(ending, _)| *ending == last);
-            if let Some((_, known)) = found {
+            if let Some((_, known)) = found.filter(|_| is_possible) {
                 unit = Some((*known).to_owned());
                 words.pop();
             }
         }
         let is_any = |all: &[&str], word: &String| all.contains(&word.as_str());
-        let strong = STRONG_WORDS
-            .iter()
-            .find(|(_, all)| words.iter().any(|word| is_any(all, word)));
-        let weak = WEAK_WORDS
-            .iter()
-            .find(|(_, all)| words.iter().any(|word| is_any(all, word)));
-        let by_word = strong.or(weak);
+        let by_word = role_words(&words);
         let role = match (by_word.map(|(role, _)| *role), unit.as_deref().and_then(role_of_unit)) {
             // A unit is more precise than a word, except for what no model reads.
             (Some(SignalRole::Other), _) => Some(SignalRole::Other),
@@ -209,6 +207,15 @@ impl NameParts {
             unit,
         }
     }
+}
+
+/// The role that words show, with all words that show it.
+fn role_words(words: &[String]) -> Option<&'static (SignalRole, &'static [&'static str])> {
+    let find = |table: &'static [(SignalRole, &'static [&'static str])]| {
+        let mut entries = table.iter();
+        entries.find(|(_, all)| words.iter().any(|word| all.contains(&word.as_str())))
+    };
+    find(STRONG_WORDS).or_else(|| find(WEAK_WORDS))
 }
 
 /// The words of a name in lower case: parts between other characters, at capitals, and at numbers.
@@ -283,6 +290,12 @@ mod tests {
             ("time_ms", SignalRole::Time, false, Some("ms")),
             ("q3_deg", SignalRole::Position, false, Some("deg")),
             ("motor_temperature1", SignalRole::Other, false, None),
+            ("tau2_n", SignalRole::Force, false, Some("N")),
+            ("current2_a", SignalRole::Force, false, Some("A")),
+            // Joints called a and n.
+            ("q_a", SignalRole::Position, false, None),
+            ("pos_n", SignalRole::Position, false, None),
+            ("vel_a", SignalRole::Rate, false, None),
         ] {
             let parts = NameParts::new(name);
             assert_eq!(
@@ -292,6 +305,7 @@ mod tests {
             );
         }
         assert_eq!(NameParts::new("arm1").role, None);
+        assert_eq!(NameParts::new("q_a").words, ["a"]);
     }
 
     #[test]
