@@ -177,10 +177,17 @@ impl<'a> EffectSelector<'a> {
         // Mean square of a series.
         let size = |values: &[f64]| dot(values, values) / values.len().max(1) as f64;
         let measured = self.pool.column(self.measured);
+        // The least relative error of the driven channels, as a square.
+        let relative = (rest.iter().enumerate())
+            .filter(|(d, _)| !self.problem.is_idle(*d))
+            .filter_map(|(d, values)| Some(self.pool.mean_square(d, values) / size(measured.0[d].as_deref()?)))
+            .filter(|relative| relative.is_finite())
+            .fold(1.0, f64::min);
         for (d, values) in rest.iter().enumerate() {
             let noise = self.problem.noise[d].powi(2);
             let rounding = measured.0[d].as_deref().map_or(0.0, size) * 1e-14;
-            let variance = self.pool.mean_square(d, values).max(noise).max(rounding);
+            let idle = self.problem.idle_squares.get(d).copied().unwrap_or(0.0) * relative;
+            let variance = self.pool.mean_square(d, values).max(noise).max(rounding).max(idle);
             self.weights[d] = if variance > 0.0 { 1.0 / variance } else { 1.0 };
         }
         self.base_set = self.conditioning_set(&[]);

@@ -268,6 +268,9 @@ pub struct DiagnosisProblem {
     pub noise: Vec<f64>,
     /// Channels without a force signal, since nothing drives there; empty if all have one.
     pub idle: Vec<bool>,
+    /// Mean squares of the terms that cancel in each idle channel, `[channel]`, 0 for the others. The diagnosis estimates
+    /// them.
+    pub idle_squares: Vec<f64>,
     /// Samples that are left out, such as those of a push, `[channel][sample]`; empty if all count.
     pub left_out: Vec<Vec<bool>>,
     /// Samples next to reversals, `[channel][sample]`, which do not decide but count in figures. The diagnosis finds

@@ -1,6 +1,10 @@
 //! Idle channels, which have no force signal since nothing drives there: their equation of motion has the force zero.
 //! They have no sensor faults, and their noise is that of the states, which appears in the residual of a fit. Input:
-//! the problem; output: the noise of its idle channels.
+//! the problem; output: the noise of its idle channels, and the size of their terms.
+//!
+//! Decision: the equations of an idle channel are not believed more than those of the driven ones, relative to the size of
+//! their terms. Its residual is smallest where all terms are small, so that a weight from its own residual would force
+//! wrong parameters as long as an effect is missing at a drive.
 
 use super::bench::EffectSelector;
 use super::noise::white_noise;
@@ -27,15 +31,18 @@ impl DiagnosisProblem {
         let candidates = std::mem::take(&mut self.candidates);
         let found = EffectSelector::new(self, &NoColumnProvider).idle_channel_noise();
         self.candidates = candidates;
-        for (channel, noise) in found {
+        self.idle_squares = vec![0.0; self.layout.channels.len()];
+        for (channel, noise, squares) in found {
             self.noise[channel] = noise;
+            self.idle_squares[channel] = squares;
         }
     }
 }
 
 impl EffectSelector<'_> {
-    /// Standard deviation of the noise of each idle channel, as (channel, noise in N or N m).
-    fn idle_channel_noise(&mut self) -> Vec<(usize, f64)> {
+    /// Standard deviation of the noise of each idle channel, and mean square of its terms, as (channel, noise in N or
+    /// N m, square of that unit).
+    fn idle_channel_noise(&mut self) -> Vec<(usize, f64, f64)> {
         let problem = self.problem;
         let channels = 0..problem.layout.channels.len();
         let mean = |values: &[f64]| dot(values, values) / values.len().max(1) as f64;
@@ -70,7 +77,7 @@ impl EffectSelector<'_> {
         // The noise is not below rounding.
         let noise = |(d, size): (&usize, &f64)| {
             let rounding = FORCE_ROUNDING * size.max(mean(&rest[*d])).sqrt();
-            (*d, white_noise(&rest[*d]).max(rounding))
+            (*d, white_noise(&rest[*d]).max(rounding), *size)
         };
         idle.iter().zip(&sizes).map(noise).collect()
     }

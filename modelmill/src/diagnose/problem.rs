@@ -278,6 +278,7 @@ fn problem(
         layout: layout(model, all),
         noise: noise_levels(&measured, all)?,
         idle: idle.collect(),
+        idle_squares: Vec::new(),
         measured: ForceColumn::new(measured),
         base: regressor(all, &ModelEvaluator::new(&model.derivation), model)?,
         candidates: std::mem::take(&mut made.candidates),

@@ -394,6 +394,18 @@ parameters = { Fv = { name = "Fv", nominal = 1.5 } }
 "#;
     let found = told("cart_pole-rubs", CART_POLE, friction, 3.0);
     assert_eq!(found, [("viscous_friction".to_owned(), vec!["motor".to_owned()])]);
+    // The equation of the free joint is not believed more than that of the drive, whose friction is not known yet.
+    let both = format!(
+        "{friction}{}",
+        friction
+            .replace("motor", "phi")
+            .replace("\"Fv\"", "\"Fv_phi\"")
+            .replace("1.5", "0.01")
+    );
+    let mut found = told("cart_pole-rubs-twice", CART_POLE, &both, 3.0);
+    found.sort();
+    let expected = ["motor", "phi"].map(|at| ("viscous_friction".to_owned(), vec![at.to_owned()]));
+    assert_eq!(found, expected);
 }
 
 const CABLES: &str = r#"

@@ -335,6 +335,12 @@ class Diagnosis(Result):
         return corrected
 
     @property
+    def unresolved(self) -> list[dict[str, Any]]:
+        """Faults of the recordings that could not be corrected, and what to do; nothing else is stated then."""
+        unresolved: list[dict[str, Any]] = self._object.get("unresolved", [])
+        return unresolved
+
+    @property
     def budget(self) -> dict[str, dict[str, Any]]:
         """The error of each drive, divided into noise, a non-repeatable part, and a repeatable part that nothing explains."""
         budget: dict[str, dict[str, Any]] = self._object["budget"]

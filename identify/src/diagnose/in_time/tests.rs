@@ -35,6 +35,7 @@ fn problem(seed: u64, change: impl Fn(usize, f64, f64) -> f64) -> DiagnosisProbl
         ],
         noise: vec![0.2],
         idle: vec![false],
+        idle_squares: Vec::new(),
         removed: vec![0.0],
         ..DiagnosisProblem::default()
     };
