@@ -123,7 +123,15 @@ impl EffectSelector<'_> {
             let estimates: Vec<EstimatedQuantity> = estimates.collect();
             let parameters = estimates.len() / intervals.len();
             let own = estimates.chunks(parameters.max(1)).zip(intervals);
-            found.extend(own.map(|(own, interval)| of(own.to_vec(), Some(interval))));
+            found.extend(own.map(|(own, interval)| {
+                let mut own = own.to_vec();
+                // The recording is stated beside them.
+                let suffix = format!(" in {}", interval.recording);
+                for one in &mut own {
+                    one.name = one.name.strip_suffix(&suffix).unwrap_or(&one.name).to_owned();
+                }
+                of(own, Some(interval))
+            }));
         }
         found
     }

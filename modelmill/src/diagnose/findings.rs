@@ -355,7 +355,10 @@ impl Model {
             findings.notes.push(note);
         }
         findings.regions = regions(&findings);
-        if question.repeat_with_nominal && held != FixedParameters::All && !findings.off_nominal.is_empty() {
+        // Where something changes within a recording, fixed values show that change and nothing else.
+        let is_steady = !words::has_change_in_time(&findings.diagnosis);
+        let is_free = held != FixedParameters::All;
+        if question.repeat_with_nominal && is_free && is_steady && !findings.off_nominal.is_empty() {
             findings.with_nominal = Some(nominal_diagnosis(&findings, &between)?);
         }
         Ok(findings)

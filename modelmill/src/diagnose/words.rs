@@ -180,8 +180,9 @@ pub fn floor_label(noise_floor: f64) -> &'static str {
     }
 }
 
-/// Why a candidate was rejected, as a sentence for people; `has_effects` states whether the diagnosis found any effect.
-pub fn refusal(reason: RejectionReason, has_effects: bool) -> &'static str {
+/// Why a candidate was rejected, as a sentence for people; `has_findings` states whether the diagnosis
+/// found anything.
+pub fn refusal(reason: RejectionReason, has_findings: bool) -> &'static str {
     match reason {
         RejectionReason::WrongSign => "a parameter would have an impossible sign",
         RejectionReason::CancelsAnother => "it would only cancel another effect at its place",
@@ -190,7 +191,7 @@ pub fn refusal(reason: RejectionReason, has_effects: bool) -> &'static str {
         }
         RejectionReason::LessLikelyThanNot => "possible, but less likely than not",
         RejectionReason::ExplainedBetter => "another candidate explains more",
-        RejectionReason::ExplainsNothing if has_effects => {
+        RejectionReason::ExplainsNothing if has_findings => {
             "redundant: it explains almost nothing in addition to the effects found"
         }
         RejectionReason::ExplainsNothing => "explains almost none of the error",
@@ -303,11 +304,8 @@ fn unexplained_verdict(
             "A part of the residual is not {clearly}explained by any effect of the library, on {sits}."
         ));
     }
-    // Changes in time are listed with the disturbances; here only what follows for the model.
-    let changes: Vec<&str> = (diagnosis.disturbances.iter())
-        .filter(|one| is_change_in_time(one))
-        .filter_map(|one| one.description.as_deref())
-        .collect();
+    // Changes in time are listed with their sizes among the disturbances; here only what follows for the model.
+    let changes = changes_in_time(diagnosis);
     if !changes.is_empty() {
         says.push(format!(
             "Something changes during a recording: {}. No single model is valid before and after it: cut the recording there.",
@@ -364,8 +362,41 @@ pub(crate) fn time_residual(one: &TimeResidual, channel: &str, unit: &str) -> St
 
 /// Whether the residual is noise everywhere, and nothing changes within a recording.
 fn is_all_explained(diagnosis: &ModelDiagnosis) -> bool {
-    let mut disturbances = diagnosis.disturbances.iter();
-    diagnosis.unexplained.is_empty() && diagnosis.time_residuals.is_empty() && !disturbances.any(is_change_in_time)
+    diagnosis.unexplained.is_empty() && diagnosis.time_residuals.is_empty() && !has_change_in_time(diagnosis)
+}
+
+/// What changes within recordings, as clauses: each kind and place once, with its times.
+fn changes_in_time(diagnosis: &ModelDiagnosis) -> Vec<String> {
+    let changes = || diagnosis.disturbances.iter().filter(|one| is_change_in_time(one));
+    let mut clauses = Vec::new();
+    for (k, one) in changes().enumerate() {
+        let is_same = |other: &&Disturbance| (&other.kind, &other.at) == (&one.kind, &one.at);
+        if changes().take(k).any(|other| is_same(&other)) {
+            continue;
+        }
+        let times = changes().filter(is_same).map(|other| {
+            let from = significant(other.interval.unwrap_or_default()[0], 4);
+            format!("at t = {from} s of {}", other.recordings.join(", "))
+        });
+        let times: Vec<String> = times.collect();
+        clauses.push(format!("{} {}", what_changes(one), joined_by_and(&times)));
+    }
+    clauses
+}
+
+/// What a change within a recording changes, as a clause.
+fn what_changes(one: &Disturbance) -> String {
+    let at = one.at.join(", ");
+    match one.kind.as_str() {
+        "gain_change" => format!("the scale of the measured force of {at} changes"),
+        "offset_step" => format!("the zero of the measured force of {at} jumps"),
+        _ => format!("the load on {at} changes"),
+    }
+}
+
+/// Whether something changes within a recording.
+pub(crate) fn has_change_in_time(diagnosis: &ModelDiagnosis) -> bool {
+    diagnosis.disturbances.iter().any(is_change_in_time)
 }
 
 /// Whether a disturbance is a change within a recording.
@@ -492,16 +523,59 @@ fn disturbances(diagnosis: &ModelDiagnosis, channels: &[String]) -> Option<Strin
     })
 }
 
+/// Disturbances as sentences; noise and outliers of several drives share one.
+pub fn disturbance_sentences(all: &[Disturbance]) -> Vec<String> {
+    let mut sentences = Vec::new();
+    for (k, one) in all.iter().enumerate() {
+        let alike: Vec<&Disturbance> = all.iter().filter(|other| other.kind == one.kind).collect();
+        let common = match one.kind.as_str() {
+            "coloured_noise" => {
+                "have slow noise. It does not repeat when the machine passes the same state, so no model can explain it"
+            }
+            "outliers" => "have outliers. The fit ignores them",
+            _ => "",
+        };
+        if alike.len() < 2 || common.is_empty() {
+            sentences.push(format!("{}.", one.description.as_deref().unwrap_or_default()));
+        } else if all[..k].iter().all(|earlier| earlier.kind != one.kind) {
+            let sizes: Vec<String> = alike.iter().map(|one| sized_place(one)).collect();
+            sentences.push(format!("{} {common}.", joined_by_and(&sizes)));
+        }
+    }
+    sentences
+}
+
+/// The place of noise or outliers with their size in brackets.
+fn sized_place(one: &Disturbance) -> String {
+    let at = one.at.join(", ");
+    match one.kind.as_str() {
+        "outliers" => format!(
+            "{at} ({} of the samples, {} rms)",
+            share_of_samples(one),
+            estimate(one, "size")
+        ),
+        _ => format!("{at} ({} below {})", estimate(one, "noise"), estimate(one, "corner")),
+    }
+}
+
+/// The estimate of a disturbance with its unit, rounded for a sentence; empty if there is none.
+fn estimate(one: &Disturbance, name: &str) -> String {
+    let found = one.estimates.iter().find(|value| value.name == name);
+    found.map_or_else(String::new, |q| {
+        format!("{} {}", significant(q.value, 3), q.unit).trim_end().to_owned()
+    })
+}
+
+/// The share of the samples that are outliers.
+fn share_of_samples(one: &Disturbance) -> String {
+    let share = one.estimates.iter().find(|value| value.name == "share");
+    percent(share.map(|share| share.value))
+}
+
 /// A disturbance as a sentence without the last full stop; sizes have units.
 pub fn disturbance(one: &Disturbance) -> String {
     let at = one.at.join(", ");
-    // The value of an estimate with its unit, rounded for a sentence.
-    let value = |name: &str| {
-        let found = one.estimates.iter().find(|value| value.name == name);
-        found.map_or_else(String::new, |q| {
-            format!("{} {}", significant(q.value, 3), q.unit).trim_end().to_owned()
-        })
-    };
+    let value = |name: &str| estimate(one, name);
     // All estimates with standard deviations, for kinds without a sentence of their own.
     let all: Vec<String> = (one.estimates.iter())
         .map(|q| {
@@ -521,15 +595,11 @@ pub fn disturbance(one: &Disturbance) -> String {
             value("corner")
         ),
         "quantised_force" => format!("the measured force of {at} is quantised in steps of {}", value("step")),
-        "outliers" => {
-            // The share of the samples has no unit.
-            let share = one.estimates.iter().find(|value| value.name == "share");
-            format!(
-                "{at} has outliers: {} of the samples, {} rms. The fit ignores them",
-                percent(share.map(|share| share.value)),
-                value("size")
-            )
-        }
+        "outliers" => format!(
+            "{at} has outliers: {} of the samples, {} rms. The fit ignores them",
+            share_of_samples(one),
+            value("size")
+        ),
         "periodic_in_time" => {
             // A hum may have several frequencies.
             let frequencies = one.estimates.iter().filter(|value| value.name == "frequency");
@@ -567,13 +637,11 @@ pub fn disturbance(one: &Disturbance) -> String {
         }
         "gain_change" | "offset_step" | "payload_change" if one.interval.is_some() => {
             let [from, to] = one.interval.unwrap_or_default().map(|t| significant(t, 4));
-            let what = match one.kind.as_str() {
-                "gain_change" => format!("the scale of the measured force of {at} changes"),
-                "offset_step" => format!("the zero of the measured force of {at} jumps"),
-                _ => format!("the load on {at} changes"),
-            };
             let runs = one.recordings.join(", ");
-            format!("{what} at t = {from} s and stays until {to} s ({runs}): {all}")
+            format!(
+                "{} at t = {from} s and stays until {to} s ({runs}): {all}",
+                what_changes(one)
+            )
         }
         other => format!("{} ({at}): {all}", kind(other)),
     }

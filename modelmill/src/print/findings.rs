@@ -247,8 +247,7 @@ impl DiagnosisFindings {
         if !disturbances.is_empty() {
             lines.push(String::new());
             lines.push(style.bold("Disturbances in the recordings (not model errors)"));
-            for one in &disturbances {
-                let says = format!("{}.", one.description.as_deref().unwrap_or_default());
+            for says in words::disturbance_sentences(&disturbances) {
                 let wrapped = words::lines(&says, 98);
                 lines.extend(wrapped.iter().map(|line| format!("  {line}")));
             }
@@ -369,7 +368,7 @@ impl DiagnosisFindings {
 
     /// The rejected candidates that explain most of the error alone, with the reason.
     fn refused_text(&self, style: TerminalStyle, lines: &mut Vec<String>) {
-        let has_effects = !self.diagnosis.effects.is_empty();
+        let has_findings = self.diagnosis.steps.len() > 1;
         // Candidates are sorted by what they explain alone, so the first are the closest rivals.
         let candidates = self.diagnosis.candidates.iter();
         let rows: Vec<Vec<String>> = candidates
@@ -379,7 +378,7 @@ impl DiagnosisFindings {
                     vec![
                         words::effect(&c.effect),
                         percent(Some(c.explained)),
-                        words::refusal(why, has_effects).to_owned(),
+                        words::refusal(why, has_findings).to_owned(),
                     ]
                 })
             })

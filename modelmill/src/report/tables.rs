@@ -263,12 +263,12 @@ pub(crate) fn candidates(findings: &DiagnosisFindings) -> String {
         "result",
     ];
     // The reason of a rejection depends on whether any effect was found.
-    let has_effects = !findings.diagnosis.effects.is_empty();
+    let has_findings = findings.diagnosis.steps.len() > 1;
     // Candidates that were found have no reason of rejection.
     let row = |c: &CandidateOutcome| -> Vec<TableCell> {
         let verdict = match &c.rejection_reason {
             None => TableCell::html("<b>found</b>".to_owned()),
-            Some(why) => TableCell::text(words::refusal(*why, has_effects)),
+            Some(why) => TableCell::text(words::refusal(*why, has_findings)),
         };
         vec![
             TableCell::text(&words::kind(&c.effect.kind)),

@@ -144,7 +144,7 @@ impl TourText {
         // Effects that were found come first, then the best of the rejected ones.
         let shown = all.iter().filter(|c| c.rejection_reason.is_none());
         let others = all.iter().filter(|c| c.rejection_reason.is_some()).take(OTHERS);
-        let has_effects = !findings.diagnosis.effects.is_empty();
+        let has_findings = findings.diagnosis.steps.len() > 1;
         let rows: Vec<Vec<String>> = shown
             .chain(others)
             .map(|c| {
@@ -152,7 +152,7 @@ impl TourText {
                     words::effect(&c.effect),
                     format!("{:.0} %", 100.0 * c.explained),
                     c.rejection_reason
-                        .map_or("found", |why| words::refusal(why, has_effects))
+                        .map_or("found", |why| words::refusal(why, has_findings))
                         .to_owned(),
                 ]
             })
