@@ -60,8 +60,8 @@ impl SignalRecording {
         run.repeatability = periods::measure_repeatability(&run.time, period, drives, forces);
         if let Some(repeats) = &run.repeatability {
             run.notes.push(RecordingNote::info(format!(
-                "The motion in {} repeats itself every {} s, {} times in all; over these periods the forces spread \
-                 by {:.3} % of their size, the noise floor.",
+                "The motion in {} repeats itself every {} s, {} times in all. From period to period the forces differ by \
+                 {:.3} % of their rms value: noise, and all else that does not repeat.",
                 self.file(),
                 seven_digits(period),
                 repeats.periods,

@@ -349,16 +349,16 @@ impl Model {
         findings.possible = described_effects(&findings, &findings.diagnosis.possible_effects);
         findings.laws = laws::hypotheses(&findings.before.model, &findings.diagnosis);
         findings.undecided = undecided_effects(&findings);
-        findings.off_nominal = off_nominal_parameters(findings.final_version());
+        // Where something changes within a recording, no single set of values is valid for all of it.
+        if !words::has_change_in_time(&findings.diagnosis) {
+            findings.off_nominal = off_nominal_parameters(findings.final_version());
+        }
         if let Some(note) = reversed_sign_note(findings.final_version(), &findings.off_nominal) {
             self.host().note(&note);
             findings.notes.push(note);
         }
         findings.regions = regions(&findings);
-        // Where something changes within a recording, fixed values show that change and nothing else.
-        let is_steady = !words::has_change_in_time(&findings.diagnosis);
-        let is_free = held != FixedParameters::All;
-        if question.repeat_with_nominal && is_free && is_steady && !findings.off_nominal.is_empty() {
+        if question.repeat_with_nominal && held != FixedParameters::All && !findings.off_nominal.is_empty() {
             findings.with_nominal = Some(nominal_diagnosis(&findings, &between)?);
         }
         Ok(findings)

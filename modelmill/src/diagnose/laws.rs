@@ -285,7 +285,7 @@ fn library_entry(sites: &[LawSite], law: &Proposed, parameters: &[EffectEstimate
     }
     let _ = writeln!(
         text,
-        "expression = \"{expression}\"\nsays = \"A hypothesis that recordings suggest. It is no law of the machine until its cause is understood.\""
+        "expression = \"{expression}\"\nsays = \"A hypothesis that recordings suggest. Do not treat it as a property of the machine before its physical cause is known.\""
     );
     // Units are those of the place: of a force or of a torque.
     text.push_str("[effect_kind.parameters]\n");

@@ -28,6 +28,7 @@ mod candidates;
 mod columns;
 mod constants;
 mod corrected;
+mod disturbance_words;
 mod encoders;
 mod faults;
 mod findings;

@@ -7,8 +7,10 @@ use modelmill_identify::diagnose::{
 };
 
 use crate::faults::{SuspectedFault, is_suspicion};
-use crate::text::table::{number, percent, significant};
+use crate::text::table::{percent, significant};
 
+use super::disturbance_words::what_changes;
+pub use super::disturbance_words::{disturbance, disturbance_sentences};
 use super::thresholds::{HARDLY_LOWER, NOISE_FREE_ROUNDINGS};
 
 /// Kinds of changes during a recording.
@@ -61,7 +63,7 @@ pub fn effects(effects: &[LocatedEffect]) -> String {
 }
 
 /// Names as a list whose last entry is joined by `and`.
-fn joined_by_and(names: &[String]) -> String {
+pub(super) fn joined_by_and(names: &[String]) -> String {
     match names {
         [] => "nothing".to_owned(),
         [one] => one.clone(),
@@ -282,6 +284,12 @@ fn unexplained_verdict(
         ("clearly ", "clearly explains")
     };
     let mut says = match (found, sits.is_empty()) {
+        ([], true) if has_change_in_time(diagnosis) => vec![format!(
+            "No single set of parameters explains a whole recording: the error {} is {} of the force, and {error} with the \
+             changes below. {noise}",
+            judged.phrase(),
+            percent(diagnosis.steps.first().map(|first| first.check))
+        )],
         ([], true) => vec![format!(
             "The model does not explain all of the recordings: the error {} is {error} of the force. {noise}",
             judged.phrase()
@@ -308,7 +316,8 @@ fn unexplained_verdict(
     let changes = changes_in_time(diagnosis);
     if !changes.is_empty() {
         says.push(format!(
-            "Something changes during a recording: {}. No single model is valid before and after it: cut the recording there.",
+            "Something changes during a recording: {}. No single model is valid before and after such a change: split \
+             the recording at that time, and identify the parts separately.",
             changes.join("; ")
         ));
     }
@@ -320,7 +329,8 @@ fn unexplained_verdict(
     let in_time: Vec<&str> = in_time.collect();
     if !in_time.is_empty() {
         says.push(format!(
-            "A residual follows the time and not the state, on {}; it is more than noise (see the residuals that follow the time).",
+            "A part of the residual of {} occurs at certain times only: it does not recur when the state recurs, and it is larger \
+             than the noise.",
             in_time.join(", ")
         ));
     }
@@ -340,7 +350,10 @@ pub(crate) fn time_residual(one: &TimeResidual, channel: &str, unit: &str) -> St
                 })
                 .collect();
             if one.intervals.len() > MOST_INTERVALS {
-                times.push(format!("{} more", one.intervals.len() - MOST_INTERVALS));
+                times.push(format!(
+                    "and further intervals ({})",
+                    one.intervals.len() - MOST_INTERVALS
+                ));
             }
             format!(
                 "{channel} has an unexplained force of {size} in some intervals only ({noise}): {}. Look for contacts, stuck \
@@ -382,16 +395,6 @@ fn changes_in_time(diagnosis: &ModelDiagnosis) -> Vec<String> {
         clauses.push(format!("{} {}", what_changes(one), joined_by_and(&times)));
     }
     clauses
-}
-
-/// What a change within a recording changes, as a clause.
-fn what_changes(one: &Disturbance) -> String {
-    let at = one.at.join(", ");
-    match one.kind.as_str() {
-        "gain_change" => format!("the scale of the measured force of {at} changes"),
-        "offset_step" => format!("the zero of the measured force of {at} jumps"),
-        _ => format!("the load on {at} changes"),
-    }
 }
 
 /// Whether something changes within a recording.
@@ -464,7 +467,13 @@ fn first_checks(diagnosis: &ModelDiagnosis) -> Option<String> {
 /// The faults that were corrected hypothetically, as sentences; the verdict on the corrected recordings follows.
 pub(crate) fn corrected_text(corrected: &[SuspectedFault]) -> String {
     let sentences: Vec<String> = (corrected.iter())
-        .map(|fault| format!("In {} {}.", fault.recordings.join(", "), fault.clause.replace('`', "")))
+        .map(|fault| {
+            format!(
+                "In {} {}.",
+                joined_by_and(&fault.recordings),
+                fault.clause.replace('`', "")
+            )
+        })
         .collect();
     let with = if corrected.len() == 1 {
         "With it corrected"
@@ -477,7 +486,13 @@ pub(crate) fn corrected_text(corrected: &[SuspectedFault]) -> String {
 /// The verdict if faults remain that cannot be corrected.
 pub(crate) fn unresolved_text(unresolved: &[SuspectedFault]) -> String {
     let sentences: Vec<String> = (unresolved.iter())
-        .map(|fault| format!("In {} {}.", fault.recordings.join(", "), fault.clause.replace('`', "")))
+        .map(|fault| {
+            format!(
+                "In {} {}.",
+                joined_by_and(&fault.recordings),
+                fault.clause.replace('`', "")
+            )
+        })
         .collect();
     format!(
         "Check the recording and the model first. {} Until this is clear, nothing can be stated about the model.",
@@ -521,130 +536,6 @@ fn disturbances(diagnosis: &ModelDiagnosis, channels: &[String]) -> Option<Strin
             named.join(", ")
         )
     })
-}
-
-/// Disturbances as sentences; noise and outliers of several drives share one.
-pub fn disturbance_sentences(all: &[Disturbance]) -> Vec<String> {
-    let mut sentences = Vec::new();
-    for (k, one) in all.iter().enumerate() {
-        let alike: Vec<&Disturbance> = all.iter().filter(|other| other.kind == one.kind).collect();
-        let common = match one.kind.as_str() {
-            "coloured_noise" => {
-                "have slow noise. It does not repeat when the machine passes the same state, so no model can explain it"
-            }
-            "outliers" => "have outliers. The fit ignores them",
-            _ => "",
-        };
-        if alike.len() < 2 || common.is_empty() {
-            sentences.push(format!("{}.", one.description.as_deref().unwrap_or_default()));
-        } else if all[..k].iter().all(|earlier| earlier.kind != one.kind) {
-            let sizes: Vec<String> = alike.iter().map(|one| sized_place(one)).collect();
-            sentences.push(format!("{} {common}.", joined_by_and(&sizes)));
-        }
-    }
-    sentences
-}
-
-/// The place of noise or outliers with their size in brackets.
-fn sized_place(one: &Disturbance) -> String {
-    let at = one.at.join(", ");
-    match one.kind.as_str() {
-        "outliers" => format!(
-            "{at} ({} of the samples, {} rms)",
-            share_of_samples(one),
-            estimate(one, "size")
-        ),
-        _ => format!("{at} ({} below {})", estimate(one, "noise"), estimate(one, "corner")),
-    }
-}
-
-/// The estimate of a disturbance with its unit, rounded for a sentence; empty if there is none.
-fn estimate(one: &Disturbance, name: &str) -> String {
-    let found = one.estimates.iter().find(|value| value.name == name);
-    found.map_or_else(String::new, |q| {
-        format!("{} {}", significant(q.value, 3), q.unit).trim_end().to_owned()
-    })
-}
-
-/// The share of the samples that are outliers.
-fn share_of_samples(one: &Disturbance) -> String {
-    let share = one.estimates.iter().find(|value| value.name == "share");
-    percent(share.map(|share| share.value))
-}
-
-/// A disturbance as a sentence without the last full stop; sizes have units.
-pub fn disturbance(one: &Disturbance) -> String {
-    let at = one.at.join(", ");
-    let value = |name: &str| estimate(one, name);
-    // All estimates with standard deviations, for kinds without a sentence of their own.
-    let all: Vec<String> = (one.estimates.iter())
-        .map(|q| {
-            let deviation = q.standard_deviation;
-            let deviation = deviation.map_or_else(String::new, |std| format!(" ± {}", significant(std, 2)));
-            let said = format!("{} {}{deviation} {}", q.name, number(q.value), q.unit);
-            said.trim_end().to_owned()
-        })
-        .collect();
-    let all = all.join(", ");
-    match one.kind.as_str() {
-        // Each kind says what it is and what follows for the model.
-        "coloured_noise" => format!(
-            "{at} has slow noise of {}, mostly below about {}. It does not repeat when the machine passes the same state, so no model \
-             can explain it",
-            value("noise"),
-            value("corner")
-        ),
-        "quantised_force" => format!("the measured force of {at} is quantised in steps of {}", value("step")),
-        "outliers" => format!(
-            "{at} has outliers: {} of the samples, {} rms. The fit ignores them",
-            share_of_samples(one),
-            value("size")
-        ),
-        "periodic_in_time" => {
-            // A hum may have several frequencies.
-            let frequencies = one.estimates.iter().filter(|value| value.name == "frequency");
-            let frequencies: Vec<String> = frequencies
-                .map(|value| format!("{} Hz", significant(value.value, 4)))
-                .collect();
-            format!(
-                "{at} has hum of {} at {}: it is periodic in time and not a function of the state",
-                value("amplitude"),
-                frequencies.join(" and ")
-            )
-        }
-        "offset_drift" => format!("the zero of the measured force of {at} drifts with time: {all}"),
-        "friction_drift" => {
-            format!("the friction of {at} changes during a recording, as it does when a joint warms up: {all}")
-        }
-        "encoder_eccentricity" => format!(
-            "the encoder of {at} has the error of an eccentric disc, {} times per turn: {all}",
-            value("times_per_turn")
-        ),
-        "different_runs" => {
-            format!("the friction of {at} differs from the fixed values of the model: {all}")
-        }
-        "encoder_zero" => {
-            format!("the encoder of {at} has a constant offset, since its zero differs from that of the model: {all}")
-        }
-        "contact_event" => {
-            let [from, to] = one.interval.unwrap_or_default();
-            format!(
-                "a contact or push from {} to {} s of {}, on {at}: {all}. The fit ignores this time",
-                significant(from, 4),
-                significant(to, 4),
-                one.recordings.join(", ")
-            )
-        }
-        "gain_change" | "offset_step" | "payload_change" if one.interval.is_some() => {
-            let [from, to] = one.interval.unwrap_or_default().map(|t| significant(t, 4));
-            let runs = one.recordings.join(", ");
-            format!(
-                "{} at t = {from} s and stays until {to} s ({runs}): {all}",
-                what_changes(one)
-            )
-        }
-        other => format!("{} ({at}): {all}", kind(other)),
-    }
 }
 
 /// Text in lines of at most `letters` letters, broken between words; a longer word has a line of its own.

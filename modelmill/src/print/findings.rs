@@ -199,17 +199,7 @@ impl DiagnosisFindings {
         self.missing_text(style, spelling, &mut lines);
         self.possible_text(style, &mut lines);
         self.disturbances_text(style, &mut lines);
-        lines.push(String::new());
-        lines.push(style.bold(if diagnosis.verdict == DiagnosisVerdict::Unexplained {
-            "Where the residual is largest"
-        } else {
-            "Where the error without added effects is largest"
-        }));
-        let places = &self.regions;
-        lines.extend(places.iter().map(|region| format!("  {}.", region.says)));
-        if places.is_empty() {
-            lines.push("  Nowhere in particular: no range of a coordinate, rate, load or time stands out.".to_owned());
-        }
+        self.regions_text(style, &mut lines);
         lines.extend(laws::text(&self.laws, &self.before.model, style, spelling));
         self.refused_text(style, &mut lines);
         self.undecided_text(style, &mut lines);
@@ -238,6 +228,25 @@ impl DiagnosisFindings {
             ));
         }
         lines
+    }
+
+    /// Where the error, or what remains of it, is largest.
+    fn regions_text(&self, style: TerminalStyle, lines: &mut Vec<String>) {
+        let is_unexplained = self.diagnosis.verdict == DiagnosisVerdict::Unexplained;
+        // Without a drive whose residual is repeatable, nothing was searched.
+        if is_unexplained && self.regions.is_empty() {
+            return;
+        }
+        lines.push(String::new());
+        lines.push(style.bold(if is_unexplained {
+            "Where the residual is largest"
+        } else {
+            "Where the error without added effects is largest"
+        }));
+        lines.extend(self.regions.iter().map(|region| format!("  {}.", region.says)));
+        if self.regions.is_empty() {
+            lines.push("  Nowhere in particular: no range of a coordinate, rate, load or time stands out.".to_owned());
+        }
     }
 
     /// Disturbances of the recordings, and the parts of the residual of each drive.
@@ -483,7 +492,7 @@ impl DiagnosisFindings {
         let says = format!("With all parameters fixed at their nominal values: {says}");
         lines.extend(words::lines(&says, 98).iter().map(|line| format!("  {line}")));
         let fix_parameters = Remedy::option(OptionName::Held).spell(spelling);
-        lines.push(format!("  (Details: {fix_parameters}.)"));
+        lines.push(format!("  For the full result use {fix_parameters}."));
     }
 }
 

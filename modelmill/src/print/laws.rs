@@ -68,7 +68,12 @@ pub(super) fn text(
         let wrapped = words::lines(&gain(law), 96);
         lines.extend(wrapped.iter().map(|line| format!("    {line}")));
         if !hypothesis.near_ties.is_empty() {
-            lines.push("    These explain the recordings equally well:".to_owned());
+            let these = if hypothesis.near_ties.len() == 1 {
+                "This law explains"
+            } else {
+                "These laws explain"
+            };
+            lines.push(format!("    {these} the recordings equally well:"));
             for tie in &hypothesis.near_ties {
                 lines.push(format!("      {}", tie.label()));
             }
@@ -76,9 +81,9 @@ pub(super) fn text(
         // A law without memory has an entry for a library and the step that adds it.
         match &law.entry {
             Some(entry) => {
-                lines.push(format!("    As a library file, {LIBRARY}:"));
+                lines.push(format!("    Append to the library file {LIBRARY}:"));
                 lines.extend(entry.text.lines().map(|line| style.dim(&format!("      {line}"))));
-                lines.push("    and to add it:".to_owned());
+                lines.push("    To add the law to the model:".to_owned());
                 let command = spelling.spell_effect_of_library(model, &entry.effect, LIBRARY);
                 lines.push(format!("      {command}"));
             }

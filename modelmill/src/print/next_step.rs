@@ -2,7 +2,7 @@
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{CommandName, Message, OptionName, Remedy};
-use modelmill_identify::ParameterStatus;
+use modelmill_identify::{ErrorFigures, ParameterStatus};
 
 use crate::identify::{Identification, RefinementResult};
 use crate::text::table::percent;
@@ -11,6 +11,22 @@ use crate::text::table::percent;
 const VAGUE: f64 = 0.5;
 /// From this part of uncertain parameters on, the advice is about them. By judgement.
 const MANY: f64 = 0.25;
+
+/// The error relative to the force, as the end of a sentence: of all drives, or where their units differ of the drive with
+/// the largest error.
+fn error_text(figures: &ErrorFigures) -> String {
+    if let Some(nrms) = figures.nrms {
+        return format!("is {} of the force", percent(Some(nrms)));
+    }
+    let of_drives = figures.channels.iter();
+    let largest = of_drives
+        .filter_map(|(name, one)| Some((name, one.nrms?)))
+        .max_by(|a, b| a.1.total_cmp(&b.1));
+    match largest {
+        Some((name, nrms)) => format!("of {name} is {} of its force", percent(Some(nrms))),
+        None => "has no force to compare with".to_owned(),
+    }
+}
 
 impl Identification {
     /// The next step: more information on uncertain parameters, a validation run, or the diagnosis.
@@ -37,9 +53,8 @@ impl Identification {
             };
             let judged = self.fit.check.as_ref().unwrap_or(&self.fit.fit);
             return message!(
-                "Next: {vague} of {n} base parameters are uncertain by more than half their value. The error is {} of the \
-                 force: if that is more than the noise, run {} first. If it finds nothing, record a richer motion ({}){}.",
-                percent(judged.nrms),
+                "Next: {vague} of {n} base parameters are uncertain by more than half their value. The error {}: if that is more than the noise, run {} first. If it finds nothing, record a richer motion ({}){}.",
+                error_text(judged),
                 Remedy::command(CommandName::Diagnose),
                 Remedy::command(CommandName::Excite),
                 physical

@@ -229,7 +229,7 @@ impl RunsComparison {
         lines.push(String::new());
         lines.push(style.bold("Lasting changes, in the order of the runs"));
         if self.points.is_empty() {
-            lines.push("  No base parameter changed for two or more runs.".to_owned());
+            lines.push("  No base parameter took a new value and kept it for two or more runs.".to_owned());
         }
         for point in &self.points {
             // Six names are enough to recognise the change; the JSON has all.

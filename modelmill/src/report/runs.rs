@@ -98,7 +98,7 @@ fn changes_list(changes: &[RunChange]) -> String {
 /// Lasting changes, each with its physical causes and the base parameters before and since.
 fn points(compared: &RunsComparison) -> String {
     if compared.points.is_empty() {
-        return "<p>No base parameter changed for two or more runs.</p>\n".to_owned();
+        return "<p>No base parameter took a new value and kept it for two or more runs.</p>\n".to_owned();
     }
     let mut html = String::new();
     // The file is named, since numbers of runs are hard to find again.

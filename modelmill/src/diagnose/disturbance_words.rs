@@ -1,0 +1,143 @@
+//! Sentences about disturbances of recordings. Input are disturbances of a diagnosis, output is English text without line
+//! breaks.
+
+use modelmill_identify::diagnose::Disturbance;
+
+use crate::text::table::{number, percent, significant};
+
+use super::words::{joined_by_and, kind};
+
+/// Disturbances as sentences; noise and outliers of several drives share one.
+pub fn disturbance_sentences(all: &[Disturbance]) -> Vec<String> {
+    let mut sentences = Vec::new();
+    for (k, one) in all.iter().enumerate() {
+        let alike: Vec<&Disturbance> = all.iter().filter(|other| other.kind == one.kind).collect();
+        let common = match one.kind.as_str() {
+            "coloured_noise" => {
+                "have slow noise. It does not repeat when the machine passes the same state, so no model can explain it"
+            }
+            "outliers" => "have outliers. The fit ignores them",
+            _ => "",
+        };
+        if alike.len() < 2 || common.is_empty() {
+            sentences.push(format!("{}.", one.description.as_deref().unwrap_or_default()));
+        } else if all[..k].iter().all(|earlier| earlier.kind != one.kind) {
+            let sizes: Vec<String> = alike.iter().map(|one| sized_place(one)).collect();
+            sentences.push(format!("{} {common}.", joined_by_and(&sizes)));
+        }
+    }
+    sentences
+}
+
+/// The place of noise or outliers with their size in brackets.
+fn sized_place(one: &Disturbance) -> String {
+    let at = one.at.join(", ");
+    match one.kind.as_str() {
+        "outliers" => format!(
+            "{at} ({} of the samples, {} rms)",
+            share_of_samples(one),
+            estimate(one, "size")
+        ),
+        _ => format!("{at} ({} below {})", estimate(one, "noise"), estimate(one, "corner")),
+    }
+}
+
+/// The estimate of a disturbance with its unit, rounded for a sentence; empty if there is none.
+fn estimate(one: &Disturbance, name: &str) -> String {
+    let found = one.estimates.iter().find(|value| value.name == name);
+    found.map_or_else(String::new, |q| {
+        format!("{} {}", significant(q.value, 3), q.unit).trim_end().to_owned()
+    })
+}
+
+/// The share of the samples that are outliers.
+fn share_of_samples(one: &Disturbance) -> String {
+    let share = one.estimates.iter().find(|value| value.name == "share");
+    percent(share.map(|share| share.value))
+}
+
+/// A disturbance as a sentence without the last full stop; sizes have units.
+pub fn disturbance(one: &Disturbance) -> String {
+    let at = one.at.join(", ");
+    let value = |name: &str| estimate(one, name);
+    // All estimates with standard deviations, for kinds without a sentence of their own.
+    let all: Vec<String> = (one.estimates.iter())
+        .map(|q| {
+            let deviation = q.standard_deviation;
+            let deviation = deviation.map_or_else(String::new, |std| format!(" ± {}", significant(std, 2)));
+            let unit = if q.unit == "1" { "" } else { &q.unit };
+            let said = format!("{} {}{deviation} {unit}", q.name, number(q.value));
+            said.trim_end().to_owned()
+        })
+        .collect();
+    let all = all.join(", ");
+    match one.kind.as_str() {
+        // Each kind says what it is and what follows for the model.
+        "coloured_noise" => format!(
+            "{at} has slow noise of {}, mostly below about {}. It does not repeat when the machine passes the same state, so no model \
+             can explain it",
+            value("noise"),
+            value("corner")
+        ),
+        "quantised_force" => format!("the measured force of {at} is quantised in steps of {}", value("step")),
+        "outliers" => format!(
+            "{at} has outliers: {} of the samples, {} rms. The fit ignores them",
+            share_of_samples(one),
+            value("size")
+        ),
+        "periodic_in_time" => {
+            // A hum may have several frequencies.
+            let frequencies = one.estimates.iter().filter(|value| value.name == "frequency");
+            let frequencies: Vec<String> = frequencies
+                .map(|value| format!("{} Hz", significant(value.value, 4)))
+                .collect();
+            format!(
+                "{at} has hum of {} at {}: it is periodic in time and not a function of the state",
+                value("amplitude"),
+                frequencies.join(" and ")
+            )
+        }
+        "offset_drift" => format!("the zero of the measured force of {at} drifts with time: {all}"),
+        "friction_drift" => {
+            format!("the friction of {at} changes during a recording, as it does when a joint warms up: {all}")
+        }
+        "encoder_eccentricity" => format!(
+            "the encoder of {at} has the error of an eccentric disc, {} times per turn: {all}",
+            value("times_per_turn")
+        ),
+        "different_runs" => {
+            format!("the friction of {at} differs from the fixed values of the model: {all}")
+        }
+        "encoder_zero" => {
+            format!("the encoder of {at} has a constant offset, since its zero differs from that of the model: {all}")
+        }
+        "contact_event" => {
+            let [from, to] = one.interval.unwrap_or_default();
+            format!(
+                "a contact or push from {} to {} s of {}, on {at}: {all}. The fit ignores this time",
+                significant(from, 4),
+                significant(to, 4),
+                one.recordings.join(", ")
+            )
+        }
+        "gain_change" | "offset_step" | "payload_change" if one.interval.is_some() => {
+            let [from, to] = one.interval.unwrap_or_default().map(|t| significant(t, 4));
+            let runs = one.recordings.join(", ");
+            format!(
+                "{} at t = {from} s and keeps the new value until {to} s ({runs}): {all}",
+                what_changes(one)
+            )
+        }
+        other => format!("{} ({at}): {all}", kind(other)),
+    }
+}
+
+/// What a change within a recording changes, as a clause.
+pub(super) fn what_changes(one: &Disturbance) -> String {
+    let at = one.at.join(", ");
+    match one.kind.as_str() {
+        "gain_change" => format!("the scale of the measured force of {at} changes"),
+        "offset_step" => format!("the zero of the measured force of {at} jumps"),
+        _ => format!("the load on {at} changes"),
+    }
+}
