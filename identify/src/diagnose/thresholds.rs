@@ -365,8 +365,9 @@ pub(super) const LOUD_LEAST_SHARE: f64 = 0.5;
 /// Loud windows may last for this share of the time at most (1); else they are no exception. By judgement.
 pub(super) const LOUD_MOST_DURATION: f64 = 0.4;
 
-/// Half width of the band of a resonance, relative to its frequency (1). By judgement.
-pub(super) const RESONANCE_HALF_WIDTH: f64 = 0.2;
+/// Half width of the band of a resonance, relative to its frequency (1). By judgement: noise of positions, derived twice and
+/// cut off by a low-pass, has two thirds of its power within a fifth of the cut-off, but less than half within a tenth.
+pub(super) const RESONANCE_HALF_WIDTH: f64 = 0.1;
 
 /// Share of the power above the white noise that must lie in this band (1). By judgement: a low-pass leaves at most a
 /// quarter in any such band.

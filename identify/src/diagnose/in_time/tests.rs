@@ -98,3 +98,43 @@ fn noise_and_drift_are_no_steps() {
         assert_eq!(interval_of(&found(&warming), "offset_step"), None, "seed {seed}");
     }
 }
+
+/// Noise of positions that is derived twice and cut off by a low-pass is no resonance; a ringing joint is one.
+#[test]
+fn a_resonance_is_no_noise_of_derivatives() {
+    let problem = problem(1, |_, _, _| 0.0);
+    let scaled = |values: Vec<f64>| -> Vec<f64> {
+        let size = (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt();
+        values.iter().map(|x| 0.8 * x / size).collect()
+    };
+    let frequency = |rest: &[f64]| {
+        let found = time_residual(&problem, 0, rest, 0.0)?;
+        (found.character == ResidualCharacter::Resonance).then_some(found.frequency)?
+    };
+    for seed in 0..10 {
+        let mut noise = TestNoise::new(seed);
+        let positions: Vec<f64> = (0..2000).map(|_| noise.normal()).collect();
+        for cutoff in [4.0, 6.0, 9.0] {
+            let filter = crate::signal::LowPass::butterworth(4, cutoff, 50.0).expect("a filter");
+            let smooth = filter.zero_phase(&positions).expect("enough samples");
+            let mut derived = vec![0.0; 2000];
+            for i in 1..1999 {
+                derived[i] = smooth[i + 1] - 2.0 * smooth[i] + smooth[i - 1];
+            }
+            assert_eq!(frequency(&scaled(derived)), None, "{seed} {cutoff}");
+        }
+        // A joint with 6 Hz and a damping ratio of 0.02, excited by noise.
+        let (rate, damping) = (std::f64::consts::TAU * 6.0, 0.02);
+        let [mut x, mut v] = [0.0, 0.0];
+        let mut ring = Vec::new();
+        for force in &positions {
+            for _ in 0..20 {
+                v += 0.001 * (force - 2.0 * damping * rate * v - rate * rate * x);
+                x += 0.001 * v;
+            }
+            ring.push(x);
+        }
+        let found = frequency(&scaled(ring)).expect("a resonance");
+        assert!((found - 6.0).abs() < 0.3, "{seed}: {found}");
+    }
+}
