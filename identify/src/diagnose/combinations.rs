@@ -146,9 +146,9 @@ impl EffectSelector<'_> {
         }
     }
 
-    /// The weakest of the dispensable members of each place, by index, weakest first. `strength` gets the set without a member and the
-    /// member; it returns a strength, smaller for weaker members, or `None` for a member that is needed. Members of
-    /// one place may replace each other, so that only one of them goes at a time.
+    /// The weakest of the dispensable members of each place, by index, weakest first. `strength` gets the set without a
+    /// member and the member; it returns a strength, smaller for weaker members, or `None` for a member that is needed.
+    /// Members of one place may replace each other, so that only one of them is removed at a time.
     fn weakest_by_place(
         &self,
         picks: &[SelectedEffect],

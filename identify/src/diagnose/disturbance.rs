@@ -136,8 +136,8 @@ impl EffectSelector<'_> {
         found
     }
 
-    /// Splits the residual of each channel by its origin, and reports coloured noise and residuals that follow the time. `rest` is `[channel][sample]`,
-    /// `again` the repeatable share of its squares.
+    /// Splits the residual of each channel by its origin, and reports coloured noise and residuals that follow the time.
+    /// `rest` is `[channel][sample]`, `again` the repeatable share of its squares.
     pub(crate) fn residual_budgets(
         &self,
         picks: &[SelectedEffect],

@@ -8,7 +8,8 @@
 //!    microseconds; `tuning` finds constants, `fit_dependent` computes columns that depend on the fit, `force_signals` those of
 //!    faulty force signals, `tilt` rotates gravity, `body` places an additional mass, `constant` corrects a number of
 //!    the model.
-//! 3. `search` - forward search over sets, with exchanges; `combinations` tries pairs and the same kinds at all drives; `evidence` decides on time that was not fitted; `simplification`
+//! 3. `search` - forward search over sets, with exchanges; `combinations` tries pairs and the same kinds at all drives;
+//!    `evidence` decides on time that was not fitted; `simplification`
 //!    makes the last set as small and simple as possible.
 //! 4. `aliases` - effects that this recording cannot distinguish; `reproducible` - the repeatable residual that no
 //!    candidate explains.

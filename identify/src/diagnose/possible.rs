@@ -37,7 +37,8 @@ impl EffectSelector<'_> {
 }
 
 impl AssessedEffects {
-    /// Removes the effects that are less likely than not, even together with their alternatives, and returns them. Disturbances of the recordings stay.
+    /// Removes the effects that are less likely than not, even together with their alternatives, and returns them.
+    /// Disturbances of the recordings stay.
     pub(crate) fn set_aside_unlikely(&mut self, bench: &EffectSelector<'_>) -> Vec<IdentifiedEffect> {
         let all = self.identified_effects(bench);
         let is_unlikely = |pick: &SelectedEffect| {

@@ -231,8 +231,8 @@ pub(crate) fn project_on_series(
 ///
 /// The period is the shortest one after which the run repeats, from [`find_period`]. Otherwise it is the length of
 /// the run, with or without a repetition of the first sample at the end, if all positions and rates return to their
-/// start: signals that are rates may return while the `positions` do not, as in a swing-up. It is then refined for the smallest
-/// residual. Harmonics count up to the last one above the noise. The residual is noise if its spectrum is flat: no
+/// start: signals that are rates may return while the `positions` do not, as in a swing-up. It is then refined for the
+/// smallest residual. Harmonics count up to the last one above the noise. The residual is noise if its spectrum is flat: no
 /// line may exceed the noise at the harmonics, and the mean must be that of the upper half of the band.
 pub(crate) fn find_series(time: &[f64], signals: &[&[f64]], positions: &[&[f64]]) -> Option<PeriodicSeries> {
     // Constant signals have no period.

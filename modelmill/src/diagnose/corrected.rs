@@ -34,7 +34,7 @@ pub(super) struct CorrectedRecordings {
 impl CorrectedRecordings {
     /// Corrects faults as long as some are found; `None` if the recordings have none.
     ///
-    /// Fails if a corrected recording cannot be prepared.
+    /// Fails if a recording cannot be prepared with another direction of gravity, and when the job is cancelled.
     pub(super) fn new(
         model: &Model,
         fit: &[&PreparedRecording],

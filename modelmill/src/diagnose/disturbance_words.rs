@@ -14,7 +14,7 @@ pub fn disturbance_sentences(all: &[Disturbance]) -> Vec<String> {
         let alike: Vec<&Disturbance> = all.iter().filter(|other| other.kind == one.kind).collect();
         let common = match one.kind.as_str() {
             "coloured_noise" => {
-                "have slow noise. It does not repeat when the machine passes the same state, so no model can explain it"
+                "have coloured noise. It does not repeat when the machine passes the same state, so no model can explain it"
             }
             "outliers" => "have outliers. The fit ignores them",
             _ => "",
@@ -74,7 +74,7 @@ pub fn disturbance(one: &Disturbance) -> String {
     match one.kind.as_str() {
         // Each kind says what it is and what follows for the model.
         "coloured_noise" => format!(
-            "{at} has slow noise of {}, mostly below about {}. It does not repeat when the machine passes the same state, so no model \
+            "{at} has coloured noise of {}, mostly below about {}. It does not repeat when the machine passes the same state, so no model \
              can explain it",
             value("noise"),
             value("corner")

@@ -118,7 +118,8 @@ pub struct DiagnosisFindings {
     pub notes: Vec<RecordingNote>,
     /// Faults of the recordings that were corrected hypothetically: all findings hold for the corrected recordings.
     pub corrected: Vec<SuspectedFault>,
-    /// Faults that could not be corrected, since several explain a recording equally well. Nothing else is claimed then.
+    /// Faults that could not be corrected: several explain a recording equally well, or the correction of one fails.
+    /// Nothing else is claimed then.
     pub unresolved: Vec<SuspectedFault>,
     /// The search problem and its solution, without the columns.
     pub(crate) answer: DiagnosisSolution,
@@ -353,7 +354,11 @@ impl Model {
         if !words::has_change_in_time(&findings.diagnosis) {
             findings.off_nominal = off_nominal_parameters(findings.final_version());
         }
-        if let Some(note) = reversed_sign_note(findings.final_version(), &findings.off_nominal) {
+        let turned = reversed_sign_note(findings.final_version(), &findings.off_nominal);
+        for note in [turned, findings.answer.unsearched_changes_note()]
+            .into_iter()
+            .flatten()
+        {
             self.host().note(&note);
             findings.notes.push(note);
         }

@@ -16,6 +16,7 @@ use crate::runs::RecordingDifference;
 use crate::runs::payload::PayloadColumns;
 use crate::segment::RecordingSegment;
 use crate::text::table::count;
+use modelmill_identify::RecordingNote;
 
 use super::candidates::{DerivedCandidates, candidates};
 use super::columns::{self, CandidateOrigin, load_dependent_columns, refined_columns};
@@ -45,6 +46,8 @@ pub enum FixedParameters {
 pub(crate) struct DiagnosisSolution {
     /// The problem in numbers, without columns.
     pub problem: DiagnosisProblem,
+    /// Whether changes within recordings were searched.
+    pub are_changes_searched: bool,
     /// Its solution.
     pub diagnosis: ModelDiagnosis,
     /// Candidates that `add` could add, with their derivation.
@@ -52,6 +55,17 @@ pub(crate) struct DiagnosisSolution {
 }
 
 impl DiagnosisSolution {
+    /// The note that changes within recordings were not searched; `None` if they were.
+    pub(crate) fn unsearched_changes_note(&self) -> Option<RecordingNote> {
+        let note = || {
+            RecordingNote::warning(
+                "Changes within a recording, such as a load that is taken up, were not searched: the model has too many \
+                 base parameters for this search. Divide the recording and compare its parts as runs.",
+            )
+        };
+        (!self.are_changes_searched).then(note)
+    }
+
     /// Sum of the squared residuals of all drives, each relative to the squared force of the drive (1).
     pub(crate) fn mean_square_residual(&self) -> f64 {
         let parts = self.diagnosis.budgets.iter().zip(&self.diagnosis.residual);
@@ -141,6 +155,7 @@ pub(crate) fn find_missing_effects(
         model,
         all: &all,
     };
+    let are_changes_searched = problem.searches_changes();
     let mut diagnosis = model
         .host()
         .run_job("searching for missing effects", 0, |_| diagnose(&mut problem, &supply))?;
@@ -158,6 +173,7 @@ pub(crate) fn find_missing_effects(
         }));
     Ok(DiagnosisSolution {
         problem: problem.without_columns(),
+        are_changes_searched,
         diagnosis,
         candidates,
     })

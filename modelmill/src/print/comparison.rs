@@ -9,7 +9,8 @@ use crate::text::TerminalStyle;
 use crate::text::table::count;
 
 impl ModelComparison {
-    /// Errors, regions, dependence on the rates and notes as one JSON object; `parameters` is `nominal` or the file that the values come from.
+    /// Errors, regions, dependence on the rates and notes as one JSON object; `parameters` is `nominal` or the file that
+    /// the values come from.
     pub fn json(&self, parameters: &str, spelling: &dyn RemedySpelling) -> Outcome<Value> {
         let mut object = json!({ "model": self.model, "parameters": parameters });
         let figures = serde_json::to_value(&self.figures);

@@ -569,13 +569,19 @@ impl PreparedRecording {
 
     /// Whether a fault is a wrong sign of forces that are smaller than the nominal ones by a factor typical of a gear.
     fn is_sign_of_gears(&self, model: &Model, fault: &SuspectedFault) -> bool {
-        let (drives, first) = (model.drives(), self.segments.first());
-        let factors = || first.map_or_else(Vec::new, |first| audit::gear_factors(model, first));
-        fault.kind == RecordingFaultKind::WrongSign && {
-            let geared: Vec<bool> = factors().iter().map(Option::is_some).collect();
-            let is_geared = |at: &String| drives.iter().zip(&geared).any(|(drive, geared)| drive == at && *geared);
-            fault.at.iter().all(is_geared)
-        }
+        let Some(first) = self
+            .segments
+            .first()
+            .filter(|_| fault.kind == RecordingFaultKind::WrongSign)
+        else {
+            return false;
+        };
+        let (drives, factors) = (model.drives(), audit::gear_factors(model, first));
+        let is_geared = |at: &String| {
+            let mut pairs = drives.iter().zip(&factors);
+            pairs.any(|(drive, factor)| drive == at && factor.is_some())
+        };
+        fault.at.iter().all(is_geared)
     }
 
     /// The recording as it would be after operations on its columns, prepared and examined again for a model. Its notes

@@ -183,8 +183,8 @@ fn find_change(
     })
 }
 
-/// The step or interval of a shape that explains most in a recording, with the squares that it explains; `None` if it explains too little, or hardly more
-/// than a slow change.
+/// The step or interval of a shape that explains most in a recording, with the squares that it explains; `None` if it
+/// explains too little, or hardly more than a slow change.
 fn best_profile(products: &BlockProducts<'_>, shape: usize, recording: usize) -> Option<(f64, TimeProfile)> {
     let blocks = products.recordings[recording].blocks.len();
     // The level of the recording is free, since the other recordings may have changes too.

@@ -20,6 +20,19 @@ const MOST_COLUMNS: usize = 400;
 /// Fewest samples of a block.
 const FEWEST_IN_BLOCK: usize = 5;
 
+impl DiagnosisProblem {
+    /// Whether changes within recordings are searched: not for models with very many columns.
+    pub fn searches_changes(&self) -> bool {
+        self.columns_of_changes(self.base.len()) <= MOST_COLUMNS
+    }
+
+    /// Number of columns of a search of changes beside a set of `set` columns.
+    fn columns_of_changes(&self, set: usize) -> usize {
+        let of_shapes = self.change_shapes.iter().map(|shape| shape.parameters.len());
+        set + self.friction.len() + of_shapes.sum::<usize>()
+    }
+}
+
 /// A recording, cut into blocks.
 pub(super) struct CutRecording {
     /// Its name.
@@ -130,12 +143,11 @@ impl<'a> BlockProducts<'a> {
         if cut.is_empty() {
             return None;
         }
-        // Friction that the model lacks would look like a change where the motion changes.
-        let set: Vec<&ForceColumn> = set.iter().copied().chain(&problem.friction).collect();
-        let of_shapes = problem.change_shapes.iter().map(|shape| shape.parameters.len());
-        if set.len() + of_shapes.sum::<usize>() > MOST_COLUMNS {
+        if problem.columns_of_changes(set.len()) > MOST_COLUMNS {
             return None;
         }
+        // Friction that the model lacks would look like a change where the motion changes.
+        let set: Vec<&ForceColumn> = set.iter().copied().chain(&problem.friction).collect();
         let excluded = excluded_samples(problem);
         let channels = problem.layout.channels.len();
         let mut one = Self {
