@@ -166,8 +166,9 @@ fn find_change(
     (!columns.is_empty()).then(|| FoundChange {
         candidate: CandidateEffect {
             effect: shape.effect.clone(),
-            // The time of each change is searched.
-            searched_constants: intervals.len(),
+            // A change that lasts has one searched time, one that ends has two. Each is the best of as many times as
+            // there are effective samples: as for the best of many candidates, this costs twice their logarithm.
+            searched_constants: intervals.iter().map(|one| if one.lasts { 2 } else { 4 }).sum(),
             parameters,
             is_part_of_load: false,
             refines: None,
