@@ -648,19 +648,7 @@ impl EffectSelector<'_> {
                 let channels = self.affected_channels(&[pick]);
                 (self.evidence(&without, picks, &channels).gain, None)
             } else if let Some(refused) = found.rejected.iter().find(|r| r.pick.candidate == k) {
-                let why = if refused.wrong_sign {
-                    RejectionReason::WrongSign
-                } else if refused.cancels {
-                    RejectionReason::CancelsAnother
-                } else if refused.is_implausible {
-                    RejectionReason::ImplausibleValue
-                } else {
-                    refused
-                        .evidence
-                        .insufficiency_reason(has_check)
-                        .unwrap_or(RejectionReason::ExplainedBetter)
-                };
-                (refused.evidence.gain, Some(why))
+                (refused.evidence.gain, Some(refused.reason(has_check)))
             } else if let Some(pick) = &self.current_choices[k] {
                 let mut with = picks.to_vec();
                 with.push(pick.clone());
@@ -689,6 +677,7 @@ impl EffectSelector<'_> {
             });
         }
         // Found effects first, then by the share that each explains alone.
+        rejection::name_unconfirmed(&mut considered);
         considered.sort_by(|a, b| {
             (b.rejection_reason.is_none().cmp(&a.rejection_reason.is_none())).then(b.explained.total_cmp(&a.explained))
         });
