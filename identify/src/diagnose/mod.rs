@@ -104,7 +104,8 @@ pub enum DiagnosisVerdict {
     Adequate,
     /// Effects are missing, and with them the model is adequate.
     MissingEffect,
-    /// A repeatable part of the residual remains that no candidate explains.
+    /// A part of the residual remains that no candidate explains: it is repeatable, or it follows the time. Also if the
+    /// recordings are explained only after the correction of a fault.
     Unexplained,
 }
 

@@ -63,7 +63,7 @@ pub fn effects(effects: &[LocatedEffect]) -> String {
 }
 
 /// Names as a list whose last entry is joined by `and`.
-pub(super) fn joined_by_and(names: &[String]) -> String {
+pub(crate) fn joined_by_and(names: &[String]) -> String {
     match names {
         [] => "nothing".to_owned(),
         [one] => one.clone(),
@@ -228,11 +228,12 @@ pub fn verdict(diagnosis: &ModelDiagnosis, channels: &[String], judged: Validati
     let them = if found.len() == 1 { "it" } else { "them" };
     // Each verdict states the error and compares it with the noise.
     let says = match diagnosis.verdict {
-        // After a correction the verdict stays cautious, although nothing is left to explain.
-        DiagnosisVerdict::Unexplained if found.is_empty() && is_all_explained(diagnosis) => {
-            adequate_text(diagnosis, last.check, judged)
-        }
-        DiagnosisVerdict::Adequate => adequate_text(diagnosis, last.check, judged),
+        // After a correction nothing is left to explain, but the recordings as they are stay unexplained.
+        DiagnosisVerdict::Unexplained if found.is_empty() && is_all_explained(diagnosis) => format!(
+            "{} The recordings as they are count as unexplained: repeat the diagnosis once the fault is corrected.",
+            explained_text("The model explains the recordings", diagnosis, last.check, judged)
+        ),
+        DiagnosisVerdict::Adequate => explained_text("The model is adequate", diagnosis, last.check, judged),
         DiagnosisVerdict::MissingEffect => {
             format!(
                 "The model lacks {}. With {them} {falls}. {noise}",
@@ -410,15 +411,15 @@ fn is_change_in_time(one: &Disturbance) -> bool {
     one.interval.is_some() && CHANGES_IN_TIME.contains(&one.kind.as_str())
 }
 
-/// The sentences of a model that lacks nothing.
-fn adequate_text(diagnosis: &ModelDiagnosis, error: f64, judged: ValidationMethod) -> String {
+/// The sentences of a model that lacks nothing; `claim` is the first clause.
+fn explained_text(claim: &str, diagnosis: &ModelDiagnosis, error: f64, judged: ValidationMethod) -> String {
     let lowers = if diagnosis.possible_effects.is_empty() {
         "No effect of the library lowers this error."
     } else {
         "No effect of the library clearly lowers this error."
     };
     format!(
-        "The model is adequate: its error {} is {} of the force. {} {lowers}",
+        "{claim}: its error {} is {} of the force. {} {lowers}",
         judged.phrase(),
         percent(Some(error)),
         noise_floor_text(diagnosis)

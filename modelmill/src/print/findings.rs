@@ -6,6 +6,7 @@ use serde_json::{Map, Value, json};
 
 use super::laws;
 use crate::diagnose::{DiagnosisFindings, EffectEstimate, MissingEffect, UndecidedEffect, words};
+use crate::faults::RecordingFaultKind;
 use crate::print::{OptionName, Remedy, StepSpelling, notes};
 use crate::text::TerminalStyle;
 use crate::text::table::{ColumnAlignment, number, percent, significant, table};
@@ -208,7 +209,14 @@ impl DiagnosisFindings {
         // depending on the reader.
         let at_fault = self.corrected.iter().chain(&self.unresolved);
         let mut next: Vec<String> = at_fault
-            .map(|fault| format!("Correct the recording first: {}.", fault.advice.spell(spelling)))
+            .map(|fault| {
+                // The direction of gravity may be an error of the model file.
+                let first = match fault.kind {
+                    RecordingFaultKind::GravityDirection => "Before the next diagnosis",
+                    _ => "Correct the recording first",
+                };
+                format!("{first}: {}.", fault.advice.spell(spelling))
+            })
             .collect();
         let entries = self.entries_to_add().iter();
         next.extend(entries.map(|entry| spelling.spell_effect(&self.before.model, entry)));
@@ -252,7 +260,9 @@ impl DiagnosisFindings {
     /// Disturbances of the recordings, and the parts of the residual of each drive.
     fn disturbances_text(&self, style: TerminalStyle, lines: &mut Vec<String>) {
         let diagnosis = &self.diagnosis;
-        let disturbances = self.disturbances();
+        let mut disturbances = self.disturbances();
+        // The verdict names the direction of gravity, which may be an error of the model file.
+        disturbances.retain(|one| one.kind != RecordingFaultKind::GravityDirection.name());
         if !disturbances.is_empty() {
             lines.push(String::new());
             lines.push(style.bold("Disturbances in the recordings (not model errors)"));
