@@ -405,7 +405,7 @@ impl CoreModel {
         let data = recordings(&data);
         self.run_interruptible(py, progress.as_ref(), || {
             let found = self.model.compare(&borrow_recordings(&data), &values)?;
-            let text = found.text(name, TerminalStyle::PLAIN);
+            let text = found.text(name, TerminalStyle::PLAIN, &PythonSpelling);
             let json = found.json(name, &PythonSpelling)?;
             Ok(PythonResult::new(&json, &text, remarks(&found.notes)))
         })

@@ -33,6 +33,7 @@ mod interpret;
 mod json;
 mod languages;
 mod pages;
+mod next_step;
 mod pictures;
 mod plausible;
 mod preparation;
