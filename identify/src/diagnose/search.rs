@@ -145,7 +145,7 @@ impl EffectSelector<'_> {
             if settled.is_possible()
                 && evidence.is_sufficient()
                 && !self.is_worse_overall(accepted, &settled.picks, &channels)
-                && self.is_ladder_step(accepted, &settled, evidence.gain)
+                && self.is_next_step(accepted, &settled, evidence.gain)
             {
                 return Some(EffectSetChange {
                     picks: settled.picks,
@@ -159,7 +159,7 @@ impl EffectSelector<'_> {
 
     /// Whether a set may follow the accepted one: the error of all drives together does not rise, a general kind that
     /// replaces simpler ones is much better, and faults of force signals are confirmed.
-    fn is_ladder_step(&self, accepted: &[SelectedEffect], next: &ScoredEffectSet, gain: f64) -> bool {
+    fn is_next_step(&self, accepted: &[SelectedEffect], next: &ScoredEffectSet, gain: f64) -> bool {
         let before: usize = accepted.iter().map(|pick| self.freedoms(pick)).sum();
         let is_refinement = next.freedoms >= before + REFINEMENT_FEWEST_NUMBERS
             && next.picks.len() <= accepted.len()

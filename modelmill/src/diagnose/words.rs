@@ -143,16 +143,32 @@ fn place_list(places: &[&str], channels: &[String]) -> String {
 }
 
 /// The effects that a step of the selection added and dropped; `channels` are the names of the drives.
-pub fn rung(rung: &SelectionStep, channels: &[String]) -> String {
+pub fn step_text(step: &SelectionStep, diagnosis: &ModelDiagnosis, channels: &[String]) -> String {
     // The first step is the model of the file.
-    if rung.added.is_empty() && rung.dropped.is_empty() {
+    if step.added.is_empty() && step.dropped.is_empty() {
         return "the given model".to_owned();
     }
+    // A change that only refines another one at the same time is listed nowhere else under its own name.
+    let refines = |one: &&LocatedEffect| {
+        let is_listed = |kind: &str, at: &[String]| (kind, at) == (one.kind.as_str(), &one.at);
+        let mut listed = diagnosis.disturbances.iter();
+        let mut dropped = diagnosis.steps.iter().flat_map(|other| &other.dropped);
+        CHANGES_IN_TIME.contains(&one.kind.as_str())
+            && !listed.any(|other| is_listed(&other.kind, &other.at))
+            && !dropped.any(|other| other == *one)
+    };
+    let (refining, added): (Vec<LocatedEffect>, Vec<LocatedEffect>) =
+        step.added.iter().cloned().partition(|one| refines(&one));
     // Signs show what was added and what became unnecessary.
     let mut says = Vec::new();
     let named = |effects: &[LocatedEffect]| grouped_effects(effects, channels);
-    says.extend(named(&rung.added).iter().map(|name| format!("+ {name}")));
-    says.extend(named(&rung.dropped).iter().map(|name| format!("− {name}")));
+    says.extend(named(&added).iter().map(|name| format!("+ {name}")));
+    says.extend(
+        refining
+            .iter()
+            .map(|one| format!("+ refinement of the change in time ({})", one.at.join(", "))),
+    );
+    says.extend(named(&step.dropped).iter().map(|name| format!("− {name}")));
     says.join(" ")
 }
 
@@ -216,9 +232,9 @@ pub fn refusal(reason: RejectionReason, has_findings: bool) -> &'static str {
 ///
 /// `channels` are the names of the drives. `judged` states the data on which errors are evaluated.
 pub fn verdict(diagnosis: &ModelDiagnosis, channels: &[String], judged: ValidationMethod) -> String {
-    let ladder = &diagnosis.steps;
+    let steps = &diagnosis.steps;
     // Without steps there is no verdict.
-    let (Some(first), Some(last)) = (ladder.first(), ladder.last()) else {
+    let (Some(first), Some(last)) = (steps.first(), steps.last()) else {
         return String::new();
     };
     let noise = noise_floor_text(diagnosis);

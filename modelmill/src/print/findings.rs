@@ -178,11 +178,11 @@ impl DiagnosisFindings {
         lines.push(style.bold("Error after each added effect, relative to the force (nrms)"));
         // Errors after each step, on fitted and on validation data.
         let rows: Vec<Vec<String>> = (diagnosis.steps.iter())
-            .map(|rung| {
+            .map(|step| {
                 vec![
-                    words::rung(rung, self.channels()),
-                    percent(Some(rung.fit)),
-                    percent(Some(rung.check)),
+                    words::step_text(step, diagnosis, self.channels()),
+                    percent(Some(step.fit)),
+                    percent(Some(step.check)),
                 ]
             })
             .collect();
@@ -526,17 +526,17 @@ pub(super) fn estimates(all: &[EffectEstimate]) -> Vec<Value> {
 }
 
 /// The steps of the search as JSON.
-fn steps(ladder: &[SelectionStep]) -> Vec<Value> {
-    let step = |rung: &SelectionStep| {
+fn steps(all: &[SelectionStep]) -> Vec<Value> {
+    let one_step = |step: &SelectionStep| {
         json!({
-            "added": rung.added.first(),
-            "also_added": rung.added.get(1..).unwrap_or_default(),
-            "dropped": rung.dropped,
-            "fit": rung.fit,
-            "check": rung.check,
-            "gain": rung.evidence.map(|e| e.gain),
-            "evidence": rung.evidence,
+            "added": step.added.first(),
+            "also_added": step.added.get(1..).unwrap_or_default(),
+            "dropped": step.dropped,
+            "fit": step.fit,
+            "check": step.check,
+            "gain": step.evidence.map(|e| e.gain),
+            "evidence": step.evidence,
         })
     };
-    ladder.iter().map(step).collect()
+    all.iter().map(one_step).collect()
 }

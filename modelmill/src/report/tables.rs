@@ -64,25 +64,25 @@ pub fn table(class: &str, head: &[&str], rows: &[Vec<TableCell>]) -> String {
 }
 
 /// Error after each added effect, with the evidence for it.
-pub(crate) fn ladder(findings: &DiagnosisFindings) -> String {
+pub(crate) fn steps(findings: &DiagnosisFindings) -> String {
     let diagnosis = &findings.diagnosis;
     let rows: Vec<Vec<TableCell>> = diagnosis
         .steps
         .iter()
-        .map(|rung| {
+        .map(|step| {
             // Shares are sorted by value, not by text.
             let percents = |v: f64| TableCell::number(&percent(Some(v)), v);
             // Gain, its certainty and the samples on which they are based.
-            let evidence = rung.evidence;
+            let evidence = step.evidence;
             // A step without evidence, such as the first, has empty cells.
             let of = |f: &dyn Fn() -> Option<(String, f64)>| match f() {
                 Some((text, value)) => TableCell::number(&text, value),
                 None => TableCell::text(""),
             };
             vec![
-                TableCell::text(&words::rung(rung, findings.channels())),
-                percents(rung.fit),
-                percents(rung.check),
+                TableCell::text(&words::step_text(step, &findings.diagnosis, findings.channels())),
+                percents(step.fit),
+                percents(step.check),
                 of(&|| evidence.map(|e| (percent(Some(e.gain)), e.gain))),
                 // Without noise the ratio is huge and only its size class matters.
                 of(&|| evidence.map(|e| (significant(e.blocks_t.min(999.0), 2), e.blocks_t))),
