@@ -20,8 +20,9 @@ impl DiagnosisFindings {
     /// All findings as one JSON object; `spelling` writes commands or calls for its reader.
     ///
     /// - `verdict`, `noise_floor` (relative to the force, as all errors here)
-    /// - `budget`: for each drive, the parts of its residual (`noise`, `not_repeating`, `model`), relative to the rms
-    ///   force of the drive; `rms` is this force in `unit`
+    /// - `budget`: for each drive, the parts of its residual (`noise`, `in_time`, `model`) and the disturbances that were
+    ///   `subtracted` from its force, relative to the rms force of the drive; `rms` is this force in `unit`. `not_repeating`
+    ///   are `in_time` and `subtracted` together
     /// - `disturbances`: faults of the recordings, with estimates and times (`interval`, s)
     /// - `corrected`: faults of the recordings that were corrected hypothetically, with what to do about them (`todo`);
     ///   all other findings hold for the corrected recordings
@@ -84,7 +85,9 @@ impl DiagnosisFindings {
                 };
                 let value = json!({
                     "noise": part(budget.noise),
-                    "not_repeating": part(budget.non_repeatable),
+                    "not_repeating": part(budget.non_repeatable()),
+                    "in_time": part(budget.in_time),
+                    "subtracted": part(budget.subtracted),
                     "model": part(budget.model),
                     "unit": model.force_unit(d),
                     "rms": budget.force,
@@ -287,12 +290,12 @@ impl DiagnosisFindings {
         // Parts of the residual of each drive, relative to its force.
         let rows: Vec<Vec<String>> = (self.channels().iter().zip(&diagnosis.budgets))
             .map(|(channel, budget)| {
-                // Noise, what does not repeat, and what a model could explain.
+                // Noise, what follows the time, and what a model could explain; disturbances are no part of the residual.
                 let of = |x: f64| part(x, budget.force);
                 vec![
                     channel.clone(),
                     of(budget.noise),
-                    of(budget.non_repeatable),
+                    of(budget.in_time),
                     of(budget.model),
                 ]
             })
@@ -302,7 +305,8 @@ impl DiagnosisFindings {
             &[
                 ("drive", ColumnAlignment::Left),
                 ("noise", ColumnAlignment::Right),
-                ("disturbances", ColumnAlignment::Right),
+                    of(budget.subtracted),
+                ("follows the time", ColumnAlignment::Right),
                 ("repeatable, unexplained", ColumnAlignment::Right),
             ],
             &rows,
@@ -312,6 +316,7 @@ impl DiagnosisFindings {
     /// Missing effects with their estimates, and effects that explain the recordings equally well. What a kind
     /// means and how to separate it are printed once, at its first place.
     fn missing_text(&self, style: TerminalStyle, spelling: &dyn StepSpelling, lines: &mut Vec<String>) {
+                ("(subtracted disturbances)", ColumnAlignment::Right),
         if self.missing.is_empty() {
             return;
         }
@@ -494,15 +499,27 @@ impl DiagnosisFindings {
             "  Possible causes: a payload, a misplaced mass or a wrong length that the nominal values do not contain."
                 .to_owned(),
         );
-        // A second diagnosis with fixed parameters shows which effects could explain the differences.
+        // A second diagnosis with fixed parameters shows which further effects could explain the differences. It is no
+        // second verdict, since the nominal values may be wrong.
         let Some(held) = &self.with_nominal else {
             return;
         };
-        let says = words::verdict(&held.diagnosis, self.channels(), self.validation);
-        let says = format!("With all parameters fixed at their nominal values: {says}");
-        lines.extend(words::lines(&says, 98).iter().map(|line| format!("  {line}")));
+        let is_new = |(effect, _): &&(LocatedEffect, Vec<EffectEstimate>)| {
+            !self.missing.iter().any(|found| found.effect == *effect)
+        };
+        let further: Vec<String> = (held.missing.iter().filter(is_new))
+            .map(|(effect, values)| format!("{}: {}", words::effect(effect), values_text(values)))
+            .collect();
+        if !further.is_empty() {
+            let says =
+                "If the nominal values are correct, these effects may explain a part of the differences instead:";
+            lines.push(format!("  {says}"));
+            lines.extend(further.iter().map(|says| format!("    {says}")));
+        }
         let fix_parameters = Remedy::option(OptionName::Held).spell(spelling);
-        lines.push(format!("  For the full result use {fix_parameters}."));
+        lines.push(format!(
+            "  To diagnose with all parameters fixed at their nominal values, use {fix_parameters}."
+        ));
     }
 }
 
