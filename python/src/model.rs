@@ -467,7 +467,7 @@ impl CoreModel {
             let spelling = PythonSpelling;
             let text = found.text(TerminalStyle::PLAIN, &spelling).join("\n");
             // The model with the effects that were found.
-            let better = match found.entries.as_slice() {
+            let better = match found.entries_to_add() {
                 [] => None,
                 entries => Some(self.with_same_host(self.model.with_added_effects(entries)?)),
             };

@@ -209,6 +209,9 @@ pub fn refusal(reason: RejectionReason, has_findings: bool) -> &'static str {
         }
         RejectionReason::LessLikelyThanNot => "possible, but less likely than not",
         RejectionReason::ExplainedBetter => "another candidate explains more",
+        RejectionReason::NotConfirmedEverywhere => {
+            "not confirmed in all parts of the data (near and far from reversals, both halves)"
+        }
         RejectionReason::ExplainsNothing if has_findings => {
             "redundant: it explains almost nothing in addition to the effects found"
         }
@@ -225,9 +228,6 @@ pub fn refusal(reason: RejectionReason, has_findings: bool) -> &'static str {
 
 /// The verdict with figures. The order of the sentences: what may be wrong with the recording or the model,
 /// which effects were found and how the error falls, which part of the residual stays unexplained, disturbances
-        RejectionReason::NotConfirmedEverywhere => {
-            "not confirmed in all parts of the data (near and far from reversals, both halves)"
-        }
 /// in the recordings.
 ///
 /// `channels` are the names of the drives. `judged` states the data on which errors are evaluated.

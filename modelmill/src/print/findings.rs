@@ -9,7 +9,7 @@ use crate::diagnose::{DiagnosisFindings, EffectEstimate, MissingEffect, Undecide
 use crate::faults::RecordingFaultKind;
 use crate::print::{OptionName, Remedy, StepSpelling, notes};
 use crate::text::TerminalStyle;
-use crate::text::table::{ColumnAlignment, number, percent, significant, table};
+use crate::text::table::{ColumnAlignment, all_digits, number, percent, significant, table};
 
 /// Rejected candidates that the text names at most.
 const MOST_CANDIDATES: usize = 6;
@@ -201,6 +201,7 @@ impl DiagnosisFindings {
         // The noise floor follows the table, as the lower bound of all errors.
         lines.push(format!("  {}", words::noise_floor_text(diagnosis)));
         self.missing_text(style, spelling, &mut lines);
+        self.sums_text(&mut lines);
         self.possible_text(style, &mut lines);
         self.disturbances_text(style, &mut lines);
         self.regions_text(style, &mut lines);
@@ -221,8 +222,15 @@ impl DiagnosisFindings {
                 format!("{first}: {}.", fault.advice.spell(spelling))
             })
             .collect();
-        let entries = self.entries_to_add().iter();
-        next.extend(entries.map(|entry| spelling.spell_effect(&self.before.model, entry)));
+        let entries = self.entries_to_add();
+        next.extend(
+            entries
+                .iter()
+                .map(|entry| spelling.spell_effect(&self.before.model, entry)),
+        );
+        if entries.len() > 1 {
+            next.push(format!("{}.", spelling.spell_completion()));
+        }
         next.extend(self.further_action().map(str::to_owned));
         if !next.is_empty() {
             lines.push(String::new());
@@ -297,6 +305,7 @@ impl DiagnosisFindings {
                     of(budget.noise),
                     of(budget.in_time),
                     of(budget.model),
+                    of(budget.subtracted),
                 ]
             })
             .collect();
@@ -305,9 +314,9 @@ impl DiagnosisFindings {
             &[
                 ("drive", ColumnAlignment::Left),
                 ("noise", ColumnAlignment::Right),
-                    of(budget.subtracted),
                 ("follows the time", ColumnAlignment::Right),
                 ("repeatable, unexplained", ColumnAlignment::Right),
+                ("(subtracted disturbances)", ColumnAlignment::Right),
             ],
             &rows,
         ));
@@ -316,7 +325,6 @@ impl DiagnosisFindings {
     /// Missing effects with their estimates, and effects that explain the recordings equally well. What a kind
     /// means and how to separate it are printed once, at its first place.
     fn missing_text(&self, style: TerminalStyle, spelling: &dyn StepSpelling, lines: &mut Vec<String>) {
-                ("(subtracted disturbances)", ColumnAlignment::Right),
         if self.missing.is_empty() {
             return;
         }
@@ -363,6 +371,24 @@ impl DiagnosisFindings {
                     lines.push(format!("      {command}"));
                 }
             }
+        }
+    }
+
+    /// Values of the model file that are sums of the findings above them.
+    fn sums_text(&self, lines: &mut Vec<String>) {
+        for entry in self.summed_entries() {
+            let values = entry.parameters.iter().filter_map(|p| {
+                let nominal = p.nominal?;
+                Some(format!("{} = {}", p.symbol, all_digits(nominal)))
+            });
+            let values: Vec<String> = values.collect();
+            let says = format!(
+                "At {}, {} was found more than once. The effects add up, and the model file gets their sum: {}.",
+                entry.at.join(", "),
+                words::kind(&entry.kind),
+                values.join(", ")
+            );
+            lines.extend(words::lines(&says, 96).iter().map(|line| format!("    {line}")));
         }
     }
 
@@ -524,13 +550,13 @@ impl DiagnosisFindings {
 }
 
 /// Estimates with standard deviations and units, for a line of text.
-fn values_text(estimates: &[EffectEstimate]) -> String {
+pub(crate) fn values_text(estimates: &[EffectEstimate]) -> String {
     let values = estimates.iter().map(|e| {
         let std = e
             .std
             .map_or_else(String::new, |std| format!(" ± {}", significant(std, 2)));
         let unit = if e.unit == "1" { "" } else { &e.unit };
-        let said = format!("{} = {}{std} {unit}", e.name, number(e.value));
+        let said = format!("{} = {}{std} {unit}", e.name, all_digits(e.value));
         said.trim_end().to_owned()
     });
     values.collect::<Vec<String>>().join(", ")
