@@ -152,7 +152,8 @@ pub struct ProposedLaw {
     pub gain: f64,
     /// Effects found that become unnecessary with it.
     pub instead_of: Vec<LocatedEffect>,
-    /// Effects found at the same place that stay: the law describes what they leave.
+    /// Effects found at the same place that stay. They are estimated together with the law, so their values differ from
+    /// those without it.
     pub in_addition_to: Vec<LocatedEffect>,
     /// Its entry; `None` if the law depends on the earlier motion, which no formula can express.
     pub entry: Option<LawEntry>,

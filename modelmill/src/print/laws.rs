@@ -115,7 +115,8 @@ pub(crate) fn gain(law: &ProposedLaw) -> String {
         let these = words::effects(&law.in_addition_to);
         let _ = write!(
             says,
-            " The law acts in addition to {these} at the same place, and does not replace it."
+            " Its values were estimated together with {these} at the same place, whose values change with the law: identify \
+             again after adding it."
         );
     }
     says
