@@ -14,9 +14,6 @@ use modelmill::{Host, Model};
 
 use crate::args::DiagnosisArgs;
 
-/// Significant digits of values on the command line.
-const DIGITS: usize = 5;
-
 /// Spells command lines that read the same recordings as the current one, for texts that advise a next step.
 pub(crate) struct CommandLineSpelling {
     /// Flags `--data` and `--check` of the current command.
@@ -73,6 +70,10 @@ impl StepSpelling for CommandLineSpelling {
     fn spell_effect_of_library(&self, model: &Model, effect: &NewEffect, library: &str) -> String {
         let effect = self.spell_effect(model, effect);
         format!("{effect} --library {}", quote_word(library))
+    }
+
+    fn spell_completion(&self) -> String {
+        "`modelmill diagnose` with `--out completed.toml` adds all of them in one step".to_owned()
     }
 
     fn spell_identification(&self, model: &Model) -> String {
@@ -205,15 +206,9 @@ pub(crate) fn library_flags(host: &Host) -> String {
 fn effect_argument(named: &NamedEffect) -> String {
     let mut text = format!("{}@{}", named.effect.kind, named.effect.at.join(","));
     for (symbol, value) in &named.values {
-        let _ = write!(text, ":{symbol}={}", round_significant(*value));
+        let _ = write!(text, ":{symbol}={value}");
     }
     text
-}
-
-/// A value rounded to [`DIGITS`] significant digits.
-fn round_significant(value: f64) -> f64 {
-    let text = format!("{value:.*e}", DIGITS - 1);
-    text.parse().unwrap_or(value)
 }
 
 /// A word quoted for a POSIX shell; plain words stay as they are.
@@ -290,7 +285,7 @@ mod tests {
             at: vec!["a".to_owned(), "b".to_owned()],
             parameters: vec![NewParameter {
                 symbol: "k".to_owned(),
-                nominal: Some(round_significant(12.345_678)),
+                nominal: Some(12.346),
                 ..NewParameter::default()
             }],
             constants: vec![("q0".to_owned(), 0.5)],

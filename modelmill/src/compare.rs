@@ -228,6 +228,24 @@ pub fn error_locations(
     })
 }
 
+/// How the residuals of a model with some values of its base parameters depend on the rates of their drives.
+///
+/// Fails when a pose has no solution.
+pub(crate) fn residual_dependences(
+    model: &Model,
+    data: &[RecordingSegment],
+    values: &[f64],
+) -> Outcome<Vec<RateDependence>> {
+    let measured = (data.iter().map(along::measured_forces)).collect::<Outcome<Vec<_>>>()?;
+    let forces = data
+        .iter()
+        .map(|one| along::filter_and_decimate(along::forces(model, one, values)?, one))
+        .collect::<Outcome<Vec<_>>>()?;
+    let drives = model.drives().into_iter().enumerate();
+    let drives: Vec<(usize, String)> = drives.filter(|(d, _)| !is_rounding(*d, &measured, &forces)).collect();
+    residuals_by_rate(model, data, &measured, &forces, &drives)
+}
+
 /// How the residuals of some drives, given by index and name, depend on their rates.
 ///
 /// Fails when a pose has no solution.

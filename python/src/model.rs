@@ -405,7 +405,7 @@ impl CoreModel {
         let data = recordings(&data);
         self.run_interruptible(py, progress.as_ref(), || {
             let found = self.model.compare(&borrow_recordings(&data), &values)?;
-            let text = found.text(name, TerminalStyle::PLAIN);
+            let text = found.text(name, TerminalStyle::PLAIN, &PythonSpelling);
             let json = found.json(name, &PythonSpelling)?;
             Ok(PythonResult::new(&json, &text, remarks(&found.notes)))
         })
@@ -467,7 +467,7 @@ impl CoreModel {
             let spelling = PythonSpelling;
             let text = found.text(TerminalStyle::PLAIN, &spelling).join("\n");
             // The model with the effects that were found.
-            let better = match found.entries.as_slice() {
+            let better = match found.entries_to_add() {
                 [] => None,
                 entries => Some(self.with_same_host(self.model.with_added_effects(entries)?)),
             };

@@ -34,6 +34,10 @@ impl StepSpelling for PythonSpelling {
         call + ")"
     }
 
+    fn spell_completion(&self) -> String {
+        "`model` of this diagnosis has all of them; `model.save(\"completed.toml\")` writes its file".to_owned()
+    }
+
     fn spell_identification(&self, _: &Model) -> String {
         "m.identify(data)".to_owned()
     }

@@ -62,7 +62,7 @@ struct EditRequest {
     base: u64,
     /// The complete new text.
     text: String,
-    /// Name of the step for the pane *Ladder*, if the edit is a step.
+    /// Name of the step for the pane *Steps*, if the edit is a step.
     #[serde(default)]
     did: Option<String>,
 }

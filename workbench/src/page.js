@@ -181,7 +181,7 @@
     faults();
     for (const one of document.querySelectorAll('.pane')) one.classList.toggle('stale', !view.valid);
     if (view.model) { equations(); sliders(); by('equations').dataset.revision = view.derived; }
-    rungs();
+    stepErrors();
     for (const hear of window.workbench.heard) hear(view);
     if (opened !== view.opened) { opened = view.opened; brought(); }
     told_command();
@@ -192,7 +192,7 @@
   const others = {};
   const command = () => {
     const { commands } = view;
-    const step = { mechanism: 'picture', equations: 'equations', comparison: 'compare', diagnosis: 'diagnose', ladder: 'identify' };
+    const step = { mechanism: 'picture', equations: 'equations', comparison: 'compare', diagnosis: 'diagnose', steps: 'identify' };
     if (pane === 'comparison' && by('identified').checked) return commands.identify;
     return pane in others ? others[pane](commands) : commands[step[pane]];
   };
@@ -231,7 +231,7 @@
     by('summary').textContent = model.summary;
   };
 
-  const rungs = () => {
+  const stepErrors = () => {
     const row = (what, errors) => {
       const one = make('tr');
       cell(one, what);
@@ -239,13 +239,13 @@
         for (const of of ['fit', 'check']) amount(one, percent(errors[whose][of]), errors[whose][of]);
       return one;
     };
-    const rows = view.ladder.map((one) => row(one.what, one.errors));
+    const rows = view.session_steps.map((one) => row(one.what, one.errors));
     if (errors && errors.revision === view.revision) {
       const brief = (f) => ({ fit: f.fit && f.fit.nrms, check: f.check && f.check.nrms });
       rows.push(row('current text', { nominal: brief(errors.nominal), identified: brief(errors.identified) }));
     }
-    by('rungs').tBodies[0].replaceChildren(...rows);
-    window.enlivenTables(by('rungs'));
+    by('step-errors').tBodies[0].replaceChildren(...rows);
+    window.enlivenTables(by('step-errors'));
   };
 
   // ---- panes that send requests
@@ -298,7 +298,7 @@
     const notes = told.notes.filter((note) => note.severity === 'warning').map((note) => make('p', note.says, 'alias'));
     by('errors').replaceChildren(figures(told), ...notes);
     by('comparison').dataset.revision = told.revision;
-    rungs();
+    stepErrors();
     say('', 'errors');
   };
 
@@ -482,9 +482,9 @@
   by('identified').addEventListener('change', told_command);
   by('places').addEventListener('click', () => tried(async () => {
     const told = await ask('compare', { places: true, afresh: true });
-    const places = told.compared.where;
-    by('where').replaceChildren(...(places.length ? places : [{ says: 'No region of coordinates, rates, loads or time has a larger error than the rest' }])
-      .map((one) => make('li', `${one.says}.`)));
+    const { where, by_rate } = told.compared;
+    const places = where.length ? where : [{ says: 'No region of coordinates, rates, loads or time has a larger error than the rest' }];
+    by('where').replaceChildren(...[...places, ...by_rate].map((one) => make('li', `${one.says}.`)));
     made_of('where', told.revision);
     say('');
   }));
@@ -531,10 +531,12 @@
       box.append(make('p', `These recordings cannot distinguish ${effect.kind.replaceAll('_', ' ')} from ${others}. ${effect.separate_by || ''}`));
       if (effect.separate_command) box.append(make('code', effect.separate_command));
     }
-    for (const one of found.corrected) box.append(make('p', `Correct the recording first: ${one.todo}.`));
-    for (const one of found.disturbances) box.append(make('p', `Disturbance in the recordings: ${one.says}.`));
+    // The direction of gravity may be an error of the model file.
+    const gravity = (one) => one.kind === 'gravity_direction';
+    for (const one of found.corrected) box.append(make('p', `${gravity(one) ? 'Before the next diagnosis' : 'Correct the recording first'}: ${one.todo}.`));
+    for (const one of found.disturbances.filter((one) => !gravity(one))) box.append(make('p', `Disturbance in the recordings: ${one.says}.`));
     const figure = make('figure', undefined, 'still');
-    figure.innerHTML = found.ladder;
+    figure.innerHTML = found.picture;
     figure.prepend(make('figcaption', `Error relative to the force ${found.judged}`));
     box.append(figure);
     window.enlivenPictures(box);

@@ -119,6 +119,10 @@ impl StepSpelling for PageSpelling {
         LibrarySpelling.spell_effect(model, effect)
     }
 
+    fn spell_completion(&self) -> String {
+        LibrarySpelling.spell_completion()
+    }
+
     fn spell_identification(&self, model: &Model) -> String {
         LibrarySpelling.spell_identification(model)
     }

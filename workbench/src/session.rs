@@ -18,11 +18,11 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 mod excitation;
-mod ladder;
+mod session_steps;
 
 use excitation::ExcitationJob;
 pub(crate) use excitation::KeepTrajectoryRequest;
-use ladder::ErrorLadder;
+use session_steps::SessionSteps;
 
 use crate::document::EditedDocument;
 use crate::options::{ExcitationSettings, Options, WorkbenchCommands, WorkbenchStep};
@@ -72,7 +72,7 @@ struct SessionState {
     /// Why the file cannot be read any more.
     unreadable: Option<String>,
     /// Errors after each step of the session.
-    ladder: ErrorLadder,
+    steps: SessionSteps,
     /// The last diagnosis.
     diagnosis: DiagnosisJob,
 }
@@ -157,7 +157,7 @@ impl WorkbenchSession {
             derived: now,
             saved,
             unreadable: None,
-            ladder: ErrorLadder::new(options.first + 1),
+            steps: SessionSteps::new(options.first + 1),
             diagnosis: DiagnosisJob {
                 number: options.first,
                 ..DiagnosisJob::default()
@@ -211,7 +211,7 @@ impl WorkbenchSession {
         view_json["unreadable"] = json!(state.unreadable);
         view_json["data"] = json!(!self.options.data.is_empty());
         view_json["opened"] = json!(self.options.first);
-        view_json["ladder"] = state.ladder.view();
+        view_json["session_steps"] = state.steps.view();
         view_json["commands"] = json!({
             "picture": self.commands.step_command(WorkbenchStep::Picture),
             "equations": self.commands.step_command(WorkbenchStep::Equations),
@@ -230,7 +230,7 @@ impl WorkbenchSession {
             let mut state = self.state();
             let before = state.document.revision();
             if did.is_some() {
-                state.ladder.end_typing(before);
+                state.steps.end_typing(before);
             }
             if !state.document.edit(base, text) {
                 return None;
@@ -426,7 +426,7 @@ impl WorkbenchSession {
         let mut state = self.state();
         if state.document.revision() == revision {
             let errors = json!({ "nominal": relative_errors(&view_json["nominal"]), "identified": relative_errors(&view_json["identified"]) });
-            if state.ladder.add_errors(revision, errors) {
+            if state.steps.add_errors(revision, errors) {
                 drop(state);
                 self.notify_pages();
             }
@@ -657,7 +657,7 @@ impl WorkbenchSession {
         {
             let mut state = self.state();
             let now = state.document.revision();
-            state.ladder.end_typing(now);
+            state.steps.end_typing(now);
             if !state.document.edit(revision, &edited.text) {
                 return Err("the text was changed meanwhile; add the effect again".to_owned());
             }
@@ -677,7 +677,7 @@ impl WorkbenchSession {
 impl SessionState {
     /// Records a step that led to the current text.
     fn record_step(&mut self, what: &str) {
-        self.ladder.record_step(self.document.revision(), what);
+        self.steps.record_step(self.document.revision(), what);
     }
 }
 

@@ -103,7 +103,7 @@ pub(crate) fn findings(findings: &DiagnosisFindings, commands: &dyn WorkbenchCom
     let model = &findings.before.model;
     let mut view_json = findings.json(commands);
     view_json["says"] = json!(findings.verdict_text());
-    view_json["ladder"] = json!(report::ladder(findings));
+    view_json["picture"] = json!(report::steps_picture(findings));
     view_json["judged"] = json!(findings.validation.phrase());
     view_json["entries"] = findings
         .entries_to_add()

@@ -204,6 +204,9 @@ pub(crate) struct DiagnosisArgs {
 pub(crate) struct DiagnoseArgs {
     #[command(flatten)]
     pub(crate) diagnosis: DiagnosisArgs,
+    /// Write the completed model to this file: the model file with all effects found added
+    #[arg(long, value_name = "FILE", help_heading = None)]
+    pub(crate) out: Option<PathBuf>,
     /// Print one JSON object on standard output
     #[arg(long, help_heading = None)]
     pub(crate) json: bool,

@@ -167,7 +167,10 @@ pub(crate) enum ProgramCommand {
     #[command(after_help = "Examples (from the project's root):\n  \
         modelmill diagnose model-spec/models/spidermill.toml \\\n      \
         --data recordings/spidermill-mbs/with-rods-fit.csv \\\n      \
-        --check recordings/spidermill-mbs/with-rods-check.csv")]
+        --check recordings/spidermill-mbs/with-rods-check.csv\n  \
+        modelmill diagnose model-spec/models/spidermill.toml \\\n      \
+        --data recordings/spidermill-mbs/with-rods-fit.csv \\\n      \
+        --check recordings/spidermill-mbs/with-rods-check.csv --out completed.toml")]
     Diagnose(DiagnoseArgs),
     /// Write a diagnosis as one self-contained page: error after each added effect, curves, error maps, candidates,
     /// parameters, equations

@@ -18,5 +18,5 @@ pub(crate) fn run(host: &Host, args: &CompareArgs) -> CommandOutcome {
     if args.json {
         return terminal::print_json(&compared.json(&name, &FlagSpelling)?);
     }
-    terminal::print(&compared.text(&name, terminal::style()))
+    terminal::print(&compared.text(&name, terminal::style(), &FlagSpelling))
 }

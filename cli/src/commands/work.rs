@@ -199,6 +199,10 @@ impl StepSpelling for WorkbenchAdvice {
         self.flags.spell_effect_of_library(model, effect, library)
     }
 
+    fn spell_completion(&self) -> String {
+        self.flags.spell_completion()
+    }
+
     fn spell_identification(&self, model: &Model) -> String {
         self.flags.spell_identification(model)
     }

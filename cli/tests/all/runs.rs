@@ -66,7 +66,7 @@ fn many_runs_become_a_page() {
     let says = printed(&["runs", &model, "--data", data, "--out", &out]);
     assert!(says.contains("run13.csv was not evaluated"), "{says}");
     assert!(
-        says.contains("from run 4 on") && says.contains("kg more on S3"),
+        says.contains("from run 4 on") && says.contains("kg larger") && says.contains("the load on S3"),
         "{says}"
     );
     let page = fs::read_to_string(Path::new(&out).join("runs.html")).expect("a page");

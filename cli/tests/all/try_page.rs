@@ -89,9 +89,9 @@ fn the_mill_in_a_page_gives_the_figures_of_the_program() {
         &window,
         "at('found').querySelector('.finding button').click();
          await until('the effect', () => at('text').value.includes('rod_inertia'));
-         tab('ladder');
-         await until('a rung', () => [...at('rungs').tBodies[0].rows].some((row) => row.cells[0].textContent.includes('rod inertia')), 120000);
-         return [...at('rungs').tBodies[0].rows].map((row) => [row.cells[0].textContent, parseFloat(row.cells[4].textContent)]);",
+         tab('steps');
+         await until('a step', () => [...at('step-errors').tBodies[0].rows].some((row) => row.cells[0].textContent.includes('rod inertia')), 120000);
+         return [...at('step-errors').tBodies[0].rows].map((row) => [row.cells[0].textContent, parseFloat(row.cells[4].textContent)]);",
     );
     assert!(
         errors[1][0].as_str().is_some_and(|what| what.contains("rod inertia")),

@@ -239,7 +239,7 @@ fn diagnoses(browser: &mut Browser, window: &Window) -> String {
                  at('found').querySelectorAll('figure svg .dot').length];",
     );
     assert_eq!(finding[0], 1, "{finding}");
-    assert!(number(&finding, "/2") >= 4.0, "the ladder has its dots: {finding}");
+    assert!(number(&finding, "/2") >= 4.0, "the picture has its dots: {finding}");
     let command = finding[1].as_str().expect("a command").to_owned();
     assert!(
         command.contains("rod_inertia --at spindle_left,spindle_right"),
@@ -255,9 +255,9 @@ fn adds_as_the_command_does(browser: &mut Browser, window: &Window, bench: &Work
         window,
         "at('found').querySelector('.finding button').click();
          await until('the effect', () => at('text').value.includes('rod_inertia'));
-         tab('ladder');
-         await until('a rung', () => at('rungs').tBodies[0].rows.length >= 2 &&
-           at('rungs').tBodies[0].rows[1].cells[0].textContent.includes('rod inertia'));
+         tab('steps');
+         await until('a step', () => at('step-errors').tBodies[0].rows.length >= 2 &&
+           at('step-errors').tBodies[0].rows[1].cells[0].textContent.includes('rod inertia'));
          const { value, selectionStart, selectionEnd } = at('text');
          const old = at('found').previousElementSibling;
          return [value, value.slice(selectionStart, selectionEnd), old.classList.contains('of-before') && old.textContent];",
@@ -280,11 +280,11 @@ fn adds_as_the_command_does(browser: &mut Browser, window: &Window, bench: &Work
     printed(&words);
     let by_command = std::fs::read_to_string(&copy).expect("the copy");
     assert_eq!(added[0], json!(by_command));
-    let rungs: Vec<Vec<String>> = [0, 1].map(|k| row(browser, window, "rungs", k)).into();
+    let steps: Vec<Vec<String>> = [0, 1].map(|k| row(browser, window, "step-errors", k)).into();
     let value = |text: &str| -> f64 { text.trim_end_matches(" %").parse().expect("a percentage") };
-    let [before, after] = [0, 1].map(|k| value(&rungs[k][4]));
-    assert_eq!(rungs[0][4], expected);
-    assert!(after < 1e-3 * before, "{rungs:?}");
+    let [before, after] = [0, 1].map(|k| value(&steps[k][4]));
+    assert_eq!(steps[0][4], expected);
+    assert!(after < 1e-3 * before, "{steps:?}");
 
     // Undone and done again, then saved by the key.
     browser.run(

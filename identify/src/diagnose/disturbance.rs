@@ -54,8 +54,11 @@ pub struct Disturbance {
 pub struct ResidualBudget {
     /// Noise, white or coloured: it is not repeatable.
     pub noise: f64,
-    /// Disturbances that are not a function of the state: drift, hum, outliers, events, differences between recordings.
-    pub non_repeatable: f64,
+    /// Disturbances that were subtracted from the force, and are no part of the residual: drift, hum, outliers, differences
+    /// between recordings.
+    pub subtracted: f64,
+    /// Residual that follows the time and not the state, and is no noise.
+    pub in_time: f64,
     /// Repeatable residual, which the model does not explain.
     pub model: f64,
     /// The measured force itself.
@@ -65,6 +68,13 @@ pub struct ResidualBudget {
 /// Whether a variance is not larger than that of the white noise of its channel.
 pub(crate) fn is_white(problem: &DiagnosisProblem, channel: usize, variance: f64) -> bool {
     variance < COLOURED_LEAST_VARIANCE_RATIO * problem.noise[channel].powi(2)
+}
+
+impl ResidualBudget {
+    /// Everything that is not repeatable and no noise: what was subtracted, and what follows the time.
+    pub fn non_repeatable(&self) -> f64 {
+        self.subtracted.hypot(self.in_time)
+    }
 }
 
 impl EffectSelector<'_> {
@@ -178,7 +188,8 @@ impl EffectSelector<'_> {
             let in_time_power = (left - model - noise).max(0.0);
             let budget = ResidualBudget {
                 noise: noise.max(0.0).sqrt(),
-                non_repeatable: (size(&disturbed) + removed + in_time_power).sqrt(),
+                subtracted: (size(&disturbed) + removed).sqrt(),
+                in_time: in_time_power.sqrt(),
                 model: model.sqrt(),
                 force: size(&force).sqrt(),
             };

@@ -104,7 +104,8 @@ pub enum DiagnosisVerdict {
     Adequate,
     /// Effects are missing, and with them the model is adequate.
     MissingEffect,
-    /// A repeatable part of the residual remains that no candidate explains.
+    /// A part of the residual remains that no candidate explains: it is repeatable, or it follows the time. Also if the
+    /// recordings are explained only after the correction of a fault.
     Unexplained,
 }
 
@@ -271,16 +272,16 @@ fn diagnose_cleaned(
     let found = bench.search_sets();
     let picks = found.steps.last().map_or(Vec::new(), |s| s.picks.clone());
     // Report the steps with their errors; the first entry is the model without any effect.
-    let mut ladder = vec![bench.selection_step(&[], &[], None)];
+    let mut steps = vec![bench.selection_step(&[], &[], None)];
     let mut before: Vec<SelectedEffect> = Vec::new();
     for step in &found.steps {
-        ladder.push(bench.selection_step(&before, &step.picks, step.evidence));
+        steps.push(bench.selection_step(&before, &step.picks, step.evidence));
         before.clone_from(&step.picks);
     }
     // Stage 2: drop effects that explain less than what stays unexplained on their channels.
     let (mut picks, mut left) = bench.drop_below_unexplained(picks);
     if picks.len() < before.len() {
-        ladder.push(bench.selection_step(&before, &picks, None));
+        steps.push(bench.selection_step(&before, &picks, None));
     }
     // Stage 3: propose laws for the unexplained residual. Effects that such a law contains are dropped, if the law
     // still explains as much without them.
@@ -295,7 +296,7 @@ fn diagnose_cleaned(
             law.law.gain < REPLACING_LAW_LEAST_SHARE || laws_then.iter().any(is_its)
         };
         if laws.iter().all(stands) {
-            ladder.push(bench.selection_step(&picks, &needed, None));
+            steps.push(bench.selection_step(&picks, &needed, None));
             (picks, left, sites, laws) = (needed, left_then, sites_then, laws_then);
         }
     }
@@ -303,7 +304,7 @@ fn diagnose_cleaned(
     let mut assessed = bench.assess_effects(&picks, &left);
     let possible = assessed.set_aside_unlikely(&bench);
     if !possible.is_empty() {
-        ladder.push(bench.selection_step(&picks, &assessed.picks, None));
+        steps.push(bench.selection_step(&picks, &assessed.picks, None));
         picks.clone_from(&assessed.picks);
         left = bench.set_residual(&picks);
     }
@@ -350,7 +351,7 @@ fn diagnose_cleaned(
         noise_floor: noise_floor(&budgets),
         budgets,
         disturbances,
-        steps: ladder,
+        steps,
         effects,
         possible_effects: possible,
         candidates,
@@ -648,19 +649,7 @@ impl EffectSelector<'_> {
                 let channels = self.affected_channels(&[pick]);
                 (self.evidence(&without, picks, &channels).gain, None)
             } else if let Some(refused) = found.rejected.iter().find(|r| r.pick.candidate == k) {
-                let why = if refused.wrong_sign {
-                    RejectionReason::WrongSign
-                } else if refused.cancels {
-                    RejectionReason::CancelsAnother
-                } else if refused.is_implausible {
-                    RejectionReason::ImplausibleValue
-                } else {
-                    refused
-                        .evidence
-                        .insufficiency_reason(has_check)
-                        .unwrap_or(RejectionReason::ExplainedBetter)
-                };
-                (refused.evidence.gain, Some(why))
+                (refused.evidence.gain, Some(refused.reason(has_check)))
             } else if let Some(pick) = &self.current_choices[k] {
                 let mut with = picks.to_vec();
                 with.push(pick.clone());
@@ -688,6 +677,7 @@ impl EffectSelector<'_> {
                 rejection_reason: refused,
             });
         }
+        rejection::name_unconfirmed(&mut considered);
         // Found effects first, then by the share that each explains alone.
         considered.sort_by(|a, b| {
             (b.rejection_reason.is_none().cmp(&a.rejection_reason.is_none())).then(b.explained.total_cmp(&a.explained))

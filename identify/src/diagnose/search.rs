@@ -7,6 +7,7 @@ use super::bench::{EffectSelector, ProjectedGram, ScoredEffectSet, SelectedEffec
 use super::evidence::SelectionEvidence;
 use super::pool::FitScope;
 use super::problem::{ColumnSource, DiagnosisProblem};
+use super::rejection::RejectedCandidate;
 use super::thresholds::{
     OTHER_KIND_SHARE, OTHER_SET_LEAST_ADVANTAGE, OTHER_SET_LEAST_GAIN, PLACE_PRICE, REFINEMENT_FEWEST_NUMBERS,
     REFINEMENT_LEAST_GAIN, RIVAL_FINER_GAIN_FACTOR, RIVAL_MOST_GRID_RATIO, RIVAL_MOST_RATIO, SIMPLER_KIND_SHARE,
@@ -39,21 +40,6 @@ struct SupportedEffectSet {
     trial: ScoredEffectSet,
     /// Evidence for it, compared with the accepted set.
     evidence: SelectionEvidence,
-}
-
-/// A candidate that was tested and rejected, with the reason.
-#[derive(Clone, Debug)]
-pub(crate) struct RejectedCandidate {
-    /// The candidate with its columns.
-    pub(crate) pick: SelectedEffect,
-    /// Evidence for it, which is not sufficient unless one of the flags below is set.
-    pub(crate) evidence: SelectionEvidence,
-    /// Whether an estimate has a sign that is physically impossible.
-    pub(crate) wrong_sign: bool,
-    /// Whether an effect of the set does little but cancel another one.
-    pub(crate) cancels: bool,
-    /// Whether an estimate is beyond what the machine's size and forces allow.
-    pub(crate) is_implausible: bool,
 }
 
 /// Result of the search.
@@ -159,7 +145,7 @@ impl EffectSelector<'_> {
             if settled.is_possible()
                 && evidence.is_sufficient()
                 && !self.is_worse_overall(accepted, &settled.picks, &channels)
-                && self.is_ladder_step(accepted, &settled, evidence.gain)
+                && self.is_next_step(accepted, &settled, evidence.gain)
             {
                 return Some(EffectSetChange {
                     picks: settled.picks,
@@ -173,7 +159,7 @@ impl EffectSelector<'_> {
 
     /// Whether a set may follow the accepted one: the error of all drives together does not rise, a general kind that
     /// replaces simpler ones is much better, and faults of force signals are confirmed.
-    fn is_ladder_step(&self, accepted: &[SelectedEffect], next: &ScoredEffectSet, gain: f64) -> bool {
+    fn is_next_step(&self, accepted: &[SelectedEffect], next: &ScoredEffectSet, gain: f64) -> bool {
         let before: usize = accepted.iter().map(|pick| self.freedoms(pick)).sum();
         let is_refinement = next.freedoms >= before + REFINEMENT_FEWEST_NUMBERS
             && next.picks.len() <= accepted.len()
@@ -279,13 +265,7 @@ impl EffectSelector<'_> {
             }
             // Only single effects are reported as rejected; a pair has no reason of its own.
             if let [pick] = news.as_slice() {
-                refused.push(RejectedCandidate {
-                    pick: pick.clone(),
-                    evidence,
-                    wrong_sign: !trial.wrong_sign.is_empty(),
-                    cancels: !trial.cancelling.is_empty(),
-                    is_implausible: !trial.implausible.is_empty(),
-                });
+                refused.push(RejectedCandidate::new(pick.clone(), evidence, &trial));
             }
         }
         None

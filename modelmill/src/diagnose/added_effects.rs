@@ -7,11 +7,10 @@ use modelmill_spec::{EffectKind, LoadedModel};
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 
+use super::estimates::{effect_estimates, round_significant};
 use super::places::candidate_places;
 use super::problem::DiagnosisSolution;
-
-/// Significant digits of estimates that go into a model file.
-const DIGITS: usize = 5;
+use super::thresholds::ESTIMATE_MOST_DIGITS;
 
 /// A model file with the effects found, not yet written to disk.
 #[derive(Clone, Debug)]
@@ -86,43 +85,23 @@ fn split_shared_places(entries: Vec<NewEffect>) -> Vec<NewEffect> {
     made
 }
 
-/// An effect as an entry. An estimate may belong to a parameter, to a constant that enters linearly, or to the
-/// product of both.
+/// An effect as an entry, with the values that the findings state.
 fn entry(found: &IdentifiedEffect, kind: &EffectKind, answer: &DiagnosisSolution) -> NewEffect {
-    let parameters = &answer.problem.candidates[found.candidate].parameters;
     let mut effect = NewEffect {
         kind: kind.name.clone(),
         at: found.effect.at.clone(),
-        constants: found.constants.clone(),
         ..NewEffect::default()
     };
-    // Stage 1: each estimate becomes a parameter or a constant of the entry.
-    let estimates = parameters.iter().zip(&found.estimates);
-    for (parameter, value) in estimates.clone() {
-        let symbol = parameter.symbol.as_str();
-        // The product of a parameter and a constant, divided by the parameter, gives the constant.
-        if let Some((factor, constant)) = symbol.split_once('*') {
-            let of = estimates.clone().find(|(p, _)| p.symbol == factor);
-            if let Some((_, of)) = of
-                && *of != 0.0
-            {
-                effect
-                    .constants
-                    .push((constant.to_owned(), round_significant(value / of)));
-            }
-        } else if kind.constants.iter().any(|c| c.symbol == symbol) {
-            effect.constants.push((symbol.to_owned(), round_significant(*value)));
-        } else if kind.parameters.iter().any(|p| p.symbol == symbol) {
+    for estimate in effect_estimates(answer, found) {
+        if kind.parameters.iter().any(|p| p.symbol == estimate.name) {
             effect.parameters.push(NewParameter {
-                symbol: symbol.to_owned(),
-                nominal: Some(round_significant(*value)),
+                symbol: estimate.name,
+                nominal: Some(estimate.value),
                 ..NewParameter::default()
             });
+        } else if kind.constants.iter().any(|c| c.symbol == estimate.name) {
+            effect.constants.push((estimate.name, estimate.value));
         }
-    }
-    // Stage 2: constants of the search get the same number of digits.
-    for (_, value) in &mut effect.constants {
-        *value = round_significant(*value);
     }
     effect
 }
@@ -136,7 +115,7 @@ fn sum(one: &NewEffect, other: &NewEffect) -> NewEffect {
             Some(p) => {
                 // Parameters of equal columns add up.
                 p.nominal = match (p.nominal, more.nominal) {
-                    (Some(a), Some(b)) => Some(round_significant(a + b)),
+                    (Some(a), Some(b)) => Some(round_significant(a + b, ESTIMATE_MOST_DIGITS)),
                     (a, b) => a.or(b),
                 }
             }
@@ -144,12 +123,6 @@ fn sum(one: &NewEffect, other: &NewEffect) -> NewEffect {
         }
     }
     both
-}
-
-/// A value with the digits that go into a model file.
-pub(crate) fn round_significant(value: f64) -> f64 {
-    let text = format!("{value:.*e}", DIGITS - 1);
-    text.parse().unwrap_or(value)
 }
 
 /// Adds entries to the text of a model's file, one after the other.

@@ -7,9 +7,7 @@
 use modelmill_identify::diagnose::{DiagnosisVerdict, Disturbance};
 
 use crate::error::{Error, Outcome};
-use crate::faults::{
-    ColumnOperation, FaultCorrection, RecordingFaultKind, SuspectedFault, correction_score, with_gravity,
-};
+use crate::faults::{ColumnOperation, FaultCorrection, RecordingFaultKind, SuspectedFault, correction_score};
 use crate::model::Model;
 use crate::recording::PreparedRecording;
 
@@ -29,6 +27,8 @@ pub(super) struct CorrectedRecordings {
     pub(super) corrected: Vec<SuspectedFault>,
     /// Faults that remain: several explain a recording equally well, or the correction of one fails.
     pub(super) unresolved: Vec<SuspectedFault>,
+    /// Files of recordings that contradict a direction of gravity which others show.
+    disagreeing: Vec<String>,
 }
 
 impl CorrectedRecordings {
@@ -50,6 +50,7 @@ impl CorrectedRecordings {
             check: copies(check),
             corrected: Vec::new(),
             unresolved: Vec::new(),
+            disagreeing: Vec::new(),
         };
         // Several faults may be present, and one may hide another.
         for _ in 0..CORRECTION_ROUNDS {
@@ -65,7 +66,11 @@ impl CorrectedRecordings {
             match correction {
                 // The same fault of a recording once more would undo its correction.
                 _ if known => break,
-                FaultCorrection::Gravity(gravity) => all.correct_gravity(fault, gravity)?,
+                FaultCorrection::Gravity(gravity) => {
+                    if !all.correct_gravity(fault, gravity)? {
+                        break;
+                    }
+                }
                 FaultCorrection::Columns(operations) => {
                     if !all.correct_columns(fault, &operations)? {
                         break;
@@ -79,6 +84,12 @@ impl CorrectedRecordings {
             .chain(&all.check)
             .filter_map(PreparedRecording::suspected_fault);
         all.unresolved = merge_faults(left.cloned());
+        for fault in &mut all.unresolved {
+            if fault.kind == RecordingFaultKind::GravityDirection && !all.disagreeing.is_empty() {
+                let others = words::joined_by_and(&all.disagreeing);
+                fault.clause = format!("{}, but {others} agrees with the model file", fault.clause);
+            }
+        }
         Ok(Some(all))
     }
 
@@ -95,20 +106,34 @@ impl CorrectedRecordings {
         merged.into_iter().nth(unclear.unwrap_or(0))
     }
 
-    /// Prepares all recordings again for the model with another direction of gravity.
-    fn correct_gravity(&mut self, mut fault: SuspectedFault, gravity: [f64; 3]) -> Outcome {
-        self.model = with_gravity(&self.model, gravity)?;
-        fault.recordings = self
-            .fit
-            .iter()
-            .chain(&self.check)
-            .map(|one| one.file().to_owned())
-            .collect();
-        for one in self.fit.iter_mut().chain(&mut self.check) {
-            *one = one.corrected(&self.model, &[])?;
+    /// Prepares all recordings again for the model with another direction of gravity. Those that it explains better are
+    /// named. `false` if some contradict it: one model has one gravity, so nothing can be corrected then.
+    ///
+    /// Fails when a recording cannot be prepared, or when the job is cancelled.
+    fn correct_gravity(&mut self, mut fault: SuspectedFault, gravity: [f64; 3]) -> Outcome<bool> {
+        let turned = self.model.with_gravity(gravity)?;
+        let mut all: Vec<PreparedRecording> = self.fit.iter().chain(&self.check).cloned().collect();
+        for one in &mut all {
+            let corrected = one.corrected(&turned, &[])?;
+            if !fault.recordings.iter().any(|file| file == one.file()) && one.suspected_fault().is_none() {
+                let score = correction_score((&self.model, &one.segments), (&turned, &corrected.segments));
+                let score = score.unwrap_or(0.0);
+                if score > SHARED_FAULT_LEAST_SCORE {
+                    fault.recordings.push(one.file().to_owned());
+                } else if score < -SHARED_FAULT_LEAST_SCORE {
+                    self.disagreeing.push(one.file().to_owned());
+                }
+            }
+            *one = corrected;
         }
+        if !self.disagreeing.is_empty() {
+            return Ok(false);
+        }
+        self.model = turned;
+        self.check = all.split_off(self.fit.len());
+        self.fit = all;
         self.corrected.push(fault);
-        Ok(())
+        Ok(true)
     }
 
     /// Corrects columns of the recordings that have a fault, and of those that it explains better. `false` if one that has
@@ -130,7 +155,7 @@ impl CorrectedRecordings {
                 Err(_) => continue,
             };
             if !has_it {
-                let score = correction_score(&self.model, &one.segments, &corrected.segments);
+                let score = correction_score((&self.model, &one.segments), (&self.model, &corrected.segments));
                 if score.is_none_or(|score| score < SHARED_FAULT_LEAST_SCORE) {
                     continue;
                 }
@@ -207,7 +232,8 @@ impl DiagnosisFindings {
         self.unresolved = unresolved;
     }
 
-    /// Makes the verdict the cautious one if the model explains everything but a recording was at fault.
+    /// Makes the verdict [`DiagnosisVerdict::Unexplained`] if the model explains everything but a recording was at fault:
+    /// the recording as it is stays unexplained until the fault is corrected.
     pub(super) fn respect_faults(&mut self) {
         let dead = |one: &Disturbance| one.kind == RecordingFaultKind::DeadChannel.name();
         let is_at_fault = !self.corrected.is_empty() || self.diagnosis.disturbances.iter().any(dead);

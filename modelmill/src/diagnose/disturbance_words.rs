@@ -3,7 +3,7 @@
 
 use modelmill_identify::diagnose::Disturbance;
 
-use crate::text::table::{number, percent, significant};
+use crate::text::table::{all_digits, number, percent, significant};
 
 use super::words::{joined_by_and, kind};
 
@@ -66,7 +66,11 @@ pub fn disturbance(one: &Disturbance) -> String {
             let deviation = q.standard_deviation;
             let deviation = deviation.map_or_else(String::new, |std| format!(" ± {}", significant(std, 2)));
             let unit = if q.unit == "1" { "" } else { &q.unit };
-            let said = format!("{} {}{deviation} {unit}", q.name, number(q.value));
+            let value = match q.standard_deviation {
+                Some(_) => all_digits(q.value),
+                None => number(q.value),
+            };
+            let said = format!("{} {value}{deviation} {unit}", q.name);
             said.trim_end().to_owned()
         })
         .collect();

@@ -3,10 +3,8 @@
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{CommandName, Message, OptionName, Remedy};
-use modelmill_identify::diagnose::{
-    DiagnosisVerdict, EffectParameter, EffectSupport, IdentifiedEffect, LocatedEffect, ModelDiagnosis,
-};
-use modelmill_identify::{ErrorRegion, FitParameter, ParameterStatus, RecordingNote};
+use modelmill_identify::diagnose::{DiagnosisVerdict, EffectSupport, IdentifiedEffect, LocatedEffect, ModelDiagnosis};
+use modelmill_identify::{ErrorRegion, RecordingNote};
 use modelmill_spec::Mechanics;
 use modelmill_spec::edit::NewEffect;
 
@@ -22,6 +20,7 @@ use crate::text::table::percent;
 
 use super::added_effects::{self, CompletedModelFile};
 use super::corrected::CorrectedRecordings;
+use super::estimates::{EffectEstimate, effect_estimates};
 use super::faults;
 use super::laws::{self, LawHypothesis};
 use super::long_recordings;
@@ -173,54 +172,12 @@ pub struct SeparationProposal {
     pub noise: Option<f64>,
 }
 
-/// The estimate of a parameter or constant of an effect.
-#[derive(Clone, Debug, PartialEq)]
-pub struct EffectEstimate {
-    /// Symbol of the parameter or constant.
-    pub name: String,
-    /// Its value.
-    pub value: f64,
-    /// Standard deviation. `None` for a constant, and for a parameter that is identifiable only in combination with
-    /// others, not individually.
-    pub std: Option<f64>,
-    /// SI unit of the value.
-    pub unit: String,
-}
-
 /// A diagnosis with all base parameters fixed at their nominal values.
 pub struct NominalDiagnosis {
     /// Verdict, error after each step of the search, all candidates, and the residual.
     pub diagnosis: ModelDiagnosis,
     /// The effects found, with their estimates.
     pub missing: Vec<(LocatedEffect, Vec<EffectEstimate>)>,
-}
-
-impl DiagnosisFindings {
-    /// The entries that should be added: none if a suspected fault (exchanged columns, wrong sign, wrong units, wrong
-    /// direction of gravity) could be the cause of the findings.
-    pub fn entries_to_add(&self) -> &[NewEffect] {
-        if words::has_suspicion(&self.diagnosis) {
-            &[]
-        } else {
-            &self.entries
-        }
-    }
-
-    /// Advice if not all effects can be added to the model file: because of a suspected fault, or of a delayed force
-    /// signal.
-    pub(crate) fn further_action(&self) -> Option<&'static str> {
-        if self.missing.is_empty() || words::has_suspicion(&self.diagnosis) {
-            return None;
-        }
-        let is_late = |found: &MissingEffect| {
-            let is_its = |entry: &NewEffect| entry.kind == found.effect.kind;
-            ["time_delay", "force_lag"].contains(&found.effect.kind.as_str()) && !self.entries.iter().any(is_its)
-        };
-        self.missing
-            .iter()
-            .any(is_late)
-            .then_some("Correct the delayed force signal where it is recorded: a model file has no entry for it.")
-    }
 }
 
 impl Model {
@@ -450,10 +407,8 @@ fn nominal_diagnosis(findings: &DiagnosisFindings, between: &[RecordingDifferenc
         run_differences: between,
     };
     let answer = problem::find_missing_effects(&version.model, &of(false), &of(true), asked)?;
-    let missing = answer.diagnosis.effects.iter().map(|found| {
-        let parameters = &answer.problem.candidates[found.candidate].parameters;
-        (found.effect.clone(), search_estimates(parameters, found))
-    });
+    let missing =
+        (answer.diagnosis.effects.iter()).map(|found| (found.effect.clone(), effect_estimates(&answer, found)));
     Ok(NominalDiagnosis {
         missing: missing.collect(),
         diagnosis: answer.diagnosis,
@@ -466,7 +421,7 @@ fn described_effects(findings: &DiagnosisFindings, effects: &[IdentifiedEffect])
         .iter()
         .map(|found| MissingEffect {
             effect: found.effect.clone(),
-            estimates: estimates(findings, found),
+            estimates: effect_estimates(&findings.answer, found),
             probability: found.probability,
             support: found.support,
             indistinguishable_from: found.indistinguishable_from.clone(),
@@ -487,93 +442,6 @@ fn undecided_effects(findings: &DiagnosisFindings) -> Vec<UndecidedEffect> {
         separating_experiment: findings.deciding_experiment(&effect.kind, &effect.at.join(" and ")),
     };
     findings.diagnosis.undetermined_effects.iter().map(of).collect()
-}
-
-/// Unit of a constant of a found effect at its places.
-fn unit_of_constant(findings: &DiagnosisFindings, found: &IdentifiedEffect, name: &str) -> String {
-    let candidates = &findings.answer.candidates;
-    let kind = (candidates.kinds.iter()).find(|kind| kind.name == found.effect.kind);
-    let constant = kind.and_then(|kind| kind.constants.iter().find(|one| one.symbol == name));
-    let mut spots = candidates.singles.iter().flat_map(|single| &single.spots);
-    let spot = spots.find(|spot| found.effect.at.contains(&spot.name));
-    let units = constant.zip(spot).and_then(|(constant, spot)| {
-        let mut units = constant.units.iter();
-        units.find(|(carries, _)| *carries == spot.carries)
-    });
-    units.map_or_else(String::new, |(_, unit)| unit.clone())
-}
-
-/// Estimates of the search.
-fn search_estimates(parameters: &[EffectParameter], found: &IdentifiedEffect) -> Vec<EffectEstimate> {
-    let values = found.estimates.iter().zip(&found.standard_deviations);
-    let of = |(p, (value, std)): (&EffectParameter, (&f64, &Option<f64>))| EffectEstimate {
-        name: p.symbol.clone(),
-        value: *value,
-        std: *std,
-        unit: p.unit.clone(),
-    };
-    parameters.iter().zip(values).map(of).collect()
-}
-
-/// Estimates of an effect with standard deviations, from identification with all effects found. If the model
-/// with the effects cannot separate them, those of the search.
-fn estimates(findings: &DiagnosisFindings, found: &IdentifiedEffect) -> Vec<EffectEstimate> {
-    let parameters = &findings.answer.problem.candidates[found.candidate].parameters;
-    let mut all = search_estimates(parameters, found);
-    // Constants have no standard deviation, since they were found by a search.
-    all.extend(found.constants.iter().map(|(name, value)| EffectEstimate {
-        name: name.clone(),
-        value: *value,
-        std: None,
-        unit: unit_of_constant(findings, found, name),
-    }));
-    let is_its = |entry: &&NewEffect| entry.kind == found.effect.kind && entry.at == found.effect.at;
-    if let Some(entry) = findings.entries.iter().find(is_its) {
-        for estimate in &mut all {
-            // A value that was fixed at zero, since it would have the wrong sign, stays zero.
-            if estimate.value == 0.0 {
-                continue;
-            }
-            if let Some(p) = identified_parameter(findings, entry, &estimate.name) {
-                estimate.value = p.value;
-                estimate.std = p.std;
-            } else if let Some((_, constant)) = estimate.name.clone().split_once('*') {
-                // A product of a parameter and a constant is reported as the constant.
-                let known = entry.constants.iter().find(|(symbol, _)| symbol == constant);
-                if let Some((_, value)) = known {
-                    estimate.value = *value;
-                    constant.clone_into(&mut estimate.name);
-                }
-            }
-        }
-    }
-    all
-}
-
-/// The identified parameter of an added effect, if the model with the effects has it by itself.
-fn identified_parameter<'a>(
-    findings: &'a DiagnosisFindings,
-    entry: &NewEffect,
-    symbol: &str,
-) -> Option<&'a FitParameter> {
-    let after = findings.after.as_ref().ok()?;
-    let fit = &after.identified.as_ref()?.fit;
-    let derivation = &after.model.derivation;
-    let mechanism = &derivation.mechanism;
-    let place = findings.entries.iter().position(|one| one == entry)?;
-    // Added effects are the last ones of the edited model.
-    let first = mechanism.effects.len().checked_sub(findings.entries.len())?;
-    let effect = mechanism.effects.get(first + place)?;
-    let term = (effect.kind == entry.kind).then(|| effect.terms.iter().find(|term| term.symbol == symbol))??;
-    let reduction = &derivation.reduction;
-    // A parameter is determined by itself if its product is retained alone.
-    let k = reduction
-        .retained
-        .iter()
-        .position(|k| reduction.products[*k].0 == [(term.parameter.0, 1)])?;
-    fit.parameters
-        .get(k)
-        .filter(|p| p.status == ParameterStatus::Identified)
 }
 
 /// Experiment that distinguishes an effect from its alternatives, by the text of the library.
@@ -601,7 +469,7 @@ fn separation(findings: &DiagnosisFindings, found: &IdentifiedEffect) -> Option<
     if rivals.is_empty() || !is_force(&&found.effect) {
         return None;
     }
-    let values = estimates(findings, found).into_iter();
+    let values = effect_estimates(&findings.answer, found).into_iter();
     let values = values.filter(|e| !e.name.contains('*') && e.value.is_finite());
     let others = findings.diagnosis.effects.iter();
     let others = others.filter(|other| other.effect != found.effect && is_force(&&other.effect));

@@ -17,10 +17,9 @@ use crate::model::Model;
 use crate::regressors::SegmentList;
 use crate::segment::RecordingSegment;
 
-use super::added_effects::round_significant;
 use super::candidates::DerivedCandidates;
 use super::columns::unit_forces;
-use super::findings::EffectEstimate;
+use super::estimates::{EffectEstimate, round_by_deviation, rounded_estimate};
 use super::places::{CandidatePlace, candidate_places};
 
 /// Places on which laws may act, along all recordings: drives, and joints without a drive of their own.
@@ -153,6 +152,9 @@ pub struct ProposedLaw {
     pub gain: f64,
     /// Effects found that become unnecessary with it.
     pub instead_of: Vec<LocatedEffect>,
+    /// Effects found at the same place that stay. They are estimated together with the law, so their values differ from
+    /// those without it.
+    pub in_addition_to: Vec<LocatedEffect>,
     /// Its entry; `None` if the law depends on the earlier motion, which no formula can express.
     pub entry: Option<LawEntry>,
 }
@@ -185,17 +187,25 @@ impl ProposedLaw {
 /// Laws that a diagnosis proposes, by the names of the model.
 pub(crate) fn hypotheses(model: &Model, diagnosis: &ModelDiagnosis) -> Vec<LawHypothesis> {
     let sites = &diagnosis.sites;
+    let effects: Vec<&LocatedEffect> = diagnosis.effects.iter().map(|one| &one.effect).collect();
     // Alternatives are named in the same way.
     let one = |proposal: &LawProposal| LawHypothesis {
-        law: law(model, sites, &proposal.law),
-        near_ties: (proposal.near_ties.iter()).map(|tie| law(model, sites, tie)).collect(),
+        law: law(model, sites, &effects, &proposal.law),
+        near_ties: (proposal.near_ties.iter())
+            .map(|tie| law(model, sites, &effects, tie))
+            .collect(),
     };
     diagnosis.laws.iter().map(one).collect()
 }
 
-/// A law of the search with the names of the model.
-fn law(model: &Model, sites: &[LawSite], law: &Proposed) -> ProposedLaw {
+/// A law of the search with the names of the model; `effects` are those that were found.
+fn law(model: &Model, sites: &[LawSite], effects: &[&LocatedEffect], law: &Proposed) -> ProposedLaw {
     let site = &sites[law.site];
+    // A joint and the drive on it are one place.
+    let place = joint_of(model, &site.name);
+    let stays = |one: &&&LocatedEffect| {
+        one.at.iter().any(|other| joint_of(model, other) == place) && !law.replaced_effects.contains(one)
+    };
     // Parameters are numbered in the order of the terms.
     let mut named = LawFormula::new(law);
     let expression = named.text(law, &|variable, other| {
@@ -207,15 +217,15 @@ fn law(model: &Model, sites: &[LawSite], law: &Proposed) -> ProposedLaw {
     for term in &law.terms {
         let values = term.values.iter().zip(&term.standard_deviations);
         for ((value, deviation), symbol) in values.zip(symbols.by_ref()) {
-            parameters.push(EffectEstimate {
-                name: symbol.clone(),
-                value: *value,
-                std: deviation.is_finite().then_some(*deviation),
-                unit: term.product.unit(site, sites),
-            });
+            let deviation = deviation.is_finite().then_some(*deviation);
+            parameters.push(rounded_estimate(
+                symbol,
+                *value,
+                deviation,
+                &term.product.unit(site, sites),
+            ));
         }
     }
-    // The entry uses rounded values, the hypothesis the exact ones.
     ProposedLaw {
         expression,
         at: site.name.clone(),
@@ -223,6 +233,21 @@ fn law(model: &Model, sites: &[LawSite], law: &Proposed) -> ProposedLaw {
         parameters,
         gain: law.gain,
         instead_of: law.replaced_effects.clone(),
+        in_addition_to: effects.iter().filter(stays).map(|one| (*one).clone()).collect(),
+    }
+}
+
+/// The coordinate of a drive that acts on a joint; other names stay as they are.
+fn joint_of<'a>(model: &'a Model, name: &'a str) -> &'a str {
+    let mechanism = &model.derivation.mechanism;
+    match mechanism
+        .drives
+        .iter()
+        .find(|drive| drive.name == name)
+        .map(|drive| &drive.kind)
+    {
+        Some(DriveKind::Joint(i)) => &mechanism.coordinates[i.0].name,
+        _ => name,
     }
 }
 
@@ -304,13 +329,13 @@ fn library_entry(sites: &[LawSite], law: &Proposed, parameters: &[EffectEstimate
         let _ = writeln!(
             text,
             "{symbol} = {{ unit = {{ {carries} = \"{unit}\" }}, value = {} }}",
-            round_significant(*value)
+            round_by_deviation(*value, None)
         );
     }
     // Estimates become nominal values.
     let nominal = |p: &EffectEstimate| NewParameter {
         symbol: p.name.clone(),
-        nominal: Some(round_significant(p.value)),
+        nominal: Some(p.value),
         ..NewParameter::default()
     };
     // The effect acts at the first place; the second one is an argument.
@@ -396,7 +421,7 @@ impl LawFormula {
     /// A constant as a number, or by a symbol of its own.
     fn constant(&mut self, symbol: &str, value: f64, factor: LawFactor) -> String {
         if !self.with_symbols {
-            return round_significant(value).to_string();
+            return round_by_deviation(value, None).to_string();
         }
         let of_name = |one: &&(String, f64, LawFactor)| one.0.trim_end_matches(char::is_numeric) == symbol;
         // Several constants of one name are numbered from the second on.
@@ -550,6 +575,36 @@ mod tests {
         let mut formula = LawFormula::new(&law);
         formula.with_symbols = with_symbols;
         formula.text(&law, &|variable, _| variable_word(variable).to_owned())
+    }
+
+    /// A law at a joint names the effects that stay at the drive on this joint, and not those that it replaces.
+    #[test]
+    fn effects_at_the_place_of_a_law_are_named() {
+        let model = Model::open("../model-spec/models/two_link.toml").unwrap();
+        let effect = |kind: &str, at: &str| LocatedEffect {
+            kind: kind.to_owned(),
+            at: vec![at.to_owned()],
+        };
+        let drive = model.drives()[0].clone();
+        let joint = joint_of(&model, &drive).to_owned();
+        assert_ne!(joint, drive);
+        let sites = [LawSite {
+            name: joint,
+            ..LawSite::default()
+        }];
+        let found = [
+            effect("coulomb_friction", &drive),
+            effect("viscous_friction", &drive),
+            effect("coulomb_friction", &model.drives()[1]),
+        ];
+        let proposed = Proposed {
+            site: 0,
+            terms: Vec::new(),
+            gain: 0.5,
+            replaced_effects: vec![found[1].clone()],
+        };
+        let law = law(&model, &sites, &found.iter().collect::<Vec<_>>(), &proposed);
+        assert_eq!(law.in_addition_to, found[..1]);
     }
 
     #[test]

@@ -14,11 +14,12 @@
 //! 6. `encoders`, `gears`, `memory`, `payloads`, `constants`, `tilt`, `held_friction`: add candidates that a model file
 //!    cannot contain.
 //! 7. `problem`: formulates the search with all of these, and solves it.
-//! 8. `added_effects`: adds the effects found to the model file, in memory.
+//! 8. `estimates`, `added_effects`: give each effect found one value per parameter, and add the effects to the model file, in
+//!    memory.
 //! 9. `model_versions`: identifies the models without and with the effects, and evaluates them along all recordings.
 //! 10. `off_nominal`: lists base parameters whose estimates differ from the nominal values.
 //! 11. `laws`: lists force laws that are in no library and would explain the residual.
-//! 12. `findings`: collects the results.
+//! 12. `findings`: collects the results; `completed` gives the completed model file.
 //!
 //! In addition, `requested_effects` derives and evaluates effects that the user names, `words` writes sentences, and
 //! `thresholds` contains the decision thresholds.
@@ -26,10 +27,12 @@
 pub(crate) mod added_effects;
 mod candidates;
 mod columns;
+mod completed;
 mod constants;
 mod corrected;
 mod disturbance_words;
 mod encoders;
+mod estimates;
 mod faults;
 mod findings;
 mod gears;
@@ -49,9 +52,9 @@ mod tilt;
 pub mod words;
 
 pub(crate) use candidates::sign;
+pub use estimates::EffectEstimate;
 pub use findings::{
-    DiagnosisFindings, DiagnosisOptions, EffectEstimate, MissingEffect, NominalDiagnosis, SeparationProposal,
-    UndecidedEffect,
+    DiagnosisFindings, DiagnosisOptions, MissingEffect, NominalDiagnosis, SeparationProposal, UndecidedEffect,
 };
 pub use laws::{LawEntry, LawHypothesis, ProposedLaw};
 pub use model_versions::{ForceComparison, ModelVersion};

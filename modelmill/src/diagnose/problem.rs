@@ -22,6 +22,7 @@ use super::candidates::{DerivedCandidates, candidates};
 use super::columns::{self, CandidateOrigin, load_dependent_columns, refined_columns};
 use super::constants::constants;
 use super::encoders::{self, encoders};
+use super::estimates::round_by_deviation;
 use super::faults::subtract_known;
 use super::gears::gears;
 use super::held_friction;
@@ -189,6 +190,10 @@ fn describe_disturbance(one: &mut Disturbance, model: &Model) {
         for value in one.estimates.iter_mut().filter(|v| v.unit.is_empty()) {
             model.force_unit(d).clone_into(&mut value.unit);
         }
+    }
+    // Text and JSON state the same digits.
+    for value in one.estimates.iter_mut().filter(|v| v.standard_deviation.is_some()) {
+        value.value = round_by_deviation(value.value, value.standard_deviation);
     }
     if one.description.is_none() {
         one.description = Some(words::disturbance(one));

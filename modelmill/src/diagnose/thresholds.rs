@@ -84,3 +84,8 @@ pub(super) const CORRECTION_ROUNDS: usize = 3;
 /// A fault of one recording is corrected in another one if the errors fall by at least this sum of logarithms over the
 /// drives there (1). By judgement.
 pub(super) const SHARED_FAULT_LEAST_SCORE: f64 = 0.3;
+/// Fewest significant digits of an estimate, however uncertain it is: estimates of an effect with several parameters may be
+/// uncertain one by one although their force is not. By judgement.
+pub(super) const ESTIMATE_FEWEST_DIGITS: usize = 5;
+/// Most significant digits of an estimate. By judgement: recordings have at most this many.
+pub(super) const ESTIMATE_MOST_DIGITS: usize = 9;

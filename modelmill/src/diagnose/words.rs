@@ -63,7 +63,7 @@ pub fn effects(effects: &[LocatedEffect]) -> String {
 }
 
 /// Names as a list whose last entry is joined by `and`.
-pub(super) fn joined_by_and(names: &[String]) -> String {
+pub(crate) fn joined_by_and(names: &[String]) -> String {
     match names {
         [] => "nothing".to_owned(),
         [one] => one.clone(),
@@ -143,16 +143,32 @@ fn place_list(places: &[&str], channels: &[String]) -> String {
 }
 
 /// The effects that a step of the selection added and dropped; `channels` are the names of the drives.
-pub fn rung(rung: &SelectionStep, channels: &[String]) -> String {
+pub fn step_text(step: &SelectionStep, diagnosis: &ModelDiagnosis, channels: &[String]) -> String {
     // The first step is the model of the file.
-    if rung.added.is_empty() && rung.dropped.is_empty() {
+    if step.added.is_empty() && step.dropped.is_empty() {
         return "the given model".to_owned();
     }
+    // A change that only refines another one at the same time is listed nowhere else under its own name.
+    let refines = |one: &&LocatedEffect| {
+        let is_listed = |kind: &str, at: &[String]| (kind, at) == (one.kind.as_str(), &one.at);
+        let mut listed = diagnosis.disturbances.iter();
+        let mut dropped = diagnosis.steps.iter().flat_map(|other| &other.dropped);
+        CHANGES_IN_TIME.contains(&one.kind.as_str())
+            && !listed.any(|other| is_listed(&other.kind, &other.at))
+            && !dropped.any(|other| other == *one)
+    };
+    let (refining, added): (Vec<LocatedEffect>, Vec<LocatedEffect>) =
+        step.added.iter().cloned().partition(|one| refines(&one));
     // Signs show what was added and what became unnecessary.
     let mut says = Vec::new();
     let named = |effects: &[LocatedEffect]| grouped_effects(effects, channels);
-    says.extend(named(&rung.added).iter().map(|name| format!("+ {name}")));
-    says.extend(named(&rung.dropped).iter().map(|name| format!("− {name}")));
+    says.extend(named(&added).iter().map(|name| format!("+ {name}")));
+    says.extend(
+        refining
+            .iter()
+            .map(|one| format!("+ refinement of the change in time ({})", one.at.join(", "))),
+    );
+    says.extend(named(&step.dropped).iter().map(|name| format!("− {name}")));
     says.join(" ")
 }
 
@@ -193,6 +209,9 @@ pub fn refusal(reason: RejectionReason, has_findings: bool) -> &'static str {
         }
         RejectionReason::LessLikelyThanNot => "possible, but less likely than not",
         RejectionReason::ExplainedBetter => "another candidate explains more",
+        RejectionReason::NotConfirmedEverywhere => {
+            "not confirmed in all parts of the data (near and far from reversals, both halves)"
+        }
         RejectionReason::ExplainsNothing if has_findings => {
             "redundant: it explains almost nothing in addition to the effects found"
         }
@@ -213,9 +232,9 @@ pub fn refusal(reason: RejectionReason, has_findings: bool) -> &'static str {
 ///
 /// `channels` are the names of the drives. `judged` states the data on which errors are evaluated.
 pub fn verdict(diagnosis: &ModelDiagnosis, channels: &[String], judged: ValidationMethod) -> String {
-    let ladder = &diagnosis.steps;
+    let steps = &diagnosis.steps;
     // Without steps there is no verdict.
-    let (Some(first), Some(last)) = (ladder.first(), ladder.last()) else {
+    let (Some(first), Some(last)) = (steps.first(), steps.last()) else {
         return String::new();
     };
     let noise = noise_floor_text(diagnosis);
@@ -225,11 +244,12 @@ pub fn verdict(diagnosis: &ModelDiagnosis, channels: &[String], judged: Validati
     let them = if found.len() == 1 { "it" } else { "them" };
     // Each verdict states the error and compares it with the noise.
     let says = match diagnosis.verdict {
-        // After a correction the verdict stays cautious, although nothing is left to explain.
-        DiagnosisVerdict::Unexplained if found.is_empty() && is_all_explained(diagnosis) => {
-            adequate_text(diagnosis, last.check, judged)
-        }
-        DiagnosisVerdict::Adequate => adequate_text(diagnosis, last.check, judged),
+        // After a correction nothing is left to explain, but the recordings as they are stay unexplained.
+        DiagnosisVerdict::Unexplained if found.is_empty() && is_all_explained(diagnosis) => format!(
+            "{} The recordings as they are count as unexplained: repeat the diagnosis once the fault is corrected.",
+            explained_text("The model explains the recordings", diagnosis, last.check, judged)
+        ),
+        DiagnosisVerdict::Adequate => explained_text("The model is adequate", diagnosis, last.check, judged),
         DiagnosisVerdict::MissingEffect => {
             format!(
                 "The model lacks {}. With {them} {falls}. {noise}",
@@ -407,15 +427,15 @@ fn is_change_in_time(one: &Disturbance) -> bool {
     one.interval.is_some() && CHANGES_IN_TIME.contains(&one.kind.as_str())
 }
 
-/// The sentences of a model that lacks nothing.
-fn adequate_text(diagnosis: &ModelDiagnosis, error: f64, judged: ValidationMethod) -> String {
+/// The sentences of a model that lacks nothing; `claim` is the first clause.
+fn explained_text(claim: &str, diagnosis: &ModelDiagnosis, error: f64, judged: ValidationMethod) -> String {
     let lowers = if diagnosis.possible_effects.is_empty() {
         "No effect of the library lowers this error."
     } else {
         "No effect of the library clearly lowers this error."
     };
     format!(
-        "The model is adequate: its error {} is {} of the force. {} {lowers}",
+        "{claim}: its error {} is {} of the force. {} {lowers}",
         judged.phrase(),
         percent(Some(error)),
         noise_floor_text(diagnosis)

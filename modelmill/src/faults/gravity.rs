@@ -4,14 +4,10 @@
 //! With nominal masses the forces are linear in the three components of gravity, which are a least squares problem with
 //! friction and an offset of every drive. The model is derived again with the direction that was found.
 
-use std::sync::Arc;
-
 use modelmill_boundary::message;
 use modelmill_boundary::text::Remedy;
 use modelmill_codegen::ModelEvaluator;
-use modelmill_spec::edit::write_gravity;
 use nalgebra::{DMatrix, DVector, Vector3};
-use std::path::Path;
 
 use super::bench::{FaultBench, HypothesisErrors, solve_scaled};
 use super::correction::{FaultCorrection, ForceChange, MotionChange};
@@ -20,9 +16,7 @@ use super::thresholds::{
     GRAVITY_LEAST_NOMINAL_ERROR, GRAVITY_MOST_NOMINAL_ERROR, GRAVITY_MOST_UNCERTAINTY, GRAVITY_SIZE_TOLERANCE,
 };
 use super::{FaultSubject, RecordingFaultKind, SuspectedFault, judge};
-use crate::error::{Error, Outcome};
 use crate::model::Model;
-use crate::progress::SilentProgress;
 use crate::text::table::significant;
 
 /// Columns of friction and offset of a drive: rate, its sign, and a constant.
@@ -40,17 +34,6 @@ pub(super) struct GravityFinding {
     pub(super) fault: SuspectedFault,
     /// Sum of the logarithms by which fitted errors and errors with nominal values fall.
     pub(super) score: f64,
-}
-
-/// The model with another vector of gravity, m/s^2. Its file has the new entry, so that effects can be added to it.
-///
-/// Fails when the entry cannot be written, or when the derivation fails.
-pub(crate) fn with_gravity(model: &Model, gravity: [f64; 3]) -> Outcome<Model> {
-    let text = write_gravity(model.text(), gravity).map_err(Error::input)?;
-    let host = model.host().clone().with_progress(Arc::new(SilentProgress));
-    let loaded = host.load_text(Path::new(&model.path), &text)?;
-    let derived = host.derive(&model.path, loaded)?;
-    Ok(derived.with_values_of(model).with_host(model.host()))
 }
 
 /// The direction of gravity of a recording, if it clearly differs from that of the model; `None` otherwise, and if it
@@ -82,7 +65,7 @@ pub(super) fn find_direction(
     let direction = nearest_axis(found.normalize());
     let gravity: [f64; 3] = (given.norm() * direction).into();
     // The complete model decides, since another direction may have other base parameters.
-    let corrected = with_gravity(model, gravity).ok()?;
+    let corrected = model.with_gravity(gravity).ok()?;
     let other = bench.with_model(&corrected);
     let errors = other.errors(&other.rows(&MotionChange::None)?, &ForceChange::default());
     let [fit_gain, nominal_gain] = [errors.fit_gain(before), errors.nominal_gain(before)];
@@ -167,7 +150,7 @@ impl GravityRows {
         for axis in 0..3 {
             let mut gravity = [0.0; 3];
             gravity[axis] = signs[axis] * size;
-            let turned = with_gravity(model, gravity).ok()?;
+            let turned = model.with_gravity(gravity).ok()?;
             along.push(forces(&turned, &standstill, &turned.nominal)?);
         }
         // Shares of the file's gravity in the three directions; their sum is at most -1.

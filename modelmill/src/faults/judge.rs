@@ -139,9 +139,12 @@ pub(crate) fn find_fault(subject: &FaultSubject<'_>) -> Option<SuspectedFault> {
 }
 
 /// Sum over the drives of the logarithms by which the errors of a recording fall by a correction, fitted and with nominal
-/// values; `None` if they cannot be compared.
-pub(crate) fn correction_score(model: &Model, before: &[RecordingSegment], after: &[RecordingSegment]) -> Option<f64> {
-    let errors = |segments: &[RecordingSegment]| {
+/// values; `None` if they cannot be compared. Both states have a model, since gravity is corrected there.
+pub(crate) fn correction_score(
+    before: (&Model, &[RecordingSegment]),
+    after: (&Model, &[RecordingSegment]),
+) -> Option<f64> {
+    let errors = |(model, segments): (&Model, &[RecordingSegment])| {
         let bench = FaultBench::new(model, segments)?;
         Some(match bench.rows(&MotionChange::None) {
             Some(rows) => bench.errors(&rows, &ForceChange::default()),

@@ -32,7 +32,6 @@ use crate::segment::RecordingSegment;
 use bench::FaultBench;
 pub(crate) use correction::{ColumnOperation, FaultCorrection};
 use correction::{ForceChange, MotionChange};
-pub(crate) use gravity::with_gravity;
 pub(crate) use judge::{correction_score, find_fault};
 pub(crate) use silent::{SilentInterval, silent_intervals};
 

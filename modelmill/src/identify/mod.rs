@@ -14,8 +14,8 @@ use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_identify::estimate::FEWEST_ROWS;
 use modelmill_identify::fit_parameters;
 use modelmill_identify::{
-    ErrorFigures, EstimatorOutput, FitFile, FitParameter, ParameterInfo, ParameterStatus, RecordingNote,
-    RunRepeatability,
+    ErrorFigures, EstimatorOutput, FitFile, FitParameter, ParameterInfo, ParameterStatus, RateDependence,
+    RecordingNote, RunRepeatability,
 };
 use modelmill_spec::Sign;
 
@@ -50,6 +50,11 @@ pub struct Identification {
     pub notes: Vec<RecordingNote>,
     /// File names of the periodic recordings, each with the period and the noise floor.
     pub repeats: Vec<(String, RunRepeatability)>,
+    /// How the residuals of the fitted recordings depend on the velocities of their drives. Empty if there is no such
+    /// dependence, and if a model is identified from segments.
+    pub by_rate: Vec<RateDependence>,
+    /// Whether the model has nominal values, so that their errors mean something.
+    pub(crate) has_nominal: bool,
 }
 
 impl Model {
@@ -104,6 +109,7 @@ impl Model {
             ..options.clone()
         };
         let mut found = identify(self, &fit, &instruments, &check, &options)?;
+        found.by_rate = compare::residual_dependences(self, &fit, &found.values())?;
         // The influence of faults costs a second fit, which instruments do not support.
         if instruments.is_empty()
             && let Some(note) = influence::fault_influence(self, recordings, &found.found, &options)
@@ -212,6 +218,8 @@ pub fn identify(
         options: options.clone(),
         notes,
         repeats,
+        by_rate: Vec::new(),
+        has_nominal: (0..model.base.len()).any(|k| model.has_nominal(k)),
     })
 }
 

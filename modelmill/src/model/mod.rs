@@ -3,6 +3,7 @@
 mod changes;
 mod entries;
 mod equations;
+mod gravity_variants;
 mod sampled_rank;
 mod summary;
 mod values;
@@ -23,6 +24,7 @@ use nalgebra::DMatrix;
 
 use crate::error::{Error, Outcome};
 use crate::host::Host;
+use gravity_variants::GravityVariants;
 
 pub use changes::{EntryChange, ModelChanges};
 pub use equations::EquationsText;
@@ -59,6 +61,8 @@ pub struct Model {
     signs: Vec<Sign>,
     /// Provides the file, and all files that are read later.
     host: Host,
+    /// The same model with other directions of gravity, as far as they were derived.
+    gravity_variants: GravityVariants,
 }
 
 impl Model {
@@ -162,6 +166,7 @@ impl Host {
             derivation: Arc::new(derivation),
             notes,
             host: self.clone(),
+            gravity_variants: GravityVariants::default(),
         })
     }
 }

@@ -21,12 +21,14 @@ impl ModelComparison {
             object.insert("where".to_owned(), json!(self.places.regions));
             object.insert("by_rate".to_owned(), json!(self.places.by_rate));
             object.insert("data".to_owned(), notes(&self.notes, spelling));
+            let next = self.next_step().map(|step| step.spell(spelling));
+            object.insert("next".to_owned(), json!(next));
         }
         Ok(object)
     }
 
     /// The comparison as text: figures of each drive, the regions of the error, and how it depends on the rates.
-    pub fn text(&self, parameters: &str, style: TerminalStyle) -> String {
+    pub fn text(&self, parameters: &str, style: TerminalStyle, spelling: &dyn RemedySpelling) -> String {
         let mut lines = vec![style.bold(&format!(
             "{} with {parameters} parameters on {}",
             self.model,
@@ -42,9 +44,12 @@ impl ModelComparison {
         let by_rate = tables::by_rate(&self.places);
         if !by_rate.is_empty() {
             lines.push(String::new());
-            lines.push(style.bold("How the residual depends on the rate of its drive"));
+            lines.push(style.bold("How the residual depends on the velocity of its drive"));
             lines.extend(by_rate);
-            lines.push("  Try `diagnose`: it finds the effects that explain this.".to_owned());
+        }
+        if let Some(step) = self.next_step() {
+            lines.push(String::new());
+            lines.push(step.spell(spelling));
         }
         lines.join("\n")
     }

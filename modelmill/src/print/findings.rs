@@ -6,9 +6,10 @@ use serde_json::{Map, Value, json};
 
 use super::laws;
 use crate::diagnose::{DiagnosisFindings, EffectEstimate, MissingEffect, UndecidedEffect, words};
+use crate::faults::RecordingFaultKind;
 use crate::print::{OptionName, Remedy, StepSpelling, notes};
 use crate::text::TerminalStyle;
-use crate::text::table::{ColumnAlignment, number, percent, significant, table};
+use crate::text::table::{ColumnAlignment, all_digits, number, percent, significant, table};
 
 /// Rejected candidates that the text names at most.
 const MOST_CANDIDATES: usize = 6;
@@ -19,8 +20,9 @@ impl DiagnosisFindings {
     /// All findings as one JSON object; `spelling` writes commands or calls for its reader.
     ///
     /// - `verdict`, `noise_floor` (relative to the force, as all errors here)
-    /// - `budget`: for each drive, the parts of its residual (`noise`, `not_repeating`, `model`), relative to the rms
-    ///   force of the drive; `rms` is this force in `unit`
+    /// - `budget`: for each drive, the parts of its residual (`noise`, `in_time`, `model`) and the disturbances that were
+    ///   `subtracted` from its force, relative to the rms force of the drive; `rms` is this force in `unit`. `not_repeating`
+    ///   are `in_time` and `subtracted` together
     /// - `disturbances`: faults of the recordings, with estimates and times (`interval`, s)
     /// - `corrected`: faults of the recordings that were corrected hypothetically, with what to do about them (`todo`);
     ///   all other findings hold for the corrected recordings
@@ -83,7 +85,9 @@ impl DiagnosisFindings {
                 };
                 let value = json!({
                     "noise": part(budget.noise),
-                    "not_repeating": part(budget.non_repeatable),
+                    "not_repeating": part(budget.non_repeatable()),
+                    "in_time": part(budget.in_time),
+                    "subtracted": part(budget.subtracted),
                     "model": part(budget.model),
                     "unit": model.force_unit(d),
                     "rms": budget.force,
@@ -177,11 +181,11 @@ impl DiagnosisFindings {
         lines.push(style.bold("Error after each added effect, relative to the force (nrms)"));
         // Errors after each step, on fitted and on validation data.
         let rows: Vec<Vec<String>> = (diagnosis.steps.iter())
-            .map(|rung| {
+            .map(|step| {
                 vec![
-                    words::rung(rung, self.channels()),
-                    percent(Some(rung.fit)),
-                    percent(Some(rung.check)),
+                    words::step_text(step, diagnosis, self.channels()),
+                    percent(Some(step.fit)),
+                    percent(Some(step.check)),
                 ]
             })
             .collect();
@@ -197,6 +201,7 @@ impl DiagnosisFindings {
         // The noise floor follows the table, as the lower bound of all errors.
         lines.push(format!("  {}", words::noise_floor_text(diagnosis)));
         self.missing_text(style, spelling, &mut lines);
+        self.sums_text(&mut lines);
         self.possible_text(style, &mut lines);
         self.disturbances_text(style, &mut lines);
         self.regions_text(style, &mut lines);
@@ -208,10 +213,24 @@ impl DiagnosisFindings {
         // depending on the reader.
         let at_fault = self.corrected.iter().chain(&self.unresolved);
         let mut next: Vec<String> = at_fault
-            .map(|fault| format!("Correct the recording first: {}.", fault.advice.spell(spelling)))
+            .map(|fault| {
+                // The direction of gravity may be an error of the model file.
+                let first = match fault.kind {
+                    RecordingFaultKind::GravityDirection => "Before the next diagnosis",
+                    _ => "Correct the recording first",
+                };
+                format!("{first}: {}.", fault.advice.spell(spelling))
+            })
             .collect();
-        let entries = self.entries_to_add().iter();
-        next.extend(entries.map(|entry| spelling.spell_effect(&self.before.model, entry)));
+        let entries = self.entries_to_add();
+        next.extend(
+            entries
+                .iter()
+                .map(|entry| spelling.spell_effect(&self.before.model, entry)),
+        );
+        if entries.len() > 1 {
+            next.push(format!("{}.", spelling.spell_completion()));
+        }
         next.extend(self.further_action().map(str::to_owned));
         if !next.is_empty() {
             lines.push(String::new());
@@ -252,7 +271,9 @@ impl DiagnosisFindings {
     /// Disturbances of the recordings, and the parts of the residual of each drive.
     fn disturbances_text(&self, style: TerminalStyle, lines: &mut Vec<String>) {
         let diagnosis = &self.diagnosis;
-        let disturbances = self.disturbances();
+        let mut disturbances = self.disturbances();
+        // The verdict names the direction of gravity, which may be an error of the model file.
+        disturbances.retain(|one| one.kind != RecordingFaultKind::GravityDirection.name());
         if !disturbances.is_empty() {
             lines.push(String::new());
             lines.push(style.bold("Disturbances in the recordings (not model errors)"));
@@ -277,13 +298,14 @@ impl DiagnosisFindings {
         // Parts of the residual of each drive, relative to its force.
         let rows: Vec<Vec<String>> = (self.channels().iter().zip(&diagnosis.budgets))
             .map(|(channel, budget)| {
-                // Noise, what does not repeat, and what a model could explain.
+                // Noise, what follows the time, and what a model could explain; disturbances are no part of the residual.
                 let of = |x: f64| part(x, budget.force);
                 vec![
                     channel.clone(),
                     of(budget.noise),
-                    of(budget.non_repeatable),
+                    of(budget.in_time),
                     of(budget.model),
+                    of(budget.subtracted),
                 ]
             })
             .collect();
@@ -292,8 +314,9 @@ impl DiagnosisFindings {
             &[
                 ("drive", ColumnAlignment::Left),
                 ("noise", ColumnAlignment::Right),
-                ("disturbances", ColumnAlignment::Right),
+                ("follows the time", ColumnAlignment::Right),
                 ("repeatable, unexplained", ColumnAlignment::Right),
+                ("(subtracted disturbances)", ColumnAlignment::Right),
             ],
             &rows,
         ));
@@ -348,6 +371,24 @@ impl DiagnosisFindings {
                     lines.push(format!("      {command}"));
                 }
             }
+        }
+    }
+
+    /// Values of the model file that are sums of the findings above them.
+    fn sums_text(&self, lines: &mut Vec<String>) {
+        for entry in self.summed_entries() {
+            let values = entry.parameters.iter().filter_map(|p| {
+                let nominal = p.nominal?;
+                Some(format!("{} = {}", p.symbol, all_digits(nominal)))
+            });
+            let values: Vec<String> = values.collect();
+            let says = format!(
+                "At {}, {} was found more than once. The effects add up, and the model file gets their sum: {}.",
+                entry.at.join(", "),
+                words::kind(&entry.kind),
+                values.join(", ")
+            );
+            lines.extend(words::lines(&says, 96).iter().map(|line| format!("    {line}")));
         }
     }
 
@@ -484,26 +525,38 @@ impl DiagnosisFindings {
             "  Possible causes: a payload, a misplaced mass or a wrong length that the nominal values do not contain."
                 .to_owned(),
         );
-        // A second diagnosis with fixed parameters shows which effects could explain the differences.
+        // A second diagnosis with fixed parameters shows which further effects could explain the differences. It is no
+        // second verdict, since the nominal values may be wrong.
         let Some(held) = &self.with_nominal else {
             return;
         };
-        let says = words::verdict(&held.diagnosis, self.channels(), self.validation);
-        let says = format!("With all parameters fixed at their nominal values: {says}");
-        lines.extend(words::lines(&says, 98).iter().map(|line| format!("  {line}")));
+        let is_new = |(effect, _): &&(LocatedEffect, Vec<EffectEstimate>)| {
+            !self.missing.iter().any(|found| found.effect == *effect)
+        };
+        let further: Vec<String> = (held.missing.iter().filter(is_new))
+            .map(|(effect, values)| format!("{}: {}", words::effect(effect), values_text(values)))
+            .collect();
+        if !further.is_empty() {
+            let says =
+                "If the nominal values are correct, these effects may explain a part of the differences instead:";
+            lines.push(format!("  {says}"));
+            lines.extend(further.iter().map(|says| format!("    {says}")));
+        }
         let fix_parameters = Remedy::option(OptionName::Held).spell(spelling);
-        lines.push(format!("  For the full result use {fix_parameters}."));
+        lines.push(format!(
+            "  To diagnose with all parameters fixed at their nominal values, use {fix_parameters}."
+        ));
     }
 }
 
 /// Estimates with standard deviations and units, for a line of text.
-fn values_text(estimates: &[EffectEstimate]) -> String {
+pub(crate) fn values_text(estimates: &[EffectEstimate]) -> String {
     let values = estimates.iter().map(|e| {
         let std = e
             .std
             .map_or_else(String::new, |std| format!(" ± {}", significant(std, 2)));
         let unit = if e.unit == "1" { "" } else { &e.unit };
-        let said = format!("{} = {}{std} {unit}", e.name, number(e.value));
+        let said = format!("{} = {}{std} {unit}", e.name, all_digits(e.value));
         said.trim_end().to_owned()
     });
     values.collect::<Vec<String>>().join(", ")
@@ -516,17 +569,17 @@ pub(super) fn estimates(all: &[EffectEstimate]) -> Vec<Value> {
 }
 
 /// The steps of the search as JSON.
-fn steps(ladder: &[SelectionStep]) -> Vec<Value> {
-    let step = |rung: &SelectionStep| {
+fn steps(all: &[SelectionStep]) -> Vec<Value> {
+    let one_step = |step: &SelectionStep| {
         json!({
-            "added": rung.added.first(),
-            "also_added": rung.added.get(1..).unwrap_or_default(),
-            "dropped": rung.dropped,
-            "fit": rung.fit,
-            "check": rung.check,
-            "gain": rung.evidence.map(|e| e.gain),
-            "evidence": rung.evidence,
+            "added": step.added.first(),
+            "also_added": step.added.get(1..).unwrap_or_default(),
+            "dropped": step.dropped,
+            "fit": step.fit,
+            "check": step.check,
+            "gain": step.evidence.map(|e| e.gain),
+            "evidence": step.evidence,
         })
     };
-    ladder.iter().map(step).collect()
+    all.iter().map(one_step).collect()
 }

@@ -32,6 +32,8 @@ impl Identification {
                 "estimator".to_owned(),
                 estimation::json(model, &self.found, &self.options),
             );
+            object.insert("by_rate".to_owned(), json!(self.by_rate));
+            object.insert("next".to_owned(), json!(self.next_step().spell(spelling)));
             // Periods exist for periodic recordings only.
             if !self.repeats.is_empty() {
                 let repeats = self
@@ -74,14 +76,13 @@ impl Identification {
         lines.push(String::new());
         lines.push(style.bold("Error"));
         // Errors with nominal values mean nothing if the file has none.
-        let has_nominal = (0..model.base.len()).any(|k| model.has_nominal(k));
         let mut figures = Vec::new();
-        if has_nominal {
+        if self.has_nominal {
             figures.push(("fit, nominal", &self.nominal_fit));
         }
         figures.push(("fit, identified", &fit.fit));
         if let (Some(check), Some(nominal)) = (&fit.check, &self.nominal_check) {
-            if has_nominal {
+            if self.has_nominal {
                 figures.push(("validation, nominal", nominal));
             }
             figures.push(("validation, identified", check));

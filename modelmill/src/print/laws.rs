@@ -1,13 +1,15 @@
 //! Laws that a diagnosis proposes for the residual, as JSON for scripts and as text for people.
 
+use std::fmt::Write as _;
+
 use serde_json::{Value, json};
 
-use super::findings::estimates;
+use super::findings::{estimates, values_text};
 use crate::diagnose::{LawHypothesis, ProposedLaw, words};
 use crate::model::Model;
 use crate::print::StepSpelling;
 use crate::text::TerminalStyle;
-use crate::text::table::{number, percent, significant};
+use crate::text::table::percent;
 
 /// The caution that goes with every law.
 pub(crate) const HYPOTHESIS: &str =
@@ -40,6 +42,7 @@ fn law(law: &ProposedLaw, model: &Model, spelling: &dyn StepSpelling) -> Value {
         "gain": law.gain,
         "parameters": estimates(&law.parameters),
         "instead_of": law.instead_of,
+        "in_addition_to": law.in_addition_to,
         "entry": entry.map(|entry| &entry.text),
         "kind": entry.map(|entry| &entry.effect.kind),
         "places": entry.map(|entry| &entry.effect.at),
@@ -64,7 +67,7 @@ pub(super) fn text(
         // Expression, values, and the share that it explains.
         let law = &hypothesis.law;
         lines.push(format!("  {}", law.label()));
-        lines.push(format!("    {}", values(law)));
+        lines.push(format!("    {}", values_text(&law.parameters)));
         let wrapped = words::lines(&gain(law), 96);
         lines.extend(wrapped.iter().map(|line| format!("    {line}")));
         if !hypothesis.near_ties.is_empty() {
@@ -96,18 +99,6 @@ pub(super) fn text(
     lines
 }
 
-/// Parameters of a law with standard deviations and units.
-pub(crate) fn values(law: &ProposedLaw) -> String {
-    let value = |p: &crate::diagnose::EffectEstimate| {
-        let deviation = (p.std).map_or_else(String::new, |std| format!(" ± {}", significant(std, 2)));
-        let unit = if p.unit == "1" { "" } else { &p.unit };
-        let said = format!("{} = {}{deviation} {unit}", p.name, number(p.value));
-        said.trim_end().to_owned()
-    };
-    let all: Vec<String> = law.parameters.iter().map(value).collect();
-    all.join(", ")
-}
-
 /// Which share of the residual a law explains, and which effects it makes unnecessary.
 pub(crate) fn gain(law: &ProposedLaw) -> String {
     let mut says = format!(
@@ -120,5 +111,13 @@ pub(crate) fn gain(law: &ProposedLaw) -> String {
         says.push_str(&words::effects(&law.instead_of));
     }
     says.push('.');
+    if !law.in_addition_to.is_empty() {
+        let these = words::effects(&law.in_addition_to);
+        let _ = write!(
+            says,
+            " Its values were estimated together with {these} at the same place, whose values change with the law: identify \
+             again after adding it."
+        );
+    }
     says
 }

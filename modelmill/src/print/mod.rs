@@ -25,6 +25,7 @@ mod variants;
 use modelmill_identify::RecordingNote;
 use serde_json::Value;
 
+pub(crate) use findings::values_text;
 pub use spelling::{
     CommandName, LibrarySpelling, Message, OptionName, OptionSetting, Remedy, RemedySpelling, StepSpelling,
 };

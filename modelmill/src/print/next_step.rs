@@ -1,9 +1,12 @@
-//! The advice after an identification: from the uncertainties of its parameters to one message with the next command.
+//! The next step after a command has compared a model with recordings: from a quick look at the residual to one message with
+//! the next command. All commands use the same look, so that nobody records again while the model lacks an effect.
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{CommandName, Message, OptionName, Remedy};
-use modelmill_identify::{ErrorFigures, ParameterStatus};
+use modelmill_identify::{ErrorFigures, ParameterStatus, RateDependence, RateTerm};
 
+use crate::compare::ModelComparison;
+use crate::diagnose::words::joined_by_and;
 use crate::identify::{Identification, RefinementResult};
 use crate::text::table::percent;
 
@@ -11,6 +14,118 @@ use crate::text::table::percent;
 const VAGUE: f64 = 0.5;
 /// From this part of uncertain parameters on, the advice is about them. By judgement.
 const MANY: f64 = 0.25;
+/// Identified values are worse than nominal ones if their error is larger by this factor. By judgement.
+const WORSE_FACTOR: f64 = 1.05;
+/// Errors below this part of the force are not compared, nor called large. By judgement.
+const SMALL_ERROR: f64 = 0.03;
+/// Residuals whose neighbours are correlated by more than this are no white noise. By judgement.
+const CORRELATED: f64 = 0.5;
+
+/// What a command knows of the residual of a model.
+pub(crate) struct ResidualLook<'a> {
+    /// Errors on the data that decide.
+    pub(crate) figures: &'a ErrorFigures,
+    /// Errors of the nominal values on the same data, if identified values are used.
+    pub(crate) nominal: Option<&'a ErrorFigures>,
+    /// How the residuals depend on the velocities of their drives.
+    pub(crate) by_rate: &'a [RateDependence],
+    /// Correlation of neighbouring residuals, by drive.
+    pub(crate) correlations: &'a [f64],
+}
+
+impl ResidualLook<'_> {
+    /// What shows that the model lacks an effect, as sentences; `None` if a quick look shows nothing.
+    pub(crate) fn finding(&self) -> Option<Message> {
+        let signs = [self.friction_text(), self.worse_text(), self.correlation_text()];
+        let signs: Vec<Message> = signs.into_iter().flatten().map(Message::from).collect();
+        (!signs.is_empty()).then(|| Message::join(signs, " "))
+    }
+
+    /// The next step if something is missing: the diagnosis, before anything is recorded again.
+    pub(crate) fn diagnosis_step(&self) -> Option<Message> {
+        let finding = self.finding()?;
+        Some(message!(
+            "{} Next: {} finds the effects that explain this. Do so before you record again.",
+            finding,
+            Remedy::command(CommandName::Diagnose)
+        ))
+    }
+
+    /// Drives whose residuals look like friction.
+    fn friction_text(&self) -> Option<String> {
+        let mut drives: Vec<String> = Vec::new();
+        let mut kinds: Vec<String> = Vec::new();
+        for one in self.by_rate {
+            let kind = match one.term {
+                RateTerm::Sign => "dry",
+                RateTerm::Rate => "viscous",
+                RateTerm::Load => "load-dependent",
+                RateTerm::Hysteresis => "hysteretic",
+            };
+            if !drives.contains(&one.channel) {
+                drives.push(one.channel.clone());
+            }
+            if !kinds.iter().any(|known| known == kind) {
+                kinds.push(kind.to_owned());
+            }
+        }
+        (!drives.is_empty()).then(|| {
+            format!(
+                "The residual of {} depends on the velocity like {} friction. The model lacks this friction, or its friction has \
+                 wrong values.",
+                joined_by_and(&drives),
+                joined_by_and(&kinds)
+            )
+        })
+    }
+
+    /// Errors that are larger with identified than with nominal values.
+    fn worse_text(&self) -> Option<String> {
+        let nominal = self.nominal?;
+        let is_worse = |found: f64, nominal: f64| found > SMALL_ERROR && found > WORSE_FACTOR * nominal;
+        let text = |what: &str, found: f64, nominal: f64| {
+            let [found, nominal] = [found, nominal].map(|error| percent(Some(error)));
+            format!("{what}{found} instead of {nominal}")
+        };
+        if let (Some(found), Some(nominal)) = (self.figures.nrms, nominal.nrms)
+            && is_worse(found, nominal)
+        {
+            return Some(format!(
+                "The identified values predict the validation run worse than the nominal ones: the error is {}.",
+                text("", found, nominal)
+            ));
+        }
+        let drives = self.figures.channels.iter().filter_map(|(drive, found)| {
+            let (found, nominal) = (found.nrms?, nominal.channels.get(drive)?.nrms?);
+            is_worse(found, nominal).then(|| text(&format!("{drive} "), found, nominal))
+        });
+        let drives: Vec<String> = drives.collect();
+        (!drives.is_empty()).then(|| {
+            format!(
+                "The identified values predict some drives of the validation run worse than the nominal ones: the error is {}.",
+                drives.join(", ")
+            )
+        })
+    }
+
+    /// Large errors that are no white noise.
+    fn correlation_text(&self) -> Option<String> {
+        let most = self.correlations.iter().copied().fold(0.0, f64::max);
+        let is_large = |error: &f64| *error > SMALL_ERROR;
+        let drives = self.figures.channels.values().filter_map(|one| one.nrms);
+        let largest = self
+            .figures
+            .nrms
+            .or_else(|| drives.max_by(f64::total_cmp))
+            .filter(is_large)?;
+        (most > CORRELATED).then(|| {
+            format!(
+                "The error of {} of the force is not white noise: neighbouring residuals are correlated (coefficient {most:.2}).",
+                percent(Some(largest))
+            )
+        })
+    }
+}
 
 /// The error relative to the force, as the end of a sentence: of all drives, or where their units differ of the drive with
 /// the largest error.
@@ -28,9 +143,33 @@ fn error_text(figures: &ErrorFigures) -> String {
     }
 }
 
+impl ModelComparison {
+    /// The next step: the diagnosis, if the residual depends on the velocities; `None` if a quick look shows nothing.
+    pub fn next_step(&self) -> Option<Message> {
+        let look = ResidualLook {
+            figures: &self.figures,
+            nominal: None,
+            by_rate: &self.places.by_rate,
+            correlations: &[],
+        };
+        look.diagnosis_step()
+    }
+}
+
 impl Identification {
-    /// The next step: more information on uncertain parameters, a validation run, or the diagnosis.
+    /// The next step: the diagnosis if the residual shows that the model lacks an effect, else more information on uncertain
+    /// parameters, a validation run, or the diagnosis.
     pub fn next_step(&self) -> Message {
+        let look = ResidualLook {
+            figures: self.fit.check.as_ref().unwrap_or(&self.fit.fit),
+            // The fit itself cannot be worse than the nominal values.
+            nominal: self.nominal_check.as_ref().filter(|_| self.has_nominal),
+            by_rate: &self.by_rate,
+            correlations: &self.found.deviations.residual_lag1,
+        };
+        if let Some(step) = look.diagnosis_step() {
+            return step;
+        }
         let parameters = &self.fit.parameters;
         let estimated = parameters.iter().filter(|p| p.status != ParameterStatus::Known);
         // Parameters that the file declares as known are not counted.
@@ -51,10 +190,10 @@ impl Identification {
                     Remedy::option(OptionName::Physical)
                 ),
             };
-            let judged = self.fit.check.as_ref().unwrap_or(&self.fit.fit);
             return message!(
-                "Next: {vague} of {n} base parameters are uncertain by more than half their value. The error {}: if that is more than the noise, run {} first. If it finds nothing, record a richer motion ({}){}.",
-                error_text(judged),
+                "Next: {vague} of {n} base parameters are uncertain by more than half their value. The error {}: if that is more \
+                 than the noise, run {} first. If it finds nothing, record a richer motion ({}){}.",
+                error_text(look.figures),
                 Remedy::command(CommandName::Diagnose),
                 Remedy::command(CommandName::Excite),
                 physical
@@ -74,5 +213,94 @@ impl Identification {
             diagnose,
             Remedy::command(CommandName::Adopt)
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use modelmill_boundary::text::LibrarySpelling;
+    use serde_json::json;
+
+    use super::*;
+
+    fn figures(errors: [f64; 2]) -> ErrorFigures {
+        let channel =
+            |nrms: f64| json!({ "nrms": nrms, "mean_relative": null, "max_abs": 1.0, "rms": 0.1, "zero_measured": 0 });
+        let value = json!({
+            "nrms": errors[0].hypot(errors[1]), "samples": 100,
+            "channels": { "a": channel(errors[0]), "b": channel(errors[1]) },
+        });
+        serde_json::from_value(value).expect("error figures")
+    }
+
+    fn dependence(channel: &str, term: RateTerm) -> RateDependence {
+        RateDependence {
+            channel: channel.to_owned(),
+            term,
+            value: 2.0,
+            std: 0.1,
+            unit: "N m".to_owned(),
+            share: 0.5,
+            levels: None,
+            alternative: None,
+            says: String::new(),
+        }
+    }
+
+    fn step(
+        nominal: Option<[f64; 2]>,
+        errors: [f64; 2],
+        by_rate: &[RateDependence],
+        correlation: f64,
+    ) -> Option<String> {
+        let nominal = nominal.map(figures);
+        let look = ResidualLook {
+            figures: &figures(errors),
+            nominal: nominal.as_ref(),
+            by_rate,
+            correlations: &[0.0, correlation],
+        };
+        look.diagnosis_step().map(|step| step.spell(&LibrarySpelling))
+    }
+
+    /// White noise, and small errors whatever their correlation, are no reason for a diagnosis.
+    #[test]
+    fn noise_needs_no_diagnosis() {
+        assert_eq!(step(None, [0.1, 0.1], &[], 0.1), None);
+        assert_eq!(step(Some([0.01, 0.01]), [0.011, 0.011], &[], 0.9), None);
+        assert_eq!(step(Some([0.2, 0.2]), [0.1, 0.1], &[], 0.2), None);
+    }
+
+    /// Each sign of a missing effect leads to the diagnosis first.
+    #[test]
+    fn a_missing_effect_is_diagnosed_before_anything_is_recorded_again() {
+        let friction = [
+            dependence("a", RateTerm::Sign),
+            dependence("a", RateTerm::Rate),
+            dependence("b", RateTerm::Sign),
+        ];
+        for (found, expected) in [
+            (
+                step(None, [0.1, 0.1], &friction, 0.0),
+                "of a and b depends on the velocity like dry and viscous friction",
+            ),
+            (
+                step(Some([0.1, 0.1]), [0.2, 0.1], &[], 0.0),
+                "worse than the nominal ones: the error is 22.4 % instead of 14.1 %",
+            ),
+            // The total may hide a drive.
+            (
+                step(Some([0.05, 0.4]), [0.2, 0.1], &[], 0.0),
+                "a 20.0 % instead of 5.00 %",
+            ),
+            (step(None, [0.3, 0.3], &[], 0.95), "correlated (coefficient 0.95)"),
+        ] {
+            let found = found.expect("a step");
+            assert!(found.contains(expected), "{found}");
+            assert!(
+                found.contains("`diagnose`") && found.ends_with("before you record again."),
+                "{found}"
+            );
+        }
     }
 }

@@ -350,8 +350,10 @@ fn undecided_text(undecided: &[UndecidedDrive]) -> Message {
     let insensitive = named(&|one| matches!(one, UndecidedReason::SmallestChange { .. }));
     if !insensitive.is_empty() {
         told.push(message!(
-            "Even a change of most of its force would be within noise and model error at {}. Record longer or faster motions.",
-            list(&insensitive)
+            "Even a change of most of its force would be within noise and model error at {}. Run {} first; if it finds nothing, \
+             record longer or faster motions.",
+            list(&insensitive),
+            Remedy::command(CommandName::Diagnose)
         ));
     }
     Message::join(told, " ")

@@ -25,6 +25,9 @@ pub trait StepSpelling: RemedySpelling {
         format!("{effect}, with the library {library}")
     }
 
+    /// Step: add all effects found at once.
+    fn spell_completion(&self) -> String;
+
     /// Step: identify a model again from the same recordings.
     fn spell_identification(&self, model: &Model) -> String;
 
@@ -44,6 +47,10 @@ impl StepSpelling for LibrarySpelling {
             let _ = write!(says, "{joint} {symbol} = {value}");
         }
         says
+    }
+
+    fn spell_completion(&self) -> String {
+        "`DiagnosisFindings::completed_model` has all of them".to_owned()
     }
 
     fn spell_identification(&self, model: &Model) -> String {

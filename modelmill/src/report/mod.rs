@@ -2,18 +2,18 @@
 //!
 //! [`runs_page`] is the page of differences between runs, [`atlas()`] that of many mechanisms.
 //!
-//! `words`, `tables`, and pictures (`ladder`, `curves`, `maps`, `regions`, `spectrum`) -> `page`. The pictures need no
+//! `words`, `tables`, and pictures (`steps`, `curves`, `maps`, `regions`, `spectrum`) -> `page`. The pictures need no
 //! script; with `page.js` curves can be zoomed and tables sorted.
 
 mod atlas;
 mod curves;
 mod draw;
-mod ladder;
 mod maps;
 mod page;
 mod regions;
 mod runs;
 mod spectrum;
+mod steps;
 mod tables;
 mod units;
 
@@ -27,8 +27,8 @@ pub use runs::{parameter_history, runs_page};
 pub use tables::{TableCell, table};
 
 /// Picture (SVG) of the error after each added effect, on the fitted and on the validation runs, with the noise.
-pub fn ladder(findings: &DiagnosisFindings) -> String {
-    ladder::picture(findings)
+pub fn steps_picture(findings: &DiagnosisFindings) -> String {
+    steps::picture(findings)
 }
 
 /// The key of the colours: the model before and after the effects.

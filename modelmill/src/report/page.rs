@@ -8,10 +8,10 @@ use modelmill_codegen::review::PageFormat;
 use modelmill_draw::page as pages;
 use modelmill_identify::diagnose::DiagnosisVerdict;
 
-use super::{DiagnosisFindings, curves, ladder, legend, maps, regions, spectrum, tables, words};
+use super::{DiagnosisFindings, curves, legend, maps, regions, spectrum, steps, tables, words};
 use crate::compare::ErrorLocations;
 use crate::error::Outcome;
-use crate::print::{StepSpelling, laws as law_texts};
+use crate::print::{StepSpelling, laws as law_texts, values_text};
 use crate::text::svg::escape;
 use crate::text::table::percent;
 
@@ -27,7 +27,7 @@ pub fn page(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> Outcom
     let mut page = pages::begin(&title);
     // The sections in the order in which a user needs them, each with its id and title.
     let sections = [
-        ("ladder", "Error after each added effect", ladder_section(findings)),
+        ("steps", "Error after each added effect", steps_section(findings)),
         (
             "found",
             "Missing effects and next steps",
@@ -126,7 +126,7 @@ fn summary(findings: &DiagnosisFindings) -> String {
 }
 
 /// Errors after each added effect, as picture and table, and errors of each drive.
-fn ladder_section(findings: &DiagnosisFindings) -> String {
+fn steps_section(findings: &DiagnosisFindings) -> String {
     // The picture shows the steps, the table has the numbers.
     format!(
         "<figure class=\"still\"><figcaption><b>Error relative to the force</b> <span class=\"key c-fit\">fit</span> \
@@ -134,8 +134,8 @@ fn ladder_section(findings: &DiagnosisFindings) -> String {
          <p>All errors are nrms: rms of measured minus calculated force, divided by rms of the measured force. Each step was \
          tested {}.</p>\n{}",
         findings.validation.phrase(),
-        ladder::picture(findings),
-        tables::ladder(findings),
+        steps::picture(findings),
+        tables::steps(findings),
         findings.validation.phrase(),
         tables::drives(findings)
     )
@@ -165,7 +165,7 @@ fn laws(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String {
             html,
             "<p><code>{}</code> with {}: it {}</p>",
             escape(&law.label()),
-            escape(&law_texts::values(law)),
+            escape(&values_text(&law.parameters)),
             escape(&law_texts::gain(law))
         );
         // Alternatives that the recordings do not distinguish.

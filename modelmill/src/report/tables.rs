@@ -2,15 +2,16 @@
 
 use std::fmt::Write as _;
 
-use modelmill_identify::diagnose::{CandidateOutcome, IdentifiedEffect};
+use modelmill_identify::diagnose::CandidateOutcome;
 use modelmill_identify::{FitParameter, NoteSeverity, ParameterStatus};
 
 use super::draw::attribute;
 use super::units::{force_unit, typographic_unit};
 use super::{DiagnosisFindings, ModelVersion, words};
+use crate::diagnose::MissingEffect;
 use crate::print::StepSpelling;
 use crate::text::svg::escape;
-use crate::text::table::{percent, significant};
+use crate::text::table::{all_digits, percent, significant};
 
 /// Number of candidates that are shown before the others are folded.
 const FIRST: usize = 20;
@@ -64,25 +65,25 @@ pub fn table(class: &str, head: &[&str], rows: &[Vec<TableCell>]) -> String {
 }
 
 /// Error after each added effect, with the evidence for it.
-pub(crate) fn ladder(findings: &DiagnosisFindings) -> String {
+pub(crate) fn steps(findings: &DiagnosisFindings) -> String {
     let diagnosis = &findings.diagnosis;
     let rows: Vec<Vec<TableCell>> = diagnosis
         .steps
         .iter()
-        .map(|rung| {
+        .map(|step| {
             // Shares are sorted by value, not by text.
             let percents = |v: f64| TableCell::number(&percent(Some(v)), v);
             // Gain, its certainty and the samples on which they are based.
-            let evidence = rung.evidence;
+            let evidence = step.evidence;
             // A step without evidence, such as the first, has empty cells.
             let of = |f: &dyn Fn() -> Option<(String, f64)>| match f() {
                 Some((text, value)) => TableCell::number(&text, value),
                 None => TableCell::text(""),
             };
             vec![
-                TableCell::text(&words::rung(rung, findings.channels())),
-                percents(rung.fit),
-                percents(rung.check),
+                TableCell::text(&words::step_text(step, &findings.diagnosis, findings.channels())),
+                percents(step.fit),
+                percents(step.check),
                 of(&|| evidence.map(|e| (percent(Some(e.gain)), e.gain))),
                 // Without noise the ratio is huge and only its size class matters.
                 of(&|| evidence.map(|e| (significant(e.blocks_t.min(999.0), 2), e.blocks_t))),
@@ -153,8 +154,8 @@ pub(crate) fn drives(findings: &DiagnosisFindings) -> String {
 pub(crate) fn effects(findings: &DiagnosisFindings) -> String {
     let answer = &findings.answer;
     // Kinds in the order of their first effect, so that a text about a kind is not repeated for each of its places.
-    let mut kinds: Vec<(&str, Vec<&IdentifiedEffect>)> = Vec::new();
-    for found in &answer.diagnosis.effects {
+    let mut kinds: Vec<(&str, Vec<&MissingEffect>)> = Vec::new();
+    for found in &findings.missing {
         let name = found.effect.kind.as_str();
         match kinds.iter_mut().find(|(kind, _)| *kind == name) {
             Some((_, all)) => all.push(found),
@@ -177,12 +178,12 @@ pub(crate) fn effects(findings: &DiagnosisFindings) -> String {
         }
         // Values of each place.
         if let [one] = all.as_slice() {
-            html.push_str(&effect(findings, one, ""));
+            html.push_str(&effect(one, ""));
         } else {
             html.push_str("<ul>\n");
             for one in all {
                 let places = format!("{}: ", one.effect.at.join(", "));
-                let _ = writeln!(html, "<li>{}</li>", effect(findings, one, &places));
+                let _ = writeln!(html, "<li>{}</li>", effect(one, &places));
             }
             html.push_str("</ul>\n");
         }
@@ -207,26 +208,15 @@ pub(crate) fn effects(findings: &DiagnosisFindings) -> String {
 }
 
 /// Values of one effect behind a label, and the effects that explain the recordings equally well.
-fn effect(findings: &DiagnosisFindings, found: &IdentifiedEffect, label: &str) -> String {
-    // Parameters are estimated linearly, constants by search.
-    let parameters = &findings.answer.problem.candidates[found.candidate].parameters;
-    let values = parameters.iter().zip(&found.estimates).map(|(p, value)| {
-        format!(
-            "<code>{}</code> = {} {}",
-            escape(&p.symbol),
-            significant(*value, 4),
-            escape(&typographic_unit(&p.unit))
-        )
-    });
-    let constants = found.constants.iter().map(|(name, value)| {
-        format!(
-            "<code>{}</code> = {} (found by search)",
-            escape(name),
-            significant(*value, 3)
-        )
+fn effect(found: &MissingEffect, label: &str) -> String {
+    let values = found.estimates.iter().map(|one| {
+        let std = (one.std).map_or_else(String::new, |std| format!(" ± {}", significant(std, 2)));
+        let unit = typographic_unit(if one.unit == "1" { "" } else { &one.unit });
+        let value = format!("{}{std} {unit}", all_digits(one.value));
+        format!("<code>{}</code> = {}", escape(&one.name), escape(value.trim_end()))
     });
     // A kind without parameters has no values to show.
-    let all: Vec<String> = values.chain(constants).collect();
+    let all: Vec<String> = values.collect();
     let mut html = String::new();
     if !all.is_empty() || !label.is_empty() {
         let _ = writeln!(html, "<p>{}{}</p>", escape(label), all.join(", "));

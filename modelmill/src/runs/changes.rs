@@ -423,7 +423,11 @@ pub(crate) fn change_text(model: &Model, what: &PhysicalChange) -> String {
             let Some(mass) = mass else {
                 return format!("another load on {frame}; this motion does not determine its mass");
             };
-            let more = if mass.value > 0.0 { "more" } else { "less" };
+            let [differs, moved] = if mass.value > 0.0 {
+                ["larger", "added"]
+            } else {
+                ["smaller", "removed"]
+            };
             let weighs = ChangeEstimate {
                 value: mass.value.abs(),
                 ..*mass
@@ -435,9 +439,9 @@ pub(crate) fn change_text(model: &Model, what: &PhysicalChange) -> String {
                 .collect();
             let there = match known.as_slice() {
                 [] => String::new(),
-                known => format!(", its centre at {}", known.join(", ")),
+                known => format!(", and the centre of the {moved} mass is at {}", known.join(", ")),
             };
-            format!("{} {more} on {frame}{there}", weighs.text("kg"))
+            format!("the load on {frame} is {} {differs}{there}", weighs.text("kg"))
         }
         PhysicalChange::Friction {
             drive,
@@ -449,12 +453,12 @@ pub(crate) fn change_text(model: &Model, what: &PhysicalChange) -> String {
             let part = |p: Option<f64>| p.map_or(String::new(), |p| format!(" ({:+.0} %)", 100.0 * p));
             let total: f64 = parts.iter().flatten().sum();
             let why = if total > 0.0 || (parts == &[None, None] && dry.value > 0.0) {
-                "colder, worn, or other grease"
+                "a colder drive, wear or other grease"
             } else {
-                "warmer, run in, or other grease"
+                "a warmer drive, running-in or other grease"
             };
             format!(
-                "friction of {drive}: dry {} {}{}, viscous {} {}{}; {why}",
+                "the friction of {drive} differs: dry friction by {} {}{}, viscous friction by {} {}{}. Possible causes: {why}",
                 signed_text(*dry),
                 unit(drive),
                 part(parts[0]),

@@ -231,7 +231,7 @@ impl Model {
             // Stage 3: permanent changes over the order of the runs, and the fit of all runs together.
             let base: Vec<usize> = (0..layout.base).collect();
             let alone: Vec<&[FittedValue]> = all.iter().map(|run| &run.alone[..]).collect();
-            let points = points::find_change_points(&bench, &alone, &wholes, &withins, &before, &doubts);
+            let mut points = points::find_change_points(&bench, &alone, &wholes, &withins, &before, &doubts);
             let mut together = NormalEquations::new(layout.base);
             for whole in &wholes {
                 together.merge(&whole.select_columns(&base));
@@ -239,13 +239,15 @@ impl Model {
             let shared = shared.answer()?;
             // Forces whose true scale is known weigh loads truly, and as uncertainly as their scale.
             let gains = shared.as_ref().map_or(&[][..], |fit| &fit.gains);
-            for change in all
-                .iter_mut()
-                .flat_map(|run| &mut run.changes)
-                .filter(|_| !gains.is_empty())
-            {
-                payload_scale::apply_gains(&mut change.change, &change.drive_weights, gains);
-                change.says = changes::change_text(self, &change.change);
+            if !gains.is_empty() {
+                let changes: Vec<&[RunChange]> = all.iter().map(|run| &run.changes[..]).collect();
+                points::adopt_drive_weights(&mut points, &changes);
+                let of_runs = all.iter_mut().flat_map(|run| &mut run.changes);
+                let of_points = points.iter_mut().flat_map(|point| &mut point.changes);
+                for change in of_runs.chain(of_points) {
+                    payload_scale::apply_gains(&mut change.change, &change.drive_weights, gains);
+                    change.says = changes::change_text(self, &change.change);
+                }
             }
             Ok(RunsComparison {
                 model: self.name.clone(),

@@ -3,7 +3,7 @@
 use modelmill_identify::changes::{NormalEquations, RunPair, UncertainValue, change_points, weighted_mean};
 
 use crate::runs::thresholds::{CHANGE_POINT_RUNS, MOST_UNEXPLAINED_SHARE};
-use crate::runs::{FittedValue, RunAnalyser, RunChange, RunStatistics};
+use crate::runs::{FittedValue, PhysicalChange, RunAnalyser, RunChange, RunStatistics};
 
 /// A permanent change of one parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -123,6 +123,26 @@ pub(crate) fn find_change_points(
     bounds.windows(3).map(point).collect()
 }
 
+/// Gives loads at change points the weights of the drives that the first run after the point has for the same load, so
+/// that known loads correct both alike. `runs` are the changes of each run relative to the first one.
+pub(crate) fn adopt_drive_weights(points: &mut [ChangePoint], runs: &[&[RunChange]]) {
+    let frame = |one: &RunChange| match &one.change {
+        PhysicalChange::Payload { frame, .. } => Some(frame.clone()),
+        _ => None,
+    };
+    for point in points {
+        let later = runs.get(point.run..).unwrap_or_default();
+        for change in &mut point.changes {
+            let Some(own) = frame(change) else { continue };
+            let mut same = (later.iter().copied().flatten())
+                .filter(|one| !one.drive_weights.is_empty() && frame(one).as_ref() == Some(&own));
+            if let Some(one) = same.next() {
+                change.drive_weights.clone_from(&one.drive_weights);
+            }
+        }
+    }
+}
+
 /// The value with its standard deviation, if the run determines it.
 fn known_value(fitted: FittedValue) -> Option<UncertainValue> {
     Some((fitted.value, fitted.deviation.filter(|d| *d > 0.0)?))
@@ -155,4 +175,40 @@ fn median(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn load(frame: &str, drive_weights: &[f64]) -> RunChange {
+        RunChange {
+            change: PhysicalChange::Payload {
+                frame: frame.to_owned(),
+                mass: None,
+                centre: [None; 3],
+            },
+            gain: 0.0,
+            unit: "m",
+            rivals: Vec::new(),
+            drive_weights: drive_weights.to_vec(),
+            says: String::new(),
+        }
+    }
+
+    /// A load has the weights of the same load after the point, not of one before it or on another body.
+    #[test]
+    fn a_load_at_a_change_point_is_weighed_as_in_the_runs_after_it() {
+        let mut points = [ChangePoint {
+            run: 2,
+            steps: Vec::new(),
+            changes: vec![load("tool", &[]), load("arm", &[])],
+        }];
+        let [first, before] = [Vec::new(), vec![load("tool", &[0.1, 0.9])]];
+        let after = vec![load("base", &[1.0, 0.0]), load("tool", &[0.4, 0.6])];
+        adopt_drive_weights(&mut points, &[&first, &before, &after]);
+        let [tool, arm] = &points[0].changes[..] else { panic!() };
+        assert_eq!(tool.drive_weights, [0.4, 0.6]);
+        assert!(arm.drive_weights.is_empty());
+    }
 }

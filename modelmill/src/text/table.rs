@@ -56,6 +56,20 @@ pub fn number(value: f64) -> String {
     significant(value, 6)
 }
 
+/// A number with all of its digits, for values that are rounded already; very large and very small ones with an exponent.
+///
+/// ```
+/// assert_eq!(modelmill::text::table::all_digits(2.160231), "2.160231");
+/// assert_eq!(modelmill::text::table::all_digits(0.0000125), "1.25e-5");
+/// ```
+pub fn all_digits(value: f64) -> String {
+    if value == 0.0 || (1e-4..1e9).contains(&value.abs()) {
+        value.to_string()
+    } else {
+        format!("{value:e}")
+    }
+}
+
 /// A value and its standard deviation, both rounded to the second digit of the standard deviation.
 ///
 /// ```

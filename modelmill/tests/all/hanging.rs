@@ -3,7 +3,11 @@
 
 use crate::made::{Made, bundled, run_of};
 use modelmill::Model;
+use modelmill::diagnose::DiagnosisOptions;
+use modelmill::faults::RecordingFaultKind;
+use modelmill::print::LibrarySpelling;
 use modelmill::recording::RecordingOptions;
+use modelmill::text::TerminalStyle;
 
 /// What is said of gravity when a recording of one model is read for another.
 fn told(of: &Model, by: &Model, name: &str, seed: u64) -> Vec<String> {
@@ -30,4 +34,50 @@ fn gravity_that_pulls_the_other_way_is_told() {
             assert_eq!(told(&stands, &stands, name, seed), [""; 0], "{name}, {seed}");
         }
     }
+}
+
+/// One model has one gravity: recordings that show another direction are named, and where others contradict them nothing is
+/// claimed.
+#[test]
+fn a_direction_of_gravity_is_stated_of_recordings_that_show_it() {
+    let name = "two_link";
+    let text = std::fs::read_to_string(bundled(name)).expect("a model");
+    let [stands, hangs] =
+        [text.clone(), text.replace("\"-g\"", "\"g\"")].map(|t| Model::from_text(name, &t).expect("a model"));
+    let record = |machine: &Model, seed: u64| {
+        let file = run_of(machine, name, seed, Made::Friction(0, 0.2, 0.3));
+        let read = stands.recording(file, &RecordingOptions::default());
+        read.expect("the recording")
+    };
+    let [first, second, upright] = [record(&hangs, 50), record(&hangs, 51), record(&stands, 52)];
+    let options = DiagnosisOptions {
+        repeat_with_nominal: false,
+        ..DiagnosisOptions::default()
+    };
+    let found = (stands.diagnose(&[&first], &[&second], &options)).expect("a diagnosis");
+    let [fault] = &found.corrected[..] else {
+        panic!("{:?}", found.corrected);
+    };
+    assert_eq!(fault.kind, RecordingFaultKind::GravityDirection);
+    assert_eq!(fault.recordings.len(), 2, "{fault:?}");
+    // The model file may be wrong, so that this is no disturbance that is no model error.
+    let lines = found.text(TerminalStyle::PLAIN, &LibrarySpelling);
+    let text = lines.join("\n");
+    assert!(text.contains("Before the next diagnosis: "), "{text}");
+    let listed = text
+        .split("(not model errors)")
+        .nth(1)
+        .and_then(|rest| rest.split("\n\n").next());
+    assert!(!listed.is_some_and(|listed| listed.contains("gravity")), "{text}");
+
+    let found = (stands.diagnose(&[&first], &[&upright], &options)).expect("a diagnosis");
+    let [fault] = &found.unresolved[..] else {
+        panic!("{:?} {:?}", found.corrected, found.unresolved);
+    };
+    assert_eq!(fault.kind, RecordingFaultKind::GravityDirection);
+    assert!(
+        found.missing.is_empty() && fault.clause.contains("agrees with the model file"),
+        "{fault:?}"
+    );
+    assert!(found.completed_model().is_err());
 }

@@ -342,13 +342,13 @@ class Diagnosis(Result):
 
     @property
     def budget(self) -> dict[str, dict[str, Any]]:
-        """The error of each drive, divided into noise, a non-repeatable part, and a repeatable part that nothing explains."""
+        """The error of each drive, divided into noise, a part that follows the time, and a repeatable part that nothing explains."""
         budget: dict[str, dict[str, Any]] = self._object["budget"]
         return budget
 
     @property
     def model(self) -> Model | None:
-        """The model with the missing effects added; None if nothing is missing."""
+        """The model with the missing effects added, as ``diagnose --out`` writes it; None if nothing is missing. ``save`` writes its file."""
         return self._better
 
     def report(self) -> Page:

@@ -52,7 +52,7 @@ pub(crate) fn run(host: &Host, args: &TourArgs) -> CommandOutcome {
     story.diagnose(&place, &rods);
     let edited = place.add(&rods, &flags)?;
     story.add(&place, edited.as_ref());
-    story.ladder(&rods);
+    story.steps(&rods);
     place.write(RODS_PAGE, &page(&rods, &flags)?)?;
 
     // Step 6: the model as published, on a recording without rods.

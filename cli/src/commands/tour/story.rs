@@ -209,7 +209,7 @@ impl TourText {
     }
 
     /// Errors after each added effect, and the identified parameters.
-    pub(super) fn ladder(&mut self, findings: &DiagnosisFindings) {
+    pub(super) fn steps(&mut self, findings: &DiagnosisFindings) {
         self.heading("5  Identify again: the error falls");
         self.bars(findings);
         if let Ok(after) = &findings.after
@@ -230,11 +230,11 @@ impl TourText {
 
     /// Errors on the validation run as logarithmic bars, down to the noise floor.
     fn bars(&mut self, findings: &DiagnosisFindings) {
-        let (ladder, noise) = (&findings.diagnosis.steps, findings.diagnosis.noise_floor);
+        let (steps, noise) = (&findings.diagnosis.steps, findings.diagnosis.noise_floor);
         let channels = findings.channels();
-        let largest = ladder.iter().map(|rung| rung.check).fold(noise, f64::max);
+        let largest = steps.iter().map(|step| step.check).fold(noise, f64::max);
         // The axis includes the noise floor, if it is above zero.
-        let least = ladder.iter().map(|rung| rung.check);
+        let least = steps.iter().map(|step| step.check);
         let least = least.chain([noise]).filter(|e| *e > 0.0);
         // The axis begins below the smallest error, so that its bar has a length.
         let least = least.fold(f64::INFINITY, f64::min) / 3.0;
@@ -247,8 +247,10 @@ impl TourText {
             }
         };
         let name = words::floor_label(noise).to_owned();
-        let rungs = ladder.iter().map(|rung| (words::rung(rung, channels), rung.check));
-        for (name, error) in rungs.chain([(name, noise)]) {
+        let named = steps
+            .iter()
+            .map(|step| (words::step_text(step, &findings.diagnosis, channels), step.check));
+        for (name, error) in named.chain([(name, noise)]) {
             let bar = bar(share(error), 1.0, BAR);
             // Green: within 30 % of the noise floor, so nothing is left to explain.
             let bar = if error > noise * 1.3 {

@@ -483,8 +483,8 @@ fn sentence(one: &RateDependence, force_unit: &str, has_rate: bool) -> String {
                 )
             });
             format!(
-                "The residual of {channel} follows the sign of its rate: {positive} {unit} at {limit}positive rate, \
-                 {negative} {unit} at {limit}negative rate ({share}), as {cause}{alternative}"
+                "The residual of {channel} follows the sign of its velocity: {positive} {unit} at {limit}positive velocity, \
+                 {negative} {unit} at {limit}negative velocity ({share}), as {cause}{alternative}"
             )
         }
         RateTerm::Rate => {
@@ -500,18 +500,18 @@ fn sentence(one: &RateDependence, force_unit: &str, has_rate: bool) -> String {
                 )
             });
             format!(
-                "The residual of {channel} follows its rate with a slope of {} {unit} ({std} {unit}; {share}), as \
+                "The residual of {channel} follows its velocity with a slope of {} {unit} ({std} {unit}; {share}), as \
                  {cause}{alternative}",
                 with_sign(one.value)
             )
         }
         RateTerm::Load => format!(
-            "The part of the residual of {channel} that follows the sign of its rate changes by {} {force_unit} for \
+            "The part of the residual of {channel} that follows the sign of its velocity changes by {} {force_unit} for \
              each {force_unit} of calculated force ({std}; {share}), as load-dependent friction does",
             with_sign(one.value)
         ),
         RateTerm::Hysteresis => format!(
-            "The part of the residual of {channel} that follows the sign of its rate is {size} {unit} {} while the \
+            "The part of the residual of {channel} that follows the sign of its velocity is {size} {unit} {} while the \
              speed rises than while it falls ({std} {unit}; {share}), as friction with hysteresis does",
             if is_missing { "larger" } else { "smaller" }
         ),

@@ -233,5 +233,9 @@ fn small_terms_stay_in_the_fit() {
     let found = find_rate_dependence("a", "N m", &[segment]);
     assert_eq!(terms(&found), [RateTerm::Sign]);
     check(&found[0], 2.0);
-    assert!(found[0].says.contains("at small positive rate"), "{}", found[0].says);
+    assert!(
+        found[0].says.contains("at small positive velocity"),
+        "{}",
+        found[0].says
+    );
 }

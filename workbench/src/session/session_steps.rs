@@ -1,10 +1,10 @@
-//! The steps of a session (pane *Ladder*): edits of the text with the errors after each.
+//! The steps of a session (pane *Steps*): edits of the text with the errors after each.
 
 use serde_json::{Value, json};
 
 /// Steps of a session, each with the errors of the resulting text. Errors arrive later than the step, if they are
 /// computed at all. A step without errors of its own revision is not listed.
-pub(super) struct ErrorLadder {
+pub(super) struct SessionSteps {
     /// Edits since the last listed step, with the revisions that they led to.
     done: Vec<(u64, String)>,
     /// The last errors, with their revision.
@@ -12,33 +12,33 @@ pub(super) struct ErrorLadder {
     /// The revision of the last listed step.
     last: Option<u64>,
     /// The listed steps, oldest first.
-    rungs: Vec<LadderStep>,
+    listed: Vec<SessionStep>,
 }
 
 /// One listed step.
-struct LadderStep {
+struct SessionStep {
     /// What was done, in words.
     what: String,
     /// Relative errors with nominal and identified values, as JSON.
     errors: Value,
 }
 
-impl ErrorLadder {
+impl SessionSteps {
     /// The steps of a text that was opened with this revision.
     pub(super) fn new(opened: u64) -> Self {
         Self {
             done: vec![(opened, "as opened".to_owned())],
             compared: None,
             last: None,
-            rungs: Vec::new(),
+            listed: Vec::new(),
         }
     }
 
     /// The steps as JSON for the page.
     pub(super) fn view(&self) -> Value {
-        let rungs = self.rungs.iter();
-        rungs
-            .map(|rung| json!({ "what": rung.what, "errors": rung.errors }))
+        let listed = self.listed.iter();
+        listed
+            .map(|step| json!({ "what": step.what, "errors": step.errors }))
             .collect()
     }
 
@@ -61,7 +61,7 @@ impl ErrorLadder {
         let Some(errors) = self.errors_of(revision) else {
             return;
         };
-        let is_news = self.rungs.last().is_none_or(|rung| rung.errors != *errors);
+        let is_news = self.listed.last().is_none_or(|step| step.errors != *errors);
         if is_news && self.last != Some(revision) {
             self.record_step(revision, "edited");
         }
@@ -85,7 +85,7 @@ impl ErrorLadder {
             return false;
         }
         self.last = Some(revision);
-        self.rungs.push(LadderStep {
+        self.listed.push(SessionStep {
             what: what.join(", "),
             errors,
         });

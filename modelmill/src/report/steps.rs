@@ -19,23 +19,23 @@ const LETTERS: usize = 38;
 /// The picture as SVG.
 pub(crate) fn picture(findings: &DiagnosisFindings) -> String {
     let diagnosis = &findings.diagnosis;
-    let (ladder, noise, judged) = (&diagnosis.steps, diagnosis.noise_floor, findings.validation);
+    let (steps, noise, judged) = (&diagnosis.steps, diagnosis.noise_floor, findings.validation);
     // The axis covers all errors and the noise.
-    let errors = ladder.iter().flat_map(|rung| [rung.fit, rung.check]);
+    let errors = steps.iter().flat_map(|step| [step.fit, step.check]);
     let all: Vec<f64> = errors.chain([noise]).filter(|e| *e > 0.0).collect();
     let low = all.iter().copied().fold(f64::INFINITY, f64::min);
     let high = all.iter().copied().fold(0.0, f64::max);
     if !low.is_finite() {
         return String::new();
     }
-    let labels: Vec<Vec<String>> = ladder
+    let labels: Vec<Vec<String>> = steps
         .iter()
-        .map(|rung| words::lines(&words::rung(rung, findings.channels()), LETTERS))
+        .map(|step| words::lines(&words::step_text(step, diagnosis, findings.channels()), LETTERS))
         .collect();
     // All rows have the height of the longest label.
     let longest = labels.iter().map(Vec::len).max().unwrap_or(1);
     let row = ROW.max(LINE * longest as f64 + 8.0);
-    let bottom = TOP + row * ladder.len() as f64;
+    let bottom = TOP + row * steps.len() as f64;
     // The axis has room of a factor 1.6 at both ends.
     let percents = [100.0 * low / 1.6, 100.0 * high * 1.6];
     let x = PlotAxis::decades(percents, [LEFT, WIDTH - 176.0]);
@@ -59,16 +59,16 @@ pub(crate) fn picture(findings: &DiagnosisFindings) -> String {
     let mut last: Option<[f64; 3]> = None;
     // One row for each step: two dots, lines to those of the step before, values at the right, label at the
     // left.
-    for (k, rung) in ladder.iter().enumerate() {
+    for (k, step) in steps.iter().enumerate() {
         let middle = TOP + row * (k as f64 + 0.5);
-        let [fit, check] = [rung.fit, rung.check].map(|e| x.position(100.0 * e));
+        let [fit, check] = [step.fit, step.check].map(|e| x.position(100.0 * e));
         if let Some([fit_before, check_before, before]) = last {
             picture.path(
-                "rung c-fit",
+                "step-mark c-fit",
                 &format!("M{fit_before:.1} {before:.1}L{fit:.1} {:.1}", middle - 7.0),
             );
             picture.path(
-                "rung c-after",
+                "step-mark c-after",
                 &format!("M{check_before:.1} {:.1}L{check:.1} {:.1}", before + 14.0, middle + 7.0),
             );
         }
@@ -80,13 +80,13 @@ pub(crate) fn picture(findings: &DiagnosisFindings) -> String {
             "tick c-fit",
             [right, middle - 3.0],
             "start",
-            &format!("fit {}", percent(Some(rung.fit))),
+            &format!("fit {}", percent(Some(step.fit))),
         );
         picture.text(
             "tick c-after",
             [right, middle + 12.0],
             "start",
-            &format!("{} {}", judged.label(), percent(Some(rung.check))),
+            &format!("{} {}", judged.label(), percent(Some(step.check))),
         );
         for (i, line) in labels[k].iter().enumerate() {
             let up = 0.5 * LINE * (labels[k].len() as f64 - 1.0);
