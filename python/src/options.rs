@@ -3,7 +3,9 @@
 use modelmill::diagnose::NamedEffect;
 use modelmill::excite::{ExcitationCriterion, ExcitationRequest, Options, SeparationRequest, TrajectoryLimit};
 use modelmill::identify::{EquationWeights, EstimateRefinement, EstimatorOptions};
-use modelmill::recording::{DerivativeSource, MAX_FILTER_ORDER, RecordingOptions, SmoothingMethod, StatePreparation};
+use modelmill::recording::{
+    DerivativeSource, MAX_FILTER_ORDER, RecordingOptions, SmoothingMethod, StandstillRule, StatePreparation,
+};
 use modelmill::runs::{KnownLoad, PerRunSelection, RunsOptions};
 use pyo3::prelude::*;
 
@@ -82,6 +84,7 @@ impl ReadingOptions {
             leave_out_events: self.leave_out_events,
             between: self.between,
             rate: check_positive("rate", self.rate, "a sampling rate in Hz such as 100")?,
+            standstill: StandstillRule::default(),
         })
     }
 

@@ -395,14 +395,15 @@ impl WorkbenchSession {
 
     /// Reads the recordings for fit and validation with a model.
     fn recordings(&self, model: &Model) -> Outcome<SessionRecordings> {
-        let read = |all: &[Vec<PathBuf>]| -> Outcome<Vec<PreparedRecording>> {
-            let one = |run: &Vec<PathBuf>| {
-                let paths: Vec<&Path> = run.iter().map(PathBuf::as_path).collect();
-                model.recording_of(&paths, &self.options.reading)
-            };
-            all.iter().map(one).collect()
-        };
-        Ok([read(&self.options.data)?, read(&self.options.check)?])
+        let [fit, check] = [&self.options.data, &self.options.check].map(|runs| {
+            let paths = runs.iter().map(|run| run.iter().map(PathBuf::as_path).collect());
+            paths.collect::<Vec<Vec<&Path>>>()
+        });
+        let [fit, check] = model.prepare_recordings([&fit, &check], &self.options.reading);
+        Ok([
+            fit.into_iter().collect::<Outcome<_>>()?,
+            check.into_iter().collect::<Outcome<_>>()?,
+        ])
     }
 
     /// Errors along the recordings, with the values of the file and with identified ones. `with_places` adds the

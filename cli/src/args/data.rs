@@ -6,7 +6,7 @@ use clap::Args;
 use modelmill::model::BaseParameterValues;
 use modelmill::{Host, Model};
 
-use crate::args::estimation::{EstimatorArgs, StandstillArgs};
+use crate::args::estimation::EstimatorArgs;
 use crate::args::preparation::PreparationArgs;
 use crate::failure::CommandOutcome;
 use crate::terminal;
@@ -118,8 +118,6 @@ pub(crate) struct IdentifyArgs {
     pub(crate) json: bool,
     #[command(flatten)]
     pub(crate) estimators: EstimatorArgs,
-    #[command(flatten)]
-    pub(crate) standstill: StandstillArgs,
     #[command(flatten)]
     pub(crate) preparation: PreparationArgs,
 }

@@ -55,19 +55,9 @@ pub(crate) enum WeightsArg {
     Variance,
 }
 
-/// Equations that are left out of a fit.
-#[derive(Debug, Clone, Args)]
-#[command(next_help_heading = "Leaving out equations")]
-pub(crate) struct StandstillArgs {
-    /// Leave an equation out while its drive is slower than this fraction of its maximum speed; 0.01 is usual. Static
-    /// friction at standstill is unknown
-    #[arg(long, value_name = "PART", value_parser = parse_fraction)]
-    pub(crate) standstill: Option<f64>,
-}
-
 impl EstimatorArgs {
     /// The same as options of the library.
-    pub(crate) fn options(&self, standstill: &StandstillArgs) -> EstimatorOptions {
+    pub(crate) fn options(&self, standstill: Option<f64>) -> EstimatorOptions {
         EstimatorOptions {
             weights: match self.weights {
                 WeightsArg::Auto => EquationWeights::Automatic,
@@ -83,16 +73,8 @@ impl EstimatorArgs {
                 None if self.essential => EstimateRefinement::Essential,
                 None => EstimateRefinement::None,
             },
-            standstill: standstill.standstill,
+            standstill: standstill.filter(|part| *part > 0.0),
         }
-    }
-}
-
-/// Reads a number between 0 and 1, both excluded.
-fn parse_fraction(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(part) if part > 0.0 && part < 1.0 => Ok(part),
-        _ => Err("expected a number between 0 and 1, such as 0.01".to_owned()),
     }
 }
 

@@ -3,7 +3,9 @@
 use std::fmt::Write as _;
 
 use clap::{Args, ValueEnum};
-use modelmill::recording::{DerivativeSource, MAX_FILTER_ORDER, RecordingOptions, SmoothingMethod, StatePreparation};
+use modelmill::recording::{
+    DerivativeSource, MAX_FILTER_ORDER, RecordingOptions, SmoothingMethod, StandstillRule, StatePreparation,
+};
 
 use crate::flags::quote_word;
 
@@ -60,6 +62,10 @@ pub(crate) struct PreparationArgs {
     /// Sampling rate of recordings without a column of times, Hz
     #[arg(long, value_name = "HZ", value_parser = parse_cutoff, allow_negative_numbers = true)]
     pub(crate) rate: Option<f64>,
+    /// Leave out a force while its drive is slower than this fraction of its maximum speed, where static friction is
+    /// unknown; 0.01 is usual, and 0 leaves out none. Default: where the forces show that the drive sticks
+    #[arg(long, value_name = "PART", value_parser = parse_fraction)]
+    pub(crate) standstill: Option<f64>,
 }
 
 /// Where derivatives come from.
@@ -95,6 +101,11 @@ impl PreparationArgs {
             leave_out_events: self.leave_out_events,
             between: self.between,
             rate: self.rate,
+            standstill: match self.standstill {
+                None => StandstillRule::Automatic,
+                Some(part) if part > 0.0 => StandstillRule::Below(part),
+                Some(_) => StandstillRule::KeepAll,
+            },
         }
     }
 
@@ -129,6 +140,7 @@ impl PreparationArgs {
         option("band", number(self.band));
         option("between", self.between.map(|(from, to)| format!("{from},{to}")));
         option("rate", number(self.rate));
+        option("standstill", number(self.standstill));
         if self.skip_bad_samples {
             all.push_str(" --skip-bad-samples");
         }
@@ -172,6 +184,14 @@ pub(crate) fn parse_map(text: &str) -> Result<(String, String), String> {
             Ok((ours.trim().to_owned(), theirs.trim().to_owned()))
         }
         _ => Err("expected OURS=THEIRS, such as theta1=pos_left".to_owned()),
+    }
+}
+
+/// Reads a number from 0 to below 1.
+fn parse_fraction(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(part) if (0.0..1.0).contains(&part) => Ok(part),
+        _ => Err("expected a number between 0 and 1, such as 0.01".to_owned()),
     }
 }
 

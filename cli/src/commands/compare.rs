@@ -11,7 +11,7 @@ use crate::{commands, terminal};
 pub(crate) fn run(host: &Host, args: &CompareArgs) -> CommandOutcome {
     let model = commands::model(host, &args.model)?;
     let values = args.parameters.values(host, &model)?;
-    let data = commands::recordings(&model, &args.data, &args.preparation.reading())?;
+    let [data, _] = commands::recordings(&model, [&args.data, &[]], &args.preparation.reading())?;
     let compared = model.compare(&data.iter().collect::<Vec<_>>(), &values)?;
     // The name states in the output which values were used.
     let name = args.parameters.name();

@@ -48,8 +48,8 @@ fn variants(args: &DiffArgs, before: &Model, after: &Model) -> CommandOutcome<Op
     }
     VariantComparison::check([before, after])?;
     let reading = args.preparation.reading();
-    let first = commands::recordings(before, &args.data, &reading)?;
-    let second = commands::recordings(after, &args.data, &reading)?;
+    let [first, _] = commands::recordings(before, [&args.data, &[]], &reading)?;
+    let [second, _] = commands::recordings(after, [&args.data, &[]], &reading)?;
     // A remark on a recording that both models produce is printed once.
     let told: Vec<&RecordingNote> = first.iter().flat_map(PreparedRecording::notes).collect();
     for note in second.iter().flat_map(PreparedRecording::notes) {

@@ -24,7 +24,7 @@ pub(crate) fn run(host: &Host, args: &ExciteArgs) -> CommandOutcome {
         ));
     }
     // Recordings are needed only for --separate, to estimate effect and noise.
-    let data = commands::recordings(&model, &args.separate.data, &args.separate.reading())?;
+    let [data, _] = commands::recordings(&model, [&args.separate.data, &[]], &args.separate.reading())?;
     let found = model.excite(&args.request(), &data.iter().collect::<Vec<_>>())?;
     // Files are written before the text, so that they exist even if standard output is closed.
     target.write(&found.csv())?;

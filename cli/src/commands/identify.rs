@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use modelmill::Host;
 use modelmill::identify::Instruments;
-use modelmill::recording::{PreparedRecording, RecordingOptions};
+use modelmill::recording::{PreparedRecording, RecordingOptions, StandstillRule};
 
 use crate::args::IdentifyArgs;
 use crate::failure::{CommandFailure, CommandOutcome};
@@ -26,11 +26,15 @@ pub(crate) fn run(host: &Host, args: &IdentifyArgs) -> CommandOutcome {
         .as_ref()
         .map(|path| OutputFile::new(path, inputs))
         .transpose()?;
-    let reading = args.preparation.reading();
-    let data = commands::recordings(&model, &args.data, &reading)?;
-    let check = commands::recordings(&model, &args.check, &reading)?;
+    let mut reading = args.preparation.reading();
+    let standstill = args.preparation.standstill;
+    // A bound of the user belongs to the estimator, which applies it to the equations of the fit only.
+    if standstill.is_some() {
+        reading.standstill = StandstillRule::KeepAll;
+    }
+    let [data, check] = commands::recordings(&model, [&args.data, &args.check], &reading)?;
     // The options of the estimator are separate from those for reading.
-    let options = args.estimators.options(&args.standstill);
+    let options = args.estimators.options(standstill);
     let reading = RecordingOptions {
         columns: args.estimators.instrument_map.clone(),
         ..reading
@@ -41,7 +45,8 @@ pub(crate) fn run(host: &Host, args: &IdentifyArgs) -> CommandOutcome {
         Some(_) => Vec::new(),
         None => {
             let files: Vec<PathBuf> = args.estimators.instruments.iter().map(PathBuf::from).collect();
-            commands::recordings(&model, &files, &reading)?
+            let [instruments, _] = commands::recordings(&model, [&files, &[]], &reading)?;
+            instruments
         }
     };
     let recorded: Vec<&PreparedRecording> = recorded.iter().collect();

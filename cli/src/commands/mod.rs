@@ -99,21 +99,28 @@ pub(crate) fn files_of(path: &Path) -> Vec<PathBuf> {
     }
 }
 
-/// Reads recordings; their remarks go to standard error as they come up.
+/// Reads the recordings of a fit and of its validation, with a common preparation. Their remarks go to standard error
+/// as they come up.
 pub(crate) fn recordings(
     model: &Model,
-    paths: &[PathBuf],
+    [fit, check]: [&[PathBuf]; 2],
     reading: &RecordingOptions,
-) -> CommandOutcome<Vec<PreparedRecording>> {
-    let each = paths.iter();
-    each.map(|path| recording(model, path, reading)).collect()
+) -> CommandOutcome<[Vec<PreparedRecording>; 2]> {
+    let files = [fit, check].map(|paths| paths.iter().map(|path| files_of(path)).collect::<Vec<_>>());
+    let [fit, check] = [&files[0], &files[1]].map(|files| runs_of(files));
+    let mut read = [Vec::new(), Vec::new()];
+    for (read, all) in read.iter_mut().zip(model.prepare_recordings([&fit, &check], reading)) {
+        for recording in all {
+            read.push(recording?);
+        }
+    }
+    Ok(read)
 }
 
-/// Reads one run and prepares it: positions, rates, accelerations and forces.
-fn recording(model: &Model, path: &Path, reading: &RecordingOptions) -> CommandOutcome<PreparedRecording> {
-    let files = files_of(path);
-    let files: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
-    Ok(model.recording_of(&files, reading)?)
+/// The files of each run, as the library expects them.
+pub(crate) fn runs_of(files: &[Vec<PathBuf>]) -> Vec<Vec<&Path>> {
+    let each = files.iter();
+    each.map(|files| files.iter().map(PathBuf::as_path).collect()).collect()
 }
 
 /// Runs the diagnosis of the command line: reads model and recordings, then searches for missing effects.
@@ -124,15 +131,17 @@ pub(crate) fn diagnose(
 ) -> CommandOutcome<DiagnosisFindings> {
     let model = args.parameters.apply_to(host, self::model(host, &args.model)?)?;
     let reading = args.preparation.reading();
-    // Reads recordings and prepares them for a diagnosis.
-    let read = |paths: &[PathBuf]| -> CommandOutcome<Vec<PreparedRecording>> {
-        let each = paths.iter().map(|path| {
-            let read = recording(&model, path, &reading)?;
-            Ok(read.for_diagnosis(&model)?)
-        });
-        each.collect()
-    };
-    let [fit, check] = [read(&args.data)?, read(&args.check)?];
+    // Long recordings are thinned out at once, to save memory.
+    let mut read = [Vec::new(), Vec::new()];
+    for (read, all) in read
+        .iter_mut()
+        .zip(recordings(&model, [&args.data, &args.check], &reading)?)
+    {
+        for one in all {
+            read.push(one.for_diagnosis(&model)?);
+        }
+    }
+    let [fit, check] = read;
     let [fit, check] = [&fit, &check].map(|all| all.iter().collect::<Vec<_>>());
     Ok(model.diagnose(&fit, &check, &question)?)
 }

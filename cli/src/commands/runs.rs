@@ -1,6 +1,6 @@
 //! `runs`: reports what changed between recordings of one machine.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use modelmill::Host;
 use modelmill::recording::has_recording_extension;
@@ -42,10 +42,10 @@ pub(crate) fn run(host: &Host, args: &RunsArgs) -> CommandOutcome {
     let model = commands::model(host, &args.model)?;
     let reading = args.preparation.reading();
     // A run that cannot be read is passed on with its error; the library decides whether the others are sufficient.
-    let recordings = data.iter().map(|path| {
-        let files = commands::files_of(path);
-        let files: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
-        model.recording_of(&files, &reading).map_err(|error| UnreadRun {
+    let files: Vec<Vec<PathBuf>> = data.iter().map(|path| commands::files_of(path)).collect();
+    let [read, _] = model.prepare_recordings([&commands::runs_of(&files), &[]], &reading);
+    let recordings = data.iter().zip(read).map(|(path, read)| {
+        read.map_err(|error| UnreadRun {
             file: path.display().to_string(),
             error,
         })

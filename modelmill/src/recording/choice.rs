@@ -1,5 +1,6 @@
-//! Choice of the smoothing of a recording if the user gave none: candidates are tested, and the one with the smallest
-//! force residual on held-out parts of the run is taken.
+//! Choice of the smoothing of recordings of one machine if the user gave none: candidates are tested, and the one with
+//! the smallest force residual on held-out parts of the runs is taken. All recordings with one sampling rate get the
+//! same choice; those of the fit decide.
 //!
 //! Spectra of positions alone cannot distinguish noise of clocks and encoders from motion; forces can. For each
 //! cut-off on a list, the model's regressor, with friction and an offset of every drive added, is fitted to the
@@ -10,20 +11,27 @@
 //! units. A periodic motion may also be fitted by a Fourier series, whose harmonics are tested in the same way: it
 //! averages over the periods what a low-pass lets through. Local polynomials are no candidates: at the same cut-off
 //! their residual equals that of the low-pass on all recordings that were examined.
+//!
+//! Decimation is chosen last. Then the cut-off is raised as far as the decimation needs it and noise permits.
 
 use modelmill_boundary::message;
-use modelmill_boundary::text::{OptionName, Remedy};
-use modelmill_codegen::{ModelEvaluator, MotionStates};
+use modelmill_boundary::text::{Message, OptionName, Remedy};
 use modelmill_identify::{
     DECIMATION_PASSBAND, LowPass, PreparationChoices, PreparedRun, RecordingNote, SignalRecording as Raw,
 };
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 use super::free;
+use super::friction_rows::{PickedStates, regressor_with_friction};
+use super::held_out::{
+    FOLDS, FoldSums, HeldOutResidual, OctavePower, ROUNDING, TimeWindow, WindowSamples, fit_folds, margin,
+};
 use super::options::RecordingOptions;
 use super::smoother::{SmootherCandidate, floor_to_count, series_up_to};
+use super::stick::StickPhases;
 use super::thresholds::{
-    SAME_RESIDUAL_TOLERANCE, SMOOTHING_LEAST_GAIN, SMOOTHING_ROWS_PER_COLUMN, WINDOW_FEWEST_SAMPLES,
+    DECIMATION_FEWEST_KEPT, SAME_RATE_TOLERANCE, SAME_RESIDUAL_TOLERANCE, SMOOTHING_LEAST_GAIN,
+    SUITED_CUTOFF_PASSBANDS, SUITED_MOST_GROWTH, WINDOW_FEWEST_SAMPLES,
 };
 use crate::error::Outcome;
 use crate::model::Model;
@@ -39,8 +47,6 @@ const HIGHEST: f64 = 0.2;
 const FARTHEST: f64 = 8.0;
 /// The lowest cut-off, relative to the band of the forces.
 const LOWEST: f64 = 0.15;
-/// Number of parts of the time, each of which is held out once.
-const FOLDS: usize = 5;
 /// Number of octaves above the band of the motion that are evaluated.
 const OCTAVES: usize = 2;
 /// Largest number of samples for each candidate; longer recordings are evaluated in windows.
@@ -49,49 +55,76 @@ const LOOKED_AT: usize = 12_000;
 const FINE: f64 = 5.0;
 /// Number of windows of a long recording.
 const WINDOWS: usize = 10;
-/// Periods of the band that are dropped at both ends of a held-out part, and the largest share of it that may be
-/// dropped.
-const DROPPED: (f64, f64) = (1.5, 0.2);
 /// Passbands of the decimation that are tested, relative to the band of the forces.
 const PARALLEL: [f64; 3] = [0.5, 1.0, 2.0];
 /// Samples next to a window, at the rate of the evaluation, beyond which the low-pass has no influence.
 const BEYOND: usize = 60;
-/// A residual below this fraction of the force is rounding.
-const ROUNDING: f64 = 1e-6;
 /// A cut-off whose residual exceeds the smallest by this factor ends the search downwards.
 const HOPELESS: f64 = 1.5;
 
-/// The reading options with all open choices of the preparation made, and a note on them; `None` if nothing is open,
-/// or if the recording has no forces to decide it.
-pub(super) fn choose_preparation(
-    model: &Model,
-    raw: &Raw,
-    reading: &RecordingOptions,
-) -> Outcome<Option<(RecordingOptions, RecordingNote)>> {
-    let drives = model.drives();
-    let has_forces = !drives.is_empty() && drives.iter().all(|drive| raw.has_column(drive));
-    if !has_forces || model.base.is_empty() {
-        return Ok(None);
-    }
-    let open = raw.find_open_choices(&model.active_coordinates(), &drives, &reading.preparation)?;
-    Ok(open.and_then(|open| {
-        let search = SmootherSearch {
-            model,
-            raw,
-            reading,
-            open,
-        };
-        search.best_reading()
-    }))
+/// One recording whose preparation is chosen.
+#[derive(Clone, Copy)]
+pub(super) struct OpenRecording<'a> {
+    /// The recording before preparation.
+    pub(super) raw: &'a Raw,
+    /// Its index among the recordings of the stick phases.
+    pub(super) index: usize,
+    /// The period of its motion, s, if it is periodic.
+    period: Option<f64>,
+    /// Whether it belongs to the fit.
+    is_fitted: bool,
 }
 
-/// Force residual on held-out parts.
-#[derive(Clone, Copy)]
-struct HeldOutResidual {
-    /// The logarithm of the geometric mean of the residual over the drives, in units of the forces.
-    figure: f64,
-    /// The geometric mean of the relative residuals below the band of the motion over the drives.
-    relative: f64,
+/// A choice for some recordings together.
+pub(super) struct PreparationChoice {
+    /// Index of each recording, with its reading options.
+    pub(super) readings: Vec<(usize, RecordingOptions)>,
+    /// What was chosen, and why.
+    pub(super) note: RecordingNote,
+}
+
+/// The choices of the preparation that are open for recordings of one machine. All recordings with the same sampling
+/// rate get the same cut-off, smoothing and decimation: otherwise the same parameters would be fitted to one motion and
+/// compared with another that was smoothed differently.
+///
+/// Recordings in which nothing is open, or without forces to decide it, have no choice.
+pub(super) fn choose_preparation(
+    model: &Model,
+    recordings: &[&Raw],
+    fitted: usize,
+    reading: &RecordingOptions,
+    sticks: &StickPhases,
+) -> Outcome<Vec<PreparationChoice>> {
+    let drives = model.drives();
+    let coordinates = model.active_coordinates();
+    let mut groups: Vec<Vec<(OpenRecording<'_>, PreparationChoices)>> = Vec::new();
+    for (index, raw) in recordings.iter().enumerate() {
+        let has_forces = !drives.is_empty() && drives.iter().all(|drive| raw.has_column(drive));
+        if !has_forces || model.base.is_empty() {
+            continue;
+        }
+        let Some(open) = raw.find_open_choices(&coordinates, &drives, &reading.preparation)? else {
+            continue;
+        };
+        let one = OpenRecording {
+            raw,
+            index,
+            period: open.period,
+            is_fitted: index < fitted,
+        };
+        // A decimation counts samples, so it is common to equal rates only.
+        let is_alike = |(_, other): &(OpenRecording<'_>, PreparationChoices)| {
+            (open.rate_hz / other.rate_hz - 1.0).abs() < SAME_RATE_TOLERANCE
+        };
+        match groups.iter_mut().find(|group| group.iter().all(is_alike)) {
+            Some(group) => group.push((one, open)),
+            None => groups.push(vec![(one, open)]),
+        }
+    }
+    Ok(groups
+        .into_iter()
+        .filter_map(|group| SmootherSearch::new(model, reading, sticks, group)?.best_choice())
+        .collect())
 }
 
 /// Smoothers of one kind that were tested, in the order of decreasing bandwidth.
@@ -131,21 +164,55 @@ fn cost_text(difference: f64) -> String {
     }
 }
 
-/// The search for the best smoother of one recording.
+/// The search for the best smoother of some recordings with one sampling rate.
 struct SmootherSearch<'a> {
     /// The model that is fitted.
     model: &'a Model,
-    /// The recording before preparation.
-    raw: &'a Raw,
+    /// The recordings.
+    recordings: Vec<OpenRecording<'a>>,
+    /// Recordings that get the same choice and do not decide.
+    followers: Vec<OpenRecording<'a>>,
     /// The options of the user.
     reading: &'a RecordingOptions,
-    /// The choices that are open, with rate, band and period of the motion.
+    /// Intervals in which drives stick, whose forces do not count.
+    sticks: &'a StickPhases,
+    /// The choices that are open, with rate, band and period of the motions.
     open: PreparationChoices,
 }
 
-impl SmootherSearch<'_> {
-    /// The options with the best smoother and decimation, and the note that states the choice.
-    fn best_reading(&self) -> Option<(RecordingOptions, RecordingNote)> {
+impl<'a> SmootherSearch<'a> {
+    /// The search for a group of recordings: those of the fit decide if there are any, and the fastest of their motions
+    /// determines the band. `None` without recordings.
+    fn new(
+        model: &'a Model,
+        reading: &'a RecordingOptions,
+        sticks: &'a StickPhases,
+        group: Vec<(OpenRecording<'a>, PreparationChoices)>,
+    ) -> Option<Self> {
+        // A series needs a period in every recording; the longest has the most harmonics.
+        let periods = group.iter().map(|(one, _)| one.period);
+        let period = periods.reduce(|a, b| Some(a?.max(b?))).flatten();
+        let has_fit = group.iter().any(|(one, _)| one.is_fitted);
+        let (deciding, following): (Vec<_>, Vec<_>) = group.into_iter().partition(|(one, _)| one.is_fitted || !has_fit);
+        let all = || deciding.iter().map(|(_, open)| open);
+        let open = PreparationChoices {
+            rate_hz: all().map(|open| open.rate_hz).reduce(f64::min)?,
+            band_hz: all().map(|open| open.band_hz).reduce(f64::max)?,
+            cutoff_hz: all().map(|open| open.cutoff_hz).reduce(f64::max)?,
+            period,
+        };
+        Some(Self {
+            model,
+            recordings: deciding.into_iter().map(|(one, _)| one).collect(),
+            followers: following.into_iter().map(|(one, _)| one).collect(),
+            reading,
+            sticks,
+            open,
+        })
+    }
+
+    /// The options with the best smoother and decimation for each recording, and the note that states the choice.
+    fn best_choice(&self) -> Option<PreparationChoice> {
         let PreparationChoices {
             rate_hz,
             band_hz,
@@ -165,7 +232,7 @@ impl SmootherSearch<'_> {
         let ladder: Vec<SmootherCandidate> = ladder.into_iter().map(SmootherCandidate::low_pass).collect();
         // The lowest cut-off loses the most samples at the ends, so that its windows exist for all candidates.
         let runs = self.runs(ladder[ladder.len() - 1])?;
-        let looked_at = self.windows(&runs);
+        let looked_at = self.window_groups(&runs, ladder[0]);
         let filtered = self.try_smoothers(&ladder, &looked_at)?;
         let series = period.and_then(|period| {
             let ladder = series_up_to(filtered.best().0.cutoff, period);
@@ -194,40 +261,60 @@ impl SmootherSearch<'_> {
         };
         // Decimation is chosen last, for the smoother that was found.
         let (smoother, left) = tried.best();
-        let (decimate, left) = self.decimation(smoother, &looked_at).unwrap_or((1, left));
-        let mut reading = self.reading.clone();
-        smoother.apply_to(&mut reading.preparation);
-        reading.preparation.decimate = decimate;
-        reading.preparation.chosen = true;
+        let (smoother, decimate, left) = self.decimation(smoother, &looked_at).unwrap_or((smoother, 1, left));
+        let readings = self.recordings.iter().chain(&self.followers).map(|one| {
+            let mut reading = self.reading.clone();
+            smoother.apply_to(&mut reading.preparation, one.period);
+            reading.preparation.decimate = decimate;
+            reading.preparation.chosen = true;
+            (one.index, reading)
+        });
         // The note states how the residual changes with the alternatives.
         let mut others = vec![String::new()];
         others.extend(tried.neighbours().chain(other));
-        let others = others.join(", ");
+        let says = self.choice_text(smoother, decimate, left, &others.join(", "));
+        Some(PreparationChoice {
+            readings: readings.collect(),
+            note: RecordingNote::info(says),
+        })
+    }
+
+    /// The note on a choice; `others` are the costs of the alternatives.
+    fn choice_text(
+        &self,
+        smoother: SmootherCandidate,
+        decimate: usize,
+        left: HeldOutResidual,
+        others: &str,
+    ) -> Message {
         let every = if decimate > 1 {
             format!(", and decimated by {decimate} after a low-pass on forces and regressor")
         } else {
             String::new()
         };
-        let says = message!(
-            "{} {}{every}. This was chosen automatically, since it predicts held-out parts of the run best. The error there is {} \
+        let all = self.recordings.iter().chain(&self.followers);
+        let files: Vec<&str> = all.map(|one| one.raw.file()).collect();
+        let what = match files.as_slice() {
+            [one] => format!("{one} {}", smoother.describe(false)),
+            all => format!("{} {}", all.join(", "), smoother.describe(true)),
+        };
+        message!(
+            "{what}{every}. This was chosen automatically, since it predicts held-out parts of the run best. The error there is {} \
              (below {} Hz, geometric mean over the drives){others}. Set it yourself with {}, {} and {}.",
-            self.raw.file(),
-            smoother.describe(),
             percent(Some(left.relative)),
-            significant(band_hz, 3),
+            significant(self.open.band_hz, 3),
             Remedy::option(OptionName::CutoffHz),
             Remedy::option(OptionName::Smoothing),
             Remedy::option(OptionName::Decimate),
-        );
-        Some((reading, RecordingNote::info(says)))
+        )
     }
 
     /// Tests smoothers in the order of decreasing bandwidth, until the residual is clearly too large.
-    fn try_smoothers(&self, ladder: &[SmootherCandidate], looked_at: &[TimeWindow]) -> Option<SmootherTrials> {
+    fn try_smoothers(&self, ladder: &[SmootherCandidate], looked_at: &[Vec<TimeWindow>]) -> Option<SmootherTrials> {
         let mut all: Vec<(SmootherCandidate, HeldOutResidual)> = Vec::new();
         let mut least = f64::INFINITY;
         for smoother in ladder {
-            let Some(left) = self.held_out_residual(*smoother, self.open.band_hz, looked_at) else {
+            let Some(left) = self.held_out_residual(*smoother, self.open.band_hz, self.open.band_hz, looked_at) else {
                 continue;
             };
             all.push((*smoother, left));
@@ -242,51 +329,100 @@ impl SmootherSearch<'_> {
         Some(SmootherTrials { all, best })
     }
 
-    /// The factor of decimation, with the residual on held-out parts; `None` if it cannot be evaluated.
-    fn decimation(&self, smoother: SmootherCandidate, looked_at: &[TimeWindow]) -> Option<(usize, HeldOutResidual)> {
-        let mut best: Option<(usize, HeldOutResidual)> = None;
+    /// The factor of decimation and the smoother that suits it, with the residual on held-out parts; `None` if it
+    /// cannot be evaluated.
+    fn decimation(
+        &self,
+        smoother: SmootherCandidate,
+        looked_at: &[Vec<TimeWindow>],
+    ) -> Option<(SmootherCandidate, usize, HeldOutResidual)> {
+        let mut best: Option<(usize, f64, HeldOutResidual)> = None;
+        let all = self.recordings.iter().chain(&self.followers);
+        let most = all.map(|one| one.raw.samples() / DECIMATION_FEWEST_KEPT).min()?;
         // Passbands increase, so that the strongest decimation is tested first.
         for part in PARALLEL {
-            let passed = part * self.open.band_hz;
-            let factor = floor_to_count(DECIMATION_PASSBAND * self.open.rate_hz / passed).max(1);
-            let passed = if factor == 1 { f64::INFINITY } else { passed };
-            let left = self.held_out_residual(smoother, passed, looked_at)?;
-            if best.is_none_or(|(_, least)| left.figure < least.figure - SMOOTHING_LEAST_GAIN) {
-                best = Some((factor, left));
+            let factor = floor_to_count(DECIMATION_PASSBAND * self.open.rate_hz / (part * self.open.band_hz));
+            let factor = factor.min(most).max(1);
+            let passed = if factor == 1 {
+                f64::INFINITY
+            } else {
+                DECIMATION_PASSBAND * self.open.rate_hz / factor as f64
+            };
+            let left = self.held_out_residual(smoother, passed, self.open.band_hz, looked_at)?;
+            if best.is_none_or(|(_, _, least)| left.figure < least.figure - SMOOTHING_LEAST_GAIN) {
+                best = Some((factor, passed, left));
             }
             if factor == 1 {
                 break;
             }
         }
-        best
+        let (factor, passed, left) = best?;
+        Some(if factor == 1 {
+            (smoother, 1, left)
+        } else {
+            let (suited, left) = self
+                .suited_smoother(smoother, passed, looked_at)
+                .unwrap_or((smoother, left));
+            (suited, factor, left)
+        })
     }
 
-    /// The recording prepared with a smoother; `None` if that fails.
-    fn runs(&self, smoother: SmootherCandidate) -> Option<Vec<PreparedRun>> {
-        let mut preparation = self.reading.preparation.clone();
-        smoother.apply_to(&mut preparation);
-        // Band and period are known already; finding them again would need all positions.
-        preparation.band_hz = Some(self.open.band_hz);
-        preparation.unexamined = true;
-        let mut runs = free::runs(self.model, self.raw, &preparation).ok()?;
-        // Forces of a model with delay belong to earlier states.
-        let delay = self.model.derivation.mechanism.force_delay;
-        if delay != 0.0 {
-            for run in &mut runs {
-                run.shift_states_by_delay(delay)?;
+    /// A smoother that passes what the decimation passes, Hz; `None` if that would let in too much noise.
+    ///
+    /// Otherwise forces have frequencies that the smoothed accelerations lack, and inertias become too large. What a
+    /// smoother lets through above the passband costs nothing, since the decimation removes it.
+    fn suited_smoother(
+        &self,
+        smoother: SmootherCandidate,
+        passed: f64,
+        looked_at: &[Vec<TimeWindow>],
+    ) -> Option<(SmootherCandidate, HeldOutResidual)> {
+        let judged = |smoother| self.held_out_residual(smoother, passed, passed.min(self.open.band_hz), looked_at);
+        let plain = judged(smoother)?;
+        for ratio in SUITED_CUTOFF_PASSBANDS {
+            let suited = smoother.at_least((ratio * passed).min(HIGHEST * self.open.rate_hz));
+            if suited == smoother {
+                break;
+            }
+            let left = judged(suited)?;
+            if left.relative <= (1.0 + SUITED_MOST_GROWTH) * plain.relative {
+                let left = self.held_out_residual(suited, passed, self.open.band_hz, looked_at)?;
+                return Some((suited, left));
             }
         }
-        Some(runs)
+        None
+    }
+
+    /// The runs of each recording prepared with a smoother; `None` if that fails.
+    fn runs(&self, smoother: SmootherCandidate) -> Option<Vec<Vec<PreparedRun>>> {
+        let delay = self.model.derivation.mechanism.force_delay;
+        let prepare = |one: &OpenRecording<'_>| {
+            let mut preparation = self.reading.preparation.clone();
+            smoother.apply_to(&mut preparation, one.period);
+            // Band and period are known already; finding them again would need all positions.
+            preparation.band_hz = Some(self.open.band_hz);
+            preparation.unexamined = true;
+            let mut runs = free::runs(self.model, one.raw, &preparation).ok()?;
+            // Forces of a model with delay belong to earlier states.
+            if delay != 0.0 {
+                for run in &mut runs {
+                    run.shift_states_by_delay(delay)?;
+                }
+            }
+            Some(runs)
+        };
+        self.recordings.iter().map(prepare).collect()
     }
 
     /// The intervals of time that all candidates have, or windows of them in a long recording.
-    fn windows(&self, runs: &[PreparedRun]) -> Vec<TimeWindow> {
-        let total: f64 = runs.iter().map(duration).sum();
+    fn windows(&self, runs: &[Vec<PreparedRun>]) -> Vec<TimeWindow> {
+        let total: f64 = runs.iter().flatten().map(duration).sum();
         let step = self.evaluation_rate().recip();
         let most = step * LOOKED_AT as f64;
         let share = if total > most { most / total } else { 1.0 };
         let mut windows = Vec::new();
-        for run in runs {
+        let each = runs.iter().enumerate();
+        for (recording, run) in each.flat_map(|(recording, runs)| runs.iter().map(move |run| (recording, run))) {
             let (Some(first), Some(last)) = (run.time.first(), run.time.last()) else {
                 continue;
             };
@@ -295,6 +431,7 @@ impl SmootherSearch<'_> {
             for part in 0..parts {
                 let from = first + length * part as f64;
                 windows.push(TimeWindow {
+                    recording,
                     from,
                     to: from + share * length,
                 });
@@ -314,15 +451,54 @@ impl SmootherSearch<'_> {
         (FINE * self.highest_frequency()).min(self.open.rate_hz)
     }
 
-    /// The residual of a smoother on held-out parts, fitted to rows below `passed`, Hz; `None` if there are too few
-    /// samples.
+    /// The windows in groups, of which each has a fit of its own: one group for each recording, or one for all if a
+    /// recording is too short for a fit.
+    ///
+    /// Recordings of one machine differ in noise and in what the model lacks. A common fit would judge a smoother by
+    /// the loudest of them.
+    fn window_groups(&self, runs: &[Vec<PreparedRun>], smoother: SmootherCandidate) -> Vec<Vec<TimeWindow>> {
+        let windows = self.windows(runs);
+        let of_recording = |k: usize| windows.iter().filter(|one| one.recording == k).copied().collect();
+        let groups: Vec<Vec<TimeWindow>> = (0..self.recordings.len()).map(of_recording).collect();
+        let band = self.open.band_hz;
+        if self.held_out_residual(smoother, band, band, &groups).is_some() {
+            groups
+        } else {
+            vec![windows]
+        }
+    }
+
+    /// The residual of a smoother on held-out parts, the mean over groups of windows. The fit is to rows below
+    /// `passed`, and octaves from `band` on are judged, Hz. `None` if there are too few samples.
     fn held_out_residual(
         &self,
         smoother: SmootherCandidate,
         passed: f64,
-        windows: &[TimeWindow],
+        band: f64,
+        groups: &[Vec<TimeWindow>],
     ) -> Option<HeldOutResidual> {
         let runs = self.runs(smoother)?;
+        let (mut figure, mut relative) = (0.0, 0.0);
+        for windows in groups {
+            let one = self.residual_of_windows(&runs, passed, band, windows)?;
+            figure += one.figure;
+            relative += one.relative.ln();
+        }
+        let n = groups.len() as f64;
+        Some(HeldOutResidual {
+            figure: figure / n,
+            relative: (relative / n).exp(),
+        })
+    }
+
+    /// The residual on held-out parts of one group of windows.
+    fn residual_of_windows(
+        &self,
+        runs: &[Vec<PreparedRun>],
+        passed: f64,
+        band: f64,
+        windows: &[TimeWindow],
+    ) -> Option<HeldOutResidual> {
         let every = floor_to_count(self.open.rate_hz / self.evaluation_rate()).max(1);
         let rate = self.open.rate_hz / every as f64;
         // Windows are found again in each run by their times, with one sample of tolerance.
@@ -330,7 +506,7 @@ impl SmootherSearch<'_> {
         let samples = windows
             .iter()
             .map(|window| {
-                let run = runs.iter().find(|run| {
+                let run = runs[window.recording].iter().find(|run| {
                     run.time[0] <= window.from + slack && run.time[run.time.len() - 1] >= window.to - slack
                 })?;
                 self.samples(run, window, every)
@@ -344,7 +520,7 @@ impl SmootherSearch<'_> {
         for (window, one) in samples.iter().enumerate() {
             let n = one.forces.nrows();
             let filtered = one.low_passed(passed, rate)?;
-            let margin = margin(n, rate, self.open.band_hz);
+            let margin = margin(n, rate, band);
             let thin = floor_to_count(rate / (4.0 * passed.min(self.open.band_hz * 4.0))).max(1);
             if folds.is_empty() {
                 folds = vec![FoldSums::new(one.forces.ncols(), one.regressor.ncols()); FOLDS];
@@ -368,13 +544,13 @@ impl SmootherSearch<'_> {
         let drives = samples.first()?.forces.ncols();
         // Octaves start at the band and are bounded by the rate of the evaluation.
         let edges: Vec<f64> = (0..=OCTAVES)
-            .map(|k| self.open.band_hz * 2.0_f64.powi(i32::try_from(k).unwrap_or(0)))
+            .map(|k| band * 2.0_f64.powi(i32::try_from(k).unwrap_or(0)))
             .filter(|edge| *edge < 0.45 * rate)
             .collect();
         let mut octaves = vec![vec![OctavePower::default(); edges.len()]; drives];
         for (window, fold, start, end) in parts {
             let one = &samples[window];
-            let margin = margin(end - start, rate, self.open.band_hz);
+            let margin = margin(end - start, rate, band);
             for (d, octaves) in octaves.iter_mut().enumerate() {
                 let (measured, model): (Vec<f64>, Vec<f64>) = (start..end)
                     .map(|i| {
@@ -402,19 +578,22 @@ impl SmootherSearch<'_> {
         // Stage 3: the figure over the drives.
         let mut figure = 0.0;
         let mut relative = 0.0;
+        let mut counted = 0;
         for octaves in &octaves {
+            // A drive without a force, as in the row of an undriven joint, has no relative residual.
             let size = octaves.first()?.measured;
             if size <= 0.0 {
-                return None;
+                continue;
             }
+            counted += 1;
             let rounding = ROUNDING * ROUNDING * size;
             let above: f64 = octaves[1..].iter().map(|octave| octave.residual_power(true)).sum();
             let within = octaves[0].residual_power(false).max(rounding);
             figure += 0.5 * (within + above).ln();
             relative += 0.5 * (within / size).ln();
         }
-        let n = drives as f64;
-        Some(HeldOutResidual {
+        let n = f64::from(counted);
+        (counted > 0).then(|| HeldOutResidual {
             figure: figure / n,
             relative: (relative / n).exp(),
         })
@@ -423,13 +602,14 @@ impl SmootherSearch<'_> {
     /// Regressor and forces at every `every`-th sample of a window; `None` if there are too few samples.
     fn samples(&self, run: &PreparedRun, window: &TimeWindow, every: usize) -> Option<WindowSamples> {
         let forces = run.force.as_deref()?;
+        let recording = self.recordings[window.recording].index;
         let start = run.time.partition_point(|t| *t < window.from);
         let end = run.time.partition_point(|t| *t <= window.to);
         let samples: Vec<usize> = (start..end).step_by(every).collect();
         if samples.len() < WINDOW_FEWEST_SAMPLES {
             return None;
         }
-        let regressor = self.regressor(run, &samples)?;
+        let mut regressor = regressor_with_friction(self.model, &PickedStates::new(run, &samples))?;
         let mut picked = DMatrix::zeros(samples.len(), forces.len());
         // The filter also depends on samples outside the window.
         let from = start.saturating_sub(BEYOND * every);
@@ -446,244 +626,20 @@ impl SmootherSearch<'_> {
             for (i, sample) in samples.iter().enumerate() {
                 picked[(i, d)] = smooth[*sample - from];
             }
+            // Both sides of an equation are zero where the drive sticks.
+            let stuck = self
+                .sticks
+                .is_stuck(recording, d, samples.iter().map(|sample| run.time[*sample]));
+            for i in (0..samples.len()).filter(|i| stuck[*i]) {
+                picked[(i, d)] = 0.0;
+                regressor.row_mut(i * forces.len() + d).fill(0.0);
+            }
         }
         Some(WindowSamples {
             regressor,
             forces: picked,
         })
     }
-
-    /// The model's regressor at given samples, with friction and an offset of every drive added; one row per sample
-    /// and drive.
-    fn regressor(&self, run: &PreparedRun, samples: &[usize]) -> Option<DMatrix<f64>> {
-        let pick = |columns: &[Vec<f64>]| -> Vec<Vec<f64>> {
-            let pick = |column: &Vec<f64>| samples.iter().map(|k| column[*k]).collect();
-            columns.iter().map(pick).collect()
-        };
-        let states = [&run.q, &run.qd, &run.qdd].map(|columns| pick(columns));
-        let load = pick(run.force.as_deref().unwrap_or(&[]));
-        let states = MotionStates {
-            q: states[0].iter().map(Vec::as_slice).collect(),
-            qd: states[1].iter().map(Vec::as_slice).collect(),
-            qdd: states[2].iter().map(Vec::as_slice).collect(),
-            load: load.iter().map(Vec::as_slice).collect(),
-        };
-        let evaluator = ModelEvaluator::new(&self.model.derivation);
-        let regressor = evaluator.regressor(&states).ok()?;
-        let n = self.model.drives().len();
-        let rates = evaluator.drive_motion(&states).ok()?;
-        let rates = rates.get(n..2 * n)?;
-        let width = regressor.ncols();
-        // Three more columns for each drive: rate, its sign, and a constant.
-        let mut more = regressor.resize_horizontally(width + 3 * n, 0.0);
-        for (d, rate) in rates.iter().enumerate() {
-            for (i, rate) in rate.iter().enumerate() {
-                let sign = if *rate == 0.0 { 0.0 } else { rate.signum() };
-                for (k, value) in [*rate, sign, 1.0].into_iter().enumerate() {
-                    more[(i * n + d, width + 3 * d + k)] = value;
-                }
-            }
-        }
-        more.iter().all(|x| x.is_finite()).then_some(more)
-    }
-}
-
-/// An interval of time, s.
-struct TimeWindow {
-    /// First time.
-    from: f64,
-    /// Last time.
-    to: f64,
-}
-
-/// Rows of the regressor, one per sample and drive, and forces, one row per sample and one column per drive.
-struct WindowSamples {
-    /// Row `sample * n_drives + drive`, with the columns of friction and offset behind those of the model.
-    regressor: DMatrix<f64>,
-    /// `[sample, drive]`.
-    forces: DMatrix<f64>,
-}
-
-impl WindowSamples {
-    /// The same rows after a low-pass, Hz; `None` if there are too few samples. `rate` is that of the rows, Hz.
-    fn low_passed(&self, passed: f64, rate: f64) -> Option<Self> {
-        let mut filtered = Self {
-            regressor: self.regressor.clone(),
-            forces: self.forces.clone(),
-        };
-        if passed >= 0.45 * rate {
-            return Some(filtered);
-        }
-        let low_pass = LowPass::butterworth(4, passed, rate).ok()?;
-        let (n, drives) = self.forces.shape();
-        for d in 0..drives {
-            let force: Vec<f64> = self.forces.column(d).iter().copied().collect();
-            let force = low_pass.zero_phase(&force).ok()?;
-            filtered.forces.column_mut(d).copy_from_slice(&force);
-            for mut column in filtered.regressor.column_iter_mut() {
-                let values: Vec<f64> = (0..n).map(|i| column[i * drives + d]).collect();
-                if values.iter().all(|x| *x == 0.0) {
-                    continue;
-                }
-                for (i, value) in low_pass.zero_phase(&values).ok()?.into_iter().enumerate() {
-                    column[i * drives + d] = value;
-                }
-            }
-        }
-        Some(filtered)
-    }
-}
-
-/// Inner products of measured force and model force in one octave of one drive.
-#[derive(Clone, Default)]
-struct OctavePower {
-    /// Sum of squares of the measured force.
-    measured: f64,
-    /// Inner product of both forces.
-    product: f64,
-    /// Sum of squares of the model force.
-    model: f64,
-}
-
-impl OctavePower {
-    /// Adds samples of both forces.
-    fn add(&mut self, measured: &[f64], model: &[f64]) {
-        for (y, m) in measured.iter().zip(model) {
-            self.measured += y * y;
-            self.product += y * m;
-            self.model += m * m;
-        }
-    }
-
-    /// Residual power of the measured force. Where the model overestimates an octave, its force may be damped, as a
-    /// filter does above the band of the motion: noise there costs only what it hides.
-    fn residual_power(&self, may_be_damped: bool) -> f64 {
-        let scale = if may_be_damped && self.model > 0.0 {
-            (self.product / self.model).clamp(0.0, 1.0)
-        } else {
-            1.0
-        };
-        self.measured - 2.0 * scale * self.product + scale * scale * self.model
-    }
-}
-
-/// Number of samples at both ends of `n` that a low-pass at `band`, Hz, distorts.
-fn margin(n: usize, rate: f64, band: f64) -> usize {
-    floor_to_count((DROPPED.0 * rate / band).min(DROPPED.1 * n as f64))
-}
-
-/// Sums over the rows of one fold, drive by drive.
-#[derive(Clone)]
-struct FoldSums {
-    drives: Vec<DriveNormalEquations>,
-}
-
-/// Normal equations of one drive.
-#[derive(Clone)]
-struct DriveNormalEquations {
-    /// Gram matrix of the columns, lower triangle.
-    normal: DMatrix<f64>,
-    /// Inner products of columns and force.
-    right: DVector<f64>,
-    /// Sum of squares of the force.
-    size: f64,
-    /// Number of rows.
-    rows: usize,
-}
-
-impl FoldSums {
-    /// Sums without rows.
-    fn new(drives: usize, width: usize) -> Self {
-        let products = DriveNormalEquations {
-            normal: DMatrix::zeros(width, width),
-            right: DVector::zeros(width),
-            size: 0.0,
-            rows: 0,
-        };
-        Self {
-            drives: vec![products; drives],
-        }
-    }
-
-    /// Adds the rows of all drives at a sample.
-    fn add(&mut self, samples: &WindowSamples, i: usize) {
-        let drives = self.drives.len();
-        for (d, one) in self.drives.iter_mut().enumerate() {
-            let row = samples.regressor.row(i * drives + d).transpose();
-            let force = samples.forces[(i, d)];
-            one.normal.syger(1.0, &row, &row, 1.0);
-            one.right.axpy(force, &row, 1.0);
-            one.size += force * force;
-            one.rows += 1;
-        }
-    }
-}
-
-/// For each fold the values that fit the others; `None` if there are too few rows, or a force is zero.
-fn fit_folds(folds: &[FoldSums]) -> Option<Vec<DVector<f64>>> {
-    let n = folds.first()?.drives.len();
-    let width = folds[0].drives[0].right.len();
-    let total = |d: usize| -> f64 { folds.iter().map(|fold| fold.drives[d].size).sum() };
-    let sizes: Vec<f64> = (0..n).map(total).collect();
-    let rows: usize = folds.iter().map(|fold| fold.drives[0].rows).sum();
-    if rows * n < SMOOTHING_ROWS_PER_COLUMN * width || sizes.iter().any(|size| *size <= 0.0) {
-        return None;
-    }
-    // All drives have equal relative weights first, then weights from their residuals.
-    let mut left = sizes.clone();
-    let mut values = Vec::new();
-    for _ in 0..2 {
-        let weights: Vec<f64> = (left.iter().zip(&sizes))
-            .map(|(left, size)| rows as f64 / left.max(ROUNDING * ROUNDING * size))
-            .collect();
-        left = vec![0.0; n];
-        values.clear();
-        // All folds except the one that is held out.
-        for (out, judged) in folds.iter().enumerate() {
-            let mut normal = DMatrix::zeros(width, width);
-            let mut right = DVector::zeros(width);
-            for (_, fold) in folds.iter().enumerate().filter(|(k, _)| *k != out) {
-                for (one, weight) in fold.drives.iter().zip(&weights) {
-                    normal += &one.normal * *weight;
-                    right += &one.right * *weight;
-                }
-            }
-            let found = solve_scaled(&normal, &right)?;
-            // The sum of squares of the residual follows from the sums of the fold.
-            for (left, one) in left.iter_mut().zip(&judged.drives) {
-                let explained = 2.0 * one.right.dot(&found) - (symmetric(&one.normal) * &found).dot(&found);
-                *left += (one.size - explained).max(0.0);
-            }
-            values.push(found);
-        }
-    }
-    Some(values)
-}
-
-/// Solves scaled normal equations with a small ridge, since columns may be equal.
-fn solve_scaled(normal: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
-    let mut normal = symmetric(normal);
-    let n = right.len();
-    let scale: Vec<f64> = (0..n)
-        .map(|i| normal[(i, i)].max(0.0).sqrt())
-        .map(|norm| if norm > 0.0 { norm.recip() } else { 0.0 })
-        .collect();
-    for i in 0..n {
-        for j in 0..n {
-            normal[(i, j)] *= scale[i] * scale[j];
-        }
-        normal[(i, i)] += 1e-9;
-    }
-    let scale = DVector::from_vec(scale);
-    let scaled = right.component_mul(&scale);
-    Some(normal.cholesky()?.solve(&scaled).component_mul(&scale))
-}
-
-/// The symmetric matrix of a lower triangle.
-fn symmetric(lower: &DMatrix<f64>) -> DMatrix<f64> {
-    let mut whole = lower.clone();
-    whole.fill_upper_triangle_with_lower_triangle();
-    whole
 }
 
 /// Duration of a run, s.

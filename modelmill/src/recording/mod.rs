@@ -3,12 +3,17 @@
 
 mod choice;
 mod columns;
+mod common;
 mod contents;
 pub(crate) mod free;
+mod friction_rows;
+mod held_out;
 mod leverage;
 mod options;
 mod proposal;
+mod sensor_faults;
 mod smoother;
+mod stick;
 mod thresholds;
 
 use std::path::Path;
@@ -17,8 +22,8 @@ use std::sync::Arc;
 use modelmill_boundary::files::MemoryFiles;
 use modelmill_boundary::message;
 use modelmill_boundary::text::{Message, OptionName, OptionSetting, Remedy};
-use modelmill_identify::diagnose::{Disturbance, EstimatedQuantity};
-use modelmill_identify::{PositionFault, RecordingFiles, RecordingNote, SignalRecording as Raw, UnwrappedAngle};
+use modelmill_identify::diagnose::Disturbance;
+use modelmill_identify::{RecordingFiles, RecordingNote, SignalRecording as Raw};
 
 use crate::audit::{self, ForceDelayAudit};
 use crate::error::{Error, Outcome};
@@ -29,16 +34,16 @@ use crate::host::kinds_of_files;
 use crate::model::Model;
 use crate::progress::SilentProgress;
 use crate::segment::{RecordingSegment, variances};
-use crate::text::table::significant;
 
 use columns::read_options;
 use leverage::DriveLeverage;
+use stick::StickPhases;
 use thresholds::DELAY_LEAST_SHARE_OF_GAIN;
 
 pub use contents::{ColumnInfo, RecordingContents, TableInfo};
 pub use modelmill_identify::{DerivativeSource, MAX_FILTER_ORDER, has_recording_extension};
 pub use modelmill_identify::{PreparedRun, SmoothingMethod, StatePreparation};
-pub use options::RecordingOptions;
+pub use options::{RecordingOptions, StandstillRule};
 pub use proposal::{ColumnProposal, ProposedColumn};
 
 /// Reads a recording with the columns that a model needs, completes free bodies and repairs faults of sensors.
@@ -97,7 +102,9 @@ pub(crate) fn read_as_recorded(
 ) -> Outcome<Vec<RecordingSegment>> {
     let file = RecordingFiles::open(model.host().files(), &[path])?;
     let raw = read_raw(model, &file, reading)?;
-    let (mut reading, note) = resolve_reading(model, &raw, reading)?;
+    let (_, mut readings) = common::choose(model, &[&raw], 1, reading)?;
+    let resolved = readings.pop();
+    let (mut reading, note) = resolved.unwrap_or_else(|| (reading.clone(), None));
     if reading.preparation.chosen {
         // Decimation was chosen for fits; forces are wanted at every sample.
         reading.preparation.decimate = 1;
@@ -112,22 +119,6 @@ pub(crate) fn read_as_recorded(
         model.host().note(note);
     }
     Ok(data)
-}
-
-/// The reading options with all open choices of the preparation made, and a note on the choice.
-fn resolve_reading(
-    model: &Model,
-    raw: &Raw,
-    reading: &RecordingOptions,
-) -> Outcome<(RecordingOptions, Option<RecordingNote>)> {
-    let says = format!("choosing how {} is smoothed", raw.file());
-    let chosen = model
-        .host()
-        .run_job(&says, 0, |_| choice::choose_preparation(model, raw, reading))??;
-    Ok(match chosen {
-        Some((reading, note)) => (reading, Some(note)),
-        None => (reading.clone(), None),
-    })
 }
 
 /// Assigns to every force the states at the time at which it acted, by the model's delay, s.
@@ -199,11 +190,11 @@ fn prepare(model: &Model, recording: &Raw, args: &RecordingOptions, delay: f64) 
     // Faults of positions count as disturbances of every segment.
     let faults: Vec<Disturbance> = if is_examined {
         let unwrapped = recording.unwrapped_angles().iter();
-        let unwrapped = unwrapped.map(|angle| wrapped_angle(recording.file(), angle));
+        let unwrapped = unwrapped.map(|angle| sensor_faults::wrapped_angle(recording.file(), angle));
         (recording.position_faults(&model.active_coordinates()).into_iter())
-            .map(|fault| position_fault(model, recording.file(), &fault))
+            .map(|fault| sensor_faults::position_fault(model, recording.file(), &fault))
             .chain(unwrapped)
-            .chain(late_rates_fault(recording))
+            .chain(sensor_faults::late_rates_fault(recording))
             .collect()
     } else {
         Vec::new()
@@ -222,95 +213,19 @@ fn prepare(model: &Model, recording: &Raw, args: &RecordingOptions, delay: f64) 
     with_variance.collect()
 }
 
-/// An angle to which full turns were added, as a disturbance for the diagnosis.
-fn wrapped_angle(file: &str, angle: &UnwrappedAngle) -> Disturbance {
-    Disturbance {
-        kind: RecordingFaultKind::Wrapped.name().to_owned(),
-        at: vec![angle.coordinate.clone()],
-        estimates: vec![EstimatedQuantity::new("jumps", angle.jumps as f64, "")],
-        recordings: vec![file.to_owned()],
-        interval: None,
-        description: Some(format!(
-            "the angle {} in {file} is wrapped: full turns were added at its {}",
-            angle.coordinate,
-            count_of_jumps(angle.jumps)
-        )),
+/// A recording without the forces in some intervals.
+fn without_intervals(raw: &Arc<Raw>, silent: &[SilentInterval]) -> Arc<Raw> {
+    if silent.is_empty() {
+        return raw.clone();
     }
-}
-
-/// A number of jumps in words.
-fn count_of_jumps(jumps: usize) -> String {
-    if jumps == 1 {
-        "jump".to_owned()
-    } else {
-        format!("{jumps} jumps")
-    }
-}
-
-/// Rates that lag the positions as a disturbance for the diagnosis; `None` without any.
-fn late_rates_fault(recording: &Raw) -> Option<Disturbance> {
-    let late = recording.late_rates();
-    let (_, longest) = late.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
-    let names: Vec<&str> = late.iter().map(|(name, _)| name.as_str()).collect();
-    Some(Disturbance {
-        kind: "late_rates".to_owned(),
-        at: late.iter().map(|(name, _)| name.clone()).collect(),
-        estimates: vec![EstimatedQuantity::new("delay", *longest, "s")],
-        recordings: vec![recording.file().to_owned()],
-        interval: None,
-        description: Some(format!(
-            "the recorded rates of `{}` in {} lag the positions by up to {} ms, as after a low-pass, and are not used",
-            names.join("`, `"),
-            recording.file(),
-            significant(1e3 * longest, 2)
-        )),
-    })
-}
-
-/// A fault of the positions as a disturbance for the diagnosis.
-fn position_fault(model: &Model, file: &str, fault: &PositionFault) -> Disturbance {
-    // Both faults have one number with a unit.
-    let (kind, at, name, value, unit, says) = match fault {
-        PositionFault::Jitter { time } => (
-            "time_jitter",
-            "t",
-            "jitter",
-            *time,
-            "s",
-            format!(
-                "the time stamps of {file} jitter: the position error is proportional to the rate, with the same time error for all coordinates, \
-                 {} ms rms",
-                significant(1e3 * time, 2)
-            ),
-        ),
-        PositionFault::Backlash { coordinate, width } => {
-            let is_angle = |(name, is): &(String, bool)| name == coordinate && *is;
-            let unit = if model.active_coordinate_types().iter().any(is_angle) {
-                "rad"
-            } else {
-                "m"
-            };
-            (
-                "backlash",
-                coordinate.as_str(),
-                "width",
-                *width,
-                unit,
-                format!(
-                    "backlash between the encoder of {coordinate} and its load: in {file} the reading jumps back and forth by {} {unit}",
-                    significant(*width, 2)
-                ),
-            )
+    let mut raw = (**raw).clone();
+    for one in silent {
+        let [from, to] = one.reach;
+        for drive in &one.drives {
+            raw.leave_out_samples(drive, &|t| (from..=to).contains(&t));
         }
-    };
-    Disturbance {
-        kind: kind.to_owned(),
-        at: vec![at.to_owned()],
-        estimates: vec![EstimatedQuantity::new(name, value, unit)],
-        recordings: vec![file.to_owned()],
-        interval: None,
-        description: Some(says),
     }
+    Arc::new(raw)
 }
 
 /// Warns about filter options that have no effect because all derivatives are recorded.
@@ -380,6 +295,17 @@ pub struct PreparedRecording {
     requested: RecordingOptions,
     /// The suspected fault of the recording that explains it best.
     suspect: Option<SuspectedFault>,
+    /// Intervals in which drives stick.
+    sticks: RecordingSticks,
+}
+
+/// The stick phases of one of several recordings.
+#[derive(Clone, Default)]
+struct RecordingSticks {
+    /// Those of all recordings.
+    all: Arc<StickPhases>,
+    /// Index of this recording.
+    index: usize,
 }
 
 impl Model {
@@ -414,12 +340,53 @@ impl Model {
     /// As [`Model::recording`], for one recording that consists of several files. Their columns are joined on time: the
     /// file with the lowest sampling rate determines the sample times, and the others are interpolated to them.
     pub fn recording_of(&self, paths: &[&Path], reading: &RecordingOptions) -> Outcome<PreparedRecording> {
+        PreparedRecording::new(self, self.read_raw_files(paths, reading)?, reading)
+    }
+
+    /// As [`Model::recording_of`], for several recordings of one machine: those of a fit, and those of its validation.
+    /// Cut-off, smoothing and decimation are chosen for those of the fit together, and are the same for the validation;
+    /// drives stick below the same rate in all.
+    ///
+    /// Each recording has its own result, since some of them may be unreadable.
+    pub fn prepare_recordings(
+        &self,
+        [fit, check]: [&[Vec<&Path>]; 2],
+        reading: &RecordingOptions,
+    ) -> [Vec<Outcome<PreparedRecording>>; 2] {
+        // All files are read first, since each of them matters for the choice.
+        let mut raws = Vec::new();
+        let [fit, check] = [fit, check].map(|runs| {
+            let mut errors: Vec<Option<Error>> = Vec::new();
+            for paths in runs {
+                match self.read_raw_files(paths, reading) {
+                    Ok(raw) => {
+                        raws.push(raw);
+                        errors.push(None);
+                    }
+                    Err(error) => errors.push(Some(error)),
+                }
+            }
+            errors
+        });
+        let fitted = fit.iter().filter(|error| error.is_none()).count();
+        let mut prepared = PreparedRecording::new_together(self, raws, fitted, reading).into_iter();
+        [fit, check].map(|errors| {
+            let next = |error: Option<Error>| match error {
+                Some(error) => Some(Err(error)),
+                None => prepared.next(),
+            };
+            errors.into_iter().filter_map(next).collect()
+        })
+    }
+
+    /// Reads the files of one recording.
+    fn read_raw_files(&self, paths: &[&Path], reading: &RecordingOptions) -> Outcome<Raw> {
         let opened = RecordingFiles::open(self.host().files(), paths);
         let read = opened
             .map_err(Error::from)
             .and_then(|file| read_raw(self, &file, reading));
         // A file of another kind, such as a model file, gets a message that names the kind.
-        let raw = read.map_err(|failure| {
+        read.map_err(|failure| {
             let kinds = paths.iter().map(|path| (path, kinds_of_files::file_kind(self.host(), path)));
             let mut others = kinds.filter_map(|(path, kind)| Some((path.display(), kind?)));
             others.next().map_or(failure, |(path, kind)| {
@@ -428,8 +395,7 @@ impl Model {
                      `t` and one for each coordinate and drive"
                 ))
             })
-        })?;
-        PreparedRecording::new(self, raw, reading)
+        })
     }
 
     /// As [`Model::recording`], for named columns in memory, such as those of a data frame. NaN marks
@@ -466,55 +432,101 @@ impl Model {
 impl PreparedRecording {
     /// Prepares a raw recording; unless it is `unexamined`, open choices are made and the audit runs.
     fn new(model: &Model, raw: Raw, reading: &RecordingOptions) -> Outcome<Self> {
-        let raw = Arc::new(raw);
+        let file = raw.file().to_owned();
+        let only = Self::new_together(model, vec![raw], 1, reading).pop();
+        only.unwrap_or_else(|| Err(Error::input(format!("{file} cannot be prepared"))))
+    }
+
+    /// As [`Self::new`], for recordings of one machine, with choices that are common to all of them. The first `fitted`
+    /// of them belong to a fit.
+    fn new_together(model: &Model, raws: Vec<Raw>, fitted: usize, reading: &RecordingOptions) -> Vec<Outcome<Self>> {
+        let raws: Vec<Arc<Raw>> = raws.into_iter().map(Arc::new).collect();
+        let mut prepared = Self::prepare_together(model, &raws, fitted, reading);
         if reading.preparation.unexamined {
-            return Ok(Self {
-                segments: prepare_segments(model, &raw, reading)?,
-                raw,
-                reading: reading.clone(),
-                requested: reading.clone(),
-                suspect: None,
-            });
-        }
-        let mut prepared = Self::prepare(model, raw, reading)?;
-        // Forces that were not measured would spoil the choice of the preparation and every fit.
-        let silent: Vec<SilentInterval> = (prepared.segments.iter())
-            .flat_map(|one| silent_intervals(model, one))
-            .collect();
-        if !silent.is_empty() {
-            let mut raw = (*prepared.raw).clone();
-            for one in &silent {
-                let [from, to] = one.reach;
-                for drive in &one.drives {
-                    raw.leave_out_samples(drive, &|t| (from..=to).contains(&t));
-                }
+            for one in prepared.iter().flatten() {
+                emit_notes(model, &one.segments);
             }
-            prepared = Self::prepare(model, Arc::new(raw), reading)?;
-            if let Some(first) = prepared.segments.first_mut() {
+            return prepared;
+        }
+        // Forces that were not measured would spoil the choice of the preparation and every fit.
+        let silent: Vec<Vec<SilentInterval>> = (prepared.iter())
+            .map(|one| {
+                let segments = one.iter().flat_map(|one| &one.segments);
+                segments.flat_map(|one| silent_intervals(model, one)).collect()
+            })
+            .collect();
+        if silent.iter().any(|silent| !silent.is_empty()) {
+            let without: Vec<Arc<Raw>> = (raws.iter().zip(&silent))
+                .map(|(raw, silent)| without_intervals(raw, silent))
+                .collect();
+            prepared = Self::prepare_together(model, &without, fitted, reading);
+        }
+        for (one, silent) in prepared.iter_mut().zip(&silent) {
+            let Ok(one) = one else { continue };
+            if let Some(first) = one.segments.first_mut() {
                 first.run.notes.extend(silent.iter().map(SilentInterval::note));
                 first.faults.extend(silent.iter().map(SilentInterval::disturbance));
             }
+            emit_notes(model, &one.segments);
+            one.examine(model);
+            // Events are searched in all forces, so that a push during standstill is found.
+            one.sticks.all.leave_out(model, one.sticks.index, &mut one.segments);
         }
-        emit_notes(model, &prepared.segments);
-        prepared.examine(model);
-        Ok(prepared)
+        prepared
     }
 
-    /// Makes open choices and prepares a recording, without passing notes to the listener.
-    fn prepare(model: &Model, raw: Arc<Raw>, requested: &RecordingOptions) -> Outcome<Self> {
-        let (reading, note) = resolve_reading(model, &raw, requested)?;
+    /// Makes open choices for recordings of one machine and prepares them, without passing notes to the listener.
+    fn prepare_together(
+        model: &Model,
+        raws: &[Arc<Raw>],
+        fitted: usize,
+        requested: &RecordingOptions,
+    ) -> Vec<Outcome<Self>> {
+        let all: Vec<&Raw> = raws.iter().map(Arc::as_ref).collect();
+        match common::choose(model, &all, fitted, requested) {
+            Ok((sticks, readings)) => {
+                let sticks = Arc::new(sticks);
+                let each = raws.iter().zip(readings).enumerate();
+                each.map(|(index, (raw, choice))| {
+                    let sticks = RecordingSticks {
+                        all: sticks.clone(),
+                        index,
+                    };
+                    Self::with_choices(model, raw, requested, choice, sticks)
+                })
+                .collect()
+            }
+            Err(error) if raws.len() < 2 => vec![Err(error)],
+            // A fault of one recording belongs to it alone, so that each is prepared by itself.
+            Err(_) => {
+                let each = raws.iter().map(std::slice::from_ref);
+                each.flat_map(|raw| Self::prepare_together(model, raw, 1, requested))
+                    .collect()
+            }
+        }
+    }
+
+    /// Prepares a recording with all choices made.
+    fn with_choices(
+        model: &Model,
+        raw: &Arc<Raw>,
+        requested: &RecordingOptions,
+        (reading, note): (RecordingOptions, Option<RecordingNote>),
+        sticks: RecordingSticks,
+    ) -> Outcome<Self> {
         let delay = model.derivation.mechanism.force_delay;
-        let mut segments = prepare(model, &raw, &reading, delay)?;
+        let mut segments = prepare(model, raw, &reading, delay)?;
         note_idle_options(&mut segments, &reading);
         if let (Some(note), Some(first)) = (note, segments.first_mut()) {
             first.run.notes.push(note);
         }
         Ok(Self {
             segments,
-            raw,
+            raw: raw.clone(),
             reading,
             requested: requested.clone(),
             suspect: None,
+            sticks,
         })
     }
 
@@ -605,6 +617,7 @@ impl PreparedRecording {
             reading: self.reading.clone(),
             requested: self.requested.clone(),
             suspect: self.suspect.clone(),
+            sticks: self.sticks.clone(),
         }
     }
 
@@ -635,6 +648,7 @@ impl PreparedRecording {
         let faulty = self.raw.restore_sensor_faults()?;
         let delay = model.derivation.mechanism.force_delay;
         let mut stretches = prepare(model, &faulty, &self.reading, delay).ok()?;
+        self.sticks.all.mark(self.sticks.index, &mut stretches);
         // Weights of other exclusions are kept.
         for (faulty, sound) in stretches.iter_mut().zip(&self.segments) {
             if faulty.samples() == sound.samples() {
@@ -647,7 +661,9 @@ impl PreparedRecording {
     /// The segments prepared again for another model of the same machine, which may have another delay of the force
     /// signal.
     pub(crate) fn prepare_for(&self, model: &Model) -> Outcome<Vec<RecordingSegment>> {
-        prepare_segments(model, &self.raw, &self.reading)
+        let mut stretches = prepare_segments(model, &self.raw, &self.reading)?;
+        self.sticks.all.mark(self.sticks.index, &mut stretches);
+        Ok(stretches)
     }
 }
 

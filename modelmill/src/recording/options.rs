@@ -22,4 +22,19 @@ pub struct RecordingOptions {
     pub between: Option<(f64, f64)>,
     /// Sampling rate of recordings without a column of times, Hz. The times of the samples follow from it.
     pub rate: Option<f64>,
+    /// Which forces are left out because a drive sticks or reverses there.
+    pub standstill: StandstillRule,
+}
+
+/// Which forces are left out of fits and error figures because a drive sticks or reverses, where dry friction takes any
+/// value up to its size.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum StandstillRule {
+    /// Those in phases in which the forces show that the drive sticks.
+    #[default]
+    Automatic,
+    /// Those at rates below this fraction of the largest rate of the drive.
+    Below(f64),
+    /// None.
+    KeepAll,
 }

@@ -10,7 +10,7 @@ const FEWER: f64 = 1.35;
 const MOST_HARMONICS: usize = 100;
 
 /// A candidate for the smoothing of positions.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq)]
 pub(super) struct SmootherCandidate {
     /// Cut-off frequency of the low-pass, or highest frequency of the series, Hz.
     pub(super) cutoff: f64,
@@ -38,11 +38,19 @@ impl SmootherCandidate {
         Some(floor_to_count(self.cutoff * self.period?))
     }
 
-    /// Sets the candidate in the options of a preparation.
-    pub(super) fn apply_to(self, preparation: &mut StatePreparation) {
+    /// Sets the candidate in the options of a preparation of a motion with the given period, s.
+    pub(super) fn apply_to(self, preparation: &mut StatePreparation, period: Option<f64>) {
         preparation.cutoff_hz = Some(self.cutoff);
         if self.period.is_some() {
-            preparation.smoothing = SmoothingMethod::Fourier { period: self.period };
+            preparation.smoothing = SmoothingMethod::Fourier { period };
+        }
+    }
+
+    /// The candidate with at least this cut-off, Hz; a series stays as it is.
+    pub(super) fn at_least(self, cutoff: f64) -> Self {
+        match self.period {
+            Some(_) => self,
+            None => Self::low_pass(self.cutoff.max(cutoff)),
         }
     }
 
@@ -55,15 +63,16 @@ impl SmootherCandidate {
         }
     }
 
-    /// The candidate as a predicate about a recording.
-    pub(super) fn describe(self) -> String {
+    /// The candidate as a predicate about one recording, or about several.
+    pub(super) fn describe(self, are_several: bool) -> String {
+        let is = if are_several { "are" } else { "is" };
         match self.period {
             Some(period) => format!(
-                "is fitted by a Fourier series of period {} s with {}",
+                "{is} fitted by a Fourier series of period {} s with {}",
                 significant(period, 5),
                 self.frequency_text()
             ),
-            None => format!("is smoothed by a low-pass at {}", self.frequency_text()),
+            None => format!("{is} smoothed by a low-pass at {}", self.frequency_text()),
         }
     }
 }

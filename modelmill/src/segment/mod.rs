@@ -99,14 +99,16 @@ impl RecordingSegment {
         (0..n).map(piece).collect()
     }
 
-    /// Whether the filter before a decimated sample has used a force of the drive that is excluded.
+    /// Whether the filter before a decimated sample has used mostly forces of the drive that are excluded. Excluded
+    /// forces have interpolated values, so that a few of them change the filtered force by little.
     pub(crate) fn has_excluded_input(&self, drive: usize, kept: usize) -> bool {
         let every = self.decimation();
         self.run.left_out.get(drive).is_some_and(|out| {
-            // The filter is taken to reach one decimated step to either side.
-            let to = if every == 1 { kept + 1 } else { every * (kept + 1) + 1 };
-            let around = (every * kept).saturating_sub(every - 1)..to.min(out.len());
-            out[around].contains(&true)
+            // Most of the filter's weight lies within half a decimated step to either side.
+            let half = every / 2;
+            let around = (every * kept).saturating_sub(half)..(every * kept + half + 1).min(out.len());
+            let excluded = out[around.clone()].iter().filter(|out| **out).count();
+            2 * excluded >= around.len().max(1)
         })
     }
 

@@ -10,5 +10,7 @@ mod run_plans;
 mod runs;
 mod runs_verdict;
 mod spoilt;
+mod stick;
+mod together;
 mod undriven;
 mod variants;
