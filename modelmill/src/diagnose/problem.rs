@@ -21,6 +21,7 @@ use modelmill_identify::RecordingNote;
 use super::candidates::{DerivedCandidates, candidates};
 use super::columns::{self, CandidateOrigin, load_dependent_columns, refined_columns};
 use super::constants::constants;
+use super::contacts::leave_out_late_contacts;
 use super::encoders::{self, encoders};
 use super::faults::subtract_known;
 use super::gears::gears;
@@ -156,9 +157,17 @@ pub(crate) fn find_missing_effects(
         all: &all,
     };
     let are_changes_searched = problem.searches_changes();
-    let mut diagnosis = model
-        .host()
-        .run_job("searching for missing effects", 0, |_| diagnose(&mut problem, &supply))?;
+    let forces = (problem.measured.clone(), problem.removed.clone());
+    let search = |problem: &mut DiagnosisProblem| {
+        let host = model.host();
+        host.run_job("searching for missing effects", 0, |_| diagnose(problem, &supply))
+    };
+    let mut diagnosis = search(&mut problem)?;
+    // A missing effect hides small contacts: with the effects found, they stand out. Then the search is repeated.
+    if asked.in_full && leave_out_late_contacts(&mut problem, model, &all, &diagnosis.residual) {
+        (problem.measured, problem.removed) = forces;
+        diagnosis = search(&mut problem)?;
+    }
     // Stage 5: texts, and candidates that could not be evaluated.
     for one in &mut diagnosis.disturbances {
         describe_disturbance(one, model);
