@@ -110,6 +110,16 @@ pub(super) const SUDDEN_LEAST_DEVIATIONS: f64 = 10.0;
 /// what is the rule and what the exception. By judgement.
 pub(super) const EVENTS_MOST_DURATION_SHARE: f64 = 0.6;
 
+/// The mean residual of an event exceeds the noise within it by this many standard deviations (1).
+pub(super) const LOCAL_NOISE_LEAST_DEVIATIONS: f64 = 6.0;
+
+/// A switch of friction is near the start or end of an event if there is less time between them, s.
+pub(super) const SWITCH_NEAR_S: f64 = 0.05;
+
+/// At a switch of friction an event of a single drive exceeds this share of its dry friction (1). The KUKA KR300 and
+/// the Cloos have such residuals.
+pub(super) const SWITCH_FRICTION_SHARE: f64 = 1.0;
+
 /// Samples are neighbours in state if their distance is below this many standard deviations of the states. By
 /// judgement.
 pub(super) const NEIGHBOUR_MOST_DISTANCE_SIGMAS: f64 = 1.0;

@@ -56,12 +56,6 @@ pub(super) fn residual_trace(model: &Model, data: &RecordingSegment) -> Option<R
         slowest: (0..forces.len()).map(|d| slowest_rate(model, d)).collect(),
         smear: smear.min(LONGEST_SMEAR_S),
     };
-    dump_trace(
-        &trace,
-        &rows.regressor,
-        &data.run.file,
-        prepared.cutoff_hz.unwrap_or(-1.0),
-    ); // DUMP
     fit_without_events(&mut trace, &rows.regressor)?;
     Some(trace)
 }
@@ -261,34 +255,3 @@ fn with_friction_columns(rows: DMatrix<f64>, rates: &[Vec<f64>], accelerations: 
     }
     rows
 }
-
-// DUMP-BEGIN
-pub(super) fn dump_trace(trace: &ResidualTrace, regressor: &ChannelRegressor, name: &str, cutoff: f64) {
-    use std::io::Write;
-    let Ok(dir) = std::env::var("MM_DUMP") else { return };
-    let name = name.replace('/', "_");
-    let mut k = 0;
-    while std::path::Path::new(&format!("{dir}/{name}.{k}")).exists() {
-        k += 1;
-    }
-    let mut out = std::io::BufWriter::new(std::fs::File::create(format!("{dir}/{name}.{k}")).unwrap());
-    let (n, drives, p) = (trace.samples(), trace.drives(), regressor.columns());
-    let mut put = |x: f64| out.write_all(&x.to_le_bytes()).unwrap();
-    for x in [n as f64, drives as f64, p as f64, cutoff, trace.smear] {
-        put(x);
-    }
-    trace.time.iter().for_each(|x| put(*x));
-    trace.motion.iter().flatten().flatten().for_each(|x| put(*x));
-    trace.measured.iter().flatten().for_each(|x| put(*x));
-    trace
-        .is_measured
-        .iter()
-        .flatten()
-        .for_each(|x| put(f64::from(u8::from(*x))));
-    for c in 0..p {
-        let mut e = vec![0.0; p];
-        e[c] = 1.0;
-        regressor.multiply(&e).iter().for_each(|x| put(*x));
-    }
-}
-// DUMP-END

@@ -50,6 +50,9 @@ fn group_event(rests: &[DriveResidual], group: &[DriveSegment], time: impl Fn(us
             is_strong && (a - from).abs() < tolerance && (b - to).abs() < tolerance
         })
         .collect();
+    if agreeing.iter().all(|one| one.needs_support) {
+        return None;
+    }
     let squares = agreeing
         .iter()
         .map(|one| one.deviations.min(MOST_COUNTED_DEVIATIONS).powi(2));

@@ -5,12 +5,14 @@
 //! 2. `regimes`: where a drive moves, where it stands, and where its residual shows no contact.
 //! 3. `levels`: the residual of each drive in units of its own level, without what a delay explains.
 //! 4. `segments`, `steps`: segments of one drive that stand out, in motion and at standstill.
-//! 5. `similar_states`: drops what repeats at similar states, which is a law that the model lacks.
+//! 5. `doubts`, `similar_states`: drop noise that is large for a while, friction that switches, and what repeats at
+//!    similar states, which is a law that the model lacks.
 //! 6. `grouping`: joins the drives.
 //!
 //! Decision: an event has a start and an end within the run. What lasts until the end is a change of the machine, such
 //! as a payload.
 
+mod doubts;
 mod fit;
 mod grouping;
 mod levels;
@@ -97,6 +99,10 @@ fn accept_segment(
     if !lasts || !is_within || true_share(masked) > EVENT_LONGEST_MASKED_SHARE[usize::from(is_strong)] {
         return None;
     }
+    if doubts::is_local_noise(rest, &segment) {
+        return None;
+    }
+    segment.needs_support = doubts::may_be_friction(trace, rest, &segment);
     let comparison = similar_states::compare_with_similar_states(trace, rest, states, &segment);
     segment.is_confirmed = comparison == StateComparison::Alone;
     match comparison {

@@ -23,6 +23,8 @@ pub(super) struct DriveSegment {
     pub(super) deviations: f64,
     /// Whether the residual is not there at similar states.
     pub(super) is_confirmed: bool,
+    /// Whether another drive must confirm it.
+    pub(super) needs_support: bool,
     /// Whether it lies at standstill and consists of two opposite steps.
     pub(super) is_at_standstill: bool,
 }
@@ -113,6 +115,7 @@ fn grow_segment(trace: &ResidualTrace, rest: &DriveResidual, core: std::ops::Ran
         force: sign * if typical > 0.0 { typical } else { height },
         deviations: deviations[0].max(deviations[1]),
         is_confirmed: false,
+        needs_support: false,
         is_at_standstill: false,
     })
 }

@@ -57,6 +57,7 @@ pub(super) fn pushes_at_standstill(trace: &ResidualTrace, rest: &DriveResidual) 
             force: first.height.signum() * first.height.abs().min(last.height.abs()),
             deviations: first.height.abs().min(last.height.abs()) / deviation,
             is_confirmed: true,
+            needs_support: false,
             is_at_standstill: true,
         }));
     }

@@ -23,13 +23,23 @@ fn calm_trace(seed: u64, from_point_to_point: bool) -> ResidualTrace {
     let (mut positions, mut rates, mut accelerations) = (Vec::new(), Vec::new(), Vec::new());
     for _ in 0..DRIVES {
         let waves: Vec<[f64; 3]> = (1..4)
-            .map(|k| [0.3 + draws.below_one(), TAU * f64::from(k) / 10.0, TAU * draws.below_one()])
+            .map(|k| {
+                [
+                    0.3 + draws.below_one(),
+                    TAU * f64::from(k) / 10.0,
+                    TAU * draws.below_one(),
+                ]
+            })
             .collect();
         // From point to point the same waves are played for half of every period of 5 s.
         let phase = |t: f64| {
             if from_point_to_point {
                 let part = (t / 5.0).fract();
-                let done = if part < 0.5 { part - (2.0 * TAU * part).sin() / (2.0 * TAU) } else { 0.5 };
+                let done = if part < 0.5 {
+                    part - (2.0 * TAU * part).sin() / (2.0 * TAU)
+                } else {
+                    0.5
+                };
                 5.0 * ((t / 5.0).floor() * 0.5 + done)
             } else {
                 t
@@ -38,7 +48,11 @@ fn calm_trace(seed: u64, from_point_to_point: bool) -> ResidualTrace {
         let at = |t: f64| waves.iter().map(|[a, w, p]| a * (w * phase(t) + p).sin()).sum::<f64>();
         let step = 1e-3;
         positions.push(time.iter().map(|t| at(*t)).collect());
-        rates.push(time.iter().map(|t| (at(t + step) - at(t - step)) / (2.0 * step)).collect());
+        rates.push(
+            time.iter()
+                .map(|t| (at(t + step) - at(t - step)) / (2.0 * step))
+                .collect(),
+        );
         let second = |t: &f64| (at(t + step) - 2.0 * at(*t) + at(t - step)) / (step * step);
         accelerations.push(time.iter().map(second).collect());
     }
@@ -46,7 +60,11 @@ fn calm_trace(seed: u64, from_point_to_point: bool) -> ResidualTrace {
         .iter()
         .map(|position: &Vec<f64>| position.iter().map(|q| q.sin()).collect())
         .collect();
-    let mut noise = || (0..SAMPLES).map(|_| NOISE * draws.nearly_normal()).collect::<Vec<f64>>();
+    let mut noise = || {
+        (0..SAMPLES)
+            .map(|_| NOISE * draws.nearly_normal())
+            .collect::<Vec<f64>>()
+    };
     let residual: Vec<Vec<f64>> = (0..DRIVES).map(|_| noise()).collect();
     let mut trace = ResidualTrace {
         time,
@@ -118,7 +136,10 @@ fn pushes_are_found_with_their_times() {
         let is_one = |event: &ContactEvent| pushes.iter().any(|(from, to)| event.from < *to && event.to > *from);
         wrong += events.iter().filter(|event| !is_one(event)).count();
     }
-    assert!(10 * found >= 9 * planted && wrong == 0, "{found} of {planted}, {wrong} wrong");
+    assert!(
+        10 * found >= 9 * planted && wrong == 0,
+        "{found} of {planted}, {wrong} wrong"
+    );
 }
 
 /// A force that is a function of the state is no contact, nor is one that lasts until the end.
@@ -145,7 +166,11 @@ fn faulty_readings_are_no_contacts() {
         let mut dead = calm_trace(400 + seed, false);
         for i in 0..SAMPLES {
             let fitted = dead.measured[0][i] - dead.residual[0][i];
-            let reading = if dead.measured[0][i].abs() < 0.6 { 0.0 } else { dead.measured[0][i] };
+            let reading = if dead.measured[0][i].abs() < 0.6 {
+                0.0
+            } else {
+                dead.measured[0][i]
+            };
             dead.measured[0][i] = reading;
             dead.residual[0][i] = reading - 0.3 * fitted;
         }

@@ -1,0 +1,48 @@
+//! Doubts about a segment of one drive: a noise that is large there, and a switch of friction at its start or end.
+
+use super::levels::DriveResidual;
+use super::segments::DriveSegment;
+use super::smoothing::{range_median, sample_quantile, true_ranges};
+use super::trace::ResidualTrace;
+use crate::audit::thresholds::{LOCAL_NOISE_LEAST_DEVIATIONS, SWITCH_FRICTION_SHARE, SWITCH_NEAR_S};
+
+/// Samples on either side of a reversal that show the jump of the force.
+const JUMP_SAMPLES: isize = 5;
+
+/// Whether the mean of the residual in a segment hardly exceeds what noise of its size there would give. The noise is
+/// that between neighbouring samples, half of which are taken to be independent.
+pub(super) fn is_local_noise(rest: &DriveResidual, segment: &DriveSegment) -> bool {
+    let values = &rest.values[segment.start..segment.end];
+    if values.len() < 4 {
+        return true;
+    }
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let squares = values.windows(2).map(|pair| (pair[1] - pair[0]).powi(2));
+    let variance = 0.5 * squares.sum::<f64>() / (n - 1.0);
+    let deviation = (2.0 * variance / n).sqrt();
+    mean * segment.force.signum() < LOCAL_NOISE_LEAST_DEVIATIONS * deviation
+}
+
+/// Whether dry friction may be the cause of a segment: it begins, ends or lies at a switch of friction, and is smaller
+/// than the friction of its drive. Then another drive must confirm it.
+pub(super) fn may_be_friction(trace: &ResidualTrace, rest: &DriveResidual, segment: &DriveSegment) -> bool {
+    let near = trace.sample_count(SWITCH_NEAR_S, 1);
+    let about = segment.start.saturating_sub(near)..(segment.end + near).min(trace.samples());
+    let has_switch = rest.is_masked[about].contains(&true);
+    has_switch && segment.force.abs() < SWITCH_FRICTION_SHARE * dry_friction(trace, rest)
+}
+
+/// The dry friction of a drive: half of the median jump of its force over a reversal, N or N m; 0 without reversals.
+fn dry_friction(trace: &ResidualTrace, rest: &DriveResidual) -> f64 {
+    let (force, rate) = (&trace.measured[rest.drive], &trace.motion[1][rest.drive]);
+    let reversals = true_ranges(&rest.is_masked).into_iter();
+    let jumps = reversals.filter_map(|range| {
+        let before = rate[range.start.checked_sub(1)?];
+        let after = *rate.get(range.end)?;
+        let [start, end] = [range.start, range.end].map(|at| isize::try_from(at).unwrap_or(isize::MAX));
+        let jump = range_median(force, end, end + JUMP_SAMPLES)? - range_median(force, start - JUMP_SAMPLES, start)?;
+        (before * after < 0.0).then_some(0.5 * jump.abs())
+    });
+    sample_quantile(jumps.collect(), 0.5)
+}
