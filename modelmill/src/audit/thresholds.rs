@@ -71,6 +71,9 @@ pub(super) const LONG_MEAN_S: f64 = 0.2;
 /// Time in motion that a drive must have for a level of its residual, s. By judgement.
 pub(super) const LEVEL_FEWEST_S: f64 = 1.0;
 
+/// The level of a residual is at least this share of the rms force (1): no model is more accurate. By judgement.
+pub(super) const LEVEL_LEAST_FORCE_SHARE: f64 = 1e-3;
+
 /// The level of a residual is at most this many deviations by its median (1): events raise its upper quantile.
 pub(super) const LEVEL_MOST_RATIO: f64 = 2.0;
 
@@ -111,7 +114,7 @@ pub(super) const SUDDEN_LEAST_DEVIATIONS: f64 = 10.0;
 pub(super) const EVENTS_MOST_DURATION_SHARE: f64 = 0.6;
 
 /// The mean residual of an event exceeds the noise within it by this many standard deviations (1).
-pub(super) const LOCAL_NOISE_LEAST_DEVIATIONS: f64 = 6.0;
+pub(super) const LOCAL_NOISE_LEAST_DEVIATIONS: f64 = 8.0;
 
 /// A switch of friction is near the start or end of an event if there is less time between them, s.
 pub(super) const SWITCH_NEAR_S: f64 = 0.05;
@@ -119,6 +122,9 @@ pub(super) const SWITCH_NEAR_S: f64 = 0.05;
 /// At a switch of friction an event of a single drive exceeds this share of its dry friction (1). The KUKA KR300 and
 /// the Cloos have such residuals.
 pub(super) const SWITCH_FRICTION_SHARE: f64 = 1.0;
+
+/// Weight of the jerk among the states of a drive (1): its noise is large.
+pub(super) const JERK_WEIGHT: f64 = 0.5;
 
 /// Samples are neighbours in state if their distance is below this many standard deviations of the states. By
 /// judgement.
@@ -168,6 +174,14 @@ pub(super) const GROUP_LEAST_DEVIATION_SHARE: f64 = 0.2;
 
 /// The deviations of all drives of an event, as root of their sum of squares, are at least this (1).
 pub(super) const EVENT_LEAST_POWER: f64 = 7.0;
+
+/// An event of a single drive that is shorter is brief, s.
+pub(super) const BRIEF_EVENT_S: f64 = 0.15;
+
+/// A brief event exceeds the level of its drive by this factor (1), and this share of its rms force (1). Measured arms
+/// have residuals of 10 levels for 0.07 s; hits of a limit switch have some hundred.
+pub(super) const BRIEF_LEAST_DEVIATIONS: f64 = 15.0;
+pub(super) const BRIEF_LEAST_FORCE_SHARE: f64 = 0.05;
 
 /// A drive counts with at most this many deviations (1). By judgement.
 pub(super) const MOST_COUNTED_DEVIATIONS: f64 = 40.0;

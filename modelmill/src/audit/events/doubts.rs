@@ -2,12 +2,9 @@
 
 use super::levels::DriveResidual;
 use super::segments::DriveSegment;
-use super::smoothing::{range_median, sample_quantile, true_ranges};
+use super::smoothing::sample_quantile;
 use super::trace::ResidualTrace;
 use crate::audit::thresholds::{LOCAL_NOISE_LEAST_DEVIATIONS, SWITCH_FRICTION_SHARE, SWITCH_NEAR_S};
-
-/// Samples on either side of a reversal that show the jump of the force.
-const JUMP_SAMPLES: isize = 5;
 
 /// Whether the mean of the residual in a segment hardly exceeds what noise of its size there would give. The noise is
 /// that between neighbouring samples, half of which are taken to be independent.
@@ -33,16 +30,11 @@ pub(super) fn may_be_friction(trace: &ResidualTrace, rest: &DriveResidual, segme
     has_switch && segment.force.abs() < SWITCH_FRICTION_SHARE * dry_friction(trace, rest)
 }
 
-/// The dry friction of a drive: half of the median jump of its force over a reversal, N or N m; 0 without reversals.
+/// The dry friction of a drive: half of the median jump of its fitted force where the rate changes its sign between two
+/// samples, N or N m; 0 without reversals.
 fn dry_friction(trace: &ResidualTrace, rest: &DriveResidual) -> f64 {
-    let (force, rate) = (&trace.measured[rest.drive], &trace.motion[1][rest.drive]);
-    let reversals = true_ranges(&rest.is_masked).into_iter();
-    let jumps = reversals.filter_map(|range| {
-        let before = rate[range.start.checked_sub(1)?];
-        let after = *rate.get(range.end)?;
-        let [start, end] = [range.start, range.end].map(|at| isize::try_from(at).unwrap_or(isize::MAX));
-        let jump = range_median(force, end, end + JUMP_SAMPLES)? - range_median(force, start - JUMP_SAMPLES, start)?;
-        (before * after < 0.0).then_some(0.5 * jump.abs())
-    });
+    let (fitted, rate) = (trace.fitted_force(rest.drive), &trace.motion[1][rest.drive]);
+    let reversals = (1..rate.len()).filter(|i| rate[i - 1] * rate[*i] < 0.0);
+    let jumps = reversals.map(|i| 0.5 * (fitted[i] - fitted[i - 1]).abs());
     sample_quantile(jumps.collect(), 0.5)
 }

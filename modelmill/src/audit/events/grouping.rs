@@ -6,8 +6,8 @@ use super::levels::DriveResidual;
 use super::segments::DriveSegment;
 use super::trace::ResidualTrace;
 use crate::audit::thresholds::{
-    EVENT_GAP_S, EVENT_LEAST_POWER, GROUP_LEAST_DEVIATION_SHARE, GROUP_TIME_SHARE, GROUP_TIME_TOLERANCE_S,
-    MOST_COUNTED_DEVIATIONS,
+    BRIEF_EVENT_S, BRIEF_LEAST_DEVIATIONS, BRIEF_LEAST_FORCE_SHARE, EVENT_GAP_S, EVENT_LEAST_POWER,
+    GROUP_LEAST_DEVIATION_SHARE, GROUP_TIME_SHARE, GROUP_TIME_TOLERANCE_S, MOST_COUNTED_DEVIATIONS,
 };
 
 /// Events from the accepted segments, in the order of time.
@@ -51,6 +51,13 @@ fn group_event(rests: &[DriveResidual], group: &[DriveSegment], time: impl Fn(us
         })
         .collect();
     if agreeing.iter().all(|one| one.needs_support) {
+        return None;
+    }
+    let is_single = agreeing.iter().all(|one| one.drive == strongest.drive);
+    let is_clear = strongest.deviations > BRIEF_LEAST_DEVIATIONS
+        && strongest.force.abs() > BRIEF_LEAST_FORCE_SHARE * rests[strongest.drive].force_rms;
+    let is_brief = to - from < BRIEF_EVENT_S && !strongest.is_at_standstill;
+    if is_single && is_brief && !is_clear {
         return None;
     }
     let squares = agreeing

@@ -4,7 +4,7 @@
 use super::regimes::DriveRegimes;
 use super::smoothing::{differences_per_sample, median_deviation, running_mean, running_median, sample_quantile};
 use super::trace::ResidualTrace;
-use crate::audit::thresholds::{LEVEL_FEWEST_S, LEVEL_MOST_RATIO, LONG_MEAN_S, SHORT_MEAN_S};
+use crate::audit::thresholds::{LEVEL_FEWEST_S, LEVEL_LEAST_FORCE_SHARE, LEVEL_MOST_RATIO, LONG_MEAN_S, SHORT_MEAN_S};
 
 /// Fewest samples with which the share of a delay or a compliance is fitted.
 const FEWEST_FITTED: usize = 50;
@@ -12,8 +12,6 @@ const FEWEST_FITTED: usize = 50;
 const ROUNDS: usize = 5;
 /// Residuals beyond this many deviations have less weight in it.
 const HUBER_DEVIATIONS: f64 = 2.0;
-/// Levels below this share of the rms force are rounding.
-const ROUNDING: f64 = 1e-9;
 
 /// The residual of a drive, smoothed over some time.
 pub(super) struct SmoothedResidual {
@@ -80,7 +78,7 @@ impl SmoothedResidual {
         if shown.len() < fewest {
             return Self {
                 values: vec![0.0; smooth.len()],
-                level: ROUNDING * force_rms,
+                level: LEVEL_LEAST_FORCE_SHARE * force_rms,
             };
         }
         // Long pushes raise the upper quantile, and a residual with long tails lowers the median.
@@ -91,7 +89,7 @@ impl SmoothedResidual {
             values: (smooth.iter().zip(is_masked))
                 .map(|(value, masked)| if *masked { 0.0 } else { *value })
                 .collect(),
-            level: level.max(ROUNDING * force_rms),
+            level: level.max(LEVEL_LEAST_FORCE_SHARE * force_rms),
         }
     }
 }

@@ -3,10 +3,10 @@
 
 use super::levels::DriveResidual;
 use super::segments::DriveSegment;
-use super::smoothing::range_median;
+use super::smoothing::{differences_per_sample, range_median, running_mean};
 use super::trace::ResidualTrace;
 use crate::audit::thresholds::{
-    ALONE_LEAST_SHARE, EDGE_LEAST_SHARE, EDGE_MOST_DISTANCE_SIGMAS, NEIGHBOUR_MOST_DISTANCE_SIGMAS,
+    ALONE_LEAST_SHARE, EDGE_LEAST_SHARE, EDGE_MOST_DISTANCE_SIGMAS, JERK_WEIGHT, NEIGHBOUR_MOST_DISTANCE_SIGMAS,
     REPEATED_LEAST_MEAN_SHARE, REPEATED_LEAST_RMS_SHARE,
 };
 
@@ -16,6 +16,8 @@ const COMPARED: usize = 40;
 const NEIGHBOURS: usize = 5;
 /// Time before and after a segment whose samples are no neighbours, s.
 const AROUND_S: f64 = 0.1;
+/// Time over which the jerk is averaged, s.
+const JERK_MEAN_S: f64 = 0.05;
 /// Time over which the level at either side of an edge is taken, s.
 const EDGE_LEVEL_S: f64 = 0.08;
 /// Half of the time that an edge may take, s.
@@ -35,25 +37,30 @@ pub(super) enum StateComparison {
 }
 
 /// States of one drive, each scaled by its standard deviation.
-pub(super) struct ScaledStates([Vec<f64>; 4]);
+pub(super) struct ScaledStates([Vec<f64>; 5]);
 
 impl ScaledStates {
-    /// Position, rate, acceleration and fitted force of a drive.
+    /// Position, rate, acceleration, fitted force and jerk of a drive; the jerk counts less.
     pub(super) fn new(trace: &ResidualTrace, drive: usize) -> Self {
         let [positions, rates, accelerations] = &trace.motion;
+        let jerk = differences_per_sample(&accelerations[drive]);
+        let width = trace.sample_count(JERK_MEAN_S, 1);
         let states = [
             positions[drive].clone(),
             rates[drive].clone(),
             accelerations[drive].clone(),
             trace.fitted_force(drive),
+            running_mean(&jerk, width),
         ];
-        Self(states.map(|values| {
+        let mut scaled = states.map(|values| {
             let n = values.len() as f64;
             let mean = values.iter().sum::<f64>() / n;
             let sum: f64 = values.iter().map(|x| (x - mean).powi(2)).sum();
             let scale = (n / sum.max(f64::MIN_POSITIVE)).sqrt();
-            values.iter().map(|x| scale * (x - mean)).collect()
-        }))
+            values.iter().map(|x| scale * (x - mean)).collect::<Vec<f64>>()
+        });
+        scaled[4].iter_mut().for_each(|jerk| *jerk *= JERK_WEIGHT);
+        Self(scaled)
     }
 
     /// Squared distance of two samples.

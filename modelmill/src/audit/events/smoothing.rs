@@ -8,7 +8,7 @@ pub(super) fn true_ranges(mask: &[bool]) -> Vec<Range<usize>> {
     for (i, _) in mask.iter().enumerate().filter(|(_, is_true)| **is_true) {
         match ranges.last_mut() {
             Some(last) if last.end == i => last.end = i + 1,
-            _ => ranges.push(i..i + 1),
+            _ => ranges.push(Range { start: i, end: i + 1 }),
         }
     }
     ranges
