@@ -119,6 +119,13 @@ pub(super) const LOCAL_NOISE_LEAST_DEVIATIONS: f64 = 8.0;
 /// A switch of friction is near the start or end of an event if there is less time between them, s.
 pub(super) const SWITCH_NEAR_S: f64 = 0.05;
 
+/// An event of a single drive about its reversal is longer, s: TIAGo and a double pendulum have residuals of 0.2 to
+/// 0.6 s there.
+pub(super) const STICK_LONGEST_S: f64 = 0.62;
+
+/// Or its force exceeds this multiple of the dry friction (1). By judgement.
+pub(super) const STICK_MOST_FRICTIONS: f64 = 6.0;
+
 /// At a switch of friction an event of a single drive exceeds this share of its dry friction (1). The KUKA KR300 and
 /// the Cloos have such residuals.
 pub(super) const SWITCH_FRICTION_SHARE: f64 = 1.0;

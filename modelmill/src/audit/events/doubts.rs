@@ -4,7 +4,9 @@ use super::levels::DriveResidual;
 use super::segments::DriveSegment;
 use super::smoothing::sample_quantile;
 use super::trace::ResidualTrace;
-use crate::audit::thresholds::{LOCAL_NOISE_LEAST_DEVIATIONS, SWITCH_FRICTION_SHARE, SWITCH_NEAR_S};
+use crate::audit::thresholds::{
+    LOCAL_NOISE_LEAST_DEVIATIONS, STICK_LONGEST_S, STICK_MOST_FRICTIONS, SWITCH_FRICTION_SHARE, SWITCH_NEAR_S,
+};
 
 /// Whether the mean of the residual in a segment hardly exceeds what noise of its size there would give. The noise is
 /// that between neighbouring samples, half of which are taken to be independent.
@@ -22,12 +24,21 @@ pub(super) fn is_local_noise(rest: &DriveResidual, segment: &DriveSegment) -> bo
 }
 
 /// Whether dry friction may be the cause of a segment: it begins, ends or lies at a switch of friction, and is smaller
-/// than the friction of its drive. Then another drive must confirm it.
+/// than the friction of its drive, or it is short and lies about a reversal. Then another drive must confirm it.
 pub(super) fn may_be_friction(trace: &ResidualTrace, rest: &DriveResidual, segment: &DriveSegment) -> bool {
     let near = trace.sample_count(SWITCH_NEAR_S, 1);
     let about = segment.start.saturating_sub(near)..(segment.end + near).min(trace.samples());
+    // About a reversal a drive may stick.
+    let rate = &trace.motion[1][rest.drive];
+    let last = segment.end.min(trace.samples()) - 1;
+    let lasted = trace.time[last] - trace.time[segment.start];
+    let friction = dry_friction(trace, rest);
+    let is_about_reversal = rate[segment.start] * rate[last] < 0.0 && lasted < STICK_LONGEST_S;
+    if is_about_reversal && segment.force.abs() < STICK_MOST_FRICTIONS * friction {
+        return true;
+    }
     let has_switch = rest.is_masked[about].contains(&true);
-    has_switch && segment.force.abs() < SWITCH_FRICTION_SHARE * dry_friction(trace, rest)
+    has_switch && segment.force.abs() < SWITCH_FRICTION_SHARE * friction
 }
 
 /// The dry friction of a drive: half of the median jump of its fitted force where the rate changes its sign between two

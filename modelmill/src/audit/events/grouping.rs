@@ -54,9 +54,9 @@ fn group_event(rests: &[DriveResidual], group: &[DriveSegment], time: impl Fn(us
         return None;
     }
     let is_single = agreeing.iter().all(|one| one.drive == strongest.drive);
-    let is_clear = strongest.deviations > BRIEF_LEAST_DEVIATIONS
+    let is_clear = (strongest.is_at_standstill || strongest.deviations > BRIEF_LEAST_DEVIATIONS)
         && strongest.force.abs() > BRIEF_LEAST_FORCE_SHARE * rests[strongest.drive].force_rms;
-    let is_brief = to - from < BRIEF_EVENT_S && !strongest.is_at_standstill;
+    let is_brief = to - from < BRIEF_EVENT_S;
     if is_single && is_brief && !is_clear {
         return None;
     }
