@@ -186,8 +186,8 @@ pub(super) const EVENT_LEAST_POWER: f64 = 7.0;
 pub(super) const BRIEF_EVENT_S: f64 = 0.15;
 
 /// A brief event exceeds the level of its drive by this factor (1), and this share of its rms force (1). Measured arms
-/// have residuals of 10 levels for 0.07 s; hits of a limit switch have some hundred.
-pub(super) const BRIEF_LEAST_DEVIATIONS: f64 = 15.0;
+/// have residuals of 10 levels for 0.07 s, simulated light wrists of 33 for 0.1 s; hits of a limit switch have 500.
+pub(super) const BRIEF_LEAST_DEVIATIONS: f64 = 50.0;
 pub(super) const BRIEF_LEAST_FORCE_SHARE: f64 = 0.05;
 
 /// A drive counts with at most this many deviations (1). By judgement.
