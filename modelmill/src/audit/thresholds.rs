@@ -67,6 +67,7 @@ pub(super) const DEAD_BAND_LEAST_SHARE: f64 = 0.3;
 /// out.
 pub(super) const SHORT_MEAN_S: f64 = 0.04;
 pub(super) const LONG_MEAN_S: f64 = 0.2;
+pub(super) const SLOW_MEAN_S: f64 = 0.7;
 
 /// Time in motion that a drive must have for a level of its residual, s. By judgement.
 pub(super) const LEVEL_FEWEST_S: f64 = 1.0;
@@ -130,12 +131,24 @@ pub(super) const STICK_MOST_FRICTIONS: f64 = 6.0;
 /// the Cloos have such residuals.
 pub(super) const SWITCH_FRICTION_SHARE: f64 = 1.0;
 
+/// Friction is no cause of a segment whose residual changes by this share of its force (1) at start and end, if it stands
+/// out by the first factor (1) and is shown for the most part, or by the second one. Residuals of friction of measured
+/// arms stand out by up to 11 where they are shown, and by 31 where they are hidden.
+pub(super) const SHARP_LEAST_CONTRAST: f64 = 0.75;
+pub(super) const SHARP_LEAST_DEVIATIONS: f64 = 12.5;
+pub(super) const SHARP_HIDDEN_LEAST_DEVIATIONS: f64 = 60.0;
+
 /// Weight of the jerk among the states of a drive (1): its noise is large.
 pub(super) const JERK_WEIGHT: f64 = 0.5;
 
 /// Samples are neighbours in state if their distance is below this many standard deviations of the states. By
 /// judgement.
 pub(super) const NEIGHBOUR_MOST_DISTANCE_SIGMAS: f64 = 1.0;
+
+/// Of all visits of similar states those are compared whose distance is at most this multiple of the nearest one (1), or
+/// below this many standard deviations. By judgement.
+pub(super) const VISIT_MOST_DISTANCE_RATIO: f64 = 2.0;
+pub(super) const VISIT_NEAR_SIGMAS: f64 = 0.3;
 
 /// A residual repeats with the motion if its neighbours in state have at least this share of it on average (1). By
 /// judgement.
@@ -154,14 +167,17 @@ pub(super) const EDGE_LEAST_SHARE: f64 = 0.5;
 /// Meanwhile the state changes by less than this many of its standard deviations (1).
 pub(super) const EDGE_MOST_DISTANCE_SIGMAS: f64 = 0.5;
 
-/// Time over which the level of the force is taken on either side of a step at standstill, s.
-pub(super) const STEP_WINDOW_S: f64 = 0.1;
+/// Times over which the level of the force is taken on either side of a step at standstill, s.
+pub(super) const STEP_WINDOWS_S: [f64; 2] = [0.1, 0.25];
 
 /// Time after and before a motion in which no step is a push, s: friction changes its direction there.
 pub(super) const STANDSTILL_END_MARGIN_S: f64 = 0.15;
 
 /// A step at standstill exceeds the usual change of the force by this factor (1).
-pub(super) const STEP_LEAST_DEVIATIONS: f64 = 5.0;
+pub(super) const STEP_LEAST_DEVIATIONS: f64 = 4.0;
+
+/// It also exceeds this share of the rms force of its drive (1): the KUKA KR300 has steps of 0.02 at standstill.
+pub(super) const STEP_LEAST_FORCE_SHARE: f64 = 0.035;
 
 /// Ratio of the larger to the smaller of the two steps of a push, at most (1).
 pub(super) const STEP_MOST_RATIO: f64 = 1.67;
@@ -179,11 +195,46 @@ pub(super) const GROUP_TIME_SHARE: f64 = 0.2;
 /// A drive takes part in an event if it stands out by this share of the deviations of the strongest drive (1).
 pub(super) const GROUP_LEAST_DEVIATION_SHARE: f64 = 0.2;
 
+/// Of several drives that stand out clearly one changes its residual at start and end by this share of its force (1).
+pub(super) const GROUP_LEAST_CONTRAST: f64 = 0.5;
+
+/// The drive that shows an event, which is not hidden and begins and ends at once, stands out by this share of the
+/// deviations of the strongest drive (1).
+pub(super) const SHOWN_LEAST_DEVIATION_SHARE: f64 = 0.8;
+
+/// A drive with other times takes part if it stands out by this factor (1) and overlaps with the strongest drive for
+/// this share of the shorter one of both (1): a reversal hides the start or the end of a push from one drive.
+pub(super) const GROUP_CLEAR_DEVIATIONS: f64 = 10.0;
+pub(super) const GROUP_LEAST_OVERLAP: f64 = 0.7;
+
+/// An event of a single drive exceeds this share of its rms force (1).
+pub(super) const ALONE_LEAST_FORCE_SHARE: f64 = 0.03;
+
+/// Share of the samples of an event of a single drive that may show no contact (1), unless it is large: the KUKA KR300
+/// and a double pendulum have residuals about reversals that are hidden by 0.34 or more.
+pub(super) const ALONE_MOST_MASKED_SHARE: f64 = 0.33;
+
+/// It may be hidden if it stands out by this factor (1): those of the KUKA KR300 stand out by up to 24.
+pub(super) const HIDDEN_LEAST_DEVIATIONS: f64 = 28.0;
+
+/// A brief event of several drives stands out by this factor (1): the Cloos has residuals of 8 for 0.06 s.
+pub(super) const FAINT_HIT_MOST_DEVIATIONS: f64 = 12.0;
+
+/// An event of a single drive that stands out by less than this factor (1) is faint. At its start and end the residual
+/// changes by at least the given share of its force (1), as a push does and an error of the model does not.
+pub(super) const FAINT_MOST_DEVIATIONS: f64 = 60.0;
+pub(super) const FAINT_LEAST_CONTRAST: f64 = 0.6;
+
+/// An event of a single drive that lasts less, s, stands out by this factor (1): smoothing leaves such residuals about a
+/// fast reversal of another drive.
+pub(super) const FAINT_SHORTEST_S: f64 = 0.14;
+pub(super) const FAINT_SHORT_LEAST_DEVIATIONS: f64 = 15.0;
+
 /// The deviations of all drives of an event, as root of their sum of squares, are at least this (1).
-pub(super) const EVENT_LEAST_POWER: f64 = 7.0;
+pub(super) const EVENT_LEAST_POWER: f64 = 5.0;
 
 /// An event of a single drive that is shorter is brief, s.
-pub(super) const BRIEF_EVENT_S: f64 = 0.15;
+pub(super) const BRIEF_EVENT_S: f64 = 0.075;
 
 /// A brief event exceeds the level of its drive by this factor (1), and this share of its rms force (1). Measured arms
 /// have residuals of 10 levels for 0.07 s, simulated light wrists of 33 for 0.1 s; hits of a limit switch have 500.

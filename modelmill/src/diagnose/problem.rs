@@ -158,6 +158,7 @@ pub(crate) fn find_missing_effects(
     };
     let are_changes_searched = problem.searches_changes();
     let forces = (problem.measured.clone(), problem.removed.clone());
+    let known = problem.candidates.len();
     let search = |problem: &mut DiagnosisProblem| {
         let host = model.host();
         host.run_job("searching for missing effects", 0, |_| diagnose(problem, &supply))
@@ -166,6 +167,9 @@ pub(crate) fn find_missing_effects(
     // A missing effect hides small contacts: with the effects found, they stand out. Then the search is repeated.
     if asked.in_full && leave_out_late_contacts(&mut problem, model, &all, &diagnosis.residual) {
         (problem.measured, problem.removed) = forces;
+        // The first search added changes in time that a contact may have caused.
+        problem.candidates.truncate(known);
+        problem.change_intervals.clear();
         diagnosis = search(&mut problem)?;
     }
     // Stage 5: texts, and candidates that could not be evaluated.

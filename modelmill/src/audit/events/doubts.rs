@@ -2,11 +2,16 @@
 
 use super::levels::DriveResidual;
 use super::segments::DriveSegment;
-use super::smoothing::sample_quantile;
+use super::smoothing::{range_median, sample_quantile};
 use super::trace::ResidualTrace;
 use crate::audit::thresholds::{
     LOCAL_NOISE_LEAST_DEVIATIONS, STICK_LONGEST_S, STICK_MOST_FRICTIONS, SWITCH_FRICTION_SHARE, SWITCH_NEAR_S,
 };
+
+/// Half of the time that an edge may take, s.
+const EDGE_RISE_S: f64 = 0.04;
+/// Time over which the level at either side of an edge is taken, s.
+const EDGE_LEVEL_S: f64 = 0.08;
 
 /// Whether the mean of the residual in a segment hardly exceeds what noise of its size there would give. The noise is
 /// that between neighbouring samples, half of which are taken to be independent.
@@ -37,8 +42,30 @@ pub(super) fn may_be_friction(trace: &ResidualTrace, rest: &DriveResidual, segme
     if is_about_reversal && segment.force.abs() < STICK_MOST_FRICTIONS * friction {
         return true;
     }
-    let has_switch = rest.is_masked[about].contains(&true);
-    has_switch && segment.force.abs() < SWITCH_FRICTION_SHARE * friction
+    let has_switch = |at: usize| {
+        let about = at.saturating_sub(near)..(at + near).min(trace.samples());
+        rest.is_masked[about].contains(&true)
+    };
+    let is_between_switches = has_switch(segment.start) || has_switch(segment.end);
+    let is_short = lasted < STICK_LONGEST_S && rest.is_masked[about].contains(&true);
+    (is_between_switches || is_short) && segment.force.abs() < SWITCH_FRICTION_SHARE * friction
+}
+
+/// How much the residual changes at the start and at the end of a segment, in units of its force (1): 1 for a push that
+/// begins and ends at once, less for an error that comes and goes with the motion. The smaller one of both.
+pub(super) fn edge_contrast(trace: &ResidualTrace, rest: &DriveResidual, segment: &DriveSegment) -> f64 {
+    let signed = |at: usize| isize::try_from(at).unwrap_or(isize::MAX);
+    let rise = signed(trace.sample_count(EDGE_RISE_S, 1));
+    let window = signed(trace.sample_count(EDGE_LEVEL_S, 2));
+    let (start, end) = (signed(segment.start), signed(segment.end));
+    let sign = segment.force.signum();
+    // Brief segments have no room for both windows.
+    let (inner_rise, inner) = (rise.min((end - start) / 4), window.min((end - start) / 2).max(1));
+    let level = |from: isize, to: isize| sign * range_median(&rest.smooth, from, to).unwrap_or(0.0);
+    let first = level(start + inner_rise, start + inner_rise + inner) - level(start - rise - window, start - rise);
+    let last = level(end - inner_rise - inner, end - inner_rise) - level(end + rise, end + rise + window);
+    let within = rest.smooth[segment.start..segment.end].iter().map(|x| sign * x);
+    first.min(last) / sample_quantile(within.collect(), 0.8).max(segment.force.abs())
 }
 
 /// The dry friction of a drive: half of the median jump of its fitted force where the rate changes its sign between two

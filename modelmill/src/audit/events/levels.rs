@@ -2,9 +2,13 @@
 //! short and a long time, and set to zero where it shows no contact.
 
 use super::regimes::DriveRegimes;
-use super::smoothing::{differences_per_sample, median_deviation, running_mean, running_median, sample_quantile};
+use super::smoothing::{
+    differences_per_sample, median_deviation, running_mean, running_median, sample_quantile, shown_median,
+};
 use super::trace::ResidualTrace;
-use crate::audit::thresholds::{LEVEL_FEWEST_S, LEVEL_LEAST_FORCE_SHARE, LEVEL_MOST_RATIO, LONG_MEAN_S, SHORT_MEAN_S};
+use crate::audit::thresholds::{
+    LEVEL_FEWEST_S, LEVEL_LEAST_FORCE_SHARE, LEVEL_MOST_RATIO, LONG_MEAN_S, SHORT_MEAN_S, SLOW_MEAN_S,
+};
 
 /// Fewest samples with which the share of a delay or a compliance is fitted.
 const FEWEST_FITTED: usize = 50;
@@ -31,10 +35,9 @@ pub(super) struct DriveResidual {
     pub(super) values: Vec<f64>,
     /// The same, smoothed over the short time, also where it shows no contact.
     pub(super) smooth: Vec<f64>,
-    /// Smoothed over the short time, which keeps the times of an event.
-    pub(super) short: SmoothedResidual,
-    /// Smoothed over the long time, in which small forces stand out.
-    pub(super) long: SmoothedResidual,
+    /// Smoothed over times from short to long: the shortest keeps the times of an event, in the longest ones small
+    /// forces stand out.
+    pub(super) forms: [SmoothedResidual; 3],
     /// Whether a sample in motion shows no contact, or the drive stands.
     pub(super) is_masked: Vec<bool>,
     /// Regimes of the drive.
@@ -49,18 +52,19 @@ impl DriveResidual {
             .collect();
         let force_rms = trace.force_rms(drive);
         let values = without_delay(trace, drive, &is_masked);
-        let [short, long] = [SHORT_MEAN_S, LONG_MEAN_S].map(|time| {
-            // Odd widths are symmetric.
-            running_median(&values, trace.sample_count(time, 3) | 1)
-        });
+        // Odd widths are symmetric.
+        let width = |time: f64| trace.sample_count(time, 3) | 1;
+        let smooth = running_median(&values, width(SHORT_MEAN_S));
+        let long = running_median(&values, width(LONG_MEAN_S));
+        // Over a long time a switch of friction within it would count as well.
+        let slow = shown_median(&values, &is_masked, width(SLOW_MEAN_S));
         let fewest = trace.sample_count(LEVEL_FEWEST_S, FEWEST_FITTED / 2);
         let with_level = |smooth: &[f64]| SmoothedResidual::new(smooth, &is_masked, force_rms, fewest);
         Self {
             drive,
             force_rms,
-            short: with_level(&short),
-            long: with_level(&long),
-            smooth: short,
+            forms: [with_level(&smooth), with_level(&long), with_level(&slow)],
+            smooth,
             values,
             is_masked,
             regimes,

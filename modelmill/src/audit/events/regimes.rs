@@ -14,6 +14,9 @@ use crate::audit::thresholds::{
 /// Time over which rates are averaged before they are compared with a limit, s.
 const RATE_MEAN_S: f64 = 0.05;
 
+/// Rates below this share of the limit are close to zero (1).
+const CALM_RATE_SHARE: f64 = 1.0 / 3.0;
+
 /// Regimes of a drive at each sample.
 pub(super) struct DriveRegimes {
     /// Whether the drive is at standstill for some time.
@@ -47,12 +50,16 @@ pub(super) fn standing_mask(rates: &[f64], samples_per_second: f64, slowest: f64
             standing[range].fill(true);
         }
     }
+    // A slow reversal passes evenly through all small rates; at standstill most of them are close to zero.
     let shortest = count(STANDSTILL_SHORTEST_S);
-    for range in true_ranges(&standing)
-        .into_iter()
-        .filter(|range| range.len() < shortest)
-    {
-        standing[range].fill(false);
+    for range in true_ranges(&standing) {
+        let calm = magnitudes[range.clone()]
+            .iter()
+            .filter(|v| **v <= CALM_RATE_SHARE * limit)
+            .count();
+        if range.len() < shortest || 2 * calm < range.len() {
+            standing[range].fill(false);
+        }
     }
     standing
 }

@@ -3,11 +3,11 @@
 
 use super::levels::DriveResidual;
 use super::segments::DriveSegment;
-use super::smoothing::{differences_per_sample, range_median, running_mean};
+use super::smoothing::{differences_per_sample, range_median, running_mean, sample_quantile};
 use super::trace::ResidualTrace;
 use crate::audit::thresholds::{
     ALONE_LEAST_SHARE, EDGE_LEAST_SHARE, EDGE_MOST_DISTANCE_SIGMAS, JERK_WEIGHT, NEIGHBOUR_MOST_DISTANCE_SIGMAS,
-    REPEATED_LEAST_MEAN_SHARE, REPEATED_LEAST_RMS_SHARE,
+    REPEATED_LEAST_MEAN_SHARE, REPEATED_LEAST_RMS_SHARE, VISIT_MOST_DISTANCE_RATIO, VISIT_NEAR_SIGMAS,
 };
 
 /// Number of samples of a segment that are compared with the rest of the run.
@@ -87,17 +87,19 @@ pub(super) fn compare_with_similar_states(
     let mut n_compared = 0;
     for i in compared {
         n_compared += 1;
-        let Some(neighbours) = nearest_samples(states, *i, &others) else {
+        let neighbours = nearest_visits(states, *i, &others, around);
+        if neighbours.is_empty() {
             continue;
-        };
+        }
         known += 1;
-        let own = rest.values[*i];
-        let theirs = neighbours.iter().map(|k| rest.values[*k]);
-        let mean = theirs.clone().sum::<f64>() / NEIGHBOURS as f64;
-        let square = theirs.map(|x| x * x).sum::<f64>() / NEIGHBOURS as f64;
-        let is_alone = mean * own.signum() < REPEATED_LEAST_MEAN_SHARE * own.abs()
-            && square.sqrt() < REPEATED_LEAST_RMS_SHARE * own.abs();
-        alone += usize::from(is_alone);
+        let own = rest.smooth[*i];
+        let theirs: Vec<f64> = neighbours.iter().map(|k| rest.smooth[*k] / own).collect();
+        let mean = sample_quantile(theirs.clone(), 0.5);
+        // Large residuals of both signs are noise that is large there.
+        let size = sample_quantile(theirs.iter().map(|x| x.abs()).collect(), 0.5);
+        let is_large = |sign: f64| theirs.iter().any(|x| sign * x > REPEATED_LEAST_RMS_SHARE);
+        let size = if is_large(1.0) && is_large(-1.0) { size } else { 0.0 };
+        alone += usize::from(mean < REPEATED_LEAST_MEAN_SHARE && size < REPEATED_LEAST_RMS_SHARE);
     }
     if 2 * known < n_compared || known == 0 {
         let is_sudden = [segment.start, segment.end]
@@ -116,20 +118,28 @@ pub(super) fn compare_with_similar_states(
     }
 }
 
-/// The nearest samples of a sample; `None` if they are not near.
-fn nearest_samples(states: &ScaledStates, sample: usize, others: &[usize]) -> Option<Vec<usize>> {
-    if others.len() < NEIGHBOURS {
-        return None;
-    }
+/// The nearest samples of a sample, one for each visit of similar states; none if none is near.
+fn nearest_visits(states: &ScaledStates, sample: usize, others: &[usize], around: usize) -> Vec<usize> {
+    let most = NEIGHBOUR_MOST_DISTANCE_SIGMAS * NEIGHBOUR_MOST_DISTANCE_SIGMAS;
     let mut near: Vec<(f64, usize)> = others
         .iter()
         .map(|k| (states.squared_distance(sample, *k), *k))
+        .filter(|(distance, _)| *distance < most)
         .collect();
-    near.select_nth_unstable_by(NEIGHBOURS - 1, |a, b| a.0.total_cmp(&b.0));
-    near.truncate(NEIGHBOURS);
-    let most = NEIGHBOUR_MOST_DISTANCE_SIGMAS * NEIGHBOUR_MOST_DISTANCE_SIGMAS;
-    let is_near = near.iter().all(|(distance, _)| *distance < most);
-    is_near.then(|| near.into_iter().map(|(_, k)| k).collect())
+    near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    // A narrow law acts at the nearest visits only.
+    let nearest = near.first().map_or(0.0, |(distance, _)| distance.sqrt());
+    let bound = (VISIT_MOST_DISTANCE_RATIO * nearest).max(VISIT_NEAR_SIGMAS).powi(2);
+    let mut visits: Vec<usize> = Vec::new();
+    for (_, k) in near.into_iter().take_while(|(distance, _)| *distance < bound) {
+        if visits.iter().all(|visit| visit.abs_diff(k) > 2 * around) {
+            visits.push(k);
+        }
+        if visits.len() == NEIGHBOURS {
+            break;
+        }
+    }
+    visits
 }
 
 /// Whether the residual changes at an edge of a segment by a large part of its size, while the state hardly changes.

@@ -38,6 +38,25 @@ pub(super) fn running_median(values: &[f64], width: usize) -> Vec<f64> {
         .collect()
 }
 
+/// The median over those of `width` neighbouring samples that are not masked; zero if most of them are. It is computed
+/// at some samples only, since it changes slowly.
+pub(super) fn shown_median(values: &[f64], is_masked: &[bool], width: usize) -> Vec<f64> {
+    let (half, stride) = (width / 2, (width / 12).max(1));
+    let at = |i: usize| {
+        let window = i.saturating_sub(half)..(i + half + 1).min(values.len());
+        let shown: Vec<f64> = window.filter(|k| !is_masked[*k]).map(|k| values[k]).collect();
+        if 2 * shown.len() > half {
+            sample_quantile(shown, 0.5)
+        } else {
+            0.0
+        }
+    };
+    let coarse: Vec<f64> = (0..values.len()).step_by(stride).map(at).collect();
+    (0..values.len())
+        .map(|i| coarse[((i + stride / 2) / stride).min(coarse.len() - 1)])
+        .collect()
+}
+
 /// The mean over `width` neighbouring samples; fewer at the ends.
 pub(super) fn running_mean(values: &[f64], width: usize) -> Vec<f64> {
     let half = width / 2;

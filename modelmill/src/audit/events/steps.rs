@@ -8,8 +8,8 @@ use super::segments::DriveSegment;
 use super::smoothing::{dilate_mask, median_deviation, range_median, running_median, sample_quantile, true_ranges};
 use super::trace::ResidualTrace;
 use crate::audit::thresholds::{
-    EVENT_LEAST_FORCE_SHARE, STANDSTILL_END_MARGIN_S, STEP_LEAST_DEVIATIONS, STEP_LEAST_RETURN, STEP_MOST_RATIO,
-    STEP_WINDOW_S,
+    STANDSTILL_END_MARGIN_S, STEP_LEAST_DEVIATIONS, STEP_LEAST_FORCE_SHARE, STEP_LEAST_RETURN, STEP_MOST_RATIO,
+    STEP_WINDOWS_S,
 };
 
 /// Time on either side of a step that is not used, s: the step itself.
@@ -26,7 +26,7 @@ struct ForceStep {
     height: f64,
 }
 
-/// The pushes of one drive at standstill of all drives.
+/// The pushes of one drive at standstill of all drives: short ones first, then long ones, which noise hides less.
 pub(super) fn pushes_at_standstill(trace: &ResidualTrace, rest: &DriveResidual) -> Vec<DriveSegment> {
     if rest.regimes.has_dead_band {
         return Vec::new();
@@ -34,16 +34,38 @@ pub(super) fn pushes_at_standstill(trace: &ResidualTrace, rest: &DriveResidual) 
     let moves: Vec<bool> = rest.regimes.all_stand.iter().map(|stands| !stands).collect();
     let margin = trace.sample_count(STANDSTILL_END_MARGIN_S, 1);
     let usable: Vec<bool> = dilate_mask(&moves, margin).iter().map(|near| !near).collect();
-    let (window, rise) = (trace.sample_count(STEP_WINDOW_S, 2), trace.sample_count(STEP_RISE_S, 1));
-    let standing: Vec<_> = true_ranges(&usable)
-        .into_iter()
+    let mut pushes: Vec<DriveSegment> = Vec::new();
+    for seconds in STEP_WINDOWS_S {
+        for push in pushes_of_window(trace, rest, &true_ranges(&usable), seconds) {
+            if pushes
+                .iter()
+                .all(|known| push.start > known.end || push.end < known.start)
+            {
+                pushes.push(push);
+            }
+        }
+    }
+    pushes
+}
+
+/// The pushes whose steps are differences of medians over a window.
+fn pushes_of_window(
+    trace: &ResidualTrace,
+    rest: &DriveResidual,
+    standing: &[std::ops::Range<usize>],
+    seconds: f64,
+) -> Vec<DriveSegment> {
+    let (window, rise) = (trace.sample_count(seconds, 2), trace.sample_count(STEP_RISE_S, 1));
+    let standing: Vec<_> = standing
+        .iter()
         .filter(|range| range.len() > 2 * (window + rise))
+        .cloned()
         .collect();
     let differences = step_differences(&trace.residual[rest.drive], &standing, window, rise);
     let of_standing: Vec<f64> = standing.iter().flat_map(|r| differences[r.clone()].to_vec()).collect();
     let middle = sample_quantile(of_standing.clone(), 0.5);
     let deviation = median_deviation(of_standing.iter().map(|x| x - middle)).max(ROUNDING * rest.force_rms);
-    let bound = (STEP_LEAST_DEVIATIONS * deviation).max(EVENT_LEAST_FORCE_SHARE * rest.force_rms);
+    let bound = (STEP_LEAST_DEVIATIONS * deviation).max(STEP_LEAST_FORCE_SHARE * rest.force_rms);
     let mut pushes = Vec::new();
     for range in standing {
         let steps = largest_steps(&differences, &range, bound);
@@ -56,6 +78,8 @@ pub(super) fn pushes_at_standstill(trace: &ResidualTrace, rest: &DriveResidual) 
             end: last.at,
             force: first.height.signum() * first.height.abs().min(last.height.abs()),
             deviations: first.height.abs().min(last.height.abs()) / deviation,
+            masked_share: 0.0,
+            edge_contrast: 1.0,
             is_confirmed: true,
             needs_support: false,
             is_at_standstill: true,
