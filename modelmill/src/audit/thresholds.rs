@@ -138,6 +138,9 @@ pub(super) const SHARP_LEAST_CONTRAST: f64 = 0.75;
 pub(super) const SHARP_LEAST_DEVIATIONS: f64 = 12.5;
 pub(super) const SHARP_HIDDEN_LEAST_DEVIATIONS: f64 = 60.0;
 
+/// Beyond this factor (1) half of the contrast is enough, since no friction of measured arms stands out so far.
+pub(super) const HUGE_LEAST_DEVIATIONS: f64 = 100.0;
+
 /// Weight of the jerk among the states of a drive (1): its noise is large.
 pub(super) const JERK_WEIGHT: f64 = 0.5;
 

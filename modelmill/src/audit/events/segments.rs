@@ -7,8 +7,8 @@ use super::smoothing::{sample_quantile, true_ranges};
 use super::trace::ResidualTrace;
 use crate::audit::thresholds::{
     ALONE_MOST_MASKED_SHARE, EVENT_CLOSING_DEVIATIONS, EVENT_LEAST_FORCE_SHARE, EVENT_LONGEST_BRIDGE_S,
-    EVENT_LONGEST_LULL_S, EVENT_OPENING_DEVIATIONS, SHARP_HIDDEN_LEAST_DEVIATIONS, SHARP_LEAST_CONTRAST,
-    SHARP_LEAST_DEVIATIONS,
+    EVENT_LONGEST_LULL_S, EVENT_OPENING_DEVIATIONS, GROUP_LEAST_CONTRAST, HUGE_LEAST_DEVIATIONS,
+    SHARP_HIDDEN_LEAST_DEVIATIONS, SHARP_LEAST_CONTRAST, SHARP_LEAST_DEVIATIONS,
 };
 
 /// Time beyond the smoothed start and end in which the true ones are searched, s.
@@ -43,7 +43,9 @@ impl DriveSegment {
     /// Whether it begins and ends at once and is shown for the most part: friction that switches does not look so.
     pub(super) fn is_sharp(&self) -> bool {
         let is_shown = self.masked_share < ALONE_MOST_MASKED_SHARE && self.deviations > SHARP_LEAST_DEVIATIONS;
-        (is_shown || self.deviations > SHARP_HIDDEN_LEAST_DEVIATIONS) && self.edge_contrast > SHARP_LEAST_CONTRAST
+        let is_clear = is_shown || self.deviations > SHARP_HIDDEN_LEAST_DEVIATIONS;
+        let is_huge = self.deviations > HUGE_LEAST_DEVIATIONS && self.edge_contrast > GROUP_LEAST_CONTRAST;
+        is_huge || (is_clear && self.edge_contrast > SHARP_LEAST_CONTRAST)
     }
 }
 
