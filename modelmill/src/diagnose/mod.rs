@@ -10,7 +10,8 @@
 //! 2. `places`: lists the places of the mechanism on which effects may act.
 //! 3. `candidates`: derives the effects that `add` could add to the model file.
 //! 4. `columns`, `numbers`: evaluate the forces of these effects along the recordings.
-//! 5. `faults`: finds faults of recordings. Before the search, their forces are subtracted or their samples excluded.
+//! 5. `faults`, `contacts`: find faults of recordings. Before the search, their forces are subtracted or their samples
+//!    excluded; contacts are searched in its residual once more.
 //! 6. `encoders`, `gears`, `memory`, `payloads`, `constants`, `tilt`, `held_friction`: add candidates that a model file
 //!    cannot contain.
 //! 7. `problem`: formulates the search with all of these, and solves it.
@@ -29,6 +30,7 @@ mod candidates;
 mod columns;
 mod completed;
 mod constants;
+mod contacts;
 mod corrected;
 mod disturbance_words;
 mod encoders;

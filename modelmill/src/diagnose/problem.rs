@@ -21,6 +21,7 @@ use modelmill_identify::RecordingNote;
 use super::candidates::{DerivedCandidates, candidates};
 use super::columns::{self, CandidateOrigin, load_dependent_columns, refined_columns};
 use super::constants::constants;
+use super::contacts::leave_out_late_contacts;
 use super::encoders::{self, encoders};
 use super::estimates::round_by_deviation;
 use super::faults::subtract_known;
@@ -157,9 +158,21 @@ pub(crate) fn find_missing_effects(
         all: &all,
     };
     let are_changes_searched = problem.searches_changes();
-    let mut diagnosis = model
-        .host()
-        .run_job("searching for missing effects", 0, |_| diagnose(&mut problem, &supply))?;
+    let forces = (problem.measured.clone(), problem.removed.clone());
+    let known = problem.candidates.len();
+    let search = |problem: &mut DiagnosisProblem| {
+        let host = model.host();
+        host.run_job("searching for missing effects", 0, |_| diagnose(problem, &supply))
+    };
+    let mut diagnosis = search(&mut problem)?;
+    // A missing effect hides small contacts: with the effects found, they stand out. Then the search is repeated.
+    if asked.in_full && leave_out_late_contacts(&mut problem, model, &all, &diagnosis.residual) {
+        (problem.measured, problem.removed) = forces;
+        // The first search added changes in time that a contact may have caused.
+        problem.candidates.truncate(known);
+        problem.change_intervals.clear();
+        diagnosis = search(&mut problem)?;
+    }
     // Stage 5: texts, and candidates that could not be evaluated.
     for one in &mut diagnosis.disturbances {
         describe_disturbance(one, model);

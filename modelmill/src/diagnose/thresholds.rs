@@ -39,14 +39,11 @@ pub(super) const SIGN_TRIALS: usize = 200;
 /// Time before and after a contact or push that is left out of the fit, s. By judgement.
 pub(super) const CONTACT_MARGIN_S: f64 = 0.15;
 
-/// A contact or push that lasts less is not reported, s. By judgement.
-pub(super) const CONTACT_SHORTEST_S: f64 = 0.18;
-
 /// Contacts with less time between them are reported as one, s. By judgement.
 pub(super) const CONTACT_GAP_S: f64 = 0.3;
 
 /// Samples beyond the place of a contact, at other times, that decide whether the force is a function of the
-/// position. With fewer the event is not called a contact. By judgement.
+/// position. By judgement.
 pub(super) const REPEATED_PLACE_FEWEST_SAMPLES: usize = 10;
 
 /// The force of an event is a function of the position, such as an end stop, if the line fitted during the

@@ -53,7 +53,7 @@ pub use points::{ChangePoint, ParameterStep};
 use rows::{MeasuredMoments, RunRows, UnexplainedShares, WhitenedRun};
 pub use sums::{ReferenceFit, RunSums};
 use thresholds::{
-    CHANGE_LEAST_FORCE_SHARE, CHANGE_VALUE_SIGMAS, PARAMETER_CHANGE_SIGMAS, PUSH_MARGIN_SHARE, SHORTEST_PUSH_S,
+    CHANGE_LEAST_FORCE_SHARE, CHANGE_VALUE_SIGMAS, PARAMETER_CHANGE_SIGMAS, PUSH_LONGEST_GAP_S, PUSH_MARGIN_SHARE,
 };
 use time_base::{TimeBase, correct_clock, time_scaling};
 use verdict::{RunKnowledge, undecided_reasons};
@@ -357,7 +357,8 @@ fn merged_contact_events(events: Vec<ContactEvent>, stretch: &RecordingSegment) 
             continue;
         }
         match all.last_mut() {
-            Some(last) if from - last.to < SHORTEST_PUSH_S => {
+            Some(last) if from - last.to < PUSH_LONGEST_GAP_S => {
+                last.is_confirmed |= event.is_confirmed;
                 last.to = to;
                 for (d, largest, usual) in event.drives {
                     match last.drives.iter_mut().find(|(other, ..)| *other == d) {
@@ -455,7 +456,7 @@ impl<'a> RunAnalyser<'a> {
     fn exclude_contacts(&self, stretches: &mut [RecordingSegment]) -> Vec<RunChange> {
         let mut told = Vec::new();
         for stretch in stretches {
-            let found = events::events(self.model, stretch).unwrap_or_default();
+            let found = events::events(self.model, stretch);
             let found = merged_contact_events(found, stretch);
             // The start and the end of a push hardly exceed the usual residual, so that its interval is widened.
             let wide = found.iter().map(|event| {
@@ -464,11 +465,12 @@ impl<'a> RunAnalyser<'a> {
                     from: event.from - room,
                     to: event.to + room,
                     drives: Vec::new(),
+                    is_confirmed: event.is_confirmed,
                 }
             });
             events::leave_out_events(stretch, &wide.collect::<Vec<_>>());
-            // Short events are excluded, but not reported.
-            let lasting = found.iter().filter(|event| event.to - event.from >= SHORTEST_PUSH_S);
+            // Events that are only possible are excluded, but not reported.
+            let lasting = found.iter().filter(|event| event.is_confirmed);
             told.extend(lasting.map(|event| changes::event(self.model, event)));
         }
         told

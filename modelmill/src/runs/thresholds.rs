@@ -72,9 +72,8 @@ pub(super) const SCALE_CHANGE_RARITY: f64 = 0.2;
 /// By judgement.
 pub(super) const KNOWN_VALUE_SIGMAS: f64 = 3.0;
 
-/// Shorter events are excluded but not reported as pushes, s: model errors can rise for so long as well. Events with
-/// less time between them are one. By judgement.
-pub(super) const SHORTEST_PUSH_S: f64 = 0.25;
+/// Pushes with less time between them are one, s. By judgement.
+pub(super) const PUSH_LONGEST_GAP_S: f64 = 0.25;
 
 /// Share of the length of an event (1) that is excluded before and after it as well. By judgement.
 pub(super) const PUSH_MARGIN_SHARE: f64 = 0.2;

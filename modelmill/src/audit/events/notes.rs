@@ -1,0 +1,102 @@
+//! What is reported of events: notes for the user, disturbances for the diagnosis, and excluded forces.
+
+use modelmill_boundary::message;
+use modelmill_boundary::text::{OptionName, Remedy};
+use modelmill_identify::RecordingNote;
+use modelmill_identify::diagnose::{Disturbance, EstimatedQuantity};
+
+use super::{ContactEvent, events};
+use crate::model::Model;
+use crate::segment::RecordingSegment;
+use crate::text::table::significant;
+
+/// Notes on the events of a segment. With `leave_out`, their forces are excluded.
+pub(in crate::audit) fn event_notes(model: &Model, data: &mut RecordingSegment, leave_out: bool) -> Vec<RecordingNote> {
+    let events = events(model, data);
+    let notes = events
+        .iter()
+        .map(|event| event_note(model, &data.run.file, event, leave_out));
+    let notes = notes.collect();
+    // Possible contacts are no facts, so that a diagnosis decides for itself.
+    let confirmed = events.iter().filter(|event| event.is_confirmed);
+    let faults: Vec<Disturbance> = confirmed
+        .map(|event| event_disturbance(model, &data.run.file, event))
+        .collect();
+    data.faults.extend(faults);
+    if leave_out {
+        leave_out_events(data, &events);
+    }
+    notes
+}
+
+/// The note on an event: a warning, or a hint if it is only possible.
+fn event_note(model: &Model, file: &str, event: &ContactEvent, leave_out: bool) -> RecordingNote {
+    let names = model.drives();
+    let drives: Vec<String> = event
+        .drives
+        .iter()
+        .map(|(d, largest, usual)| {
+            format!(
+                "`{}` by up to {} {} where {} is usual",
+                names[*d],
+                significant(*largest, 3),
+                model.force_unit(*d),
+                significant(*usual, 2)
+            )
+        })
+        .collect();
+    let option = Remedy::option(OptionName::LeaveOutEvents);
+    let [from, to] = [event.from, event.to].map(|time| significant(time, 5));
+    let drives = drives.join(" and ");
+    let todo = if leave_out {
+        message!(". They are left out of fits and error figures ({}).", option)
+    } else {
+        message!("; {} leaves them out of fits and error figures.", option)
+    };
+    if event.is_confirmed {
+        RecordingNote::warning(message!(
+            "From {from} to {to} s of {file} there are forces that no parameters explain, {drives}, as in a contact or a push{}",
+            todo
+        ))
+    } else {
+        RecordingNote::info(message!(
+            "A possible contact from {from} to {to} s of {file}: forces that no parameters explain begin and end suddenly, {drives}. \
+             No other sample has a similar state, so that the model may be the cause as well{}",
+            todo
+        ))
+    }
+}
+
+/// An event as a disturbance for the diagnosis.
+pub(crate) fn event_disturbance(model: &Model, file: &str, event: &ContactEvent) -> Disturbance {
+    let names = model.drives();
+    let drives = event.drives.iter();
+    Disturbance {
+        kind: "contact_event".to_owned(),
+        at: drives.clone().map(|(d, _, _)| names[*d].clone()).collect(),
+        estimates: drives
+            .map(|(d, largest, _)| EstimatedQuantity::new("largest", *largest, model.force_unit(*d)))
+            .collect(),
+        recordings: vec![file.to_owned()],
+        interval: Some([event.from, event.to]),
+        description: None,
+    }
+}
+
+/// Excludes the forces of all drives during events.
+pub(crate) fn leave_out_events(data: &mut RecordingSegment, events: &[ContactEvent]) {
+    if events.is_empty() {
+        return;
+    }
+    let run = &mut data.run;
+    if run.left_out.is_empty() {
+        let drives = run.force.as_ref().map_or(0, Vec::len);
+        run.left_out = vec![vec![false; run.time.len()]; drives];
+    }
+    for (i, time) in run.time.iter().enumerate() {
+        let is_in = |event: &ContactEvent| (event.from..=event.to).contains(time);
+        if events.iter().any(is_in) {
+            run.left_out.iter_mut().for_each(|out| out[i] = true);
+        }
+    }
+}

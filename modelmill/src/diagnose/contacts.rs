@@ -1,0 +1,301 @@
+//! Contacts and pushes in a diagnosis: those that the audit of the recordings found are left out of the search, and a
+//! second look at the residual of the last set of effects finds those that a missing effect had hidden.
+
+use modelmill_codegen::{ModelEvaluator, MotionStates};
+use modelmill_identify::changes::NormalEquations;
+use modelmill_identify::diagnose::{DiagnosisProblem, Disturbance};
+
+use super::thresholds::{CONTACT_GAP_S, CONTACT_MARGIN_S, REPEATED_PLACE_FEWEST_SAMPLES, REPEATED_PLACE_MOST_RESIDUAL};
+use crate::audit::events::{ResidualTrace, event_disturbance, find_events, slowest_rate};
+use crate::model::Model;
+use crate::regressors::SegmentList;
+
+/// Time over which decimated forces spread a switch of friction, in samples.
+const SMEAR_SAMPLES: f64 = 2.0;
+
+/// Leaves out the contacts and pushes that the audit found, unless their force is a function of a position: an end
+/// stop acts at every visit of its place, a push only once.
+pub(super) fn leave_out_known_contacts(problem: &mut DiagnosisProblem, all: &SegmentList<'_>) {
+    let faults = all.iter().flat_map(|(one, _)| &one.faults);
+    let contacts = faults.filter(|one| one.kind == "contact_event").cloned();
+    leave_out_contacts(problem, all, merge_contacts(contacts.collect()));
+}
+
+/// Leaves out the contacts and pushes in the residual of a search, `[drive][sample]`. Returns whether there are any.
+pub(super) fn leave_out_late_contacts(
+    problem: &mut DiagnosisProblem,
+    model: &Model,
+    all: &SegmentList<'_>,
+    residual: &[Vec<f64>],
+) -> bool {
+    let mut contacts = Vec::new();
+    let mut start = 0;
+    for (one, _) in all {
+        let n = one.time().len();
+        let trace = residual_trace(problem, model, one, residual, start..start + n);
+        let events = trace.map_or_else(Vec::new, |trace| find_events(&trace));
+        let confirmed = events.iter().filter(|event| event.is_confirmed);
+        contacts.extend(confirmed.map(|event| event_disturbance(model, &one.run.file, event)));
+        start += n;
+    }
+    let before = problem.disturbances.len();
+    leave_out_contacts(problem, all, merge_contacts(contacts));
+    problem.disturbances.len() > before
+}
+
+/// The part of a residual that belongs to one segment; `None` if a pose has no solution or the segment is short.
+fn residual_trace(
+    problem: &DiagnosisProblem,
+    model: &Model,
+    one: &crate::segment::RecordingSegment,
+    residual: &[Vec<f64>],
+    part: std::ops::Range<usize>,
+) -> Option<ResidualTrace> {
+    let time = one.time();
+    if time.len() < super::thresholds::FEWEST_SAMPLES {
+        return None;
+    }
+    let pick = |columns: &[Vec<f64>]| -> Vec<Vec<f64>> {
+        let every = |column: &Vec<f64>| column.iter().step_by(one.decimation()).copied().collect();
+        columns.iter().map(every).collect()
+    };
+    let motion = [&one.run.q, &one.run.qd, &one.run.qdd].map(|columns| pick(columns));
+    let load = pick(one.run.force.as_deref().unwrap_or(&[]));
+    let states = MotionStates {
+        q: motion[0].iter().map(Vec::as_slice).collect(),
+        qd: motion[1].iter().map(Vec::as_slice).collect(),
+        qdd: motion[2].iter().map(Vec::as_slice).collect(),
+        load: load.iter().map(Vec::as_slice).collect(),
+    };
+    // Positions come first, rates behind them, the Jacobian last.
+    let drives = model.drives().len();
+    let mut positions = ModelEvaluator::new(&model.derivation).drive_motion(&states).ok()?;
+    positions.truncate(2 * drives);
+    let rates = positions.split_off(drives);
+    let slope = |rate: &Vec<f64>| -> Vec<f64> {
+        let last = rate.len() - 1;
+        let at = |i: usize| (i.saturating_sub(1), (i + 1).min(last));
+        let ends = (0..rate.len()).map(at);
+        ends.map(|(a, b)| (rate[b] - rate[a]) / (time[b] - time[a])).collect()
+    };
+    let accelerations = rates.iter().map(slope).collect();
+    // A row without drive has no force and no residual.
+    let of_segment = |values: Option<&Vec<f64>>| -> Vec<f64> {
+        let values = values.and_then(|values| values.get(part.clone()));
+        values.map_or_else(|| vec![0.0; part.len()], <[f64]>::to_vec)
+    };
+    let residual = (0..drives).map(|d| of_segment(residual.get(d))).collect();
+    // The forces as the search saw them: without what was subtracted.
+    let measured = problem
+        .measured
+        .0
+        .iter()
+        .map(|force| of_segment(force.as_ref()))
+        .collect();
+    let is_left_out = |d: usize, i: usize| problem.left_out.get(d).is_some_and(|out| out[part.start + i]);
+    let step = (time[time.len() - 1] - time[0]) / (time.len() - 1) as f64;
+    let is_measured = (0..drives)
+        .map(|d| {
+            (0..time.len())
+                .map(|i| !is_left_out(d, i) && !one.has_excluded_input(d, i))
+                .collect()
+        })
+        .collect();
+    Some(ResidualTrace {
+        motion: [positions, rates, accelerations],
+        measured,
+        residual,
+        is_measured,
+        slowest: (0..drives).map(|d| slowest_rate(model, d)).collect(),
+        smear: SMEAR_SAMPLES * step,
+        time,
+    })
+}
+
+/// Leaves out contacts and pushes for all drives, since a push acts through the mechanism.
+fn leave_out_contacts(problem: &mut DiagnosisProblem, all: &SegmentList<'_>, contacts: Vec<Disturbance>) {
+    let samples = ContactSamples::new(all);
+    let about = |problem: &DiagnosisProblem, contacts: &[Disturbance]| -> Vec<bool> {
+        let known = problem.left_out.first().cloned();
+        let mut about = known.unwrap_or_else(|| vec![false; samples.time.len()]);
+        for contact in contacts {
+            for (out, is) in about.iter_mut().zip(samples.mask(contact, CONTACT_MARGIN_S)) {
+                *out |= is;
+            }
+        }
+        about
+    };
+    let all_about = about(problem, &contacts);
+    let (_, kept): (Vec<Disturbance>, Vec<Disturbance>) = contacts
+        .into_iter()
+        .partition(|contact| samples.is_explained_by_place(problem, contact, &all_about));
+    if kept.is_empty() {
+        return;
+    }
+    problem.left_out = vec![about(problem, &kept); problem.layout.channels.len()];
+    problem.disturbances.extend(kept);
+}
+
+/// Times, files and positions of all decimated samples, in the order of the problem.
+struct ContactSamples<'a> {
+    /// Time of each sample, s.
+    time: Vec<f64>,
+    /// File of each sample.
+    file: Vec<&'a str>,
+    /// Positions of the coordinates, `[sample][coordinate]`, rad or m.
+    positions: Vec<Vec<f64>>,
+}
+
+impl<'a> ContactSamples<'a> {
+    /// The samples of all segments.
+    fn new(all: &SegmentList<'a>) -> Self {
+        let (mut time, mut file, mut positions) = (Vec::new(), Vec::new(), Vec::new());
+        for (one, _) in all {
+            for (i, t) in one.time().into_iter().enumerate() {
+                let at = i * one.decimation();
+                time.push(t);
+                file.push(one.run.file.as_str());
+                positions.push(one.run.q.iter().map(|q| q[at]).collect());
+            }
+        }
+        Self { time, file, positions }
+    }
+
+    /// The samples within a contact and a margin about it.
+    fn mask(&self, contact: &Disturbance, margin: f64) -> Vec<bool> {
+        let Some([from, to]) = contact.interval else {
+            return vec![false; self.time.len()];
+        };
+        let samples = self.time.iter().zip(&self.file);
+        samples
+            .map(|(time, file)| {
+                let is_within = *time >= from - margin && *time <= to + margin;
+                is_within && contact.recordings.iter().any(|one| one == file)
+            })
+            .collect()
+    }
+
+    /// Whether the force of a contact is that of an end stop, which the position of one coordinate explains.
+    fn is_explained_by_place(&self, problem: &DiagnosisProblem, contact: &Disturbance, about: &[bool]) -> bool {
+        let inside = self.mask(contact, 0.0);
+        // The drive with the largest force decides.
+        let largest = contact.estimates.iter().map(|one| one.value);
+        let strongest = contact.at.iter().zip(largest).max_by(|a, b| a.1.total_cmp(&b.1));
+        let channel = strongest.and_then(|(name, _)| problem.layout.channels.iter().position(|one| one == name));
+        let Some(channel) = channel else {
+            return false;
+        };
+        // Each coordinate is tested in both directions, since a stop may be at either end.
+        let coordinates = self.positions.first().map_or(0, Vec::len);
+        (0..coordinates).any(|i| {
+            [1.0, -1.0].into_iter().any(|sign| {
+                let along: Vec<f64> = self.positions.iter().map(|q| sign * q[i]).collect();
+                let within = along.iter().zip(&inside).filter(|(_, inside)| **inside);
+                let mut within: Vec<f64> = within.map(|(x, _)| *x).collect();
+                within.sort_by(f64::total_cmp);
+                // The place where the event begins: its tenth percentile, which single wrong samples hardly change.
+                let Some(place) = within.get(within.len() / 10) else {
+                    return false;
+                };
+                // How far each sample is beyond the place.
+                let depths: Vec<f64> = along.iter().map(|x| x - place).collect();
+                is_force_beyond_place(problem, channel, &depths, &inside, about)
+            })
+        })
+    }
+}
+
+/// Whether the force of an event is that of a stop: the line over the depth, fitted during the event, also
+/// predicts the force beyond the place at other times. Without other
+/// times nothing shows a stop. The model is fitted to the samples before the place.
+fn is_force_beyond_place(
+    problem: &DiagnosisProblem,
+    channel: usize,
+    depths: &[f64],
+    inside: &[bool],
+    about: &[bool],
+) -> bool {
+    // A drive without force shows nothing.
+    let Some(measured) = problem.measured.0[channel].as_ref() else {
+        return false;
+    };
+    // Without other samples beyond the place nothing shows that the force acts there at other times.
+    let is_otherwise = |i: &usize| depths[*i] >= 0.0 && !about[*i];
+    if (0..depths.len()).filter(is_otherwise).count() < REPEATED_PLACE_FEWEST_SAMPLES {
+        return false;
+    }
+    // The friction of the drive is part of the model here, since bodies alone would leave it in the residual.
+    let friction = problem.friction.get(3 * channel..3 * channel + 3);
+    let columns: Vec<Option<&[f64]>> = (problem.base.iter())
+        .chain(friction.unwrap_or_default())
+        .map(|column| column.0[channel].as_deref())
+        .collect();
+    // The model is fitted to samples before the place and away from the event.
+    let is_elsewhere = |i: usize| !about[i] && depths[i] < 0.0;
+    let elsewhere: Vec<usize> = (0..measured.len()).filter(|i| is_elsewhere(*i)).collect();
+    let some = |values: &[f64]| -> Vec<f64> { elsewhere.iter().map(|i| values[*i]).collect() };
+    let picked: Vec<Option<Vec<f64>>> = columns.iter().map(|column| column.map(some)).collect();
+    let picked: Vec<Option<&[f64]>> = picked.iter().map(Option::as_deref).collect();
+    // Normal equations are enough, since only predictions are needed.
+    let mut moments = NormalEquations::new(columns.len());
+    moments.add_rows(&picked, &some(measured));
+    let factors = moments.solve().values;
+    // The residual of the model at any sample.
+    let rest = |i: usize| {
+        let said = columns.iter().zip(factors.iter());
+        let said = said.map(|(column, factor)| column.map_or(0.0, |values| factor * values[i]));
+        measured[i] - said.sum::<f64>()
+    };
+    let beyond = |is_event: bool| -> Vec<(f64, f64)> {
+        (0..measured.len())
+            .filter(|i| depths[*i] >= 0.0 && if is_event { inside[*i] } else { !about[*i] })
+            .map(|i| (depths[i], rest(i)))
+            .collect()
+    };
+    // Samples beyond the place, in the event and at other times.
+    let (during, otherwise) = (beyond(true), beyond(false));
+    let Some(line) = fit_line(&during) else {
+        return false;
+    };
+    // The line must explain most of the force at other times.
+    let left: f64 = otherwise.iter().map(|(x, y)| (y - line(*x)).powi(2)).sum();
+    let whole: f64 = otherwise.iter().map(|(_, y)| y * y).sum();
+    left < REPEATED_PLACE_MOST_RESIDUAL * whole
+}
+
+/// The straight line through some points by least squares.
+fn fit_line(points: &[(f64, f64)]) -> Option<impl Fn(f64) -> f64 + use<>> {
+    // Means, slope and intercept.
+    let n = points.len() as f64;
+    let mean = |of: &dyn Fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / n;
+    let (x, y) = (mean(&|p| p.0), mean(&|p| p.1));
+    let spread = mean(&|p| (p.0 - x).powi(2));
+    let slope = mean(&|p| (p.0 - x) * (p.1 - y)) / spread;
+    (spread > 0.0).then_some(move |at: f64| y + slope * (at - x))
+}
+
+/// Contacts in the order of the recordings: close ones are joined.
+fn merge_contacts(contacts: Vec<Disturbance>) -> Vec<Disturbance> {
+    let mut merged: Vec<Disturbance> = Vec::new();
+    for contact in contacts {
+        // Contacts of one recording are in the order of time.
+        let [from, to] = contact.interval.unwrap_or_default();
+        if let Some(last) = merged.last_mut()
+            && last.recordings == contact.recordings
+            && let Some(before) = &mut last.interval
+            && from - before[1] < CONTACT_GAP_S
+        {
+            before[1] = before[1].max(to);
+            // The joined contact has the places of both, each with its force.
+            for (place, estimate) in contact.at.iter().zip(&contact.estimates) {
+                if !last.at.contains(place) {
+                    last.at.push(place.clone());
+                    last.estimates.push(estimate.clone());
+                }
+            }
+            continue;
+        }
+        merged.push(contact);
+    }
+    merged
+}
