@@ -16,7 +16,7 @@ use modelmill_rig::BodyAnchor;
 use nalgebra::{Complex, Vector2};
 
 use crate::drive::ContactPlace;
-use crate::part::{SubstitutionPart, rotation};
+use crate::part::{SubstitutionPart, rotation, wrap_angle};
 use crate::reduce::{ReductionState, TOLERANCE};
 
 /// A sum of coordinates with integer factors: the rotation of a part since the nominal configuration.
@@ -71,31 +71,85 @@ impl CoordinateSum {
 /// A position in the plane as a sum of vectors (complex numbers, m) that rotate by sums of coordinates.
 type RotatingVectors = BTreeMap<CoordinateSum, Complex<f64>>;
 
+/// What a part rotates like.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum RotationReference {
+    /// It does not rotate.
+    Base,
+    /// It rotates as an earlier part, by its index.
+    Part(usize),
+}
+
 impl ReductionState<'_> {
-    /// The earlier part, or the base as `None`, whose rotation a part has at all samples; an empty result if there is
-    /// none. Only generated plans leave the coordinates open.
-    pub(crate) fn find_same_rotation(&self, part: &SubstitutionPart) -> Option<Option<usize>> {
+    /// The earlier part, or the base, whose rotation a part has at all samples; `None` if there is none. Only generated
+    /// plans leave the coordinates open.
+    pub(crate) fn find_same_rotation(&self, part: &SubstitutionPart) -> Option<RotationReference> {
         if !self.is_generated {
             return None;
         }
         let (plane, samples) = (&self.plane, &self.samples);
-        let differs = |other: Option<usize>| {
+        let differs = |other: RotationReference| {
             let most = samples.largest(|moment| {
-                let other = other.map_or(0.0, |k| self.parts[k].rotation_angle(moment, plane, samples));
+                let other = match other {
+                    RotationReference::Base => 0.0,
+                    RotationReference::Part(k) => self.parts[k].rotation_angle(moment, plane, samples),
+                };
                 let difference = part.rotation_angle(moment, plane, samples) - other;
                 difference.sin().atan2(difference.cos())
             });
             most.is_nan() || most > TOLERANCE
         };
-        let earlier = (0..self.rotations.len()).map(Some);
-        std::iter::once(None).chain(earlier).find(|other| !differs(*other))
+        let earlier = (0..self.rotations.len()).map(RotationReference::Part);
+        std::iter::once(RotationReference::Base)
+            .chain(earlier)
+            .find(|other| !differs(*other))
+    }
+
+    /// The rotation of a reference since the nominal configuration.
+    pub(crate) fn rotation_of(&self, other: RotationReference) -> CoordinateSum {
+        match other {
+            RotationReference::Base => CoordinateSum::default(),
+            RotationReference::Part(k) => self.rotations[k].clone(),
+        }
+    }
+
+    /// The angle of a part that needs no coordinate, as an expression: a sum of coordinates and perhaps a constant. It is
+    /// reported in step 2. `coordinate` would be its own one, `nominal` is the angle in the nominal configuration (rad),
+    /// `carried` the rotation of its carrier.
+    pub(crate) fn tied_angle(
+        &mut self,
+        part: &SubstitutionPart,
+        other: RotationReference,
+        coordinate: &str,
+        nominal: f64,
+        carried: &CoordinateSum,
+    ) -> String {
+        let relative = self.rotation_of(other).minus(carried);
+        let offset = wrap_angle(nominal - relative.value(&self.nominal));
+        let mut expression = format!("{}{}", relative.text(), self.angle_offset(coordinate, offset));
+        // A constant angle stands alone.
+        if relative.text().is_empty() {
+            expression = match expression.trim_start() {
+                "" => "0".to_owned(),
+                sum => sum.trim_start_matches("+ ").replacen("- ", "-", 1),
+            };
+        }
+        let says = match other {
+            RotationReference::Base => "does not rotate, and needs no coordinate".to_owned(),
+            RotationReference::Part(k) => format!("rotates as {}, and needs no coordinate", self.parts[k].name),
+        };
+        self.report.add(2, &part.name, says, Vec::new());
+        expression
     }
 
     /// The end of a part's longitudinal axis, 1 m from its joint, if the axis has the direction of another part's, or of
     /// the plane's x axis.
-    pub(crate) fn axis_end_along(&self, part: &SubstitutionPart, other: Option<usize>) -> BodyAnchor {
+    pub(crate) fn axis_end_along(&self, part: &SubstitutionPart, other: RotationReference) -> BodyAnchor {
         let (plane, samples) = (&self.plane, &self.samples);
-        let angle = other.map_or(0.0, |k| self.parts[k].nominal_angle(plane, samples));
+        let angle = match other {
+            RotationReference::Base => 0.0,
+            RotationReference::Part(k) => self.parts[k].nominal_angle(plane, samples),
+        };
         let direction = plane.x * angle.cos() + plane.normal.cross(&plane.x) * angle.sin();
         let body = samples.nominal.motion.bodies[part.bodies[0]].R_WB;
         BodyAnchor {

@@ -202,23 +202,8 @@ impl ReductionState<'_> {
                 passive: false,
             });
         } else if let Some(other) = same {
-            // The part rotates as another one, or not at all, so that it needs no coordinate.
-            rotation = other.map_or_else(CoordinateSum::default, |other| self.rotations[other].clone());
-            let relative = rotation.minus(&carried);
-            let offset = wrap_angle(nominal - relative.value(&self.nominal));
-            expression = format!("{}{}", relative.text(), self.angle_offset(coordinate, offset));
-            // A constant angle stands alone.
-            if relative.text().is_empty() {
-                expression = match expression.trim_start() {
-                    "" => "0".to_owned(),
-                    sum => sum.trim_start_matches("+ ").replacen("- ", "-", 1),
-                };
-            }
-            let says = other.map_or_else(
-                || "does not rotate, and needs no coordinate".to_owned(),
-                |other| format!("rotates as {}, and needs no coordinate", self.parts[other].name),
-            );
-            self.report.add(2, &part.name, says, Vec::new());
+            rotation = self.rotation_of(other);
+            expression = self.tied_angle(&part, other, coordinate, nominal, &carried);
         } else {
             self.nominal.insert(coordinate.clone(), nominal);
             // A passive coordinate is determined by the loops, so that its nominal value can be rounded.
