@@ -21,11 +21,11 @@ use crate::reduce::{ReductionState, TOLERANCE};
 
 /// A sum of coordinates with integer factors: the rotation of a part since the nominal configuration.
 #[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct CoordinateSum(BTreeMap<String, i32>);
+pub(crate) struct RotationSum(BTreeMap<String, i32>);
 
-impl CoordinateSum {
+impl RotationSum {
     /// The sum with a multiple of one coordinate added.
-    pub(crate) fn with(&self, coordinate: &str, factor: i32) -> Self {
+    pub(crate) fn plus(&self, coordinate: &str, factor: i32) -> Self {
         let mut sum = self.clone();
         *sum.0.entry(coordinate.to_owned()).or_default() += factor;
         sum.0.retain(|_, factor| *factor != 0);
@@ -37,7 +37,7 @@ impl CoordinateSum {
         other
             .0
             .iter()
-            .fold(self.clone(), |sum, (name, factor)| sum.with(name, -factor))
+            .fold(self.clone(), |sum, (name, factor)| sum.plus(name, -factor))
     }
 
     /// Its value; `value` gives those of the coordinates.
@@ -69,7 +69,7 @@ impl CoordinateSum {
 }
 
 /// A position in the plane as a sum of vectors (complex numbers, m) that rotate by sums of coordinates.
-type RotatingVectors = BTreeMap<CoordinateSum, Complex<f64>>;
+type RotatingVectors = BTreeMap<RotationSum, Complex<f64>>;
 
 /// What a part rotates like.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -106,9 +106,9 @@ impl ReductionState<'_> {
     }
 
     /// The rotation of a reference since the nominal configuration.
-    pub(crate) fn rotation_of(&self, other: RotationReference) -> CoordinateSum {
+    pub(crate) fn rotation_of(&self, other: RotationReference) -> RotationSum {
         match other {
-            RotationReference::Base => CoordinateSum::default(),
+            RotationReference::Base => RotationSum::default(),
             RotationReference::Part(k) => self.rotations[k].clone(),
         }
     }
@@ -122,7 +122,7 @@ impl ReductionState<'_> {
         other: RotationReference,
         coordinate: &str,
         nominal: f64,
-        carried: &CoordinateSum,
+        carried: &RotationSum,
     ) -> String {
         let relative = self.rotation_of(other).minus(carried);
         let offset = wrap_angle(nominal - relative.value(&self.nominal));
@@ -188,7 +188,7 @@ impl ReductionState<'_> {
     fn rotating_vectors(&self, point: ContactPlace) -> RotatingVectors {
         let (plane, samples) = (&self.plane, &self.samples);
         let mut vectors = RotatingVectors::new();
-        let mut add = |sum: CoordinateSum, vector: Vector2<f64>| {
+        let mut add = |sum: RotationSum, vector: Vector2<f64>| {
             *vectors.entry(sum).or_default() += Complex::new(vector.x, vector.y);
         };
         let (mut part, mut at) = (point.part, point.at);
@@ -203,7 +203,7 @@ impl ReductionState<'_> {
             let origin = self.contact_place(&here.joint[0], part);
             at = origin.at;
         }
-        add(CoordinateSum::default(), at);
+        add(RotationSum::default(), at);
         vectors
     }
 }

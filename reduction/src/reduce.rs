@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::Complex;
 
-use crate::alike::CoordinateSum;
+use crate::alike::RotationSum;
 use crate::names::PlanNames;
 use crate::part::SubstitutionPart;
 use crate::plan::ReductionPlan;
@@ -149,11 +149,11 @@ pub(crate) struct ReductionState<'a> {
     /// Whether the plan was generated: then parts that move alike share their coordinates.
     pub(crate) is_generated: bool,
     /// The rotation of each part since the nominal configuration, in the order of `parts`.
-    pub(crate) rotations: Vec<CoordinateSum>,
+    pub(crate) rotations: Vec<RotationSum>,
     /// Exact values of the coordinates in the nominal configuration, rad.
     pub(crate) nominal: BTreeMap<String, f64>,
     /// Gaps of the loops so far, as orthogonal directions of length 1.
-    pub(crate) loop_directions: Vec<BTreeMap<CoordinateSum, Complex<f64>>>,
+    pub(crate) loop_directions: Vec<BTreeMap<RotationSum, Complex<f64>>>,
 }
 
 impl ReductionState<'_> {

@@ -4,7 +4,7 @@
 use modelmill_rig::{BodyAnchor, RigLog, source_span};
 use nalgebra::Vector2;
 
-use crate::alike::CoordinateSum;
+use crate::alike::RotationSum;
 use crate::drive::ContactPlace;
 use crate::part::{SubstitutionPart, lump_mass, part_residuals, substitute};
 use crate::plan::{PlanName, PlanPartEntry};
@@ -166,8 +166,8 @@ impl ReductionState<'_> {
         let mut expression = coordinate.clone();
         let carried = part
             .parent
-            .map_or_else(CoordinateSum::default, |parent| self.rotations[parent].clone());
-        let mut rotation = carried.with(coordinate, 1);
+            .map_or_else(RotationSum::default, |parent| self.rotations[parent].clone());
+        let mut rotation = carried.plus(coordinate, 1);
         if let Some(k) = active {
             // Largest difference between the angle and the coordinate of the rig, for each sign.
             let strays = |sign: f64| {
@@ -194,7 +194,7 @@ impl ReductionState<'_> {
                 if sign < 0.0 { "-" } else { "" },
                 self.angle_offset(coordinate, offset)
             );
-            rotation = carried.with(coordinate, if sign < 0.0 { -1 } else { 1 });
+            rotation = carried.plus(coordinate, if sign < 0.0 { -1 } else { 1 });
             self.nominal.insert(coordinate.clone(), value);
             self.draft.coordinates.push(DraftCoordinate {
                 name: coordinate.clone(),

@@ -250,7 +250,12 @@ mod tests {
         let ProgramCommand::Excite(excite) = &excite.command else {
             panic!("another command");
         };
-        let told = (excite.harmonics.clone(), excite.period, excite.limits.len(), excite.starts);
+        let told = (
+            excite.harmonics.clone(),
+            excite.period,
+            excite.limits.len(),
+            excite.starts,
+        );
         assert_eq!(told, (vec![3], PeriodArg::Fixed(2.5), 2, asked.starts), "{command}");
         for step in [
             WorkbenchStep::Picture,

@@ -1,5 +1,5 @@
-//! Why the condition number of the excitation is not the paper's: the search once more, with one assumption changed at a
-//! time. Also what the period as a variable and other numbers of harmonics buy, eq. (17).
+//! Why the condition number of the excitation is not the paper's: the search once more, with one assumption changed
+//! at a time. Also what the period as a variable and other numbers of harmonics buy, eq. (17).
 
 use modelmill::{Host, Outcome};
 use modelmill_identify::excite::Options;

@@ -31,7 +31,7 @@ impl ExperimentPage {
              an error remains that no base parameter can represent. The mean relative errors of the paper's treatment:",
         );
         self.contact_table(experiment);
-        self.held(experiment);
+        self.held_diagnosis(experiment);
     }
 
     /// Table 2 with contact points beside the axes.
@@ -69,7 +69,7 @@ impl ExperimentPage {
     }
 
     /// The diagnosis with fixed parameters.
-    fn held(&mut self, experiment: &PaperExperiment) {
+    fn held_diagnosis(&mut self, experiment: &PaperExperiment) {
         let held = &experiment.causes.held;
         self.paragraph(&format!(
             "The tool in the authors' situation: parameters from CAD, and recordings of the robot with contact points {} \
