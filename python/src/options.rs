@@ -247,6 +247,7 @@ impl ExcitationOptions {
                 seed: self.seed,
                 ..Options::default()
             },
+            other_harmonics: Vec::new(),
             rate: self.rate,
             limits: self
                 .limits

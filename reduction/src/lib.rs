@@ -12,6 +12,7 @@
 //! In addition, [`import`](fn@import) converts a robot description of other programs into a model file, and
 //! [`export`](fn@export) a model into a description.
 
+mod alike;
 mod drive;
 mod export;
 mod import;

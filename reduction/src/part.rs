@@ -84,7 +84,7 @@ fn body_rotation(body: usize, moment: &MotionSample, plane: &MotionPlane, sample
 }
 
 /// An angle between -pi and pi.
-fn wrap_angle(angle: f64) -> f64 {
+pub(crate) fn wrap_angle(angle: f64) -> f64 {
     let turn = 2.0 * std::f64::consts::PI;
     angle - turn * (angle / turn).round()
 }

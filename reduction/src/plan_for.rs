@@ -42,6 +42,7 @@ pub fn default_plan(rig: &Rig) -> Result<ReductionPlan, Message> {
         .iter()
         .position(|(_, [a, b])| is_carried(&carried, a.body) || is_carried(&carried, b.body))
     {
+        let next = choose_joint(&rig, &waiting, &carried, next);
         let (joint, [a, b]) = waiting.remove(next);
         let name = rig.joints[joint].name.clone();
         if is_carried(&carried, a.body) && is_carried(&carried, b.body) {
@@ -85,6 +86,16 @@ pub fn default_plan(rig: &Rig) -> Result<ReductionPlan, Message> {
     let mut plan = plan("the plan generated for this rig", &text).map_err(|failure| failure.render(false))?;
     plan.rig = Some(Box::new(rig));
     Ok(plan)
+}
+
+/// The next joint of a coordinate that adds a body to the tree, else `next`. Coordinates come first, in whichever order
+/// the joints stand: parts that move alike then share them.
+fn choose_joint(rig: &Rig, waiting: &[(usize, [BodyAnchor; 2])], carried: &[bool], next: usize) -> usize {
+    let is_carried = |anchor: &BodyAnchor| anchor.body.is_none_or(|body| carried[body]);
+    let of_coordinate = waiting
+        .iter()
+        .position(|(joint, [a, b])| is_carried(a) != is_carried(b) && rig.coordinate_of_joint(*joint).is_some());
+    of_coordinate.unwrap_or(next)
 }
 
 /// The end of a body's longitudinal axis: its farthest other joint, else its centre of mass, else a point along x.

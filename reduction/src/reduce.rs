@@ -1,5 +1,10 @@
 //! Runs the four steps of a reduction: a rig and a plan go in, the text of a model file and the report come out.
 
+use std::collections::BTreeMap;
+
+use nalgebra::Complex;
+
+use crate::alike::RotationSum;
 use crate::names::PlanNames;
 use crate::part::SubstitutionPart;
 use crate::plan::ReductionPlan;
@@ -92,6 +97,10 @@ fn run(rig: &Rig, plan: &ReductionPlan, log: &mut RigLog) -> Option<(PlanarDraft
         report: ReductionReport::default(),
         used_groups: Vec::new(),
         part_totals: Vec::new(),
+        is_generated: plan.rig.is_some(),
+        rotations: Vec::new(),
+        nominal: BTreeMap::new(),
+        loop_directions: Vec::new(),
     };
     // The next steps make no sense if the motion is not planar, or if parts are missing.
     work.planar_reduction(log);
@@ -137,6 +146,14 @@ pub(crate) struct ReductionState<'a> {
     pub(crate) used_groups: Vec<String>,
     /// For each part of the draft a description, and its exact mass, centre and inertia.
     pub(crate) part_totals: Vec<(String, PlanarBody)>,
+    /// Whether the plan was generated: then parts that move alike share their coordinates.
+    pub(crate) is_generated: bool,
+    /// The rotation of each part since the nominal configuration, in the order of `parts`.
+    pub(crate) rotations: Vec<RotationSum>,
+    /// Exact values of the coordinates in the nominal configuration, rad.
+    pub(crate) nominal: BTreeMap<String, f64>,
+    /// Gaps of the loops so far, as orthogonal directions of length 1.
+    pub(crate) loop_directions: Vec<BTreeMap<RotationSum, Complex<f64>>>,
 }
 
 impl ReductionState<'_> {

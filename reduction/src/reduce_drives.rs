@@ -16,6 +16,11 @@ impl ReductionState<'_> {
         let plan = self.names.plan;
         for entry in &plan.loops {
             let [one, two] = &entry.joins;
+            if self.is_generated && self.is_implied_by_rotations([one, two], log) {
+                let says = "closes by the parts that move alike and the loops before it".to_owned();
+                self.report.add(2, entry.name.get_ref(), says, Vec::new());
+                continue;
+            }
             // Points of the model at both ends.
             let ends = (self.model_point(one, log), self.model_point(two, log));
             let (Some((first, a)), Some((second, b))) = ends else {
@@ -54,6 +59,22 @@ impl ReductionState<'_> {
             );
             self.draft.loops.push((entry.name.get_ref().clone(), [first, second]));
         }
+    }
+
+    /// Whether a loop of a generated plan needs no equation.
+    fn is_implied_by_rotations(&mut self, joins: [&PlanName; 2], log: &mut RigLog) -> bool {
+        let [one, two] = joins.map(|name| {
+            let anchor = self.names.point(name, log)?;
+            let part = self
+                .parts
+                .iter()
+                .position(|part| part.bodies.first() == anchor.body.as_ref());
+            Some(self.contact_place(&anchor, part))
+        });
+        let (Some(one), Some(two)) = (one, two) else {
+            return false;
+        };
+        self.is_loop_implied([one, two])
     }
 
     /// Step 4: adds the drives of the rig. A drive of a joint acts on the coordinate of a part; a linear drive gets two

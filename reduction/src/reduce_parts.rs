@@ -4,6 +4,7 @@
 use modelmill_rig::{BodyAnchor, RigLog, source_span};
 use nalgebra::Vector2;
 
+use crate::alike::RotationSum;
 use crate::drive::ContactPlace;
 use crate::part::{SubstitutionPart, lump_mass, part_residuals, substitute};
 use crate::plan::{PlanName, PlanPartEntry};
@@ -135,9 +136,23 @@ impl ReductionState<'_> {
     /// Adds frame and coordinate of the last part. A coordinate with a name of the rig is active and must be the angle
     /// of the part up to sign and offset; others are passive.
     pub(crate) fn frame(&mut self, entry: &PlanPartEntry, log: &mut RigLog) {
-        let Some(part) = self.parts.last().cloned() else {
+        let Some(mut part) = self.parts.last().cloned() else {
             return;
         };
+        // A part that rotates as another one gets the direction of its axes, so that no angle between them remains.
+        let coordinate = entry.coordinate.get_ref();
+        let active = self.names.rig.coordinates.iter().position(|c| &c.name == coordinate);
+        let same = if active.is_none() {
+            self.find_same_rotation(&part)
+        } else {
+            None
+        };
+        if let Some(other) = same {
+            part.to = self.axis_end_along(&part, other);
+            if let Some(last) = self.parts.last_mut() {
+                last.to = part.to;
+            }
+        }
         let carrier = part.parent.map(|parent| self.parts[parent].clone());
         let (plane, samples) = (self.plane, &self.samples);
         // Angle of the part relative to its carrier.
@@ -147,11 +162,12 @@ impl ReductionState<'_> {
             };
             of(&part) - carrier.as_ref().map_or(0.0, of)
         };
-        // Whether the rig has a coordinate with this name.
-        let coordinate = entry.coordinate.get_ref();
         let nominal = wrap_angle(angle(&samples.nominal));
-        let active = self.names.rig.coordinates.iter().position(|c| &c.name == coordinate);
         let mut expression = coordinate.clone();
+        let carried = part
+            .parent
+            .map_or_else(RotationSum::default, |parent| self.rotations[parent].clone());
+        let mut rotation = carried.plus(coordinate, 1);
         if let Some(k) = active {
             // Largest difference between the angle and the coordinate of the rig, for each sign.
             let strays = |sign: f64| {
@@ -178,12 +194,18 @@ impl ReductionState<'_> {
                 if sign < 0.0 { "-" } else { "" },
                 self.angle_offset(coordinate, offset)
             );
+            rotation = carried.plus(coordinate, if sign < 0.0 { -1 } else { 1 });
+            self.nominal.insert(coordinate.clone(), value);
             self.draft.coordinates.push(DraftCoordinate {
                 name: coordinate.clone(),
                 nominal: round_to_12_digits(value),
                 passive: false,
             });
+        } else if let Some(other) = same {
+            rotation = self.rotation_of(other);
+            expression = self.tied_angle(&part, other, coordinate, nominal, &carried);
         } else {
+            self.nominal.insert(coordinate.clone(), nominal);
             // A passive coordinate is determined by the loops, so that its nominal value can be rounded.
             let nominal = (nominal * 1e6).round() / 1e6;
             self.draft.coordinates.push(DraftCoordinate {
@@ -192,6 +214,7 @@ impl ReductionState<'_> {
                 passive: true,
             });
         }
+        self.rotations.push(rotation);
         // Position of the joint in the carrier, or in the plane.
         let (on, local) = match &carrier {
             None => (

@@ -33,7 +33,7 @@ pub(crate) use data::{
 };
 #[cfg(feature = "experiment")]
 pub(crate) use experiment::ExperimentArgs;
-pub(crate) use motion::{CriterionArg, ExciteArgs, SimulateArgs};
+pub(crate) use motion::{CriterionArg, ExciteArgs, PeriodArg, SimulateArgs};
 pub(crate) use rig::{ExportArgs, ImportArgs, ReduceArgs};
 
 /// From a model file to base parameters, equations, fast Rust, and parameters from measurements.

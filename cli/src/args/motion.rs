@@ -45,12 +45,13 @@ pub(crate) enum CriterionArg {
 pub(crate) struct ExciteArgs {
     /// Model file (TOML)
     pub(crate) model: PathBuf,
-    /// Harmonics of the Fourier series of each active coordinate
-    #[arg(long, value_name = "N", default_value_t = 7, value_parser = parse_harmonics)]
-    pub(crate) harmonics: usize,
-    /// Period of the trajectory, s
-    #[arg(long, value_name = "S", default_value_t = 7.29, value_parser = parse_period)]
-    pub(crate) period: f64,
+    /// Harmonics of the Fourier series of each active coordinate; with several numbers, such as `5,7,9`, each is
+    /// searched and the best result is written
+    #[arg(long, value_name = "N[,N...]", default_value = "7", value_delimiter = ',', value_parser = parse_harmonics)]
+    pub(crate) harmonics: Vec<usize>,
+    /// Period of the trajectory, s, or a range in which the best period is searched, such as `5:10`
+    #[arg(long, value_name = "S|LOW:HIGH", default_value = "7.29", value_parser = PeriodArg::parse)]
+    pub(crate) period: PeriodArg,
     /// Limits that add to those of the model file or replace them: a coordinate (`theta1=1.5:2.1`), its rate
     /// (`theta1_d=1.2`) or acceleration (`theta1_dd=4`), the force of a drive (`spindle_left=1500`), a point
     /// (`R3m.x=0.2:0.7`), or `singularity=0.3`; may be repeated
@@ -85,6 +86,28 @@ pub(crate) struct ExciteArgs {
     pub(crate) json: bool,
     #[command(flatten)]
     pub(crate) separate: SeparateArgs,
+}
+
+/// A period, or the range in which it is searched.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum PeriodArg {
+    /// A fixed period, s.
+    Fixed(f64),
+    /// Bounds of a period that is a variable of the search, s.
+    Searched([f64; 2]),
+}
+
+impl PeriodArg {
+    /// Reads a period in s, or a range of periods.
+    fn parse(text: &str) -> Result<Self, String> {
+        match text.split_once(':') {
+            None => parse_period(text).map(Self::Fixed),
+            Some((low, high)) => match [parse_period(low.trim())?, parse_period(high.trim())?] {
+                [low, high] if low < high => Ok(Self::Searched([low, high])),
+                _ => Err("the range of periods is empty; the shorter period comes first, as in 5:10".to_owned()),
+            },
+        }
+    }
 }
 
 /// Reads a number of harmonics, 1 to 50.

@@ -7,7 +7,7 @@ use modelmill::Host;
 use modelmill::excite::{ExcitationCriterion, ExcitationRequest, Options};
 use modelmill::text::table::count;
 
-use crate::args::{CriterionArg, ExciteArgs};
+use crate::args::{CriterionArg, ExciteArgs, PeriodArg};
 use crate::failure::{CommandFailure, CommandOutcome};
 use crate::flags::FlagSpelling;
 use crate::output::OutputFile;
@@ -51,10 +51,23 @@ fn figure_path(args: &ExciteArgs) -> PathBuf {
 impl ExciteArgs {
     /// The same as a request of the library.
     fn request(&self) -> ExcitationRequest {
+        let (period, period_range) = match self.period {
+            PeriodArg::Fixed(period) => (period, None),
+            PeriodArg::Searched(range) => (range[1], Some(range)),
+        };
+        // Clap has at least the default number; a number that is repeated is searched once.
+        let (first, others) = self.harmonics.split_first().unwrap_or((&7, &[]));
+        let mut other_harmonics: Vec<usize> = Vec::new();
+        for harmonics in others {
+            if harmonics != first && !other_harmonics.contains(harmonics) {
+                other_harmonics.push(*harmonics);
+            }
+        }
         ExcitationRequest {
             options: Options {
-                harmonics: self.harmonics,
-                period: self.period,
+                harmonics: *first,
+                period,
+                period_range,
                 criterion: match self.criterion {
                     CriterionArg::Condition => ExcitationCriterion::Condition,
                     CriterionArg::LogDet => ExcitationCriterion::LogDet,
@@ -64,6 +77,7 @@ impl ExciteArgs {
                 seed: self.seed,
                 ..Options::default()
             },
+            other_harmonics,
             rate: self.rate,
             limits: self.limits.clone(),
             separate: self.separate.separation_request(),

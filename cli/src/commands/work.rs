@@ -217,7 +217,7 @@ mod tests {
     use clap::Parser;
 
     use super::*;
-    use crate::args::{CommandLine, ProgramCommand};
+    use crate::args::{CommandLine, PeriodArg, ProgramCommand};
 
     /// Commands that the page shows are valid, and read the same recordings in the same way.
     #[test]
@@ -254,8 +254,13 @@ mod tests {
         let ProgramCommand::Excite(excite) = &excite.command else {
             panic!("another command");
         };
-        let told = (excite.harmonics, excite.period, excite.limits.len(), excite.starts);
-        assert_eq!(told, (3, 2.5, 2, asked.starts), "{command}");
+        let told = (
+            excite.harmonics.clone(),
+            excite.period,
+            excite.limits.len(),
+            excite.starts,
+        );
+        assert_eq!(told, (vec![3], PeriodArg::Fixed(2.5), 2, asked.starts), "{command}");
         for step in [
             WorkbenchStep::Picture,
             WorkbenchStep::Equations,

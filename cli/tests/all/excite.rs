@@ -32,6 +32,56 @@ fn columns(path: &str) -> (Vec<String>, Vec<Vec<f64>>) {
     (names, rows.collect())
 }
 
+/// The best period within bounds is at least as good as the end of the bounds, and the best number of harmonics is written.
+#[test]
+fn the_period_and_the_number_of_harmonics_are_searched() {
+    let search = |extra: &[&str]| {
+        let out = scratch("excite-period.csv");
+        let robot = model("two_link.toml");
+        let limits = [
+            "--limits",
+            "q1=-1:1",
+            "--limits",
+            "q1_d=2",
+            "--limits",
+            "q2=-1.5:1.5",
+            "--limits",
+            "q2_d=3",
+        ];
+        let mut all = vec![
+            "excite",
+            robot.as_str(),
+            "--random",
+            "40",
+            "--starts",
+            "1",
+            "--out",
+            &out,
+            "--json",
+        ];
+        all.extend(limits);
+        all.extend(extra);
+        json(&all)
+    };
+    let free = search(&["--harmonics", "2,3", "--period", "2:8"]);
+    let period = number(&free, "/period");
+    assert!((2.0..=8.0).contains(&period), "{period}");
+    assert_eq!(free["violations"], 0);
+    let compared = free["compared_harmonics"].as_array().unwrap();
+    let best = compared
+        .iter()
+        .map(|one| number(one, "/condition_number"))
+        .fold(f64::INFINITY, f64::min);
+    assert_eq!(compared.len(), 2);
+    assert!((number(&free, "/condition_number") - best).abs() < 1e-9 * best);
+    let fixed = search(&["--harmonics", "3", "--period", "8"]);
+    assert!(best < 1.02 * number(&fixed, "/condition_number"), "{free} {fixed}");
+    refused(
+        2,
+        &["excite", &model("two_link.toml"), "--period", "8:2", "--out", "x.csv"],
+    );
+}
+
 /// The paper's series for the SpiderMill: period 7.29 s, seven harmonics.
 #[test]
 fn beats_the_best_of_a_thousand_random_trajectories_without_leaving_the_limits() {

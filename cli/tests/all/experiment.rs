@@ -67,8 +67,10 @@ fn the_error_of_the_papers_treatment_is_the_force_of_the_misplaced_mass() {
         let remains = of("spidermill_full", "explained/remains");
         assert!(remains * remains < 1e-3 && remains < 1e-3, "{remains}");
         assert!(of("spidermill_full", "explained/correlation") > 0.999);
-        // Most of what the paper's own identification changed is the same force.
-        assert!(of("spidermill_full", "paper_change/correlation") > 0.8);
+        // Much of what the paper's own identification changed is the same force, also about the mean.
+        assert!(of("spidermill_full", "paper_change/correlation") > 0.5);
+        let variation = of("spidermill_full", "paper_change/explained_variation");
+        assert!(variation > 0.1 && variation < 0.9, "{variation}");
         // The check could fail: with rods much is left.
         assert!(of("spidermill_with_rods", "explained/remains") > 0.02);
     }
@@ -96,8 +98,32 @@ fn the_error_of_the_papers_treatment_is_the_force_of_the_misplaced_mass() {
         same(&found["spidermill_full"]["p_min"], again, 1e-5);
     }
 
+    the_authors_causes(&found);
+
+    // The paper's own Table 1 is one solution of its base parameters; the other one has negative values.
+    let printed = found["table_1_of_the_paper"].as_array().unwrap();
+    let second = printed.iter().filter(|one| number(one, "/1") < 0.0).count();
+    assert_eq!((printed.len(), second), (2, 1), "{printed:?}");
+    let first = printed.iter().find(|one| number(one, "/1") > 0.0).unwrap();
+    for (k, value) in [15.9794, 5.9203, 0.833, 4.9733, 0.2162].into_iter().enumerate() {
+        assert!((number(first, &format!("/{k}")) - value).abs() < 1e-6, "{first}");
+    }
+
+    // Table 2 with other lengths is at least as close as at the start, and each excitation has a condition number.
+    assert!(number(&found, "/lengths_for_table_2/largest_factor") > 1.0);
+    let conditions = found["conditions"].as_array().unwrap();
+    assert!(conditions.len() >= 8 && conditions.iter().all(|one| number(one, "/condition_number") > 1.0));
+
     let page = std::fs::read_to_string(format!("{out}/experiment.html")).unwrap();
-    for part in ["<svg", "Table 2", "9.90 %", "misplaced m4"] {
+    for part in [
+        "<svg",
+        "Table 2",
+        "9.90 %",
+        "misplaced m4",
+        "65.1 %",
+        "(f) relative error",
+        "Complex-structured",
+    ] {
         assert!(page.contains(part), "no {part}");
     }
     // Nothing is fetched, and nothing failed on the way to the page.
@@ -105,6 +131,25 @@ fn the_error_of_the_papers_treatment_is_the_force_of_the_misplaced_mass() {
     for part in ["NaN %", "inf %", ">NaN<"] {
         assert!(!page.contains(part), "{part}");
     }
+}
+
+/// Centres of bodies that only translate have no effect; contact points beside the axes leave an error after
+/// identification, in proportion to their distance.
+fn the_authors_causes(found: &Value) {
+    assert!(number(found, "/causes/moved_centres") < 1e-8);
+    let estimated = |contact: usize, run: &str, drive: usize| {
+        number(found, &format!("/causes/contacts/{contact}/{run}/estimated/{drive}"))
+    };
+    for run in ["identification", "verification"] {
+        for drive in [0, 1] {
+            let ratio = estimated(1, run, drive) / estimated(0, run, drive);
+            assert!((ratio - 2.5).abs() < 0.25, "{run} {drive}: {ratio}");
+        }
+    }
+    // The diagnosis with fixed parameters finds both.
+    let held = |k: usize| number(found, &format!("/causes/held/m4_and_offset/{k}"));
+    assert!((held(0) - 12.456).abs() < 0.02 * 12.456, "{}", held(0));
+    assert!((held(1) - 0.02).abs() < 0.1 * 0.02, "{}", held(1));
 }
 
 #[test]

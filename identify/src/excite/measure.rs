@@ -36,11 +36,6 @@ impl<'a> TrajectoryEvaluator<'a> {
         self.evaluations.get()
     }
 
-    /// Angular frequency of the first harmonic, rad/s.
-    pub(super) fn omega(&self) -> f64 {
-        2.0 * std::f64::consts::PI / self.options.period
-    }
-
     /// Motion at the samples of the search.
     pub(super) fn sample_motion(&self, series: &[FourierSeries]) -> ExcitationMotion {
         ExcitationMotion::sample(series, samples_per_period(self.options))

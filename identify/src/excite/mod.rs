@@ -108,8 +108,10 @@ pub enum ExcitationCriterion {
 pub struct Options {
     /// Number of harmonics of the series.
     pub harmonics: usize,
-    /// Period, s.
+    /// Period, s; with [`Options::period_range`] the result has another one.
     pub period: f64,
+    /// Bounds of the period, s, if it is a variable of the search, eq. (17); `None` to keep [`Options::period`].
+    pub period_range: Option<[f64; 2]>,
     /// Criterion that is minimised.
     pub criterion: ExcitationCriterion,
     /// Number of random feasible trajectories that are tried first.
@@ -122,11 +124,33 @@ pub struct Options {
     pub seed: u64,
 }
 
+impl Options {
+    /// The period for a position between -1 and 1 in the range: the ratio of the ends is divided evenly. The fixed
+    /// period if there is no range.
+    pub(crate) fn period_at(&self, position: f64) -> f64 {
+        self.period_range.map_or(self.period, |[low, high]| {
+            (low.ln() + 0.5 * (position + 1.0) * (high / low).ln()).exp()
+        })
+    }
+
+    /// The position of a period in the range, the inverse of [`Options::period_at`]; 0 if the range is one point.
+    pub(crate) fn period_position(&self, period: f64) -> f64 {
+        let [low, high] = self.period_range.unwrap_or([period; 2]);
+        let width = (high / low).ln();
+        if width > 0.0 {
+            2.0 * (period / low).ln() / width - 1.0
+        } else {
+            0.0
+        }
+    }
+}
+
 impl Default for Options {
     fn default() -> Self {
         Self {
             harmonics: 7,
             period: 7.29,
+            period_range: None,
             criterion: ExcitationCriterion::Condition,
             random: 1000,
             starts: 4,

@@ -1,5 +1,7 @@
 //! Random trajectories within the limits, as large as the limits allow.
 
+use std::f64::consts::PI;
+
 use modelmill_runtime::RandomBits;
 
 use super::feasible::{max_scale_factor, worst_plant_limit};
@@ -81,8 +83,14 @@ pub(super) fn draw_feasible(
     let mut flow = SearchFlow::Continue(());
     while flow.is_continue() && feasible < wanted && tried < PATIENCE * wanted {
         tried += 1;
+        // One period for all coordinates; without a range no number is drawn, so that fixed periods keep their seeds.
+        let position = match measure.options.period_range {
+            Some(_) => 2.0 * draws.below_one() - 1.0,
+            None => 0.0,
+        };
+        let omega = 2.0 * PI / measure.options.period_at(position);
         let mut series: Vec<FourierSeries> = (0..measure.limits.len())
-            .map(|i| draw_series(measure, i, draws))
+            .map(|i| draw_series(measure, i, omega, draws))
             .collect();
         for _ in 0..SHRINKS {
             match worst_plant_limit(measure, &series, super::samples_per_period(measure.options)) {
@@ -109,9 +117,8 @@ pub(super) fn draw_feasible(
 }
 
 /// A random series of one coordinate that reaches its tightest limit, around a random mean within the remaining range.
-fn draw_series(measure: &TrajectoryEvaluator<'_>, i: usize, draws: &mut RandomBits) -> FourierSeries {
+fn draw_series(measure: &TrajectoryEvaluator<'_>, i: usize, omega: f64, draws: &mut RandomBits) -> FourierSeries {
     let n = measure.options.harmonics;
-    let omega = measure.omega();
     let [low, high] = measure.limits[i].position;
     let shape = FourierSeries {
         offset: 0.0,

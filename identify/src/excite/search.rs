@@ -1,5 +1,5 @@
 //! Local optimisation from a start: sequential quadratic programming (D. Kraft, 1988, the crate `slsqp`) on the
-//! coefficients of eq. (17), with limits as smooth constraints.
+//! coefficients of eq. (17), with limits as smooth constraints. The period is one of them if it has a range.
 //!
 //! The largest excess over a limit is approximated by `log(sum of exp(r * excess)) / r`, which is smooth and never
 //! below it (G. Kreisselmeier and R. Steinhauser, 1979); r grows from one round to the next.
@@ -8,6 +8,7 @@
 //! of them cheap. They need smooth functions: the logarithm of the condition number and smooth largest excesses.
 
 use std::cell::{Cell, RefCell};
+use std::f64::consts::PI;
 
 use slsqp::{StopTols, minimize};
 
@@ -100,7 +101,13 @@ fn optimise_round(
     let constraint = |k: usize| move |x: &[f64], gradient: Option<&mut [f64]>, (): &mut ()| entry(x, k, gradient);
     let constraints: Vec<_> = (1..=n_constraints).map(constraint).collect();
     // Coefficients of size 1 reach a limit; four times that is far beyond.
-    let bounds = vec![(-4.0, 4.0); start.len()];
+    let mut bounds = vec![(-4.0, 4.0); start.len()];
+    // The last coefficient is the position of the period in its range.
+    if measure.options.period_range.is_some()
+        && let Some(last) = bounds.last_mut()
+    {
+        *last = (-1.0, 1.0);
+    }
     let tolerances = StopTols {
         ftol_rel: 1e-6,
         ..StopTols::default()
@@ -198,31 +205,25 @@ fn smooth_largest(values: impl Iterator<Item = f64> + Clone, sharpness: f64) -> 
 struct CoefficientScales<'m, 'a> {
     /// Limits and options.
     measure: &'m TrajectoryEvaluator<'a>,
-    /// Largest amplitude of each harmonic within the tightest limit, `[coordinate][harmonic]`, rad or m.
-    amplitudes: Vec<Vec<f64>>,
 }
 
 impl<'m, 'a> CoefficientScales<'m, 'a> {
-    /// Amplitudes from the limits of position, rate and acceleration.
+    /// The scales within the limits of a search.
     fn new(measure: &'m TrajectoryEvaluator<'a>) -> Self {
-        let amplitudes = measure.limits.iter().map(|limits| {
-            let harmonics = 1..=measure.options.harmonics;
-            harmonics
-                .map(|k| {
-                    let w = k as f64 * measure.omega();
-                    let by_rate = limits.rate.map_or(f64::INFINITY, |r| half_width(r) / w);
-                    let by_acceleration = limits.acceleration.map_or(f64::INFINITY, |r| half_width(r) / (w * w));
-                    half_width(limits.position).min(by_rate).min(by_acceleration)
-                })
-                .collect()
-        });
-        Self {
-            measure,
-            amplitudes: amplitudes.collect(),
-        }
+        Self { measure }
     }
 
-    /// Coefficients of size 1 for some series: for each coordinate the mean, then sines and cosines.
+    /// Largest amplitude of the harmonic with the angular frequency `w` (rad/s) within the tightest limit of a
+    /// coordinate, rad or m.
+    fn amplitude(&self, coordinate: usize, w: f64) -> f64 {
+        let limits = &self.measure.limits[coordinate];
+        let by_rate = limits.rate.map_or(f64::INFINITY, |r| half_width(r) / w);
+        let by_acceleration = limits.acceleration.map_or(f64::INFINITY, |r| half_width(r) / (w * w));
+        half_width(limits.position).min(by_rate).min(by_acceleration)
+    }
+
+    /// Coefficients of size 1 for some series: for each coordinate the mean, then sines and cosines; at the end the
+    /// period, if it is a variable.
     fn encode(&self, series: &[FourierSeries]) -> Vec<f64> {
         let mut x = Vec::new();
         for (i, one) in series.iter().enumerate() {
@@ -231,23 +232,34 @@ impl<'m, 'a> CoefficientScales<'m, 'a> {
             for list in [&one.mu, &one.nu] {
                 for (k, coefficient) in list.iter().enumerate() {
                     let w = (k + 1) as f64 * one.omega;
-                    x.push(coefficient / (w * self.amplitudes[i][k]));
+                    x.push(coefficient / (w * self.amplitude(i, w)));
                 }
             }
+        }
+        let options = self.measure.options;
+        if options.period_range.is_some() {
+            let period = series.first().map_or(options.period, FourierSeries::period);
+            x.push(options.period_position(period));
         }
         x
     }
 
     /// The series of some coefficients; the inverse of `encode`.
     fn decode(&self, x: &[f64]) -> Vec<FourierSeries> {
-        let n = self.measure.options.harmonics;
-        let omega = self.measure.omega();
-        let each = x.chunks_exact(1 + 2 * n).enumerate();
+        let options = self.measure.options;
+        let n = options.harmonics;
+        // The differences step a little beyond the ends of the range.
+        let position = x.last().filter(|_| options.period_range.is_some());
+        let omega = 2.0 * PI / options.period_at(position.map_or(0.0, |x| x.clamp(-1.0, 1.0)));
+        let each = x.chunks_exact(1 + 2 * n).take(self.measure.limits.len()).enumerate();
         each.map(|(i, x)| {
             let [low, high] = self.measure.limits[i].position;
             let list = |from: usize| {
                 (0..n)
-                    .map(|k| x[from + k] * (k + 1) as f64 * omega * self.amplitudes[i][k])
+                    .map(|k| {
+                        let w = (k + 1) as f64 * omega;
+                        x[from + k] * (k + 1) as f64 * omega * self.amplitude(i, w)
+                    })
                     .collect()
             };
             FourierSeries {

@@ -32,6 +32,11 @@ pub(crate) fn variant(host: &Host, name: &str, file: &str, own: &str) -> Outcome
     host.derive(name, loaded)
 }
 
+/// Reads a rig file, called `file`, that may extend bundled ones.
+pub(crate) fn rig_variant(file: &str, own: &str) -> Outcome<modelmill_rig::Rig> {
+    Ok(modelmill_rig::load(file, own, &files(&RIGS))?.rig)
+}
+
 /// Reads a bundled rig file.
 pub(crate) fn rig(name: &str) -> Outcome<modelmill_rig::Rig> {
     Ok(modelmill_rig::load(name, &text(&RIGS, name)?, &files(&RIGS))?.rig)

@@ -10,6 +10,8 @@ use modelmill::text::svg::{PanelStyle, SvgFigure, sheet};
 
 /// Largest relative error that is drawn.
 const RELATIVE: f64 = 1.0;
+/// The same in the panels of Fig. 6 and 7, per cent, so that errors of some per cent can be seen.
+const PANEL_RELATIVE: f64 = 50.0;
 
 /// The next round number above all magnitudes, so that scales can be read.
 fn round_limit(columns: &[&DriveColumns]) -> f64 {
@@ -32,9 +34,11 @@ fn scale(limit: f64) -> PanelStyle<'static> {
     }
 }
 
-/// Angles of a trajectory around their means, and the forces along it.
-pub(crate) fn motion(title: &str, periodic: &PeriodicTrajectory, along: &TreatmentRun, drives: &[String]) -> String {
+/// A figure with the six panels of Fig. 6 and 7: angles of the cranks (a, b), forces of the spindles (c, d), and
+/// relative errors of the paper's treatment (e, f), left and right.
+pub(crate) fn panels(title: &str, periodic: &PeriodicTrajectory, along: &TreatmentRun) -> String {
     let mut figure = SvgFigure::new(title, &along.time);
+    let sides = ["left", "right"];
     // Angles relative to their means, so that both cranks have one scale.
     let angles: DriveColumns = periodic
         .series
@@ -45,26 +49,40 @@ pub(crate) fn motion(title: &str, periodic: &PeriodicTrajectory, along: &Treatme
         })
         .collect();
     let limit = round_limit(&[&angles]);
-    figure.panel_with(
-        "angles around their means, degrees",
-        &[("theta1", &angles[0]), ("theta2", &angles[1])],
-        &scale(limit),
-    );
-    let curves: Vec<(&str, &[f64])> = names(drives, &along.measured);
-    figure.panel_with(
-        "spindle forces of the rig, N",
-        &curves,
-        &scale(round_limit(&[&along.measured])),
-    );
+    for (k, (side, letter)) in sides.into_iter().zip(["a", "b"]).enumerate() {
+        let mean = periodic.series[k].offset.to_degrees();
+        let title = format!("({letter}) {side} active joint: angle about its mean of {mean:.1} degrees, degrees");
+        figure.panel_with(&title, &[("", &angles[k])], &scale(limit));
+    }
+    let (calculated, estimated) = (&along.calculated[0], &along.estimated[0]);
+    let limit = round_limit(&[&along.measured, calculated, estimated]);
+    for (k, (side, letter)) in sides.into_iter().zip(["c", "d"]).enumerate() {
+        figure.panel_with(
+            &format!("({letter}) force of the {side} spindle, N"),
+            &[
+                ("rig", &along.measured[k]),
+                ("calculated", &calculated[k]),
+                ("estimated", &estimated[k]),
+            ],
+            &scale(limit),
+        );
+    }
+    for (k, (side, letter)) in sides.into_iter().zip(["e", "f"]).enumerate() {
+        let [calculated, estimated] = [calculated, estimated].map(|forces| relative_error(along, forces, k));
+        figure.panel_with(
+            &format!("({letter}) relative error of the {side} spindle force, per cent, cut off at {PANEL_RELATIVE}"),
+            &[("calculated", &calculated), ("estimated", &estimated)],
+            &scale(PANEL_RELATIVE),
+        );
+    }
     figure.finish()
 }
 
-/// Curves with the names of their drives.
-fn names<'a>(drives: &'a [String], columns: &'a DriveColumns) -> Vec<(&'a str, &'a [f64])> {
-    drives
-        .iter()
-        .map(String::as_str)
-        .zip(columns.iter().map(Vec::as_slice))
+/// The relative error of a drive, per cent; larger values are cut off by the panel.
+fn relative_error(along: &TreatmentRun, modelled: &DriveColumns, drive: usize) -> Vec<f64> {
+    let pairs = modelled[drive].iter().zip(&along.measured[drive]);
+    pairs
+        .map(|(m, y)| if *y == 0.0 { 0.0 } else { 100.0 * (m - y) / y })
         .collect()
 }
 

@@ -5,24 +5,32 @@
 //! trajectories are rounded to four decimals before the simulation, so that the page can print what was used.
 //! Errors that are rounding are shown as zero, because their digits differ between machines.
 
+mod bundled;
+mod causes;
+mod conditions;
 mod figures;
+mod held;
 mod lengths;
 mod page;
+mod page_causes;
+mod page_differences;
 mod page_forces;
 mod page_parameters;
+mod page_statements;
 mod printed;
+mod replica;
+mod results;
 mod runs;
 mod study;
 mod wording;
 
-mod bundled;
-
-use modelmill::text::TerminalStyle;
-use modelmill::text::table::{ColumnAlignment, number, percent, table};
 use modelmill::{Host, Model, Outcome};
 use modelmill_identify::excite::Options;
-use serde_json::json;
+use modelmill_identify::interpret::PhysicalSolution;
 
+use causes::AuthorCauses;
+use conditions::ConditionRow;
+use replica::LengthSearch;
 use runs::PeriodicTrajectory;
 use study::TreatmentStudy;
 
@@ -49,8 +57,16 @@ pub struct PaperExperiment {
     benches: [TreatmentStudy; 2],
     /// The paper's base parameters: calculated, of the consistent treatment, and the paper's estimate.
     base: [Vec<f64>; 3],
+    /// The two causes that the authors name.
+    causes: AuthorCauses,
+    /// Table 1 from the paper's own estimates: all real solutions.
+    printed_solutions: Vec<PhysicalSolution>,
     /// The error for other distances of the base joints.
     lengths: Vec<lengths::DistanceErrors>,
+    /// Lengths and limits with which Table 2 comes closest to the paper's.
+    replica: LengthSearch,
+    /// The best condition numbers under other assumptions.
+    conditions: Vec<ConditionRow>,
     /// Samples per second, Hz.
     rate: f64,
 }
@@ -109,8 +125,19 @@ impl PaperExperiment {
         ];
         // The test motion once more, with other distances of the base joints.
         let lengths = lengths::scan(host, &trajectories[1].series)?;
+        // A smaller search is enough to compare assumptions.
+        let smaller = Options {
+            random: args.random.div_ceil(4),
+            starts: 1,
+            steps: args.random.div_ceil(10).min(100),
+            ..excitation
+        };
         Ok(Self {
+            causes: AuthorCauses::new([&paper, &consistent], &trajectories, args.rate)?,
+            printed_solutions: study::printed_solutions(&paper, &benches[0].fits[0].fit)?,
             lengths,
+            replica: LengthSearch::new(host, &trajectories, 4 * args.random, args.seed)?,
+            conditions: conditions::compare(host, &smaller)?,
             paper,
             trajectories,
             benches,
@@ -122,102 +149,5 @@ impl PaperExperiment {
     /// The page.
     pub fn page(&self) -> String {
         page::render(self)
-    }
-
-    /// Error figures of all runs, for people.
-    pub fn text(&self, style: TerminalStyle) -> String {
-        let mut lines = vec![style.bold(&format!(
-            "The paper's experiment: condition number {} (paper {})",
-            number(self.trajectories[0].condition_number),
-            printed::CONDITION_NUMBER
-        ))];
-        // One row per rig, run and treatment.
-        let mut rows = Vec::new();
-        for (bench, rig) in self.benches.iter().zip(["rig", "rig with rods"]) {
-            for (along, run) in bench.runs.iter().zip(["identification", "verification"]) {
-                for (t, treatment) in ["the paper's", "consistent"].into_iter().enumerate() {
-                    let mut row = vec![format!("{rig}, {run}"), treatment.to_owned()];
-                    for modelled in [&along.calculated[t], &along.estimated[t]] {
-                        row.extend((0..2).map(|d| percent(Some(along.errors(d, modelled).nrms))));
-                    }
-                    let remains = along.explained_error().remains;
-                    row.push(if t == 0 { percent(Some(remains)) } else { String::new() });
-                    rows.push(row);
-                }
-            }
-        }
-        let columns = [
-            ("nrms", ColumnAlignment::Left),
-            ("treatment of m4", ColumnAlignment::Left),
-            ("calculated fe1", ColumnAlignment::Right),
-            ("fe10", ColumnAlignment::Right),
-            ("estimated fe1", ColumnAlignment::Right),
-            ("fe10", ColumnAlignment::Right),
-            ("residual without m4's shift", ColumnAlignment::Right),
-        ];
-        lines.extend(table(2, &columns, &rows));
-        lines.join("\n")
-    }
-
-    /// All figures as one JSON object.
-    pub fn json(&self) -> serde_json::Value {
-        // The same numbers for scripts.
-        let bench = |bench: &TreatmentStudy| {
-            let run = |k: usize| {
-                let along = &bench.runs[k];
-                let treatment = |t: usize| {
-                    let errors = |modelled: &study::DriveColumns| -> Vec<serde_json::Value> {
-                        (0..modelled.len())
-                            .map(|d| {
-                                let e = along.errors(d, modelled);
-                                json!({ "nrms": e.nrms, "mean_relative": e.mean_relative, "median_relative": e.median_relative })
-                            })
-                            .collect()
-                    };
-                    json!({
-                        "calculated": errors(&along.calculated[t]),
-                        "estimated": errors(&along.estimated[t]),
-                    })
-                };
-                let explained = along.explained_error();
-                let printed = study::explain_error(&along.printed_change(), &along.placement());
-                json!({
-                    "paper": treatment(0),
-                    "consistent": treatment(1),
-                    "explained": {
-                        "remains": explained.remains,
-                        "correlation": explained.correlation,
-                    },
-                    "paper_change": {
-                        "remains": printed.remains,
-                        "correlation": printed.correlation,
-                    },
-                })
-            };
-            let solutions: Vec<_> = bench.physical.iter().map(|one| one.values.clone()).collect();
-            json!({
-                "identification": run(0),
-                "verification": run(1),
-                "p_min": bench.fits[0].values(),
-                "table_1": solutions,
-            })
-        };
-        json!({
-            "condition_number": self.trajectories[0].condition_number,
-            "rate": self.rate,
-            "spidermill_full": bench(&self.benches[0]),
-            "spidermill_with_rods": bench(&self.benches[1]),
-            "lengths": self.lengths.iter().map(|length| {
-                json!({
-                    "b": length.distance,
-                    "nrms": length.errors.iter().map(|e| e.nrms).collect::<Vec<_>>(),
-                })
-            }).collect::<Vec<_>>(),
-            "p_min": {
-                "calculated": self.base[0],
-                "consistent": self.base[1],
-                "paper_estimated": self.base[2],
-            },
-        })
     }
 }

@@ -13,10 +13,14 @@ pub(crate) fn render(experiment: &PaperExperiment) -> String {
     page.method(experiment);
     page.table_2(experiment);
     page.placement(experiment);
+    page.causes(experiment);
     page.peaks(experiment);
     page.base_parameters(experiment);
     page.table_1(experiment);
     page.differences(experiment);
+    page.conditions(experiment);
+    page.replica(experiment);
+    page.statements();
     page.coefficients(experiment);
     page.0.push_str(&report::end_page(&[]));
     page.0

@@ -1,20 +1,14 @@
-//! Chapters 5 to 7 of the page: changes of the parameters, differences to the paper's numbers with their reasons, and
-//! the coefficients of the trajectories.
-
-use std::fmt::Write as _;
+//! Chapters 6 and 7 of the page: changes of the parameters by identification, and Table 1.
 
 use crate::page::ExperimentPage;
-use crate::study::{self, UNKNOWN};
-use crate::wording::{decimals, largest, least, percent, share};
+use crate::study::{self, ExplainedError, TreatmentRun, UNKNOWN};
+use crate::wording::{decimals, share};
 use crate::{PaperExperiment, figures, printed};
 
-/// Least and largest of the paper's errors with calculated parameters, from Table 2, as shares.
-const PAPER_ERRORS: [f64; 2] = [0.0782, 0.1020];
-
 impl ExperimentPage {
-    /// Chapter 5: base parameters before and after identification.
+    /// Chapter 6: base parameters before and after identification.
     pub(crate) fn base_parameters(&mut self, experiment: &PaperExperiment) {
-        self.heading("5  Base parameters: identification corrects the place of the mass");
+        self.heading("6  Base parameters: identification corrects the place of the mass");
         let [calculated, consistent, estimated] = &experiment.base;
         // Where the paper's estimate and ours move, compared with the consistent values.
         self.paragraph(
@@ -71,14 +65,22 @@ impl ExperimentPage {
         // The same comparison in forces, which needs neither rig.
         self.paragraph(&format!(
             "In forces: take the paper's estimated and calculated parameters, put both into eq. (16) along our runs, \
-             and subtract. Of this change, {} (identification run) and {} (verification run) is the force of the \
-             misplaced m4, without any fit (squares; correlation {:.2} and {:.2}). This does not use our rigs. The \
-             remainder is the amount by which the paper's values go beyond the consistent ones.",
+             and subtract. This change is compared with the force of the misplaced m4, without any fit and without our \
+             rigs. Of its squares, {} (identification run) and {} (verification run) are that force. Most of this is the \
+             constant part, which gravity causes. About their means both are less alike; the table has the correlation \
+             coefficient (Pearson) and the share of the variation about the mean that is explained, 1 minus the ratio \
+             of the squares. The remainder is the amount by which the paper's values go beyond the consistent ones.",
             share(1.0 - changes[0].remains.powi(2)),
             share(1.0 - changes[1].remains.powi(2)),
-            changes[0].correlation,
-            changes[1].correlation,
         ));
+        self.table(
+            &[
+                "run",
+                "correlation coefficient (Pearson)",
+                "explained variation about the mean",
+            ],
+            &change_rows(runs, &changes),
+        );
         self.figure(
             &figures::printed_change(
                 "What the paper's identification changed, verification run",
@@ -90,9 +92,9 @@ impl ExperimentPage {
         );
     }
 
-    /// Chapter 6: physical parameters, compared with Table 1 of the paper.
+    /// Chapter 7: physical parameters, compared with Table 1 of the paper.
     pub(crate) fn table_1(&mut self, experiment: &PaperExperiment) {
-        self.heading("6  Table 1, compared with the paper's");
+        self.heading("7  Table 1, compared with the paper's");
         // The parameters that are assumed to be known, as in the paper.
         self.paragraph(
             "As in the paper, m1, m3 and dc1 are known and the others are solved from the five estimated base parameters; all real \
@@ -137,6 +139,7 @@ impl ExperimentPage {
                 ));
             }
         }
+        self.second_root(experiment);
         // Why no solution is the robot.
         self.paragraph(
             "With p4,min = 0 the printed treatment allows only m4 = 0 or dc3 = d3: the two solutions for the rig. \
@@ -147,103 +150,69 @@ impl ExperimentPage {
         );
     }
 
-    /// Chapter 7: reasons for other numbers than the paper's, and the influence of one length.
-    pub(crate) fn differences(&mut self, experiment: &PaperExperiment) {
-        self.heading("7  Where our numbers differ from the paper's, and why");
-        let plain = &experiment.benches[0].runs;
-        // The size of the errors depends on lengths that the paper does not print.
+    /// The other solution of the paper's own Table 1, and why it is refused.
+    fn second_root(&mut self, experiment: &PaperExperiment) {
+        let solutions = &experiment.printed_solutions;
+        let d3 = experiment.paper.derivation.mechanism.constants.iter();
+        let d3 = d3.into_iter().find(|c| c.name == "d3").map_or(f64::NAN, |c| c.value);
         self.paragraph(&format!(
-            "The paper prints masses but no lengths, limits or coefficients. The lengths of spidermill.toml (d1, d3, \
-             b, dA, Bx, By) and both trajectories are assumptions, and they determine how large the errors are in per \
-             cent. Before identification ours are {} to {} (nrms), and the mean relative error is {} to {}, far above \
-             the paper's 8 to 10 %. With these lengths the misplaced m4 is a larger part of the spindle forces, and \
-             these pass through zero often. So this page reproduces the cause of the paper's errors, but not their \
-             size.",
-            percent(least(plain, |a, d| a.errors(d, &a.calculated[0]).nrms)),
-            percent(largest(plain, |a, d| a.errors(d, &a.calculated[0]).nrms)),
-            percent(least(plain, |a, d| a.errors(d, &a.calculated[0]).mean_relative)),
-            percent(largest(plain, |a, d| a.errors(d, &a.calculated[0]).mean_relative)),
+            "The paper's own Table 1 has a second root. Its equations are quadratic in dc3: the five base parameters of \
+             its right column belong to {} real solutions, of which it prints one.",
+            solutions.len()
         ));
-        // The influence of one of these lengths.
-        self.paragraph(
-            "The influence of one unprinted length: the same test motion with other distances b of the base joints \
-             (all else unchanged), compared with the consistent treatment, which represents the rig. The error is the \
-             force of the misplaced m4 at every b. Its size relative to the other forces changes.",
-        );
-        // Distances at which the errors of both spindles are within the paper's band.
-        let reached: Vec<_> = experiment
-            .lengths
+        let mut head = vec![String::new(), "*paper's estimate".to_owned()];
+        head.extend((0..solutions.len()).map(|k| format!("solution {}", k + 1)));
+        let rows: Vec<Vec<String>> = UNKNOWN
             .iter()
-            .filter(|length| {
-                let nrms = length.errors.iter().map(|e| e.nrms);
-                nrms.clone().fold(0.0, f64::max) <= PAPER_ERRORS[1]
-                    && nrms.fold(f64::INFINITY, f64::min) >= PAPER_ERRORS[0]
+            .enumerate()
+            .map(|(i, name)| {
+                let mut row = vec![(*name).to_owned(), format!("{:.4}", printed::ESTIMATED[i].1)];
+                row.extend(solutions.iter().map(|one| decimals(one.values[i])));
+                row
             })
             .collect();
-        self.figure(
-            &figures::lengths(&experiment.lengths, PAPER_ERRORS),
-            "The paper's band is a mean relative error; ours is the nrms, which has no peaks. At every instant the \
-             spindle mounts (dA, Bx, By) scale error and force by the same factor.",
-        );
-        if !reached.is_empty() {
-            self.paragraph(&format!(
-                "At b = {} the nrms of both spindles is within the paper's band (the mean relative error is not: {}). \
-                 The b of the real robot is not known.",
-                reached
-                    .iter()
-                    .map(|length| format!("{} m", length.distance))
-                    .collect::<Vec<_>>()
-                    .join(", "),
-                reached
-                    .iter()
-                    .flat_map(|length| length.errors.iter().map(|e| percent(e.mean_relative)))
-                    .collect::<Vec<_>>()
-                    .join(", "),
+        let head: Vec<&str> = head.iter().map(String::as_str).collect();
+        self.table(&head, &rows);
+        // The reasons are read from the values, so that they hold for them.
+        for (k, one) in solutions.iter().enumerate() {
+            let negative: Vec<&str> = (UNKNOWN.iter().zip(&one.values))
+                .filter(|(_, value)| **value < 0.0)
+                .map(|(name, _)| *name)
+                .collect();
+            let mut reasons = Vec::new();
+            if !negative.is_empty() {
+                reasons.push(format!("negative {}", negative.join(", ")));
+            }
+            if one.values[2] > d3 {
+                reasons.push(format!(
+                    "a centre of mass beyond the end of the coupler (dc3 > d3 = {d3} m)"
+                ));
+            }
+            let verdict = match reasons.as_slice() {
+                [] => {
+                    "possible: all masses and inertias are positive and the centre lies within the coupler".to_owned()
+                }
+                reasons => format!("refused: {}", reasons.join("; ")),
+            };
+            self.paragraph(&format!("Solution {}: {verdict}.", k + 1));
+        }
+    }
+}
+
+/// One row per run for all drives, and one per drive: how the paper's change follows the force of the misplaced mass.
+fn change_rows(runs: &[TreatmentRun; 2], changes: &[ExplainedError; 2]) -> Vec<Vec<String>> {
+    let row = |name: String, one: &ExplainedError| vec![name, format!("{:.2}", one.correlation), share(one.variation)];
+    let mut rows = Vec::new();
+    for ((along, change), run) in runs.iter().zip(changes).zip(["identification", "verification"]) {
+        rows.push(row(format!("{run}, both spindles"), change));
+        let (printed, placement) = (along.printed_change(), along.placement());
+        let drives = study::single_drives(&printed).zip(study::single_drives(&placement));
+        for ((printed, placement), side) in drives.zip(["fe1, left", "fe10, right"]) {
+            rows.push(row(
+                format!("{run}, {side}"),
+                &study::explain_error(&printed, &placement),
             ));
         }
-        // The errors after identification have no counterpart on the rig without rods.
-        self.paragraph(
-            "The paper's errors after identification, 3.3 to 3.6 %, have no counterpart on the rig without rods, \
-             where the residual is zero. They must come from something that its multibody model has in addition to a \
-             planar rigid M structure, perhaps spindles with mass and their offset at the cranks. The rig with rods \
-             shows such a residual. Its size depends on the rods, whose mass is an assumption.",
-        );
     }
-
-    /// Coefficients of both trajectories, so that the runs can be repeated.
-    pub(crate) fn coefficients(&mut self, experiment: &PaperExperiment) {
-        self.paragraph("Coefficients of the trajectories, eq. (15), rad and rad/s:");
-        let names = experiment.paper.active_coordinates();
-        // One table per trajectory, with the coefficients as they were used.
-        for (periodic, run) in experiment.trajectories.iter().zip(["Identification", "Verification"]) {
-            let means: Vec<String> = periodic
-                .series
-                .iter()
-                .zip(&names)
-                .map(|(series, name)| format!("mean of {name} {:.4}", series.offset))
-                .collect();
-            self.paragraph(&format!("{run}, period {} s, {}:", periodic.period, means.join(", ")));
-            // Two columns per coordinate: the coefficients mu and nu of every harmonic.
-            let mut head = vec!["k".to_owned()];
-            for name in &names {
-                head.extend([format!("mu, {name}"), format!("nu, {name}")]);
-            }
-            let harmonics = periodic.series.first().map_or(0, |series| series.mu.len());
-            let rows: Vec<Vec<String>> = (0..harmonics)
-                .map(|k| {
-                    let mut row = vec![(k + 1).to_string()];
-                    for series in &periodic.series {
-                        row.extend([series.mu[k], series.nu[k]].map(decimals));
-                    }
-                    row
-                })
-                .collect();
-            let head: Vec<&str> = head.iter().map(String::as_str).collect();
-            self.table(&head, &rows);
-        }
-        let _ = writeln!(
-            self.0,
-            "<p>This page is written by <code>modelmill experiment --out docs</code>.</p>"
-        );
-    }
+    rows
 }

@@ -35,6 +35,54 @@ pub(crate) struct PeriodicTrajectory {
     pub(crate) random: usize,
 }
 
+/// Factors of the limits of the active coordinates: of their ranges, and of rates and accelerations.
+#[derive(Clone, Copy)]
+pub(crate) struct LimitFactors {
+    /// Factor of the ranges of positions, about their middles.
+    pub(crate) positions: f64,
+    /// Factor of rates and accelerations.
+    pub(crate) rates: f64,
+}
+
+impl Default for LimitFactors {
+    fn default() -> Self {
+        Self {
+            positions: 1.0,
+            rates: 1.0,
+        }
+    }
+}
+
+/// The best trajectory within scaled limits, without rounding; `None` if there is none.
+pub(crate) fn search_within(
+    model: &Model,
+    options: &Options,
+    factors: LimitFactors,
+    message: &str,
+) -> Outcome<Option<PeriodicTrajectory>> {
+    let all_limits = limits::merged_limits(model, &[])?;
+    let mut coordinates = limits::active_limits(model, &all_limits)?;
+    for one in &mut coordinates {
+        let [low, high] = one.position;
+        let (middle, half) = (0.5 * (low + high), 0.5 * factors.positions * (high - low));
+        one.position = [middle - half, middle + half];
+        for range in [&mut one.rate, &mut one.acceleration].into_iter().flatten() {
+            *range = range.map(|end| factors.rates * end);
+        }
+    }
+    let plant = ModelPlant::new(model, &all_limits);
+    let search = model.host().run_job(message, max_progress_steps(options), |job| {
+        excite(&plant, &coordinates, options, &|more| job.flow(more))
+    })?;
+    Ok(search.ok().map(|found| PeriodicTrajectory {
+        period: found.series.first().map_or(options.period, FourierSeries::period),
+        condition_number: found.condition_number,
+        series: found.series,
+        start: found.start_condition_number,
+        random: found.feasible_starts,
+    }))
+}
+
 /// Searches for a trajectory; it satisfies all limits with rounded coefficients.
 pub(crate) fn search(model: &Model, options: &Options, message: &str) -> Outcome<PeriodicTrajectory> {
     // Limits of the model file, for the active coordinates.

@@ -47,8 +47,10 @@ pub(crate) struct TreatmentRun {
 pub(crate) struct ExplainedError {
     /// 2-norm of the error minus that force, relative to the error.
     pub(crate) remains: f64,
-    /// Correlation of the error with that force.
+    /// Correlation coefficient (Pearson) of the error with that force, each drive about its own mean.
     pub(crate) correlation: f64,
+    /// Share of the variation of the error about its mean that the force explains, 1 minus the ratio of the squares.
+    pub(crate) variation: f64,
 }
 
 /// Error figures of one drive.
@@ -181,15 +183,37 @@ impl TreatmentRun {
 
 /// The part of some forces that others explain, over all drives.
 pub(crate) fn explain_error(forces: &DriveColumns, by: &DriveColumns) -> ExplainedError {
-    let (forces, by) = (forces.concat(), by.concat());
     // Nothing is fitted: the factor of the known force is 1.
-    let rest: Vec<f64> = forces.iter().zip(&by).map(|(e, d)| e - d).collect();
+    let rest = difference(forces, by);
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let norm = |a: &[f64]| dot(a, a).sqrt();
+    // The mean of each drive is subtracted, so that a constant force counts neither as likeness nor as variation.
+    let [varying, varying_by, varying_rest] = [forces, by, &rest].map(|columns| about_means(columns).concat());
     ExplainedError {
-        remains: norm(&rest) / norm(&forces),
-        correlation: dot(&forces, &by) / (norm(&forces) * norm(&by)),
+        remains: norm(&rest.concat()) / norm(&forces.concat()),
+        correlation: dot(&varying, &varying_by) / (norm(&varying) * norm(&varying_by)),
+        variation: 1.0 - dot(&varying_rest, &varying_rest) / dot(&varying, &varying),
     }
+}
+
+/// Each column about its mean.
+fn about_means(columns: &DriveColumns) -> DriveColumns {
+    let centred = |column: &Vec<f64>| {
+        let mean = column.iter().sum::<f64>() / column.len().max(1) as f64;
+        column.iter().map(|x| x - mean).collect()
+    };
+    columns.iter().map(centred).collect()
+}
+
+/// The largest difference of two sets of forces, relative to the largest force.
+pub(crate) fn largest_difference(a: &DriveColumns, b: &DriveColumns) -> f64 {
+    let largest = |columns: &DriveColumns| columns.iter().flatten().fold(0.0_f64, |m, x| m.max(x.abs()));
+    largest(&difference(a, b)) / largest(a)
+}
+
+/// The single drives of some forces, each as columns of its own.
+pub(crate) fn single_drives(columns: &DriveColumns) -> impl Iterator<Item = DriveColumns> + '_ {
+    columns.iter().map(|column| vec![column.clone()])
 }
 
 /// `a - b`, sample by sample.
@@ -228,6 +252,15 @@ pub(crate) fn values_with(model: &Model, changed: &[(&str, f64)]) -> Vec<f64> {
         .collect();
     let constants: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
     model.derivation.base_values(&parameters, &constants)
+}
+
+/// Table 1 from the base parameters that the paper's own estimates give: its solution and all others.
+pub(crate) fn printed_solutions(model: &Model, fit: &FitFile) -> Outcome<Vec<PhysicalSolution>> {
+    let mut fit = fit.clone();
+    for (parameter, value) in fit.parameters.iter_mut().zip(values_with(model, &printed::ESTIMATED)) {
+        parameter.value = value;
+    }
+    physical(model, &fit)
 }
 
 /// Table 1: all real solutions for the parameters that the paper determines; empty if they are undetermined.

@@ -25,6 +25,11 @@ pub(crate) fn least(runs: &[TreatmentRun], of: impl Fn(&TreatmentRun, usize) -> 
     run_values(runs, of).fold(f64::INFINITY, f64::min)
 }
 
+/// The least and the largest value of `of` over runs and drives, as per cent.
+pub(crate) fn range(runs: &[TreatmentRun], of: impl Fn(&TreatmentRun, usize) -> f64) -> String {
+    format!("{} to {}", percent(least(runs, &of)), percent(largest(runs, &of)))
+}
+
 /// Values of `of` for all runs and drives.
 fn run_values<'a>(
     runs: &'a [TreatmentRun],
@@ -60,6 +65,20 @@ pub(crate) fn rounding(value: f64) -> String {
     } else {
         percent(value)
     }
+}
+
+/// A change relative to something, or a statement that it is rounding.
+pub(crate) fn change(value: f64) -> String {
+    if value < ROUNDING {
+        "less than a part in 10^8".to_owned()
+    } else {
+        percent(value)
+    }
+}
+
+/// A length in whole millimetres.
+pub(crate) fn millimetres(metres: f64) -> String {
+    format!("{:.0}", 1000.0 * metres)
 }
 
 /// A number as per cent with three digits; rounding errors are printed as zero.

@@ -1,6 +1,6 @@
 //! Candidates for a wrong length or angle of the model: first and second derivatives of the base columns by
-//! each constant, by central differences. There are none if all base parameters are fixed, since these depend
-//! on the constants too.
+//! each constant, by central differences. Fixed base parameters follow the constant, because their values are
+//! computed from it: their derivative is that of column times value.
 
 use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
@@ -21,12 +21,9 @@ const STEP: f64 = 1e-3;
 pub(crate) fn constants(model: &Model, all: &SegmentList<'_>, is_held: &dyn Fn(usize) -> bool) -> Vec<CandidateEffect> {
     let derivation = &model.derivation;
     let mechanism = &derivation.mechanism;
-    // Fixed base parameters were computed with the nominal lengths.
-    if (0..model.base.len()).all(is_held) {
-        return Vec::new();
-    }
     // The columns for a constant that differs by a step.
     let usual: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
+    let changes = BaseValueChanges::new(model, &usual);
     let along = |k: usize, step: f64| {
         let mut moved = usual.clone();
         moved[k] += step;
@@ -50,7 +47,8 @@ pub(crate) fn constants(model: &Model, all: &SegmentList<'_>, is_held: &dyn Fn(u
             middle = along(k, 0.0).ok();
         }
         let Some(middle) = &middle else { continue };
-        // First and second derivative; fixed base parameters are summed with their nominal values.
+        // First and second derivative; fixed base parameters are summed with the values that belong to the constant.
+        let [values_back, values_ahead] = [-step, step].map(|step| changes.values(model, k, step));
         let [mut slope, mut bend] = [(); 2].map(|()| ForceSensitivity {
             base: Vec::new(),
             fixed: ForceColumn(vec![None; model.drives().len()]),
@@ -63,16 +61,27 @@ pub(crate) fn constants(model: &Model, all: &SegmentList<'_>, is_held: &dyn Fn(u
                 }
                 without_rounding(sum)
             };
-            // The central first difference.
-            let first = 0.5 / step;
-            // The central second difference.
-            let second = 1.0 / (step * step);
-            let first = sum([(first, &ahead[p]), (0.0, middle), (-first, &back[p])]);
-            let second = sum([(second, &ahead[p]), (-2.0 * second, middle), (second, &back[p])]);
-            // Estimated base parameters get columns, fixed ones a force.
+            // Estimated base parameters get the change of their column, fixed ones that of their force.
+            let [at_back, at_middle, at_ahead] = if is_held(p) {
+                [values_back[p], model.nominal[p], values_ahead[p]]
+            } else {
+                [1.0; 3]
+            };
+            // The central first and second difference.
+            let (first, second) = (0.5 / step, 1.0 / (step * step));
+            let first = sum([
+                (first * at_ahead, &ahead[p]),
+                (0.0, middle),
+                (-first * at_back, &back[p]),
+            ]);
+            let second = sum([
+                (second * at_ahead, &ahead[p]),
+                (-2.0 * second * at_middle, middle),
+                (second * at_back, &back[p]),
+            ]);
             for (part, change) in [(&mut slope, first), (&mut bend, second)] {
                 if is_held(p) {
-                    part.fixed.add(model.nominal[p], &change);
+                    part.fixed.add(1.0, &change);
                 } else {
                     part.base.push(change);
                 }
@@ -104,6 +113,43 @@ pub(crate) fn constants(model: &Model, all: &SegmentList<'_>, is_held: &dyn Fn(u
         });
     }
     candidates
+}
+
+/// Base parameters as functions of the constants: masses, centres and inertias keep their nominal values.
+struct BaseValueChanges {
+    /// Nominal values of the dynamic parameters.
+    parameters: Vec<f64>,
+    /// The constants of the model file.
+    constants: Vec<f64>,
+    /// Base parameters for both.
+    base: Vec<f64>,
+}
+
+impl BaseValueChanges {
+    /// The base parameters at the constants of the model file.
+    fn new(model: &Model, constants: &[f64]) -> Self {
+        let derivation = &model.derivation;
+        let parameters: Vec<f64> = derivation.mechanism.parameters.iter().map(|p| p.nominal).collect();
+        Self {
+            base: derivation.base_values(&parameters, constants),
+            constants: constants.to_vec(),
+            parameters,
+        }
+    }
+
+    /// The values of the model, which may be identified ones, with the change that belongs to a step of one constant.
+    fn values(&self, model: &Model, constant: usize, step: f64) -> Vec<f64> {
+        let mut moved = self.constants.clone();
+        moved[constant] += step;
+        let there = model.derivation.base_values(&self.parameters, &moved);
+        let changes = there.iter().zip(&self.base).map(|(there, here)| there - here);
+        model
+            .nominal
+            .iter()
+            .zip(changes)
+            .map(|(value, change)| value + change)
+            .collect()
+    }
 }
 
 /// The column without channels that are rounding only.

@@ -10,7 +10,8 @@ use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_identify::RecordingNote;
 use modelmill_identify::excite::{
-    ExcitationMotion, ExcitationPlant, ExcitationTrajectory, excite, max_progress_steps, scaled_condition_number,
+    ExcitationLimits, ExcitationMotion, ExcitationPlant, ExcitationTrajectory, FourierSeries, excite,
+    max_progress_steps, scaled_condition_number,
 };
 
 use crate::diagnose::NamedEffect;
@@ -32,6 +33,8 @@ pub use separated::SeparationResult;
 pub struct ExcitationRequest {
     /// The search: harmonics, period, criterion, number of trajectories, seed.
     pub options: Options,
+    /// Other numbers of harmonics, each with a search of its own. The best result counts.
+    pub other_harmonics: Vec<usize>,
     /// Sampling rate of the trajectory, Hz.
     pub rate: f64,
     /// Limits in addition to those of the model file, or in their place.
@@ -44,6 +47,7 @@ impl Default for ExcitationRequest {
     fn default() -> Self {
         Self {
             options: Options::default(),
+            other_harmonics: Vec::new(),
             rate: 500.0,
             limits: Vec::new(),
             separate: None,
@@ -70,8 +74,12 @@ pub struct ExcitationResult {
     pub model: String,
     /// The trajectory: coefficients, condition numbers, and its distance from the limits.
     pub found: ExcitationTrajectory,
-    /// The options of the search.
+    /// The options of the search, with the number of harmonics and the period of the result.
     pub options: Options,
+    /// The bounds of the period, s, if it was a variable of the search.
+    pub period_range: Option<[f64; 2]>,
+    /// The result for each number of harmonics, in the order of the request; one row if there was one number.
+    pub compared: Vec<HarmonicsResult>,
     /// The difference of the effects along the trajectory; `None` if the request had no effects to distinguish.
     pub separated: Option<SeparationResult>,
     /// Condition number of the regressor with columns of equal norm; `None` if it is infinite or no base parameter is
@@ -87,6 +95,82 @@ pub struct ExcitationResult {
     pub picture: String,
     /// Notes on limits and effects.
     pub notes: Vec<RecordingNote>,
+}
+
+/// The best trajectory for one number of harmonics.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HarmonicsResult {
+    /// Number of harmonics.
+    pub harmonics: usize,
+    /// Period, s.
+    pub period: f64,
+    /// Value of the criterion that was minimised.
+    pub value: f64,
+    /// Condition number of the regressor.
+    pub condition_number: f64,
+}
+
+impl HarmonicsResult {
+    /// The result of a search.
+    fn new(harmonics: usize, found: &ExcitationTrajectory) -> Self {
+        Self {
+            harmonics,
+            period: found.series.first().map_or(f64::NAN, FourierSeries::period),
+            value: found.value,
+            condition_number: found.condition_number,
+        }
+    }
+}
+
+/// Searches once for each number of harmonics and keeps the best trajectory. The options get its number and period.
+///
+/// Fails if no number of harmonics has a trajectory, or if the listener stops the job.
+fn search_all(
+    model: &Model,
+    plant: &dyn ExcitationPlant,
+    limits: &[ExcitationLimits],
+    options: &mut Options,
+    others: &[usize],
+) -> Outcome<(ExcitationTrajectory, Vec<HarmonicsResult>)> {
+    let mut compared = Vec::new();
+    let mut best: Option<(usize, ExcitationTrajectory)> = None;
+    let mut failure = None;
+    for harmonics in std::iter::once(options.harmonics).chain(others.iter().copied()) {
+        let one = Options {
+            harmonics,
+            ..options.clone()
+        };
+        // The search reports progress for each trajectory.
+        let found = model
+            .host()
+            .run_job("searching for a trajectory", max_progress_steps(&one), |job| {
+                excite(plant, limits, &one, &|more| job.flow(more))
+            })?;
+        match found {
+            Ok(found) => {
+                compared.push(HarmonicsResult::new(harmonics, &found));
+                if best.as_ref().is_none_or(|(_, best)| found.value < best.value) {
+                    best = Some((harmonics, found));
+                }
+            }
+            Err(error) => failure = Some(error),
+        }
+    }
+    match (best, failure) {
+        (Some((harmonics, found)), _) => {
+            options.harmonics = harmonics;
+            // Without a range the period stays as it was given, to the last digit.
+            if options.period_range.is_some() {
+                options.period = found.series.first().map_or(options.period, FourierSeries::period);
+            }
+            Ok((found, compared))
+        }
+        (None, Some(error)) => Err(Error::input(format!("{}: {error}", model.path))),
+        (None, None) => Err(Error::input(format!(
+            "{}: no number of harmonics was given",
+            model.path
+        ))),
+    }
 }
 
 impl Model {
@@ -143,13 +227,7 @@ impl Model {
             Some(separating) => separating,
             None => &plant,
         };
-        // The search reports progress for each trajectory.
-        let found = self
-            .host()
-            .run_job("searching for a trajectory", max_progress_steps(&options), |job| {
-                excite(searched, &coordinates, &options, &|more| job.flow(more))
-            })?
-            .map_err(|error| Error::input(format!("{}: {error}", self.path)))?;
+        let (found, compared) = search_all(self, searched, &coordinates, &mut options, &request.other_harmonics)?;
         let samples = samples_per_period(request.rate, options.period);
         let motion = ExcitationMotion::sample(&found.series, samples);
         let time: Vec<f64> = (0..samples)
@@ -197,6 +275,8 @@ impl Model {
             model: self.name.clone(),
             picture: picture(self, &plant, &found, &title, &time, &motion),
             found,
+            period_range: options.period_range,
+            compared,
             options,
             separated,
             scaled,

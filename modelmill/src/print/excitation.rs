@@ -23,6 +23,8 @@ impl ExcitationResult {
     /// - `value` and `ends`: the criterion at the result, and at the end of each local search
     /// - `limits`: the fraction of each limit that is used (1 at the limit), and whether a bound proves
     ///   this for all times (otherwise it was checked at fine samples)
+    /// - `period_range`: bounds of the period in s if it was a variable of the search, otherwise null
+    /// - `compared_harmonics`: the result for each number of harmonics
     /// - `coefficients`: offset and Fourier coefficients of each coordinate (m or rad); `period` is in s
     pub fn json(&self) -> Value {
         let found = &self.found;
@@ -65,6 +67,13 @@ impl ExcitationResult {
             "violations": self.violations(),
             "limits": limits.collect::<Vec<_>>(),
             "period": self.options.period,
+            "period_range": self.period_range,
+            "compared_harmonics": self.compared.iter().map(|one| json!({
+                "harmonics": one.harmonics,
+                "period": one.period,
+                "value": criterion(one.value),
+                "condition_number": one.condition_number,
+            })).collect::<Vec<_>>(),
             "harmonics": self.options.harmonics,
             "seed": self.options.seed,
             "coefficients": Value::Object(coefficients.collect::<Map<_, _>>()),
@@ -76,10 +85,10 @@ impl ExcitationResult {
         let found = &self.found;
         // The head has what was asked for.
         let mut lines = vec![style.bold(&format!(
-            "{}: {} of {} s",
+            "{}: {} of {}",
             self.model,
             count(self.options.harmonics, "harmonic", "harmonics"),
-            self.options.period
+            self.period_text()
         ))];
         // The goal of the search decides which figures are printed.
         if let Some(separated) = &self.separated {
@@ -87,9 +96,54 @@ impl ExcitationResult {
         } else {
             lines.extend(self.conditions());
         }
+        lines.extend(self.harmonics());
         lines.push(String::new());
         lines.extend(self.limits());
         lines.join("\n")
+    }
+
+    /// The period; with its bounds if it was a variable of the search.
+    fn period_text(&self) -> String {
+        match self.period_range {
+            None => format!("{} s", self.options.period),
+            Some([low, high]) => format!(
+                "{} s (the best period between {low} and {high} s)",
+                significant(self.options.period, 4)
+            ),
+        }
+    }
+
+    /// The result for each number of harmonics, if several were compared.
+    fn harmonics(&self) -> Vec<String> {
+        if self.compared.len() < 2 {
+            return Vec::new();
+        }
+        let rows: Vec<Vec<String>> = self
+            .compared
+            .iter()
+            .map(|one| {
+                vec![
+                    one.harmonics.to_string(),
+                    significant(one.period, 4),
+                    number(one.condition_number),
+                    if one.harmonics == self.options.harmonics {
+                        "written"
+                    } else {
+                        ""
+                    }
+                    .to_owned(),
+                ]
+            })
+            .collect();
+        let columns = [
+            ("harmonics", ColumnAlignment::Right),
+            ("period, s", ColumnAlignment::Right),
+            ("condition number", ColumnAlignment::Right),
+            ("", ColumnAlignment::Left),
+        ];
+        let mut lines = vec![String::new()];
+        lines.extend(table(2, &columns, &rows));
+        lines
     }
 
     /// How well the trajectory determines the base parameters.

@@ -84,6 +84,19 @@ fn a_length_that_is_off_is_found_with_its_error() {
     near(only(&findings, "constant_error", "r4"), "error", 0.1, 0.1);
 }
 
+/// Fixed base parameters contain lengths too, so they have the same error.
+#[test]
+fn a_length_that_is_off_is_found_while_base_parameters_are_fixed() {
+    let text = std::fs::read_to_string(bundled(ARM)).expect("a model");
+    for (seed, changed) in [(721, 0.45), (722, 0.41)] {
+        let other = text.replacen("r4 = { value = 0.4331", &format!("r4 = {{ value = {changed}"), 1);
+        let truth = Model::from_text("other", &other).expect("the model");
+        let file = run_of(&truth, ARM, seed, Made::Nothing);
+        let findings = diagnosed(&file, FixedParameters::All);
+        near(only(&findings, "constant_error", "r4"), "error", changed - 0.4331, 0.1);
+    }
+}
+
 #[test]
 fn a_gear_that_yields_is_found_with_its_compliance() {
     let file = run(ARM, 730, Made::Yields(1, 4e-4));

@@ -5,6 +5,7 @@ mod couplings;
 mod export;
 mod faulty;
 mod mjcf;
+mod order_of_entries;
 mod spidermill;
 mod urdf;
 mod welds;

@@ -95,6 +95,7 @@ impl ExcitationSettings {
                 seed: self.seed,
                 ..Options::default()
             },
+            other_harmonics: Vec::new(),
             rate: self.rate,
             limits: self.limits.iter().map(limit).collect::<Result<_, _>>()?,
             separate: None,

@@ -279,9 +279,12 @@ impl TourText {
             "The paper that describes this robot reports an error of its model. It names two causes: mainly the positions of the \
              point masses that replace the coupling elements and the platform, and to a lesser extent the contact points of the \
              screws on the cranks. In its equations each coupler carries half of the platform's mass m4: in the force balance at \
-             the joint between the couplers, but in the moment balance at the coupler's centre. The diagnosis uses a recording \
+             the joint between the couplers, but in the moment balance at the coupler's centre. The page docs/experiment.html \
+             examines both causes: these bodies only translate, so the positions of their centres have no effect on the \
+             forces; contact points beside the axes of the cranks leave an error such as the paper has after its \
+             identification. The diagnosis uses a recording \
              from a simulation of the same robot. It does not estimate base parameters, but fixes them at their nominal values \
-             (`--held`):",
+             (`--held`), so the first error below is that of the nominal model, as in step 2 and unlike steps 3 and 5:",
         );
         self.paragraph(&verdict(findings));
         let diagnosis = &findings.diagnosis;
