@@ -34,6 +34,12 @@ use crate::tree::expressions::ParameterMonomial;
 const DEPENDENT: f64 = 1e-13;
 /// The same for loops with rounded lengths: as a multiple of their closure error, relative to the size of a loop.
 const PER_OFF: f64 = 100.0;
+/// Residuals below this multiple of the closure error may be its effect: rates and accelerations of nearly singular
+/// equations enlarge it. They are taken for it if a gap separates them from larger ones. A Bennett linkage whose twist is
+/// given with 16 digits has a residual of some 1e3 closure errors.
+const UNCERTAIN_PER_OFF: f64 = 1e6;
+/// Ratio of two successive residuals that counts as a gap. Independent columns of one linkage differ by less.
+const GAP: f64 = 1e4;
 /// Largest residual of a column at further states with the factors as written, relative to its terms.
 const SHOWN: f64 = 1e-10;
 /// The same for loops with rounded lengths, as a multiple of their closure error.
@@ -78,7 +84,8 @@ pub(super) fn reduce(
         let largest = sizes.iter().fold(0.0, |a: f64, b| a.max(*b));
         let is_effective = |k: &usize| sizes[*k] > limit * largest;
         let tried: Vec<usize> = order.iter().copied().filter(is_effective).collect();
-        let base = NumericBase::new(&w, &tried, limit);
+        let mut base = NumericBase::new(&w, &tried, limit);
+        base.drop_uncertain(UNCERTAIN_PER_OFF * states.closure_error());
         // Contributions below the residual of dropped columns are rounding errors.
         let rounding = (1e3 * base.most_dropped).clamp(1e-60, 1e-9);
         let (mut found, effective) = numeric_reduction(mechanism, candidates, &w, &tried, &base, rounding);
@@ -218,6 +225,8 @@ fn add_multiple(column: &mut [BigFloat], factor: &BigFloat, other: &[BigFloat]) 
 struct NumericBase {
     /// Retained columns, in the order in which they were selected.
     kept: Vec<usize>,
+    /// The relative residual of each when it was selected.
+    sizes: Vec<f64>,
     /// Least relative residual of a retained column when it was selected.
     least_kept: f64,
     /// Largest relative residual of a column that was not selected.
@@ -235,6 +244,7 @@ impl NumericBase {
         let mut left = w.values.clone();
         let mut base = Self {
             kept: Vec::new(),
+            sizes: Vec::new(),
             least_kept: 1.0,
             most_dropped: 0.0,
             shares: vec![Vec::new(); w.values.len()],
@@ -253,6 +263,7 @@ impl NumericBase {
             };
             base.least_kept = base.least_kept.min(size);
             base.kept.push(pivot);
+            base.sizes.push(size);
             // The selected residual is removed from all other columns.
             let direction = left[pivot].clone();
             let square = dot(&direction, &direction);
@@ -261,6 +272,26 @@ impl NumericBase {
                 add_multiple(&mut left[j], &-&share, &direction);
                 base.shares[j].push(share);
             }
+        }
+    }
+
+    /// Drops the columns that were selected last, if their residuals are below `uncertain` and a gap separates them from
+    /// those before.
+    fn drop_uncertain(&mut self, uncertain: f64) {
+        let sizes = &self.sizes;
+        let is_first = |i: &usize| {
+            let before = sizes[..*i].iter().copied().fold(f64::INFINITY, f64::min);
+            sizes[*i] < uncertain && sizes[*i] * GAP < before
+        };
+        let Some(n_certain) = (1..sizes.len()).find(is_first) else {
+            return;
+        };
+        self.most_dropped = sizes[n_certain];
+        self.kept.truncate(n_certain);
+        self.sizes.truncate(n_certain);
+        self.least_kept = self.sizes.iter().copied().fold(1.0, f64::min);
+        for shares in &mut self.shares {
+            shares.truncate(n_certain);
         }
     }
 
