@@ -93,7 +93,7 @@ fn factors_by_relations(
         .filter(|r| !is_long || r.len() <= FEW || undefined.contains(&r.column))
         .cloned()
         .collect();
-    search.replace_relations(&mut related, direct, stream)?;
+    search.replace_relations(&mut related, &direct, stream)?;
     // Too many terms: columns are written by near columns.
     if is_long {
         return Ok(related.into_dependent_columns());
@@ -142,10 +142,12 @@ fn nearest_relations(
     let mut related = search.solve_relations(&nearest, may_wait, stream)?;
     let open = related.incomplete_columns();
     let direct = short_direct.iter().filter(|r| open.contains(&r.column));
-    search.replace_relations(&mut related, direct.map(|r| (*r).clone()).collect(), stream)?;
+    let direct: Vec<ColumnRelation> = direct.map(|r| (*r).clone()).collect();
+    search.replace_relations(&mut related, &direct, stream)?;
     let open = related.incomplete_columns();
     let waiting = nearest.iter().filter(|r| open.contains(&r.column) && may_wait(r));
-    search.replace_relations(&mut related, waiting.cloned().collect(), stream)?;
+    let waiting: Vec<ColumnRelation> = waiting.cloned().collect();
+    search.replace_relations(&mut related, &waiting, stream)?;
     Ok(related)
 }
 
@@ -199,11 +201,11 @@ impl FactorSearch<'_> {
     fn replace_relations(
         &mut self,
         related: &mut SolvedRelations,
-        others: Vec<ColumnRelation>,
+        others: &[ColumnRelation],
         stream: &mut RandomStream,
     ) -> Result<(), DeriveError> {
         if !others.is_empty() && !related.has_unknown_factor() {
-            related.replace(self.solve_relations(&others, |_| false, stream)?);
+            related.replace(self.solve_relations(others, |_| false, stream)?);
         }
         Ok(())
     }

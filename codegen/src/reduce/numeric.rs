@@ -34,11 +34,11 @@ use crate::tree::expressions::ParameterMonomial;
 const DEPENDENT: f64 = 1e-13;
 /// The same for loops with rounded lengths: as a multiple of their closure error, relative to the size of a loop.
 const PER_OFF: f64 = 100.0;
-/// Residuals below this multiple of the closure error may be its effect: rates and accelerations of nearly singular
-/// equations enlarge it. They are taken for it if a gap separates them from larger ones. A Bennett linkage whose twist is
-/// given with 16 digits has a residual of some 1e3 closure errors.
+/// Columns that are smaller than this multiple of the closure error, relative to the largest one, may be its effect:
+/// nearly singular equations enlarge it in rates and accelerations. They are taken for it if a gap separates them from
+/// larger ones. Columns of a Bennett linkage whose twist is given with 16 digits reach some 1e4 closure errors.
 const UNCERTAIN_PER_OFF: f64 = 1e6;
-/// Ratio of two successive residuals that counts as a gap. Independent columns of one linkage differ by less.
+/// Ratio of the sizes of two columns that counts as a gap. Columns of one linkage differ by less. By judgement.
 const GAP: f64 = 1e4;
 /// Largest residual of a column at further states with the factors as written, relative to its terms.
 const SHOWN: f64 = 1e-10;
@@ -81,11 +81,10 @@ pub(super) fn reduce(
             w.norms[k] / states.loop_size().powi(2 - metres)
         };
         let sizes: Vec<f64> = (0..columns.len()).map(sized).collect();
-        let largest = sizes.iter().fold(0.0, |a: f64, b| a.max(*b));
-        let is_effective = |k: &usize| sizes[*k] > limit * largest;
+        let least = least_effective_size(&sizes, limit, UNCERTAIN_PER_OFF * states.closure_error());
+        let is_effective = |k: &usize| sizes[*k] > least;
         let tried: Vec<usize> = order.iter().copied().filter(is_effective).collect();
-        let mut base = NumericBase::new(&w, &tried, limit);
-        base.drop_uncertain(UNCERTAIN_PER_OFF * states.closure_error());
+        let base = NumericBase::new(&w, &tried, limit);
         // Contributions below the residual of dropped columns are rounding errors.
         let rounding = (1e3 * base.most_dropped).clamp(1e-60, 1e-9);
         let (mut found, effective) = numeric_reduction(mechanism, candidates, &w, &tried, &base, rounding);
@@ -107,6 +106,18 @@ pub(super) fn reduce(
         rows.extend(further);
     }
     Err(DeriveError::NotConfirmed)
+}
+
+/// The size below which columns count as zero. It is `limit` relative to the largest column, or a gap between sizes that
+/// are below `uncertain`.
+fn least_effective_size(sizes: &[f64], limit: f64, uncertain: f64) -> f64 {
+    let mut sorted = sizes.to_vec();
+    sorted.sort_by(|a, b| b.total_cmp(a));
+    let largest = sorted.first().copied().unwrap_or(0.0);
+    let gap = sorted
+        .windows(2)
+        .find(|pair| pair[1] < uncertain * largest && pair[1] * GAP < pair[0]);
+    gap.map_or(0.0, |pair| pair[1]).max(limit * largest)
 }
 
 /// The reduction by the numeric dependences, and the positions of the columns with an effect. Factors are written in
@@ -225,8 +236,6 @@ fn add_multiple(column: &mut [BigFloat], factor: &BigFloat, other: &[BigFloat]) 
 struct NumericBase {
     /// Retained columns, in the order in which they were selected.
     kept: Vec<usize>,
-    /// The relative residual of each when it was selected.
-    sizes: Vec<f64>,
     /// Least relative residual of a retained column when it was selected.
     least_kept: f64,
     /// Largest relative residual of a column that was not selected.
@@ -244,7 +253,6 @@ impl NumericBase {
         let mut left = w.values.clone();
         let mut base = Self {
             kept: Vec::new(),
-            sizes: Vec::new(),
             least_kept: 1.0,
             most_dropped: 0.0,
             shares: vec![Vec::new(); w.values.len()],
@@ -263,7 +271,6 @@ impl NumericBase {
             };
             base.least_kept = base.least_kept.min(size);
             base.kept.push(pivot);
-            base.sizes.push(size);
             // The selected residual is removed from all other columns.
             let direction = left[pivot].clone();
             let square = dot(&direction, &direction);
@@ -272,26 +279,6 @@ impl NumericBase {
                 add_multiple(&mut left[j], &-&share, &direction);
                 base.shares[j].push(share);
             }
-        }
-    }
-
-    /// Drops the columns that were selected last, if their residuals are below `uncertain` and a gap separates them from
-    /// those before.
-    fn drop_uncertain(&mut self, uncertain: f64) {
-        let sizes = &self.sizes;
-        let is_first = |i: &usize| {
-            let before = sizes[..*i].iter().copied().fold(f64::INFINITY, f64::min);
-            sizes[*i] < uncertain && sizes[*i] * GAP < before
-        };
-        let Some(n_certain) = (1..sizes.len()).find(is_first) else {
-            return;
-        };
-        self.most_dropped = sizes[n_certain];
-        self.kept.truncate(n_certain);
-        self.sizes.truncate(n_certain);
-        self.least_kept = self.sizes.iter().copied().fold(1.0, f64::min);
-        for shares in &mut self.shares {
-            shares.truncate(n_certain);
         }
     }
 

@@ -142,7 +142,8 @@ impl PairCounts {
         }
     }
 
-    /// Pairs that occur most often and at least twice. No operand is in two of them, so that they can be replaced together.
+    /// Pairs that occur most often and at least twice. No operand is in two of them, so that they can be replaced
+    /// together.
     pub(super) fn most_common(&self) -> BTreeSet<OperandPair> {
         let most = self.pairs.iter().map(|(_, n)| *n).max().unwrap_or(0);
         if most < 2 {
