@@ -149,7 +149,7 @@ impl fmt::Display for DeriveError {
             }
             Self::LoopsNotSampled { loops } => write!(
                 f,
-                "the loops {} cannot be solved symbolically: they are not planar, or no order was found in which each loop determines two coordinates",
+                "the loops {} cannot be solved symbolically: no order was found in which each of them determines the coordinates that it closes with",
                 loops.join(", ")
             ),
             Self::BranchesNotSeparated { loops } => write!(

@@ -85,7 +85,12 @@ pub(crate) fn angle(formula: &SourceFormula, scope: &FormulaScope, log: &mut Dia
                     .label(format!(
                         "expected integer multiples, at most {LARGEST_FACTOR}, of angles"
                     ))
-                    .help("for half angles, declare the half as the coordinate and write the full angle as twice that"),
+                    .help(format!(
+                        "for half angles, declare the half as the coordinate and write the full angle as twice that; for the \
+                         ratio of a gear, declare a coordinate that follows, such as `geared = {{ follows = \"{}\" }}`, and \
+                         write `geared` here",
+                        formula.text
+                    )),
                 );
                 return None;
             }
@@ -232,7 +237,12 @@ pub(crate) fn length(
     if !split_length(&exact, &BigRational::one(), &mut offset, &mut coordinates) {
         log.push(
             Diagnostic::error(formula.ast.span, "a joint's length must be linear in its coordinates")
-                .label("expected for example `q3`, or `d3 + 2*q3`"),
+                .label("expected for example `q3`, or `d3 + 2*q3`")
+                .help(format!(
+                    "for a constant times an angle, as of a screw, declare a coordinate that follows, such as \
+                     `travel = {{ follows = \"{}\" }}`, and write `travel` here",
+                    formula.text
+                )),
         );
         return None;
     }

@@ -94,6 +94,8 @@ pub struct DynamicParameter {
     pub name: String,
     /// Nominal value in SI units; zero if the file gives none.
     pub nominal: f64,
+    /// Whether the file gives the nominal value, which may be zero.
+    pub has_nominal: bool,
     /// Unit as printed.
     pub unit: String,
     /// Remark of the author.

@@ -40,8 +40,11 @@ pub(super) fn sufficient_residuals(
 ) -> Option<Vec<ExprId>> {
     /// Number of poses in addition to the nominal one.
     const POSES: usize = 6;
-    /// How far away these are, in rad or relative to the size of the loops.
+    /// How far away these are, in rad or relative to the largest loop equation.
     const REACH: f64 = 0.05;
+    /// How often the distance to a pose may be halved where a loop ends before it. At the least distance an equation
+    /// that does not depend on the others is off by the square of 3e-3, far above `CLOSED`.
+    const HALVINGS: i32 = 4;
     /// Residuals relative to the size of the loops that count as zero.
     const CLOSED: f64 = 1e-7;
     /// Singular values relative to the largest that count as zero.
@@ -51,7 +54,7 @@ pub(super) fn sufficient_residuals(
     let mut stream = RandomStream::new(5);
     let mut poses = vec![loops.closed_nominal_pose()?];
     for _ in 0..POSES {
-        poses.push(loops.random_pose(REACH, &mut stream)?);
+        poses.push(loops.random_pose_within(REACH, HALVINGS, &mut stream)?);
     }
     // Full rank by the passive coordinates.
     let is_regular = |jacobian: &DMatrix<f64>| {

@@ -19,6 +19,9 @@ pub(crate) struct NumericLoops<'a> {
     unknown: Vec<usize>,
     /// Coordinates that are moved, with the value that counts as one for each: 1 rad or the size of the loops in m.
     moved: Vec<(usize, f64)>,
+    /// How far each moved coordinate goes for a reach of one: 1 rad, or the size of the largest loop equation in m. The
+    /// size of all loops is a sum over their equations; so far a slide may leave the workspace.
+    spans: Vec<f64>,
     /// Number of residuals, which come before the derivatives on the tape.
     n_residuals: usize,
     /// The value that counts as one for each unknown: 1 rad, or the size of the loops in m.
@@ -51,6 +54,18 @@ impl<'a> NumericLoops<'a> {
                 size
             }
         };
+        let sizes: Vec<f64> = (residual.iter())
+            .map(|equation| magnitude::nominal_magnitude(graph, mechanism, &[*equation]))
+            .collect();
+        // An equation between angles has no size, and counts as 1.
+        let largest = sizes
+            .into_iter()
+            .filter(|equation| *equation <= size)
+            .fold(0.0, f64::max);
+        let span = |i: usize| {
+            let has_size = !mechanism.coordinates[i].motion.is_angle() && largest > 0.0;
+            if has_size { largest } else { one(i) }
+        };
         let mut roots = residual.to_vec();
         for p in &unknown {
             roots.extend(graph.differentiate(residual, Atom::Coordinate(*p)));
@@ -59,6 +74,7 @@ impl<'a> NumericLoops<'a> {
             mechanism,
             scales: unknown.iter().map(|i| one(*i)).collect(),
             unknown,
+            spans: moved.iter().map(|i| span(*i)).collect(),
             moved: moved.iter().map(|i| (*i, one(*i))).collect(),
             n_residuals: residual.len(),
             tape: EvaluationTape::new(graph, &roots),
@@ -89,20 +105,34 @@ impl<'a> NumericLoops<'a> {
             .unwrap_or(1.0)
     }
 
-    /// A random pose whose moved coordinates lie within `reach` of the nominal one (rad, or relative to the size of the
-    /// loops), reached in small steps; `None` if the loops cannot be followed so far.
+    /// A random pose whose moved coordinates lie within `reach` of the nominal one (rad, or relative to the largest loop
+    /// equation), reached in small steps; `None` if the loops cannot be followed so far.
     pub(crate) fn random_pose(&self, reach: f64, stream: &mut RandomStream) -> Option<Vec<f64>> {
+        let direction = self.random_direction(stream);
+        self.followed_pose(&direction, reach)
+    }
+
+    /// As [`Self::random_pose`], but nearer to the nominal pose where the loops cannot be followed so far: the distance
+    /// is halved up to `halvings` times.
+    pub(crate) fn random_pose_within(&self, reach: f64, halvings: i32, stream: &mut RandomStream) -> Option<Vec<f64>> {
+        let direction = self.random_direction(stream);
+        (0..=halvings).find_map(|n| self.followed_pose(&direction, reach * 0.5_f64.powi(n)))
+    }
+
+    /// How far each moved coordinate goes for a reach of one, at random.
+    fn random_direction(&self, stream: &mut RandomStream) -> Vec<f64> {
+        let spans = self.spans.iter();
+        spans.map(|span| span * uniform_symmetric(stream)).collect()
+    }
+
+    /// The pose at `reach` times the direction from the nominal pose, which is reached in small steps.
+    fn followed_pose(&self, direction: &[f64], reach: f64) -> Option<Vec<f64>> {
         // Number of small steps, each of which is closed again.
         const STEPS: u32 = 8;
         let mut q = self.declared_nominal_pose();
-        let moves: Vec<(usize, f64)> = self
-            .moved
-            .iter()
-            .map(|(i, one)| (*i, one * reach * uniform_symmetric(stream) / f64::from(STEPS)))
-            .collect();
         for _ in 0..STEPS {
-            for (i, dx) in &moves {
-                q[*i] += dx;
+            for ((i, _), dx) in self.moved.iter().zip(direction) {
+                q[*i] += dx * reach / f64::from(STEPS);
             }
             self.close_loops(&mut q)?;
         }

@@ -26,16 +26,6 @@ pub(crate) fn use_counts(graph: &Graph, roots: &[ExprId]) -> Vec<usize> {
 pub(crate) fn rewrite(
     graph: &mut Graph,
     roots: &[ExprId],
-    rule: impl FnMut(&mut Graph, ExprId, Node) -> ExprId,
-) -> Vec<ExprId> {
-    rewrite_affected(graph, roots, |_| true, rule)
-}
-
-/// Rewrites bottom-up the nodes that are affected and those above them; all others stay as they are.
-pub(crate) fn rewrite_affected(
-    graph: &mut Graph,
-    roots: &[ExprId],
-    is_affected: impl Fn(&Node) -> bool,
     mut rule: impl FnMut(&mut Graph, ExprId, Node) -> ExprId,
 ) -> Vec<ExprId> {
     let mut new: Vec<Option<ExprId>> = vec![None; graph.len()];
@@ -45,28 +35,22 @@ pub(crate) fn rewrite_affected(
             continue;
         }
         let id = ExprId(u32::try_from(i).expect("graph below 4G nodes"));
-        let mut is_same = !is_affected(graph.node(id));
-        if is_same {
-            graph.for_each_child(id, |child| is_same &= new[child.index()] == Some(child));
-        }
-        if is_same {
-            new[i] = Some(id);
-            continue;
-        }
-        // The node with its operands replaced.
-        let node = match graph.node(id).clone() {
-            Node::Sum(terms) => Node::Sum(terms.into_iter().map(|(c, k)| (rewritten(&new, c), k)).collect()),
-            Node::Product(factors) => {
-                Node::Product(factors.into_iter().map(|(c, n)| (rewritten(&new, c), n)).collect())
-            }
-            Node::Unary(f, c) => Node::Unary(f, rewritten(&new, c)),
-            leaf => leaf,
-        };
+        let node = replace_operands(graph.node(id), |operand| rewritten(&new, operand));
         // The rule may replace the node by anything of equal value.
         let value = rule(graph, id, node);
         new[i] = Some(value);
     }
     roots.iter().map(|root| rewritten(&new, *root)).collect()
+}
+
+/// A node with its operands replaced.
+pub(crate) fn replace_operands(node: &Node, new: impl Fn(ExprId) -> ExprId) -> Node {
+    match node {
+        Node::Sum(terms) => Node::Sum(terms.iter().map(|(c, k)| (new(*c), k.clone())).collect()),
+        Node::Product(factors) => Node::Product(factors.iter().map(|(c, n)| (new(*c), *n)).collect()),
+        Node::Unary(f, c) => Node::Unary(*f, new(*c)),
+        leaf => leaf.clone(),
+    }
 }
 
 /// Builds a node by the constructors that simplify; `id` is the node itself if it has no operands.

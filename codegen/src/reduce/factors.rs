@@ -5,7 +5,7 @@ use modelmill_algebra::field::{FieldElement, RandomStream};
 
 use super::dependences::DependenceStructure;
 use super::oracle::{ConstantOccurrence, OperationBudget, PrimeFieldOracle};
-use super::reconstruct::{self, DependenceSurvey};
+use super::reconstruct::{self, DependenceSurvey, FunctionNeed};
 use super::relations::{self, ColumnRelation, DependentColumn, RelationRows, SolvedRelations};
 use super::sample::SampledRegressor;
 use crate::DeriveError;
@@ -20,12 +20,14 @@ const FEW: usize = 12;
 /// Above this number of terms in all factors on retained columns, columns are written by neighbouring columns.
 const MOST_TERMS: usize = 5_000;
 
-/// The dependent columns as combinations of others. Factors that cannot be reconstructed are `None`.
+/// The dependent columns as combinations of others. Factors that cannot be reconstructed are `None`. `values` are those
+/// of the constants in the file, at which factors should be finite.
 pub(super) fn find_factors(
     dependences: &DependenceStructure,
     regressor: &SampledRegressor,
     variables: &[ConstantOccurrence],
     roots: &[i64],
+    values: &[f64],
     operations: u64,
     stream: &mut RandomStream,
 ) -> Result<Vec<DependentColumn>, DeriveError> {
@@ -37,10 +39,15 @@ pub(super) fn find_factors(
         .filter(|relation| relation.has_retained_only())
         .cloned()
         .collect();
-    let mut budget = OperationBudget::new(operations);
-    let mut by = |relations: &[ColumnRelation]| {
-        factors_by_relations(relations, dependences, regressor, variables, roots, &mut budget, stream)
+    let mut search = FactorSearch {
+        dependences,
+        regressor,
+        variables,
+        roots,
+        values,
+        budget: OperationBudget::new(operations),
     };
+    let mut by = |relations: &[ColumnRelation]| factors_by_relations(relations, &mut search, stream);
     match by(&dependences.relations) {
         // Which columns are near may depend on the constants, for example with roots of either sign.
         Err(DeriveError::RankChanged) if direct.len() < dependences.relations.len() => by(&direct),
@@ -71,72 +78,137 @@ pub(super) fn n_quotients(
 /// The dependent columns from given relations, which include those to retained columns.
 fn factors_by_relations(
     all: &[ColumnRelation],
-    dependences: &DependenceStructure,
-    regressor: &SampledRegressor,
-    variables: &[ConstantOccurrence],
-    roots: &[i64],
-    budget: &mut OperationBudget,
+    search: &mut FactorSearch<'_>,
     stream: &mut RandomStream,
 ) -> Result<Vec<DependentColumn>, DeriveError> {
-    // Reconstructs the factors of some relations; those to retained columns are needed for all others.
-    let mut found = |chosen: Vec<ColumnRelation>, stream: &mut RandomStream| {
-        let mut oracle = MotionFactorOracle {
-            regressor,
-            dependences,
-            relations: &chosen,
-            sampling: stream.clone(),
-            budget: &mut *budget,
-        };
-        let mut survey = DependenceSurvey::new(&mut oracle, variables, roots, stream)?;
-        // A relation to retained columns is needed by all that use its column.
-        let wanted: Vec<(usize, bool)> = (chosen.iter())
-            .flat_map(|r| std::iter::repeat_n(r.has_retained_only(), r.len()))
-            .enumerate()
-            .collect();
-        let factors = survey.reconstruct_functions(&mut oracle, &wanted, stream)?;
-        Ok::<_, DeriveError>(SolvedRelations::new(chosen.iter(), factors))
-    };
-    // The relation to near columns comes directly after the one to retained columns.
-    let nearest = (0..all.len()).filter(|i| all.get(i + 1).is_none_or(ColumnRelation::has_retained_only));
-    let mut related = found(nearest.map(|i| all[i].clone()).collect(), stream)?;
+    let mut related = nearest_relations(all, search, stream)?;
     // A near relation may be complicated: if the first joints of an arm have no effect on all of a link, relations
     // between links divide by sines of twists, and relations to retained columns do not.
     let is_long = related.is_complete() && related.n_terms() > MOST_TERMS;
     let unwieldy = related.unwieldy_columns();
+    // At the file's values a pivot of a near relation may vanish, for example at lengths that are equal on both sides.
+    let undefined = related.undefined_columns(search.values);
     let direct: Vec<ColumnRelation> = (all.iter())
         .filter(|r| r.has_retained_only() && unwieldy.contains(&r.column))
-        .filter(|r| !is_long || r.len() <= FEW)
+        .filter(|r| !is_long || r.len() <= FEW || undefined.contains(&r.column))
         .cloned()
         .collect();
-    if !direct.is_empty() && !related.has_unknown_factor() {
-        related.replace(found(direct, stream)?);
-    }
+    search.replace_relations(&mut related, &direct, stream)?;
     // Too many terms: columns are written by near columns.
     if is_long {
         return Ok(related.into_dependent_columns());
     }
-    let mut written = related.expanded_factors(&dependences.wanted, roots);
+    let (wanted, roots) = (&search.dependences.wanted, search.roots);
+    let mut written = related.expanded_factors(wanted, roots);
     // Factors that cannot be multiplied out are reconstructed from the combined relations.
     let missing: Vec<usize> = (0..written.len()).filter(|k| written[*k].is_none()).collect();
     if !missing.is_empty() && related.is_complete() {
         let mut rest = RelationFactorOracle {
             related: &related,
-            regressor,
-            wanted: missing.iter().map(|k| dependences.wanted[*k]).collect(),
-            budget,
+            regressor: search.regressor,
+            wanted: missing.iter().map(|k| wanted[*k]).collect(),
+            budget: &mut search.budget,
         };
-        let found = reconstruct::reconstruct(&mut rest, variables, roots, stream)?;
+        let found = reconstruct::reconstruct(&mut rest, search.variables, roots, stream)?;
         for (k, function) in missing.into_iter().zip(found) {
             written[k] = function;
         }
     }
     // Every factor on a retained column becomes a line of its own.
-    let pairs = dependences.wanted.iter().zip(written);
+    let pairs = wanted.iter().zip(written);
     let line = |((column, p), factor): (&(usize, usize), _)| DependentColumn {
         column: *column,
         factors: vec![(*p, factor)],
     };
     Ok(pairs.map(line).collect())
+}
+
+/// The relations to near columns where there are any, and to retained columns elsewhere.
+///
+/// Factors of a near relation may have hundreds of terms although the relation to retained columns is short. Both give
+/// the same factors in the end. So long factors are reconstructed only if the short relation fails.
+fn nearest_relations(
+    all: &[ColumnRelation],
+    search: &mut FactorSearch<'_>,
+    stream: &mut RandomStream,
+) -> Result<SolvedRelations, DeriveError> {
+    let short_direct: Vec<&ColumnRelation> = (all.iter())
+        .filter(|r| r.has_retained_only() && r.len() <= FEW)
+        .collect();
+    let may_wait = |r: &ColumnRelation| !r.has_retained_only() && short_direct.iter().any(|d| d.column == r.column);
+    // The relation to near columns comes directly after the one to retained columns.
+    let nearest = (0..all.len()).filter(|i| all.get(i + 1).is_none_or(ColumnRelation::has_retained_only));
+    let nearest: Vec<ColumnRelation> = nearest.map(|i| all[i].clone()).collect();
+    let mut related = search.solve_relations(&nearest, may_wait, stream)?;
+    let open = related.incomplete_columns();
+    let direct = short_direct.iter().filter(|r| open.contains(&r.column));
+    let direct: Vec<ColumnRelation> = direct.map(|r| (*r).clone()).collect();
+    search.replace_relations(&mut related, &direct, stream)?;
+    let open = related.incomplete_columns();
+    let waiting = nearest.iter().filter(|r| open.contains(&r.column) && may_wait(r));
+    let waiting: Vec<ColumnRelation> = waiting.cloned().collect();
+    search.replace_relations(&mut related, &waiting, stream)?;
+    Ok(related)
+}
+
+/// What all reconstructions of the factors of relations share.
+struct FactorSearch<'a> {
+    /// The dependences between columns.
+    dependences: &'a DependenceStructure,
+    /// The regressor's columns at random points.
+    regressor: &'a SampledRegressor,
+    /// Constants on which factors may depend.
+    variables: &'a [ConstantOccurrence],
+    /// Integers whose square roots factors may contain.
+    roots: &'a [i64],
+    /// Values of all constants in the file.
+    values: &'a [f64],
+    /// Remaining field operations.
+    budget: OperationBudget,
+}
+
+impl FactorSearch<'_> {
+    /// Reconstructs the factors of some relations. Factors with many terms are left out where a relation `may_wait`.
+    fn solve_relations(
+        &mut self,
+        chosen: &[ColumnRelation],
+        may_wait: impl Fn(&ColumnRelation) -> bool,
+        stream: &mut RandomStream,
+    ) -> Result<SolvedRelations, DeriveError> {
+        let mut oracle = MotionFactorOracle {
+            regressor: self.regressor,
+            dependences: self.dependences,
+            relations: chosen,
+            sampling: stream.clone(),
+            budget: &mut self.budget,
+        };
+        let mut survey = DependenceSurvey::new(&mut oracle, self.variables, self.roots, stream)?;
+        // A relation to retained columns is needed by all that use its column.
+        let of_relation = |r: &ColumnRelation| {
+            let need = match (r.has_retained_only(), may_wait(r)) {
+                (true, _) => FunctionNeed::ByOthers,
+                (_, true) => FunctionNeed::IfShort,
+                (_, false) => FunctionNeed::ByItself,
+            };
+            std::iter::repeat_n(need, r.len())
+        };
+        let wanted: Vec<(usize, FunctionNeed)> = chosen.iter().flat_map(of_relation).enumerate().collect();
+        let factors = survey.reconstruct_functions(&mut oracle, &wanted, stream)?;
+        Ok(SolvedRelations::new(chosen.iter(), factors))
+    }
+
+    /// Replaces relations by others of the same columns, as far as the factors of these can be reconstructed.
+    fn replace_relations(
+        &mut self,
+        related: &mut SolvedRelations,
+        others: &[ColumnRelation],
+        stream: &mut RandomStream,
+    ) -> Result<(), DeriveError> {
+        if !others.is_empty() && !related.has_unknown_factor() {
+            related.replace(self.solve_relations(others, |_| false, stream)?);
+        }
+        Ok(())
+    }
 }
 
 /// Evaluates the factors of relations from points of motion.
@@ -284,7 +356,16 @@ mod tests {
         let variables = constant_occurrences(&graph, &outputs, &projection.loops.residual);
         let roots = root_radicands(&graph, &outputs, &projection.loops.residual);
         let mut factors = |dependences: &DependenceStructure| {
-            find_factors(dependences, &regressor, &variables, &roots, operations, &mut stream)
+            let values: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
+            find_factors(
+                dependences,
+                &regressor,
+                &variables,
+                &roots,
+                &values,
+                operations,
+                &mut stream,
+            )
         };
         let near = factors(&dependences)?;
         assert!(

@@ -14,6 +14,9 @@ use super::support::{PartialSamples, nonzero_monomials};
 use crate::DeriveError;
 use crate::expr::{FieldPoint, Rational};
 
+/// Largest number of coefficients of one linear system.
+const MOST_UNKNOWNS: usize = 400;
+
 /// What is known about a function before its coefficients are computed.
 #[derive(Clone, Debug, Default)]
 pub(super) struct FunctionShape {
@@ -179,20 +182,10 @@ impl FunctionShape {
         roots: &[i64],
         stream: &mut RandomStream,
     ) -> Result<Option<RationalFunction>, DeriveError> {
-        // Largest number of coefficients of one linear system.
-        const MOST_UNKNOWNS: usize = 400;
         if self.lost {
             return Ok(None);
         }
-        // A quotient of degree 2k in the tangent of half an angle is a quotient of trigonometric polynomials of degree
-        // k.
-        let angle_degree = self
-            .degrees
-            .iter()
-            .filter(|((_, in_angle), _)| *in_angle)
-            .map(|(_, (n, d))| n.max(d).div_ceil(2))
-            .max();
-        let angle_degree = angle_degree.unwrap_or(0);
+        let angle_degree = self.angle_degree();
         if roots.len() >= MOST_UNKNOWNS.ilog2() as usize {
             return Ok(None);
         }
@@ -270,6 +263,20 @@ impl FunctionShape {
             }
         }
         Ok(None)
+    }
+
+    /// Whether one linear system has all monomials that the degrees allow, in the first form that is tried.
+    pub(super) fn is_short(&self) -> bool {
+        let monomials = [self.monomials(true, self.angle_degree()), self.monomials(false, 0)];
+        monomials.iter().map(Vec::len).sum::<usize>() <= MOST_UNKNOWNS
+    }
+
+    /// The degree in cosines and sines together. A quotient of degree 2k in the tangent of half an angle is a quotient
+    /// of trigonometric polynomials of degree k.
+    fn angle_degree(&self) -> usize {
+        let angles = self.degrees.iter().filter(|((_, in_angle), _)| *in_angle);
+        let degrees = angles.map(|(_, (n, d))| n.max(d).div_ceil(2));
+        degrees.max().unwrap_or(0)
     }
 
     /// All monomials that the degrees allow in the numerator or denominator. `angle_bound` limits the degree in cosine

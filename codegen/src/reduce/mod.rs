@@ -140,6 +140,7 @@ fn reduce_exactly(
         units: &units,
     };
     let names = |k: usize| candidates[effective[k]].clone();
+    let values: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
     // Factors of a set of dependences, confirmed with fresh constants.
     let reduced = |dependences: &DependenceStructure, stream: &mut RandomStream| {
         let factors = factors::find_factors(
@@ -147,6 +148,7 @@ fn reduce_exactly(
             &regressor,
             &variables,
             &roots,
+            &values,
             factors::MOST_OPERATIONS,
             stream,
         )?;
@@ -178,7 +180,40 @@ fn reduce_exactly(
         let (first, rest): (Vec<usize>, Vec<usize>) = order.iter().partition(|k| exchange.retained.contains(k));
         dependences = DependenceStructure::find_dependences(&regressor, &[first, rest].concat(), &mut stream)?;
     }
-    reduced(&dependences, &mut stream)
+    let mut found = reduced(&dependences, &mut stream)?;
+    // A factor without a value at the file's values divides by a pivot that vanishes there, for example at lengths that
+    // are equal on both sides of a machine. The column that it belongs to takes the place of that pivot.
+    for _ in 0..MOST_EXCHANGES {
+        let Some((product, retained)) = undefined_factor(mechanism, &found) else {
+            break;
+        };
+        let [by, pivot] = [product, retained].map(|at| dependences.shown[at]);
+        if order[..preference.n_named].contains(&pivot) {
+            break;
+        }
+        let wanted: Vec<usize> = (dependences.pivots.iter())
+            .map(|k| if *k == pivot { by } else { *k })
+            .collect();
+        let (first, rest): (Vec<usize>, Vec<usize>) = order.iter().partition(|k| wanted.contains(k));
+        dependences = DependenceStructure::find_dependences(&regressor, &[first, rest].concat(), &mut stream)?;
+        found = reduced(&dependences, &mut stream)?;
+    }
+    Ok(found)
+}
+
+/// Largest number of pivots that are exchanged one by one because they vanish at the file's values. By judgement: both
+/// hands of a humanoid have some ten.
+const MOST_EXCHANGES: usize = 20;
+
+/// The positions of a dependent product and of the retained one whose factor in it has no finite value at the file's
+/// values; `None` if all factors have one.
+fn undefined_factor(mechanism: &Mechanism, found: &BaseReduction) -> Option<(usize, usize)> {
+    let constants: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
+    let lines = found.dependencies.iter().zip(found.factors(&constants));
+    lines.into_iter().find_map(|(line, factors)| {
+        let (k, _) = factors.into_iter().find(|(_, factor)| !factor.is_finite())?;
+        Some((line.product, found.retained[k]))
+    })
 }
 
 /// A reduction that retains every wanted product with an effect; for uses that need no base.

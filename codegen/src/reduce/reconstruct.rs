@@ -28,8 +28,19 @@ pub(crate) fn reconstruct<O: PrimeFieldOracle>(
     stream: &mut RandomStream,
 ) -> Result<Vec<Option<RationalFunction>>, DeriveError> {
     let mut survey = DependenceSurvey::new(oracle, constants, roots, stream)?;
-    let all: Vec<(usize, bool)> = (0..survey.shapes.len()).map(|k| (k, true)).collect();
+    let all: Vec<(usize, FunctionNeed)> = (0..survey.shapes.len()).map(|k| (k, FunctionNeed::ByOthers)).collect();
     survey.reconstruct_functions(oracle, &all, stream)
+}
+
+/// Whether a function is worth the work of a reconstruction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum FunctionNeed {
+    /// The other functions are of no use without it.
+    ByOthers,
+    /// It is wanted whatever the work.
+    ByItself,
+    /// It is wanted if one linear system has all its monomials.
+    IfShort,
 }
 
 /// Which functions depend on which constants, and what was sampled for that.
@@ -83,12 +94,12 @@ impl<O: PrimeFieldOracle> DependenceSurvey<O> {
         })
     }
 
-    /// Reconstructs some of the functions, each with whether the others are useless without it. If such a function
-    /// cannot be reconstructed, all that come after it are `None` as well.
+    /// Reconstructs some of the functions. If one that others need cannot be reconstructed, all that come after it are
+    /// `None` as well.
     pub(super) fn reconstruct_functions(
         &mut self,
         oracle: &mut O,
-        wanted: &[(usize, bool)],
+        wanted: &[(usize, FunctionNeed)],
         stream: &mut RandomStream,
     ) -> Result<Vec<Option<RationalFunction>>, DeriveError> {
         // Only the requested functions take part in the steps below.
@@ -100,12 +111,16 @@ impl<O: PrimeFieldOracle> DependenceSurvey<O> {
         }
         total_degrees(oracle, origin, &self.constants, &indices, shapes, stream)?;
         let mut found = Vec::with_capacity(wanted.len());
-        for (k, is_needed) in wanted {
+        for (k, need) in wanted {
+            if *need == FunctionNeed::IfShort && !shapes[*k].is_short() {
+                found.push(None);
+                continue;
+            }
             let function = shapes[*k].fit_function(&mut self.fields, oracle, *k, &self.roots, stream)?;
             // Other functions are not used without a needed one, so no work is spent on them.
             let resists = function.is_none();
             found.push(function);
-            if resists && *is_needed {
+            if resists && *need == FunctionNeed::ByOthers {
                 found.resize(wanted.len(), None);
                 break;
             }

@@ -292,6 +292,21 @@ impl SolvedRelations {
         unwieldy.map(|(relation, _)| relation.column).collect()
     }
 
+    /// Dependent columns whose relations to other dependent columns have no finite value at given constants.
+    pub(super) fn undefined_columns(&self, constants: &[f64]) -> Vec<usize> {
+        let is_finite = |f: &Option<RationalFunction>| f.as_ref().is_none_or(|f| f.value_f64(constants).is_finite());
+        let lines = self.0.iter();
+        let undefined = lines.filter(|(r, factors)| !r.has_retained_only() && !factors.iter().all(is_finite));
+        undefined.map(|(relation, _)| relation.column).collect()
+    }
+
+    /// Columns of which a factor is unknown.
+    pub(super) fn incomplete_columns(&self) -> Vec<usize> {
+        let lines = self.0.iter();
+        let incomplete = lines.filter(|(_, factors)| factors.iter().any(Option::is_none));
+        incomplete.map(|(relation, _)| relation.column).collect()
+    }
+
     /// Whether a factor on retained columns could not be reconstructed, so that the others are of no use.
     pub(super) fn has_unknown_factor(&self) -> bool {
         let mut direct = self.0.iter().filter(|(relation, _)| relation.has_retained_only());

@@ -10,6 +10,7 @@ mod expression;
 mod once;
 mod order;
 mod pose;
+mod regroup;
 mod scope;
 mod sections;
 

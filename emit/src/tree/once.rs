@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use modelmill_codegen::expr::Atom;
 
-use super::build::group_statements;
+use super::regroup::group_statements;
 use super::scope::{NameScope, unique_name};
 use super::{CodeStatement, PoseCheck, StatementRoutine};
 /// What all programs of one struct compute once per geometry and parameters.

@@ -337,6 +337,7 @@ fn term_parameter(
                 DynamicParameter {
                     name,
                     nominal: nominal.map_or(0.0, |number| number.value),
+                    has_nominal: nominal.is_some(),
                     unit: unit.text.clone(),
                     note: parameter.note.as_ref().map(|note| note.text.clone()),
                 },

@@ -22,6 +22,7 @@ pub(super) fn read_identified(
         let mut parameters = symbols.parameters.iter_mut();
         if let Some(parameter) = parameters.find(|one| one.name == key.name) {
             parameter.nominal = number.value;
+            parameter.has_nominal = true;
             continue;
         }
         let known = symbols.parameters.iter().map(|one| one.name.as_str());

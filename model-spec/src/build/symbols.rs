@@ -103,6 +103,7 @@ pub(super) fn declare(model: &ModelEntry, places: &mut MechanismSpans, log: &mut
             DynamicParameter {
                 name: key.name.clone(),
                 nominal: entry.nominal.map_or(0.0, |number| number.value),
+                has_nominal: entry.nominal.is_some(),
                 unit: unit.map_or_else(|| "?".to_owned(), |unit| unit.text.clone()),
                 note: entry.note.as_ref().map(|note| note.text.clone()),
             },
@@ -260,6 +261,7 @@ impl SymbolTable {
                 Some(_) => {}
                 None => {
                     self.parameters[idx.0].nominal = nominal.value;
+                    self.parameters[idx.0].has_nominal = true;
                     self.nominal_given[idx.0] = Some(nominal.span);
                 }
             }
@@ -309,6 +311,7 @@ fn declare_shorthands(model: &ModelEntry, symbols: &mut SymbolTable, log: &mut D
                     DynamicParameter {
                         name,
                         nominal: nominal.map_or(0.0, |number| number.value),
+                        has_nominal: nominal.is_some(),
                         unit: dimension.to_string(),
                         note: None,
                     },

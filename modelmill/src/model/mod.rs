@@ -539,8 +539,8 @@ impl Model {
         self.identified[k]
     }
 
-    /// Whether a base parameter has a nominal value: it was identified, or the file gives nominal values other than
-    /// zero for all factors of one of its products.
+    /// Whether a base parameter has a nominal value: it was identified, or the file gives nominal values, which may be
+    /// zero, for all factors of one of its products.
     pub fn has_nominal(&self, k: usize) -> bool {
         if self.identified[k] {
             return true;
@@ -560,10 +560,10 @@ impl Model {
         {
             lumped.push(more);
         }
-        // A product has a nominal value if all its factors have one that is not zero.
+        // A product has a nominal value if all its factors have one.
         std::iter::once(reduction.retained[k]).chain(lumped).any(|product| {
             let powers = &reduction.products[product].0;
-            powers.iter().all(|(p, _)| parameters[*p].nominal != 0.0)
+            powers.iter().all(|(p, _)| parameters[*p].has_nominal)
         })
     }
 

@@ -4,6 +4,9 @@
 //!
 //! Decision: random states have no order, while Newton's method starts from the state before. Therefore they are
 //! evaluated one by one if one of them has no solution.
+//!
+//! Decision: a coordinate that moves the rest of the machine slowly, such as the angle of a screw, goes further and
+//! faster in proportion. Over one radian of a screw the columns of the machine behind it hardly change.
 
 use std::cmp::Ordering;
 
@@ -11,6 +14,7 @@ use modelmill_codegen::review::NumericRank;
 use modelmill_codegen::{ModelEvaluator, MotionStates, PoseFault, PoseReason, ReductionMethod};
 use modelmill_identify::estimate::{condition_number, numeric_rank};
 use modelmill_runtime::RandomBits;
+use modelmill_spec::CoordinateMotion;
 use nalgebra::DMatrix;
 
 use crate::error::Outcome;
@@ -28,6 +32,18 @@ const ACCELERATION: f64 = 5.0;
 /// Range of loads, N or N m.
 const LOAD: f64 = 100.0;
 
+/// Largest factor by which a slow coordinate goes further and faster. A spindle of 1 mm per turn moves a link of 1 m by
+/// 1.6e-4 rad per rad. By judgement.
+const LARGEST_TRAVEL: f64 = 1e4;
+/// A coordinate is slow if no passive coordinate moves faster than this share of its own rate, in rad or half metres.
+/// Links of equal kind move at about the same rate. By judgement.
+const SLOW: f64 = 0.1;
+/// Factor between the rate of a passive coordinate at the nominal pose and that at poses around it, above which the
+/// nominal pose is near a fold. At a distance of 0.03 rad from a fold it is about this. By judgement.
+const NEAR_FOLD: f64 = 30.0;
+/// Number of states at which it is determined how fast each coordinate moves the others. By judgement.
+const TRAVEL_SAMPLES: usize = 8;
+
 /// Below this ratio of the last singular value that counts to the first that does not, the rank is unclear.
 const SMALL_GAP: f64 = 1e3;
 /// Above this condition number, the pages of equations report how clear the rank is.
@@ -43,6 +59,8 @@ pub struct SampledRank {
     pub gap: f64,
     /// Number of random states that were left out because the model is singular or undefined there.
     pub left_out: usize,
+    /// A warning if the nominal pose is near a fold of the loops.
+    near_fold: Option<String>,
 }
 
 /// The numeric rank, and warnings about it.
@@ -114,7 +132,7 @@ pub(crate) fn judge_rank(model: &Model) -> Outcome<RankJudgement> {
     let is_exact = matches!(model.derivation.reduction.method, ReductionMethod::Exact { .. });
     // A rank below or above the number of base parameters means different things for exact and numeric
     // reduction.
-    let mut warnings = Vec::new();
+    let mut warnings: Vec<String> = found.near_fold.iter().cloned().collect();
     let undetermined = || count(retained - rank, "direction", "directions");
     match rank.cmp(&retained) {
         Ordering::Less if is_exact => warnings.push(format!(
@@ -160,6 +178,7 @@ fn sampled_rank(model: &Model) -> Result<SampledRank, String> {
     let wanted = SAMPLES.max((4 * n_products).div_ceil(n_drives));
     let evaluator = ModelEvaluator::new(&model.derivation);
     let mut sampling = StateSampling::new(model, n_drives);
+    let near_fold = sampling.extend_travel(model, &evaluator);
     // States that Newton's method cannot follow in a row are evaluated one by one.
     sampling.draw(&evaluator, wanted)?;
     let (full, retained) = match both_regressors(&evaluator, &sampling.states()) {
@@ -178,6 +197,7 @@ fn sampled_rank(model: &Model) -> Result<SampledRank, String> {
         },
         gap: found.gap,
         left_out: sampling.left_out,
+        near_fold,
     })
 }
 
@@ -236,10 +256,25 @@ fn stack_rows(parts: &[DMatrix<f64>]) -> DMatrix<f64> {
     DMatrix::from_rows(&rows)
 }
 
+/// An active coordinate and how far it goes.
+struct SampledCoordinate {
+    /// Nominal value, rad or m.
+    nominal: f64,
+    /// What counts as one: 1 rad or 0.5 m.
+    unit: f64,
+    /// By how much it goes further and faster, because it moves the passive coordinates slowly.
+    travel: f64,
+}
+
+/// What counts as one for a coordinate: 1 rad or 0.5 m.
+fn motion_unit(motion: CoordinateMotion) -> f64 {
+    if motion.is_angle() { 1.0 } else { 0.5 }
+}
+
 /// Random states that the mechanism can reach.
 struct StateSampling {
-    /// Nominal values and motions of the active coordinates.
-    active: Vec<(f64, bool)>,
+    /// The active coordinates.
+    active: Vec<SampledCoordinate>,
     /// Number of drives, which have a load each.
     n_drives: usize,
     random: RandomBits,
@@ -257,9 +292,13 @@ impl StateSampling {
     /// Without states yet.
     fn new(model: &Model, n_drives: usize) -> Self {
         let coordinates = model.derivation.mechanism.coordinates.iter();
-        let active: Vec<(f64, bool)> = coordinates
+        let active: Vec<SampledCoordinate> = coordinates
             .filter(|c| !c.passive)
-            .map(|c| (c.nominal, c.motion.is_angle()))
+            .map(|c| SampledCoordinate {
+                nominal: c.nominal,
+                unit: motion_unit(c.motion),
+                travel: 1.0,
+            })
             .collect();
         let n = active.len();
         Self {
@@ -271,6 +310,88 @@ impl StateSampling {
             refused: 0,
             left_out: 0,
         }
+    }
+
+    /// Determines how much further each coordinate goes: until one of the passive coordinates moves as far as the
+    /// coordinate itself would without this. Returns a warning if the nominal pose is near a fold of the loops.
+    fn extend_travel(&mut self, model: &Model, evaluator: &ModelEvaluator<'_>) -> Option<String> {
+        let coordinates = &model.derivation.mechanism.coordinates;
+        let names = |is_passive: bool| -> Vec<&str> {
+            let these = coordinates.iter().filter(|c| c.passive == is_passive);
+            these.map(|c| c.name.as_str()).collect()
+        };
+        let mut warning = None;
+        for i in 0..self.active.len() {
+            let Some(speeds) = self.passive_speeds(model, evaluator, i) else {
+                continue;
+            };
+            let fastest = speeds.iter().flatten().fold(0.0_f64, |most, x| most.max(*x));
+            if fastest > 0.0 && fastest < SLOW {
+                self.active[i].travel = fastest.recip().clamp(1.0, LARGEST_TRAVEL);
+            }
+            // The first pose is the nominal one.
+            let Some((nominal, others)) = speeds.split_first().filter(|(_, others)| !others.is_empty()) else {
+                continue;
+            };
+            let median = |p: usize| {
+                let mut all: Vec<f64> = others.iter().map(|speeds| speeds[p]).collect();
+                all.sort_by(f64::total_cmp);
+                all[all.len() / 2]
+            };
+            let fold = (0..nominal.len()).find(|p| nominal[*p] > NEAR_FOLD * median(*p).max(SLOW));
+            warning = warning.or_else(|| {
+                let p = fold?;
+                Some(format!(
+                    "the nominal pose is near a fold of the loops: `{}` moves {} times as fast as `{}` there, and {} times at \
+                     poses around it; small errors of the lengths change this pose much; choose another nominal pose",
+                    names(true)[p],
+                    significant(nominal[p], 3),
+                    names(false)[i],
+                    significant(median(p), 3)
+                ))
+            });
+        }
+        warning
+    }
+
+    /// How fast each passive coordinate moves if one active coordinate moves at the rate one, in rad or half metres: at
+    /// the nominal pose and at random ones, because a link may be at its dead centre. `None` if the nominal pose has no
+    /// rates.
+    fn passive_speeds(&self, model: &Model, evaluator: &ModelEvaluator<'_>, active: usize) -> Option<Vec<Vec<f64>>> {
+        let coordinates = model.derivation.mechanism.coordinates.iter();
+        let units: Vec<f64> = coordinates
+            .filter(|c| c.passive)
+            .map(|c| motion_unit(c.motion))
+            .collect();
+        let n = self.active.len();
+        let mut random = RandomBits::new(0x7370_696e);
+        let mut rates = vec![0.0; n];
+        rates[active] = self.active[active].unit;
+        let zeros = vec![0.0; n.max(self.n_drives)];
+        let mut speeds = Vec::new();
+        for sample in 0..TRAVEL_SAMPLES {
+            let reach = if sample == 0 { 0.0 } else { self.reach };
+            let pose = self
+                .active
+                .iter()
+                .map(|c| c.nominal + c.unit * reach * draw(&mut random));
+            let q: Vec<f64> = pose.collect();
+            let state = MotionStates {
+                q: q.iter().map(std::slice::from_ref).collect(),
+                qd: rates.iter().map(std::slice::from_ref).collect(),
+                qdd: zeros[..n].iter().map(std::slice::from_ref).collect(),
+                load: zeros[..self.n_drives].iter().map(std::slice::from_ref).collect(),
+            };
+            match evaluator.passive_motion(&state) {
+                Ok(motion) => {
+                    let rates = motion.iter().flatten().skip(units.len());
+                    speeds.push(rates.zip(&units).map(|(rate, unit)| (rate / unit).abs()).collect());
+                }
+                Err(_) if sample == 0 => return None,
+                Err(_) => {}
+            }
+        }
+        Some(speeds)
     }
 
     /// Draws until there are as many states as wanted.
@@ -285,10 +406,7 @@ impl StateSampling {
             let q: Vec<f64> = self
                 .active
                 .iter()
-                .map(|(nominal, is_angle)| {
-                    let reach = if *is_angle { self.reach } else { 0.5 * self.reach };
-                    nominal + reach * draw(&mut self.random)
-                })
+                .map(|c| c.nominal + c.unit * self.reach * c.travel * draw(&mut self.random))
                 .collect();
             let still = MotionStates {
                 q: q.iter().map(std::slice::from_ref).collect(),
@@ -314,6 +432,15 @@ impl StateSampling {
             for (set, range) in self.columns[1..].iter_mut().zip([RATE, ACCELERATION, LOAD]) {
                 for column in set {
                     column.push(range * draw(&mut self.random));
+                }
+            }
+            for motion in &mut self.columns[1..3] {
+                for (value, c) in motion
+                    .iter_mut()
+                    .filter_map(|column| column.last_mut())
+                    .zip(&self.active)
+                {
+                    *value *= c.travel;
                 }
             }
         }

@@ -33,6 +33,7 @@ pub(super) fn complete(model: &Model, raw: &mut Raw) -> Outcome<Vec<RecordingNot
             normalise_quaternions(raw, names)?;
         }
         check_twist(mechanism, body, raw)?;
+        fill_scalar_part(mechanism, body, raw);
     }
     add_shared_drive_forces(mechanism, raw)?;
     // A row without drive needs a force, which is zero.
@@ -167,6 +168,18 @@ fn check_twist(mechanism: &Mechanism, body: &FreeBody, raw: &Raw) -> Outcome {
         )));
     }
     Ok(())
+}
+
+/// Derivatives of the quaternion's scalar part where those of the other parts are recorded: the angular velocity has
+/// three components, so the fourth column is not read. Without the column its derivatives would be computed by a
+/// filter, which the forces would have to pass as well.
+fn fill_scalar_part(mechanism: &Mechanism, body: &FreeBody, raw: &mut Raw) {
+    let name = |k: usize| mechanism.coordinates[body.quaternion[k].0].name.as_str();
+    for suffix in ["_d", "_dd"] {
+        if raw.has_column(&format!("{}{suffix}", name(1))) {
+            raw.set_column(&format!("{}{suffix}", name(0)), vec![0.0; raw.samples()]);
+        }
+    }
 }
 
 /// Indices of the coordinates whose rates are the velocity, and of those whose rates are the angular velocity.

@@ -18,9 +18,9 @@ use nalgebra::{DMatrix, DVector};
 use super::friction_rows::{PickedStates, rates_of_drives, regressor_with_friction, sign, solve_scaled};
 use super::options::StandstillRule;
 use super::thresholds::{
-    DRY_FRICTION_LEAST_SIGMAS, STICK_BIN_FEWEST_SAMPLES, STICK_BLUR_PERIODS, STICK_CLEAR_MOTION, STICK_FAINT_SHORTFALL,
-    STICK_LEAST_SHORTFALL, STICK_LOWEST_SHORTFALL, STICK_MOST_SHARE, STICK_NOISE_RATIO, STICK_RATE_SHARES,
-    STICK_SHORTFALL_SIGMAS,
+    BLUR_LEAST_SLOW_SHARE, BLUR_MOST_SHARE, DRY_FRICTION_LEAST_SIGMAS, STICK_BIN_FEWEST_SAMPLES, STICK_BLUR_PERIODS,
+    STICK_CLEAR_MOTION, STICK_FAINT_SHORTFALL, STICK_LEAST_SHORTFALL, STICK_LOWEST_SHORTFALL, STICK_MOST_SHARE,
+    STICK_NOISE_RATIO, STICK_RATE_SHARES, STICK_SHORTFALL_SIGMAS,
 };
 use crate::model::Model;
 use crate::segment::RecordingSegment;
@@ -83,6 +83,7 @@ impl StickPhases {
         if bounds.iter().all(Option::is_none) {
             return Self::default();
         }
+        let mut counts = vec![SlowCounts::default(); bounds.len()];
         let mut found = Self {
             bounds,
             ..Self::default()
@@ -102,12 +103,31 @@ impl StickPhases {
                         let within = fit.fill_forces(model, run, d, &intervals[d][before..]);
                         fills[d].extend(within.unwrap_or_default());
                     }
+                    counts[d].add(run, rates, bound.rate, &intervals[d]);
                 }
             }
             found.intervals.push(intervals);
             found.fills.push(fills);
         }
+        if rule == StandstillRule::Automatic {
+            found.keep_blurred(&counts);
+        }
         found
+    }
+
+    /// Keeps the forces of drives that hardly stand: what is left out of them is mostly the blur of reversals, and too
+    /// much for what remains to represent the motion.
+    fn keep_blurred(&mut self, counts: &[SlowCounts]) {
+        for (d, counts) in counts.iter().enumerate() {
+            if !counts.is_blur() {
+                continue;
+            }
+            self.bounds[d] = None;
+            for (intervals, fills) in self.intervals.iter_mut().zip(&mut self.fills) {
+                intervals[d].clear();
+                fills[d].clear();
+            }
+        }
     }
 
     /// Whether there are no stick phases at all.
@@ -227,6 +247,36 @@ fn add_slow_intervals(run: &PreparedRun, rates: &[f64], bound: f64, all: &mut Ve
             Some(last) if from <= last[1] => last[1] = last[1].max(to),
             _ => all.push([from, to]),
         }
+    }
+}
+
+/// Samples of a drive in all recordings.
+#[derive(Clone, Copy, Default)]
+struct SlowCounts {
+    /// All samples.
+    all: usize,
+    /// Samples slower than the bound.
+    slow: usize,
+    /// Samples in the intervals to leave out.
+    left_out: usize,
+}
+
+impl SlowCounts {
+    /// Adds the samples of a run, of which those in the intervals would be left out.
+    fn add(&mut self, run: &PreparedRun, rates: &[f64], bound: f64, intervals: &[[f64; 2]]) {
+        self.all += rates.len();
+        self.slow += rates.iter().filter(|rate| rate.abs() <= bound).count();
+        let of = |[from, to]: &[f64; 2]| {
+            let end = run.time.partition_point(|t| t <= to);
+            end - run.time.partition_point(|t| t < from).min(end)
+        };
+        self.left_out += intervals.iter().map(of).sum::<usize>();
+    }
+
+    /// Whether the intervals cover a large part of the samples, of which the drive is slow in a small part only.
+    fn is_blur(&self) -> bool {
+        let left_out = self.left_out as f64;
+        left_out > BLUR_MOST_SHARE * self.all as f64 && (self.slow as f64) < BLUR_LEAST_SLOW_SHARE * left_out
     }
 }
 

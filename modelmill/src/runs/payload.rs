@@ -118,6 +118,7 @@ fn with_bodies(mechanism: &Mechanism, frames: &[FrameIdx]) -> (Mechanism, usize)
             variant.parameters.push(DynamicParameter {
                 name: format!("payload{first}_{i}"),
                 nominal: 0.0,
+                has_nominal: false,
                 unit: unit.to_owned(),
                 note: None,
             });

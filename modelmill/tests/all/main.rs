@@ -5,6 +5,7 @@ mod events;
 mod every_model;
 mod hanging;
 mod made;
+mod mechanisms;
 mod missing;
 mod run_plans;
 mod runs;

@@ -65,15 +65,18 @@ fn recordings_of_the_fit_decide_for_all() {
             .to_vec(),
         ..RecordingOptions::default()
     };
-    let of = |paths: &[&Path]| -> Vec<Vec<_>> { paths.iter().map(|path| vec![*path]).collect() };
     let together = |fit: &[&Path], check: &[&Path]| {
-        let [fit, check] = model.prepare_recordings([&of(fit), &of(check)], &reading);
+        let [fit, check] = model.prepare_recordings([&one_file_each(fit), &one_file_each(check)], &reading);
         let all = fit.into_iter().chain(check);
         all.map(|one| prepared(&one.expect("a recording"))).collect::<Vec<_>>()
     };
     let [slow, fast, check] = [&paths[0], &paths[1], &paths[2]];
     let alone = |path: &Path| prepared(&model.recording(path, &reading).expect("a recording"));
-    assert_ne!(alone(slow), alone(fast), "the recordings do not differ enough for this test");
+    assert_ne!(
+        alone(slow),
+        alone(fast),
+        "the recordings do not differ enough for this test"
+    );
     // The validation gets the preparation of the fit.
     let all = together(&[slow], &[check]);
     assert_eq!(all, [alone(slow); 2]);
@@ -82,8 +85,13 @@ fn recordings_of_the_fit_decide_for_all() {
     assert!(all.iter().all(|one| *one == all[0]), "{all:?}");
     assert_eq!(together(&[fast, slow], &[check])[0], all[0]);
     // A file that cannot be read leaves the others as they are.
-    let [fit, _] = model.prepare_recordings([&of(&[&folder.join("none.csv"), slow]), &[]], &reading);
+    let [fit, _] = model.prepare_recordings([&one_file_each(&[&folder.join("none.csv"), slow]), &[]], &reading);
     assert!(fit[0].is_err());
     assert_eq!(fit[1].as_ref().map(prepared).ok(), Some(alone(slow)));
     std::fs::remove_dir_all(&folder).expect("the folder");
+}
+
+/// Recordings of one file each.
+fn one_file_each<'a>(paths: &[&'a Path]) -> Vec<Vec<&'a Path>> {
+    paths.iter().map(|path| vec![*path]).collect()
 }

@@ -15,22 +15,6 @@ use super::mjcf_defaults::MjcfDefaults;
 use super::placed::{DescriptionPose, rotation_about, rotation_from_quaternion};
 use super::xml::{children, exact_numbers, line, located_message, numbers, required_attribute, symmetric, vector};
 
-/// Sections without effect on the dynamics, or read elsewhere; they are skipped without a remark.
-const NO_DYNAMICS: [&str; 12] = [
-    "asset",
-    "visual",
-    "statistic",
-    "contact",
-    "sensor",
-    "custom",
-    "size",
-    "extension",
-    "keyframe",
-    "default",
-    "compiler",
-    "option",
-];
-
 /// Settings of `<compiler>`, with MuJoCo's defaults.
 struct MjcfCompiler {
     /// Whether angles are in degrees.
@@ -144,16 +128,6 @@ pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
     }
     reader.read_actuators(&root)?;
     reader.read_keyframe(&root)?;
-    // A remark for each section that is neither read nor known to have no effect.
-    for node in root.children().filter(Node::is_element) {
-        let tag = node.tag_name().name();
-        if !NO_DYNAMICS.contains(&tag) && !["worldbody", "equality", "actuator", "tendon"].contains(&tag) {
-            reader
-                .out
-                .remarks
-                .push(located_message(&node, "this section is not read"));
-        }
-    }
     Ok(reader.out)
 }
 
@@ -249,7 +223,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
     }
 
     /// The first number of an attribute, zero without it. Nonzero further ones are reported.
-    fn first(&mut self, node: &Node<'a, 'i>, class: Option<&str>, key: &str) -> Result<f64, String> {
+    pub(super) fn first(&mut self, node: &Node<'a, 'i>, class: Option<&str>, key: &str) -> Result<f64, String> {
         let Some(text) = self.text(node, class, key)? else {
             return Ok(0.0);
         };

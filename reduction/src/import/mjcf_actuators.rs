@@ -38,6 +38,13 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                     &node,
                     &format!("it drives the joints of the tendon `{name}` together; in the model each joint has a separate drive"),
                 ));
+                // Inertia and damping of one rotor act on all joints of the tendon at once.
+                for key in ["armature", "damping"] {
+                    if self.first(&node, None, key)? != 0.0 {
+                        let remark = format!("`{key}` of an actuator on a fixed tendon: left out");
+                        self.out.remarks.push(located_message(&node, &remark));
+                    }
+                }
                 // A fixed tendon is a sum of joint positions; each joint gets a drive with its coefficient.
                 for joint in children(&tendon, "joint") {
                     let gear = gear * super::xml::number_attribute(&joint, "coef")?;
@@ -127,15 +134,15 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         let own = |key: &str| Ok::<f64, String>(self.numbers::<1>(tendon, None, key)?.map_or(0.0, |[x]| x));
         let (damping, friction) = (own("damping")?, own("frictionloss")?);
         let on_tendon = own("armature")?;
-        let on_drive = self.numbers::<1>(node, None, "armature")?.map_or(0.0, |[x]| x);
+        let [armature, drag] = [self.first(node, None, "armature")?, self.first(node, None, "damping")?];
         self.out.straight_drives.push(StraightDrive {
             name: node.attribute("name").unwrap_or(&line).to_owned(),
             line: super::xml::line(node),
             ends,
             force: self.force_range(node)?.map(|range| scale_range(range, gear)),
-            damping,
+            damping: damping + drag * gear * gear,
             friction,
-            armature: on_tendon + on_drive * gear * gear,
+            armature: on_tendon + armature * gear * gear,
             tendon: line,
         });
         // The gear scales the force of the actuator; the model has the force along the tendon.
@@ -169,7 +176,8 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
     /// Marks a joint as driven by an actuator `node`, with force limits and reflected rotor inertia.
     fn add_joint_drive(&mut self, node: &Node<'a, 'i>, name: &str, gear: f64) -> Result<(), String> {
         let range = self.force_range(node)?;
-        let armature = self.numbers::<1>(node, None, "armature")?.map_or(0.0, |[x]| x);
+        let armature = self.first(node, None, "armature")?;
+        let damping = self.first(node, None, "damping")?;
         // The joint by its name.
         let joint = self
             .out
@@ -181,6 +189,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         // A free body cannot have a drive.
         joint.is_driven = joint.kind != DescriptionJointKind::Free;
         joint.armature += armature * gear * gear;
+        joint.damping += damping * gear * gear;
         // Limits at the joint itself have priority.
         if joint.force.is_none() {
             joint.force = range.map(|range| scale_range(range, gear));

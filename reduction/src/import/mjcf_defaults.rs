@@ -94,7 +94,7 @@ impl<'a, 'i> MjcfDefaults<'a, 'i> {
 
 /// The tag under which a class has the defaults of an element; empty for elements whose defaults are not read.
 fn default_tag(tag: &str) -> &'static str {
-    const TAGS: [&str; 14] = [
+    const TAGS: [&str; 17] = [
         "joint",
         "geom",
         "site",
@@ -105,6 +105,9 @@ fn default_tag(tag: &str) -> &'static str {
         "position",
         "velocity",
         "intvelocity",
+        "orientation",
+        "pid",
+        "dcmotor",
         "damper",
         "cylinder",
         "muscle",

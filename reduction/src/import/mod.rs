@@ -19,7 +19,9 @@ mod mjcf_include;
 mod model_text;
 mod placed;
 mod sdf;
+mod unread;
 mod urdf;
+mod urdf_extensions;
 mod welds;
 mod xml;
 
@@ -116,6 +118,7 @@ pub fn import(text: &str, options: &Options) -> Result<DescriptionImport, Import
         )),
     };
     let mut description = read.map_err(ImportError)?;
+    description.remarks.extend(unread::unread_remarks(&document));
     // Values of the options replace those of the description, such as a keyframe of MJCF.
     for (name, value) in options.pose {
         let mut joints = description.links.iter().flat_map(|link| &link.joints);

@@ -114,3 +114,18 @@ pub(crate) fn named_axis(direction: &Vector3<f64>) -> Option<(&'static str, Matr
     let turned = Rotation3::rotation_between(&Vector3::z(), &unit)?;
     Some(("z", turned.into_inner()))
 }
+
+/// The smallest rotation that turns one direction into another; `None` if one has no length. For opposite directions it
+/// is half a turn about a perpendicular axis.
+pub(crate) fn rotation_between_axes(from: &Vector3<f64>, to: &Vector3<f64>) -> Option<Matrix3<f64>> {
+    let (from, to) = (from.try_normalize(0.0)?, to.try_normalize(0.0)?);
+    let turn = nalgebra::Rotation3::rotation_between(&from, &to);
+    Some(turn.map_or_else(
+        || {
+            let least = from.iamin();
+            let across = from.cross(&Vector3::ith(least, 1.0)).normalize();
+            2.0 * across * across.transpose() - Matrix3::identity()
+        },
+        nalgebra::Rotation3::into_inner,
+    ))
+}

@@ -9,7 +9,8 @@ use super::description::{
     ClosureConstraint, DescriptionClosure, DescriptionCoupling, DescriptionInertia, DescriptionJoint,
     DescriptionJointKind, DescriptionLink, RobotDescription,
 };
-use super::placed::{DescriptionPose, rotation, rotation_from_quaternion};
+use super::placed::{DescriptionPose, rotation, rotation_between_axes, rotation_from_quaternion};
+use super::urdf_extensions::ball_constraint;
 use super::xml::{
     child, children, exact_numbers, line, located_message, required_attribute, required_child, symmetric, vector,
 };
@@ -111,7 +112,72 @@ pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
         .and_then(|name| links.iter().position(|node| node.attribute("name") == Some(name)))
         .unwrap_or(0);
     tree(&mut out, &links, &places, &joints, &own, base)?;
+    read_constraints(&mut out, &model, &links, &frames)?;
     Ok(out)
+}
+
+/// Reads Drake's closures of loops: `ball_constraint` and `weld_constraint`. The links must be known.
+fn read_constraints(
+    out: &mut RobotDescription,
+    model: &Node,
+    links: &[Node],
+    frames: &[SdfFrame],
+) -> Result<(), String> {
+    let known: Vec<String> = out.links.iter().map(|link| link.name.clone()).collect();
+    let index = |name: &str| known.iter().position(|link| link == name);
+    for node in children(model, "ball_constraint") {
+        out.closures.push(ball_constraint(&node, |name| match index(name) {
+            None if name == "world" => Ok(None),
+            None => Err(located_message(&node, &format!("there is no link `{name}`"))),
+            found => Ok(found),
+        })?);
+    }
+    for node in children(model, "weld_constraint") {
+        // A frame stands for its pose in the link to which it is attached.
+        let end = |tag: &str| -> Result<(Option<usize>, DescriptionPose), String> {
+            let inner = required_child(&node, tag)?;
+            let name = inner.text().unwrap_or("").trim();
+            let place = pose_in_model(frames, name, &inner, 0)?;
+            let Some(link) = attached_link(name, &inner, links, frames)? else {
+                return Ok((None, place));
+            };
+            let link = required_attribute(&links[link], "name")?;
+            let in_link = pose_in_model(frames, &link, &inner, 0)?.inverse().compose(&place);
+            Ok((index(&link), in_link))
+        };
+        out.closures.push(DescriptionClosure {
+            name: format!("closure_{}", line(&node)),
+            line: line(&node),
+            ends: [end("parent")?, end("child")?],
+            constraint: ClosureConstraint::Frames,
+        });
+    }
+    Ok(())
+}
+
+/// The link to which a frame is attached, directly or through other frames; none is the world.
+fn attached_link(name: &str, from: &Node, links: &[Node], frames: &[SdfFrame]) -> Result<Option<usize>, String> {
+    let mut name = name.to_owned();
+    for _ in 0..LONGEST_CHAIN {
+        if name == "world" {
+            return Ok(None);
+        }
+        if let Some(k) = links.iter().position(|link| link.attribute("name") == Some(&name)) {
+            return Ok(Some(k));
+        }
+        let frame = frames
+            .iter()
+            .find(|frame| frame.name == name)
+            .ok_or_else(|| located_message(from, &format!("there is no link `{name}`")))?;
+        if frame.usually == "__model__" {
+            return Ok(links.first().map(|_| 0));
+        }
+        name.clone_from(&frame.usually);
+    }
+    Err(located_message(
+        from,
+        "its frame is attached to itself through other frames",
+    ))
 }
 
 /// The trimmed text of a child element.
@@ -251,28 +317,8 @@ fn joint(
     let name = required_attribute(node, "name")?;
     let end = |tag: &str| -> Result<Option<usize>, String> {
         let inner = required_child(node, tag)?;
-        let mut name = inner.text().unwrap_or("").trim().to_owned();
         // A frame as parent or child means the link to which it is attached.
-        for _ in 0..LONGEST_CHAIN {
-            if name == "world" {
-                return Ok(None);
-            }
-            if let Some(k) = links.iter().position(|link| link.attribute("name") == Some(&name)) {
-                return Ok(Some(k));
-            }
-            let frame = frames
-                .iter()
-                .find(|frame| frame.name == name)
-                .ok_or_else(|| located_message(&inner, &format!("there is no link `{name}`")))?;
-            if frame.usually == "__model__" {
-                return Ok(links.first().map(|_| 0));
-            }
-            name.clone_from(&frame.usually);
-        }
-        Err(located_message(
-            &inner,
-            "its frame is attached to itself through other frames",
-        ))
+        attached_link(inner.text().unwrap_or("").trim(), &inner, links, frames)
     };
     // Each degree of freedom becomes a joint, with the element that describes its axis.
     let kind = required_attribute(node, "type")?;
@@ -573,12 +619,7 @@ fn tree(
         // A hinge has its axis along x of the closure's frame.
         let mut place = between.place;
         if let (ClosureConstraint::Axes, Some(joint)) = (holds, between.joints.first()) {
-            let turned = nalgebra::Rotation3::rotation_between(&Vector3::x(), &joint.axis);
-            // For the direction -x it is half a turn about any perpendicular axis.
-            place.r = turned.map_or_else(
-                || Matrix3::from_diagonal(&Vector3::new(-1.0, -1.0, 1.0)),
-                nalgebra::Rotation3::into_inner,
-            );
+            place.r = rotation_between_axes(&Vector3::x(), &joint.axis).unwrap_or_else(Matrix3::identity);
         }
         // The same pose as seen from the links at both ends.
         let end = |link: Option<usize>| match link {

@@ -10,10 +10,11 @@ use super::description::{
     ClosureConstraint, DescriptionClosure, DescriptionCoupling, DescriptionInertia, DescriptionJoint,
     DescriptionJointKind, DescriptionLink, RobotDescription,
 };
-use super::placed::DescriptionPose;
+use super::placed::{DescriptionPose, rotation_from_quaternion};
+use super::urdf_extensions;
 use super::xml::{
-    child, children, line, located_message, number_attribute, required_attribute, required_child, symmetric,
-    three_numbers, vector,
+    child, children, exact_numbers, line, located_message, number_attribute, required_attribute, required_child,
+    symmetric, three_numbers, vector,
 };
 
 /// A joint between two links, as the file describes it.
@@ -151,6 +152,8 @@ pub(crate) fn read(document: &Document, closures: Option<&str>, is_floating: boo
     if let Some(file) = closures {
         add_closures(&mut out, &joints, file)?;
     }
+    urdf_extensions::read_closures(&mut out, &robot)?;
+    urdf_extensions::read_rotors(&mut out, &robot)?;
     Ok(out)
 }
 
@@ -364,10 +367,15 @@ fn joint(node: &Node, out: &mut RobotDescription) -> Result<UrdfJoint, String> {
 
 /// The pose `<origin>` of an element; the identity without one.
 fn origin(of: &Node) -> Result<DescriptionPose, String> {
-    let Some(node) = child(of, "origin") else {
+    child_pose(of, "origin")
+}
+
+/// The pose in a child element; the identity without one.
+pub(super) fn child_pose(of: &Node, tag: &str) -> Result<DescriptionPose, String> {
+    let Some(node) = child(of, tag) else {
         return Ok(DescriptionPose::identity());
     };
-    // Both attributes are optional.
+    // All attributes are optional; URDF 1.2 has quaternions.
     let or_zeros = |key: &str| {
         if node.has_attribute(key) {
             three_numbers(&node, key)
@@ -375,7 +383,13 @@ fn origin(of: &Node) -> Result<DescriptionPose, String> {
             Ok([0.0; 3])
         }
     };
-    Ok(DescriptionPose::from_xyz_rpy(or_zeros("xyz")?, or_zeros("rpy")?))
+    let mut pose = DescriptionPose::from_xyz_rpy(or_zeros("xyz")?, or_zeros("rpy")?);
+    if let Some(text) = node.attribute("quat_xyzw") {
+        let [x, y, z, w] = exact_numbers(&node, "quat_xyzw", text)?;
+        pose.r = rotation_from_quaternion([w, x, y, z])
+            .ok_or_else(|| located_message(&node, "the quaternion in `quat_xyzw` is zero"))?;
+    }
+    Ok(pose)
 }
 
 /// Adds the contents of a file of closures: frames that coincide and joints that are driven.

@@ -3,6 +3,7 @@
 mod approximations;
 mod couplings;
 mod export;
+mod extensions;
 mod faulty;
 mod mjcf;
 mod order_of_entries;

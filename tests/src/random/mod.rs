@@ -134,6 +134,7 @@ impl Draft {
         self.mechanism.parameters.push(DynamicParameter {
             name: format!("{prefix}{i}"),
             nominal,
+            has_nominal: true,
             unit: "1".to_owned(),
             note: None,
         });

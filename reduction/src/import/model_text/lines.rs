@@ -120,7 +120,9 @@ impl ModelTextBuilder<'_> {
         // Names of the drives and their points.
         kept.into_iter()
             .map(|line| {
-                let name = self.unique_name(&line.name);
+                // Recordings have the time in the column `t`, so no drive has this name.
+                let wanted = if line.name == "t" { "t_drive" } else { &line.name };
+                let name = self.unique_name(wanted);
                 let points = ["from", "to"].map(|end| self.unique_name(&format!("{name}_{end}")));
                 NamedDriveLine { line, name, points }
             })
