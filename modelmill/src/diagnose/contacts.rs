@@ -3,9 +3,12 @@
 
 use modelmill_codegen::{ModelEvaluator, MotionStates};
 use modelmill_identify::changes::NormalEquations;
-use modelmill_identify::diagnose::{DiagnosisProblem, Disturbance};
+use modelmill_identify::diagnose::{DiagnosisProblem, Disturbance, TimeResidual};
 
-use super::thresholds::{CONTACT_GAP_S, CONTACT_MARGIN_S, REPEATED_PLACE_FEWEST_SAMPLES, REPEATED_PLACE_MOST_RESIDUAL};
+use super::thresholds::{
+    CONTACT_GAP_S, CONTACT_LEAST_RESIDUAL_RATIO, CONTACT_MARGIN_S, REPEATED_PLACE_FEWEST_SAMPLES,
+    REPEATED_PLACE_MOST_RESIDUAL,
+};
 use crate::audit::events::{ResidualTrace, event_disturbance, find_events, slowest_rate};
 use crate::model::Model;
 use crate::regressors::SegmentList;
@@ -41,6 +44,24 @@ pub(super) fn leave_out_late_contacts(
     let before = problem.disturbances.len();
     leave_out_contacts(problem, all, merge_contacts(contacts));
     problem.disturbances.len() > before
+}
+
+/// Drops the contacts whose forces a residual that follows the time reaches at other times, too, such as the ringing of
+/// an elastic joint: then nothing shows that they are contacts. `channels` are the names of the channels.
+pub(super) fn drop_doubtful_contacts(
+    disturbances: &mut Vec<Disturbance>,
+    residuals: &[TimeResidual],
+    channels: &[String],
+) {
+    let stands_out = |name: &String, force: f64| {
+        let here = residuals.iter().filter(|one| channels.get(one.channel) == Some(name));
+        let largest = here.map(|one| one.rms).fold(0.0, f64::max);
+        force.abs() > CONTACT_LEAST_RESIDUAL_RATIO * largest
+    };
+    disturbances.retain(|one| {
+        let mut forces = one.at.iter().zip(&one.estimates);
+        one.kind != "contact_event" || forces.any(|(name, force)| stands_out(name, force.value))
+    });
 }
 
 /// The part of a residual that belongs to one segment; `None` if a pose has no solution or the segment is short.
@@ -298,4 +319,37 @@ fn merge_contacts(contacts: Vec<Disturbance>) -> Vec<Disturbance> {
         merged.push(contact);
     }
     merged
+}
+
+#[cfg(test)]
+mod tests {
+    use modelmill_identify::diagnose::{EstimatedQuantity, ResidualCharacter};
+
+    use super::*;
+
+    /// A contact is stated only if its force is clearly larger than a residual that follows the time at other times.
+    #[test]
+    fn contacts_in_a_residual_as_large_are_dropped() {
+        let channels = ["one".to_owned(), "two".to_owned()];
+        let contact = |at: &str, force: f64| Disturbance {
+            kind: "contact_event".to_owned(),
+            at: vec![at.to_owned()],
+            estimates: vec![EstimatedQuantity::new("force", force, "N m")],
+            recordings: Vec::new(),
+            interval: None,
+            description: None,
+        };
+        let all = [contact("one", 3.2), contact("one", -40.0), contact("two", 3.2)];
+        let ringing = TimeResidual {
+            channel: 0,
+            character: ResidualCharacter::Large,
+            rms: 2.0,
+            noise: 0.05,
+            intervals: Vec::new(),
+            frequency: None,
+        };
+        let mut kept = all.to_vec();
+        drop_doubtful_contacts(&mut kept, &[ringing], &channels);
+        assert_eq!(kept, all[1..]);
+    }
 }

@@ -21,7 +21,7 @@ use modelmill_identify::RecordingNote;
 use super::candidates::{DerivedCandidates, candidates};
 use super::columns::{self, CandidateOrigin, load_dependent_columns, refined_columns};
 use super::constants::constants;
-use super::contacts::leave_out_late_contacts;
+use super::contacts::{drop_doubtful_contacts, leave_out_late_contacts};
 use super::encoders::{self, encoders};
 use super::estimates::round_by_deviation;
 use super::faults::subtract_known;
@@ -173,6 +173,11 @@ pub(crate) fn find_missing_effects(
         problem.change_intervals.clear();
         diagnosis = search(&mut problem)?;
     }
+    drop_doubtful_contacts(
+        &mut diagnosis.disturbances,
+        &diagnosis.time_residuals,
+        &problem.layout.channels,
+    );
     // Stage 5: texts, and candidates that could not be evaluated.
     for one in &mut diagnosis.disturbances {
         describe_disturbance(one, model);

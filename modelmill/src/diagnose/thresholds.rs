@@ -39,6 +39,10 @@ pub(super) const SIGN_TRIALS: usize = 200;
 /// Time before and after a contact or push that is left out of the fit, s. By judgement.
 pub(super) const CONTACT_MARGIN_S: f64 = 0.15;
 
+/// The force of a contact must exceed the rms value of a residual that follows the time at the same drive by this factor
+/// (1): a ringing joint reaches 2.3 (`flexible-motor-encoder`). By judgement.
+pub(super) const CONTACT_LEAST_RESIDUAL_RATIO: f64 = 4.0;
+
 /// Contacts with less time between them are reported as one, s. By judgement.
 pub(super) const CONTACT_GAP_S: f64 = 0.3;
 

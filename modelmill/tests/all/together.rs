@@ -20,7 +20,8 @@ fn text_of(fastest: f64, noise: f64, seed: u64) -> String {
     let mut draws = Draws::new(seed);
     let waves: Vec<[f64; 3]> = (1..6)
         .map(|k| {
-            let part = f64::from(k) / 5.0;
+            // The frequencies have no common period: a periodic motion has its own smoothing.
+            let part = (f64::from(k) / 5.0).powf(1.1);
             [0.05 / f64::from(k), fastest * part, 6.3 * draws.uniform()]
         })
         .collect();

@@ -26,11 +26,13 @@ const FRICTION_COLUMNS: usize = 6;
 /// Smear of a run whose motion was not filtered, s.
 const UNFILTERED_SMEAR_S: f64 = 0.05;
 
-/// The residual of a segment of a recording; `None` if there are too few samples, or if the model cannot be fitted.
+/// The residual of a segment of a recording; `None` if there are no forces or too few samples, or if
+/// the model cannot be fitted.
 pub(super) fn residual_trace(model: &Model, data: &RecordingSegment) -> Option<ResidualTrace> {
+    // Without forces there is no residual, and effects that depend on the load cannot be evaluated.
+    let forces = data.run.force.as_deref()?;
     let samples = evaluated_samples(&data.run.time)?;
     let rows = EventRows::new(model, data, &samples)?;
-    let forces = data.run.force.as_deref()?;
     let measured: Vec<Vec<f64>> = forces.iter().map(|force| local_medians(force, &samples)).collect();
     let is_measured = (0..measured.len())
         .map(|d| samples.iter().map(|k| data.run.is_force_measured(d, *k)).collect())
