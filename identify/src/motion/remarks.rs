@@ -5,7 +5,7 @@
 use std::f64::consts::TAU;
 
 use modelmill_boundary::message;
-use modelmill_boundary::text::{CommandName, Message, OptionName, Remedy};
+use modelmill_boundary::text::{Message, OptionName, Remedy};
 
 use crate::motion::derivatives::mean_rate;
 use crate::motion::periods;
@@ -183,11 +183,9 @@ impl SignalRecording {
         if !resting.is_empty() {
             run.notes.push(RecordingNote::info(message!(
                 "In {} there is standstill, a rate below a hundredth of the fastest: {} of the samples. Friction takes any \
-                 value there; {} with {} leaves such equations out of the fit.",
+                 value there; {} leaves such equations out of a fit.",
                 self.file(),
                 resting.join(", "),
-                // Other commands do not have the option.
-                Remedy::command(CommandName::Identify),
                 Remedy::option(OptionName::Standstill).with_value("0.01")
             )));
         }

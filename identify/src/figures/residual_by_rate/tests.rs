@@ -79,7 +79,7 @@ fn dry_friction_is_found_with_its_levels_and_share() {
         assert!(
             found[0]
                 .says
-                .starts_with("The residual of joint2 follows the sign of its rate: +2.")
+                .starts_with("The residual of joint2 follows the sign of its velocity: +2.")
         );
         assert!(found[0].says.contains("as dry friction of"), "{}", found[0].says);
         assert_eq!(serde_json::to_value(&found[0]).unwrap()["term"], "sign");
