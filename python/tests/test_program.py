@@ -20,7 +20,7 @@ RUNS = "recordings/spidermill-mbs"
 DAYS = "recordings/spidermill-days"
 
 #: Texts that tell how to ask for something, in the words of a notebook or of a command line.
-SPELLED = {"says", "separate_by", "separate_command"}
+SPELLED = {"says", "next", "separate_by", "separate_command"}
 
 
 def same(ours: Any, program: Any, place: str = "") -> None:

@@ -18,9 +18,9 @@ use nalgebra::{DMatrix, DVector};
 use super::friction_rows::{PickedStates, rates_of_drives, regressor_with_friction, sign, solve_scaled};
 use super::options::StandstillRule;
 use super::thresholds::{
-    BLUR_LEAST_SLOW_SHARE, BLUR_MOST_SHARE, DRY_FRICTION_LEAST_SIGMAS, STICK_BIN_FEWEST_SAMPLES, STICK_BLUR_PERIODS,
-    STICK_CLEAR_MOTION, STICK_FAINT_SHORTFALL, STICK_LEAST_SHORTFALL, STICK_LOWEST_SHORTFALL, STICK_MOST_SHARE,
-    STICK_NOISE_RATIO, STICK_RATE_SHARES, STICK_SHORTFALL_SIGMAS,
+    BLUR_LEAST_SLOW_SHARE, BLUR_MOST_SHARE, DRY_FRICTION_LEAST_SHARE, DRY_FRICTION_LEAST_SIGMAS,
+    STICK_BIN_FEWEST_SAMPLES, STICK_BLUR_PERIODS, STICK_CLEAR_MOTION, STICK_FAINT_SHORTFALL, STICK_LEAST_SHORTFALL,
+    STICK_LOWEST_SHORTFALL, STICK_MOST_SHARE, STICK_NOISE_RATIO, STICK_RATE_SHARES, STICK_SHORTFALL_SIGMAS,
 };
 use crate::model::Model;
 use crate::segment::RecordingSegment;
@@ -353,6 +353,15 @@ impl FrictionRows {
         })
     }
 
+    /// The rms value of the measured force of a drive, N or N m.
+    fn force_rms(&self, drive: usize) -> f64 {
+        let rows = (drive..self.forces.len())
+            .step_by(self.drives)
+            .filter(|row| self.is_measured[*row]);
+        let squares: Vec<f64> = rows.map(|row| self.forces[row].powi(2)).collect();
+        (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
+    }
+
     /// How much the friction of a drive falls short of that of motion, relative to it, at the rates that `wanted`
     /// selects.
     fn shortfall(&self, values: &DVector<f64>, d: usize, friction: f64, wanted: impl Fn(f64) -> bool) -> ShortfallBin {
@@ -466,9 +475,10 @@ impl FrictionFit {
             let motion = self
                 .rows
                 .shortfall(&self.values, d, friction, |rate| rate > STICK_CLEAR_MOTION * fastest[d]);
-            // Dry friction itself must be certain.
+            // Dry friction itself must be certain, and more than rounding.
             let (_, std) = motion.mean();
-            let is_certain = friction > 0.0 && friction.is_finite() && std * DRY_FRICTION_LEAST_SIGMAS < 1.0;
+            let least = DRY_FRICTION_LEAST_SHARE * self.rows.force_rms(d);
+            let is_certain = friction > least && friction.is_finite() && std * DRY_FRICTION_LEAST_SIGMAS < 1.0;
             if !is_certain || motion.samples < STICK_BIN_FEWEST_SAMPLES {
                 return None;
             }

@@ -64,6 +64,9 @@ pub(super) const STICK_SHORTFALL_SIGMAS: f64 = 2.5;
 /// Dry friction must exceed this many standard deviations of its mean during motion. By judgement.
 pub(super) const DRY_FRICTION_LEAST_SIGMAS: f64 = 10.0;
 
+/// Dry friction must exceed this share of the rms force of its drive (1): less is rounding. By judgement.
+pub(super) const DRY_FRICTION_LEAST_SHARE: f64 = 1e-3;
+
 /// A drive that would stick for more than this share of the time has no clear motion to compare with (1). By judgement,
 /// above the 97 % of the arm of TIAGo.
 pub(super) const STICK_MOST_SHARE: f64 = 0.99;
