@@ -100,7 +100,8 @@ pub(super) const EVENT_LONGEST_LULL_S: f64 = 0.06;
 /// Samples that show no contact belong to the event about them if they last less, s.
 pub(super) const EVENT_LONGEST_BRIDGE_S: f64 = 0.3;
 
-/// An event that lasts less is not reported, s: hits of a limit switch last 0.06 s.
+/// An event that lasts less at half of its height is not reported, s: hits of a limit switch last 0.06 s, and 0.04 s at
+/// half of their height.
 pub(super) const SHORTEST_EVENT_S: f64 = 0.04;
 
 /// Samples that show no contact are at most this share of an event (1): of one that is weak, and of one that is strong.

@@ -133,12 +133,12 @@ fn residual_trace(
     })
 }
 
-/// Leaves out contacts and pushes for all drives, since a push acts through the mechanism.
+/// Leaves out contacts and pushes for all drives, since a push acts through the mechanism. What is left out of a drive
+/// for another reason, such as its own standstill, stays left out of this drive alone.
 fn leave_out_contacts(problem: &mut DiagnosisProblem, all: &SegmentList<'_>, contacts: Vec<Disturbance>) {
     let samples = ContactSamples::new(all);
-    let about = |problem: &DiagnosisProblem, contacts: &[Disturbance]| -> Vec<bool> {
-        let known = problem.left_out.first().cloned();
-        let mut about = known.unwrap_or_else(|| vec![false; samples.time.len()]);
+    let about = |contacts: &[Disturbance]| -> Vec<bool> {
+        let mut about = vec![false; samples.time.len()];
         for contact in contacts {
             for (out, is) in about.iter_mut().zip(samples.mask(contact, CONTACT_MARGIN_S)) {
                 *out |= is;
@@ -146,14 +146,20 @@ fn leave_out_contacts(problem: &mut DiagnosisProblem, all: &SegmentList<'_>, con
         }
         about
     };
-    let all_about = about(problem, &contacts);
-    let (_, kept): (Vec<Disturbance>, Vec<Disturbance>) = contacts
-        .into_iter()
-        .partition(|contact| samples.is_explained_by_place(problem, contact, &all_about));
+    let all_about = about(&contacts);
+    let mut kept = contacts;
+    kept.retain(|contact| !samples.is_explained_by_place(problem, contact, &all_about));
     if kept.is_empty() {
         return;
     }
-    problem.left_out = vec![about(problem, &kept); problem.layout.channels.len()];
+    let about = about(&kept);
+    let channels = problem.layout.channels.len();
+    problem.left_out.resize(channels, vec![false; about.len()]);
+    for left_out in &mut problem.left_out {
+        for (out, is) in left_out.iter_mut().zip(&about) {
+            *out |= is;
+        }
+    }
     problem.disturbances.extend(kept);
 }
 

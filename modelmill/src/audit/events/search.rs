@@ -42,10 +42,11 @@ fn accept_segment(
 ) -> Option<DriveSegment> {
     let is_strong = segment.deviations > SUDDEN_LEAST_DEVIATIONS;
     let masked = &rest.is_masked[segment.start..segment.end];
-    let time = |samples: usize| samples as f64 / trace.sample_rate();
     let shown = masked.iter().filter(|masked| !**masked).count();
-    // An event has a start and an end, and enough samples that show it.
-    let lasts = time(masked.len()) >= SHORTEST_EVENT_S && (is_strong || time(shown) >= SHORTEST_EVENT_S);
+    // An event has a start and an end, and enough samples that show it. Samples are counted: a duration computed from
+    // their number may fall short of the limit by rounding.
+    let shortest = trace.sample_count(SHORTEST_EVENT_S, 1);
+    let lasts = masked.len() >= shortest && (is_strong || shown >= shortest);
     let is_within = segment.start > 2 && segment.end + 2 < trace.samples();
     if !lasts || !is_within || true_share(masked) > EVENT_LONGEST_MASKED_SHARE[usize::from(is_strong)] {
         return None;
