@@ -34,12 +34,6 @@ use crate::tree::expressions::ParameterMonomial;
 const DEPENDENT: f64 = 1e-13;
 /// The same for loops with rounded lengths: as a multiple of their closure error, relative to the size of a loop.
 const PER_OFF: f64 = 100.0;
-/// Columns that are smaller than this multiple of the closure error, relative to the largest one, may be its effect:
-/// nearly singular equations enlarge it in rates and accelerations. They are taken for it if a gap separates them from
-/// larger ones. Columns of a Bennett linkage whose twist is given with 16 digits reach some 1e4 closure errors.
-const UNCERTAIN_PER_OFF: f64 = 1e6;
-/// Ratio of the sizes of two columns that counts as a gap. Columns of one linkage differ by less. By judgement.
-const GAP: f64 = 1e4;
 /// Largest residual of a column at further states with the factors as written, relative to its terms.
 const SHOWN: f64 = 1e-10;
 /// The same for loops with rounded lengths, as a multiple of their closure error.
@@ -81,8 +75,8 @@ pub(super) fn reduce(
             w.norms[k] / states.loop_size().powi(2 - metres)
         };
         let sizes: Vec<f64> = (0..columns.len()).map(sized).collect();
-        let least = least_effective_size(&sizes, limit, UNCERTAIN_PER_OFF * states.closure_error());
-        let is_effective = |k: &usize| sizes[*k] > least;
+        let largest = sizes.iter().fold(0.0, |a: f64, b| a.max(*b));
+        let is_effective = |k: &usize| sizes[*k] > limit * largest;
         let tried: Vec<usize> = order.iter().copied().filter(is_effective).collect();
         let base = NumericBase::new(&w, &tried, limit);
         // Contributions below the residual of dropped columns are rounding errors.
@@ -106,18 +100,6 @@ pub(super) fn reduce(
         rows.extend(further);
     }
     Err(DeriveError::NotConfirmed)
-}
-
-/// The size below which columns count as zero. It is `limit` relative to the largest column, or a gap between sizes that
-/// are below `uncertain`.
-fn least_effective_size(sizes: &[f64], limit: f64, uncertain: f64) -> f64 {
-    let mut sorted = sizes.to_vec();
-    sorted.sort_by(|a, b| b.total_cmp(a));
-    let largest = sorted.first().copied().unwrap_or(0.0);
-    let gap = sorted
-        .windows(2)
-        .find(|pair| pair[1] < uncertain * largest && pair[1] * GAP < pair[0]);
-    gap.map_or(0.0, |pair| pair[1]).max(limit * largest)
 }
 
 /// The reduction by the numeric dependences, and the positions of the columns with an effect. Factors are written in
