@@ -52,6 +52,11 @@ impl CommandLineSpelling {
         }
     }
 
+    /// `modelmill identify ...` of a model file with the same recordings.
+    pub(crate) fn identification_command(&self, path: &str) -> String {
+        format!("modelmill identify {} {}", quote_word(path), self.recordings)
+    }
+
     /// The spelling for the arguments of `diagnose` and `report`.
     pub(crate) fn from_args(args: &DiagnosisArgs) -> Self {
         Self::new(&args.data, &args.check, &args.preparation.reading())
@@ -77,11 +82,7 @@ impl StepSpelling for CommandLineSpelling {
     }
 
     fn spell_identification(&self, model: &Model) -> String {
-        format!(
-            "modelmill identify {} {} --out fit.json",
-            quote_word(&model.path),
-            self.recordings
-        )
+        format!("{} --out fit.json", self.identification_command(&model.path))
     }
 
     /// `modelmill excite --separate ...` for a motion that distinguishes the effects.

@@ -16,6 +16,12 @@ use crate::{commands, terminal};
 /// Prints the missing effects, or that none is missing, or that no known effect explains the error.
 pub(crate) fn run(host: &Host, args: &DiagnoseArgs) -> CommandOutcome {
     let target = target(args)?;
+    // Relative paths in the file start from the folder of the target: a search takes long, so this is checked first.
+    if let Some(target) = &target
+        && let Ok(given) = std::fs::read_to_string(&args.diagnosis.model)
+    {
+        host.load_text(target.path(), &given)?;
+    }
     let flags = CommandLineSpelling::from_args(&args.diagnosis);
     let question = DiagnosisOptions {
         fixed: args.diagnosis.fixed_parameters(),
@@ -37,7 +43,7 @@ pub(crate) fn run(host: &Host, args: &DiagnoseArgs) -> CommandOutcome {
         terminal::print(&findings.text(terminal::style(), &flags).join("\n"))?;
     }
     if let (Some(target), true) = (&target, is_written) {
-        terminal::note(&completion_text(&findings, target.path()));
+        terminal::note(&completion_text(&findings, target.path(), &flags));
     }
     written.unwrap_or(Ok(()))
 }
@@ -66,8 +72,9 @@ fn write_completed_model(host: &Host, findings: &DiagnosisFindings, target: &Out
 }
 
 /// What was written, and what to do with it.
-fn completion_text(findings: &DiagnosisFindings, path: &Path) -> String {
-    let path = path.display();
+fn completion_text(findings: &DiagnosisFindings, path: &Path, flags: &CommandLineSpelling) -> String {
+    let path = path.display().to_string();
+    let next = flags.identification_command(&path);
     let others: Vec<_> = (findings.effects_without_entry().iter())
         .map(|one| one.effect.clone())
         .collect();
@@ -79,7 +86,7 @@ fn completion_text(findings: &DiagnosisFindings, path: &Path) -> String {
     match findings.entries_to_add().len() {
         0 => format!("{path} is written: it is the given model, without added effects{others}"),
         n => format!(
-            "{path} is written: the given model with {} added{others}. Identify it next: `modelmill identify {path}`",
+            "{path} is written: the given model with {} added{others}. Identify it next: `{next}`",
             count(n, "effect", "effects")
         ),
     }

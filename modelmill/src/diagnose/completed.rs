@@ -24,10 +24,11 @@ impl DiagnosisFindings {
     /// The text of the completed model file, in which the effects found are added to the given one. It is the given file if
     /// no effect is missing.
     ///
-    /// Fails where the findings do not state what is missing: if a fault of the recordings is not cleared up, and if the
-    /// effects contradict the model file.
+    /// Fails where the findings do not state what is missing: if the recordings or the direction of gravity in the model
+    /// file have a fault, also one that was corrected hypothetically, and if the effects contradict the model file.
     pub fn completed_model(&self) -> Outcome<&str> {
-        if !self.unresolved.is_empty() || words::has_suspicion(&self.diagnosis) {
+        let has_fault = !self.unresolved.is_empty() || !self.corrected.is_empty();
+        if has_fault || words::has_suspicion(&self.diagnosis) {
             return Err(Error::input(
                 "the model cannot be completed, because the recordings or the model may have a fault; correct first what the \
                  verdict names",
@@ -59,12 +60,14 @@ impl DiagnosisFindings {
             let mut found = self.missing.iter();
             found.any(|one| one.effect.kind == entry.kind && one.effect.at == entry.at)
         };
-        let acts_once = |entry: &&NewEffect| {
+        let is_found_once = |entry: &&NewEffect| {
             let found = self.missing.iter().filter(|one| one.effect.kind == entry.kind);
             found.filter(|one| one.effect.at.contains(&entry.at[0])).count() < 2
         };
         let entries = self.entries_to_add().iter();
-        entries.filter(|entry| !is_found(entry) && !acts_once(entry)).collect()
+        entries
+            .filter(|entry| !is_found(entry) && !is_found_once(entry))
+            .collect()
     }
 
     /// Advice if not all effects can be added to the model file: because of a suspected fault, or of a delayed force

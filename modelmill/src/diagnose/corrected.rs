@@ -87,7 +87,8 @@ impl CorrectedRecordings {
         for fault in &mut all.unresolved {
             if fault.kind == RecordingFaultKind::GravityDirection && !all.disagreeing.is_empty() {
                 let others = words::joined_by_and(&all.disagreeing);
-                fault.clause = format!("{}, but {others} agrees with the model file", fault.clause);
+                let verb = if all.disagreeing.len() == 1 { "agrees" } else { "agree" };
+                fault.clause = format!("{}, but {others} {verb} with the model file", fault.clause);
             }
         }
         Ok(Some(all))

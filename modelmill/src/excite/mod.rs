@@ -153,7 +153,13 @@ fn search_all(
                     best = Some((harmonics, found));
                 }
             }
-            Err(error) => failure = Some(error),
+            Err(error) => {
+                if !others.is_empty() {
+                    let says = format!("With {harmonics} harmonics no trajectory was found: {error}");
+                    model.host().note(&RecordingNote::warning(message!("{says}")));
+                }
+                failure = Some(error);
+            }
         }
     }
     match (best, failure) {

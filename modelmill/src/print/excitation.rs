@@ -3,6 +3,7 @@
 use modelmill_identify::excite::ExcitationCriterion;
 use serde_json::{Map, Value, json};
 
+use crate::excite::HarmonicsResult;
 use crate::excite::plant::used_fraction;
 use crate::excite::{ExcitationResult, SeparationResult};
 use crate::print::RemedySpelling;
@@ -43,12 +44,7 @@ impl ExcitationResult {
                 "proven": margin.proven,
             })
         });
-        // The search takes the logarithm of the condition number; people do not.
-        let criterion = |value: f64| match self.options.criterion {
-            ExcitationCriterion::Condition => value.exp(),
-            ExcitationCriterion::LogDet => value,
-            ExcitationCriterion::Separation => (-value).exp(),
-        };
+        let criterion = |value: f64| self.criterion_value(value);
         json!({
             "model": self.model,
             "condition_number": found.condition_number,
@@ -113,34 +109,42 @@ impl ExcitationResult {
         }
     }
 
-    /// The result for each number of harmonics, if several were compared.
+    /// The criterion as people read it: the search takes the logarithm of the condition number and of the separation.
+    fn criterion_value(&self, value: f64) -> f64 {
+        match self.options.criterion {
+            ExcitationCriterion::Condition => value.exp(),
+            ExcitationCriterion::LogDet => value,
+            ExcitationCriterion::Separation => (-value).exp(),
+        }
+    }
+
+    /// The result for each number of harmonics, if several were compared, with the criterion that decides.
     fn harmonics(&self) -> Vec<String> {
         if self.compared.len() < 2 {
             return Vec::new();
         }
-        let rows: Vec<Vec<String>> = self
-            .compared
-            .iter()
-            .map(|one| {
-                vec![
-                    one.harmonics.to_string(),
-                    significant(one.period, 4),
-                    number(one.condition_number),
-                    if one.harmonics == self.options.harmonics {
-                        "written"
-                    } else {
-                        ""
-                    }
-                    .to_owned(),
-                ]
-            })
-            .collect();
-        let columns = [
+        // The condition number stands in the table in any case.
+        let criterion = match self.options.criterion {
+            ExcitationCriterion::Condition => None,
+            ExcitationCriterion::LogDet => Some("log det"),
+            ExcitationCriterion::Separation => Some("separation"),
+        };
+        let row = |one: &HarmonicsResult| {
+            let is_written = one.harmonics == self.options.harmonics;
+            let mut row = vec![one.harmonics.to_string(), significant(one.period, 4)];
+            row.extend(criterion.map(|_| significant(self.criterion_value(one.value), 4)));
+            row.push(number(one.condition_number));
+            row.push(if is_written { "written" } else { "" }.to_owned());
+            row
+        };
+        let rows: Vec<Vec<String>> = self.compared.iter().map(row).collect();
+        let mut columns = vec![
             ("harmonics", ColumnAlignment::Right),
             ("period, s", ColumnAlignment::Right),
-            ("condition number", ColumnAlignment::Right),
-            ("", ColumnAlignment::Left),
         ];
+        columns.extend(criterion.map(|name| (name, ColumnAlignment::Right)));
+        columns.push(("condition number", ColumnAlignment::Right));
+        columns.push(("", ColumnAlignment::Left));
         let mut lines = vec![String::new()];
         lines.extend(table(2, &columns, &rows));
         lines

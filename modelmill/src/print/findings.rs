@@ -228,7 +228,8 @@ impl DiagnosisFindings {
                 .iter()
                 .map(|entry| spelling.spell_effect(&self.before.model, entry)),
         );
-        if entries.len() > 1 {
+        // A model is completed only once the faults are corrected.
+        if entries.len() > 1 && self.corrected.is_empty() {
             next.push(format!("{}.", spelling.spell_completion()));
         }
         next.extend(self.further_action().map(str::to_owned));

@@ -497,6 +497,7 @@ impl PreparedRecording {
                 .collect()
             }
             Err(error) if raws.len() < 2 => vec![Err(error)],
+            Err(Error::Cancelled) => raws.iter().map(|_| Err(Error::Cancelled)).collect(),
             // A fault of one recording belongs to it alone, so that each is prepared by itself.
             Err(_) => {
                 let each = raws.iter().map(std::slice::from_ref);

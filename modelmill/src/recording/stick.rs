@@ -229,7 +229,11 @@ impl StickPhases {
 
 /// Adds the intervals in which a run is slower than a bound, widened by the blur of its smoothing.
 fn add_slow_intervals(run: &PreparedRun, rates: &[f64], bound: f64, all: &mut Vec<[f64; 2]>) {
-    let blur = run.prepared.cutoff_hz.map_or(0.0, |cutoff| STICK_BLUR_PERIODS / cutoff);
+    let blur = match run.prepared.cutoff_hz {
+        // A series chosen automatically represents the motion up to noise: it blurs nothing.
+        Some(cutoff) if run.prepared.period.is_none() => STICK_BLUR_PERIODS / cutoff,
+        _ => 0.0,
+    };
     let n = rates.len();
     // A change of sign between two samples is a reversal, too, however fast.
     let is_slow = |i: usize| {

@@ -123,18 +123,19 @@ pub(crate) fn find_change_points(
     bounds.windows(3).map(point).collect()
 }
 
-/// Gives loads at change points the weights of the drives that the first run after the point has for the same load, so
-/// that known loads correct both alike. `runs` are the changes of each run relative to the first one.
+/// Gives loads at change points the weights of the drives that a run has for the same load, so that known loads correct
+/// both alike: the first run after the point that has it, or for a load that is put down the last one before. `runs` are
+/// the changes of each run relative to the first one.
 pub(crate) fn adopt_drive_weights(points: &mut [ChangePoint], runs: &[&[RunChange]]) {
     let frame = |one: &RunChange| match &one.change {
         PhysicalChange::Payload { frame, .. } => Some(frame.clone()),
         _ => None,
     };
     for point in points {
-        let later = runs.get(point.run..).unwrap_or_default();
+        let (earlier, later) = runs.split_at(point.run.min(runs.len()));
         for change in &mut point.changes {
             let Some(own) = frame(change) else { continue };
-            let mut same = (later.iter().copied().flatten())
+            let mut same = (later.iter().chain(earlier.iter().rev()).copied().flatten())
                 .filter(|one| !one.drive_weights.is_empty() && frame(one).as_ref() == Some(&own));
             if let Some(one) = same.next() {
                 change.drive_weights.clone_from(&one.drive_weights);

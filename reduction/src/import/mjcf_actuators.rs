@@ -178,6 +178,11 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         let range = self.force_range(node)?;
         let armature = self.first(node, None, "armature")?;
         let damping = self.first(node, None, "damping")?;
+        for (what, value) in [("armature", armature), ("damping", damping)] {
+            if value < 0.0 {
+                return Err(located_message(node, &format!("`{what}` cannot be negative")));
+            }
+        }
         // The joint by its name.
         let joint = self
             .out
@@ -188,8 +193,8 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             .ok_or_else(|| located_message(node, &format!("there is no joint `{name}`")))?;
         // A free body cannot have a drive.
         joint.is_driven = joint.kind != DescriptionJointKind::Free;
-        joint.armature += armature * gear * gear;
-        joint.damping += damping * gear * gear;
+        joint.armature += armature * (gear * gear);
+        joint.damping += damping * (gear * gear);
         // Limits at the joint itself have priority.
         if joint.force.is_none() {
             joint.force = range.map(|range| scale_range(range, gear));

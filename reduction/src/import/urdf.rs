@@ -385,6 +385,12 @@ pub(super) fn child_pose(of: &Node, tag: &str) -> Result<DescriptionPose, String
     };
     let mut pose = DescriptionPose::from_xyz_rpy(or_zeros("xyz")?, or_zeros("rpy")?);
     if let Some(text) = node.attribute("quat_xyzw") {
+        if node.has_attribute("rpy") {
+            return Err(located_message(
+                &node,
+                "`rpy` and `quat_xyzw` exclude each other; give one of them",
+            ));
+        }
         let [x, y, z, w] = exact_numbers(&node, "quat_xyzw", text)?;
         pose.r = rotation_from_quaternion([w, x, y, z])
             .ok_or_else(|| located_message(&node, "the quaternion in `quat_xyzw` is zero"))?;

@@ -109,7 +109,11 @@ pub(super) fn read_rotors(out: &mut RobotDescription, robot: &Node) -> Result<()
             let Some(rotor) = child(&actuator, "rotor_inertia") else {
                 continue;
             };
-            let rotor = number_attribute(&rotor, "value")?;
+            let rotor_node = rotor;
+            let rotor = number_attribute(&rotor_node, "value")?;
+            if rotor < 0.0 {
+                return Err(located_message(&rotor_node, "a rotor inertia cannot be negative"));
+            }
             let gear = child(&actuator, "gear_ratio").map_or(Ok(1.0), |gear| number_attribute(&gear, "value"))?;
             let mut names = children(&node, "joint");
             let (Some(joint), None) = (names.next(), names.next()) else {
@@ -121,7 +125,8 @@ pub(super) fn read_rotors(out: &mut RobotDescription, robot: &Node) -> Result<()
             let name = required_attribute(&joint, "name")?;
             let mut joints = out.links.iter_mut().flat_map(|link| &mut link.joints);
             let Some(joint) = joints.find(|joint| joint.name == name) else {
-                let remark = format!("its rotor inertia is left out, since the joint `{name}` does not move or exist");
+                let remark =
+                    format!("its rotor inertia is left out, since the joint `{name}` is fixed or does not exist");
                 out.remarks.push(located_message(&node, &remark));
                 continue;
             };

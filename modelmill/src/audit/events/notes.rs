@@ -1,5 +1,7 @@
 //! What is reported of events: notes for the user, disturbances for the diagnosis, and excluded forces.
 
+use std::ops::Range;
+
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_identify::RecordingNote;
@@ -83,7 +85,8 @@ pub(crate) fn event_disturbance(model: &Model, file: &str, event: &ContactEvent)
     }
 }
 
-/// Excludes the forces of all drives during events.
+/// Excludes the forces of all drives during events. Their values are replaced by a line between the samples around: they
+/// count nowhere, but a filter of all forces would carry the real ones into the samples around.
 pub(crate) fn leave_out_events(data: &mut RecordingSegment, events: &[ContactEvent]) {
     if events.is_empty() {
         return;
@@ -93,10 +96,27 @@ pub(crate) fn leave_out_events(data: &mut RecordingSegment, events: &[ContactEve
         let drives = run.force.as_ref().map_or(0, Vec::len);
         run.left_out = vec![vec![false; run.time.len()]; drives];
     }
-    for (i, time) in run.time.iter().enumerate() {
-        let is_in = |event: &ContactEvent| (event.from..=event.to).contains(time);
-        if events.iter().any(is_in) {
-            run.left_out.iter_mut().for_each(|out| out[i] = true);
+    for event in events {
+        let start = run.time.partition_point(|time| *time < event.from);
+        let end = run.time.partition_point(|time| *time <= event.to);
+        for out in &mut run.left_out {
+            out[start..end].fill(true);
         }
+        for force in run.force.iter_mut().flatten() {
+            bridge(force, start..end);
+        }
+    }
+}
+
+/// Replaces some values by a line between their neighbours; at an end by the only neighbour.
+fn bridge(values: &mut [f64], gap: Range<usize>) {
+    let before = gap.start.checked_sub(1).map(|i| values[i]);
+    let after = values.get(gap.end).copied();
+    let (Some(before), Some(after)) = (before.or(after), after.or(before)) else {
+        return;
+    };
+    let steps = gap.len() as f64 + 1.0;
+    for (k, value) in values[gap].iter_mut().enumerate() {
+        *value = before + (k as f64 + 1.0) / steps * (after - before);
     }
 }

@@ -38,7 +38,9 @@ pub(super) fn residual_trace(model: &Model, data: &RecordingSegment) -> Option<R
         .map(|d| samples.iter().map(|k| data.run.is_force_measured(d, *k)).collect())
         .collect();
     let prepared = &data.run.prepared;
-    let smear = prepared.cutoff_hz.map_or(UNFILTERED_SMEAR_S, f64::recip);
+    // A series chosen automatically represents the motion up to noise: it smears nothing.
+    let cutoff = prepared.cutoff_hz.filter(|_| prepared.period.is_none());
+    let smear = cutoff.map_or(UNFILTERED_SMEAR_S, f64::recip);
     let mut trace = ResidualTrace {
         time: samples.iter().map(|k| data.run.time[*k]).collect(),
         motion: rows.motion,
