@@ -38,6 +38,16 @@ impl OutputFile {
                 path.display()
             )));
         }
+        // A long command would fail at its end.
+        if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty())
+            && !folder.is_dir()
+        {
+            return Err(CommandFailure::Usage(format!(
+                "{flag} {}: there is no folder {}; create it first",
+                path.display(),
+                folder.display()
+            )));
+        }
         for input in inputs {
             if is_same_file(path, input) {
                 return Err(CommandFailure::Usage(format!(

@@ -64,7 +64,7 @@ pub(crate) struct PreparationArgs {
     pub(crate) rate: Option<f64>,
     /// Leave out a force while its drive is slower than this fraction of its maximum speed, where static friction is
     /// unknown; 0.01 is usual, and 0 leaves out none. Default: where the forces show that the drive sticks
-    #[arg(long, value_name = "PART", value_parser = parse_fraction)]
+    #[arg(long, value_name = "PART", value_parser = parse_fraction, allow_negative_numbers = true)]
     pub(crate) standstill: Option<f64>,
 }
 

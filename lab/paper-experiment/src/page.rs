@@ -26,6 +26,20 @@ pub(crate) fn render(experiment: &PaperExperiment) -> String {
     page.0
 }
 
+/// A text as HTML. What stands between two backticks is code.
+fn with_code(text: &str) -> String {
+    let mut html = String::new();
+    for (k, part) in text.split('`').enumerate() {
+        let part = escape(part);
+        if k % 2 == 1 {
+            let _ = write!(html, "<code>{part}</code>");
+        } else {
+            html.push_str(&part);
+        }
+    }
+    html
+}
+
 /// The HTML written so far.
 pub(crate) struct ExperimentPage(pub(crate) String);
 
@@ -37,7 +51,7 @@ impl ExperimentPage {
 
     /// Appends a paragraph.
     pub(crate) fn paragraph(&mut self, text: &str) {
-        let _ = writeln!(self.0, "<p>{}</p>", escape(text));
+        let _ = writeln!(self.0, "<p>{}</p>", with_code(text));
     }
 
     /// Appends a figure with its caption.
@@ -80,7 +94,7 @@ impl ExperimentPage {
         for row in rows {
             self.0.push_str("<tr>");
             for (k, cell) in row.iter().enumerate() {
-                let _ = write!(self.0, "<td{}>{}</td>", class(k, Some(cell)), escape(cell));
+                let _ = write!(self.0, "<td{}>{}</td>", class(k, Some(cell)), with_code(cell));
             }
             self.0.push_str("</tr>\n");
         }

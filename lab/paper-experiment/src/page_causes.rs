@@ -20,7 +20,7 @@ impl ExperimentPage {
         self.paragraph(&format!(
             "Lever arms: refuted. G2, G6 and G4 do not rotate, so every point of such a body has the same acceleration, \
              and where its centre is has no effect on the spindle forces. Moved by {} mm along x and y, all three \
-             together, the forces of the complete robot change by {} of the largest force. Step 4 of the reduction, the \
+             together, the forces of the complete robot change by {} of the largest force. Step 2 of the reduction, the \
              point masses at R2m, R3m and R4m, is exact; `modelmill reduce` measures the same. The error comes from \
              the same bodies, but from the equations: m4 acts at two places (section 3).",
             millimetres(causes::SHIFT),
@@ -28,7 +28,9 @@ impl ExperimentPage {
         ));
         self.paragraph(
             "Contact points: confirmed. The reduction puts them on the axes of the cranks. If they are beside the axes, \
-             an error remains that no base parameter can represent. The mean relative errors of the paper's treatment:",
+             an error remains that no base parameter can represent. The errors of the paper's treatment follow. The mean \
+             relative error is the paper's measure. It depends on the samples near zero force, and changes by up to 60 % \
+             with the sampling rate; the nrms does not. So it shows the order of size, and no distance to a millimetre:",
         );
         self.contact_table(experiment);
         self.held_diagnosis(experiment);
@@ -74,7 +76,8 @@ impl ExperimentPage {
         self.paragraph(&format!(
             "The tool in the authors' situation: parameters from CAD, and recordings of the robot with contact points {} \
              mm beside the axes. The model is the paper's, with a constant eA = 0 for the distance. `modelmill diagnose \
-             --held` fixes all parameters at their CAD values and gets no hint which mass or length is wrong.",
+             --held` fixes all parameters at their CAD values. The constant eA names the distance; nothing else says what is \
+             wrong.",
             millimetres(held.offset)
         ));
         let [mass, offset] = held.first;

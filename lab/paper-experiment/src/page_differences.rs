@@ -207,7 +207,7 @@ impl ExperimentPage {
     }
 }
 
-/// What the period as a variable and more harmonics buy, and which assumption reaches the paper's condition number.
+/// What the period as a variable and more harmonics gain, and which assumption reaches the paper's condition number.
 fn condition_words(experiment: &PaperExperiment) -> String {
     let rows = &experiment.conditions;
     let find = |harmonics: usize, is_free: bool| {
@@ -222,7 +222,7 @@ fn condition_words(experiment: &PaperExperiment) -> String {
     if let (Some(fixed), Some(free)) = (find(7, false), find(7, true)) {
         let ratio = fixed.condition_number / free.condition_number;
         words.push(format!(
-            "The period as a variable buys a factor of {} (7 harmonics, {} s instead of {} s).",
+            "The period as a variable improves it by a factor of {} (7 harmonics, {} s instead of {} s).",
             significant(ratio, 3),
             significant(free.period, 3),
             fixed.period,
@@ -230,7 +230,8 @@ fn condition_words(experiment: &PaperExperiment) -> String {
     }
     if let (Some(few), Some(many)) = (find(3, true), find(9, true)) {
         words.push(format!(
-            "From 3 to 9 harmonics, each with its best period, the condition number goes from {} to {}.",
+            "From 3 to 9 harmonics, each with its best period, the condition number goes from {} to {}. The searches are \
+             local: two of them that differ by less than a tenth are not distinguishable.",
             significant(few.condition_number, 3),
             significant(many.condition_number, 3),
         ));

@@ -15,7 +15,7 @@ impl ExperimentPage {
             "The consistent treatment is a special case of eq. (16): the five values in column two give exactly its \
              forces, with p4,min = 0. Identification with the paper's treatment arrives at these values on the rig. \
              The paper's own estimate, computed from the right column of its Table 1 with the lengths assumed here, \
-             moves in the same direction for all five. It overshoots in p1,min and p2,min. So does ours when the \
+             moves in the same direction for all five. It overshoots in all but p4,min. So does ours when the \
              spindles are rods, which add to the inertia of the cranks. The paper does not state whether its \
              multibody model has such spindles.",
         );
