@@ -312,7 +312,7 @@ mod tests {
         let text = step(None, [0.1, 0.1], &friction, 0.0).expect("a step");
         assert_eq!(
             text,
-            "The friction of a and b is smaller than in the model: its values are too large. Next: `identify` estimates them."
+            "The friction of a and b is smaller than in the model: its values are too large. Next: verb `identify` estimates them."
         );
         // With one drive that lacks friction, the diagnosis comes first, and names this drive only.
         friction[0].value = 2.0;
