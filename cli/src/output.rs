@@ -42,8 +42,8 @@ impl OutputFile {
         if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty())
             && !folder.is_dir()
         {
-            return Err(CommandFailure::Usage(format!(
-                "{flag} {}: there is no folder {}; create it first",
+            return Err(CommandFailure::Input(format!(
+                "{flag} {} cannot be written: there is no folder {}; create it first",
                 path.display(),
                 folder.display()
             )));
