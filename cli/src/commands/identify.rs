@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use modelmill::{Host, Model};
 use modelmill::identify::Instruments;
 use modelmill::recording::{PreparedRecording, RecordingOptions, StandstillRule};
 use modelmill::servo::{ServoIdentification, ServoModel};
+use modelmill::{Host, Model};
 
 use crate::args::IdentifyArgs;
 use crate::failure::{CommandFailure, CommandOutcome};

@@ -7,7 +7,10 @@ pub(crate) mod projection;
 
 use std::collections::BTreeSet;
 
-use modelmill_spec::{ActuatorTerm, CoordinateIdx, DriveKind, EffectPlace, EffectTerm, ExactExpression, Mechanism, ModelEffect, PlaceQuantity};
+use modelmill_spec::{
+    ActuatorTerm, CoordinateIdx, DriveKind, EffectPlace, EffectTerm, ExactExpression, Mechanism, ModelEffect,
+    PlaceQuantity,
+};
 
 use crate::DeriveError;
 use crate::expr::{Atom, ExprId, Graph};
@@ -79,7 +82,13 @@ pub(crate) fn unreduced_equations(graph: &mut Graph, mechanism: &Mechanism) -> R
                 .map(|term| ParameterMonomial(vec![(term.parameter.0, 1)])),
         );
     }
-    products.extend(mechanism.servo_forces.iter().flat_map(|force| &force.terms).map(servo_product));
+    products.extend(
+        mechanism
+            .servo_forces
+            .iter()
+            .flat_map(|force| &force.terms)
+            .map(servo_product),
+    );
     let products: Vec<ParameterMonomial> = products.into_iter().collect();
     let mut equations = UnreducedEquations {
         tree,

@@ -25,7 +25,10 @@ impl Mechanism {
         let mut mechanism = self.clone();
         for actuator in &self.actuators {
             let known = mechanism.coordinates.iter().position(|c| c.name == actuator.signal);
-            let signal = known.map_or_else(|| add_signal(&mut mechanism, &actuator.signal, actuator.motion), CoordinateIdx);
+            let signal = known.map_or_else(
+                || add_signal(&mut mechanism, &actuator.signal, actuator.motion),
+                CoordinateIdx,
+            );
             mechanism.drives[actuator.drive.0].is_driven = false;
             // The force of the actuator is on the other side than that of the bodies.
             let terms = actuator.terms.iter().map(|term| ActuatorTerm {

@@ -16,11 +16,11 @@ mod velocity_servo;
 mod voltage;
 
 use crate::exact::{ExactExpression, ModelSymbol, ParameterIdx, PlaceQuantity};
+use crate::formula::SourceFormula;
 use crate::joint_motion::CoordinateMotion;
 use crate::kinds::PlaceLoad;
 use crate::mechanism::DriveIdx;
 use crate::schema::ActuatorEntry;
-use crate::formula::SourceFormula;
 use crate::unit::UnitDimension;
 use crate::words::words;
 

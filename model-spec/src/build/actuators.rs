@@ -169,7 +169,10 @@ fn check_signals(
     for (k, actuator) in actuators.iter().enumerate() {
         let name = &actuator.signal;
         let is_coordinate = symbols.coordinates.iter().any(|c| {
-            let stem = name.strip_suffix("_dd").or_else(|| name.strip_suffix("_d")).unwrap_or(name);
+            let stem = name
+                .strip_suffix("_dd")
+                .or_else(|| name.strip_suffix("_d"))
+                .unwrap_or(name);
             c.name == *name || c.name == stem
         });
         let is_drive = drives.rows.iter().any(|d| d.name == *name);
@@ -180,9 +183,12 @@ fn check_signals(
         let drive = &drives.rows[actuator.drive.0].name;
         let span = spans.iter().find(|(one, _)| one.text == *drive).map(|(_, span)| *span);
         log.push(
-            Diagnostic::error(span.unwrap_or(model.span), format!("`{name}` cannot name the signal of `{drive}`"))
-                .label("recordings have another column of this name")
-                .help("choose another `signal`, and name the column of the file in [recording.columns]"),
+            Diagnostic::error(
+                span.unwrap_or(model.span),
+                format!("`{name}` cannot name the signal of `{drive}`"),
+            )
+            .label("recordings have another column of this name")
+            .help("choose another `signal`, and name the column of the file in [recording.columns]"),
         );
     }
 }

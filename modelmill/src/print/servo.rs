@@ -83,7 +83,10 @@ impl ServoModel {
             let fix = match (freedom.open, freedom.fixed_by.as_slice()) {
                 (1, []) => "give a gain as a number, or record a force".to_owned(),
                 (1, [one]) => format!("a number for {one} in the model file fixes the scale"),
-                (1, all) => format!("a number for one of {} in the model file fixes the scale", all.join(", ")),
+                (1, all) => format!(
+                    "a number for one of {} in the model file fixes the scale",
+                    all.join(", ")
+                ),
                 (n, all) => format!("{n} numbers in the model file are needed, of {}", all.join(", ")),
             };
             format!("Only ratios of {} can be known: {fix}.", names.join(", "))
@@ -147,7 +150,11 @@ impl ServoIdentification {
             count(self.parameters.len(), "base parameter", "base parameters"),
             count(self.samples, "sample", "samples")
         ))];
-        lines.extend(self.parameters.iter().map(|p| format!("  {} = {}", p.name, p.expression)));
+        lines.extend(
+            self.parameters
+                .iter()
+                .map(|p| format!("  {} = {}", p.name, p.expression)),
+        );
         lines.push(String::new());
         lines.extend(self.parameter_table());
         lines.push(String::new());
@@ -184,7 +191,9 @@ impl ServoIdentification {
                     p.name.clone(),
                     number(p.value),
                     p.std.map_or_else(String::new, |std| significant(std, 2)),
-                    p.std.filter(|_| p.value != 0.0).map_or_else(String::new, |std| percent(Some((std / p.value).abs()))),
+                    p.std
+                        .filter(|_| p.value != 0.0)
+                        .map_or_else(String::new, |std| percent(Some((std / p.value).abs()))),
                     match (p.status, &p.relative_to) {
                         (ServoStatus::Ratio, Some(reference)) => format!("times {reference}"),
                         (ServoStatus::Identified, _) => String::new(),

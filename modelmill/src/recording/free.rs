@@ -38,7 +38,12 @@ pub(super) fn complete(model: &Model, raw: &mut Raw) -> Outcome<Vec<RecordingNot
     add_shared_drive_forces(mechanism, raw)?;
     // A row without drive needs a force, which is zero.
     let mut zero = Vec::new();
-    for (row, drive) in mechanism.drives.iter().enumerate().filter(|(_, drive)| !drive.is_driven) {
+    for (row, drive) in mechanism
+        .drives
+        .iter()
+        .enumerate()
+        .filter(|(_, drive)| !drive.is_driven)
+    {
         // Actuators stand in the equations in place of forces, which are not read even if they were recorded.
         if mechanism.is_servo_row(row) || mechanism.is_signal_row(row) {
             raw.set_column(&drive.name, vec![0.0; raw.samples()]);

@@ -177,7 +177,10 @@ fn prepare(model: &Model, recording: &Raw, args: &RecordingOptions, delay: f64) 
     // Models with actuators may have recordings without forces, which few operations can use.
     let mechanism = &model.derivation.mechanism;
     let has_unused_actuators = !mechanism.actuators.is_empty() && mechanism.servo_forces.is_empty();
-    if let Some(first) = runs.first_mut().filter(|run| has_unused_actuators && run.force.is_none()) {
+    if let Some(first) = runs
+        .first_mut()
+        .filter(|run| has_unused_actuators && run.force.is_none())
+    {
         first.notes.push(RecordingNote::warning(message!(
             "{} has no forces; {} uses the actuators of the model in their place, but comparisons with measured forces are not \
              possible.",

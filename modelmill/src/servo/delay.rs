@@ -97,14 +97,21 @@ fn residuals(servo: &ServoModel, samples: &[UsedSamples], delay: f64) -> Outcome
                 let rows = one.regressor.chunks_exact(n).skip(place).step_by(body_rows.len());
                 table.extend(rows.filter(|row| row.iter().any(|x| *x != 0.0)));
             }
-            let used: Vec<usize> =
-                (0..n).filter(|k| *k != response && table.iter().any(|row| row[*k] != 0.0)).collect();
+            let used: Vec<usize> = (0..n)
+                .filter(|k| *k != response && table.iter().any(|row| row[*k] != 0.0))
+                .collect();
             let mut regression = LeastSquares::new(used.len().max(1));
             let pick = |row: &[f64]| -> Vec<f64> {
-                if used.is_empty() { vec![0.0] } else { used.iter().map(|k| row[*k]).collect() }
+                if used.is_empty() {
+                    vec![0.0]
+                } else {
+                    used.iter().map(|k| row[*k]).collect()
+                }
             };
             for row in &table {
-                regression.add_rows(&pick(row), &[-row[response]]).map_err(failed(servo))?;
+                regression
+                    .add_rows(&pick(row), &[-row[response]])
+                    .map_err(failed(servo))?;
             }
             let solution = RFactor::new(&regression)
                 .solve_near(&vec![0.0; used.len().max(1)])
@@ -118,7 +125,11 @@ fn residuals(servo: &ServoModel, samples: &[UsedSamples], delay: f64) -> Outcome
                 .collect();
             let squares: f64 = residual.iter().map(|e| e * e).sum();
             let products: f64 = residual.windows(2).map(|w| w[0] * w[1]).sum();
-            let lag = if squares > 0.0 { (products / squares).clamp(0.0, 0.999) } else { 0.0 };
+            let lag = if squares > 0.0 {
+                (products / squares).clamp(0.0, 0.999)
+            } else {
+                0.0
+            };
             Ok(ResidualLevel {
                 squares,
                 independent: (residual.len() as f64 * (1.0 - lag) / (1.0 + lag)).max(1.0),
@@ -139,8 +150,9 @@ fn response_column(servo: &ServoModel, drive: usize) -> usize {
     let mechanism = &model.derivation.mechanism;
     let forces = mechanism.servo_forces.iter().filter(|force| force.drive.0 == drive);
     let first = forces.flat_map(|force| &force.terms).next();
-    let wanted: Vec<(usize, u32)> =
-        first.map_or_else(Vec::new, |term| term.parameters.iter().map(|(p, n)| (p.0, *n)).collect());
+    let wanted: Vec<(usize, u32)> = first.map_or_else(Vec::new, |term| {
+        term.parameters.iter().map(|(p, n)| (p.0, *n)).collect()
+    });
     (0..model.base.len())
         .find(|k| model.products_of(*k).iter().any(|(product, _)| product.0 == wanted))
         .unwrap_or(0)
@@ -163,7 +175,11 @@ fn best_delay(drive: String, profile: &[ResidualLevel]) -> ServoDelay {
         value += 0.5 * (left - right) / (left + right).max(f64::MIN_POSITIVE);
         left + right
     } else {
-        let next = if best == 0 { fall(1.min(last)) } else { fall(last.saturating_sub(1)) };
+        let next = if best == 0 {
+            fall(1.min(last))
+        } else {
+            fall(last.saturating_sub(1))
+        };
         2.0 * next
     };
     let lower = (0..=best).rev().find(|k| fall(*k) > INTERVAL_FALL);

@@ -189,11 +189,18 @@ impl<'a> ServoSystem<'a> {
     fn new(servo: &'a ServoModel, segments: &[RecordingSegment]) -> Outcome<Self> {
         let model = &servo.equations;
         let most = MOST_SAMPLES / segments.len().max(1);
-        let samples = segments.iter().map(|one| UsedSamples::new(servo, one, most)).collect::<Outcome<_>>()?;
+        let samples = segments
+            .iter()
+            .map(|one| UsedSamples::new(servo, one, most))
+            .collect::<Outcome<_>>()?;
         let references = servo.scale.freedoms.iter().map(|freedom| (freedom.reference, 1.0));
-        let known = (0..model.base.len()).filter(|k| model.is_known(*k)).map(|k| (k, model.nominal[k]));
+        let known = (0..model.base.len())
+            .filter(|k| model.is_known(*k))
+            .map(|k| (k, model.nominal[k]));
         let fixed: Vec<(usize, f64)> = known.chain(references).collect();
-        let unknown = (0..model.base.len()).filter(|k| fixed.iter().all(|(one, _)| one != k)).collect();
+        let unknown = (0..model.base.len())
+            .filter(|k| fixed.iter().all(|(one, _)| one != k))
+            .collect();
         Ok(Self {
             servo,
             samples,
@@ -264,17 +271,28 @@ impl<'a> ServoSystem<'a> {
             let joined: Vec<f64> = (theirs.chunks_exact(n).zip(plain.chunks_exact(n)))
                 .flat_map(|(z, w)| z.iter().chain(w).copied())
                 .collect();
-            let found = estimate_with_instruments(n, weights.len(), |visit: &mut RowVisitor<'_>| visit(&joined, &right));
+            let found =
+                estimate_with_instruments(n, weights.len(), |visit: &mut RowVisitor<'_>| visit(&joined, &right));
             match found {
                 Ok(found) if found.strength >= INSTRUMENT_CORRELATION => {
                     let strength = found.strength;
-                    return Ok((found.solution, found.uncertainty, ServoEstimator::Instruments { strength }));
+                    return Ok((
+                        found.solution,
+                        found.uncertainty,
+                        ServoEstimator::Instruments { strength },
+                    ));
                 }
                 Ok(found) => {
-                    reason = format!("instruments from the commands are weak, with a correlation of {}", number(found.strength));
+                    reason = format!(
+                        "instruments from the commands are weak, with a correlation of {}",
+                        number(found.strength)
+                    );
                 }
                 Err(LeastSquaresError::WeakInstruments { correlation }) => {
-                    reason = format!("instruments from the commands are weak, with a correlation of {}", number(correlation));
+                    reason = format!(
+                        "instruments from the commands are weak, with a correlation of {}",
+                        number(correlation)
+                    );
                 }
                 Err(error) => return Err(failed(error)),
             }
@@ -285,20 +303,30 @@ impl<'a> ServoSystem<'a> {
             visit(&plain, &right)
         });
         let found = found.map_err(failed)?;
-        Ok((found.solution, found.uncertainty, ServoEstimator::LeastSquares { reason }))
+        Ok((
+            found.solution,
+            found.uncertainty,
+            ServoEstimator::LeastSquares { reason },
+        ))
     }
 
     /// Weighted columns of the unknowns.
     fn columns(&self, rows: &EquationRows, weights: &[f64]) -> Vec<f64> {
         let n = self.servo.equations.base.len();
         let weighted = rows.regressor.chunks_exact(n).zip(weights.iter().cycle());
-        weighted.flat_map(|(row, weight)| self.unknown.iter().map(move |k| weight * row[*k])).collect()
+        weighted
+            .flat_map(|(row, weight)| self.unknown.iter().map(move |k| weight * row[*k]))
+            .collect()
     }
 
     /// Weighted right-hand side: measured forces less the columns with fixed values.
     fn right_side(&self, rows: &EquationRows, weights: &[f64]) -> Vec<f64> {
         let n = self.servo.equations.base.len();
-        let all = rows.regressor.chunks_exact(n).zip(&rows.measured).zip(weights.iter().cycle());
+        let all = rows
+            .regressor
+            .chunks_exact(n)
+            .zip(&rows.measured)
+            .zip(weights.iter().cycle());
         all.map(|((row, y), weight)| weight * (y - self.fixed.iter().map(|(k, p)| row[*k] * p).sum::<f64>()))
             .collect()
     }
@@ -328,7 +356,10 @@ impl<'a> ServoSystem<'a> {
             let mut moved: Vec<f64> = delays.iter().map(|one| one.value).collect();
             moved[i] += delay.std;
             let other = self.solve(&moved)?;
-            for (slot, (a, b)) in variance.iter_mut().zip(other.solution.values.iter().zip(&solved.solution.values)) {
+            for (slot, (a, b)) in variance
+                .iter_mut()
+                .zip(other.solution.values.iter().zip(&solved.solution.values))
+            {
                 *slot += (a - b).powi(2);
             }
         }
@@ -341,7 +372,12 @@ impl<'a> ServoSystem<'a> {
         let infos = model.parameter_infos();
         (infos.iter().enumerate())
             .map(|(k, info)| {
-                let freedom = self.servo.scale.freedoms.iter().find(|freedom| freedom.base.contains(&k));
+                let freedom = self
+                    .servo
+                    .scale
+                    .freedoms
+                    .iter()
+                    .find(|freedom| freedom.base.contains(&k));
                 let at = self.unknown.iter().position(|one| *one == k);
                 let std = at.map(|at| solved.uncertainty.std[at].hypot(spread[at].sqrt()));
                 let status = match (at, freedom) {
@@ -352,7 +388,9 @@ impl<'a> ServoSystem<'a> {
                     (Some(_), Some(_)) => ServoStatus::Ratio,
                     (Some(_), None) => ServoStatus::Identified,
                 };
-                let reference = freedom.filter(|_| status == ServoStatus::Ratio).map(|freedom| &infos[freedom.reference]);
+                let reference = freedom
+                    .filter(|_| status == ServoStatus::Ratio)
+                    .map(|freedom| &infos[freedom.reference]);
                 ServoParameter {
                     name: info.name.clone(),
                     expression: info.expression.clone(),
@@ -382,7 +420,12 @@ impl<'a> ServoSystem<'a> {
             .map(|(place, d)| {
                 let gains = self.gain_columns(*d);
                 let (mut error, mut force, mut counted) = (0.0, 0.0, 0.0);
-                let own = rows.regressor.chunks_exact(n).zip(&rows.measured).skip(place).step_by(body_rows.len());
+                let own = rows
+                    .regressor
+                    .chunks_exact(n)
+                    .zip(&rows.measured)
+                    .skip(place)
+                    .step_by(body_rows.len());
                 for (row, y) in own.filter(|(row, y)| **y != 0.0 || row.iter().any(|x| *x != 0.0)) {
                     let total: f64 = row.iter().zip(base).map(|(x, p)| x * p).sum();
                     let actuated: f64 = gains.iter().map(|k| row[*k] * base[*k]).sum();
@@ -395,7 +438,11 @@ impl<'a> ServoSystem<'a> {
                     drive: mechanism.drives[*d].name.clone(),
                     error: rms(error),
                     force: rms(force),
-                    unit: if is_scaled { model.force_unit(*d).to_owned() } else { "relative".to_owned() },
+                    unit: if is_scaled {
+                        model.force_unit(*d).to_owned()
+                    } else {
+                        "relative".to_owned()
+                    },
                 }
             })
             .collect()
@@ -404,13 +451,23 @@ impl<'a> ServoSystem<'a> {
     /// Base parameters whose column contains the signal of the drive.
     fn gain_columns(&self, drive: usize) -> Vec<usize> {
         let model = &self.servo.equations;
-        let forces = model.derivation.mechanism.servo_forces.iter().filter(|force| force.drive.0 == drive);
+        let forces = model
+            .derivation
+            .mechanism
+            .servo_forces
+            .iter()
+            .filter(|force| force.drive.0 == drive);
         let products: Vec<Vec<(usize, u32)>> = forces
             .flat_map(|force| &force.terms)
             .map(|term| term.parameters.iter().map(|(p, n)| (p.0, *n)).collect())
             .collect();
         (0..model.base.len())
-            .filter(|k| model.products_of(*k).iter().any(|(product, _)| products.contains(&product.0)))
+            .filter(|k| {
+                model
+                    .products_of(*k)
+                    .iter()
+                    .any(|(product, _)| products.contains(&product.0))
+            })
             .collect()
     }
 }
@@ -424,12 +481,7 @@ impl EquationRows {
 }
 
 /// Notes on the result.
-fn remarks(
-    servo: &ServoModel,
-    unknown: &[usize],
-    solved: &ServoSolution,
-    delays: &[ServoDelay],
-) -> Vec<RecordingNote> {
+fn remarks(servo: &ServoModel, unknown: &[usize], solved: &ServoSolution, delays: &[ServoDelay]) -> Vec<RecordingNote> {
     let mut notes = Vec::new();
     for freedom in &servo.scale.freedoms {
         let base = &servo.equations.base;
@@ -453,7 +505,10 @@ fn remarks(
              of a position controller, or filter more strongly."
         )));
     }
-    let names: Vec<String> = unknown.iter().map(|k| servo.equations.base[*k].expression.clone()).collect();
+    let names: Vec<String> = unknown
+        .iter()
+        .map(|k| servo.equations.base[*k].expression.clone())
+        .collect();
     for direction in solved.solution.describe_undetermined(&names) {
         notes.push(RecordingNote::warning(message!(
             "The recording does not determine {direction}; record a motion that excites it."

@@ -38,7 +38,10 @@ pub(super) fn commanded_segment(servo: &ServoModel, segment: &RecordingSegment) 
         columns
     });
     let mut instruments = segment.clone();
-    let signals: Vec<usize> = actuators.iter().map(|actuator| servo.signal_position(actuator)).collect();
+    let signals: Vec<usize> = actuators
+        .iter()
+        .map(|actuator| servo.signal_position(actuator))
+        .collect();
     for i in (0..segment.run.q.len()).filter(|i| !signals.contains(i)) {
         let run = &segment.run;
         let fitted = fit_motion(&features, [&run.q[i], &run.qd[i], &run.qdd[i]])?;

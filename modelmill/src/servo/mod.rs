@@ -99,7 +99,9 @@ impl ServoModel {
     /// Rows of the regressor that belong to bodies; the others belong to signals and are zero.
     fn body_rows(&self) -> Vec<usize> {
         let mechanism = self.mechanism();
-        (0..mechanism.drives.len()).filter(|d| !mechanism.is_signal_row(*d)).collect()
+        (0..mechanism.drives.len())
+            .filter(|d| !mechanism.is_signal_row(*d))
+            .collect()
     }
 
     /// Position among the active coordinates of the signal of an actuator.

@@ -4,7 +4,7 @@ use modelmill_codegen::ModelEvaluator;
 use modelmill_spec::{ExactExpression, ExactFunction};
 
 use super::ServoModel;
-use super::thresholds::{LARGEST_DELAY, MOST_SAMPLES, STANDSTILL_SHARE};
+use super::thresholds::{LARGEST_DELAY, MOST_SAMPLES, REVERSAL_PERIODS, STANDSTILL_SHARE};
 use crate::along;
 use crate::error::Outcome;
 use crate::segment::RecordingSegment;
@@ -72,7 +72,9 @@ impl UsedSamples {
         let evaluator = ModelEvaluator::new(&model.derivation);
         let n_drives = model.drives().len();
         let states = segment.states(0, segment.samples());
-        let all = evaluator.regressor(&states).map_err(|fault| segment.pose_error(model, fault, 0))?;
+        let all = evaluator
+            .regressor(&states)
+            .map_err(|fault| segment.pose_error(model, fault, 0))?;
         let force = segment.run.force.as_deref().unwrap_or(&[]);
         let (mut regressor, mut measured) = (Vec::new(), Vec::new());
         for sample in 0..segment.samples() {
@@ -113,8 +115,7 @@ fn counting_samples(servo: &ServoModel, segment: &RecordingSegment) -> Outcome<V
     let run = &segment.run;
     let rates = along::drive_rates(&servo.equations, segment)?;
     let has_direction = has_direction(servo);
-    // Half a period of the cut-off is the width of what the filter mixes.
-    let width = run.prepared.cutoff_hz.map_or(0.0, |cutoff| 0.5 / cutoff);
+    let width = run.prepared.cutoff_hz.map_or(0.0, |cutoff| REVERSAL_PERIODS / cutoff);
     Ok(servo
         .body_rows()
         .into_iter()
@@ -134,7 +135,11 @@ fn counting_samples(servo: &ServoModel, segment: &RecordingSegment) -> Outcome<V
 /// The derivative of a column by the differences to its neighbours.
 fn slope(time: &[f64], column: &[f64], sample: usize) -> f64 {
     let (a, b) = (sample.saturating_sub(1), (sample + 1).min(column.len() - 1));
-    if a == b { 0.0 } else { (column[b] - column[a]) / (time[b] - time[a]) }
+    if a == b {
+        0.0
+    } else {
+        (column[b] - column[a]) / (time[b] - time[a])
+    }
 }
 
 /// Whether an effect depends on the direction of a motion.

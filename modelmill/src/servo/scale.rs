@@ -43,11 +43,15 @@ impl ServoScale {
         if unknown.is_empty() {
             return Ok(Self { freedoms: Vec::new() });
         }
-        let failed = |reason: String| Error::input(format!("{}: what can be known was not found: {reason}", model.path));
+        let failed =
+            |reason: String| Error::input(format!("{}: what can be known was not found: {reason}", model.path));
         let rows = consistent_rows(model, unknown.len()).map_err(failed)?;
         let null = null_space(&rows, &unknown).map_err(failed)?;
         Ok(Self {
-            freedoms: groups(&null, &unknown).into_iter().map(|group| freedom(model, group)).collect(),
+            freedoms: groups(&null, &unknown)
+                .into_iter()
+                .map(|group| freedom(model, group))
+                .collect(),
         })
     }
 
@@ -68,9 +72,17 @@ fn consistent_rows(model: &Model, n_unknown: usize) -> Result<DMatrix<f64>, Stri
     let mut random = RandomBits::new(0x7365_7276);
     // Known base parameters are 1 times numbers of the file; all others are random and not zero.
     let values: Vec<f64> = (0..model.base.len())
-        .map(|k| if model.is_known(k) { model.nominal[k] } else { 0.5 + random.below_one() })
+        .map(|k| {
+            if model.is_known(k) {
+                model.nominal[k]
+            } else {
+                0.5 + random.below_one()
+            }
+        })
         .collect();
-    let active: Vec<usize> = (0..mechanism.coordinates.len()).filter(|i| !mechanism.coordinates[*i].passive).collect();
+    let active: Vec<usize> = (0..mechanism.coordinates.len())
+        .filter(|i| !mechanism.coordinates[*i].passive)
+        .collect();
     // Every row is affine in its signal, so that two evaluations give the signal that obeys the equation.
     let evaluate = |at: Option<f64>, columns: &mut [Vec<Vec<f64>>; 4]| {
         for servo in &mechanism.servo_forces {
@@ -97,7 +109,10 @@ fn consistent_rows(model: &Model, n_unknown: usize) -> Result<DMatrix<f64>, Stri
             let sum = |of: &DMatrix<f64>| values.iter().enumerate().map(|(k, p)| p * of[(row, k)]).sum::<f64>();
             let slope = sum(&one) - sum(&zero);
             if slope == 0.0 {
-                return Err(format!("the signal of `{}` has no effect", mechanism.drives[servo.drive.0].name));
+                return Err(format!(
+                    "the signal of `{}` has no effect",
+                    mechanism.drives[servo.drive.0].name
+                ));
             }
             columns[0][signal][sample] = -sum(&zero) / slope;
         }
@@ -106,7 +121,9 @@ fn consistent_rows(model: &Model, n_unknown: usize) -> Result<DMatrix<f64>, Stri
     // Rows of coordinates that nothing drives hold only along motions that obey them, which these states do not.
     let is_used = |d: &usize| mechanism.is_servo_row(*d) || mechanism.drives[*d].is_driven;
     let used: Vec<usize> = (0..n_drives).filter(is_used).collect();
-    let rows: Vec<usize> = (0..wanted).flat_map(|s| used.iter().map(move |d| s * n_drives + d)).collect();
+    let rows: Vec<usize> = (0..wanted)
+        .flat_map(|s| used.iter().map(move |d| s * n_drives + d))
+        .collect();
     Ok(all.select_rows(&rows))
 }
 
@@ -126,7 +143,9 @@ fn null_space(rows: &DMatrix<f64>, unknown: &[usize]) -> Result<DMatrix<f64>, St
         .ok_or("the singular values do not converge")?;
     let directions = svd.v_t.ok_or("the singular vectors do not converge")?;
     let largest = svd.singular_values.max();
-    let open: Vec<usize> = (0..n).filter(|i| svd.singular_values[*i] <= NULL_SHARE * largest).collect();
+    let open: Vec<usize> = (0..n)
+        .filter(|i| svd.singular_values[*i] <= NULL_SHARE * largest)
+        .collect();
     Ok(DMatrix::from_fn(n, open.len(), |k, i| directions[(open[i], k)]))
 }
 
@@ -178,11 +197,19 @@ fn freedom(model: &Model, (base, open): (Vec<usize>, usize)) -> ScaleFreedom {
     let is_gain = |k: &usize| single(*k).is_some_and(|p| gains.contains(&p));
     let has_gain = |k: &usize| {
         let products = model.products_of(*k);
-        products.iter().any(|(product, _)| product.0.iter().any(|(p, _)| gains.contains(p)))
+        products
+            .iter()
+            .any(|(product, _)| product.0.iter().any(|(p, _)| gains.contains(p)))
     };
-    let reference = base.iter().find(|k| is_gain(k)).or_else(|| base.iter().find(|k| has_gain(k)));
+    let reference = base
+        .iter()
+        .find(|k| is_gain(k))
+        .or_else(|| base.iter().find(|k| has_gain(k)));
     // The numbers of effects cannot be written into a model file.
-    let fixed_by = base.iter().filter_map(|k| single(*k)).filter(|p| !of_effects.contains(p) || gains.contains(p));
+    let fixed_by = base
+        .iter()
+        .filter_map(|k| single(*k))
+        .filter(|p| !of_effects.contains(p) || gains.contains(p));
     ScaleFreedom {
         reference: reference.or(base.first()).copied().unwrap_or(0),
         open,

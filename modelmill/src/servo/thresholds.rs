@@ -18,6 +18,9 @@ pub(super) const INTERVAL_FALL: f64 = 3.84;
 /// Samples whose rate is below this share of the rms rate of the drive are left out: friction has no known direction
 /// there. By judgement.
 pub(super) const STANDSTILL_SHARE: f64 = 0.02;
+/// Samples nearer to a reversal than this many periods of the filter's cut-off are left out: the filter mixes both
+/// directions of the friction there. By judgement.
+pub(super) const REVERSAL_PERIODS: f64 = 1.0;
 /// Lags of the commands from which instruments are formed, s. A servo follows its command within some tenths of a
 /// second. By judgement.
 pub(super) const INSTRUMENT_LAGS: [f64; 8] = [0.0, 0.01, 0.02, 0.04, 0.08, 0.16, 0.24, 0.32];
