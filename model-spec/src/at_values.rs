@@ -55,6 +55,11 @@ impl Mechanism {
             coupling.offset = stands.exact(&coupling.offset);
         }
         stands.bodies(&mut at.parts, &mut at.lumped_masses);
+        let actuators = at.actuators.iter_mut().flat_map(|actuator| &mut actuator.terms);
+        let forces = at.servo_forces.iter_mut().flat_map(|force| &mut force.terms);
+        for term in actuators.chain(forces) {
+            term.factor = stands.exact(&term.factor);
+        }
         for effect in &mut at.effects {
             for term in &mut effect.terms {
                 term.expression = stands.exact(&term.expression);

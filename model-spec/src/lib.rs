@@ -3,6 +3,7 @@
 //! The way of a file: `document` (TOML with places) -> `merge` (variants) -> `schema` (tables of the format)
 //! -> `build` (names, units, shapes) -> `pose` (loops and drives at the nominal pose).
 
+mod actuators;
 mod additions;
 mod angle;
 mod at_values;
@@ -49,6 +50,7 @@ mod unit;
 mod values;
 mod words;
 
+pub use actuators::{ActuatorGain, ActuatorKind, ActuatorTerm, ModelActuator, ServoForce};
 pub use additions::{AddedEffect, ConstantValue};
 pub use column::{ColumnFault, ColumnQuantity, ColumnSum, read_column};
 pub use column_unit::{split_header_unit, unit_factor};

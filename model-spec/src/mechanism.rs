@@ -5,6 +5,7 @@
 
 use num_rational::BigRational;
 
+use crate::actuators::{ModelActuator, ServoForce};
 use crate::exact::{CoordinateIdx, ExactAngle, ExactExpression, ExactLength, ModelSymbol, ParameterIdx};
 use crate::joint_motion::CoordinateMotion;
 use crate::mechanics::Mechanics;
@@ -54,6 +55,11 @@ pub struct Mechanism {
     /// Drives of a mechanism with more drives than degrees of freedom, such as cables. Then none of [`Self::drives`]
     /// is driven, and these act on all of them by their transposed Jacobian, `J' f`.
     pub shared_drives: Vec<ModelDrive>,
+    /// Actuators, for recordings of commands, currents or voltages. They are not part of the equations, see
+    /// [`Mechanism::with_servo_equations`].
+    pub actuators: Vec<ModelActuator>,
+    /// Forces of actuators in the equations of motion; none unless [`Mechanism::with_servo_equations`] added them.
+    pub servo_forces: Vec<ServoForce>,
     /// Friction, drive inertia and the like.
     pub effects: Vec<ModelEffect>,
     /// Delay of the recorded forces relative to the motion, s; zero unless an effect defines it. Equations and code

@@ -14,7 +14,7 @@ const ALTERNATIVES: [&[&[&str]]; 3] = [
     &[&["joint"], &["linear"]],
 ];
 /// A field that each new entry of a list must have. An entry of a variant without it can only override another one.
-const REQUIRED_FIELDS: [(&str, &str); 8] = [
+const REQUIRED_FIELDS: [(&str, &str); 9] = [
     ("frame", "on"),
     ("point", "on"),
     ("part", "on"),
@@ -23,6 +23,7 @@ const REQUIRED_FIELDS: [(&str, &str); 8] = [
     ("effect", "kind"),
     ("effect_kind", "on"),
     ("drive", "name"),
+    ("actuator", "kind"),
 ];
 /// Keys that belong to one file and are not taken over.
 const OWN_KEYS: [&str; 4] = ["schema", "name", "extends", "remove"];

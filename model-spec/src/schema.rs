@@ -1,5 +1,6 @@
 //! The tables of a model file as types; readers and the JSON Schema for editors derive from them.
 
+use crate::actuators::ActuatorKind;
 use crate::formula::SourceFormula;
 use crate::kinds::{ActsOn, OtherMotion, Scale, Sign};
 use crate::mechanics::Mechanics;
@@ -46,6 +47,8 @@ record! {
         "loop" loops: optional EntryList<LoopEntry>,
         /// Drives, one per degree of freedom.
         "drive" drive: optional EntryList<DriveEntry>,
+        /// Actuators of drives, for recordings of commands, currents or voltages in place of forces.
+        "actuator" actuator: optional EntryList<ActuatorEntry>,
         /// Friction, drive inertia and the like.
         "effect" effect: optional EntryList<EffectEntry>,
         /// Libraries of further kinds of effects: TOML files of `[[effect_kind]]` tables, relative to this one.
@@ -345,6 +348,43 @@ record! {
         "from" from: required SpannedName,
         /// The other end.
         "to" to: required SpannedName,
+    }
+}
+
+record! {
+    /// What turns a command, a current or a voltage into the force of a drive. Gains are numbers or constants if they are
+    /// known, and parameters if they are to be estimated.
+    ActuatorEntry = "an actuator" {
+        /// Name, by which a variant can override it.
+        "name" name: optional SpannedName,
+        /// The drive whose force it makes.
+        "drive" drive: required SpannedName,
+        /// `position_servo`, `velocity_servo`, `current`, `voltage` or `duty`.
+        "kind" kind: required ActuatorKind,
+        /// Name of the recorded signal; that of the drive with `_command`, `_current`, `_voltage` or `_duty` if omitted.
+        "signal" signal: optional SpannedName,
+        /// Position gain of a `position_servo`, N m/rad or N/m.
+        "kp" kp: optional SourceFormula,
+        /// Damping of a `position_servo` by the rate of the joint, N m s/rad or N s/m.
+        "kd" kd: optional SourceFormula,
+        /// Gain of the error of the rate of a `position_servo` or `velocity_servo`, N m s/rad or N s/m.
+        "kv" kv: optional SourceFormula,
+        /// Torque of the motor per current, N m/A or N/A.
+        "torque_constant" torque_constant: optional SourceFormula,
+        /// Turns of the motor per turn of the joint, with its sign; 1 if omitted.
+        "ratio" ratio: optional SourceFormula,
+        /// Share of the motor's power that reaches the joint; 1 if omitted.
+        "efficiency" efficiency: optional SourceFormula,
+        /// Resistance of the winding, Ohm.
+        "resistance" resistance: optional SourceFormula,
+        /// Voltage per rate of the motor, V s/rad or V s/m; none if omitted.
+        "back_emf" back_emf: optional SourceFormula,
+        /// Voltage at a duty cycle of 1, V.
+        "supply" supply: optional SourceFormula,
+        /// Delay from the recorded signal to the force, s; estimated if omitted.
+        "delay" delay: optional SpannedNumber,
+        /// Remark.
+        "note" note: optional SpannedText,
     }
 }
 

@@ -59,6 +59,7 @@
 //! | [`Model::evaluate`] | forces along a recording |
 //! | [`Model::functions`] | forces, regressor, mass matrix and other functions at given states |
 //! | [`Model::identify`] | base parameters from recordings by least squares, eq. (12) |
+//! | [`Model::identify_servo`] | base parameters and gains from commands or currents, without forces |
 //! | [`Model::compare`] | error metrics (such as the NRMS), and the ranges of coordinates, rates, loads and time in which errors are large |
 //! | [`Model::diagnose`] | the physical effects that are missing |
 //! | [`Model::runs`] | changes between recordings of one machine |
@@ -178,7 +179,7 @@
 //! The modules are listed in the order of the data flow. Each module uses only modules before it.
 //!
 //! [`text`], [`error`], [`progress`], [`host`], [`model`], [`picture`], [`atlas`], [`segment`], [`along`], [`audit`],
-//! [`recording`], [`compare`], [`evaluate`], [`states`], [`identify`], [`runs`], [`diagnose`], [`add`], [`adopt`],
+//! [`recording`], [`compare`], [`evaluate`], [`states`], [`identify`], [`servo`], [`runs`], [`diagnose`], [`add`], [`adopt`],
 //! [`interpret`], [`excite`], [`variants`], [`generate`], [`simulate`], [`reduce`], [`mod@import`], [`mod@export`],
 //! [`mod@print`], [`report`].
 
@@ -212,6 +213,7 @@ mod regressors;
 pub mod report;
 pub mod runs;
 pub mod segment;
+pub mod servo;
 #[cfg(feature = "rig")]
 pub mod simulate;
 pub mod states;

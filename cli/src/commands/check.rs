@@ -23,11 +23,24 @@ pub(crate) fn run(host: &Host, args: &CheckArgs) -> CommandOutcome {
     };
     let picture = args.drawing.target(model.files())?;
     let checked = model.check()?;
+    let servo = if model.actuators().is_empty() {
+        None
+    } else {
+        Some(model.servo_model()?)
+    };
     if let Some(target) = &picture {
         args.drawing.draw(target, &model, None)?;
     }
     if args.json {
-        return terminal::print_json(&checked.json(&FlagSpelling));
+        let mut object = checked.json(&FlagSpelling);
+        if let Some(servo) = &servo {
+            object["servo"] = servo.json();
+        }
+        return terminal::print_json(&object);
     }
-    terminal::print(&checked.text(terminal::style()))
+    terminal::print(&checked.text(terminal::style()))?;
+    match servo {
+        Some(servo) => terminal::print(&servo.text(terminal::style())),
+        None => Ok(()),
+    }
 }

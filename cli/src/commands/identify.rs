@@ -2,9 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use modelmill::Host;
 use modelmill::identify::Instruments;
 use modelmill::recording::{PreparedRecording, RecordingOptions, StandstillRule};
+use modelmill::servo::{ServoIdentification, ServoModel};
+use modelmill::{Host, Model};
 
 use crate::args::IdentifyArgs;
 use crate::failure::{CommandFailure, CommandOutcome};
@@ -31,6 +32,19 @@ pub(crate) fn run(host: &Host, args: &IdentifyArgs) -> CommandOutcome {
     // A bound of the user belongs to the estimator, which applies it to the equations of the fit only.
     if standstill.is_some() {
         reading.standstill = StandstillRule::KeepAll;
+    }
+    if !model.actuators().is_empty()
+        && let Some(found) = identify_from_signals(&model, args, &reading)?
+    {
+        let object = found.json(&FlagSpelling);
+        if let Some(target) = &target {
+            target.write(&format!("{object:#}\n"))?;
+        }
+        return if args.json {
+            terminal::print_json(&object)
+        } else {
+            terminal::print(&found.text(terminal::style()))
+        };
     }
     let [data, check] = commands::recordings(&model, [&args.data, &args.check], &reading)?;
     // The options of the estimator are separate from those for reading.
@@ -73,6 +87,29 @@ pub(crate) fn run(host: &Host, args: &IdentifyArgs) -> CommandOutcome {
         ));
     }
     Ok(())
+}
+
+/// Estimates a model with actuators from commands, currents or voltages; `None` if the recordings have forces and lack
+/// these signals.
+fn identify_from_signals(
+    model: &Model,
+    args: &IdentifyArgs,
+    reading: &RecordingOptions,
+) -> CommandOutcome<Option<ServoIdentification>> {
+    let servo = model.servo_model()?;
+    let reading = ServoModel::reading(reading);
+    let read = commands::recordings(&servo.equations, [&args.data, &args.check], &reading);
+    let [data, check] = match read {
+        Ok(read) => read,
+        // Without the signals, forces may do; the first error names the missing signals.
+        Err(error) => {
+            let has_forces = commands::recordings(model, [&args.data, &args.check], &reading)
+                .is_ok_and(|[data, _]| data.iter().all(PreparedRecording::has_forces));
+            return if has_forces { Ok(None) } else { Err(error) };
+        }
+    };
+    let [data, check] = [&data, &check].map(|all| all.iter().collect::<Vec<_>>());
+    Ok(Some(servo.identify(&data, &check)?))
 }
 
 /// The period in s of `--instruments period=SECONDS`; none if the instruments are recordings.

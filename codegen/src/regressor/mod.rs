@@ -7,7 +7,10 @@ pub(crate) mod projection;
 
 use std::collections::BTreeSet;
 
-use modelmill_spec::{CoordinateIdx, DriveKind, EffectPlace, EffectTerm, Mechanism, ModelEffect, PlaceQuantity};
+use modelmill_spec::{
+    ActuatorTerm, CoordinateIdx, DriveKind, EffectPlace, EffectTerm, ExactExpression, Mechanism, ModelEffect,
+    PlaceQuantity,
+};
 
 use crate::DeriveError;
 use crate::expr::{Atom, ExprId, Graph};
@@ -79,6 +82,13 @@ pub(crate) fn unreduced_equations(graph: &mut Graph, mechanism: &Mechanism) -> R
                 .map(|term| ParameterMonomial(vec![(term.parameter.0, 1)])),
         );
     }
+    products.extend(
+        mechanism
+            .servo_forces
+            .iter()
+            .flat_map(|force| &force.terms)
+            .map(servo_product),
+    );
     let products: Vec<ParameterMonomial> = products.into_iter().collect();
     let mut equations = UnreducedEquations {
         tree,
@@ -189,6 +199,7 @@ impl UnreducedEquations {
         // Sums over all effects.
         let mut on_tree = vec![Graph::ZERO; mechanism.coordinates.len()];
         let mut on_drives = vec![Graph::ZERO; mechanism.drives.len()];
+        let value_of = value;
         let value = |term: &EffectTerm| value(&ParameterMonomial(vec![(term.parameter.0, 1)]));
         for (effect, of_mechanics) in mechanism.effects.iter().zip(&self.of_mechanics) {
             // Effects with mechanics act on the tree by their generalised forces.
@@ -226,7 +237,32 @@ impl UnreducedEquations {
                 }
             }
         }
+        self.add_servo_forces(graph, mechanism, value_of, &mut on_drives)?;
         Ok(EffectForces { on_tree, on_drives })
+    }
+
+    /// Adds the forces of actuators to those along the drives.
+    fn add_servo_forces(
+        &self,
+        graph: &mut Graph,
+        mechanism: &Mechanism,
+        value: &dyn Fn(&ParameterMonomial) -> ExprId,
+        on_drives: &mut [ExprId],
+    ) -> Result<(), DeriveError> {
+        for servo in &mechanism.servo_forces {
+            let (place, signal) = (EffectPlace::Drive(servo.drive), EffectPlace::Coordinate(servo.signal));
+            for term in &servo.terms {
+                let value = value(&servo_product(term));
+                if value == Graph::ZERO {
+                    continue;
+                }
+                let factor = self.place_factor(graph, mechanism, place, Some(signal), &term.factor)?;
+                let force = graph.mul(factor, value);
+                let slot = &mut on_drives[servo.drive.0];
+                *slot = graph.add(*slot, force);
+            }
+        }
+        Ok(())
     }
 
     /// The factor of an effect's parameter at one of its places: the term's expression with the quantities of the
@@ -245,11 +281,23 @@ impl UnreducedEquations {
             [_, _] => Some(effect.places[1 - at]),
             _ => effect.other,
         };
+        self.place_factor(graph, mechanism, place, other, &term.expression)
+    }
+
+    /// The value of an expression in the quantities of a place and of another one.
+    fn place_factor(
+        &self,
+        graph: &mut Graph,
+        mechanism: &Mechanism,
+        place: EffectPlace,
+        other: Option<EffectPlace>,
+        expression: &ExactExpression,
+    ) -> Result<ExprId, DeriveError> {
         // Quantities of the place and of the other place.
         let here = self.quantities(graph, place);
         let there = other.map_or([None; 4], |other| self.quantities(graph, other));
         // An angle is inserted as a coordinate, so that its sine is that of the joint.
-        let mut expression = term.expression.clone();
+        let mut expression = expression.clone();
         let named = [
             (Some(place), PlaceQuantity::Coordinate),
             (other, PlaceQuantity::OtherCoordinate),
@@ -290,6 +338,11 @@ impl UnreducedEquations {
             EffectPlace::Point(_) | EffectPlace::Part(_) | EffectPlace::Base | EffectPlace::Force => [None; 4],
         }
     }
+}
+
+/// The product of gains of a term of an actuator's force.
+fn servo_product(term: &ActuatorTerm) -> ParameterMonomial {
+    ParameterMonomial(term.parameters.iter().map(|(p, power)| (p.0, *power)).collect())
 }
 
 /// The angle of a revolute joint at a place; `None` for all other places.

@@ -11,6 +11,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::actuators::ModelActuator;
 use crate::build::MechanismSpans;
 use crate::build::bodies::check_unique;
 use crate::build::frames::{FrameTree, PointTable, duplicate_name};
@@ -366,6 +367,7 @@ pub(super) fn recording(
     model: &ModelEntry,
     symbols: &SymbolTable,
     drives: &DriveRows,
+    actuators: &[ModelActuator],
     log: &mut DiagnosticLog,
 ) -> Vec<(String, String)> {
     let Some(columns) = model.recording.as_ref().and_then(|entry| entry.columns.as_ref()) else {
@@ -384,6 +386,11 @@ pub(super) fn recording(
     // Drives have a column for the force and one for its variance.
     for drive in drives.rows.iter().chain(&drives.shared) {
         known.extend([drive.name.clone(), format!("{}_var", drive.name)]);
+    }
+    // Signals of actuators have columns, which may have derivatives too.
+    for actuator in actuators {
+        let name = &actuator.signal;
+        known.extend([name.clone(), format!("{name}_d"), format!("{name}_dd")]);
     }
     let mut pairs: Vec<(String, String)> = Vec::new();
     // Unknown names of the model are left out, so that nothing is mapped to them.

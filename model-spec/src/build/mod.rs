@@ -4,6 +4,7 @@
 //! definition counts as known, so that one fault is reported once.
 
 mod actuation;
+mod actuators;
 mod bodies;
 mod couplings;
 pub(crate) mod effect_places;
@@ -71,6 +72,7 @@ pub(crate) fn build(
     let loops = actuation::loops(model, &points, &mut places, log);
     free::check_loops(&tree, &loops, &points, &places, log);
     let drives = actuation::drives(model, &symbols, &tree, &points, &mut places, log);
+    let actuators = actuators::actuators(model, &symbols, &drives, log);
     // Effects come after drives, points and parts, on which they act.
     let own_kinds = model.effect_kind.iter().flat_map(|list| &list.entries);
     let own_kinds: Vec<&EffectKindEntry> = libraries.iter().chain(own_kinds).collect();
@@ -86,7 +88,7 @@ pub(crate) fn build(
     let retain = retain::retain(model, &symbols, log);
     let limits = limits::limits(model, &symbols.coordinates, &drives.rows, &points.points, log);
     let identified_base = identified::read_identified(model, &mut symbols, log);
-    let columns = actuation::recording(model, &symbols, &drives, log);
+    let columns = actuation::recording(model, &symbols, &drives, &actuators, log);
     let torque = actuation::torque(model, &drives, log);
     actuation::check_place_names(model, log);
     // With errors, unused names are often a consequence.
@@ -116,6 +118,8 @@ pub(crate) fn build(
         couplings,
         drives: drives.rows,
         shared_drives: drives.shared,
+        actuators,
+        servo_forces: Vec::new(),
         effects,
         force_delay,
         identified_base,

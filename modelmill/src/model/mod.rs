@@ -31,6 +31,7 @@ pub use equations::EquationsText;
 pub use modelmill_codegen::review::PageFormat;
 pub use modelmill_spec::LoadedModel;
 pub use sampled_rank::SampledRank;
+pub(crate) use sampled_rank::reachable_states;
 pub use summary::{ModelCheck, ModelSummary};
 pub use values::BaseParameterValues;
 

@@ -256,6 +256,16 @@ fn stack_rows(parts: &[DMatrix<f64>]) -> DMatrix<f64> {
     DMatrix::from_rows(&rows)
 }
 
+/// Positions, rates, accelerations and loads of random states that the mechanism can reach, each as columns of samples.
+///
+/// Fails when too few poses can be reached; the error is the reason as text.
+pub(crate) fn reachable_states(model: &Model, wanted: usize) -> Result<[Vec<Vec<f64>>; 4], String> {
+    let evaluator = ModelEvaluator::new(&model.derivation);
+    let mut sampling = StateSampling::new(model, model.derivation.mechanism.drives.len());
+    sampling.draw(&evaluator, wanted)?;
+    Ok(sampling.columns)
+}
+
 /// An active coordinate and how far it goes.
 struct SampledCoordinate {
     /// Nominal value, rad or m.

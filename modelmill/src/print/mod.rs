@@ -17,6 +17,7 @@ mod proposal;
 #[cfg(feature = "import")]
 mod reduction;
 pub(crate) mod runs;
+mod servo;
 mod spelling;
 mod summary;
 pub mod tables;

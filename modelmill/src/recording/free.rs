@@ -38,8 +38,16 @@ pub(super) fn complete(model: &Model, raw: &mut Raw) -> Outcome<Vec<RecordingNot
     add_shared_drive_forces(mechanism, raw)?;
     // A row without drive needs a force, which is zero.
     let mut zero = Vec::new();
-    for drive in mechanism.drives.iter().filter(|drive| !drive.is_driven) {
-        if !raw.has_column(&drive.name) && mechanism.shared_drives.is_empty() {
+    for (row, drive) in mechanism
+        .drives
+        .iter()
+        .enumerate()
+        .filter(|(_, drive)| !drive.is_driven)
+    {
+        // Actuators stand in the equations in place of forces, which are not read even if they were recorded.
+        if mechanism.is_servo_row(row) || mechanism.is_signal_row(row) {
+            raw.set_column(&drive.name, vec![0.0; raw.samples()]);
+        } else if !raw.has_column(&drive.name) && mechanism.shared_drives.is_empty() {
             raw.set_column(&drive.name, vec![0.0; raw.samples()]);
             zero.push(format!("`{}`", drive.name));
         }

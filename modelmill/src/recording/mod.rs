@@ -21,7 +21,7 @@ use std::sync::Arc;
 
 use modelmill_boundary::files::MemoryFiles;
 use modelmill_boundary::message;
-use modelmill_boundary::text::{Message, OptionName, OptionSetting, Remedy};
+use modelmill_boundary::text::{CommandName, Message, OptionName, OptionSetting, Remedy};
 use modelmill_identify::diagnose::Disturbance;
 use modelmill_identify::{RecordingFiles, RecordingNote, SignalRecording as Raw};
 
@@ -173,6 +173,20 @@ fn prepare(model: &Model, recording: &Raw, args: &RecordingOptions, delay: f64) 
         first.notes.splice(0..0, suspicions);
         let oddities = recording.signal_notes(&model.active_coordinate_types(), &model.drives());
         first.notes.splice(0..0, oddities);
+    }
+    // Models with actuators may have recordings without forces, which few operations can use.
+    let mechanism = &model.derivation.mechanism;
+    let has_unused_actuators = !mechanism.actuators.is_empty() && mechanism.servo_forces.is_empty();
+    if let Some(first) = runs
+        .first_mut()
+        .filter(|run| has_unused_actuators && run.force.is_none())
+    {
+        first.notes.push(RecordingNote::warning(message!(
+            "{} has no forces; {} uses the actuators of the model in their place, but comparisons with measured forces are not \
+             possible.",
+            first.file,
+            Remedy::command(CommandName::Identify)
+        )));
     }
     // Remedies for angles in degrees are kept, in case the audit finds such angles.
     let coordinates = model.active_coordinate_types();
@@ -430,6 +444,11 @@ impl Model {
 }
 
 impl PreparedRecording {
+    /// Whether the forces of all drives were recorded.
+    pub fn has_forces(&self) -> bool {
+        self.segments.iter().all(|segment| segment.run.force.is_some())
+    }
+
     /// Prepares a raw recording; unless it is `unexamined`, open choices are made and the audit runs.
     fn new(model: &Model, raw: Raw, reading: &RecordingOptions) -> Outcome<Self> {
         let file = raw.file().to_owned();

@@ -10,6 +10,7 @@ mod missing;
 mod run_plans;
 mod runs;
 mod runs_verdict;
+mod servo;
 mod spoilt;
 mod stick;
 mod together;

@@ -80,6 +80,8 @@ impl Draft {
                 couplings: Vec::new(),
                 drives: Vec::new(),
                 shared_drives: Vec::new(),
+                actuators: Vec::new(),
+                servo_forces: Vec::new(),
                 effects: Vec::new(),
                 force_delay: 0.0,
                 identified_base: Vec::new(),

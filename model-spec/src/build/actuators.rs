@@ -1,0 +1,194 @@
+//! Actuators of a file.
+//!
+//! The table `actuator` goes in; actuators with their signals and terms come out.
+
+use std::collections::BTreeMap;
+
+use crate::actuators::{ActuatorGain, GainEntry, ModelActuator};
+use crate::build::actuation::DriveRows;
+use crate::build::symbols::SymbolTable;
+use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
+use crate::joint_motion::CoordinateMotion;
+use crate::mechanism::{DriveIdx, DriveKind};
+use crate::schema::{ActuatorEntry, ModelEntry};
+use crate::scope::{FormulaRequirement, SymbolSort};
+use crate::suggest;
+use crate::values::SpannedName;
+
+/// Reads the actuators; a faulty one is reported and left out.
+pub(super) fn actuators(
+    model: &ModelEntry,
+    symbols: &SymbolTable,
+    drives: &DriveRows,
+    log: &mut DiagnosticLog,
+) -> Vec<ModelActuator> {
+    let entries = model.actuator.iter().flat_map(|list| &list.entries);
+    let mut seen: BTreeMap<usize, SourceSpan> = BTreeMap::new();
+    let mut actuators: Vec<ModelActuator> = Vec::new();
+    for entry in entries {
+        let Some(drive) = find_drive(entry, drives, log) else {
+            continue;
+        };
+        let span = entry.drive.as_ref().map_or(entry.span, |name| name.span);
+        if let Some(first) = seen.insert(drive.0, span) {
+            log.push(
+                Diagnostic::error(span, "this drive has two actuators")
+                    .label("the second one")
+                    .related(first, "the first one")
+                    .help("put both into one actuator"),
+            );
+            continue;
+        }
+        actuators.extend(actuator(entry, drive, symbols, drives, log));
+    }
+    check_signals(model, &actuators, symbols, drives, log);
+    actuators
+}
+
+/// The drive of an actuator.
+fn find_drive(entry: &ActuatorEntry, drives: &DriveRows, log: &mut DiagnosticLog) -> Option<DriveIdx> {
+    let name = entry.drive.as_ref()?;
+    let found = drives.rows.iter().position(|d| d.is_driven && d.name == name.text);
+    if found.is_none() {
+        let is_shared = drives.shared.iter().any(|d| d.name == name.text);
+        let names = drives.rows.iter().filter(|d| d.is_driven).map(|d| d.name.as_str());
+        log.push(if is_shared {
+            Diagnostic::error(name.span, format!("`{}` shares its row with other drives", name.text))
+                .label("an actuator needs a drive with an equation of motion of its own")
+                .help("record the force of this drive, and delete the actuator")
+        } else {
+            Diagnostic::error(name.span, format!("there is no drive `{}`", name.text))
+                .label("expected the name of a `[[drive]]`")
+                .help(suggest::advice(&name.text, "drives", names))
+        });
+    }
+    found.map(DriveIdx)
+}
+
+/// Reads one actuator; `None` after a fault, which is reported.
+fn actuator(
+    entry: &ActuatorEntry,
+    drive: DriveIdx,
+    symbols: &SymbolTable,
+    drives: &DriveRows,
+    log: &mut DiagnosticLog,
+) -> Option<ModelActuator> {
+    let kind = entry.kind?;
+    let before = log.n_errors();
+    let row = &drives.rows[drive.0];
+    let load = row.kind.place_load(&symbols.coordinates);
+    let known = kind.entry().gains();
+    // A gain of another kind would be ignored without a word.
+    for key in GainEntry::KEYS {
+        if let Some(formula) = GainEntry::formula(key, entry)
+            && !known.iter().any(|one| one.key == key)
+        {
+            let keys: Vec<&str> = known.iter().map(|one| one.key).collect();
+            log.push(
+                Diagnostic::error(formula.ast.span, format!("`{}` has no `{key}`", kind.name()))
+                    .label(format!("expected one of {}", keys.join(", ")))
+                    .help(format!("its force is {}", kind.formula())),
+            );
+        }
+    }
+    let mut gains: BTreeMap<&str, ActuatorGain> = BTreeMap::new();
+    for one in known {
+        let Some(formula) = GainEntry::formula(one.key, entry) else {
+            if one.is_required && !entry.faulty {
+                log.push(
+                    Diagnostic::error(entry.span, format!("`{}` needs `{}`", kind.name(), one.key))
+                        .label(format!("its force is {}", kind.formula()))
+                        .help(if one.may_be_unknown {
+                            "give a number if it is known, otherwise the name of a parameter of [parameters]"
+                        } else {
+                            "give a number or a constant; where it is unknown, give 1: the other gains then include it"
+                        }),
+                );
+            }
+            continue;
+        };
+        let sorts: &[SymbolSort] = if one.may_be_unknown {
+            &[SymbolSort::Constant, SymbolSort::Parameter]
+        } else {
+            &[SymbolSort::Constant]
+        };
+        let what = format!("`{}`", one.key);
+        let wanted = FormulaRequirement {
+            sorts,
+            dimension: one.dimension(load),
+            what: &what,
+        };
+        let Some(exact) = symbols.scope.resolve(&formula, wanted, log) else {
+            continue;
+        };
+        match ActuatorGain::from_expression(&exact) {
+            Some(gain) => {
+                gains.insert(one.key, gain);
+            }
+            None => log.push(
+                Diagnostic::error(formula.ast.span, format!("`{}` is no product", one.key))
+                    .label("expected a number, an expression in constants, or a parameter times such")
+                    .help("declare one parameter for the complete gain"),
+            ),
+        }
+    }
+    let delay = entry.delay.as_ref().map(|number| number.value);
+    if let Some(number) = entry.delay.as_ref().filter(|number| number.value < 0.0) {
+        log.push(Diagnostic::error(number.span, "this delay is negative").label("expected seconds, 0 or more"));
+    }
+    let motion = match row.kind {
+        DriveKind::Joint(i) if kind.entry().is_position() => symbols.coordinates[i.0].motion,
+        _ => CoordinateMotion::Prismatic,
+    };
+    let signal = entry.signal.as_ref();
+    (log.n_errors() == before).then(|| ModelActuator {
+        drive,
+        kind,
+        signal: signal.map_or_else(|| format!("{}_{}", row.name, kind.signal()), |name| name.text.clone()),
+        motion,
+        terms: kind.entry().terms(&|key| gains.get(key).cloned()),
+        delay,
+    })
+}
+
+/// Reports signals with the name of another column, which would be read from the same place of a recording.
+fn check_signals(
+    model: &ModelEntry,
+    actuators: &[ModelActuator],
+    symbols: &SymbolTable,
+    drives: &DriveRows,
+    log: &mut DiagnosticLog,
+) {
+    let entries = model.actuator.iter().flat_map(|list| &list.entries);
+    let spans: Vec<(&SpannedName, SourceSpan)> = entries
+        .filter_map(|entry| {
+            let drive = entry.drive.as_ref()?;
+            Some((drive, entry.signal.as_ref().map_or(drive.span, |name| name.span)))
+        })
+        .collect();
+    for (k, actuator) in actuators.iter().enumerate() {
+        let name = &actuator.signal;
+        let is_coordinate = symbols.coordinates.iter().any(|c| {
+            let stem = name
+                .strip_suffix("_dd")
+                .or_else(|| name.strip_suffix("_d"))
+                .unwrap_or(name);
+            c.name == *name || c.name == stem
+        });
+        let is_drive = drives.rows.iter().any(|d| d.name == *name);
+        let is_taken = actuators[..k].iter().any(|other| other.signal == *name);
+        if !(is_coordinate || is_drive || is_taken || name == "t") {
+            continue;
+        }
+        let drive = &drives.rows[actuator.drive.0].name;
+        let span = spans.iter().find(|(one, _)| one.text == *drive).map(|(_, span)| *span);
+        log.push(
+            Diagnostic::error(
+                span.unwrap_or(model.span),
+                format!("`{name}` cannot name the signal of `{drive}`"),
+            )
+            .label("recordings have another column of this name")
+            .help("choose another `signal`, and name the column of the file in [recording.columns]"),
+        );
+    }
+}

@@ -1,0 +1,525 @@
+//! Base parameters and gains from servo logs: `[H, -S] p = 0` with known columns on the right-hand side, by
+//! instrumental variables where a command is recorded, otherwise by least squares.
+//!
+//! Decision: without a known number in a group of parameters, the reference of the group is set to 1 and the values of
+//! the others are ratios to it. A solution of unit norm would depend on the choice of units.
+
+use modelmill_boundary::message;
+use modelmill_identify::estimate::{EstimateOptions, RowVisitor, estimate, estimate_with_instruments};
+use modelmill_identify::{LeastSquaresError, ParameterUncertainty, RecordingNote, RegressionSolution};
+
+use super::ServoModel;
+use super::delay::{ServoDelay, delays};
+use super::instruments::commanded_segment;
+use super::rows::{EquationRows, UsedSamples};
+use super::scale::ServoScale;
+use super::thresholds::{INSTRUMENT_CORRELATION, MOST_SAMPLES};
+use crate::error::{Error, Outcome};
+use crate::recording::PreparedRecording;
+use crate::segment::RecordingSegment;
+use crate::text::table::{count, number};
+
+/// The estimator that was used.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ServoEstimator {
+    /// Instrumental variables from the commands.
+    Instruments {
+        /// Smallest canonical correlation between instruments and regressor, 0 to 1.
+        strength: f64,
+    },
+    /// Least squares, with the reason.
+    LeastSquares {
+        /// Why there are no instruments.
+        reason: String,
+    },
+}
+
+/// What an estimated value means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ServoStatus {
+    /// The value itself.
+    Identified,
+    /// A ratio to the reference of its group.
+    Ratio,
+    /// The reference of a group: 1, because only ratios can be known.
+    Reference,
+    /// A number of the model file.
+    Known,
+    /// The recording does not determine it.
+    Undetermined,
+}
+
+/// A base parameter from a servo log.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ServoParameter {
+    /// Its name.
+    pub name: String,
+    /// Its expression in parameters and gains.
+    pub expression: String,
+    /// Its unit; of a ratio, that of the quotient.
+    pub unit: String,
+    /// The value.
+    pub value: f64,
+    /// Standard deviation, with autocorrelation and the uncertainty of delays; `None` if the value is not estimated.
+    pub std: Option<f64>,
+    /// What the value means.
+    pub status: ServoStatus,
+    /// Expression of the reference of a ratio.
+    pub relative_to: Option<String>,
+}
+
+/// The balance of one drive.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ServoRowError {
+    /// Name of the drive.
+    pub drive: String,
+    /// Rms value of the part that the model does not explain, in `unit`.
+    pub error: f64,
+    /// Rms value of the force of the actuator, or the measured one.
+    pub force: f64,
+    /// N or N m; relative to the reference where only ratios are known.
+    pub unit: String,
+}
+
+/// An identification from servo logs.
+#[derive(Clone, Debug)]
+pub struct ServoIdentification {
+    /// Name of the model.
+    pub model: String,
+    /// Number of samples.
+    pub samples: usize,
+    /// The estimator that was used.
+    pub estimator: ServoEstimator,
+    /// The base parameters, in the order of the model.
+    pub parameters: Vec<ServoParameter>,
+    /// Condition number after scaling the columns to equal norm.
+    pub scaled_condition_number: Option<f64>,
+    /// Delays of the actuators.
+    pub delays: Vec<ServoDelay>,
+    /// Errors of the drives on the recordings of the fit.
+    pub fit: Vec<ServoRowError>,
+    /// Errors of the drives on validation runs; empty without any.
+    pub check: Vec<ServoRowError>,
+    /// What can be known.
+    pub scale: ServoScale,
+    /// Notes on the result.
+    pub notes: Vec<RecordingNote>,
+}
+
+impl ServoModel {
+    /// Identifies base parameters and gains from recordings that were prepared for [`ServoModel::equations`], and
+    /// validates them with those of `check`.
+    ///
+    /// Fails when the recordings are too short or do not determine any parameter, or when a pose has no solution.
+    pub fn identify(&self, fit: &[&PreparedRecording], check: &[&PreparedRecording]) -> Outcome<ServoIdentification> {
+        let segments = |all: &[&PreparedRecording]| -> Vec<RecordingSegment> {
+            all.iter().flat_map(|one| one.segments.clone()).collect()
+        };
+        let (fit, check) = (segments(fit), segments(check));
+        self.check_length(&fit)?;
+        let delays = delays(self, &fit)?;
+        let values: Vec<f64> = delays.iter().map(|delay| delay.value).collect();
+        let system = ServoSystem::new(self, &fit)?;
+        let solved = system.solve(&values)?;
+        let spread = system.delay_spread(&delays, &solved)?;
+        let base = system.base_values(&solved);
+        let checked = if check.is_empty() {
+            Vec::new()
+        } else {
+            let system = ServoSystem::new(self, &check)?;
+            system.row_errors(&system.equations(&values)?.0, &base)
+        };
+        let mut notes = remarks(self, &system.unknown, &solved, &delays);
+        for note in &notes {
+            self.equations.host().note(note);
+        }
+        notes.extend(fit.iter().flat_map(|one| one.run.notes.iter().cloned()));
+        Ok(ServoIdentification {
+            model: self.equations.name.clone(),
+            samples: system.samples.iter().map(|one| one.segment.samples()).sum(),
+            parameters: system.parameters(&solved, &spread, &base),
+            scaled_condition_number: Some(solved.solution.scaled_condition_number).filter(|c| c.is_finite()),
+            fit: system.row_errors(&solved.equations, &base),
+            check: checked,
+            estimator: solved.estimator,
+            delays,
+            scale: self.scale.clone(),
+            notes,
+        })
+    }
+
+    /// Fails unless there are several equations for each unknown.
+    fn check_length(&self, fit: &[RecordingSegment]) -> Outcome {
+        let samples: usize = fit.iter().map(RecordingSegment::samples).sum();
+        let unknown = self.equations.base.len();
+        if samples > 4 * unknown {
+            return Ok(());
+        }
+        Err(Error::input(format!(
+            "{} are too few for {}; use a longer recording",
+            count(samples, "sample", "samples"),
+            count(unknown, "base parameter", "base parameters")
+        )))
+    }
+}
+
+/// The system of equations of some recordings.
+struct ServoSystem<'a> {
+    /// The model.
+    servo: &'a ServoModel,
+    /// The samples that are used, by segment.
+    samples: Vec<UsedSamples>,
+    /// Estimated base parameters.
+    unknown: Vec<usize>,
+    /// Base parameters with a value that is not estimated: numbers of the file, and references of groups.
+    fixed: Vec<(usize, f64)>,
+}
+
+/// A solution with its equations.
+struct ServoSolution {
+    solution: RegressionSolution,
+    uncertainty: ParameterUncertainty,
+    estimator: ServoEstimator,
+    /// The equations of the recordings, all segments after one another.
+    equations: EquationRows,
+}
+
+impl<'a> ServoSystem<'a> {
+    /// Selects samples and unknowns.
+    fn new(servo: &'a ServoModel, segments: &[RecordingSegment]) -> Outcome<Self> {
+        let model = &servo.equations;
+        let most = MOST_SAMPLES / segments.len().max(1);
+        let samples = segments
+            .iter()
+            .map(|one| UsedSamples::new(servo, one, most))
+            .collect::<Outcome<_>>()?;
+        let references = servo.scale.freedoms.iter().map(|freedom| (freedom.reference, 1.0));
+        let known = (0..model.base.len())
+            .filter(|k| model.is_known(*k))
+            .map(|k| (k, model.nominal[k]));
+        let fixed: Vec<(usize, f64)> = known.chain(references).collect();
+        let unknown = (0..model.base.len())
+            .filter(|k| fixed.iter().all(|(one, _)| one != k))
+            .collect();
+        Ok(Self {
+            servo,
+            samples,
+            unknown,
+            fixed,
+        })
+    }
+
+    /// The equations with some delays, and those at the instruments; `None` without commands or if the instruments
+    /// leave the range of the mechanism.
+    fn equations(&self, delays: &[f64]) -> Outcome<(EquationRows, Option<EquationRows>)> {
+        let mut own = EquationRows {
+            regressor: Vec::new(),
+            measured: Vec::new(),
+        };
+        let mut instruments = Some(own.clone());
+        for one in &self.samples {
+            let segment = one.delayed(self.servo, delays);
+            own.append(one.equations(self.servo, &segment)?);
+            let theirs = commanded_segment(self.servo, &segment).and_then(|at| one.equations(self.servo, &at).ok());
+            instruments = instruments.zip(theirs).map(|(mut all, theirs)| {
+                all.append(theirs);
+                all
+            });
+        }
+        Ok((own, instruments))
+    }
+
+    /// Number of rows of a sample.
+    fn n_rows(&self) -> usize {
+        self.servo.body_rows().len()
+    }
+
+    /// Solves the equations with some delays: first with equal weights, then with weights by drive.
+    fn solve(&self, delays: &[f64]) -> Outcome<ServoSolution> {
+        let (own, instruments) = self.equations(delays)?;
+        let mut weights = vec![1.0; self.n_rows()];
+        let first = self.solve_weighted(&own, instruments.as_ref(), &weights)?;
+        if weights.len() > 1 {
+            let values = self.base_values_of(&first.0);
+            for (weight, row) in weights.iter_mut().zip(self.row_errors(&own, &values)) {
+                *weight = if row.error > 0.0 { row.error.recip() } else { 1.0 };
+            }
+        }
+        let (solution, uncertainty, estimator) = self.solve_weighted(&own, instruments.as_ref(), &weights)?;
+        Ok(ServoSolution {
+            solution,
+            uncertainty,
+            estimator,
+            equations: own,
+        })
+    }
+
+    /// Solves the equations with some weights of the drives.
+    fn solve_weighted(
+        &self,
+        own: &EquationRows,
+        instruments: Option<&EquationRows>,
+        weights: &[f64],
+    ) -> Outcome<(RegressionSolution, ParameterUncertainty, ServoEstimator)> {
+        let n = self.unknown.len();
+        let failed = |error: LeastSquaresError| Error::input(format!("{}: {error}", self.servo.equations.path));
+        let right = self.right_side(own, weights);
+        let plain = self.columns(own, weights);
+        let mut reason = "the recording has no command that is free of the noise of sensors".to_owned();
+        if let Some(instruments) = instruments {
+            let theirs = self.columns(instruments, weights);
+            let joined: Vec<f64> = (theirs.chunks_exact(n).zip(plain.chunks_exact(n)))
+                .flat_map(|(z, w)| z.iter().chain(w).copied())
+                .collect();
+            let found =
+                estimate_with_instruments(n, weights.len(), |visit: &mut RowVisitor<'_>| visit(&joined, &right));
+            match found {
+                Ok(found) if found.strength >= INSTRUMENT_CORRELATION => {
+                    let strength = found.strength;
+                    return Ok((
+                        found.solution,
+                        found.uncertainty,
+                        ServoEstimator::Instruments { strength },
+                    ));
+                }
+                Ok(found) => {
+                    reason = format!(
+                        "instruments from the commands are weak, with a correlation of {}",
+                        number(found.strength)
+                    );
+                }
+                Err(LeastSquaresError::WeakInstruments { correlation }) => {
+                    reason = format!(
+                        "instruments from the commands are weak, with a correlation of {}",
+                        number(correlation)
+                    );
+                }
+                Err(error) => return Err(failed(error)),
+            }
+        }
+        let nominal: Vec<f64> = self.unknown.iter().map(|k| self.servo.equations.nominal[*k]).collect();
+        let options = EstimateOptions::default();
+        let found = estimate(&nominal, weights.len(), &options, |visit: &mut RowVisitor<'_>| {
+            visit(&plain, &right)
+        });
+        let found = found.map_err(failed)?;
+        Ok((
+            found.solution,
+            found.uncertainty,
+            ServoEstimator::LeastSquares { reason },
+        ))
+    }
+
+    /// Weighted columns of the unknowns.
+    fn columns(&self, rows: &EquationRows, weights: &[f64]) -> Vec<f64> {
+        let n = self.servo.equations.base.len();
+        let weighted = rows.regressor.chunks_exact(n).zip(weights.iter().cycle());
+        weighted
+            .flat_map(|(row, weight)| self.unknown.iter().map(move |k| weight * row[*k]))
+            .collect()
+    }
+
+    /// Weighted right-hand side: measured forces less the columns with fixed values.
+    fn right_side(&self, rows: &EquationRows, weights: &[f64]) -> Vec<f64> {
+        let n = self.servo.equations.base.len();
+        let all = rows
+            .regressor
+            .chunks_exact(n)
+            .zip(&rows.measured)
+            .zip(weights.iter().cycle());
+        all.map(|((row, y), weight)| weight * (y - self.fixed.iter().map(|(k, p)| row[*k] * p).sum::<f64>()))
+            .collect()
+    }
+
+    /// Values of all base parameters.
+    fn base_values(&self, solved: &ServoSolution) -> Vec<f64> {
+        self.base_values_of(&solved.solution)
+    }
+
+    /// Values of all base parameters from a solution.
+    fn base_values_of(&self, solution: &RegressionSolution) -> Vec<f64> {
+        let mut values = vec![0.0; self.servo.equations.base.len()];
+        for (k, value) in &self.fixed {
+            values[*k] = *value;
+        }
+        for (k, value) in self.unknown.iter().zip(&solution.values) {
+            values[*k] = *value;
+        }
+        values
+    }
+
+    /// Additional variance of the unknowns from the uncertainty of each delay: the change of the solution over one
+    /// standard deviation of the delay.
+    fn delay_spread(&self, delays: &[ServoDelay], solved: &ServoSolution) -> Outcome<Vec<f64>> {
+        let mut variance = vec![0.0; self.unknown.len()];
+        for (i, delay) in delays.iter().enumerate().filter(|(_, delay)| delay.std > 0.0) {
+            let mut moved: Vec<f64> = delays.iter().map(|one| one.value).collect();
+            moved[i] += delay.std;
+            let other = self.solve(&moved)?;
+            for (slot, (a, b)) in variance
+                .iter_mut()
+                .zip(other.solution.values.iter().zip(&solved.solution.values))
+            {
+                *slot += (a - b).powi(2);
+            }
+        }
+        Ok(variance)
+    }
+
+    /// The base parameters with their meaning.
+    fn parameters(&self, solved: &ServoSolution, spread: &[f64], base: &[f64]) -> Vec<ServoParameter> {
+        let model = &self.servo.equations;
+        let infos = model.parameter_infos();
+        (infos.iter().enumerate())
+            .map(|(k, info)| {
+                let freedom = self
+                    .servo
+                    .scale
+                    .freedoms
+                    .iter()
+                    .find(|freedom| freedom.base.contains(&k));
+                let at = self.unknown.iter().position(|one| *one == k);
+                let std = at.map(|at| solved.uncertainty.std[at].hypot(spread[at].sqrt()));
+                let status = match (at, freedom) {
+                    (None, Some(_)) => ServoStatus::Reference,
+                    (None, None) => ServoStatus::Known,
+                    (Some(at), _) if !solved.solution.determined[at] => ServoStatus::Undetermined,
+                    (Some(_), Some(freedom)) if freedom.open > 1 => ServoStatus::Undetermined,
+                    (Some(_), Some(_)) => ServoStatus::Ratio,
+                    (Some(_), None) => ServoStatus::Identified,
+                };
+                let reference = freedom
+                    .filter(|_| status == ServoStatus::Ratio)
+                    .map(|freedom| &infos[freedom.reference]);
+                ServoParameter {
+                    name: info.name.clone(),
+                    expression: info.expression.clone(),
+                    unit: match (status, reference) {
+                        (ServoStatus::Reference, _) => "1".to_owned(),
+                        (_, Some(reference)) => format!("({})/({})", info.unit, reference.unit),
+                        _ => info.unit.clone(),
+                    },
+                    value: base[k],
+                    std: std.filter(|std| std.is_finite() && status != ServoStatus::Undetermined),
+                    status,
+                    relative_to: reference.map(|reference| reference.expression.clone()),
+                }
+            })
+            .collect()
+    }
+
+    /// The error of each drive: the balance of the equation, and the size of the force of its actuator.
+    fn row_errors(&self, rows: &EquationRows, base: &[f64]) -> Vec<ServoRowError> {
+        let model = &self.servo.equations;
+        let mechanism = &model.derivation.mechanism;
+        let (n, body_rows) = (base.len(), self.servo.body_rows());
+        let is_scaled = self.servo.scale.freedoms.is_empty();
+        body_rows
+            .iter()
+            .enumerate()
+            .map(|(place, d)| {
+                let gains = self.gain_columns(*d);
+                let (mut error, mut force, mut counted) = (0.0, 0.0, 0.0);
+                let own = rows
+                    .regressor
+                    .chunks_exact(n)
+                    .zip(&rows.measured)
+                    .skip(place)
+                    .step_by(body_rows.len());
+                for (row, y) in own.filter(|(row, y)| **y != 0.0 || row.iter().any(|x| *x != 0.0)) {
+                    let total: f64 = row.iter().zip(base).map(|(x, p)| x * p).sum();
+                    let actuated: f64 = gains.iter().map(|k| row[*k] * base[*k]).sum();
+                    error += (y - total).powi(2);
+                    force += (y - actuated).powi(2);
+                    counted += 1.0;
+                }
+                let rms = |sum: f64| if counted > 0.0 { f64::sqrt(sum / counted) } else { 0.0 };
+                ServoRowError {
+                    drive: mechanism.drives[*d].name.clone(),
+                    error: rms(error),
+                    force: rms(force),
+                    unit: if is_scaled {
+                        model.force_unit(*d).to_owned()
+                    } else {
+                        "relative".to_owned()
+                    },
+                }
+            })
+            .collect()
+    }
+
+    /// Base parameters whose column contains the signal of the drive.
+    fn gain_columns(&self, drive: usize) -> Vec<usize> {
+        let model = &self.servo.equations;
+        let forces = model
+            .derivation
+            .mechanism
+            .servo_forces
+            .iter()
+            .filter(|force| force.drive.0 == drive);
+        let products: Vec<Vec<(usize, u32)>> = forces
+            .flat_map(|force| &force.terms)
+            .map(|term| term.parameters.iter().map(|(p, n)| (p.0, *n)).collect())
+            .collect();
+        (0..model.base.len())
+            .filter(|k| {
+                model
+                    .products_of(*k)
+                    .iter()
+                    .any(|(product, _)| products.contains(&product.0))
+            })
+            .collect()
+    }
+}
+
+impl EquationRows {
+    /// Adds the equations of another segment behind these.
+    fn append(&mut self, other: Self) {
+        self.regressor.extend(other.regressor);
+        self.measured.extend(other.measured);
+    }
+}
+
+/// Notes on the result.
+fn remarks(servo: &ServoModel, unknown: &[usize], solved: &ServoSolution, delays: &[ServoDelay]) -> Vec<RecordingNote> {
+    let mut notes = Vec::new();
+    for freedom in &servo.scale.freedoms {
+        let base = &servo.equations.base;
+        let reference = &base[freedom.reference].expression;
+        notes.push(RecordingNote::warning(if freedom.fixed_by.is_empty() {
+            message!(
+                "Only ratios to {reference} can be known: no number of the model fixes the scale of its equations; give a gain as a \
+                 number, or record the force of a drive."
+            )
+        } else {
+            message!(
+                "Only ratios to {reference} can be known: no number of the model fixes the scale of its equations; give a number \
+                 for one of {} in the model file.",
+                freedom.fixed_by.join(", ")
+            )
+        }));
+    }
+    if let ServoEstimator::LeastSquares { reason } = &solved.estimator {
+        notes.push(RecordingNote::warning(message!(
+            "Least squares was used, because {reason}: noise of the positions makes its estimates too small; record the command \
+             of a position controller, or filter more strongly."
+        )));
+    }
+    let names: Vec<String> = unknown
+        .iter()
+        .map(|k| servo.equations.base[*k].expression.clone())
+        .collect();
+    for direction in solved.solution.describe_undetermined(&names) {
+        notes.push(RecordingNote::warning(message!(
+            "The recording does not determine {direction}; record a motion that excites it."
+        )));
+    }
+    for delay in delays.iter().filter(|delay| delay.is_open) {
+        notes.push(RecordingNote::warning(message!(
+            "The delay of {} is not determined below {} ms; give it as `delay` of the actuator, or record a faster motion.",
+            delay.drive,
+            number(1e3 * super::thresholds::LARGEST_DELAY)
+        )));
+    }
+    notes
+}

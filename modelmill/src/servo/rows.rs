@@ -1,0 +1,180 @@
+//! Equations of a servo log: rows of the regressor along a segment with delayed signals, and the samples that count.
+
+use modelmill_codegen::ModelEvaluator;
+use modelmill_spec::{ExactExpression, ExactFunction};
+
+use super::ServoModel;
+use super::thresholds::{LARGEST_DELAY, MOST_SAMPLES, REVERSAL_PERIODS, STANDSTILL_SHARE};
+use crate::along;
+use crate::error::Outcome;
+use crate::segment::RecordingSegment;
+
+/// Equations of one segment, interleaved per sample.
+#[derive(Clone)]
+pub(super) struct EquationRows {
+    /// Rows of the regressor, `[sample][row][base parameter]`; zero where an equation does not count.
+    pub(super) regressor: Vec<f64>,
+    /// Measured forces, `[sample][row]`; zero for drives with actuators.
+    pub(super) measured: Vec<f64>,
+}
+
+/// The samples of a segment that are used, with the equations that count there.
+pub(super) struct UsedSamples {
+    /// The segment without its first samples, which a delay would need from before its start.
+    pub(super) segment: RecordingSegment,
+    /// `counts[row][sample]`, by position among the rows of bodies.
+    pub(super) counts: Vec<Vec<bool>>,
+    /// The complete segment, from which delayed signals are taken.
+    complete: RecordingSegment,
+}
+
+impl UsedSamples {
+    /// Selects at most `most` samples of a segment, evenly.
+    ///
+    /// Fails when a pose has no solution.
+    pub(super) fn new(servo: &ServoModel, complete: &RecordingSegment, most: usize) -> Outcome<Self> {
+        let time = &complete.run.time;
+        let start = time.first().copied().unwrap_or(0.0) + LARGEST_DELAY;
+        let first = time.partition_point(|t| *t < start);
+        let every = (time.len() - first).div_ceil(most.clamp(1, MOST_SAMPLES)).max(1);
+        let places: Vec<usize> = (first..time.len()).step_by(every).collect();
+        let segment = pick(complete, &places);
+        let counts = counting_samples(servo, &segment)?;
+        Ok(Self {
+            segment,
+            counts,
+            complete: complete.clone(),
+        })
+    }
+
+    /// The used samples with signals delayed, `delays` in s by actuator.
+    pub(super) fn delayed(&self, servo: &ServoModel, delays: &[f64]) -> RecordingSegment {
+        let mut segment = self.segment.clone();
+        let from = &self.complete.run;
+        for (actuator, delay) in servo.actuators().iter().zip(delays) {
+            let i = servo.signal_position(actuator);
+            let (q, qd, qdd) = (&from.q[i], &from.qd[i], &from.qdd[i]);
+            for (sample, t) in self.segment.run.time.iter().enumerate() {
+                let [value, rate, acceleration] = interpolate(&from.time, [q, qd, qdd], t - delay);
+                segment.run.q[i][sample] = value;
+                segment.run.qd[i][sample] = rate;
+                segment.run.qdd[i][sample] = acceleration;
+            }
+        }
+        segment
+    }
+
+    /// The equations along a segment with the same samples.
+    ///
+    /// Fails when a pose has no solution.
+    pub(super) fn equations(&self, servo: &ServoModel, segment: &RecordingSegment) -> Outcome<EquationRows> {
+        let model = &servo.equations;
+        let evaluator = ModelEvaluator::new(&model.derivation);
+        let n_drives = model.drives().len();
+        let states = segment.states(0, segment.samples());
+        let all = evaluator
+            .regressor(&states)
+            .map_err(|fault| segment.pose_error(model, fault, 0))?;
+        let force = segment.run.force.as_deref().unwrap_or(&[]);
+        let (mut regressor, mut measured) = (Vec::new(), Vec::new());
+        for sample in 0..segment.samples() {
+            for (d, counts) in servo.body_rows().into_iter().zip(&self.counts) {
+                let weight = f64::from(u8::from(counts[sample]));
+                regressor.extend(all.row(sample * n_drives + d).iter().map(|x| weight * x));
+                measured.push(weight * force.get(d).map_or(0.0, |force| force[sample]));
+            }
+        }
+        Ok(EquationRows { regressor, measured })
+    }
+}
+
+/// A segment with some of its samples.
+fn pick(segment: &RecordingSegment, places: &[usize]) -> RecordingSegment {
+    let mut picked = segment.clone();
+    let run = &mut picked.run;
+    let columns = run.q.iter_mut().chain(&mut run.qd).chain(&mut run.qdd);
+    for column in columns.chain(run.force.iter_mut().flatten()) {
+        *column = places.iter().map(|at| column[*at]).collect();
+    }
+    run.left_out = run
+        .left_out
+        .iter()
+        .map(|out| places.iter().map(|at| out[*at]).collect())
+        .collect();
+    run.lines = places.iter().filter_map(|at| run.lines.get(*at).copied()).collect();
+    run.time = places.iter().map(|at| run.time[*at]).collect();
+    picked.variance = None;
+    picked.weights = None;
+    picked.load = None;
+    picked
+}
+
+/// Which equations count: forces that were measured and, where friction has a direction, drives that move. Around a
+/// reversal the filter mixes both directions.
+fn counting_samples(servo: &ServoModel, segment: &RecordingSegment) -> Outcome<Vec<Vec<bool>>> {
+    let run = &segment.run;
+    let rates = along::drive_rates(&servo.equations, segment)?;
+    let has_direction = has_direction(servo);
+    let width = run.prepared.cutoff_hz.map_or(0.0, |cutoff| REVERSAL_PERIODS / cutoff);
+    Ok(servo
+        .body_rows()
+        .into_iter()
+        .map(|d| {
+            let n = rates[d].len().max(1) as f64;
+            let rms = (rates[d].iter().map(|v| v * v).sum::<f64>() / n).sqrt();
+            let is_moving = |sample: usize| {
+                rates[d][sample].abs() > (STANDSTILL_SHARE * rms).max(slope(&run.time, &rates[d], sample).abs() * width)
+            };
+            (0..run.samples())
+                .map(|sample| run.is_force_measured(d, sample) && (!has_direction || is_moving(sample)))
+                .collect()
+        })
+        .collect())
+}
+
+/// The derivative of a column by the differences to its neighbours.
+fn slope(time: &[f64], column: &[f64], sample: usize) -> f64 {
+    let (a, b) = (sample.saturating_sub(1), (sample + 1).min(column.len() - 1));
+    if a == b {
+        0.0
+    } else {
+        (column[b] - column[a]) / (time[b] - time[a])
+    }
+}
+
+/// Whether an effect depends on the direction of a motion.
+fn has_direction(servo: &ServoModel) -> bool {
+    fn has_sign(expression: &ExactExpression) -> bool {
+        match expression {
+            ExactExpression::Rational(_) | ExactExpression::Pi | ExactExpression::Symbol(_) => false,
+            ExactExpression::Sum(all) | ExactExpression::Product(all) => all.iter().any(has_sign),
+            ExactExpression::Quotient(a, b) => has_sign(a) || has_sign(b),
+            ExactExpression::Negative(a) | ExactExpression::Power(a, _) => has_sign(a),
+            ExactExpression::Apply(function, a) => *function == ExactFunction::Sign || has_sign(a),
+        }
+    }
+    let effects = servo.equations.derivation.mechanism.effects.iter();
+    let mut terms = effects.flat_map(|effect| &effect.terms);
+    terms.any(|term| has_sign(&term.expression))
+}
+
+/// Position, rate and acceleration of a signal at a time between its samples: cubic polynomials through values and
+/// slopes, and a line for the acceleration. Before the first sample it has the first value.
+fn interpolate(time: &[f64], [q, qd, qdd]: [&[f64]; 3], t: f64) -> [f64; 3] {
+    let last = time.len() - 1;
+    if t <= time[0] || last == 0 {
+        return [q[0], qd[0], qdd[0]];
+    }
+    let b = time.partition_point(|x| *x < t).clamp(1, last);
+    let a = b - 1;
+    let h = time[b] - time[a];
+    let s = (t - time[a]) / h;
+    let cubic = |y: &[f64], slope: &[f64]| {
+        let (s2, s3) = (s * s, s * s * s);
+        (2.0 * s3 - 3.0 * s2 + 1.0) * y[a]
+            + (s3 - 2.0 * s2 + s) * h * slope[a]
+            + (3.0 * s2 - 2.0 * s3) * y[b]
+            + (s3 - s2) * h * slope[b]
+    };
+    [cubic(q, qd), cubic(qd, qdd), qdd[a] + s * (qdd[b] - qdd[a])]
+}

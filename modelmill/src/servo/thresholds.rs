@@ -1,0 +1,32 @@
+//! Numbers that decide about estimates from servo logs.
+
+/// Singular values of the equations below this share of the largest count as zero: columns are scaled, and states are
+/// exact to rounding, so that true zeros are below 1e-12. By judgement.
+pub(super) const NULL_SHARE: f64 = 1e-9;
+/// An entry of a direction without effect below this share of its largest entry is rounding. By judgement.
+pub(super) const NULL_ENTRY: f64 = 1e-6;
+/// Equations for each unknown in the search for directions without effect. By judgement.
+pub(super) const SCALE_ROWS_PER_COLUMN: usize = 6;
+/// Largest delay of a servo that is searched, s: field buses and controllers of machines need less. By judgement.
+pub(super) const LARGEST_DELAY: f64 = 0.1;
+/// Step of the search for a delay, s; the minimum is interpolated by a parabola. By judgement.
+pub(super) const DELAY_STEP: f64 = 0.001;
+/// Most samples for the search of a delay. By judgement.
+pub(super) const DELAY_SAMPLES: usize = 4000;
+/// Fall of the log likelihood, times two, at the ends of an interval of 95 % of one parameter.
+pub(super) const INTERVAL_FALL: f64 = 3.84;
+/// Samples whose rate is below this share of the rms rate of the drive are left out: friction has no known direction
+/// there. By judgement.
+pub(super) const STANDSTILL_SHARE: f64 = 0.02;
+/// Samples nearer to a reversal than this many periods of the filter's cut-off are left out: the filter mixes both
+/// directions of the friction there. By judgement.
+pub(super) const REVERSAL_PERIODS: f64 = 1.0;
+/// Lags of the commands from which instruments are formed, s. A servo follows its command within some tenths of a
+/// second. By judgement.
+pub(super) const INSTRUMENT_LAGS: [f64; 8] = [0.0, 0.01, 0.02, 0.04, 0.08, 0.16, 0.24, 0.32];
+/// Instruments need this correlation with the regressor at least; below it, least squares is used. By judgement.
+pub(super) const INSTRUMENT_CORRELATION: f64 = 0.2;
+/// Ridge of the fit of instruments, as a share of the trace: lagged commands are nearly dependent. By judgement.
+pub(super) const INSTRUMENT_RIDGE: f64 = 1e-10;
+/// Most samples of the estimate; more are thinned evenly. By judgement.
+pub(super) const MOST_SAMPLES: usize = 40_000;

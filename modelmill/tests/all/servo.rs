@@ -1,0 +1,564 @@
+//! Servo logs without forces: planted gains are recovered from simulations with closed-form dynamics, and what fixes
+//! the scale is compared with an independent rank.
+
+use modelmill::Model;
+use modelmill::recording::{DerivativeSource, RecordingOptions, SmoothingMethod, StatePreparation};
+use modelmill::servo::{ServoEstimator, ServoIdentification, ServoModel, ServoStatus};
+
+use crate::draws::Draws;
+
+/// A pendulum on a position servo. `{kp}`, `{mass}` and so on are replaced by numbers or names of parameters.
+const PENDULUM: &str = r#"
+schema = 1
+name = "servo_pendulum"
+gravity = ["0", "-g", "0"]
+[constants]
+g = { value = 9.81, unit = "m/s^2" }
+[parameters]
+J = { unit = "kg m^2" }
+ml = { unit = "kg m" }
+kp = { unit = "N m" }
+kd = { unit = "N m s" }
+[coordinates]
+q = { nominal = 0 }
+[[frame]]
+name = "rod"
+on = "base"
+joint = { revolute = "q", axis = "z" }
+[[part]]
+on = "rod"
+linear = { ZZ = "{J}", MY = "-{ml}" }
+[[drive]]
+name = "motor"
+joint = "q"
+[[effect]]
+kind = "viscous_friction"
+at = "motor"
+[[effect]]
+kind = "coulomb_friction"
+at = "motor"
+[[actuator]]
+drive = "motor"
+kind = "position_servo"
+kp = "{kp}"
+kd = "{kd}"
+"#;
+
+/// The text of the pendulum with some entries replaced by numbers.
+fn pendulum(known: &[(&str, f64)]) -> String {
+    let mut text = PENDULUM.to_owned();
+    for name in ["J", "ml", "kp", "kd"] {
+        let value = known.iter().find(|(one, _)| *one == name);
+        let entry = value.map_or_else(|| name.to_owned(), |(_, value)| format!("{value}"));
+        text = text.replace(&format!("{{{name}}}"), &entry);
+        if value.is_some() {
+            text = text
+                .lines()
+                .filter(|line| !line.starts_with(&format!("{name} = {{ unit")))
+                .map(|l| format!("{l}\n"))
+                .collect();
+        }
+    }
+    text
+}
+
+/// Planted values of the pendulum.
+#[derive(Clone, Copy)]
+struct Planted {
+    j: f64,
+    ml: f64,
+    kp: f64,
+    kd: f64,
+    viscous: f64,
+    coulomb: f64,
+    delay: f64,
+}
+
+/// A sum of sines.
+fn command(t: f64, phases: &[f64]) -> f64 {
+    let parts = [(0.6, 0.41), (0.4, 1.13), (0.25, 2.37), (0.1, 4.3)];
+    parts
+        .iter()
+        .zip(phases)
+        .map(|((a, f), phase)| a * (std::f64::consts::TAU * f * t + phase).sin())
+        .sum()
+}
+
+type Columns = Vec<(String, Vec<f64>)>;
+
+/// A log of a servo at 200 Hz: command and noisy position, simulated by small steps of the closed-form equation.
+fn simulate(planted: &Planted, seed: u64, seconds: f64) -> Columns {
+    let mut draws = Draws::new(seed);
+    let phases: Vec<f64> = (0..4).map(|_| std::f64::consts::TAU * draws.uniform()).collect();
+    let (mut q, mut v) = (0.0, 0.0);
+    let (mut time, mut position, mut given) = (Vec::new(), Vec::new(), Vec::new());
+    let (step, inner) = (0.005, 200);
+    let h = step / f64::from(inner);
+    for k in 0..(seconds / step) as usize {
+        let t = k as f64 * step;
+        time.push(t);
+        position.push(q + 5e-5 * draws.normal());
+        given.push(command(t, &phases));
+        for i in 0..inner {
+            let now = t + f64::from(i) * h;
+            let reference = command(now - planted.delay, &phases);
+            let torque = planted.kp * (reference - q) - planted.kd * v;
+            let load = planted.ml * 9.81 * q.sin() + planted.viscous * v;
+            // Stiction holds the pendulum where the torque is below the Coulomb friction.
+            let free = torque - load;
+            let next = v + h * (free - planted.coulomb * v.signum()) / planted.j;
+            v = if v == 0.0 && free.abs() <= planted.coulomb || v * next < 0.0 {
+                if free.abs() <= planted.coulomb {
+                    0.0
+                } else {
+                    h * (free - planted.coulomb * free.signum()) / planted.j
+                }
+            } else {
+                next
+            };
+            q += h * v;
+        }
+    }
+    vec![
+        ("t".to_owned(), time),
+        ("q".to_owned(), position),
+        ("motor_command".to_owned(), given),
+    ]
+}
+
+/// The options that servo logs are read with.
+fn options() -> RecordingOptions {
+    RecordingOptions {
+        preparation: StatePreparation {
+            source: DerivativeSource::Positions,
+            smoothing: SmoothingMethod::Butterworth,
+            ..StatePreparation::default()
+        },
+        ..RecordingOptions::default()
+    }
+}
+
+fn servo(text: &str) -> ServoModel {
+    Model::from_text("servo.toml", text).unwrap().servo_model().unwrap()
+}
+
+fn identify(servo: &ServoModel, log: Columns) -> ServoIdentification {
+    let run = servo.equations.recording_of_table("log", log, &options()).unwrap();
+    servo.identify(&[&run], &[]).unwrap()
+}
+
+/// The value and the standard deviation of a base parameter by its expression.
+fn value(found: &ServoIdentification, expression: &str) -> (f64, f64) {
+    let one = found.parameters.iter().find(|p| p.expression == expression);
+    let one = one.unwrap_or_else(|| panic!("{expression} in {:?}", found.parameters));
+    (one.value, one.std.unwrap_or(0.0))
+}
+
+#[test]
+fn gains_and_delay_are_recovered_with_a_known_gravity_load() {
+    let servo = servo(&pendulum(&[("ml", 0.15)]));
+    assert!(servo.scale.freedoms.is_empty());
+    let (mut inside, mut all) = (0, 0);
+    for seed in 0..10 {
+        let mut draws = Draws::new(100 + seed);
+        let planted = Planted {
+            j: 0.03 + 0.05 * draws.uniform(),
+            ml: 0.15,
+            kp: 10.0 + 20.0 * draws.uniform(),
+            kd: 0.3 + 0.6 * draws.uniform(),
+            viscous: 0.05,
+            coulomb: 0.05 + 0.1 * draws.uniform(),
+            delay: 0.004 + 0.012 * draws.uniform(),
+        };
+        let found = identify(&servo, simulate(&planted, seed, 30.0));
+        let wanted = [
+            ("kp", planted.kp),
+            ("J", planted.j),
+            ("Fc_motor", planted.coulomb),
+            ("kd + Fv_motor", planted.kd + planted.viscous),
+        ];
+        for (expression, truth) in wanted {
+            let (value, std) = value(&found, expression);
+            println!("{seed} {expression} {value} +- {std} {truth}");
+            all += 1;
+            inside += i32::from((value - truth).abs() < (2.0 * std).max(0.05 * truth));
+        }
+        all += 1;
+        let delay = &found.delays[0];
+        inside += i32::from((delay.value - planted.delay).abs() < (2.0 * delay.std).max(0.0005));
+    }
+    println!("{inside} of {all}");
+    assert!(inside >= all - 5, "{inside} of {all}");
+}
+
+/// A planar arm of two links in a vertical plane, with servos on both joints.
+const ARM: &str = r#"
+schema = 1
+name = "servo_arm"
+gravity = ["0", "-g", "0"]
+[constants]
+g = { value = 9.81, unit = "m/s^2" }
+l = { value = 0.4, unit = "m" }
+[parameters]
+ZZ1 = { unit = "kg m^2" }
+MX1 = { unit = "kg m" }
+ZZ2 = { unit = "kg m^2" }
+MX2 = { unit = "kg m" }
+M2 = { unit = "kg" }
+kd1 = { unit = "N m s" }
+kp2 = { unit = "N m" }
+kd2 = { unit = "N m s" }
+[coordinates]
+q1 = { nominal = -1.5 }
+q2 = { nominal = 0.2 }
+[[frame]]
+name = "upper"
+on = "base"
+joint = { revolute = "q1", axis = "z" }
+[[frame]]
+name = "lower"
+on = "upper"
+transform = { xyz = ["l", 0, 0] }
+joint = { revolute = "q2", axis = "z" }
+[[part]]
+on = "upper"
+linear = { ZZ = "ZZ1", MX = "MX1" }
+[[part]]
+on = "lower"
+linear = { ZZ = "ZZ2", MX = "MX2", M = "M2" }
+[[drive]]
+name = "shoulder"
+joint = "q1"
+[[drive]]
+name = "elbow"
+joint = "q2"
+[[actuator]]
+drive = "shoulder"
+kind = "position_servo"
+kp = 60
+kd = "kd1"
+delay = 0
+[[actuator]]
+drive = "elbow"
+kind = "position_servo"
+kp = "kp2"
+kd = "kd2"
+delay = 0
+"#;
+
+/// A log of the arm at 200 Hz; the equations are those of a textbook (Craig, "Introduction to Robotics", 6.7).
+/// `planted` has ZZ1 + l^2 M2, MX1 + l M2, ZZ2, MX2, kp1, kd1, kp2, kd2.
+fn simulate_arm(planted: &[f64; 8], seed: u64, seconds: f64) -> Columns {
+    let [a1, b1, zz2, mx2, kp1, kd1, kp2, kd2] = *planted;
+    let mut draws = Draws::new(seed);
+    let phases: Vec<Vec<f64>> = (0..2)
+        .map(|_| (0..4).map(|_| std::f64::consts::TAU * draws.uniform()).collect())
+        .collect();
+    let (l, g) = (0.4, 9.81);
+    let reference = |t: f64| [command(t, &phases[0]) - 1.5, command(1.2 * t, &phases[1]) + 0.2];
+    let acceleration = |q: [f64; 2], v: [f64; 2], r: [f64; 2]| {
+        let (c2, s2) = (q[1].cos(), q[1].sin());
+        let (m11, m12, m22) = (a1 + zz2 + 2.0 * l * mx2 * c2, zz2 + l * mx2 * c2, zz2);
+        let gravity = [
+            b1 * g * q[0].cos() + mx2 * g * (q[0] + q[1]).cos(),
+            mx2 * g * (q[0] + q[1]).cos(),
+        ];
+        let e0 = kp1 * (r[0] - q[0]) - kd1 * v[0] - gravity[0] + l * mx2 * s2 * (2.0 * v[0] * v[1] + v[1] * v[1]);
+        let e1 = kp2 * (r[1] - q[1]) - kd2 * v[1] - gravity[1] - l * mx2 * s2 * v[0] * v[0];
+        let det = m11 * m22 - m12 * m12;
+        [(m22 * e0 - m12 * e1) / det, (m11 * e1 - m12 * e0) / det]
+    };
+    let [mut q, mut v] = [reference(0.0), [0.0, 0.0]];
+    let mut log: [Vec<f64>; 5] = Default::default();
+    let (step, inner) = (0.005, 20);
+    let h = step / f64::from(inner);
+    for k in 0..(seconds / step) as usize {
+        let t = k as f64 * step;
+        let r = reference(t);
+        let row = [
+            t,
+            q[0] + 2e-5 * draws.normal(),
+            q[1] + 2e-5 * draws.normal(),
+            r[0],
+            r[1],
+        ];
+        for (column, x) in log.iter_mut().zip(row) {
+            column.push(x);
+        }
+        for i in 0..inner {
+            // The midpoint rule: the simple Euler rule would add a damping of kp h / 2.
+            let t = t + f64::from(i) * h;
+            let a = acceleration(q, v, reference(t));
+            let half = |x: [f64; 2], slope: [f64; 2]| [x[0] + 0.5 * h * slope[0], x[1] + 0.5 * h * slope[1]];
+            let (middle, rate) = (half(q, v), half(v, a));
+            let a = acceleration(middle, rate, reference(t + 0.5 * h));
+            for j in 0..2 {
+                q[j] += h * rate[j];
+                v[j] += h * a[j];
+            }
+        }
+    }
+    let names = ["t", "q1", "q2", "shoulder_command", "elbow_command"];
+    names.iter().map(|name| (*name).to_owned()).zip(log).collect()
+}
+
+#[test]
+fn one_known_gain_determines_masses_and_gains_of_two_joints() {
+    let servo = servo(ARM);
+    assert!(servo.scale.freedoms.is_empty(), "{:?}", servo.scale);
+    let (mut inside, mut all) = (0, 0);
+    for seed in 0..5 {
+        let planted = [0.9, 1.1, 0.2, 0.5, 60.0, 4.0, 25.0, 1.5];
+        let found = identify(&servo, simulate_arm(&planted, seed, 20.0));
+        assert!(
+            matches!(found.estimator, ServoEstimator::Instruments { .. }),
+            "{:?}",
+            found.estimator
+        );
+        let wanted = [
+            ("ZZ2", planted[2]),
+            ("MX2", planted[3]),
+            ("kd1", planted[5]),
+            ("kp2", planted[6]),
+            ("kd2", planted[7]),
+        ];
+        for (expression, truth) in wanted {
+            let (value, std) = value(&found, expression);
+            println!("{seed} {expression} {value} +- {std} {truth}");
+            assert!(std < 0.05 * truth, "{expression}: {std}");
+            all += 1;
+            inside += i32::from((value - truth).abs() < (2.0 * std).max(0.01 * truth));
+        }
+    }
+    assert!(inside >= all - 2, "{inside} of {all}");
+}
+
+/// Without a known number the ratios are right, and the statement names what fixes them.
+#[test]
+fn without_a_known_number_only_ratios_are_reported() {
+    let servo = servo(&pendulum(&[]));
+    let [freedom] = servo.scale.freedoms.as_slice() else {
+        panic!("{:?}", servo.scale);
+    };
+    let mut names = freedom.fixed_by.clone();
+    names.sort();
+    assert_eq!(names, ["J", "kp", "ml"]);
+    for name in &names {
+        let fixed = self::servo(&pendulum(&[(name, 0.5)]));
+        assert!(fixed.scale.freedoms.is_empty(), "{name}: {:?}", fixed.scale);
+    }
+    // The damping stands in a sum with the friction, so that a number for it fixes nothing.
+    let open = self::servo(&pendulum(&[("kd", 0.5)]));
+    assert_eq!(open.scale.freedoms.len(), 1);
+    let planted = Planted {
+        j: 0.05,
+        ml: 0.15,
+        kp: 15.0,
+        kd: 0.5,
+        viscous: 0.05,
+        coulomb: 0.1,
+        delay: 0.008,
+    };
+    let found = identify(&servo, simulate(&planted, 3, 30.0));
+    let kp = found.parameters.iter().find(|p| p.expression == "kp").unwrap();
+    assert_eq!(
+        (kp.status, kp.value.to_bits()),
+        (ServoStatus::Reference, 1.0_f64.to_bits())
+    );
+    for (expression, truth) in [("J", 0.05), ("ml", 0.15), ("Fc_motor", 0.1), ("kd + Fv_motor", 0.55)] {
+        let (value, std) = value(&found, expression);
+        let truth = truth / planted.kp;
+        assert!(
+            (value - truth).abs() < (2.5 * std).max(0.03 * truth),
+            "{expression}: {value} +- {std}, {truth}"
+        );
+    }
+}
+
+/// Random states of a model: positions near the nominal ones, rates and accelerations, `[coordinate][sample]`.
+fn random_states(model: &Model, draws: &mut Draws, n: usize) -> [Vec<Vec<f64>>; 3] {
+    let mechanism = &model.derivation.mechanism;
+    let nominal: Vec<f64> = mechanism
+        .coordinates
+        .iter()
+        .filter(|c| !c.passive)
+        .map(|c| c.nominal)
+        .collect();
+    [0.05, 2.0, 5.0].map(|range| {
+        (nominal.iter())
+            .map(|nominal| {
+                let centre = if range < 1.0 { *nominal } else { 0.0 };
+                (0..n).map(|_| centre + range * (2.0 * draws.uniform() - 1.0)).collect()
+            })
+            .collect()
+    })
+}
+
+/// An actuator of a test: its entry, and its columns at a position, a rate and a signal, one for each gain. Written
+/// without the library of kinds.
+fn test_actuator(kind: usize, drive: &str, name: &str) -> (String, Vec<fn(f64, f64, f64) -> f64>) {
+    let head = format!("[[actuator]]\ndrive = \"{drive}\"\nsignal = \"{name}_signal\"\ndelay = 0\n");
+    let (entry, columns): (String, Vec<fn(f64, f64, f64) -> f64>) = match kind {
+        0 => (
+            format!("kind = \"position_servo\"\nkp = \"{name}_a\"\nkd = \"{name}_b\"\n"),
+            vec![|q, _, s| s - q, |_, v, _| -v],
+        ),
+        1 => (
+            format!("kind = \"velocity_servo\"\nkv = \"{name}_a\"\n"),
+            vec![|_, v, s| s - v],
+        ),
+        2 => (
+            format!("kind = \"current\"\ntorque_constant = \"{name}_a\"\nratio = 20\nefficiency = 0.5\n"),
+            vec![|_, _, s| 10.0 * s],
+        ),
+        3 => (
+            format!(
+                "kind = \"voltage\"\ntorque_constant = \"{name}_a\"\nresistance = 2\nback_emf = \"{name}_b\"\nratio = 3\n"
+            ),
+            vec![|_, _, s| 1.5 * s, |_, v, _| -4.5 * v],
+        ),
+        _ => (
+            format!("kind = \"duty\"\ntorque_constant = \"{name}_a\"\nresistance = 2\nsupply = 12\n"),
+            vec![|_, _, s| 6.0 * s],
+        ),
+    };
+    (head + &entry, columns)
+}
+
+/// Units of the gains `a` and `b` of a kind at a drive with a force or a torque.
+fn units(kind: usize, force: &str) -> [&'static str; 2] {
+    match (kind, force) {
+        (0, "N") => ["N/m", "N s/m"],
+        (0, _) => ["N m", "N m s"],
+        (1, "N") => ["N s/m", "1"],
+        (1, _) => ["N m s", "1"],
+        (_, "N") => ["N/A", "V s/m"],
+        _ => ["N m/A", "V s"],
+    }
+}
+
+/// Singular values that are not zero, of columns scaled to norm 1.
+fn rank(columns: &[Vec<f64>]) -> usize {
+    let scaled: Vec<Vec<f64>> = columns
+        .iter()
+        .map(|column| {
+            let norm = column.iter().map(|x| x * x).sum::<f64>().sqrt();
+            column
+                .iter()
+                .map(|x| if norm > 1e-10 { x / norm } else { 0.0 })
+                .collect()
+        })
+        .collect();
+    let matrix = nalgebra::DMatrix::from_fn(scaled[0].len(), scaled.len(), |i, j| scaled[j][i]);
+    matrix.singular_values().iter().filter(|s| **s > 1e-9).count()
+}
+
+/// Base parameters with gains, and the number of open scales, against ranks of `[H, -S]` at random states: `H` from the
+/// model without actuators, `S` and the signals that obey the equations by hand.
+#[test]
+fn base_parameters_with_gains_agree_with_independent_ranks() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../model-spec/models");
+    let scratch = std::env::temp_dir().join(format!("modelmill-servo-{}", std::process::id()));
+    std::fs::create_dir_all(&scratch).unwrap();
+    let names = [
+        "two_link",
+        "scara",
+        "four_bar",
+        "five_bar",
+        "slider_crank",
+        "emps",
+        "parallelogram",
+        "spidermill",
+        "three_rpr",
+    ];
+    for (m, name) in names.iter().enumerate() {
+        let file = format!("{folder}/{name}.toml");
+        let bare = Model::open(&file).unwrap();
+        for offset in 0..5 {
+            let (mut parameters, mut entries, mut columns) =
+                (String::from("[parameters]\n"), String::new(), Vec::new());
+            for (d, drive) in bare.drives().iter().enumerate() {
+                let kind = (d + offset + m) % 5;
+                let (entry, its) = test_actuator(kind, drive, &format!("gain{d}"));
+                let [a, b] = units(kind, bare.force_unit(d));
+                parameters += &format!("gain{d}_a = {{ unit = \"{a}\" }}\n");
+                if its.len() > 1 {
+                    parameters += &format!("gain{d}_b = {{ unit = \"{b}\" }}\n");
+                }
+                entries += &entry;
+                columns.push(its);
+            }
+            let path = scratch.join("variant.toml");
+            let text = format!("schema = 1\nname = \"variant\"\nextends = \"{file}\"\n{parameters}{entries}");
+            std::fs::write(&path, text).unwrap();
+            let model = Model::open(&path).unwrap_or_else(|error| panic!("{name} {offset}: {error}"));
+            let servo = model.servo_model().unwrap();
+            let (rank_of_all, rank_of_true) = ranks(&bare, &columns, 7 + m as u64);
+            assert_eq!(servo.equations.base.len(), rank_of_all, "{name}, kinds from {offset}");
+            let open: usize = servo.scale.freedoms.iter().map(|freedom| freedom.open).sum();
+            assert_eq!(
+                rank_of_all - open,
+                rank_of_true,
+                "{name}, kinds from {offset}: {:?}",
+                servo.scale
+            );
+        }
+    }
+    std::fs::remove_dir_all(&scratch).unwrap();
+}
+
+/// The rank of `[H, -S]` at random states and signals, and at signals that obey the equations for random parameters.
+fn ranks(bare: &Model, actuators: &[Vec<fn(f64, f64, f64) -> f64>], seed: u64) -> (usize, usize) {
+    let mut draws = Draws::new(seed);
+    let n = 200;
+    let [q, qd, qdd] = random_states(bare, &mut draws, n);
+    let drives = bare.drives().len();
+    let load = vec![vec![0.0; n]; drives];
+    let slices = |all: &'_ [Vec<f64>]| -> Vec<Vec<f64>> { all.to_vec() };
+    let (q, qd, qdd) = (slices(&q), slices(&qd), slices(&qdd));
+    let states = modelmill_codegen::MotionStates {
+        q: q.iter().map(Vec::as_slice).collect(),
+        qd: qd.iter().map(Vec::as_slice).collect(),
+        qdd: qdd.iter().map(Vec::as_slice).collect(),
+        load: load.iter().map(Vec::as_slice).collect(),
+    };
+    let evaluator = modelmill_codegen::ModelEvaluator::new(&bare.derivation);
+    let h = evaluator.full_regressor(&states).unwrap();
+    let motion = evaluator.drive_motion(&states).unwrap();
+    let mut parameters: Vec<f64> = (0..h.ncols()).map(|_| 0.5 + draws.uniform()).collect();
+    parameters.iter_mut().for_each(|p| *p *= 1.0);
+    let gains: Vec<Vec<f64>> = actuators
+        .iter()
+        .map(|its| its.iter().map(|_| 0.5 + draws.uniform()).collect())
+        .collect();
+    let mut stacked = [Vec::new(), Vec::new()];
+    for column in h.column_iter() {
+        stacked
+            .iter_mut()
+            .for_each(|all: &mut Vec<Vec<f64>>| all.push(column.iter().copied().collect()));
+    }
+    for (d, its) in actuators.iter().enumerate() {
+        let mut own = vec![vec![vec![0.0; n * drives]; its.len()]; 2];
+        for sample in 0..n {
+            let (position, rate) = (motion[d][sample], motion[drives + d][sample]);
+            let row = sample * drives + d;
+            let force: f64 = (0..h.ncols()).map(|k| h[(row, k)] * parameters[k]).sum();
+            let actuated = |s: f64| {
+                its.iter()
+                    .zip(&gains[d])
+                    .map(|(f, k)| k * f(position, rate, s))
+                    .sum::<f64>()
+            };
+            let slope = actuated(1.0) - actuated(0.0);
+            for (which, s) in [(0, 2.0 * draws.uniform() - 1.0), (1, (force - actuated(0.0)) / slope)] {
+                for (column, f) in own[which].iter_mut().zip(its) {
+                    column[row] = -f(position, rate, s);
+                }
+            }
+        }
+        for (all, own) in stacked.iter_mut().zip(own) {
+            all.extend(own);
+        }
+    }
+    (rank(&stacked[0]), rank(&stacked[1]))
+}
