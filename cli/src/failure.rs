@@ -9,6 +9,8 @@ pub(crate) enum CommandFailure {
     Input(String),
     /// The command line is at fault: exit status 2.
     Usage(String),
+    /// The model fails a verification, or could not be verified: exit status 1. The output states why.
+    NotVerified,
     /// The reader of standard output closed it: exit status 0 and no message.
     BrokenPipe,
 }
@@ -22,7 +24,7 @@ impl CommandFailure {
         match self {
             Self::BrokenPipe => 0,
             Self::Usage(_) | Self::Library(modelmill::Error::Options(_)) => 2,
-            Self::Input(_) | Self::Library(_) => 1,
+            Self::NotVerified | Self::Input(_) | Self::Library(_) => 1,
         }
     }
 }

@@ -48,7 +48,7 @@ fn main() -> ExitCode {
                 }
                 CommandFailure::Library(error) => terminal::error(&error.spell(&FlagSpelling)),
                 CommandFailure::Input(says) | CommandFailure::Usage(says) => terminal::error(says),
-                CommandFailure::BrokenPipe => {}
+                CommandFailure::NotVerified | CommandFailure::BrokenPipe => {}
             }
             ExitCode::from(failure.status())
         }
@@ -70,6 +70,7 @@ fn run(host: &Host, command: &ProgramCommand) -> CommandOutcome {
         ProgramCommand::Identify(args) => commands::identify::run(host, args),
         ProgramCommand::Compare(args) => commands::compare::run(host, args),
         ProgramCommand::Diagnose(args) => commands::diagnose::run(host, args),
+        ProgramCommand::Verify(args) => commands::verify::run(host, args),
         ProgramCommand::Recordings(args) => commands::recordings::run(host, args),
         ProgramCommand::Report(args) => commands::report::run(host, args),
         ProgramCommand::Simulate(args) => commands::simulate::run(host, args),

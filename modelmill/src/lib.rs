@@ -62,6 +62,7 @@
 //! | [`Model::identify_servo`] | base parameters and gains from commands or currents, without forces |
 //! | [`Model::compare`] | error metrics (such as the NRMS), and the ranges of coordinates, rates, loads and time in which errors are large |
 //! | [`Model::diagnose`] | the physical effects that are missing |
+//! | [`Model::verify`] | a test of the model: checks of drives, parameters and effects with the states pass, fail, not evaluated |
 //! | [`Model::runs`] | changes between recordings of one machine |
 //! | [`report::page`] | a diagnosis as one page |
 //! | [`Host::simulate`] | simulation of a rig (a numeric model of the complete machine, used in place of hardware) along a trajectory |
@@ -179,7 +180,8 @@
 //! The modules are listed in the order of the data flow. Each module uses only modules before it.
 //!
 //! [`text`], [`error`], [`progress`], [`host`], [`model`], [`picture`], [`atlas`], [`segment`], [`along`], [`audit`],
-//! [`recording`], [`compare`], [`evaluate`], [`states`], [`identify`], [`servo`], [`runs`], [`diagnose`], [`add`], [`adopt`],
+//! [`recording`], [`compare`], [`evaluate`], [`states`], [`identify`], [`servo`], [`runs`], [`diagnose`], [`verify`],
+//! [`add`], [`adopt`],
 //! [`interpret`], [`excite`], [`variants`], [`generate`], [`simulate`], [`reduce`], [`mod@import`], [`mod@export`],
 //! [`mod@print`], [`report`].
 
@@ -219,6 +221,7 @@ pub mod simulate;
 pub mod states;
 pub mod text;
 pub mod variants;
+pub mod verify;
 
 pub use modelmill_boundary::files;
 pub use modelmill_identify::{FitFile, NoteSeverity, RecordingNote};

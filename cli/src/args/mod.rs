@@ -12,6 +12,7 @@ pub(crate) mod preparation;
 mod rig;
 pub(crate) mod runs;
 pub(crate) mod separate;
+mod verify;
 #[cfg(feature = "workbench")]
 pub(crate) mod work;
 
@@ -35,6 +36,7 @@ pub(crate) use data::{
 pub(crate) use experiment::ExperimentArgs;
 pub(crate) use motion::{CriterionArg, ExciteArgs, PeriodArg, SimulateArgs};
 pub(crate) use rig::{ExportArgs, ImportArgs, ReduceArgs};
+pub(crate) use verify::VerifyArgs;
 
 /// From a model file to base parameters, equations, fast Rust, and parameters from measurements.
 #[derive(Debug, Parser)]
@@ -45,7 +47,7 @@ pub(crate) use rig::{ExportArgs, ImportArgs, ReduceArgs};
     after_help = "Start here:\n  \
         modelmill tour                              all main steps on bundled recordings\n  \
         modelmill help COMMAND                       options and examples of one command\n\n\
-        Exit status: 0 done, 1 the input is at fault (with the place and what to do), 2 wrong usage."
+        Exit status: 0 done, 1 the input is at fault (with the place and what to do) or the model fails `verify`, 2 wrong usage."
 )]
 pub(crate) struct CommandLine {
     /// The command to run.
@@ -172,6 +174,9 @@ pub(crate) enum ProgramCommand {
         --data recordings/spidermill-mbs/with-rods-fit.csv \\\n      \
         --check recordings/spidermill-mbs/with-rods-check.csv --out completed.toml")]
     Diagnose(DiagnoseArgs),
+    /// Test the model against recordings: checks of drives, parameters and effects, with the cause of every failure
+    #[command(after_help = verify::HELP)]
+    Verify(VerifyArgs),
     /// Write a diagnosis as one self-contained page: error after each added effect, curves, error maps, candidates,
     /// parameters, equations
     #[command(after_help = "Examples (from the project's root):\n  \

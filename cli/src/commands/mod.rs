@@ -25,6 +25,7 @@ pub(crate) mod report;
 pub(crate) mod runs;
 pub(crate) mod simulate;
 pub(crate) mod tour;
+pub(crate) mod verify;
 #[cfg(feature = "workbench")]
 pub(crate) mod work;
 

@@ -50,5 +50,6 @@ mod try_page;
 mod tx40;
 mod usage;
 mod variants;
+mod verify;
 mod weights;
 mod work;

@@ -53,6 +53,7 @@ fn every_command_helps_with_an_example() {
         "evaluate",
         "identify",
         "compare",
+        "verify",
         "simulate",
         "reduce",
         "import",

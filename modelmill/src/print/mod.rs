@@ -22,6 +22,7 @@ mod spelling;
 mod summary;
 pub mod tables;
 mod variants;
+mod verification;
 
 use modelmill_identify::RecordingNote;
 use serde_json::Value;
@@ -31,6 +32,7 @@ pub use spelling::{
     CommandName, LibrarySpelling, Message, OptionName, OptionSetting, Remedy, RemedySpelling, StepSpelling,
 };
 pub use summary::{faults, refusal, warnings};
+pub use verification::{VERIFICATION_SCHEMA, VerificationContext};
 
 /// Notes as JSON.
 pub(crate) fn notes(notes: &[RecordingNote], spelling: &dyn RemedySpelling) -> Value {

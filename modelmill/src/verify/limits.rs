@@ -1,0 +1,256 @@
+//! Limits of a verification: a file `verify.toml` goes in, limits by drive, parameter and effect come out.
+
+use std::path::Path;
+
+use toml::de::{DeTable, DeValue};
+
+use crate::error::{Error, Outcome};
+use crate::model::Model;
+
+/// Largest file of limits, bytes.
+const LARGEST_FILE: u64 = 1 << 20;
+
+/// Limits of a verification. Without any ([`VerificationLimits::default`]), default limits are used.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct VerificationLimits {
+    /// Limits of the errors of all drives that have no limit of their own.
+    pub all_drives: DriveErrorLimit,
+    /// Limits of the errors of single drives, by name.
+    pub drives: Vec<(String, DriveErrorLimit)>,
+    /// Intervals for estimates of base parameters, by name or expression.
+    pub parameters: Vec<(String, [f64; 2])>,
+    /// Probability above which a new effect is a failure.
+    pub most_probability: Option<f64>,
+    /// Effects that are known and accepted: a kind, or `kind@place`.
+    pub accepted_effects: Vec<String>,
+}
+
+/// Limits of the error of a drive.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct DriveErrorLimit {
+    /// Most rms error, in % of the rms force of the drive.
+    pub percent: Option<f64>,
+    /// Most rms error, N or N m.
+    pub rms: Option<f64>,
+}
+
+impl DriveErrorLimit {
+    /// Whether there is no limit.
+    pub fn is_empty(self) -> bool {
+        self.percent.is_none() && self.rms.is_none()
+    }
+}
+
+impl VerificationLimits {
+    /// Reads a file of limits.
+    ///
+    /// Fails when it cannot be read, and at entries that are unknown or have wrong values, with their line.
+    pub fn read(model: &Model, path: &Path) -> Outcome<Self> {
+        let text = (model.host().files().read_text(path, LARGEST_FILE)).map_err(|error| {
+            let [fault, remedy] = [error.fault.to_string(), error.fault.remedy().to_string()];
+            Error::options(format!("{} cannot be read: {fault}; {remedy}", path.display()))
+        })?;
+        Self::parse(model, &text, &path.display().to_string())
+    }
+
+    /// Reads the text of a file of limits; `file` is its name in messages.
+    ///
+    /// Fails at entries that are unknown or have wrong values, with their line.
+    ///
+    /// ```
+    /// use modelmill::Model;
+    /// use modelmill::verify::VerificationLimits;
+    ///
+    /// let arm = Model::open("../model-spec/models/two_link.toml")?;
+    /// let text = "[drives.joint1]\nerror_percent = 5.0\n";
+    /// let limits = VerificationLimits::parse(&arm, text, "verify.toml")?;
+    /// assert_eq!(limits.drives[0].1.percent, Some(5.0));
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
+    pub fn parse(model: &Model, text: &str, file: &str) -> Outcome<Self> {
+        let place = LimitsText { text, file };
+        let table = DeTable::parse(text).map_err(|error| {
+            let at = error.span().map_or(0, |span| span.start);
+            place.error(at, &format!("this is not valid TOML: {}", error.message()))
+        })?;
+        let mut limits = Self::default();
+        for (key, value) in table.get_ref() {
+            let (name, at) = (key.get_ref().as_ref(), value.span().start);
+            match name {
+                "all_drives" => limits.all_drives = drive_limit(&place, value.get_ref(), at)?,
+                "drives" => limits.read_drives(model, &place, value.get_ref(), at)?,
+                "parameters" => limits.read_parameters(model, &place, value.get_ref(), at)?,
+                "effects" => limits.read_effects(&place, value.get_ref(), at)?,
+                other => {
+                    let says = format!(
+                        "there is no entry `{other}`; the tables are [all_drives], [drives.NAME], [parameters] and [effects]"
+                    );
+                    return Err(place.error(key.span().start, &says));
+                }
+            }
+        }
+        Ok(limits)
+    }
+
+    /// The limits of a drive, each from the drive or else from all drives.
+    pub fn drive(&self, name: &str) -> DriveErrorLimit {
+        let own = self.drives.iter().find(|(drive, _)| drive == name);
+        let own = own.map_or_else(DriveErrorLimit::default, |(_, limit)| *limit);
+        if own.is_empty() { self.all_drives } else { own }
+    }
+
+    /// The interval of a base parameter, by its name or expression.
+    pub fn interval(&self, name: &str, expression: &str) -> Option<[f64; 2]> {
+        let mut found = self.parameters.iter();
+        found
+            .find(|(key, _)| key == name || key == expression)
+            .map(|(_, interval)| *interval)
+    }
+
+    /// Reads the table `drives`.
+    fn read_drives(&mut self, model: &Model, place: &LimitsText<'_>, value: &DeValue<'_>, at: usize) -> Outcome {
+        let drives = model.drives();
+        for (key, value) in place.table(value, at, "drives")? {
+            let name = key.get_ref().as_ref();
+            if !drives.iter().any(|drive| drive == name) {
+                let says = format!(
+                    "{} has no drive `{name}`; its drives are {}",
+                    model.path,
+                    drives.join(", ")
+                );
+                return Err(place.error(key.span().start, &says));
+            }
+            let limit = drive_limit(place, value.get_ref(), value.span().start)?;
+            self.drives.push((name.to_owned(), limit));
+        }
+        Ok(())
+    }
+
+    /// Reads the table `parameters`.
+    fn read_parameters(&mut self, model: &Model, place: &LimitsText<'_>, value: &DeValue<'_>, at: usize) -> Outcome {
+        for (key, value) in place.table(value, at, "parameters")? {
+            let name = key.get_ref().as_ref();
+            let mut base = model.base.iter();
+            if !base.any(|one| one.name == name || one.expression == name) {
+                let known = model
+                    .base
+                    .iter()
+                    .map(|one| format!("{} = {}", one.name, one.expression));
+                let says = format!(
+                    "{} has no base parameter `{name}`, and recordings determine no others; its base parameters are {}",
+                    model.path,
+                    known.collect::<Vec<_>>().join(", ")
+                );
+                return Err(place.error(key.span().start, &says));
+            }
+            let numbers: Option<Vec<f64>> = match value.get_ref() {
+                DeValue::Array(all) => all.iter().map(|one| number(one.get_ref())).collect(),
+                _ => None,
+            };
+            match numbers.as_deref() {
+                Some([low, high]) if low <= high => self.parameters.push((name.to_owned(), [*low, *high])),
+                _ => {
+                    let says = format!("`{name}` needs an interval: two numbers, the lower first, such as [1.2, 1.4]");
+                    return Err(place.error(value.span().start, &says));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Reads the table `effects`.
+    fn read_effects(&mut self, place: &LimitsText<'_>, value: &DeValue<'_>, at: usize) -> Outcome {
+        for (key, value) in place.table(value, at, "effects")? {
+            let (name, at) = (key.get_ref().as_ref(), value.span().start);
+            match (name, value.get_ref()) {
+                ("most_probability", value) => match number(value) {
+                    Some(p) if (0.0..=1.0).contains(&p) => self.most_probability = Some(p),
+                    _ => return Err(place.error(at, "`most_probability` is a number from 0 to 1, such as 0.5")),
+                },
+                ("accepted", DeValue::Array(all)) => {
+                    for one in all {
+                        let DeValue::String(text) = one.get_ref() else {
+                            return Err(place.error(one.span().start, ACCEPTED));
+                        };
+                        self.accepted_effects.push(text.to_string());
+                    }
+                }
+                ("accepted", _) => return Err(place.error(at, ACCEPTED)),
+                (other, _) => {
+                    let says =
+                        format!("there is no entry `{other}` in [effects]; use `most_probability` or `accepted`");
+                    return Err(place.error(key.span().start, &says));
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What the list of accepted effects expects.
+const ACCEPTED: &str = "`accepted` is a list of effects, such as [\"coulomb_friction@joint1\", \"payload\"]";
+
+/// Reads the limits of a drive.
+fn drive_limit(place: &LimitsText<'_>, value: &DeValue<'_>, at: usize) -> Outcome<DriveErrorLimit> {
+    let mut limit = DriveErrorLimit::default();
+    for (key, value) in place.table(value, at, "limits of a drive")? {
+        let name = key.get_ref().as_ref();
+        let slot = match name {
+            "error_percent" => &mut limit.percent,
+            "error" => &mut limit.rms,
+            other => {
+                let says = format!(
+                    "there is no limit `{other}` of a drive; use `error_percent` (rms error in % of the rms force) or `error` \
+                     (rms error in N or N m)"
+                );
+                return Err(place.error(key.span().start, &says));
+            }
+        };
+        match number(value.get_ref()) {
+            Some(number) if number > 0.0 && number.is_finite() => *slot = Some(number),
+            _ => {
+                return Err(place.error(
+                    value.span().start,
+                    &format!("`{name}` is a number above 0, such as 5.0"),
+                ));
+            }
+        }
+    }
+    Ok(limit)
+}
+
+/// A number of the file.
+fn number(value: &DeValue<'_>) -> Option<f64> {
+    let text = match value {
+        DeValue::Integer(number) if number.radix() == 10 => number.as_str(),
+        DeValue::Float(number) => number.as_str(),
+        _ => return None,
+    };
+    text.parse().ok().filter(|number: &f64| !number.is_nan())
+}
+
+/// The text of a file of limits, for messages with lines.
+struct LimitsText<'a> {
+    text: &'a str,
+    file: &'a str,
+}
+
+impl LimitsText<'_> {
+    /// An error at a byte of the text.
+    fn error(&self, at: usize, says: &str) -> Error {
+        let before = self.text.get(..at).unwrap_or_default();
+        let line = before.matches('\n').count() + 1;
+        Error::options(format!("{}, line {line}: {says}", self.file))
+    }
+
+    /// The entries of a value that must be a table.
+    fn table<'t, 'i>(&self, value: &'t DeValue<'i>, at: usize, what: &str) -> Outcome<&'t DeTable<'i>> {
+        match value {
+            DeValue::Table(table) => Ok(table),
+            _ => Err(self.error(
+                at,
+                &format!("`{what}` must be a table: write [{what}] and its entries below"),
+            )),
+        }
+    }
+}

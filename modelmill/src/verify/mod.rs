@@ -1,0 +1,100 @@
+//! `verify`: tests a model against recordings. A model, recordings and limits go in; checks with the states pass, fail and
+//! not evaluated come out, each failure with its cause from the diagnosis.
+//!
+//! The modules, in the order of the data flow: `limits` reads limits, `recordings`, `drives`, `parameters` and `effects` make the
+//! checks of their scopes, `causes` explains failures, `fingerprints` states which files were used.
+
+mod causes;
+mod checks;
+mod digest;
+mod drives;
+mod effects;
+mod fingerprints;
+mod limits;
+mod parameters;
+mod recordings;
+pub(crate) mod thresholds;
+
+use crate::diagnose::{DiagnosisFindings, DiagnosisOptions};
+use crate::error::{Error, Outcome};
+use crate::model::Model;
+use crate::recording::PreparedRecording;
+
+pub use checks::{CheckScope, CheckState, VerificationCheck};
+pub use digest::Sha256;
+pub use fingerprints::{FileFingerprint, FileRole};
+pub use limits::{DriveErrorLimit, VerificationLimits};
+
+/// The result of a verification, which [`Model::verify`] returns.
+pub struct ModelVerification {
+    /// Name of the model.
+    pub model: String,
+    /// All checks, by scope: recordings, drives, parameters, effects.
+    pub checks: Vec<VerificationCheck>,
+    /// The limits that were used.
+    pub limits: VerificationLimits,
+    /// The diagnosis of all recordings together, or the reason why there is none.
+    pub diagnosis: Result<DiagnosisFindings, Error>,
+}
+
+impl Model {
+    /// Tests the model, with the values of [`Model::nominal`], against recordings. All recordings are diagnosed together.
+    ///
+    /// Fails when the job is cancelled, or when a recording contains a pose that the mechanism cannot reach.
+    ///
+    /// ```
+    /// use modelmill::Model;
+    /// use modelmill::recording::RecordingOptions;
+    /// use modelmill::verify::{CheckState, VerificationLimits};
+    ///
+    /// let model = Model::open("../model-spec/models/spidermill.toml")?;
+    /// let run = model.recording("../recordings/spidermill-mbs/with-rods-check.csv", &RecordingOptions::default())?;
+    /// // The model lacks the inertia of the rods.
+    /// let verified = model.verify(&[&run], &VerificationLimits::default())?;
+    /// assert_eq!(verified.state(), CheckState::Fail);
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
+    pub fn verify(&self, recordings: &[&PreparedRecording], limits: &VerificationLimits) -> Outcome<ModelVerification> {
+        let diagnosis = match self.diagnose(recordings, &[], &DiagnosisOptions::default()) {
+            Err(Error::Cancelled) => return Err(Error::Cancelled),
+            found => found,
+        };
+        let reason = diagnosis.as_ref().err().map(ToString::to_string).unwrap_or_default();
+        let findings = diagnosis.as_ref().map_err(|_| reason.as_str());
+        let mut checks = recordings::check_recordings(recordings, findings);
+        for one in recordings {
+            checks.extend(drives::check_drives(self, one, limits, findings.ok())?);
+        }
+        checks.extend(parameters::check_parameters(self, recordings, limits, findings)?);
+        checks.extend(effects::check_effects(limits, findings));
+        Ok(ModelVerification {
+            model: self.name.clone(),
+            checks,
+            limits: limits.clone(),
+            diagnosis,
+        })
+    }
+}
+
+impl ModelVerification {
+    /// The result: fail if a check fails. Pass if some checks pass, and all those with a limit of the user do. Otherwise
+    /// the model is not evaluated.
+    pub fn state(&self) -> CheckState {
+        let count = |state: CheckState| self.count(state);
+        let is_open = |one: &VerificationCheck| !one.is_default && one.state == CheckState::NotEvaluated;
+        // The state of recordings says nothing about the model.
+        let passes = |one: &VerificationCheck| one.scope == CheckScope::Drive && one.state == CheckState::Pass;
+        if count(CheckState::Fail) > 0 {
+            CheckState::Fail
+        } else if self.checks.iter().any(is_open) || !self.checks.iter().any(passes) {
+            CheckState::NotEvaluated
+        } else {
+            CheckState::Pass
+        }
+    }
+
+    /// Number of checks with a state.
+    pub fn count(&self, state: CheckState) -> usize {
+        self.checks.iter().filter(|one| one.state == state).count()
+    }
+}
