@@ -12,7 +12,7 @@ use crate::progress::SilentProgress;
 
 use super::constants::CONSTANT_ERROR;
 use super::problem::DiagnosisSolution;
-use super::thresholds::{ZEROS_LEAST_RESIDUAL, ZEROS_MOST_PRODUCTS, ZEROS_MOST_RESIDUAL};
+use super::thresholds::{MOST_ZEROS, ZEROS_LEAST_RESIDUAL, ZEROS_MOST_PRODUCTS, ZEROS_MOST_RESIDUAL};
 
 /// Names of the axes.
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -49,7 +49,8 @@ impl NamedZeros {
     pub(super) fn new(model: &Model) -> Outcome<Option<Self>> {
         let reduction = &model.derivation.reduction;
         let places = zero_coordinates(&model.derivation.mechanism);
-        if places.is_empty() || reduction.products.len() > ZEROS_MOST_PRODUCTS {
+        let is_large = places.len() > MOST_ZEROS || reduction.products.len() > ZEROS_MOST_PRODUCTS;
+        if places.is_empty() || is_large {
             return Ok(None);
         }
         let mut loaded = (*model.loaded).clone();
@@ -101,9 +102,10 @@ impl NamedZeros {
         }
         let ratio = with_zeros.mean_square_residual() / without.mean_square_residual().max(f64::MIN_POSITIVE);
         let [n_new, n_old] = [new, old].map(|one| one.effects.len());
-        let is_unexplained = old.verdict == DiagnosisVerdict::Unexplained;
+        let unexplained = DiagnosisVerdict::Unexplained;
+        let is_solved = old.verdict == unexplained && new.verdict != unexplained;
         (n_new < n_old && ratio < ZEROS_MOST_RESIDUAL)
-            || ((n_new <= n_old || is_unexplained) && ratio < ZEROS_LEAST_RESIDUAL)
+            || ((n_new <= n_old || is_solved) && ratio < ZEROS_LEAST_RESIDUAL)
     }
 
     /// Whether one of these places of an effect is a zero.

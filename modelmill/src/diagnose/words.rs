@@ -270,7 +270,7 @@ pub(super) fn geometry_alternative_text(alternatives: &[GeometryAlternative]) ->
     let errors: Vec<String> = best.errors.iter().map(geometry_error_text).collect();
     let has_zero = best.errors.iter().any(|error| error.zero.is_some());
     let zero = if has_zero {
-        " The file writes 0 there, so the search could not try it."
+        " The file writes such a coordinate as 0."
     } else {
         ""
     };
