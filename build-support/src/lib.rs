@@ -12,9 +12,13 @@
 //! Decision: this is a crate of its own, because `modelmill-codegen` must not read files. Reading files, telling
 //! Cargo when to run again and printing diagnostics belong together, so they have one place.
 
+mod module_cache;
+
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+
+use module_cache::ModuleCache;
 
 /// Why models could not be generated: the model files' own diagnostics, rendered.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -66,7 +70,7 @@ impl Options {
 
 /// Generates a module for every model file that `pattern` names: a file, or a folder with `/*.toml`.
 ///
-/// Writes `models.rs` to the build's output folder, reruns when a model file or one that it extends changes, and ends the
+/// Writes `models.rs` to the build's output folder, derives only models that changed since, reruns when a model file or one that it extends changes, and ends the
 /// build with the model's own diagnostics if one is at fault.
 pub fn generate(pattern: &str) {
     generate_with(pattern, Options::default());
@@ -107,8 +111,9 @@ pub fn try_generate_with(pattern: &str, options: Options, out: &Path) -> Result<
     let mut text = String::new();
     let mut faults = String::new();
     let mut names = BTreeSet::new();
+    let cache = ModuleCache::beside(out);
     for file in &files {
-        match generate_module(file, options) {
+        match generate_module(file, options, cache.as_ref()) {
             Ok((name, module)) if names.insert(name.clone()) => text.push_str(&module),
             Ok((name, _)) => {
                 _ = writeln!(
@@ -148,7 +153,9 @@ fn matching_model_files(pattern: &str) -> Result<Vec<PathBuf>, BuildError> {
     Ok(files)
 }
 
-fn generate_module(file: &Path, options: Options) -> Result<(String, String), BuildError> {
+/// Name and text of the module of a model file. A module that was generated from the same texts before is taken from
+/// the cache.
+fn generate_module(file: &Path, options: Options, cache: Option<&ModuleCache>) -> Result<(String, String), BuildError> {
     let loaded = modelmill_spec::load_file(file);
     let sources = match &loaded {
         Ok(loaded) => &loaded.sources,
@@ -161,6 +168,13 @@ fn generate_module(file: &Path, options: Options) -> Result<(String, String), Bu
     let loaded = loaded.map_err(|failure| BuildError(failure.render(false)))?;
     for line in loaded.render(false).lines() {
         println!("cargo::warning={line}");
+    }
+    let name = loaded.mechanism.name.clone();
+    let key = cache.map(|cache| cache.key(&loaded.sources, options));
+    if let (Some(cache), Some(key)) = (cache, key)
+        && let Some(module) = cache.find_module(&name, key)
+    {
+        return Ok((name, module));
     }
     let derivation = modelmill_codegen::derive(&loaded.mechanism)
         .map_err(|error| BuildError(format!("{}: {error}\n", file.display())))?;
@@ -177,5 +191,9 @@ fn generate_module(file: &Path, options: Options) -> Result<(String, String), Bu
     if options.self_test {
         emitted = emitted.with_self_test(&derivation);
     }
-    Ok((loaded.mechanism.name.clone(), emitted.module()))
+    let module = emitted.module();
+    if let (Some(cache), Some(key)) = (cache, key) {
+        cache.keep_module(&name, key, &module);
+    }
+    Ok((name, module))
 }

@@ -140,3 +140,45 @@ k = { unit = { torque = "kg m^2" }, sign = "any" }
         "{error}"
     );
 }
+
+/// The number of modules that come from the cache, by a mark that is written into every module in it.
+#[test]
+fn a_change_of_one_model_derives_that_model_alone() {
+    let other = PENDULUM.replace("\"pendulum\"", "\"other\"");
+    let folder = folder("cached", &[("a.toml", PENDULUM), ("b.toml", &other)]);
+    let first = generate(&folder).unwrap();
+    let marked = || {
+        for entry in std::fs::read_dir(folder.join("modelmill-modules")).unwrap() {
+            let path = entry.unwrap().path();
+            let text = std::fs::read_to_string(&path).unwrap().replace("// kept\n", "");
+            std::fs::write(path, text + "// kept\n").unwrap();
+        }
+    };
+    let n_kept = |text: &str| text.matches("// kept").count();
+    assert_eq!(n_kept(&first), 0);
+    // Nothing has changed: both modules are taken from the cache.
+    marked();
+    assert_eq!(n_kept(&generate(&folder).unwrap()), 2);
+    // One model has changed.
+    std::fs::write(folder.join("b.toml"), other.replace("9.81", "1.62")).unwrap();
+    let changed = generate(&folder).unwrap();
+    assert_eq!(n_kept(&changed), 1);
+    assert!(changed.contains("1.62"));
+    // Other options need other modules.
+    let out = folder.join("models.rs");
+    let with_test = Options::default().with_self_test();
+    try_generate_with(&format!("{}/*.toml", folder.display()), with_test, &out).unwrap();
+    assert_eq!(n_kept(&std::fs::read_to_string(out).unwrap()), 0);
+}
+
+/// What a model extends is part of it.
+#[test]
+fn a_change_of_an_extended_model_derives_its_variants() {
+    let variant = "schema = 1\nname = \"variant\"\nextends = \"../base-of-variant/pendulum.toml\"\n";
+    let base = folder("base-of-variant", &[("pendulum.toml", PENDULUM)]);
+    let folder = folder("variant", &[("v.toml", variant)]);
+    let first = generate(&folder).unwrap();
+    std::fs::write(base.join("pendulum.toml"), PENDULUM.replace("9.81", "1.62")).unwrap();
+    let second = generate(&folder).unwrap();
+    assert!(!first.contains("1.62") && second.contains("1.62"));
+}

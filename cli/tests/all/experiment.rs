@@ -1,7 +1,17 @@
 //! The paper's experiment in a reduced form: what the page claims is so.
 
+use std::sync::LazyLock;
+
 use crate::common::{html, json, number, printed, refused, scratch};
 use serde_json::Value;
+
+/// One reduced experiment for all tests: its figures and its page.
+static EXPERIMENT: LazyLock<(Value, String)> = LazyLock::new(|| {
+    let out = folder("experiment");
+    let found = run(&out);
+    let page = std::fs::read_to_string(format!("{out}/experiment.html")).unwrap();
+    (found, page)
+});
 
 /// A folder that is fresh for this test.
 fn folder(name: &str) -> String {
@@ -42,10 +52,9 @@ fn same(list: &Value, expected: [f64; 5], tolerance: f64) {
 
 #[test]
 fn the_error_of_the_papers_treatment_is_the_force_of_the_misplaced_mass() {
-    let out = folder("experiment");
-    let found = run(&out);
+    let (found, page) = &*EXPERIMENT;
     for run in ["identification", "verification"] {
-        let of = |rig: &str, path: &str| number(&found, &format!("/{rig}/{run}/{path}"));
+        let of = |rig: &str, path: &str| number(found, &format!("/{rig}/{run}/{path}"));
         for drive in [0, 1] {
             // Nothing is lost by the reduction.
             let nrms = of("spidermill_full", &format!("consistent/calculated/{drive}/nrms"));
@@ -68,7 +77,8 @@ fn the_error_of_the_papers_treatment_is_the_force_of_the_misplaced_mass() {
         assert!(remains * remains < 1e-3 && remains < 1e-3, "{remains}");
         assert!(of("spidermill_full", "explained/correlation") > 0.999);
         // Much of what the paper's own identification changed is the same force, also about the mean.
-        assert!(of("spidermill_full", "paper_change/correlation") > 0.5);
+        let correlation = of("spidermill_full", "paper_change/correlation");
+        assert!((0.6..0.85).contains(&correlation), "{run}: {correlation}");
         let variation = of("spidermill_full", "paper_change/explained_variation");
         assert!(variation > 0.1 && variation < 0.9, "{variation}");
         // The check could fail: with rods much is left.
@@ -98,7 +108,7 @@ fn the_error_of_the_papers_treatment_is_the_force_of_the_misplaced_mass() {
         same(&found["spidermill_full"]["p_min"], again, 1e-5);
     }
 
-    the_authors_causes(&found);
+    the_authors_causes(found);
 
     // The paper's own Table 1 is one solution of its base parameters; the other one has negative values.
     let printed = found["table_1_of_the_paper"].as_array().unwrap();
@@ -109,12 +119,13 @@ fn the_error_of_the_papers_treatment_is_the_force_of_the_misplaced_mass() {
         assert!((number(first, &format!("/{k}")) - value).abs() < 1e-6, "{first}");
     }
 
-    // Table 2 with other lengths is at least as close as at the start, and each excitation has a condition number.
-    assert!(number(&found, "/lengths_for_table_2/largest_factor") > 1.0);
+    // Table 2 with other lengths is closer than with those assumed, where errors differ by factors of 3 and more; and each
+    // excitation has a condition number.
+    let factor = number(found, "/lengths_for_table_2/largest_factor");
+    assert!((1.0..2.0).contains(&factor), "{factor}");
     let conditions = found["conditions"].as_array().unwrap();
     assert!(conditions.len() >= 8 && conditions.iter().all(|one| number(one, "/condition_number") > 1.0));
 
-    let page = std::fs::read_to_string(format!("{out}/experiment.html")).unwrap();
     for part in [
         "<svg",
         "Table 2",
@@ -127,7 +138,7 @@ fn the_error_of_the_papers_treatment_is_the_force_of_the_misplaced_mass() {
         assert!(page.contains(part), "no {part}");
     }
     // Nothing is fetched, and nothing failed on the way to the page.
-    html::check(&page);
+    html::check(page);
     for part in ["NaN %", "inf %", ">NaN<"] {
         assert!(!page.contains(part), "{part}");
     }
@@ -154,12 +165,10 @@ fn the_authors_causes(found: &Value) {
 
 #[test]
 fn the_same_options_give_the_same_bytes() {
-    let [one, other] = ["experiment-1", "experiment-2"].map(|name| {
-        let out = folder(name);
-        run(&out);
-        std::fs::read(format!("{out}/experiment.html")).unwrap()
-    });
-    assert!(one == other);
+    let out = folder("experiment-again");
+    run(&out);
+    let again = std::fs::read_to_string(format!("{out}/experiment.html")).unwrap();
+    assert!(again == EXPERIMENT.1);
 }
 
 #[test]

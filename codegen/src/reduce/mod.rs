@@ -183,37 +183,59 @@ fn reduce_exactly(
     let mut found = reduced(&dependences, &mut stream)?;
     // A factor without a value at the file's values divides by a pivot that vanishes there, for example at lengths that
     // are equal on both sides of a machine. The column that it belongs to takes the place of that pivot.
+    let mut tried = vec![sorted(&dependences.pivots)];
     for _ in 0..MOST_EXCHANGES {
-        let Some((product, retained)) = undefined_factor(mechanism, &found) else {
+        let pairs = undefined_factors(mechanism, &found).into_iter();
+        let columns = pairs.map(|pair| pair.map(|at| dependences.shown[at]));
+        let Some(wanted) = next_pivots(&dependences.pivots, columns, &order[..preference.n_named], &tried) else {
             break;
         };
-        let [by, pivot] = [product, retained].map(|at| dependences.shown[at]);
-        if order[..preference.n_named].contains(&pivot) {
-            break;
-        }
-        let wanted: Vec<usize> = (dependences.pivots.iter())
-            .map(|k| if *k == pivot { by } else { *k })
-            .collect();
         let (first, rest): (Vec<usize>, Vec<usize>) = order.iter().partition(|k| wanted.contains(k));
+        tried.push(wanted);
         dependences = DependenceStructure::find_dependences(&regressor, &[first, rest].concat(), &mut stream)?;
         found = reduced(&dependences, &mut stream)?;
     }
     Ok(found)
 }
 
+/// Column numbers in ascending order.
+fn sorted(columns: &[usize]) -> Vec<usize> {
+    let mut columns = columns.to_vec();
+    columns.sort_unstable();
+    columns
+}
+
+/// The next set of pivots, sorted: the first of the `pairs` (column, pivot) is exchanged that replaces no pivot in `named`
+/// and leads to no set in `tried`, so that exchanges never alternate. `None` if there is no such pair.
+fn next_pivots(
+    pivots: &[usize],
+    pairs: impl Iterator<Item = [usize; 2]>,
+    named: &[usize],
+    tried: &[Vec<usize>],
+) -> Option<Vec<usize>> {
+    let allowed = pairs.filter(|[_, pivot]| !named.contains(pivot));
+    let exchanged = allowed.map(|[column, pivot]| {
+        let all: Vec<usize> = pivots.iter().map(|k| if *k == pivot { column } else { *k }).collect();
+        sorted(&all)
+    });
+    let mut exchanged = exchanged.filter(|wanted| !tried.contains(wanted));
+    exchanged.next()
+}
+
 /// Largest number of pivots that are exchanged one by one because they vanish at the file's values. By judgement: both
 /// hands of a humanoid have some ten.
 const MOST_EXCHANGES: usize = 20;
 
-/// The positions of a dependent product and of the retained one whose factor in it has no finite value at the file's
-/// values; `None` if all factors have one.
-fn undefined_factor(mechanism: &Mechanism, found: &BaseReduction) -> Option<(usize, usize)> {
+/// The positions of dependent products and of the retained ones whose factors in them have no finite value at the file's
+/// values.
+fn undefined_factors(mechanism: &Mechanism, found: &BaseReduction) -> Vec<[usize; 2]> {
     let constants: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
     let lines = found.dependencies.iter().zip(found.factors(&constants));
-    lines.into_iter().find_map(|(line, factors)| {
-        let (k, _) = factors.into_iter().find(|(_, factor)| !factor.is_finite())?;
-        Some((line.product, found.retained[k]))
-    })
+    let pairs = lines.flat_map(|(line, factors)| {
+        let undefined = factors.into_iter().filter(|(_, factor)| !factor.is_finite());
+        undefined.map(|(k, _)| [line.product, found.retained[k]])
+    });
+    pairs.collect()
 }
 
 /// A reduction that retains every wanted product with an effect; for uses that need no base.
@@ -235,5 +257,33 @@ pub(crate) fn without_reduction(
         products,
         dependencies: Vec::new(),
         method: ReductionMethod::Unreduced,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two columns, each of which is undefined with the other as pivot: the exchanges end, and other pairs are tried.
+    #[test]
+    fn exchanges_do_not_alternate() {
+        let mut pivots = vec![0, 1];
+        let mut tried = vec![sorted(&pivots)];
+        // Column 2 and pivot 1 ask for each other; column 3 could replace pivot 0.
+        let pairs = |pivots: &[usize]| {
+            let by = if pivots.contains(&1) { [2, 1] } else { [1, 2] };
+            [by, [3, 0]].into_iter()
+        };
+        let mut sets = Vec::new();
+        while let Some(next) = next_pivots(&pivots, pairs(&pivots), &[], &tried) {
+            tried.push(next.clone());
+            sets.push(next.clone());
+            pivots = next;
+            assert!(sets.len() < 10, "{sets:?}");
+        }
+        assert_eq!(sets, [vec![0, 2], vec![2, 3], vec![1, 3]]);
+        // Pivots that the file names stay.
+        assert_eq!(next_pivots(&[0, 1], pairs(&[0, 1]), &[1], &[]), Some(vec![1, 3]));
+        assert_eq!(next_pivots(&[0, 1], pairs(&[0, 1]), &[0, 1], &[]), None);
     }
 }

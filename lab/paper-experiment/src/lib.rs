@@ -29,7 +29,7 @@ use modelmill_identify::excite::Options;
 use modelmill_identify::interpret::PhysicalSolution;
 
 use causes::AuthorCauses;
-use conditions::ConditionRow;
+use conditions::ConditionComparison;
 use replica::LengthSearch;
 use runs::PeriodicTrajectory;
 use study::TreatmentStudy;
@@ -66,7 +66,7 @@ pub struct PaperExperiment {
     /// Lengths and limits with which Table 2 comes closest to the paper's.
     replica: LengthSearch,
     /// The best condition numbers under other assumptions.
-    conditions: Vec<ConditionRow>,
+    conditions: ConditionComparison,
     /// Samples per second, Hz.
     rate: f64,
 }

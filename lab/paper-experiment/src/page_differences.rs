@@ -82,6 +82,7 @@ impl ExperimentPage {
         self.heading("9  The condition number: why it is not the paper's");
         let shown: Vec<Vec<String>> = experiment
             .conditions
+            .rows
             .iter()
             .map(|row| {
                 vec![
@@ -104,6 +105,11 @@ impl ExperimentPage {
         ));
         self.table(&["assumption", "harmonics", "period, s", "condition number"], &shown);
         self.paragraph(&condition_words(experiment));
+        for [change, reason] in &experiment.conditions.without {
+            self.paragraph(&format!(
+                "No excitation was found with this assumption: {change}. {reason}"
+            ));
+        }
     }
 
     /// Chapter 10: lengths and limits for which Table 2 would be the paper's.
@@ -209,7 +215,7 @@ impl ExperimentPage {
 
 /// What the period as a variable and more harmonics gain, and which assumption reaches the paper's condition number.
 fn condition_words(experiment: &PaperExperiment) -> String {
-    let rows = &experiment.conditions;
+    let rows = &experiment.conditions.rows;
     let find = |harmonics: usize, is_free: bool| {
         let wanted = |row: &&ConditionRow| {
             row.harmonics == harmonics

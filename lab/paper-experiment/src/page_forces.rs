@@ -300,13 +300,15 @@ impl ExperimentPage {
             "The paper remarks that peaks of the relative error arise where the force is close to zero. This is \
              confirmed: the force of the left spindle passes through zero {} times in this run. The error does not, \
              so their quotient is unbounded there. The {} of the samples with a force below {} of its root mean \
-             square cause {} of the mean relative error. The median, {}, is not affected by peaks; the mean is {}.",
+             square cause {} of the mean relative error. The median, {}, is not affected by peaks; the mean is {}. The mean \
+             also depends on how near to these zeros samples happen to be: of every second sample alone it is {}.",
             along.zeros(0).len(),
             percent(samples),
             percent(NEAR_ZERO),
             percent(part),
             percent(errors.median_relative),
             percent(errors.mean_relative),
+            percent(along.errors_of_every(2, 0, modelled).mean_relative),
         ));
         let name = drives.first().map_or("", String::as_str);
         self.figure(

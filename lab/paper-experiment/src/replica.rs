@@ -2,8 +2,9 @@
 //! masses. The consistent model with contact points beside the axes of the cranks is the robot; the paper's treatment is
 //! the model. Lengths, pose, size and duration of both motions are varied.
 //!
-//! Decision: random trials within the bounds, then a (1+1) evolution strategy with the rule of a fifth (I. Rechenberg, 1973) are enough: the function is cheap,
-//! has kinks where forces pass through zero, and any point with the paper's figures answers the question.
+//! Decision: random trials within the bounds, then a (1+1) evolution strategy with the rule of a fifth (I. Rechenberg,
+//! 1973) are enough: the function is cheap, has kinks where forces pass through zero, and any point with the paper's
+//! figures answers the question.
 
 use modelmill::{Host, Model, Outcome};
 use modelmill_codegen::{ModelEvaluator, MotionStates};
@@ -260,10 +261,11 @@ fn unit_columns(model: &ModelEvaluator<'_>, states: &MotionStates<'_>, n: usize)
         .collect()
 }
 
-/// Mean of |error| / |force|, the paper's measure.
+/// Mean of |error| / |force|, the paper's measure. Samples with a force of zero have no relative error.
 fn mean_relative<'a>(measured: &[f64], modelled: impl Iterator<Item = &'a f64>) -> f64 {
-    let sum: f64 = measured.iter().zip(modelled).map(|(y, m)| ((y - m) / y).abs()).sum();
-    sum / measured.len() as f64
+    let pairs = measured.iter().zip(modelled).filter(|(y, _)| **y != 0.0);
+    let (sum, n) = pairs.fold((0.0, 0), |(sum, n), (y, m)| (sum + ((y - m) / y).abs(), n + 1));
+    sum / f64::from(n.max(1))
 }
 
 /// The base parameters with the masses of the model file.

@@ -108,7 +108,8 @@ impl PaperExperiment {
                 "mean_relative": self.replica.errors[1],
                 "largest_factor": self.replica.largest_factor(),
             },
-            "conditions": self.conditions.iter().map(|row| {
+            "conditions_without_result": self.conditions.without,
+            "conditions": self.conditions.rows.iter().map(|row| {
                 json!({
                     "change": row.change,
                     "harmonics": row.harmonics,

@@ -53,13 +53,15 @@ impl Default for LimitFactors {
     }
 }
 
-/// The best trajectory within scaled limits, without rounding; `None` if there is none.
+/// The best trajectory within scaled limits, without rounding; otherwise the reason why there is none.
+///
+/// Fails if the user cancels it.
 pub(crate) fn search_within(
     model: &Model,
     options: &Options,
     factors: LimitFactors,
     message: &str,
-) -> Outcome<Option<PeriodicTrajectory>> {
+) -> Outcome<Result<PeriodicTrajectory, String>> {
     let all_limits = limits::merged_limits(model, &[])?;
     let mut coordinates = limits::active_limits(model, &all_limits)?;
     for one in &mut coordinates {
@@ -74,7 +76,8 @@ pub(crate) fn search_within(
     let search = model.host().run_job(message, max_progress_steps(options), |job| {
         excite(&plant, &coordinates, options, &|more| job.flow(more))
     })?;
-    Ok(search.ok().map(|found| PeriodicTrajectory {
+    let found = search.map_err(|error| error.to_string());
+    Ok(found.map(|found| PeriodicTrajectory {
         period: found.series.first().map_or(options.period, FourierSeries::period),
         condition_number: found.condition_number,
         series: found.series,

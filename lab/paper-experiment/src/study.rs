@@ -132,7 +132,12 @@ impl TreatmentRun {
 
     /// Error figures of a drive for modelled forces.
     pub(crate) fn errors(&self, drive: usize, modelled: &DriveColumns) -> DriveErrors {
-        let pairs = || self.measured[drive].iter().zip(&modelled[drive]);
+        self.errors_of_every(1, drive, modelled)
+    }
+
+    /// The same for every k-th sample alone.
+    pub(crate) fn errors_of_every(&self, k: usize, drive: usize, modelled: &DriveColumns) -> DriveErrors {
+        let pairs = || self.measured[drive].iter().zip(&modelled[drive]).step_by(k);
         // Samples with a force of zero have no relative error.
         let mut relative: Vec<f64> = pairs()
             .filter(|(y, _)| **y != 0.0)

@@ -191,7 +191,13 @@ impl DiagnosisFindings {
     /// nothing else to state.
     pub fn verdict_text(&self) -> String {
         let says = if self.unresolved.is_empty() {
-            words::verdict(&self.diagnosis, self.channels(), self.validation)
+            let verdict = words::verdict(&self.diagnosis, self.channels(), self.validation);
+            let more = words::geometry_alternative_text(&self.geometry_alternatives);
+            [Some(verdict), more]
+                .into_iter()
+                .flatten()
+                .collect::<Vec<_>>()
+                .join(" ")
         } else {
             words::unresolved_text(&self.unresolved)
         };
@@ -221,6 +227,7 @@ impl DiagnosisFindings {
             self.possible.clear();
             self.undecided.clear();
             self.off_nominal.clear();
+            self.geometry_alternatives.clear();
             self.regions.clear();
             self.missing.clear();
             self.laws.clear();

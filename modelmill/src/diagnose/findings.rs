@@ -19,12 +19,15 @@ use crate::segment::RecordingSegment;
 use crate::text::table::percent;
 
 use super::added_effects::{self, CompletedModelFile};
+use super::constants::CONSTANT_ERROR;
 use super::corrected::CorrectedRecordings;
 use super::estimates::{EffectEstimate, effect_estimates};
 use super::faults;
+use super::geometry_alternatives::{GeometryAlternative, geometry_alternatives};
 use super::laws::{self, LawHypothesis};
 use super::long_recordings;
 use super::model_versions::ModelVersion;
+use super::named_zeros::{self, NamedZeros};
 use super::off_nominal::{OffNominalParameter, off_nominal_parameters, reversed_sign_note};
 use super::problem::{self, DiagnosisQuery, DiagnosisSolution, FixedParameters};
 use super::requested_effects::NamedEffect;
@@ -93,6 +96,9 @@ pub struct DiagnosisFindings {
     /// The second diagnosis, with all base parameters fixed at their nominal values. `None` if it was not requested,
     /// was not needed because no estimate differs, or the first one has fixed them all already.
     pub with_nominal: Option<NominalDiagnosis>,
+    /// Errors of the geometry that explain as much as the effects in [`Self::missing`] together, the best first.
+    /// Zeros that the model file writes as coordinates of points are among them.
+    pub geometry_alternatives: Vec<GeometryAlternative>,
     /// Regions of large error for the report: ranges of a coordinate, rate, load or time. If the verdict is
     /// [`DiagnosisVerdict::Unexplained`], the error is the residual of the unexplained drives. Otherwise it is the
     /// error of the given model, as in `places`.
@@ -232,25 +238,8 @@ impl Model {
         let between = (self.host()).run_job("comparing the recordings with each other", 0, |_| {
             faults::run_differences(self, &recordings)
         })??;
-        let find = |between: &[RecordingDifference]| {
-            let asked = DiagnosisQuery {
-                fixed: held,
-                in_full: true,
-                run_differences: between,
-            };
-            problem::find_missing_effects(self, &data[0], &data[1], asked)
-        };
-        // The search with differences between recordings; it is repeated without them if there are any.
-        let mut answer = find(&between)?;
         let mut between = between;
-        if !between.is_empty() {
-            // A missing effect may look like a difference between recordings.
-            let without = find(&[])?;
-            if without.mean_square_residual() < DIFFERENCE_LEAST_GAIN * answer.mean_square_residual() {
-                answer = without;
-                between.clear();
-            }
-        }
+        let (answer, named) = search_effects(self, &data, held, &mut between)?;
         let judged = if data[1].is_empty() {
             ValidationMethod::CrossValidation
         } else {
@@ -288,6 +277,7 @@ impl Model {
             undecided: Vec::new(),
             off_nominal: Vec::new(),
             with_nominal: None,
+            geometry_alternatives: Vec::new(),
             regions: Vec::new(),
             before,
             after,
@@ -320,6 +310,7 @@ impl Model {
             findings.notes.push(note);
         }
         findings.regions = regions(&findings);
+        findings.geometry_alternatives = alternatives_to_effects(&findings, named.as_ref(), held)?;
         if question.repeat_with_nominal && held != FixedParameters::All && !findings.off_nominal.is_empty() {
             findings.with_nominal = Some(nominal_diagnosis(&findings, &between)?);
         }
@@ -405,6 +396,7 @@ fn nominal_diagnosis(findings: &DiagnosisFindings, between: &[RecordingDifferenc
         fixed: FixedParameters::All,
         in_full: false,
         run_differences: between,
+        zeros: None,
     };
     let answer = problem::find_missing_effects(&version.model, &of(false), &of(true), asked)?;
     let missing =
@@ -413,6 +405,75 @@ fn nominal_diagnosis(findings: &DiagnosisFindings, between: &[RecordingDifferenc
         missing: missing.collect(),
         diagnosis: answer.diagnosis,
     })
+}
+
+/// The search for missing effects, with differences `between` recordings, which are cleared if a search without them
+/// explains more. It is repeated with zeros of the model file as candidates where these may be wrong; these zeros are
+/// returned as well.
+///
+/// Fails as [`Model::diagnose`] does.
+fn search_effects(
+    model: &Model,
+    data: &[Vec<RecordingSegment>; 2],
+    held: FixedParameters,
+    between: &mut Vec<RecordingDifference>,
+) -> Outcome<(DiagnosisSolution, Option<NamedZeros>)> {
+    let find = |between: &[RecordingDifference], zeros: Option<&NamedZeros>| {
+        let asked = DiagnosisQuery {
+            fixed: held,
+            in_full: true,
+            run_differences: between,
+            zeros,
+        };
+        problem::find_missing_effects(model, &data[0], &data[1], asked)
+    };
+    // The search with differences between recordings; it is repeated without them if there are any.
+    let mut answer = find(between, None)?;
+    if !between.is_empty() {
+        // A missing effect may look like a difference between recordings.
+        let without = find(&[], None)?;
+        if without.mean_square_residual() < DIFFERENCE_LEAST_GAIN * answer.mean_square_residual() {
+            answer = without;
+            between.clear();
+        }
+    }
+    // Zeros of the file may be wrong as well. They have no names, so they are tried only where something was found.
+    let is_explained = answer.diagnosis.verdict == DiagnosisVerdict::Adequate;
+    let named = if is_explained { None } else { NamedZeros::new(model)? };
+    if let Some(named) = &named
+        && named_zeros::needs_search(&answer)
+    {
+        let with_zeros = find(between, Some(named))?;
+        if named.is_better(&with_zeros, &answer) {
+            answer = with_zeros;
+        }
+    }
+    Ok((answer, named))
+}
+
+/// Errors of the geometry that explain as much as all effects found together.
+///
+/// Fails when it is cancelled.
+fn alternatives_to_effects(
+    findings: &DiagnosisFindings,
+    named: Option<&NamedZeros>,
+    held: FixedParameters,
+) -> Outcome<Vec<GeometryAlternative>> {
+    // Zeros that are claimed were compared with the others by the search.
+    let is_zero = |one: &MissingEffect| named.is_some_and(|named| named.has_place(&one.effect.at));
+    if findings.missing.is_empty() || findings.missing.iter().any(is_zero) {
+        return Ok(Vec::new());
+    }
+    let wrong = findings.missing.iter().filter(|one| one.effect.kind == CONSTANT_ERROR);
+    let places: Vec<&str> = wrong.flat_map(|one| one.effect.at.iter().map(String::as_str)).collect();
+    // Constants are compared by the same fit, other effects by what remains after them.
+    let constants = if places.len() == findings.missing.len() {
+        places
+    } else {
+        Vec::new()
+    };
+    let remaining = findings.answer.mean_square_residual();
+    geometry_alternatives(&findings.before, named, held, &constants, remaining)
 }
 
 /// Effects with estimates, alternatives and the experiment that separates them.

@@ -20,7 +20,9 @@
 //! 9. `model_versions`: identifies the models without and with the effects, and evaluates them along all recordings.
 //! 10. `off_nominal`: lists base parameters whose estimates differ from the nominal values.
 //! 11. `laws`: lists force laws that are in no library and would explain the residual.
-//! 12. `findings`: collects the results; `completed` gives the completed model file.
+//! 12. `geometry_alternatives`: lists errors of the geometry that explain as much as the effects found; `named_zeros` makes
+//!     zeros of the model file constants for this.
+//! 13. `findings`: collects the results; `completed` gives the completed model file.
 //!
 //! In addition, `requested_effects` derives and evaluates effects that the user names, `words` writes sentences, and
 //! `thresholds` contains the decision thresholds.
@@ -38,11 +40,13 @@ mod estimates;
 mod faults;
 mod findings;
 mod gears;
+mod geometry_alternatives;
 mod held_friction;
 mod laws;
 mod long_recordings;
 mod memory;
 mod model_versions;
+mod named_zeros;
 pub(crate) mod numbers;
 mod off_nominal;
 mod payloads;
@@ -58,6 +62,7 @@ pub use estimates::EffectEstimate;
 pub use findings::{
     DiagnosisFindings, DiagnosisOptions, MissingEffect, NominalDiagnosis, SeparationProposal, UndecidedEffect,
 };
+pub use geometry_alternatives::{GeometryAlternative, GeometryError};
 pub use laws::{LawEntry, LawHypothesis, ProposedLaw};
 pub use model_versions::{ForceComparison, ModelVersion};
 pub use modelmill_identify::diagnose::{

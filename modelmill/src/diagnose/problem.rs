@@ -29,6 +29,7 @@ use super::gears::gears;
 use super::held_friction;
 use super::laws::sites;
 use super::memory::dahl_candidates;
+use super::named_zeros::NamedZeros;
 use super::numbers::{layout, stack, variables};
 use super::payloads::{frame_loads, load_changes, payloads, reach};
 use super::thresholds::FEWEST_SAMPLES;
@@ -89,6 +90,8 @@ pub(crate) struct DiagnosisQuery<'a> {
     pub in_full: bool,
     /// Differences between the recordings.
     pub run_differences: &'a [RecordingDifference],
+    /// Zeros of the model file that are candidates as wrong constants.
+    pub zeros: Option<&'a NamedZeros>,
 }
 
 /// Finds the effects that a model lacks; `fit` are the fitted recordings, `check` the validation runs.
@@ -136,7 +139,7 @@ pub(crate) fn find_missing_effects(
     further.extend(encoders::zeros(model, &slopes));
     further.extend(encoders(model, &all, &problem, &slopes));
     further.extend(gears(model, &all, &values, &slopes)?);
-    further.extend(constants(model, &all, &|k| is_fixed(model, held, k)));
+    further.extend(constants(model, &all, asked.zeros, &|k| is_fixed(model, held, k)));
     further.extend(other_friction);
     if asked.in_full {
         if held == FixedParameters::All || problem.base.is_empty() {

@@ -90,3 +90,39 @@ pub(super) const SHARED_FAULT_LEAST_SCORE: f64 = 0.3;
 pub(super) const ESTIMATE_FEWEST_DIGITS: usize = 5;
 /// Most significant digits of an estimate. By judgement: recordings have at most this many.
 pub(super) const ESTIMATE_MOST_DIGITS: usize = 9;
+
+/// Errors of the geometry are alternatives to the effects found if their squared residual is at most this many times
+/// that with the effects (1). In 0.3 % of noise, other constants than the true one leave 1.3 times as much and more
+/// (`lab/numpy-plant`). By judgement.
+pub(super) const ALTERNATIVE_MOST_RESIDUAL: f64 = 1.05;
+
+/// Part of the squared residual of the given model (1) that their fit may leave in addition, since it ends after few
+/// rounds. By judgement.
+pub(super) const ALTERNATIVE_ROUNDING: f64 = 1e-7;
+
+/// Largest error of a length as a part of the machine's size, or of an angle as a part of a radian (1), that counts as an
+/// alternative: larger ones would be seen. By judgement.
+pub(super) const ALTERNATIVE_MOST_ERROR: f64 = 0.1;
+
+/// Alternatives are searched only if the effects found explain at least this part of the squared residual (1): with
+/// less, any error would seem to explain as much. By judgement.
+pub(super) const ALTERNATIVE_LEAST_GAIN: f64 = 0.1;
+
+/// A search with zeros as candidates replaces the one without, if it needs fewer effects and its mean square residual is
+/// at most this many times as large (1). By judgement.
+pub(super) const ZEROS_MOST_RESIDUAL: f64 = 1.05;
+
+/// It also replaces it with as many effects, or where something was unexplained, if its mean square residual is below
+/// this part (1). By judgement.
+pub(super) const ZEROS_LEAST_RESIDUAL: f64 = 0.8;
+
+/// Most alternatives that are reported. By judgement: more do not help to decide what to measure.
+pub(super) const MOST_ALTERNATIVES: usize = 3;
+
+/// A model with more products of parameters than this is not derived again for zeros of its file: the derivation of a
+/// Gough-Stewart platform with 142 takes 17 s, that of all other bundled models below 1 s.
+pub(super) const ZEROS_MOST_PRODUCTS: usize = 100;
+
+/// Most zeros that are named; with more, too many sets of errors explain the same. By judgement: the legs of a delta
+/// robot have twelve.
+pub(super) const MOST_ZEROS: usize = 12;

@@ -11,6 +11,7 @@ use crate::text::table::{percent, significant};
 
 use super::disturbance_words::what_changes;
 pub use super::disturbance_words::{disturbance, disturbance_sentences};
+use super::geometry_alternatives::{GeometryAlternative, GeometryError};
 use super::thresholds::{HARDLY_LOWER, NOISE_FREE_ROUNDINGS};
 
 /// Kinds of changes during a recording.
@@ -261,6 +262,27 @@ pub fn verdict(diagnosis: &ModelDiagnosis, channels: &[String], judged: Validati
     // Suspicions come first, since they may make the verdict wrong.
     let all = [first_checks(diagnosis), Some(says), disturbances(diagnosis, channels)];
     all.into_iter().flatten().collect::<Vec<_>>().join(" ")
+}
+
+/// The sentence about the best error of the geometry that explains as much as the effects found; `None` if there is none.
+pub(super) fn geometry_alternative_text(alternatives: &[GeometryAlternative]) -> Option<String> {
+    let best = alternatives.first()?;
+    let errors: Vec<String> = best.errors.iter().map(geometry_error_text).collect();
+    let has_zero = best.errors.iter().any(|error| error.zero.is_some());
+    let zero = if has_zero {
+        " The file writes such a coordinate as 0."
+    } else {
+        ""
+    };
+    Some(format!(
+        "Errors of the geometry explain this as well: {}.{zero} Measure the lengths before you change the model.",
+        joined_by_and(&errors)
+    ))
+}
+
+/// An error of the geometry with its value.
+pub(crate) fn geometry_error_text(error: &GeometryError) -> String {
+    format!("{} off by {} {}", error.name(), significant(error.value, 3), error.unit)
 }
 
 /// The verdict where something stays unexplained: effects that were found and how the error falls (`falls`), then what

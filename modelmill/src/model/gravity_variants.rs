@@ -38,10 +38,12 @@ impl Model {
             let host = self.host.clone().with_progress(Arc::new(SilentProgress));
             let loaded = host.load_text(Path::new(&self.path), &text)?;
             let derived = host.derive(&self.path, loaded)?;
-            if known.len() < MOST_KEPT {
-                let model = derived.clone();
-                known.push(GravityVariant { bits, model });
+            // The oldest one makes room, so that a direction that recordings ask for again stays.
+            if known.len() >= MOST_KEPT {
+                known.remove(0);
             }
+            let model = derived.clone();
+            known.push(GravityVariant { bits, model });
             derived
         };
         // Values may differ between clones that share the derivations.
@@ -63,6 +65,13 @@ mod tests {
         assert!(Arc::ptr_eq(&first.derivation, &second.derivation));
         assert_eq!(second.gravity().map(f64::to_bits), side.map(f64::to_bits));
         assert_ne!(first.nominal, second.nominal);
+        // The latest directions are kept, however many there are.
+        for k in 0..=MOST_KEPT {
+            let tilted = [0.1 * (k as f64 + 1.0), 9.81, 0.0];
+            let [one, again] = [(); 2].map(|()| model.with_gravity(tilted).unwrap());
+            assert!(Arc::ptr_eq(&one.derivation, &again.derivation), "{k}");
+        }
+        assert_eq!(model.gravity_variants.0.lock().unwrap().len(), MOST_KEPT);
         // Another direction is another derivation.
         let up = model.with_gravity([0.0, 9.81, 0.0]).unwrap();
         assert!(!Arc::ptr_eq(&first.derivation, &up.derivation));

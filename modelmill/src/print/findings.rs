@@ -29,6 +29,8 @@ impl DiagnosisFindings {
     /// - `unresolved`: faults of the recordings that could not be corrected; nothing else is stated then
     /// - `steps`: errors after each added effect, on fitted (`fit`) and validation data (`check`)
     /// - `effects`: missing effects with estimates, probability, what supports them, and alternatives
+    /// - `geometry_alternatives`: errors of the geometry that explain as much as the effects found (`share`, 1 for as
+    ///   much): each a constant, or a coordinate of a point that the file writes as zero
     /// - `possible`: the same for effects with a probability below 0.5, which the model is not said to lack
     /// - `candidates`: all effects that were tried, with the share of the squared error that each explains
     ///   alone and the reason of its rejection
@@ -125,6 +127,7 @@ impl DiagnosisFindings {
             "unresolved": self.unresolved.iter().map(|fault| fault.json(spelling)).collect::<Vec<_>>(),
             "steps": steps(&diagnosis.steps),
             "effects": described(&self.missing),
+            "geometry_alternatives": self.geometry_alternatives_json(),
             "possible": described(&self.possible),
             "candidates": candidates,
             "untold": self.undecided.iter().map(|one| {
@@ -202,6 +205,7 @@ impl DiagnosisFindings {
         lines.push(format!("  {}", words::noise_floor_text(diagnosis)));
         self.missing_text(style, spelling, &mut lines);
         self.sums_text(&mut lines);
+        self.geometry_alternatives_text(style, &mut lines);
         self.possible_text(style, &mut lines);
         self.disturbances_text(style, &mut lines);
         self.regions_text(style, &mut lines);

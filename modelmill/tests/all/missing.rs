@@ -97,6 +97,76 @@ fn a_length_that_is_off_is_found_while_base_parameters_are_fixed() {
     }
 }
 
+/// The contact point of a spindle beside the axis of its crank, and the end of a coupler beside its axis: the file writes
+/// 0 there. Neither effects nor other constants are claimed in its place.
+#[test]
+fn a_zero_of_the_file_that_is_wrong_is_found_with_its_value() {
+    const ROBOT: &str = "spidermill";
+    let text = std::fs::read_to_string(bundled(ROBOT)).expect("a model");
+    let given = Model::open(bundled(ROBOT)).expect("the model");
+    for (seed, point, place, value) in [(740, "A_right", "\"dA\", 0", 0.02), (741, "R3m", "\"d3\", 0", -0.02)] {
+        let entry = format!("name = \"{point}\"");
+        let (before, after) = text.split_once(&entry).expect("the point");
+        let other = before.to_owned() + &entry + &after.replacen(place, &place.replace('0', &value.to_string()), 1);
+        let truth = Model::from_text("other", &other).expect("the model");
+        let file = run_of(&truth, ROBOT, seed, Made::Nothing);
+        let recording = given
+            .recording(&file, &RecordingOptions::default())
+            .expect("a recording");
+        let findings = given
+            .diagnose(&[&recording], &[], &DiagnosisOptions::default())
+            .expect("an answer");
+        near(
+            only(&findings, "constant_error", &format!("y of {point}")),
+            "error",
+            value,
+            0.1,
+        );
+    }
+}
+
+/// Both contact points 20 mm beside their axes: two wrong constants explain nearly as much, so both explanations are
+/// named.
+#[test]
+fn wrong_zeros_are_alternatives_to_wrong_constants() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/seventeen-bodies");
+    let files = ["fit", "check"].map(|name| folder.join(format!("contact-20mm-{name}.csv.gz")));
+    if !files[0].exists() {
+        eprintln!("../shared/data/seventeen-bodies is absent: nothing is tested");
+        return;
+    }
+    let model = Model::open(bundled("spidermill")).expect("the model");
+    let recordings = files.map(|file| {
+        model
+            .recording(&file, &RecordingOptions::default())
+            .expect("a recording")
+    });
+    for fixed in [FixedParameters::Known, FixedParameters::All] {
+        let question = DiagnosisOptions {
+            fixed,
+            repeat_with_nominal: false,
+        };
+        let findings = model
+            .diagnose(&[&recordings[0]], &[&recordings[1]], &question)
+            .expect("an answer");
+        let names = ["y of A_left", "y of A_right"];
+        let claimed = |name: &&str| findings.missing.iter().any(|one| one.effect.at == [(*name).to_owned()]);
+        let is_named = findings.geometry_alternatives.iter().any(|one| {
+            let errors = one.errors.iter().map(|error| (error.name(), error.value.abs()));
+            errors
+                .clone()
+                .all(|(name, value)| names.contains(&name.as_str()) && (value - 0.02).abs() < 2e-3)
+                && errors.count() == 2
+        });
+        assert!(
+            names.iter().all(claimed) || is_named,
+            "{:#?} {:#?}",
+            findings.missing,
+            findings.geometry_alternatives
+        );
+    }
+}
+
 #[test]
 fn a_gear_that_yields_is_found_with_its_compliance() {
     let file = run(ARM, 730, Made::Yields(1, 4e-4));

@@ -1,0 +1,363 @@
+//! Errors of the geometry that explain the recordings as well as the effects do that were found: constants, and zeros
+//! that the model file writes as coordinates of points. The given model along the recordings goes in, sets of such
+//! errors come out.
+//!
+//! All errors are compared in one fit (separable least squares, G. H. Golub and V. Pereyra, 1973): estimated base
+//! parameters are projected out, and sets of one or two errors are tried.
+
+use modelmill_codegen::ModelEvaluator;
+use modelmill_identify::diagnose::ForceColumn;
+use nalgebra::{DMatrix, DVector};
+
+use crate::error::Outcome;
+use crate::model::Model;
+use crate::regressors::regressor;
+use crate::segment::RecordingSegment;
+
+use super::model_versions::{ForceComparison, ModelVersion};
+use super::named_zeros::NamedZeros;
+use super::payloads::reach;
+use super::problem::FixedParameters;
+use super::thresholds::{
+    ALTERNATIVE_LEAST_GAIN, ALTERNATIVE_MOST_ERROR, ALTERNATIVE_MOST_RESIDUAL, ALTERNATIVE_ROUNDING, MOST_ALTERNATIVES,
+};
+
+/// Step of the differences, as a part of the machine's size or of a radian.
+const STEP: f64 = 1e-3;
+/// Rounds of Gauss-Newton; the slopes stay those at the model file's values, so each round gains some two digits.
+const ROUNDS: usize = 5;
+/// Sets are fitted if their residual would be below the limit by linear slopes, with this part of the given squared
+/// residual as margin.
+const LINEAR_MARGIN: f64 = 0.02;
+/// Most sets of one size that are fitted.
+const MOST_FITS: usize = 10;
+/// A set of two errors ranks before one if it leaves less than this part of its squared residual.
+const SECOND_ERROR_GAIN: f64 = 2.0;
+/// Two columns count as parallel if the sine of the angle between them is below this.
+const PARALLEL: f64 = 1e-3;
+
+/// A length or angle of the model file with its error.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GeometryError {
+    /// The constant; `None` for a zero that the file writes as a coordinate of a point.
+    pub constant: Option<String>,
+    /// Point and axis of a coordinate that the file writes as zero.
+    pub zero: Option<(String, &'static str)>,
+    /// The error: what must be added to the value of the file.
+    pub value: f64,
+    /// Its unit.
+    pub unit: String,
+}
+
+/// Errors of the geometry that explain the recordings as well as the effects that were found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GeometryAlternative {
+    /// The errors, one or two.
+    pub errors: Vec<GeometryError>,
+    /// What they explain of the squared residual that the effects found explain, 1 for all of it.
+    pub share: f64,
+}
+
+/// The alternatives to the effects that were found, the best first. `constants` are the names of all of them if they are
+/// wrong constants, else empty; `remaining` is the mean square residual with them, relative to the forces. Empty if there
+/// are none, or if the model has no nominal values.
+///
+/// Fails only when the job is cancelled.
+pub(super) fn geometry_alternatives(
+    version: &ModelVersion,
+    named: Option<&NamedZeros>,
+    held: FixedParameters,
+    constants: &[&str],
+    remaining: f64,
+) -> Outcome<Vec<GeometryAlternative>> {
+    let job = (version.model.host()).run_job("comparing errors of the geometry", 0, |_| {
+        let comparison = GeometryComparison::new(version, named, held)?;
+        Some(comparison.alternatives(named, constants, remaining))
+    })?;
+    Ok(job.unwrap_or_default())
+}
+
+/// One error of the geometry in the comparison.
+struct ComparedError {
+    /// Index of its constant in the model with named zeros.
+    constant: usize,
+    /// The size that its error may have, m or rad.
+    size: f64,
+    /// Its force per unit of the error, without the part that estimated base parameters explain.
+    slope: DVector<f64>,
+}
+
+/// Some errors with their values.
+struct ErrorFit {
+    /// Their indices.
+    set: Vec<usize>,
+    /// Their values, m or rad.
+    values: Vec<f64>,
+    /// The squared residual that they leave.
+    residual: f64,
+}
+
+/// All errors of the geometry along the recordings.
+struct GeometryComparison<'a> {
+    /// The model with named zeros.
+    varied: &'a Model,
+    /// Its base parameters that are estimated.
+    estimated: Vec<usize>,
+    /// The recordings.
+    data: Vec<(&'a RecordingSegment, bool)>,
+    /// Values of its constants.
+    constants: Vec<f64>,
+    /// Nominal values of the dynamic parameters.
+    parameters: Vec<f64>,
+    /// Reciprocals of the rms forces of the drives, 1/N or 1/(N m).
+    weights: Vec<f64>,
+    /// The forces that the model must explain, less those at the nominal constants where base parameters are fixed.
+    target: DVector<f64>,
+    /// The squared residual at the nominal constants.
+    given: f64,
+    /// The errors.
+    errors: Vec<ComparedError>,
+}
+
+impl<'a> GeometryComparison<'a> {
+    /// Evaluates each error by central differences; `None` where the forces cannot be compared.
+    fn new(version: &'a ModelVersion, named: Option<&'a NamedZeros>, held: FixedParameters) -> Option<Self> {
+        let model = &version.model;
+        let varied = named.map_or(model, |named| &named.model);
+        let n_drives = varied.drives().len();
+        // Forces drive by drive, all recordings one after the other.
+        let stacked = |of: &dyn Fn(&ForceComparison, usize) -> Vec<f64>| -> Vec<Vec<f64>> {
+            let column = |d| version.runs.iter().flat_map(|run| of(run, d)).collect();
+            (0..n_drives).map(column).collect()
+        };
+        let measured = stacked(&|run, d| run.measured[d].clone());
+        let rms = |column: &Vec<f64>| (column.iter().map(|x| x * x).sum::<f64>() / column.len().max(1) as f64).sqrt();
+        let mechanism = &varied.derivation.mechanism;
+        let is_estimated = |k: &usize| held == FixedParameters::Known && !model.is_known(*k);
+        let position = |k: usize| named.map_or(k, |named| named.positions[k]);
+        let mut comparison = Self {
+            varied,
+            estimated: (0..model.base.len()).filter(is_estimated).map(position).collect(),
+            data: (version.data.iter().zip(&version.runs))
+                .map(|(data, run)| (data, run.is_check))
+                .collect(),
+            constants: mechanism.constants.iter().map(|c| c.value).collect(),
+            parameters: mechanism.parameters.iter().map(|p| p.nominal).collect(),
+            weights: measured
+                .iter()
+                .map(|force| 1.0 / rms(force).max(f64::MIN_POSITIVE))
+                .collect(),
+            target: DVector::zeros(0),
+            given: 0.0,
+            errors: Vec::new(),
+        };
+        comparison.target = comparison.weighted(&measured);
+        let nominal = comparison.forces_and_basis(&[])?;
+        // Fixed parameters may have other values than the nominal ones: only changes of the force count then.
+        if comparison.estimated.is_empty() {
+            let errors = stacked(&|run, d| run.error(d));
+            comparison.target = comparison.weighted(&errors) + &nominal.0;
+        }
+        comparison.given = comparison.residual(&[])?.norm_squared();
+        for (k, constant) in mechanism.constants.iter().enumerate() {
+            let size = match constant.unit.as_str() {
+                "m" => reach(mechanism),
+                "rad" => 1.0,
+                _ => continue,
+            };
+            let step = STEP * size;
+            let sides = [-step, step].map(|step| comparison.forces_and_basis(&[(k, step)]));
+            let [Some((back, _)), Some((ahead, _))] = sides else {
+                continue;
+            };
+            let slope = without_basis(nominal.1.as_ref(), (ahead - back) / (2.0 * step));
+            if slope.iter().all(|x| x.is_finite()) && slope.norm() * size > 0.0 {
+                comparison.errors.push(ComparedError {
+                    constant: k,
+                    size,
+                    slope,
+                });
+            }
+        }
+        Some(comparison)
+    }
+
+    /// Columns by drive as one vector, each drive divided by its rms force.
+    fn weighted(&self, columns: &[Vec<f64>]) -> DVector<f64> {
+        let weighted = columns.iter().zip(&self.weights);
+        DVector::from_vec(
+            weighted
+                .flat_map(|(column, w)| column.iter().map(move |x| w * x))
+                .collect(),
+        )
+    }
+
+    /// For some changed constants: weighted forces for nominal dynamic parameters, and an orthonormal basis of the forces
+    /// of estimated base parameters. `None` if a pose has no solution.
+    fn forces_and_basis(&self, changes: &[(usize, f64)]) -> Option<(DVector<f64>, Option<DMatrix<f64>>)> {
+        let mut constants = self.constants.clone();
+        for (k, change) in changes {
+            constants[*k] += change;
+        }
+        let derivation = &self.varied.derivation;
+        let base = derivation.base_values(&self.parameters, &constants);
+        let evaluator = ModelEvaluator::with_constants(derivation, constants);
+        let columns = regressor(&self.data, &evaluator, self.varied).ok()?;
+        let n = self.target.len() / self.weights.len().max(1);
+        let dense = |column: &ForceColumn| {
+            let channels = column.0.iter();
+            let dense: Vec<Vec<f64>> = channels.map(|x| x.clone().unwrap_or_else(|| vec![0.0; n])).collect();
+            self.weighted(&dense)
+        };
+        let columns: Vec<DVector<f64>> = columns.iter().map(dense).collect();
+        let mut sum = DVector::zeros(self.target.len());
+        for (column, value) in columns.iter().zip(base) {
+            if column.len() != sum.len() {
+                return None;
+            }
+            sum += value * column;
+        }
+        let estimated: Vec<DVector<f64>> = self.estimated.iter().map(|k| columns[*k].clone()).collect();
+        let basis = (!estimated.is_empty()).then(|| DMatrix::from_columns(&estimated).qr().q());
+        sum.iter().all(|x| x.is_finite()).then_some((sum, basis))
+    }
+
+    /// The residual with some changed constants and the best estimates of base parameters.
+    fn residual(&self, changes: &[(usize, f64)]) -> Option<DVector<f64>> {
+        let (forces, basis) = self.forces_and_basis(changes)?;
+        let left = without_basis(basis.as_ref(), &self.target - forces);
+        left.iter().all(|x| x.is_finite()).then_some(left)
+    }
+
+    /// The values of some errors by Gauss-Newton; `None` if their columns are parallel, or an error is too large to be
+    /// one.
+    fn fit(&self, set: &[usize]) -> Option<ErrorFit> {
+        if set.is_empty() {
+            return None;
+        }
+        let columns: Vec<DVector<f64>> = set.iter().map(|k| self.errors[*k].slope.normalize()).collect();
+        let matrix = DMatrix::from_columns(&columns);
+        let svd = matrix.svd(true, true);
+        if svd.singular_values.min() < PARALLEL {
+            return None;
+        }
+        let mut values = vec![0.0; set.len()];
+        let mut left = self.residual(&[])?;
+        for _ in 0..ROUNDS {
+            let step = svd.solve(&left, 0.0).ok()?;
+            for ((value, step), k) in values.iter_mut().zip(step.iter()).zip(set) {
+                *value += step / self.errors[*k].slope.norm();
+            }
+            let mut pairs = set.iter().zip(&values);
+            if pairs.any(|(k, x)| x.abs() > ALTERNATIVE_MOST_ERROR * self.errors[*k].size) {
+                return None;
+            }
+            let constants = set.iter().map(|k| self.errors[*k].constant);
+            let changes: Vec<(usize, f64)> = constants.zip(values.iter().copied()).collect();
+            left = self.residual(&changes)?;
+        }
+        Some(ErrorFit {
+            set: set.to_vec(),
+            values,
+            residual: left.norm_squared(),
+        })
+    }
+
+    /// The squared residual that a set would leave if forces were linear in the errors; decides which sets are fitted.
+    fn linear_residual(&self, set: &[usize], given: &DVector<f64>) -> f64 {
+        let gram = DMatrix::from_fn(set.len(), set.len(), |i, j| {
+            self.errors[set[i]].slope.dot(&self.errors[set[j]].slope)
+        });
+        let right = DVector::from_iterator(set.len(), set.iter().map(|k| self.errors[*k].slope.dot(given)));
+        self.given - gram.lu().solve(&right).map_or(0.0, |values| values.dot(&right))
+    }
+
+    /// Sets of one error, or of two, that leave no more than the effects found. Wrong constants are compared by the same
+    /// fit; for other effects, `remaining` is the mean square residual relative to the forces.
+    fn alternatives(&self, named: Option<&NamedZeros>, constants: &[&str], remaining: f64) -> Vec<GeometryAlternative> {
+        let name = |k: usize| {
+            self.varied.derivation.mechanism.constants[self.errors[k].constant]
+                .name
+                .as_str()
+        };
+        let all = 0..self.errors.len();
+        let (known, others): (Vec<usize>, Vec<usize>) = all.partition(|k| constants.contains(&name(*k)));
+        let by_constants = self.fit(&known).filter(|_| known.len() == constants.len());
+        let n_samples = self.target.len() as f64 / self.weights.len().max(1) as f64;
+        let found = by_constants.map_or(n_samples * remaining, |fit| fit.residual);
+        let explained = self.given - found;
+        if explained < ALTERNATIVE_LEAST_GAIN * self.given {
+            return Vec::new();
+        }
+        let most = ALTERNATIVE_MOST_RESIDUAL * found + ALTERNATIVE_ROUNDING * self.given;
+        let mut fits = self.sufficient_fits(&others, most);
+        // A second error must reduce the residual much to be worth it.
+        let rank = |fit: &ErrorFit| fit.residual * SECOND_ERROR_GAIN.powi(i32::from(fit.set.len() > 1));
+        fits.sort_by(|a, b| rank(a).total_cmp(&rank(b)));
+        fits.truncate(MOST_ALTERNATIVES);
+        let described = fits.into_iter().map(|fit| GeometryAlternative {
+            errors: (fit.set.iter().zip(&fit.values))
+                .map(|(k, value)| self.describe_error(named, *k, *value))
+                .collect(),
+            share: (self.given - fit.residual) / explained,
+        });
+        described.collect()
+    }
+
+    /// The sets of one or two errors that leave at most a given squared residual. Pairs with an error that is sufficient
+    /// alone are left out.
+    fn sufficient_fits(&self, errors: &[usize], most: f64) -> Vec<ErrorFit> {
+        let Some(given) = self.residual(&[]) else {
+            return Vec::new();
+        };
+        let fitted = |sets: Vec<Vec<usize>>| -> Vec<ErrorFit> {
+            let mut promising: Vec<(f64, Vec<usize>)> = (sets.into_iter())
+                .map(|set| (self.linear_residual(&set, &given), set))
+                .filter(|(left, _)| *left <= most + LINEAR_MARGIN * self.given)
+                .collect();
+            promising.sort_by(|a, b| a.0.total_cmp(&b.0));
+            promising.truncate(MOST_FITS);
+            let fits = promising.iter().filter_map(|(_, set)| self.fit(set));
+            fits.filter(|fit| fit.residual <= most).collect()
+        };
+        let mut fits = fitted(errors.iter().map(|k| vec![*k]).collect());
+        let is_sufficient = |k: usize| fits.iter().any(|fit| fit.set == [k]);
+        let rest: Vec<usize> = errors.iter().copied().filter(|k| !is_sufficient(*k)).collect();
+        let pairs = rest.iter().enumerate();
+        let pairs = pairs.flat_map(|(i, a)| rest[i + 1..].iter().map(move |b| vec![*a, *b]));
+        fits.extend(fitted(pairs.collect()));
+        fits
+    }
+
+    /// An error with its name in the model file.
+    fn describe_error(&self, named: Option<&NamedZeros>, k: usize, value: f64) -> GeometryError {
+        let constant = self.errors[k].constant;
+        let own = &self.varied.derivation.mechanism.constants[constant];
+        let zero = named.and_then(|named| named.zero_of_constant(constant));
+        GeometryError {
+            constant: zero.is_none().then(|| own.name.clone()),
+            zero: zero.map(|zero| (zero.point.clone(), zero.axis)),
+            value,
+            unit: own.unit.clone(),
+        }
+    }
+}
+
+/// The part of a vector that the columns of an orthonormal basis do not explain.
+fn without_basis(basis: Option<&DMatrix<f64>>, vector: DVector<f64>) -> DVector<f64> {
+    match basis {
+        Some(q) => &vector - q * q.tr_mul(&vector),
+        None => vector,
+    }
+}
+
+impl GeometryError {
+    /// Its name: that of the constant, or point and axis.
+    pub fn name(&self) -> String {
+        match (&self.constant, &self.zero) {
+            (Some(constant), _) => constant.clone(),
+            (None, Some((point, axis))) => format!("{axis} of {point}"),
+            (None, None) => String::new(),
+        }
+    }
+}

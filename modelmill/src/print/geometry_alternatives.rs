@@ -1,0 +1,45 @@
+//! Errors of the geometry that explain as much as the effects found, as JSON and as text.
+
+use serde_json::{Value, json};
+
+use crate::diagnose::{DiagnosisFindings, words};
+use crate::text::TerminalStyle;
+
+impl DiagnosisFindings {
+    /// Errors of the geometry that explain as much as the effects found, as JSON.
+    pub(super) fn geometry_alternatives_json(&self) -> Value {
+        let alternatives = self.geometry_alternatives.iter().map(|one| {
+            let errors = one.errors.iter().map(|error| {
+                let (point, axis) = error.zero.as_ref().map(|(point, axis)| (point, axis)).unzip();
+                json!({
+                    "constant": error.constant,
+                    "point": point,
+                    "axis": axis,
+                    "value": error.value,
+                    "unit": error.unit,
+                })
+            });
+            json!({"errors": errors.collect::<Vec<_>>(), "share": one.share})
+        });
+        alternatives.collect()
+    }
+
+    /// Errors of the geometry that explain as much as the effects found, as lines.
+    pub(super) fn geometry_alternatives_text(&self, style: TerminalStyle, lines: &mut Vec<String>) {
+        if self.geometry_alternatives.is_empty() {
+            return;
+        }
+        lines.push(String::new());
+        lines.push(style.bold("Errors of the geometry that explain as much as the effects found"));
+        for one in &self.geometry_alternatives {
+            let errors: Vec<String> = one.errors.iter().map(words::geometry_error_text).collect();
+            lines.push(format!(
+                "  {} ({:.1} % of what the effects explain)",
+                words::joined_by_and(&errors),
+                100.0 * one.share
+            ));
+        }
+        let advice = "These recordings do not distinguish them from the effects: measure the lengths.";
+        lines.extend(words::lines(advice, 98).iter().map(|line| format!("  {line}")));
+    }
+}
