@@ -8,6 +8,7 @@
 mod arrays;
 mod errors;
 mod fleet;
+mod inputs;
 mod model;
 mod options;
 mod results;

@@ -21,9 +21,10 @@ use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
 use crate::arrays::state_matrix;
-use crate::errors::input_error;
-use crate::options::{self, EstimationOptions, ExcitationOptions, OptionResult, ReadingOptions};
-use crate::results::{PythonExcitation, PythonRecording, PythonResult, PythonSource, RemarkList, remarks};
+use crate::errors::{input_error, library_error};
+use crate::inputs::{PythonInput, RecordingInput, RecordingOrError};
+use crate::options::{self, EstimationOptions, ExcitationOptions, OptionResult};
+use crate::results::{PythonExcitation, PythonRecording, PythonResult, RemarkList, remarks};
 use crate::spelling::PythonSpelling;
 use crate::work::{JobListener, run_blocking, run_interruptible};
 
@@ -149,6 +150,21 @@ impl CoreModel {
             Some(text) => host.fit_of_text(text, name),
             None => host.fit(Path::new(name)),
         }
+    }
+
+    /// Reads recordings and prepares them together.
+    fn prepare_inputs(
+        &self,
+        py: Python<'_>,
+        runs: [Vec<RecordingInput>; 2],
+        progress: ProgressCallback<'_, '_>,
+    ) -> PyResult<[Vec<Outcome<Arc<PreparedRecording>>>; 2]> {
+        let model = &self.model;
+        let prepared = self.run_interruptible(py, progress, || {
+            let read = runs.map(|run| run.into_iter().map(|one| one.read(model)).collect());
+            Ok(model.prepare_together(read))
+        })?;
+        Ok(prepared.map(|run| run.into_iter().map(|one| one.map(Arc::new)).collect()))
     }
 
     /// Another model of the same host.
@@ -361,36 +377,25 @@ impl CoreModel {
         })
     }
 
-    /// Reads a recording.
-    fn recording(
+    /// Prepares recordings of one machine together: those of a fit, and those of its validation. Each is a recording
+    /// that was prepared before, or a name with a source and options. Returns a recording or an exception for each.
+    fn prepare_together<'py>(
         &self,
-        py: Python<'_>,
-        name: &str,
-        source: PythonSource<'_>,
-        options: ReadingOptions,
-        progress: Option<Bound<'_, PyAny>>,
-    ) -> PyResult<PythonRecording> {
-        let reading = valid_options(py, options.reading())?;
-        let model = &self.model;
-        let recording = match source {
-            PythonSource::Files(files) => self.run_interruptible(py, progress.as_ref(), || {
-                let files: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
-                model.recording_of(&files, &reading)
-            }),
-            PythonSource::Table(columns) => {
-                let columns = columns.into_iter().map(|(name, values)| {
-                    let values = values.as_array().iter().copied().collect();
-                    (name, values)
-                });
-                let columns = columns.collect();
-                self.run_interruptible(py, progress.as_ref(), || {
-                    model.recording_of_table(name, columns, &reading)
-                })
-            }
-        }?;
-        Ok(PythonRecording {
-            recording: Arc::new(recording),
-        })
+        py: Python<'py>,
+        runs: [Vec<PythonInput<'py>>; 2],
+        progress: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<[Vec<RecordingOrError>; 2]> {
+        let input = |one: PythonInput<'py>| match one {
+            PythonInput::Prepared(one) => Ok(RecordingInput::Read(one.recording.before_preparation())),
+            PythonInput::Source(name, source, options) => RecordingInput::new(py, &name, source, &options),
+        };
+        let [fit, check] = runs.map(|run| run.into_iter().map(input).collect::<PyResult<Vec<_>>>());
+        let prepared = self.prepare_inputs(py, [fit?, check?], progress.as_ref())?;
+        let answer = |one: Outcome<Arc<PreparedRecording>>| match one {
+            Ok(recording) => (Some(PythonRecording { recording }), None),
+            Err(error) => (None, Some(library_error(py, &error))),
+        };
+        Ok(prepared.map(|run| run.into_iter().map(answer).collect()))
     }
 
     /// Compares measured forces with those of the model.

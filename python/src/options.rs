@@ -42,6 +42,8 @@ pub(crate) struct ReadingOptions {
     between: Option<(f64, f64)>,
     /// Sampling rate of recordings without times, Hz.
     rate: Option<f64>,
+    /// Forces of a drive that is slower than this fraction of its maximum rate are left out; 0 leaves out none.
+    standstill: Option<f64>,
 }
 
 impl ReadingOptions {
@@ -84,7 +86,11 @@ impl ReadingOptions {
             leave_out_events: self.leave_out_events,
             between: self.between,
             rate: check_positive("rate", self.rate, "a sampling rate in Hz such as 100")?,
-            standstill: StandstillRule::default(),
+            standstill: match check_fraction("standstill", self.standstill)? {
+                None => StandstillRule::Automatic,
+                Some(part) if part > 0.0 => StandstillRule::Below(part),
+                Some(_) => StandstillRule::KeepAll,
+            },
         })
     }
 
@@ -135,9 +141,6 @@ impl EstimationOptions {
                 return Err("prior, physical and essential exclude each other; give one of them".to_owned());
             }
         };
-        if self.standstill.is_some_and(|part| !(part > 0.0 && part < 1.0)) {
-            return Err("standstill: expected a number between 0 and 1, such as 0.01".to_owned());
-        }
         Ok(EstimatorOptions {
             weights: match self.weights.as_str() {
                 "auto" => EquationWeights::Automatic,
@@ -154,7 +157,7 @@ impl EstimationOptions {
             },
             robust: check_positive("robust", self.robust, "a bound such as 1.345")?,
             refinement,
-            standstill: self.standstill,
+            standstill: check_fraction("standstill", self.standstill)?.filter(|part| *part > 0.0),
         })
     }
 }
@@ -279,6 +282,16 @@ fn check_positive(name: &str, value: Option<f64>, expected: &str) -> OptionResul
         Some(value) if !(value > 0.0 && value.is_finite()) => {
             Err(format!("{name}={value}: expected {expected}, above 0"))
         }
+        value => Ok(value),
+    }
+}
+
+/// An optional fraction, which must be from 0 to below 1.
+fn check_fraction(name: &str, value: Option<f64>) -> OptionResult<Option<f64>> {
+    match value {
+        Some(value) if !(0.0..1.0).contains(&value) => Err(format!(
+            "{name}={value}: expected a number between 0 and 1, such as 0.01"
+        )),
         value => Ok(value),
     }
 }

@@ -1,11 +1,10 @@
 //! Results of methods as JSON (the same as the program prints), text and pages; and prepared recordings.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use modelmill::recording::PreparedRecording;
 use modelmill::{NoteSeverity, RecordingNote};
-use numpy::{PyArray1, PyReadonlyArray1};
+use numpy::PyArray1;
 use pyo3::prelude::*;
 use serde_json::Value;
 
@@ -25,15 +24,6 @@ pub(crate) fn remarks<'a>(notes: impl IntoIterator<Item = &'a RecordingNote>) ->
         (severity, note.says.spell(&PythonSpelling))
     };
     notes.into_iter().map(one).collect()
-}
-
-/// The source of a recording: files of one run, or named columns.
-#[derive(FromPyObject)]
-pub(crate) enum PythonSource<'py> {
-    /// Paths of files.
-    Files(Vec<PathBuf>),
-    /// Names and values of columns, in SI units.
-    Table(Vec<(String, PyReadonlyArray1<'py, f64>)>),
 }
 
 /// A recording that was read and prepared for a model.

@@ -247,3 +247,68 @@ def test_states_along_a_recording_have_the_programs_forces(m: modelmill.Model, t
     forces = m.inverse_dynamics(read.q, read.qd, read.qdd)
     for k, name in enumerate(m.drives):
         assert np.allclose(forces[:, k], written[name], rtol=1e-9, atol=1e-6)
+
+
+def made(path: Any, fastest: float, noise: float, seed: int) -> str:
+    """Writes a recording of an axis that follows sines up to a frequency, rad/s; positions have a noise, m."""
+    draws = np.random.default_rng(seed)
+    t = 0.002 * np.arange(5000)
+    x, v, a = np.zeros_like(t), np.zeros_like(t), np.zeros_like(t)
+    for k in range(1, 6):
+        # The frequencies have no common period: a periodic motion has its own smoothing.
+        size, w, phase = 0.05 / k, fastest * (k / 5) ** 1.1, 6.3 * draws.uniform()
+        x += size * np.sin(w * t + phase)
+        v += size * w * np.cos(w * t + phase)
+        a -= size * w * w * np.sin(w * t + phase)
+    force = 95 * a + 200 * v + 25 * np.sign(v) + 0.5 * draws.standard_normal(len(t))
+    x = x + noise * draws.standard_normal(len(t))
+    np.savetxt(path, np.stack([t, x, force], axis=1), delimiter=",", header="t,x,motor", comments="", fmt="%.12g")
+    return str(path)
+
+
+@pytest.fixture(scope="module")
+def axis(tmp_path_factory: pytest.TempPathFactory) -> tuple[modelmill.Model, list[str]]:
+    """The model of an axis, and three recordings that are smoothed differently by themselves."""
+    folder = tmp_path_factory.mktemp("axis")
+    files = [
+        made(folder / "slow.csv", 4.0, 2e-5, 1),
+        made(folder / "fast.csv", 12.0, 2e-6, 2),
+        made(folder / "check.csv", 25.0, 2e-6, 3),
+    ]
+    return modelmill.load(ROOT / AXIS), files
+
+
+AXIS = "model-spec/models/emps.toml"
+COLUMNS = {"t": "t", "x": "x", "motor": "motor"}
+MAPS = ["--map", "t=t", "--map", "x=x", "--map", "motor=motor"]
+
+
+def test_recordings_are_prepared_together(program: Program, axis: tuple[modelmill.Model, list[str]]) -> None:
+    m, (slow, fast, check) = axis
+    told = program("identify", AXIS, "--data", slow, fast, "--check", check, "--json", *MAPS)
+    same(m.identify([slow, fast], check=check, columns=COLUMNS).to_dict(), told)
+    # Also recordings that were prepared one by one before, and those that were prepared together.
+    one_by_one = [m.recording(path, columns=COLUMNS) for path in (slow, fast, check)]
+    assert len({len(one.t) for one in one_by_one}) > 1, "the recordings do not differ enough for this test"
+    same(m.identify(one_by_one[:2], check=one_by_one[2]).to_dict(), told)
+    fit, checked = m.prepare_recordings([slow, fast], check=[check], columns=COLUMNS)
+    assert len({len(one.t) for one in fit}) == 1
+    same(m.identify(fit, check=checked).to_dict(), told)
+    # Tables are no exception, except for their names.
+    tables = [np.genfromtxt(path, delimiter=",", names=True) for path in (slow, fast, check)]
+    dicts = [{name: table[name] for name in table.dtype.names} for table in tables]
+    of_tables = m.identify(dicts[:2], check=dicts[2], columns=COLUMNS).to_dict()
+    assert [one["value"] for one in of_tables["parameters"]] == [one["value"] for one in told["parameters"]]
+    same(m.compare([slow, fast], columns=COLUMNS).to_dict(), program("compare", AXIS, "--data", slow, fast, "--json", *MAPS))
+    same(m.runs([slow, fast], columns=COLUMNS).to_dict(), program("runs", AXIS, "--data", slow, fast, "--json", *MAPS))
+
+
+@pytest.mark.parametrize("part", [0.0, 0.02])
+def test_standstill_of_the_reading(program: Program, axis: tuple[modelmill.Model, list[str]], part: float) -> None:
+    m, (slow, fast, _) = axis
+    flags = ["--data", slow, fast, "--json", "--standstill", str(part), *MAPS]
+    for ours, command in ((m.compare, "compare"), (m.identify, "identify")):
+        found = ours([slow, fast], standstill=part, columns=COLUMNS)
+        same(found.to_dict(), program(command, AXIS, *flags))
+    with pytest.raises(modelmill.ModelmillError, match="between 0 and 1"):
+        m.compare(slow, standstill=1.5, columns=COLUMNS)

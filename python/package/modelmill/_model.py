@@ -83,6 +83,9 @@ class ReadingOptions(TypedDict, total=False):
         Read only the samples between these times, s.
     rate : float
         Sampling rate of recordings without a column of times, Hz.
+    standstill : float
+        Leave out the forces of a drive while it is slower than this fraction of its maximum speed; 0 leaves out none. Default:
+        where the forces show that the drive sticks.
     """
 
     columns: Mapping[str, str]
@@ -98,6 +101,7 @@ class ReadingOptions(TypedDict, total=False):
     leave_out_events: bool
     between: tuple[float, float] | None
     rate: float | None
+    standstill: float | None
 
 
 _READING: dict[str, Any] = {
@@ -114,6 +118,7 @@ _READING: dict[str, Any] = {
     "leave_out_events": False,
     "between": None,
     "rate": None,
+    "standstill": None,
 }
 
 
@@ -143,7 +148,7 @@ def _pair(of: Callable[[Any], Any]) -> Callable[[Any], Any]:
 
 
 _TYPES: list[tuple[tuple[str, ...], str, Callable[[Any], Any]]] = [
-    (("cutoff_hz", "period", "band_hz", "rate"), "a number", float),
+    (("cutoff_hz", "period", "band_hz", "rate", "standstill"), "a number", float),
     (("order", "decimate"), "an integer", index),
     (("trim",), "a number of samples, or two of them", _pair(index)),
     (("between",), "two times in s", _pair(float)),
@@ -162,6 +167,21 @@ def _answered(progress: Progress, verb: Callable[[_core._Progress], AnswerT]) ->
         found = verb(hears)
     _warn(found.notes, 4)
     return found
+
+
+def _successful(read: Recording | ModelmillError) -> Recording:
+    if isinstance(read, ModelmillError):
+        raise read
+    return read
+
+
+def _are_the_same(some: Sequence[Sequence[Any]], others: Sequence[Sequence[Any]]) -> bool:
+    return [[id(one) for one in run] for run in some] == [[id(one) for one in run] for run in others]
+
+
+def _sources(data: Any) -> list[Any]:
+    """Returns the recordings of an argument: none, one, or a list."""
+    return [] if data is None else data if isinstance(data, list) else [data]
 
 
 def _wrong_shape(name: str, shape: tuple[int, ...], names: list[str]) -> str:
@@ -279,6 +299,31 @@ class Equations:
         return "$$\\begin{aligned}" + r" \\ ".join(lines) + "\\end{aligned}$$"
 
 
+@dataclass(frozen=True)
+class _Request:
+    """A recording that a method needs: a source with options, or a recording that was prepared before."""
+
+    source: Any
+    options: Mapping[str, Any]
+    name: str
+    input: _core._Input
+    prepared: Recording | None = None
+    left_out: tuple[str, ...] = ()
+
+
+def _request(source: Any, options: Mapping[str, Any], name: str) -> _Request:
+    whole = _reading(options)
+    left_out: list[str] = []
+    read: Any
+    if isinstance(source, (str, os.PathLike)):
+        read, name = [source], os.fspath(source)
+    elif isinstance(source, tuple) and all(isinstance(one, (str, os.PathLike)) for one in source):
+        read, name = list(source), "+".join(os.fspath(one) for one in source)
+    else:
+        read, left_out = columns_of(source)
+    return _Request(source, options, name, (name, read, whole), left_out=tuple(left_out))
+
+
 class Recording:
     """A recording that was read and prepared for a model, once for several methods.
 
@@ -290,28 +335,11 @@ class Recording:
         Processing steps and warnings of the audit: severity and text.
     """
 
-    def __init__(self, model: Model, source: Any, options: Mapping[str, Any], progress: Progress, name: str | None) -> None:
-        self._source, self._options, self._model = source, dict(options), model
-        whole = _reading(options)
-        left_out: list[str] = []
-        read: Any
-        if isinstance(source, (str, os.PathLike)):
-            read, name = [source], os.fspath(source)
-        elif isinstance(source, tuple) and all(isinstance(one, (str, os.PathLike)) for one in source):
-            read, name = list(source), "+".join(os.fspath(one) for one in source)
-        else:
-            read, left_out = columns_of(source)
-            name = name or "recording"
-        self._given_name = name
-        with told(progress) as hears:
-            try:
-                self._core = model._core.recording(name, read, whole, hears)
-            except ModelmillError as error:
-                if left_out and hasattr(error, "add_note"):
-                    error.add_note(f"Columns without numbers were left out: {', '.join(left_out)}")
-                raise
-        self.name = self._core.file
-        self.notes = self._core.notes
+    def __init__(self, model: Model, request: _Request, core: _core.Recording) -> None:
+        self._model, self._core = model, core
+        self._source, self._options, self._given_name = request.source, dict(request.options), request.name
+        self.name = core.file
+        self.notes = core.notes
 
     def _motion(self) -> tuple[Floats, list[Floats], list[Floats], list[Floats]]:
         return self._core.prepared()
@@ -358,6 +386,9 @@ class Model:
         self._core = core
         self._p_min: BaseParameters | None = None
         self._compiled: dict[str, Compiled] = {}
+        # Recordings that were last prepared together: those that were given, and those that came out.
+        self._together: tuple[tuple[Any, ...], ...] = ()
+        self._together_prepared: tuple[list[Recording | ModelmillError], list[Recording | ModelmillError]] = ([], [])
 
     # What the model is.
 
@@ -671,30 +702,113 @@ class Model:
         **reading
             See :class:`ReadingOptions`.
         """
-        read = Recording(self, data, reading, progress, name)
-        _warn(read.notes)
-        return read
+        [read], _ = self._prepared([self._request(data, reading, name or "recording")], [], progress)
+        found = _successful(read)
+        _warn(found.notes)
+        return found
 
-    def _recordings(self, data: Any, reading: Mapping[str, Any], progress: Progress, what: str) -> list[_core.Recording]:
-        sources = [] if data is None else data if isinstance(data, list) else [data]
-        read: list[_core.Recording] = []
-        for k, source in enumerate(sources):
-            name = what if len(sources) == 1 else f"{what} {k + 1}"
-            read.append(self._read(source, reading, progress, name)._core)
-        return read
+    def prepare_recordings(
+        self,
+        data: Sequence[Source],
+        *,
+        check: Sequence[Source] = (),
+        progress: Progress = None,
+        **reading: Unpack[ReadingOptions],
+    ) -> tuple[list[Recording], list[Recording]]:
+        """Reads recordings of one machine and prepares them together, for use in several methods.
 
-    def _read(self, source: Any, reading: Mapping[str, Any], progress: Progress, name: str) -> Recording:
-        if isinstance(source, Recording):
-            if source._model is self:
-                if reading:
-                    raise ModelmillError(
-                        f"{source.name} is prepared already; give {', '.join(reading)} to recording() instead"
-                    )
-                return source
+        Cut-off, smoothing and decimation are chosen for those of the fit together, and are the same for the validation runs;
+        drives stick below the same rate in all. Methods that get several recordings do the same.
+
+        Parameters
+        ----------
+        data, check
+            Recordings for a fit, and validation runs, as :meth:`recording` takes them.
+        **reading
+            See :class:`ReadingOptions`.
+
+        Returns
+        -------
+        (list of Recording, list of Recording)
+            Those for the fit, and those for its validation.
+        """
+        found = self._all_recordings((list(data), "data"), (list(check), "check"), reading, progress)
+        for one in (*found[0], *found[1]):
+            _warn(one.notes)
+        return found
+
+    def _request(
+        self, source: Any, reading: Mapping[str, Any], name: str, unprepared: Mapping[str, Any] | None = None
+    ) -> _Request:
+        """Returns a source with its options; those of `unprepared` are for recordings that are read now."""
+        if not isinstance(source, Recording):
+            return _request(source, {**reading, **(unprepared or {})}, name)
+        if source._model is not self:
             # Another model may need other columns and other filters.
-            options = {**source._options, **reading}
-            return Recording(self, source._source, options, progress, source._given_name)
-        return Recording(self, source, reading, progress, name)
+            return _request(source._source, {**source._options, **reading, **(unprepared or {})}, source._given_name)
+        if reading:
+            raise ModelmillError(f"{source.name} is prepared already; give {', '.join(reading)} to recording() instead")
+        return _Request(source._source, source._options, source._given_name, source._core, source)
+
+    def _prepared(
+        self, fit: list[_Request], check: list[_Request], progress: Progress
+    ) -> tuple[list[Recording | ModelmillError], list[Recording | ModelmillError]]:
+        """Returns the recordings of a fit and of its validation, prepared together, or why there is none."""
+        given = tuple(tuple(one.prepared for one in run) for run in (fit, check))
+        flat = [one for run in given for one in run]
+        if not flat:
+            return [], []
+        if len(flat) == 1 and flat[0] is not None:
+            return [one for one in given[0] if one], [one for one in given[1] if one]
+        # Several methods often get the same recordings.
+        if None not in flat and _are_the_same(given, self._together):
+            return list(self._together_prepared[0]), list(self._together_prepared[1])
+        with told(progress) as hears:
+            answers = self._core.prepare_together([[one.input for one in run] for run in (fit, check)], hears)
+        found: list[list[Recording | ModelmillError]] = [[], []]
+        for requests, run, own in zip((fit, check), answers, found):
+            for request, (core, error) in zip(requests, run):
+                if core is not None:
+                    own.append(Recording(self, request, core))
+                elif isinstance(error, ModelmillError):
+                    if request.left_out and hasattr(error, "add_note"):
+                        error.add_note(f"Columns without numbers were left out: {', '.join(request.left_out)}")
+                    own.append(error)
+                elif error is not None:
+                    raise error
+        prepared = (found[0], found[1])
+        self._together = (tuple(found[0]), tuple(found[1])) if None in flat else given
+        self._together_prepared = prepared
+        return list(prepared[0]), list(prepared[1])
+
+    def _all_recordings(
+        self,
+        fit: tuple[Any, str],
+        check: tuple[Any, str],
+        reading: Mapping[str, Any],
+        progress: Progress,
+        unprepared: Mapping[str, Any] | None = None,
+    ) -> tuple[list[Recording], list[Recording]]:
+        """Returns all recordings of a fit and of its validation, prepared together; raises the first error."""
+        requests: list[list[_Request]] = []
+        for data, what in (fit, check):
+            sources = _sources(data)
+            names = [what if len(sources) == 1 else f"{what} {k + 1}" for k in range(len(sources))]
+            requests.append([self._request(source, reading, name, unprepared) for source, name in zip(sources, names)])
+        first, second = self._prepared(requests[0], requests[1], progress)
+        return [_successful(one) for one in first], [_successful(one) for one in second]
+
+    def _recordings(
+        self,
+        data: Any,
+        check: Any,
+        reading: Mapping[str, Any],
+        progress: Progress,
+        what: str = "data",
+        unprepared: Mapping[str, Any] | None = None,
+    ) -> tuple[list[_core.Recording], list[_core.Recording]]:
+        first, second = self._all_recordings((data, what), (check, "check"), reading, progress, unprepared)
+        return [one._core for one in first], [one._core for one in second]
 
     def compare(
         self, data: Source, *, parameters: Values = None, progress: Progress = None, **reading: Unpack[ReadingOptions]
@@ -713,7 +827,7 @@ class Model:
             See :class:`ReadingOptions`.
         """
         values, name = self._values(parameters)
-        read = self._recordings(data, reading, progress, "data")
+        read, _ = self._recordings(data, None, reading, progress)
         return Comparison(_answered(progress, lambda hears: self._core.compare(read, values, name, hears)))
 
     def identify(
@@ -726,7 +840,6 @@ class Model:
         prior: float | None = None,
         physical: bool = False,
         essential: bool = False,
-        standstill: float | None = None,
         instruments: Source = None,
         instrument_period: float | None = None,
         progress: Progress = None,
@@ -748,15 +861,17 @@ class Model:
             All bodies must be physically possible.
         essential : bool
             Base parameters that the recordings do not support keep their nominal values.
-        standstill : float, optional
-            Leave out the equations of a drive while it is slower than this fraction of its maximum speed.
         instruments, instrument_period : optional
             Instrumental variables: recordings of the reference motion, or the states one period (s) later.
         progress, **reading
-            As for :meth:`compare`.
+            As for :meth:`compare`; ``standstill`` concerns the equations of the fit only, and not the figures of the validation.
         """
-        read, checked = (self._recordings(all, reading, progress, name) for all, name in ((data, "data"), (check, "check")))
-        recorded = self._recordings(instruments, reading, progress, "instruments")
+        # A bound of the user belongs to the estimator, which applies it to the equations of the fit only.
+        standstill = reading.get("standstill")
+        others = {name: one for name, one in reading.items() if name != "standstill"}
+        unbound = {} if standstill is None else {"standstill": 0.0}
+        read, checked = self._recordings(data, check, others, progress, unprepared=unbound)
+        recorded, _ = self._recordings(instruments, None, others, progress, "instruments", unbound)
         options = {
             "weights": weights,
             "robust": robust,
@@ -795,7 +910,7 @@ class Model:
             As for :meth:`compare`.
         """
         model = self if parameters is None else self.with_fit(parameters)
-        read, checked = (model._recordings(all, reading, progress, name) for all, name in ((data, "data"), (check, "check")))
+        read, checked = model._recordings(data, check, reading, progress)
         found = _answered(progress, lambda hears: model._core.diagnose(read, checked, held, hears))
         return Diagnosis(found, None if found.model is None else Model(found.model))
 
@@ -829,15 +944,17 @@ class Model:
         """
         if isinstance(data, (str, os.PathLike)) or not isinstance(data, Sequence):
             raise ModelmillError("runs() compares several recordings with the first: pass a list of recordings")
+        requests = [self._request(source, reading, f"run {k + 1}") for k, source in enumerate(data)]
+        found, _ = self._prepared(requests, [], progress)
         read: list[_core.Recording] = []
         unread: list[tuple[int, str, str]] = []
-        for k, source in enumerate(data):
-            try:
-                read.append(self._read(source, reading, progress, f"run {k + 1}")._core)
-            except ModelmillError as error:
-                if k == 0:
-                    raise
-                unread.append((k, os.fspath(source) if isinstance(source, (str, os.PathLike)) else f"run {k + 1}", str(error)))
+        for k, (request, one) in enumerate(zip(requests, found)):
+            if isinstance(one, Recording):
+                read.append(one._core)
+            elif k == 0:
+                raise one
+            else:
+                unread.append((k, request.name, str(one)))
         return Runs(_answered(progress, lambda hears: self._core.runs(read, unread, list(per_run), list(loads), hears)))
 
     def excite(
@@ -903,7 +1020,7 @@ class Model:
             "beside": list(beside),
             "noise": noise,
         }
-        read = model._recordings(data, {"columns": columns} if columns else {}, progress, "data")
+        read, _ = model._recordings(data, None, {"columns": columns} if columns else {}, progress)
         return Excitation(_answered(progress, lambda hears: model._core.excite(options, read, hears)), self.coordinates)
 
     # Other models of the same mechanism.
@@ -975,8 +1092,7 @@ class Model:
         progress, **reading
             As for :meth:`compare`.
         """
-        sources = [] if data is None else data if isinstance(data, list) else [data]
-        read, again = (model._recordings(sources, reading, progress, "data") for model in (self, variant))
+        read, again = (model._recordings(data, None, reading, progress)[0] for model in (self, variant))
         return Difference(_answered(progress, lambda hears: self._core.diff(variant._core, read, again, hears)))
 
     def export(self, format: str = "urdf", *, parameters: Identification | PathText | None = None) -> str:

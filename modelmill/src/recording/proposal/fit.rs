@@ -5,7 +5,7 @@ use modelmill_identify::{RecordingFiles, StatePreparation};
 use nalgebra::{DMatrix, DVector};
 
 use super::super::columns::read_options;
-use super::super::prepare;
+use super::super::states::prepare;
 use super::thresholds::FIT_MOST_SAMPLES;
 use crate::error::Outcome;
 use crate::model::Model;

@@ -1,0 +1,297 @@
+//! Recordings that were read and prepared for a model: the choices that recordings of one machine have in common are
+//! made, states are prepared, and faults are searched.
+
+use std::sync::Arc;
+
+use modelmill_identify::{DerivativeSource, RecordingNote, SignalRecording as Raw};
+
+use super::common::{self, RecordingChoices, RecordingSticks};
+use super::options::RecordingOptions;
+use super::read::UnpreparedRecording;
+use super::states::{emit_notes, note_idle_options, prepare, prepare_segments, without_intervals};
+use super::thresholds::DELAY_LEAST_SHARE_OF_GAIN;
+use crate::audit::{self, ForceDelayAudit};
+use crate::error::{Error, Outcome};
+use crate::faults::{
+    ColumnOperation, FaultSubject, RecordingFaultKind, SilentInterval, SuspectedFault, find_fault, silent_intervals,
+};
+use crate::model::Model;
+use crate::progress::SilentProgress;
+use crate::segment::RecordingSegment;
+
+/// A recording that was read and prepared for a model.
+#[derive(Clone)]
+pub struct PreparedRecording {
+    /// The parts of the recording without gaps in time, each with its states and forces. There is one if the recording
+    /// has no gaps.
+    pub segments: Vec<RecordingSegment>,
+    /// The recording before preparation, without forces that were not measured.
+    raw: Arc<Raw>,
+    /// The options with which it was prepared, including automatic choices.
+    reading: RecordingOptions,
+    /// The recording as it was read, with the options as they were requested.
+    source: UnpreparedRecording,
+    /// The suspected fault of the recording that explains it best.
+    suspect: Option<SuspectedFault>,
+    /// Intervals in which drives stick.
+    sticks: RecordingSticks,
+}
+
+impl PreparedRecording {
+    /// Whether the forces of all drives were recorded.
+    pub fn has_forces(&self) -> bool {
+        self.segments.iter().all(|segment| segment.run.force.is_some())
+    }
+
+    /// Prepares a recording; unless it is `unexamined`, open choices are made and the audit runs.
+    pub(super) fn new(model: &Model, recording: UnpreparedRecording) -> Outcome<Self> {
+        let file = recording.raw.file().to_owned();
+        let only = Self::new_together(model, &[recording], 1).pop();
+        only.unwrap_or_else(|| Err(Error::input(format!("{file} cannot be prepared"))))
+    }
+
+    /// As [`Self::new`], for recordings of one machine, with choices that are common to all that have the same options.
+    /// The first `fitted` of them belong to a fit.
+    pub(super) fn new_together(model: &Model, recordings: &[UnpreparedRecording], fitted: usize) -> Vec<Outcome<Self>> {
+        let mut groups: Vec<Vec<usize>> = Vec::new();
+        for (index, one) in recordings.iter().enumerate() {
+            let has_same = |group: &&mut Vec<usize>| one.has_same_preparation(&recordings[group[0]]);
+            match groups.iter_mut().find(has_same) {
+                Some(group) => group.push(index),
+                None => groups.push(vec![index]),
+            }
+        }
+        let mut prepared: Vec<(usize, Outcome<Self>)> = Vec::new();
+        for group in groups {
+            // Validation runs with options of their own decide for themselves.
+            let of_fit = group.iter().filter(|index| **index < fitted).count();
+            let decisive = if of_fit == 0 { group.len() } else { of_fit };
+            let members: Vec<_> = group.iter().map(|index| recordings[*index].clone()).collect();
+            prepared.extend(group.into_iter().zip(Self::new_group(model, &members, decisive)));
+        }
+        prepared.sort_by_key(|(index, _)| *index);
+        prepared.into_iter().map(|(_, one)| one).collect()
+    }
+
+    /// As [`Self::new_together`], for recordings with the same options.
+    fn new_group(model: &Model, recordings: &[UnpreparedRecording], fitted: usize) -> Vec<Outcome<Self>> {
+        let mut prepared = Self::prepare_group(model, recordings, None, fitted);
+        if recordings.iter().any(|one| one.reading.preparation.unexamined) {
+            for one in prepared.iter().flatten() {
+                emit_notes(model, &one.segments);
+            }
+            return prepared;
+        }
+        // Forces that were not measured would spoil the choice of the preparation and every fit.
+        let silent: Vec<Vec<SilentInterval>> = (prepared.iter())
+            .map(|one| {
+                let segments = one.iter().flat_map(|one| &one.segments);
+                segments.flat_map(|one| silent_intervals(model, one)).collect()
+            })
+            .collect();
+        if silent.iter().any(|silent| !silent.is_empty()) {
+            prepared = Self::prepare_group(model, recordings, Some(&silent), fitted);
+        }
+        for (one, silent) in prepared.iter_mut().zip(&silent) {
+            let Ok(one) = one else { continue };
+            if let Some(first) = one.segments.first_mut() {
+                first.run.notes.extend(silent.iter().map(SilentInterval::note));
+                first.faults.extend(silent.iter().map(SilentInterval::disturbance));
+            }
+            emit_notes(model, &one.segments);
+            one.examine(model);
+            // Events are searched in all forces, so that a push during standstill is found.
+            one.sticks.all.leave_out(model, one.sticks.index, &mut one.segments);
+        }
+        prepared
+    }
+
+    /// Makes open choices for recordings of one machine and prepares them, without passing notes to the listener and
+    /// without the forces of `silent` intervals.
+    fn prepare_group(
+        model: &Model,
+        recordings: &[UnpreparedRecording],
+        silent: Option<&[Vec<SilentInterval>]>,
+        fitted: usize,
+    ) -> Vec<Outcome<Self>> {
+        let silent = |index: usize| silent.map_or(&[][..], |silent| &silent[index]);
+        let raws = recordings.iter().enumerate();
+        let raws: Vec<Arc<Raw>> = raws
+            .map(|(index, one)| without_intervals(&one.raw, silent(index)))
+            .collect();
+        let choices = common::choose_for_each(model, &raws, fitted, recordings.first().map(|one| &one.reading));
+        let each = recordings.iter().zip(raws).zip(choices);
+        each.map(|((recording, raw), choice)| Self::with_choices(model, recording, raw, choice?))
+            .collect()
+    }
+
+    /// Prepares a recording with all choices made.
+    fn with_choices(
+        model: &Model,
+        source: &UnpreparedRecording,
+        raw: Arc<Raw>,
+        choice: RecordingChoices,
+    ) -> Outcome<Self> {
+        let reading = RecordingOptions {
+            preparation: choice.reading.preparation,
+            ..source.reading.clone()
+        };
+        let delay = model.derivation.mechanism.force_delay;
+        let mut segments = prepare(model, &raw, &reading, delay)?;
+        note_idle_options(&mut segments, &reading);
+        if let Some(first) = segments.first_mut() {
+            first.run.notes.extend(choice.notes);
+        }
+        Ok(Self {
+            segments,
+            raw,
+            reading,
+            source: source.clone(),
+            suspect: None,
+            sticks: choice.sticks,
+        })
+    }
+
+    /// Looks for faults that make the numbers meaningless; without one also for delays, contacts and pushes.
+    fn examine(&mut self, model: &Model) {
+        let source = self.reading.preparation.source;
+        let suspect = find_fault(&FaultSubject {
+            model,
+            raw: &self.raw,
+            segments: &self.segments,
+            uses_recorded_derivatives: source == DerivativeSource::RecordedFirst,
+            has_mapping: !self.source.reading.columns.is_empty()
+                || !model.derivation.mechanism.recording.columns.is_empty(),
+        });
+        let of_segment = |one: &RecordingSegment| ForceDelayAudit::from_segment(model, one);
+        let delays: Vec<Option<ForceDelayAudit>> = self.segments.iter().map(of_segment).collect();
+        // Forces that are delayed by a large part of a period resemble those of another drive, or of another sign.
+        let delay_gain = delays
+            .iter()
+            .flatten()
+            .map(ForceDelayAudit::log_gain)
+            .fold(0.0, f64::max);
+        self.suspect = suspect.filter(|fault| {
+            let may_be_delay =
+                [RecordingFaultKind::ExchangedColumns, RecordingFaultKind::WrongSign].contains(&fault.kind);
+            !may_be_delay || delay_gain < DELAY_LEAST_SHARE_OF_GAIN * fault.fit_gain.max(1.0)
+        });
+        // Forces before a gear have a sign beside their factor, which the note on the gear states for each drive.
+        if self
+            .suspect
+            .as_ref()
+            .is_some_and(|fault| self.is_sign_of_gears(model, fault))
+        {
+            self.suspect = None;
+        }
+        if let (Some(fault), Some(first)) = (&self.suspect, self.segments.first_mut()) {
+            first.note(model, RecordingNote::warning(fault.note_text()));
+            first.faults.push(fault.disturbance());
+            return;
+        }
+        for (one, delays) in self.segments.iter_mut().zip(delays) {
+            for note in audit::examine_forces(model, one, delays.as_ref()) {
+                one.note(model, note);
+            }
+            audit::examine_events(model, one, self.reading.leave_out_events);
+        }
+    }
+
+    /// The recording before its preparation, to be prepared again together with others.
+    pub fn before_preparation(&self) -> UnpreparedRecording {
+        self.source.clone()
+    }
+
+    /// The suspected fault of the recording that explains it best.
+    pub fn suspected_fault(&self) -> Option<&SuspectedFault> {
+        self.suspect.as_ref()
+    }
+
+    /// Whether a fault is a wrong sign of forces that are smaller than the nominal ones by a factor typical of a gear.
+    fn is_sign_of_gears(&self, model: &Model, fault: &SuspectedFault) -> bool {
+        let Some(first) = self
+            .segments
+            .first()
+            .filter(|_| fault.kind == RecordingFaultKind::WrongSign)
+        else {
+            return false;
+        };
+        let (drives, factors) = (model.drives(), audit::gear_factors(model, first));
+        let is_geared = |at: &String| {
+            let mut pairs = drives.iter().zip(&factors);
+            pairs.any(|(drive, factor)| drive == at && factor.is_some())
+        };
+        fault.at.iter().all(is_geared)
+    }
+
+    /// The recording as it would be after operations on its columns, prepared and examined again for a model. Its notes
+    /// stay in it and are not passed to the listener.
+    ///
+    /// Fails if it cannot be prepared then.
+    pub(crate) fn corrected(&self, model: &Model, operations: &[ColumnOperation]) -> Outcome<Self> {
+        let mut raw = (*self.raw).clone();
+        for operation in operations {
+            operation.apply(&mut raw);
+        }
+        let silent = model.host().clone().with_progress(Arc::new(SilentProgress));
+        let corrected = UnpreparedRecording::new(raw, &self.source.reading);
+        Self::new(&model.clone().with_host(&silent), corrected)
+    }
+
+    /// The same recording with other segments.
+    pub(crate) fn with_segments(&self, stretches: Vec<RecordingSegment>) -> Self {
+        Self {
+            segments: stretches,
+            raw: self.raw.clone(),
+            reading: self.reading.clone(),
+            source: self.source.clone(),
+            suspect: self.suspect.clone(),
+            sticks: self.sticks.clone(),
+        }
+    }
+
+    /// Name of the file in messages.
+    pub fn file(&self) -> &str {
+        self.raw.file()
+    }
+
+    /// The values of a column as they were recorded, one for each sample, before any filter. `name` is its name in the
+    /// model. `None` if there is no such column, or if it has values that are not finite.
+    pub fn raw_column(&self, name: &str) -> Option<&[f64]> {
+        self.raw.column(name).ok()
+    }
+
+    /// Where its rates and accelerations were taken from.
+    pub(crate) fn derivative_source(&self) -> DerivativeSource {
+        self.reading.preparation.source
+    }
+
+    /// The notes of all segments.
+    pub fn notes(&self) -> impl Iterator<Item = &RecordingNote> {
+        self.segments.iter().flat_map(RecordingSegment::notes)
+    }
+
+    /// The segments without repair of sensor faults; `None` if nothing was repaired, or they cannot be prepared
+    /// without.
+    pub(crate) fn with_faults(&self, model: &Model) -> Option<Vec<RecordingSegment>> {
+        let faulty = self.raw.restore_sensor_faults()?;
+        let delay = model.derivation.mechanism.force_delay;
+        let mut stretches = prepare(model, &faulty, &self.reading, delay).ok()?;
+        self.sticks.all.mark(self.sticks.index, &mut stretches);
+        // Weights of other exclusions are kept.
+        for (faulty, sound) in stretches.iter_mut().zip(&self.segments) {
+            if faulty.samples() == sound.samples() {
+                faulty.weights.clone_from(&sound.weights);
+            }
+        }
+        Some(stretches)
+    }
+
+    /// The segments prepared again for another model of the same machine, which may have another delay of the force
+    /// signal.
+    pub(crate) fn prepare_for(&self, model: &Model) -> Outcome<Vec<RecordingSegment>> {
+        let mut stretches = prepare_segments(model, &self.raw, &self.reading)?;
+        self.sticks.all.mark(self.sticks.index, &mut stretches);
+        Ok(stretches)
+    }
+}

@@ -1,0 +1,77 @@
+//! Recordings as Python passes them: files, tables, or recordings that were prepared before.
+
+use std::path::{Path, PathBuf};
+
+use modelmill::recording::{RecordingOptions, UnpreparedRecording};
+use modelmill::{Model, Outcome};
+use numpy::PyReadonlyArray1;
+use pyo3::prelude::*;
+
+use crate::errors::input_error;
+use crate::options::ReadingOptions;
+use crate::results::PythonRecording;
+
+/// The source of a recording: files of one run, or named columns.
+#[derive(FromPyObject)]
+pub(crate) enum PythonSource<'py> {
+    /// Paths of files.
+    Files(Vec<PathBuf>),
+    /// Names and values of columns, in SI units.
+    Table(Vec<(String, PyReadonlyArray1<'py, f64>)>),
+}
+
+/// A recording that is to be prepared together with others.
+#[derive(FromPyObject)]
+pub(crate) enum PythonInput<'py> {
+    /// One that was prepared before.
+    Prepared(PyRef<'py, PythonRecording>),
+    /// Name in messages, source and options.
+    Source(String, PythonSource<'py>, ReadingOptions),
+}
+
+/// A prepared recording, or the exception that states why there is none.
+pub(crate) type RecordingOrError = (Option<PythonRecording>, Option<PyErr>);
+
+/// A recording that is to be prepared, independent of the interpreter.
+pub(crate) enum RecordingInput {
+    /// Files of one run.
+    Files(Vec<PathBuf>, RecordingOptions),
+    /// Name and columns of a table.
+    Table(String, Vec<(String, Vec<f64>)>, RecordingOptions),
+    /// A recording that was read before.
+    Read(UnpreparedRecording),
+}
+
+impl RecordingInput {
+    /// A source of Python with its options; fails with the first invalid option.
+    pub(crate) fn new(
+        py: Python<'_>,
+        name: &str,
+        source: PythonSource<'_>,
+        options: &ReadingOptions,
+    ) -> PyResult<Self> {
+        let reading = options.reading().map_err(|says| input_error(py, &says))?;
+        Ok(match source {
+            PythonSource::Files(files) => Self::Files(files, reading),
+            PythonSource::Table(columns) => {
+                let columns = columns.into_iter().map(|(name, values)| {
+                    let values = values.as_array().iter().copied().collect();
+                    (name, values)
+                });
+                Self::Table(name.to_owned(), columns.collect(), reading)
+            }
+        })
+    }
+
+    /// Reads it for a model.
+    pub(crate) fn read(self, model: &Model) -> Outcome<UnpreparedRecording> {
+        match self {
+            Self::Files(files, reading) => {
+                let files: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
+                model.read_recording(&files, &reading)
+            }
+            Self::Table(name, columns, reading) => model.read_recording_of_table(&name, columns, &reading),
+            Self::Read(recording) => Ok(recording),
+        }
+    }
+}
