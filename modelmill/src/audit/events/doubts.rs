@@ -1,6 +1,6 @@
 //! Doubts about a segment of one drive: a noise that is large there, and a switch of friction at its start or end.
 
-use super::levels::DriveResidual;
+use super::levels::SearchedResidual;
 use super::segments::DriveSegment;
 use super::smoothing::{range_median, sample_quantile};
 use super::trace::ResidualTrace;
@@ -15,7 +15,7 @@ const EDGE_LEVEL_S: f64 = 0.08;
 
 /// Whether the mean of the residual in a segment hardly exceeds what noise of its size there would give. The noise is
 /// that between neighbouring samples, half of which are taken to be independent.
-pub(super) fn is_local_noise(rest: &DriveResidual, segment: &DriveSegment) -> bool {
+pub(super) fn is_local_noise(rest: &SearchedResidual, segment: &DriveSegment) -> bool {
     let values = &rest.values[segment.start..segment.end];
     if values.len() < 4 {
         return true;
@@ -30,7 +30,7 @@ pub(super) fn is_local_noise(rest: &DriveResidual, segment: &DriveSegment) -> bo
 
 /// Whether dry friction may be the cause of a segment: it begins, ends or lies at a switch of friction, and is smaller
 /// than the friction of its drive, or it is short and lies about a reversal. Then another drive must confirm it.
-pub(super) fn may_be_friction(trace: &ResidualTrace, rest: &DriveResidual, segment: &DriveSegment) -> bool {
+pub(super) fn may_be_friction(trace: &ResidualTrace, rest: &SearchedResidual, segment: &DriveSegment) -> bool {
     let near = trace.sample_count(SWITCH_NEAR_S, 1);
     let about = segment.start.saturating_sub(near)..(segment.end + near).min(trace.samples());
     // About a reversal a drive may stick.
@@ -53,7 +53,7 @@ pub(super) fn may_be_friction(trace: &ResidualTrace, rest: &DriveResidual, segme
 
 /// How much the residual changes at the start and at the end of a segment, in units of its force (1): 1 for a push that
 /// begins and ends at once, less for an error that comes and goes with the motion. The smaller one of both.
-pub(super) fn edge_contrast(trace: &ResidualTrace, rest: &DriveResidual, segment: &DriveSegment) -> f64 {
+pub(super) fn edge_contrast(trace: &ResidualTrace, rest: &SearchedResidual, segment: &DriveSegment) -> f64 {
     let signed = |at: usize| isize::try_from(at).unwrap_or(isize::MAX);
     let rise = signed(trace.sample_count(EDGE_RISE_S, 1));
     let window = signed(trace.sample_count(EDGE_LEVEL_S, 2));
@@ -70,7 +70,7 @@ pub(super) fn edge_contrast(trace: &ResidualTrace, rest: &DriveResidual, segment
 
 /// The dry friction of a drive: half of the median jump of its fitted force where the rate changes its sign between two
 /// samples, N or N m; 0 without reversals.
-fn dry_friction(trace: &ResidualTrace, rest: &DriveResidual) -> f64 {
+fn dry_friction(trace: &ResidualTrace, rest: &SearchedResidual) -> f64 {
     let (fitted, rate) = (trace.fitted_force(rest.drive), &trace.motion[1][rest.drive]);
     let reversals = (1..rate.len()).filter(|i| rate[i - 1] * rate[*i] < 0.0);
     let jumps = reversals.map(|i| 0.5 * (fitted[i] - fitted[i - 1]).abs());

@@ -3,7 +3,7 @@
 use modelmill_identify::{ChannelRegressor, robust_fit};
 use nalgebra::DVector;
 
-use super::levels::DriveResidual;
+use super::levels::SearchedResidual;
 use super::regimes::{DriveRegimes, drive_regimes};
 use super::smoothing::{dilate_mask, true_share};
 use super::trace::ResidualTrace;
@@ -46,7 +46,7 @@ pub(super) fn fit_without_events(trace: &mut ResidualTrace, regressor: &ChannelR
         }
         let rests = regimes.into_iter().enumerate();
         let next: Vec<Vec<bool>> = rests
-            .map(|(d, regimes)| outstanding_samples(trace, &DriveResidual::new(trace, d, regimes)))
+            .map(|(d, regimes)| outstanding_samples(trace, &SearchedResidual::new(trace, d, regimes)))
             .collect();
         if next == out {
             break;
@@ -71,7 +71,7 @@ fn used_samples(trace: &ResidualTrace, regimes: &DriveRegimes, drive: usize, out
 }
 
 /// The samples at which a residual stands out, and those about them; none if they are most of the run.
-fn outstanding_samples(trace: &ResidualTrace, rest: &DriveResidual) -> Vec<bool> {
+fn outstanding_samples(trace: &ResidualTrace, rest: &SearchedResidual) -> Vec<bool> {
     let least = 0.5 * EVENT_LEAST_FORCE_SHARE * rest.force_rms;
     let stands_out: Vec<bool> = (0..trace.samples())
         .map(|i| {

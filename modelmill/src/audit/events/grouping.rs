@@ -2,7 +2,7 @@
 //! drives that agree in time support each other.
 
 use super::ContactEvent;
-use super::levels::DriveResidual;
+use super::levels::SearchedResidual;
 use super::segments::DriveSegment;
 use super::trace::ResidualTrace;
 use crate::audit::thresholds::{
@@ -16,7 +16,7 @@ use crate::audit::thresholds::{
 /// Events from the accepted segments, in the order of time.
 pub(super) fn join_segments(
     trace: &ResidualTrace,
-    rests: &[DriveResidual],
+    rests: &[SearchedResidual],
     mut segments: Vec<DriveSegment>,
 ) -> Vec<ContactEvent> {
     segments.sort_by_key(|segment| (segment.start, segment.end));
@@ -40,7 +40,7 @@ pub(super) fn join_segments(
 
 /// The events of a group of segments that overlap: that of the strongest segment, then those of what is apart from it.
 fn group_events(
-    rests: &[DriveResidual],
+    rests: &[SearchedResidual],
     mut group: Vec<DriveSegment>,
     time: impl Fn(usize) -> f64 + Copy,
 ) -> Vec<ContactEvent> {
@@ -82,7 +82,7 @@ fn is_same_event(strongest: &DriveSegment, one: &DriveSegment, time: impl Fn(usi
 
 /// Whether a segment of one drive is an event without the support of others. Where it is brief, hardly stands out, or is
 /// hidden for a large part, errors of the model look alike.
-fn is_clear_alone(rest: &DriveResidual, segment: &DriveSegment, lasted: f64) -> bool {
+fn is_clear_alone(rest: &SearchedResidual, segment: &DriveSegment, lasted: f64) -> bool {
     if segment.is_at_standstill {
         return true;
     }
@@ -97,7 +97,7 @@ fn is_clear_alone(rest: &DriveResidual, segment: &DriveSegment, lasted: f64) -> 
 
 /// The event of segments that agree; `None` if it does not stand out enough.
 fn joined_event(
-    rests: &[DriveResidual],
+    rests: &[SearchedResidual],
     strongest: &DriveSegment,
     agreeing: &[DriveSegment],
     time: impl Fn(usize) -> f64,

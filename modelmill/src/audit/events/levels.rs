@@ -26,7 +26,7 @@ pub(super) struct SmoothedResidual {
 }
 
 /// The residual of a drive along a run, in the forms in which events are searched.
-pub(super) struct DriveResidual {
+pub(super) struct SearchedResidual {
     /// Index of the drive.
     pub(super) drive: usize,
     /// Root mean square of the measured force, N or N m.
@@ -44,7 +44,7 @@ pub(super) struct DriveResidual {
     pub(super) regimes: DriveRegimes,
 }
 
-impl DriveResidual {
+impl SearchedResidual {
     /// The residual of one drive of a trace.
     pub(super) fn new(trace: &ResidualTrace, drive: usize, regimes: DriveRegimes) -> Self {
         let is_masked: Vec<bool> = (regimes.is_unknown.iter().zip(&regimes.is_standing))

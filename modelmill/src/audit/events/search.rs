@@ -1,6 +1,6 @@
 //! The search in a residual: segments of each drive, doubts about them, and events of all drives.
 
-use super::levels::DriveResidual;
+use super::levels::SearchedResidual;
 use super::segments::DriveSegment;
 use super::similar_states::{ScaledStates, StateComparison};
 use super::smoothing::true_share;
@@ -13,8 +13,8 @@ use crate::audit::thresholds::{
 /// The events in a residual, in the order of time; none if they are so long that they are no exception.
 pub(crate) fn find_events(trace: &ResidualTrace) -> Vec<ContactEvent> {
     let regimes = regimes::drive_regimes(trace).into_iter().enumerate();
-    let rests: Vec<DriveResidual> = regimes
-        .map(|(d, regimes)| DriveResidual::new(trace, d, regimes))
+    let rests: Vec<SearchedResidual> = regimes
+        .map(|(d, regimes)| SearchedResidual::new(trace, d, regimes))
         .collect();
     let mut accepted = Vec::new();
     for rest in &rests {
@@ -36,7 +36,7 @@ pub(crate) fn find_events(trace: &ResidualTrace) -> Vec<ContactEvent> {
 /// The segment, if it may be a contact; it then knows whether similar states confirm it.
 fn accept_segment(
     trace: &ResidualTrace,
-    rest: &DriveResidual,
+    rest: &SearchedResidual,
     states: &ScaledStates,
     mut segment: DriveSegment,
 ) -> Option<DriveSegment> {

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::levels::DriveResidual;
+use super::levels::SearchedResidual;
 use super::smoothing::{sample_quantile, true_ranges};
 use super::trace::ResidualTrace;
 use crate::audit::thresholds::{
@@ -50,7 +50,7 @@ impl DriveSegment {
 }
 
 /// The segments of one drive in motion.
-pub(super) fn segments_in_motion(trace: &ResidualTrace, rest: &DriveResidual) -> Vec<DriveSegment> {
+pub(super) fn segments_in_motion(trace: &ResidualTrace, rest: &SearchedResidual) -> Vec<DriveSegment> {
     let least = EVENT_LEAST_FORCE_SHARE * rest.force_rms;
     let stands_out: Vec<bool> = (0..trace.samples())
         .map(|i| {
@@ -72,7 +72,7 @@ pub(super) fn segments_in_motion(trace: &ResidualTrace, rest: &DriveResidual) ->
 
 /// Extends the core of a segment to its start and end: as far as the residual has its sign and a part of its size, in
 /// the shortest form in which it stands out.
-fn grow_segment(trace: &ResidualTrace, rest: &DriveResidual, core: Range<usize>) -> Option<DriveSegment> {
+fn grow_segment(trace: &ResidualTrace, rest: &SearchedResidual, core: Range<usize>) -> Option<DriveSegment> {
     let least = EVENT_LEAST_FORCE_SHARE * rest.force_rms;
     let (form, peak) = rest.forms.iter().find_map(|form| {
         let values = form.values[core.clone()].iter();
@@ -119,7 +119,12 @@ fn grow_segment(trace: &ResidualTrace, rest: &DriveResidual, core: Range<usize>)
 }
 
 /// The range about a core over which the residual belongs to it, with lulls and masked samples of some length.
-fn extended_range(trace: &ResidualTrace, rest: &DriveResidual, core: &Range<usize>, belongs: &[bool]) -> Range<usize> {
+fn extended_range(
+    trace: &ResidualTrace,
+    rest: &SearchedResidual,
+    core: &Range<usize>,
+    belongs: &[bool],
+) -> Range<usize> {
     let lull = trace.sample_count(EVENT_LONGEST_LULL_S, 1);
     let bridge = trace.sample_count(EVENT_LONGEST_BRIDGE_S, 2);
     // The last sample of the segment on the way from the core to one end of the run.
@@ -147,7 +152,7 @@ fn extended_range(trace: &ResidualTrace, rest: &DriveResidual, core: &Range<usiz
 
 /// The range whose start and end are where the residual passes half of its height: of all starts near the given one that
 /// with the largest sum of what exceeds the half, and the end alike. Smoothing does not shift them.
-fn sharpened_range(trace: &ResidualTrace, rest: &DriveResidual, wide: Range<usize>, sign: f64) -> Range<usize> {
+fn sharpened_range(trace: &ResidualTrace, rest: &SearchedResidual, wide: Range<usize>, sign: f64) -> Range<usize> {
     let shown = wide.clone().filter(|i| !rest.is_masked[*i]);
     let height = sample_quantile(shown.map(|i| sign * rest.smooth[i]).collect(), 0.6);
     if height <= 0.0 {

@@ -1,7 +1,7 @@
 //! Whether the residual of a segment repeats at similar states of its drive. If it does, it is a law that the model
 //! lacks and no contact.
 
-use super::levels::DriveResidual;
+use super::levels::SearchedResidual;
 use super::segments::DriveSegment;
 use super::smoothing::{differences_per_sample, range_median, running_mean, sample_quantile};
 use super::trace::ResidualTrace;
@@ -72,7 +72,7 @@ impl ScaledStates {
 /// Compares the residual of a segment with that of the rest of the run.
 pub(super) fn compare_with_similar_states(
     trace: &ResidualTrace,
-    rest: &DriveResidual,
+    rest: &SearchedResidual,
     states: &ScaledStates,
     segment: &DriveSegment,
 ) -> StateComparison {
@@ -145,7 +145,7 @@ fn nearest_visits(states: &ScaledStates, sample: usize, others: &[usize], around
 /// Whether the residual changes at an edge of a segment by a large part of its size, while the state hardly changes.
 fn is_sudden_edge(
     trace: &ResidualTrace,
-    rest: &DriveResidual,
+    rest: &SearchedResidual,
     states: &ScaledStates,
     segment: &DriveSegment,
     edge: usize,

@@ -3,7 +3,7 @@
 //! At standstill dry friction takes any value up to its limit, so that the level of the force says nothing. Friction
 //! that relaxes under a controller changes slowly; a push begins and ends at once and leaves nothing behind.
 
-use super::levels::DriveResidual;
+use super::levels::SearchedResidual;
 use super::segments::DriveSegment;
 use super::smoothing::{dilate_mask, median_deviation, range_median, running_median, sample_quantile, true_ranges};
 use super::trace::ResidualTrace;
@@ -27,7 +27,7 @@ struct ForceStep {
 }
 
 /// The pushes of one drive at standstill of all drives: short ones first, then long ones, which noise hides less.
-pub(super) fn pushes_at_standstill(trace: &ResidualTrace, rest: &DriveResidual) -> Vec<DriveSegment> {
+pub(super) fn pushes_at_standstill(trace: &ResidualTrace, rest: &SearchedResidual) -> Vec<DriveSegment> {
     if rest.regimes.has_dead_band {
         return Vec::new();
     }
@@ -51,7 +51,7 @@ pub(super) fn pushes_at_standstill(trace: &ResidualTrace, rest: &DriveResidual) 
 /// The pushes whose steps are differences of medians over a window.
 fn pushes_of_window(
     trace: &ResidualTrace,
-    rest: &DriveResidual,
+    rest: &SearchedResidual,
     standing: &[std::ops::Range<usize>],
     seconds: f64,
 ) -> Vec<DriveSegment> {
