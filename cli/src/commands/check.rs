@@ -29,5 +29,5 @@ pub(crate) fn run(host: &Host, args: &CheckArgs) -> CommandOutcome {
     if args.json {
         return terminal::print_json(&checked.json(&FlagSpelling));
     }
-    terminal::print(&checked.text(terminal::style()))
+    terminal::print(&checked.text_with_next_step(terminal::style(), &FlagSpelling))
 }

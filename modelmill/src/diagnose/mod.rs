@@ -29,6 +29,7 @@ pub(crate) mod added_effects;
 mod candidates;
 mod columns;
 mod completed;
+mod completion;
 mod constants;
 mod contacts;
 mod corrected;
@@ -54,6 +55,7 @@ mod tilt;
 pub mod words;
 
 pub(crate) use candidates::sign;
+pub use completion::ModelCompletion;
 pub use estimates::EffectEstimate;
 pub use findings::{
     DiagnosisFindings, DiagnosisOptions, MissingEffect, NominalDiagnosis, SeparationProposal, UndecidedEffect,
