@@ -20,6 +20,8 @@ pub(crate) struct CommandLineSpelling {
     recordings: String,
     /// Flags `--data` and `--map` for `excite`. Empty if the recordings need options that `excite` does not have.
     compared: String,
+    /// Whether the effects found were written into a model file.
+    is_completed: bool,
 }
 
 impl CommandLineSpelling {
@@ -49,12 +51,18 @@ impl CommandLineSpelling {
         Self {
             recordings: all.join(" "),
             compared,
+            is_completed: false,
         }
     }
 
     /// `modelmill identify ...` of a model file with the same recordings.
     pub(crate) fn identification_command(&self, path: &str) -> String {
         format!("modelmill identify {} {}", quote_word(path), self.recordings)
+    }
+
+    /// The same after the effects found were written into a model file, if they were.
+    pub(crate) fn with_completion(self, is_completed: bool) -> Self {
+        Self { is_completed, ..self }
     }
 
     /// The spelling for the arguments of `diagnose` and `report`.
@@ -75,6 +83,10 @@ impl StepSpelling for CommandLineSpelling {
     fn spell_effect_of_library(&self, model: &Model, effect: &NewEffect, library: &str) -> String {
         let effect = self.spell_effect(model, effect);
         format!("{effect} --library {}", quote_word(library))
+    }
+
+    fn has_added_effects(&self) -> bool {
+        self.is_completed
     }
 
     fn spell_completion(&self) -> String {

@@ -8,6 +8,7 @@ use modelmill_identify::{
 
 use crate::along::{self, interleave, variables};
 use crate::error::Outcome;
+use crate::faults::SuspectedFault;
 use crate::model::Model;
 use crate::recording::{self, PreparedRecording};
 use crate::segment::RecordingSegment;
@@ -24,6 +25,8 @@ pub struct ModelComparison {
     pub places: ErrorLocations,
     /// Notes on the recordings.
     pub notes: Vec<RecordingNote>,
+    /// The suspected fault of the first recording that has one: until it is corrected, all figures are doubtful.
+    pub suspect: Option<SuspectedFault>,
 }
 
 impl Model {
@@ -48,12 +51,18 @@ impl Model {
             files: data.iter().map(|one| one.run.file.clone()).collect(),
             figures,
             places: error_locations(self, &data, &measured, &forces)?,
+            suspect: first_suspect(recordings),
             notes: {
                 let notes = data.iter().flat_map(RecordingSegment::notes).cloned();
                 self.caution().into_iter().chain(notes).collect()
             },
         })
     }
+}
+
+/// The suspected fault of the first of some recordings that has one.
+pub(crate) fn first_suspect(recordings: &[&PreparedRecording]) -> Option<SuspectedFault> {
+    recordings.iter().find_map(|one| one.suspected_fault()).cloned()
 }
 
 /// The highest frequency at which the forces of all recordings can be compared, Hz. The preparation of a recording can

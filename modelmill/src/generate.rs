@@ -108,7 +108,7 @@ impl Model {
     pub fn generate(&self, code: &CodeOptions) -> Outcome<Vec<EmittedFile>> {
         // Not all languages can express reactions and the self-test; the error names those that can.
         let more = [("reactions", code.reactions), ("a self-test", code.self_test)];
-        if let Some((what, _)) = more.iter().find(|(_, asked)| *asked)
+        if let Some((what, _)) = more.iter().find(|(_, is_requested)| *is_requested)
             && !code.language.has_all()
         {
             let able = CodeLanguage::all().filter(|language| language.has_all());

@@ -314,7 +314,7 @@ impl CoreModel {
         let checked = self.run_interruptible(py, None, || self.model.check())?;
         Ok(PythonResult::new(
             &checked.json(&PythonSpelling),
-            &checked.text(TerminalStyle::PLAIN),
+            &checked.text_with_next_step(TerminalStyle::PLAIN, &PythonSpelling),
             RemarkList::new(),
         ))
     }

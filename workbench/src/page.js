@@ -531,10 +531,8 @@
       box.append(make('p', `These recordings cannot distinguish ${effect.kind.replaceAll('_', ' ')} from ${others}. ${effect.separate_by || ''}`));
       if (effect.separate_command) box.append(make('code', effect.separate_command));
     }
-    // The direction of gravity may be an error of the model file.
-    const gravity = (one) => one.kind === 'gravity_direction';
-    for (const one of found.corrected) box.append(make('p', `${gravity(one) ? 'Before the next diagnosis' : 'Correct the recording first'}: ${one.todo}.`));
-    for (const one of found.disturbances.filter((one) => !gravity(one))) box.append(make('p', `Disturbance in the recordings: ${one.says}.`));
+    for (const one of found.corrected) box.append(make('p', `${one.heading}: ${one.todo}.`));
+    for (const one of found.disturbances.filter((one) => !one.in_verdict)) box.append(make('p', `Disturbance in the recordings: ${one.says}.`));
     const figure = make('figure', undefined, 'still');
     figure.innerHTML = found.picture;
     figure.prepend(make('figcaption', `Error relative to the force ${found.judged}`));

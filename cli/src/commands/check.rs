@@ -38,9 +38,12 @@ pub(crate) fn run(host: &Host, args: &CheckArgs) -> CommandOutcome {
         }
         return terminal::print_json(&object);
     }
-    terminal::print(&checked.text(terminal::style()))?;
+    // The scale of a servo's gains is the next question of its user.
     match servo {
-        Some(servo) => terminal::print(&servo.text(terminal::style())),
-        None => Ok(()),
+        Some(servo) => {
+            terminal::print(&checked.text(terminal::style()))?;
+            terminal::print(&servo.text(terminal::style()))
+        }
+        None => terminal::print(&checked.text_with_next_step(terminal::style(), &FlagSpelling)),
     }
 }

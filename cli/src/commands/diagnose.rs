@@ -23,16 +23,17 @@ pub(crate) fn run(host: &Host, args: &DiagnoseArgs) -> CommandOutcome {
         host.load_text(target.path(), &given)?;
     }
     let flags = CommandLineSpelling::from_args(&args.diagnosis);
-    let question = DiagnosisOptions {
+    let options = DiagnosisOptions {
         fixed: args.diagnosis.fixed_parameters(),
         ..DiagnosisOptions::default()
     };
-    let findings = commands::diagnose(host, &args.diagnosis, question)?;
+    let findings = commands::diagnose(host, &args.diagnosis, options)?;
     // The findings are printed also where the model cannot be completed.
     let written = target
         .as_ref()
         .map(|target| write_completed_model(host, &findings, target));
     let is_written = matches!(written, Some(Ok(())));
+    let flags = flags.with_completion(is_written);
     if args.json {
         let mut object = findings.json(&flags);
         if let Some(target) = &target {
@@ -50,11 +51,11 @@ pub(crate) fn run(host: &Host, args: &DiagnoseArgs) -> CommandOutcome {
 
 /// The file for the completed model, which is none of the inputs.
 fn target(args: &DiagnoseArgs) -> CommandOutcome<Option<OutputFile>> {
-    let ask = &args.diagnosis;
-    let recordings = ask.data.iter().chain(&ask.check);
+    let given = &args.diagnosis;
+    let recordings = given.data.iter().chain(&given.check);
     let mut inputs: Vec<PathBuf> = recordings.flat_map(|path| commands::files_of(path)).collect();
-    inputs.push(ask.model.clone());
-    if let ParameterSource::Fit(path) = &ask.parameters {
+    inputs.push(given.model.clone());
+    if let ParameterSource::Fit(path) = &given.parameters {
         inputs.push(path.clone());
     }
     let inputs = inputs.iter().map(PathBuf::as_path);

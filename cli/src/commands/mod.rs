@@ -128,11 +128,11 @@ pub(crate) fn runs_of(files: &[Vec<PathBuf>]) -> Vec<Vec<&Path>> {
 pub(crate) fn diagnose(
     host: &Host,
     args: &DiagnosisArgs,
-    question: DiagnosisOptions,
+    options: DiagnosisOptions,
 ) -> CommandOutcome<DiagnosisFindings> {
     let model = args.parameters.apply_to(host, self::model(host, &args.model)?)?;
     let reading = args.preparation.reading();
-    // Long recordings are thinned out at once, to save memory.
+    // All recordings are prepared together at their full rate. The search needs fewer samples of long ones.
     let mut read = [Vec::new(), Vec::new()];
     for (read, all) in read
         .iter_mut()
@@ -144,7 +144,7 @@ pub(crate) fn diagnose(
     }
     let [fit, check] = read;
     let [fit, check] = [&fit, &check].map(|all| all.iter().collect::<Vec<_>>());
-    Ok(model.diagnose(&fit, &check, &question)?)
+    Ok(model.diagnose(&fit, &check, &options)?)
 }
 
 impl DiagnosisArgs {

@@ -33,9 +33,16 @@ fn the_completed_model_is_that_of_the_printed_commands_and_lacks_nothing() {
         let given = model("spidermill.toml");
         let completed = scratch(&format!("{name}.toml"));
         let base = ["diagnose", &given, "--data", &fit, "--check", &check];
-        let ran = ran(&[&base[..], &["--out", &completed]].concat());
-        assert_eq!(ran.status, 0, "{}", ran.err);
-        assert!(ran.err.contains(&format!("{completed} is written")), "{}", ran.err);
+        let wrote = ran(&[&base[..], &["--out", &completed]].concat());
+        assert_eq!(wrote.status, 0, "{}", wrote.err);
+        assert!(wrote.err.contains(&format!("{completed} is written")), "{}", wrote.err);
+        // What was done is no next step.
+        assert!(
+            !wrote.out.contains("modelmill add") && !wrote.out.contains("completed.toml"),
+            "{}",
+            wrote.out
+        );
+        let ran = ran(&base);
         let answer = json(&[&base[..], &["--json"]].concat());
         assert_eq!(answer["verdict"], "missing_effect");
         assert_eq!(answer["written"], Value::Null);

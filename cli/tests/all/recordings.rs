@@ -184,3 +184,24 @@ fn nominal_values_of_zero_are_no_prior() {
         ran.err
     );
 }
+
+/// A file that cannot be read stops no other: the rest is printed, and the exit status states that something failed.
+#[test]
+fn a_file_that_cannot_be_read_stops_no_other() {
+    let good = written("readable.csv", &swing(100, |_| 0.0));
+    let missing = [scratch("not-there-1.csv"), scratch("not-there-2.csv")];
+    let both = ran(&["recordings", &missing[0], &good]);
+    assert_eq!(both.status, 1, "{}", both.err);
+    assert!(
+        both.out.contains("q_dd") && both.err.contains("not-there-1.csv"),
+        "{} {}",
+        both.out,
+        both.err
+    );
+    let all = ran(&["recordings", &missing[0], &good, &missing[1], "--json"]);
+    assert_eq!(all.status, 1);
+    let object: Value = serde_json::from_str(&all.out).expect("JSON");
+    assert_eq!(object["recordings"].as_array().map(Vec::len), Some(1), "{object:#}");
+    assert_eq!(object["unread"].as_array().map(Vec::len), Some(2), "{object:#}");
+    assert!(all.err.contains("2 of 3 recordings cannot be read"), "{}", all.err);
+}

@@ -129,7 +129,7 @@ fn timing_jitter(all: &[CubicResidual]) -> Option<f64> {
     if all.len() < 2 {
         return None;
     }
-    let mut told: Vec<Vec<Option<f64>>> = Vec::new();
+    let mut readings: Vec<Vec<Option<f64>>> = Vec::new();
     for one in all {
         // Compare errors at slow and fast motion.
         let fastest = one.rates.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
@@ -144,15 +144,15 @@ fn timing_jitter(all: &[CubicResidual]) -> Option<f64> {
             return None;
         }
         // Time error at each fast sample: position error over rate.
-        told.push(
+        readings.push(
             pairs
                 .map(|(e, v)| (v.abs() > FAST_RATE_SHARE * fastest).then(|| e / v))
                 .collect(),
         );
     }
     let mut times = Vec::new();
-    for (k, one) in told.iter().enumerate() {
-        for other in &told[k + 1..] {
+    for (k, one) in readings.iter().enumerate() {
+        for other in &readings[k + 1..] {
             let both: Vec<(f64, f64)> = one
                 .iter()
                 .zip(other)

@@ -237,7 +237,7 @@ impl EliminatedValues {
     /// Which of them are determined, given which of the others are.
     pub(crate) fn determined_flags(&self, others: &[bool]) -> Vec<bool> {
         let is_told = |(alone, hangs): (&bool, &Vec<bool>)| {
-            *alone && hangs.iter().zip(others).all(|(hangs, told)| *told || !hangs)
+            *alone && hangs.iter().zip(others).all(|(hangs, is_known)| *is_known || !hangs)
         };
         self.determined.iter().zip(&self.depends_on).map(is_told).collect()
     }

@@ -223,9 +223,9 @@ impl<'a> EffectSelector<'a> {
         let beside = self.conditioning_set(picks);
         let problem = self.problem;
         let candidates = problem.candidates.iter().enumerate();
-        let mut asked = candidates.clone().filter(|(k, _)| is_asked(*k));
+        let mut requested = candidates.clone().filter(|(k, _)| is_asked(*k));
         // Load-dependent columns of all candidates come from one evaluation.
-        let carried = if asked.any(|(_, candidate)| candidate.source == ColumnSource::LoadDependent) {
+        let carried = if requested.any(|(_, candidate)| candidate.source == ColumnSource::LoadDependent) {
             self.load_dependent_effects(picks)
         } else {
             HashMap::new()

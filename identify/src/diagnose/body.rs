@@ -91,7 +91,7 @@ mod tests {
     use super::*;
 
     /// Ten columns that distinguish the ten parameters.
-    fn told() -> [ForceColumn; 10] {
+    fn planted_columns() -> [ForceColumn; 10] {
         std::array::from_fn(|k| {
             let mut values = vec![0.0; 10];
             values[k] = 1.0;
@@ -103,7 +103,7 @@ mod tests {
     #[test]
     fn columns_add_up_to_the_ten_parameters_of_the_body() {
         let body = AttachedBody {
-            inertial_columns: told(),
+            inertial_columns: planted_columns(),
             estimated: (0..7).collect(),
             max_distance: 2.0,
         };
@@ -147,7 +147,7 @@ mod tests {
     #[test]
     fn columns_are_derivatives() {
         let body = AttachedBody {
-            inertial_columns: told(),
+            inertial_columns: planted_columns(),
             estimated: (0..4).collect(),
             max_distance: 2.0,
         };
@@ -177,7 +177,7 @@ mod tests {
     #[test]
     fn a_centre_beyond_reach_is_no_place() {
         let body = AttachedBody {
-            inertial_columns: told(),
+            inertial_columns: planted_columns(),
             estimated: vec![0, 1],
             max_distance: 1.0,
         };

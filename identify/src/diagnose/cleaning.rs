@@ -125,23 +125,24 @@ fn remove_outliers(problem: &mut DiagnosisProblem) -> Vec<Disturbance> {
     }
     let channels = flagged.iter().zip(&sizes).enumerate();
     // Report channels with outliers.
-    let told = channels.filter(|(_, (_, sizes))| !sizes.is_empty());
-    told.map(|(d, (flagged, sizes))| {
-        let count = flagged.iter().filter(|f| **f).count() as f64;
-        let size = (sizes.iter().map(|x| x * x).sum::<f64>() / sizes.len() as f64).sqrt();
-        Disturbance {
-            kind: "outliers".to_owned(),
-            at: vec![problem.layout.channels[d].clone()],
-            estimates: vec![
-                EstimatedQuantity::new("share", count / flagged.len().max(1) as f64, "1"),
-                EstimatedQuantity::new("size", size, ""),
-            ],
-            recordings: Vec::new(),
-            interval: None,
-            description: None,
-        }
-    })
-    .collect()
+    let outlying = channels.filter(|(_, (_, sizes))| !sizes.is_empty());
+    outlying
+        .map(|(d, (flagged, sizes))| {
+            let count = flagged.iter().filter(|f| **f).count() as f64;
+            let size = (sizes.iter().map(|x| x * x).sum::<f64>() / sizes.len() as f64).sqrt();
+            Disturbance {
+                kind: "outliers".to_owned(),
+                at: vec![problem.layout.channels[d].clone()],
+                estimates: vec![
+                    EstimatedQuantity::new("share", count / flagged.len().max(1) as f64, "1"),
+                    EstimatedQuantity::new("size", size, ""),
+                ],
+                recordings: Vec::new(),
+                interval: None,
+                description: None,
+            }
+        })
+        .collect()
 }
 
 /// Whether each sample is within some samples of a reversal of the channel's drive, where friction jumps.

@@ -308,8 +308,8 @@ mod tests {
             [&rate as &dyn Fn(f64) -> f64, &force].map(|of| (0..40).map(|i| of(f64::from(i))).collect());
         for i in 1..390 {
             let t = 0.1 * f64::from(i) + 0.05;
-            let said = interpolate_force(&values, Some(&rates), t);
-            assert!((said - force(t)).abs() < 1e-9, "{t}: {said}");
+            let interpolated = interpolate_force(&values, Some(&rates), t);
+            assert!((interpolated - force(t)).abs() < 1e-9, "{t}: {interpolated}");
         }
     }
 
@@ -319,8 +319,8 @@ mod tests {
         let values: Vec<f64> = (0..40).map(|i| f64::from(i).sin()).collect();
         for i in 10..380 {
             let t = 0.1 * f64::from(i);
-            let said = interpolate_force(&values, None, t);
-            assert!((said - t.sin()).abs() < 0.025, "{t}: {said}");
+            let interpolated = interpolate_force(&values, None, t);
+            assert!((interpolated - t.sin()).abs() < 0.025, "{t}: {interpolated}");
         }
     }
 

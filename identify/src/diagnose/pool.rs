@@ -434,9 +434,9 @@ impl<'a> ColumnPool<'a> {
 }
 
 /// Indices of the true entries, ascending.
-fn true_indices(said: &[bool]) -> Vec<usize> {
-    let samples = said.iter().enumerate();
-    samples.filter_map(|(i, said)| said.then_some(i)).collect()
+fn true_indices(mask: &[bool]) -> Vec<usize> {
+    let samples = mask.iter().enumerate();
+    samples.filter_map(|(i, mask)| mask.then_some(i)).collect()
 }
 
 /// Sets values to zero where `out` is true.

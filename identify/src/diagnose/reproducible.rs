@@ -147,8 +147,8 @@ fn errors_by_samples(mut features: DMatrix<f64>, targets: &DMatrix<f64>, folds: 
 }
 
 /// Adds the squared errors of a prediction to the sum of each target.
-fn add_errors(left: &mut [f64], said: DMatrix<f64>, target: &DMatrix<f64>) {
-    for (left, column) in left.iter_mut().zip((target - said).column_iter()) {
+fn add_errors(left: &mut [f64], predicted: DMatrix<f64>, target: &DMatrix<f64>) {
+    for (left, column) in left.iter_mut().zip((target - predicted).column_iter()) {
         *left += column.norm_squared();
     }
 }

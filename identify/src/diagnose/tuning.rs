@@ -232,22 +232,22 @@ mod tests {
             ("right end", 1.0, |x| x.powi(3)),
         ];
         for (name, top, curve) in curves {
-            let asked = Cell::new(0);
+            let evaluations = Cell::new(0);
             let at = |x: f64| {
-                asked.set(asked.get() + 1);
+                evaluations.set(evaluations.get() + 1);
                 Some((curve(x), ()))
             };
             let (x, (value, ())) = maximise(0.0, 1.0, &at).expect("a value");
             assert!((x - top).abs() <= 2.0 * NEAR, "{name}: {x}");
             assert!((value - curve(x)).abs() < 1e-15, "{name}");
-            assert!(asked.get() <= MAX_EVALUATIONS, "{name}: {}", asked.get());
+            assert!(evaluations.get() <= MAX_EVALUATIONS, "{name}: {}", evaluations.get());
         }
-        let asked = Cell::new(0);
+        let evaluations = Cell::new(0);
         maximise(0.0, 1.0, &|x: f64| {
-            asked.set(asked.get() + 1);
+            evaluations.set(evaluations.get() + 1);
             Some((1.0 - (x - 0.3).powi(2), ()))
         });
-        assert!(asked.get() <= 7, "{}", asked.get());
+        assert!(evaluations.get() <= 7, "{}", evaluations.get());
     }
 
     #[test]

@@ -81,17 +81,17 @@ impl SeparationMeasure {
 /// assert!((found.residual - found.effect * 0.75_f64.sqrt()).abs() < 1e-12);
 /// assert!((found.reverse_residual - found.residual).abs() < 1e-12);
 /// ```
-pub fn measure_separation(question: &SeparationProblem) -> Option<SeparationMeasure> {
-    let rows = question.effect.nrows();
+pub fn measure_separation(problem: &SeparationProblem) -> Option<SeparationMeasure> {
+    let rows = problem.effect.nrows();
     let rms = |matrix: &DMatrix<f64>| matrix.norm() / (rows as f64).sqrt();
-    let effect = rms(&question.effect);
+    let effect = rms(&problem.effect);
     let is_felt = effect.is_finite() && effect > 0.0;
     if rows == 0 || !is_felt {
         return None;
     }
-    let base = orthonormal_basis(&question.base);
-    let beyond = project_out(&base, &question.effect);
-    let spans = question.rivals.iter().map(|rival| orthonormal_extension(&base, rival));
+    let base = orthonormal_basis(&problem.base);
+    let beyond = project_out(&base, &problem.effect);
+    let spans = problem.rivals.iter().map(|rival| orthonormal_extension(&base, rival));
     let (rival, span, left) = spans
         .enumerate()
         .map(|(k, span)| {
@@ -100,7 +100,7 @@ pub fn measure_separation(question: &SeparationProblem) -> Option<SeparationMeas
         })
         .min_by(|a, b| a.2.total_cmp(&b.2))?;
     let size = rms(&beyond);
-    let angles = question.fitted.iter().map(|fitted| {
+    let angles = problem.fitted.iter().map(|fitted| {
         let own = orthonormal_extension(&base, fitted);
         smallest_angle_sine(&own, &span)
     });
@@ -225,19 +225,19 @@ mod tests {
             let effect = random(&mut noise, 40, 2);
             let rivals: Vec<_> = (1..4).map(|n| random(&mut noise, 40, n)).collect();
             let fitted = vec![effect.clone()];
-            let question = SeparationProblem {
+            let problem = SeparationProblem {
                 base,
                 effect,
                 fitted,
                 rivals,
             };
-            let found = measure_separation(&question).unwrap();
-            let each = question.rivals.iter();
+            let found = measure_separation(&problem).unwrap();
+            let each = problem.rivals.iter();
             let least = each
-                .map(|rival| left(&question.effect, &[&question.base, rival]))
+                .map(|rival| left(&problem.effect, &[&problem.base, rival]))
                 .fold(f64::INFINITY, f64::min);
             assert!((found.residual - least).abs() < 1e-12 * found.effect);
-            let beyond = left(&question.effect, &[&question.base]);
+            let beyond = left(&problem.effect, &[&problem.base]);
             assert!((found.outside_base - beyond).abs() < 1e-12 * found.effect);
             assert!(found.residual <= found.outside_base && found.outside_base <= found.effect);
         }
@@ -274,7 +274,7 @@ mod tests {
         let base = random(&mut noise, 30, 2);
         let both = random(&mut noise, 30, 2);
         let one = both.columns(0, 1) * 2.0 + base.columns(1, 1) * 3.0;
-        let ask = |effect: &DMatrix<f64>, rival: &DMatrix<f64>| {
+        let measured = |effect: &DMatrix<f64>, rival: &DMatrix<f64>| {
             measure_separation(&SeparationProblem {
                 base: base.clone(),
                 effect: effect.clone(),
@@ -283,11 +283,11 @@ mod tests {
             })
             .unwrap()
         };
-        let special = ask(&one, &both);
+        let special = measured(&one, &both);
         assert!(special.is_mimicked() && !special.is_in_base());
-        let general = ask(&both, &one);
+        let general = measured(&both, &one);
         assert!(!general.is_mimicked() && general.can_explain_rival());
-        assert!(ask(&(&base * 1.5), &both).is_in_base());
+        assert!(measured(&(&base * 1.5), &both).is_in_base());
     }
 
     #[test]

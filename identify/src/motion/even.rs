@@ -165,9 +165,9 @@ mod tests {
                 .map(|k| 6.0 * k / f64::from(steps))
                 .collect();
             let values: Vec<f64> = time.iter().map(|t| t.sin()).collect();
-            let asked: Vec<f64> = (0..500).map(|k| 1.5 + 0.006 * f64::from(k)).collect();
-            let found = CubicSpline::new(&time, &values).evaluate_at(&asked);
-            let off = asked.iter().zip(found).map(|(t, v)| (v - t.sin()).abs());
+            let sample_times: Vec<f64> = (0..500).map(|k| 1.5 + 0.006 * f64::from(k)).collect();
+            let found = CubicSpline::new(&time, &values).evaluate_at(&sample_times);
+            let off = sample_times.iter().zip(found).map(|(t, v)| (v - t.sin()).abs());
             off.fold(0.0, f64::max)
         };
         let [coarse, fine] = [error(60), error(120)];

@@ -157,7 +157,7 @@ impl<'a> FourierBasis<'a> {
     fn residual(&self, series: &DVector<f64>, values: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let [along, rates, _] = self.evaluate_series(series);
         let pairs = values.iter().zip(along);
-        (pairs.map(|(value, said)| value - said).collect(), rates)
+        (pairs.map(|(value, fitted)| value - fitted).collect(), rates)
     }
 
     /// One Gauss-Newton step towards the period with the smallest residual of all signals, s. Each signal is weighted

@@ -212,15 +212,15 @@ mod tests {
 
     #[test]
     fn corrections_undo_what_was_spoilt() {
-        let sound = recording(f64::sin);
-        let mut read = sound.clone();
+        let intact = recording(f64::sin);
+        let mut read = intact.clone();
         read.scale_column("q", -4.0);
         read.exchange_columns("q", "motor");
-        let [moved, before] = [read.column("motor").unwrap()[7], sound.column("q").unwrap()[7]];
+        let [moved, before] = [read.column("motor").unwrap()[7], intact.column("q").unwrap()[7]];
         assert!((moved + 4.0 * before).abs() < 1e-12);
         read.exchange_columns("motor", "q");
         read.scale_column("q", -0.25);
-        assert_eq!(read, sound);
+        assert_eq!(read, intact);
         read.leave_out_samples("motor", &|t| (1.0..2.0).contains(&t));
         let lost = read.lost_samples("motor").unwrap();
         assert_eq!(lost.iter().filter(|lost| **lost).count(), 200);

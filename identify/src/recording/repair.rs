@@ -171,21 +171,21 @@ impl SignalColumn {
     ///
     /// Before the first and behind the last measured sample the nearest value is used.
     pub(super) fn interpolate_lost(&mut self) {
-        let sound: Vec<usize> = (0..self.values.len()).filter(|i| !self.interpolated[*i]).collect();
-        let (Some(first), Some(last)) = (sound.first().copied(), sound.last().copied()) else {
+        let intact: Vec<usize> = (0..self.values.len()).filter(|i| !self.interpolated[*i]).collect();
+        let (Some(first), Some(last)) = (intact.first().copied(), intact.last().copied()) else {
             return;
         };
         for i in 0..self.values.len() {
             if !self.interpolated[i] {
                 continue;
             }
-            let after = sound.partition_point(|k| *k < i);
+            let after = intact.partition_point(|k| *k < i);
             self.values[i] = if i < first {
                 self.values[first]
             } else if i > last {
                 self.values[last]
             } else {
-                let (a, b) = (sound[after - 1], sound[after]);
+                let (a, b) = (intact[after - 1], intact[after]);
                 let part = (i - a) as f64 / (b - a) as f64;
                 self.values[a] + part * (self.values[b] - self.values[a])
             };
@@ -393,10 +393,10 @@ mod tests {
 
     #[test]
     fn sound_signals_stay_as_they_are() {
-        let sound = recording(q, |i| force(i).to_string());
-        assert_eq!(sound.notes(), []);
-        assert_eq!(sound.lost_samples("motor"), None);
-        assert_eq!(sound.restore_sensor_faults(), None);
+        let intact = recording(q, |i| force(i).to_string());
+        assert_eq!(intact.notes(), []);
+        assert_eq!(intact.lost_samples("motor"), None);
+        assert_eq!(intact.restore_sensor_faults(), None);
         // A coarse encoder makes steps all the time.
         let coarse = recording(|i| (q(i) * 200.0).round() / 200.0, |i| force(i).to_string());
         assert_eq!(coarse.notes(), []);

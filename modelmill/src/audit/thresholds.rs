@@ -245,6 +245,12 @@ pub(super) const BRIEF_EVENT_S: f64 = 0.075;
 pub(super) const BRIEF_LEAST_DEVIATIONS: f64 = 50.0;
 pub(super) const BRIEF_LEAST_FORCE_SHARE: f64 = 0.05;
 
+/// Forces are left out before and after an event as well: for this share of its length (1), since the start and the end of
+/// a force that rises slowly hardly exceed the usual residual, and for at least this time, s. Half of a sine lasts longer
+/// at its foot than at half of its height by a quarter at each side. By judgement.
+pub(super) const EVENT_MARGIN_SHARE: f64 = 0.2;
+pub(super) const EVENT_LEAST_MARGIN_S: f64 = 0.15;
+
 /// A drive counts with at most this many deviations (1). By judgement.
 pub(super) const MOST_COUNTED_DEVIATIONS: f64 = 40.0;
 

@@ -2,11 +2,11 @@
 //! are the entries to add and the text of the file.
 
 use modelmill_boundary::message;
-use modelmill_boundary::text::Message;
 use modelmill_spec::edit::NewEffect;
 
 use crate::error::{Error, Outcome};
 
+use super::completion::ModelCompletion;
 use super::findings::{DiagnosisFindings, MissingEffect};
 use super::words;
 
@@ -36,7 +36,7 @@ impl DiagnosisFindings {
         }
         match (&self.edited, &self.after) {
             (Some(completed), _) => Ok(&completed.text),
-            (None, Err(reason)) if *reason != Message::new() => {
+            (None, ModelCompletion::Refused(reason)) => {
                 Err(Error::input(message!("the model cannot be completed: {}", reason)))
             }
             _ => Ok(self.before.model.text()),

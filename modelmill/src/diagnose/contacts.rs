@@ -1,15 +1,15 @@
 //! Contacts and pushes in a diagnosis: those that the audit of the recordings found are left out of the search, and a
 //! second look at the residual of the last set of effects finds those that a missing effect had hidden.
 
-use modelmill_codegen::{ModelEvaluator, MotionStates};
 use modelmill_identify::changes::NormalEquations;
 use modelmill_identify::diagnose::{DiagnosisProblem, Disturbance, TimeResidual};
 
 use super::thresholds::{
-    CONTACT_GAP_S, CONTACT_LEAST_RESIDUAL_RATIO, CONTACT_MARGIN_S, REPEATED_PLACE_FEWEST_SAMPLES,
-    REPEATED_PLACE_MOST_RESIDUAL,
+    CONTACT_GAP_S, CONTACT_LEAST_RESIDUAL_RATIO, REPEATED_PLACE_FEWEST_SAMPLES, REPEATED_PLACE_MOST_RESIDUAL,
 };
-use crate::audit::events::{ResidualTrace, event_disturbance, find_events, slowest_rate};
+use crate::audit::events::{
+    ResidualTrace, event_disturbance, find_events, left_out_interval, motion_of_drives, slowest_rate, standing_states,
+};
 use crate::model::Model;
 use crate::regressors::SegmentList;
 
@@ -76,30 +76,9 @@ fn residual_trace(
     if time.len() < super::thresholds::FEWEST_SAMPLES {
         return None;
     }
-    let pick = |columns: &[Vec<f64>]| -> Vec<Vec<f64>> {
-        let every = |column: &Vec<f64>| column.iter().step_by(one.decimation()).copied().collect();
-        columns.iter().map(every).collect()
-    };
-    let motion = [&one.run.q, &one.run.qd, &one.run.qdd].map(|columns| pick(columns));
-    let load = pick(one.run.force.as_deref().unwrap_or(&[]));
-    let states = MotionStates {
-        q: motion[0].iter().map(Vec::as_slice).collect(),
-        qd: motion[1].iter().map(Vec::as_slice).collect(),
-        qdd: motion[2].iter().map(Vec::as_slice).collect(),
-        load: load.iter().map(Vec::as_slice).collect(),
-    };
-    // Positions come first, rates behind them, the Jacobian last.
     let drives = model.drives().len();
-    let mut positions = ModelEvaluator::new(&model.derivation).drive_motion(&states).ok()?;
-    positions.truncate(2 * drives);
-    let rates = positions.split_off(drives);
-    let slope = |rate: &Vec<f64>| -> Vec<f64> {
-        let last = rate.len() - 1;
-        let at = |i: usize| (i.saturating_sub(1), (i + 1).min(last));
-        let ends = (0..rate.len()).map(at);
-        ends.map(|(a, b)| (rate[b] - rate[a]) / (time[b] - time[a])).collect()
-    };
-    let accelerations = rates.iter().map(slope).collect();
+    let samples: Vec<usize> = (0..one.run.time.len()).step_by(one.decimation()).collect();
+    let motion = motion_of_drives(model, &standing_states(model, &one.run, &samples, &time), &time)?;
     // A row without drive has no force and no residual.
     let of_segment = |values: Option<&Vec<f64>>| -> Vec<f64> {
         let values = values.and_then(|values| values.get(part.clone()));
@@ -123,7 +102,7 @@ fn residual_trace(
         })
         .collect();
     Some(ResidualTrace {
-        motion: [positions, rates, accelerations],
+        motion,
         measured,
         residual,
         is_measured,
@@ -140,7 +119,10 @@ fn leave_out_contacts(problem: &mut DiagnosisProblem, all: &SegmentList<'_>, con
     let about = |contacts: &[Disturbance]| -> Vec<bool> {
         let mut about = vec![false; samples.time.len()];
         for contact in contacts {
-            for (out, is) in about.iter_mut().zip(samples.mask(contact, CONTACT_MARGIN_S)) {
+            for (out, is) in about
+                .iter_mut()
+                .zip(samples.mask(contact.interval.map(left_out_interval), contact))
+            {
                 *out |= is;
             }
         }
@@ -188,15 +170,15 @@ impl<'a> ContactSamples<'a> {
         Self { time, file, positions }
     }
 
-    /// The samples within a contact and a margin about it.
-    fn mask(&self, contact: &Disturbance, margin: f64) -> Vec<bool> {
-        let Some([from, to]) = contact.interval else {
+    /// The samples of the recordings of a contact within an interval, s.
+    fn mask(&self, interval: Option<[f64; 2]>, contact: &Disturbance) -> Vec<bool> {
+        let Some([from, to]) = interval else {
             return vec![false; self.time.len()];
         };
         let samples = self.time.iter().zip(&self.file);
         samples
             .map(|(time, file)| {
-                let is_within = *time >= from - margin && *time <= to + margin;
+                let is_within = (from..=to).contains(time);
                 is_within && contact.recordings.iter().any(|one| one == file)
             })
             .collect()
@@ -204,7 +186,7 @@ impl<'a> ContactSamples<'a> {
 
     /// Whether the force of a contact is that of an end stop, which the position of one coordinate explains.
     fn is_explained_by_place(&self, problem: &DiagnosisProblem, contact: &Disturbance, about: &[bool]) -> bool {
-        let inside = self.mask(contact, 0.0);
+        let inside = self.mask(contact.interval, contact);
         // The drive with the largest force decides.
         let largest = contact.estimates.iter().map(|one| one.value);
         let strongest = contact.at.iter().zip(largest).max_by(|a, b| a.1.total_cmp(&b.1));
@@ -269,9 +251,9 @@ fn is_force_beyond_place(
     let factors = moments.solve().values;
     // The residual of the model at any sample.
     let rest = |i: usize| {
-        let said = columns.iter().zip(factors.iter());
-        let said = said.map(|(column, factor)| column.map_or(0.0, |values| factor * values[i]));
-        measured[i] - said.sum::<f64>()
+        let predicted = columns.iter().zip(factors.iter());
+        let predicted = predicted.map(|(column, factor)| column.map_or(0.0, |values| factor * values[i]));
+        measured[i] - predicted.sum::<f64>()
     };
     let beyond = |is_event: bool| -> Vec<(f64, f64)> {
         (0..measured.len())

@@ -10,7 +10,9 @@ use crate::error::{Error, Outcome};
 use crate::faults::{ColumnOperation, FaultCorrection, RecordingFaultKind, SuspectedFault, correction_score};
 use crate::model::Model;
 use crate::recording::PreparedRecording;
+use crate::text::names::joined_by_and;
 
+use super::completion::ModelCompletion;
 use super::findings::DiagnosisFindings;
 use super::thresholds::{CORRECTION_ROUNDS, SHARED_FAULT_LEAST_SCORE};
 use super::words;
@@ -86,7 +88,7 @@ impl CorrectedRecordings {
         all.unresolved = merge_faults(left.cloned());
         for fault in &mut all.unresolved {
             if fault.kind == RecordingFaultKind::GravityDirection && !all.disagreeing.is_empty() {
-                let others = words::joined_by_and(&all.disagreeing);
+                let others = joined_by_and(&all.disagreeing);
                 let verb = if all.disagreeing.len() == 1 { "agrees" } else { "agree" };
                 fault.clause = format!("{}, but {others} {verb} with the model file", fault.clause);
             }
@@ -233,7 +235,7 @@ impl DiagnosisFindings {
             self.laws.clear();
             self.entries.clear();
             self.edited = None;
-            self.after = Err(modelmill_boundary::text::Message::new());
+            self.after = ModelCompletion::NothingToAdd;
             self.with_nominal = None;
         }
         self.corrected = corrected;

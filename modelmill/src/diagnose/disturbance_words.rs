@@ -3,9 +3,10 @@
 
 use modelmill_identify::diagnose::Disturbance;
 
+use crate::text::names::joined_by_and;
 use crate::text::table::{all_digits, number, percent, significant};
 
-use super::words::{joined_by_and, kind};
+use super::words::kind;
 
 /// Disturbances as sentences; noise and outliers of several drives share one.
 pub fn disturbance_sentences(all: &[Disturbance]) -> Vec<String> {
@@ -70,8 +71,8 @@ pub fn disturbance(one: &Disturbance) -> String {
                 Some(_) => all_digits(q.value),
                 None => number(q.value),
             };
-            let said = format!("{} {value}{deviation} {unit}", q.name);
-            said.trim_end().to_owned()
+            let quantity_text = format!("{} {value}{deviation} {unit}", q.name);
+            quantity_text.trim_end().to_owned()
         })
         .collect();
     let all = all.join(", ");

@@ -64,15 +64,15 @@ pub(crate) fn subtract_known(
             continue;
         }
         // The same fault in several recordings becomes one entry.
-        let is_same = |told: &&mut Disturbance| {
-            told.description.is_some() && (&told.kind, &told.description) == (&one.kind, &one.description)
+        let is_same = |reported: &&mut Disturbance| {
+            reported.description.is_some() && (&reported.kind, &reported.description) == (&one.kind, &one.description)
         };
         match problem.disturbances.iter_mut().find(is_same) {
             // Only files that are not listed yet.
-            Some(told) => {
-                let files = one.recordings.iter().filter(|file| !told.recordings.contains(file));
+            Some(reported) => {
+                let files = one.recordings.iter().filter(|file| !reported.recordings.contains(file));
                 let new: Vec<String> = files.cloned().collect();
-                told.recordings.extend(new);
+                reported.recordings.extend(new);
             }
             None => problem.disturbances.push(one.clone()),
         }

@@ -2,7 +2,7 @@
 //! with the effects found, and regions where the error is largest. Text, JSON and the page print them.
 
 use modelmill_boundary::message;
-use modelmill_boundary::text::{CommandName, Message, OptionName, Remedy};
+use modelmill_boundary::text::{CommandName, OptionName, Remedy};
 use modelmill_identify::diagnose::{DiagnosisVerdict, EffectSupport, IdentifiedEffect, LocatedEffect, ModelDiagnosis};
 use modelmill_identify::{ErrorRegion, RecordingNote};
 use modelmill_spec::Mechanics;
@@ -19,6 +19,7 @@ use crate::segment::RecordingSegment;
 use crate::text::table::percent;
 
 use super::added_effects::{self, CompletedModelFile};
+use super::completion::ModelCompletion;
 use super::constants::CONSTANT_ERROR;
 use super::corrected::CorrectedRecordings;
 use super::estimates::{EffectEstimate, effect_estimates};
@@ -105,9 +106,8 @@ pub struct DiagnosisFindings {
     pub regions: Vec<ErrorRegion>,
     /// The given model, without added effects, along all recordings.
     pub before: ModelVersion,
-    /// The model with the effects found, or the reason why there is none. The reason is empty if there is no effect to
-    /// add.
-    pub after: Result<ModelVersion, Message>,
+    /// The model with the effects found, or the reason why there is none.
+    pub after: ModelCompletion,
     /// The effects found, as entries of a model file. Effects that a model file cannot contain have no entry.
     pub entries: Vec<NewEffect>,
     /// The model file with these entries; `None` if there are none or they cannot be added.
@@ -188,7 +188,7 @@ pub struct NominalDiagnosis {
 
 impl Model {
     /// Finds the physical effects that the model lacks. Parameters are fitted to the recordings `fit`. Errors are
-    /// evaluated on the validation runs `check`, or by cross-validation if there are none. `question` contains the
+    /// evaluated on the validation runs `check`, or by cross-validation if there are none. `options` contains the
     /// options.
     ///
     /// Fails if a recording is too short, has no forces, or contains positions at which the loops of the mechanism
@@ -197,17 +197,17 @@ impl Model {
         &self,
         fit: &[&PreparedRecording],
         check: &[&PreparedRecording],
-        question: &DiagnosisOptions,
+        options: &DiagnosisOptions,
     ) -> Outcome<DiagnosisFindings> {
         // What makes numbers meaningless comes first; the search runs on recordings without it.
         let corrected = (self.host()).run_job("looking for faults of the recordings", 0, |_| {
             CorrectedRecordings::new(self, fit, check)
         })??;
         let mut findings = match corrected {
-            None => self.diagnose_prepared(fit, check, *question)?,
+            None => self.diagnose_prepared(fit, check, *options)?,
             Some(all) => {
                 let [fit, check] = [&all.fit, &all.check].map(|runs| runs.iter().collect::<Vec<_>>());
-                let mut findings = all.model.diagnose_prepared(&fit, &check, *question)?;
+                let mut findings = all.model.diagnose_prepared(&fit, &check, *options)?;
                 findings.add_corrections(all.corrected, all.unresolved);
                 findings
             }
@@ -223,7 +223,7 @@ impl Model {
         &self,
         fit: &[&PreparedRecording],
         check: &[&PreparedRecording],
-        question: DiagnosisOptions,
+        options: DiagnosisOptions,
     ) -> Outcome<DiagnosisFindings> {
         // Long recordings are decimated first, to save memory and time.
         let fewer = |all: &[&PreparedRecording]| -> Outcome<Vec<PreparedRecording>> {
@@ -232,7 +232,7 @@ impl Model {
         let [fewer_fit, fewer_check] = [fewer(fit)?, fewer(check)?];
         let [of_fit, of_check] = [&fewer_fit, &fewer_check].map(|all| all.iter().collect::<Vec<&PreparedRecording>>());
         let data = segments(self, &of_fit, &of_check);
-        let held = question.fixed;
+        let held = options.fixed;
         let recordings: Vec<&PreparedRecording> = of_fit.into_iter().chain(of_check).collect();
         // Differences between recordings are found first, since they would look like effects.
         let between = (self.host()).run_job("comparing the recordings with each other", 0, |_| {
@@ -253,21 +253,21 @@ impl Model {
         // The model file with the effects, and that model identified from the same recordings.
         let entries = added_effects::entries(self, &answer);
         let (edited, after) = if entries.is_empty() {
-            (None, Err(Message::new()))
+            (None, ModelCompletion::NothingToAdd)
         } else {
             match added_effects::add_entries(self, &entries) {
                 Ok(edited) => {
                     let after = version_with_effects(self, &edited, [fit, check], &data, held);
-                    (Some(edited), after.map_err(|error| error.message()))
+                    (Some(edited), ModelCompletion::from(after))
                 }
-                Err(error) => (None, Err(error.message())),
+                Err(error) => (None, ModelCompletion::Refused(error.message())),
             }
         };
         let [fit_data, check_data] = data;
         // The given model, for comparison.
         let before = ModelVersion::new(self.clone(), fit_data, check_data, held)?;
         let places = judged_error_locations(&before)?;
-        let left = after.as_ref().ok().map(self::judged_error_locations).transpose()?;
+        let left = after.version().map(self::judged_error_locations).transpose()?;
         let variables = variables(&before)?;
         let mut findings = DiagnosisFindings {
             diagnosis: answer.diagnosis.clone(),
@@ -311,7 +311,7 @@ impl Model {
         }
         findings.regions = regions(&findings);
         findings.geometry_alternatives = alternatives_to_effects(&findings, named.as_ref(), held)?;
-        if question.repeat_with_nominal && held != FixedParameters::All && !findings.off_nominal.is_empty() {
+        if options.repeat_with_nominal && held != FixedParameters::All && !findings.off_nominal.is_empty() {
             findings.with_nominal = Some(nominal_diagnosis(&findings, &between)?);
         }
         Ok(findings)
@@ -321,7 +321,7 @@ impl Model {
 impl DiagnosisFindings {
     /// The model with the effects found, or the given model if there is none.
     pub fn final_version(&self) -> &ModelVersion {
-        self.after.as_ref().unwrap_or(&self.before)
+        self.after.version().unwrap_or(&self.before)
     }
 
     /// The experiment that decides whether effects of a kind are present at some places: the text of the
@@ -392,13 +392,13 @@ fn nominal_diagnosis(findings: &DiagnosisFindings, between: &[RecordingDifferenc
         let wanted = runs.filter(|(_, run)| run.is_check == is_check);
         wanted.map(|(data, _)| data.clone()).collect()
     };
-    let asked = DiagnosisQuery {
+    let query = DiagnosisQuery {
         fixed: FixedParameters::All,
         in_full: false,
         run_differences: between,
         zeros: None,
     };
-    let answer = problem::find_missing_effects(&version.model, &of(false), &of(true), asked)?;
+    let answer = problem::find_missing_effects(&version.model, &of(false), &of(true), query)?;
     let missing =
         (answer.diagnosis.effects.iter()).map(|found| (found.effect.clone(), effect_estimates(&answer, found)));
     Ok(NominalDiagnosis {

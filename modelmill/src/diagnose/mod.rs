@@ -31,6 +31,7 @@ pub(crate) mod added_effects;
 mod candidates;
 mod columns;
 mod completed;
+mod completion;
 mod constants;
 mod contacts;
 mod corrected;
@@ -58,6 +59,7 @@ mod tilt;
 pub mod words;
 
 pub(crate) use candidates::sign;
+pub use completion::ModelCompletion;
 pub use estimates::EffectEstimate;
 pub use findings::{
     DiagnosisFindings, DiagnosisOptions, MissingEffect, NominalDiagnosis, SeparationProposal, UndecidedEffect,

@@ -102,9 +102,9 @@ pub(crate) fn find_missing_effects(
     model: &Model,
     fit: &[RecordingSegment],
     check: &[RecordingSegment],
-    asked: DiagnosisQuery<'_>,
+    query: DiagnosisQuery<'_>,
 ) -> Outcome<DiagnosisSolution> {
-    let held = asked.fixed;
+    let held = query.fixed;
     // Stage 1: derive all candidates and evaluate their columns.
     let candidates = model
         .host()
@@ -124,8 +124,8 @@ pub(crate) fn find_missing_effects(
         FixedParameters::Known => Vec::new(),
     };
     fix_parameters(&mut problem, model, held);
-    problem.effects_only = !asked.in_full;
-    subtract_known(&mut problem, model, &all, asked.run_differences)?;
+    problem.effects_only = !query.in_full;
+    subtract_known(&mut problem, model, &all, query.run_differences)?;
     let units: Vec<String> = (0..model.drives().len())
         .map(|d| model.force_unit(d).to_owned())
         .collect();
@@ -141,7 +141,7 @@ pub(crate) fn find_missing_effects(
     further.extend(gears(model, &all, &values, &slopes)?);
     further.extend(constants(model, &all, asked.zeros, &|k| is_fixed(model, held, k)));
     further.extend(other_friction);
-    if asked.in_full {
+    if query.in_full {
         if held == FixedParameters::All || problem.base.is_empty() {
             let loads = frame_loads(model, &all, &PayloadColumns::new(model)?)?;
             further.extend(payloads(model, &loads));
@@ -169,7 +169,7 @@ pub(crate) fn find_missing_effects(
     };
     let mut diagnosis = search(&mut problem)?;
     // A missing effect hides small contacts: with the effects found, they stand out. Then the search is repeated.
-    if asked.in_full && leave_out_late_contacts(&mut problem, model, &all, &diagnosis.residual) {
+    if query.in_full && leave_out_late_contacts(&mut problem, model, &all, &diagnosis.residual) {
         (problem.measured, problem.removed) = forces;
         // The first search added changes in time that a contact may have caused.
         problem.candidates.truncate(known);

@@ -247,10 +247,10 @@ fn fixed_constants(kind: &EffectKind, named: &NamedEffect, constants: ConstantPo
         if constant.search == Some(ConstantSearch::Linear) {
             continue;
         }
-        let said = named.values.iter().find(|(symbol, _)| *symbol == constant.symbol);
+        let stated = named.values.iter().find(|(symbol, _)| *symbol == constant.symbol);
         // Defaults of the library are texts, which may be expressions.
         let usual = constant.value.as_ref().and_then(|text| text.parse::<f64>().ok());
-        match (said, constants, constant.search, usual) {
+        match (stated, constants, constant.search, usual) {
             (Some((_, value)), ..) => given.push((constant.symbol.clone(), *value)),
             (None, ConstantPolicy::Usual, Some(_), Some(value)) => {
                 given.push((constant.symbol.clone(), value));

@@ -36,9 +36,6 @@ pub(super) const BODY_PARAMETER_FACTOR: f64 = 3.0;
 /// Random bodies within `BODY_PARAMETER_FACTOR` that must all agree on the sign of a base parameter. By judgement.
 pub(super) const SIGN_TRIALS: usize = 200;
 
-/// Time before and after a contact or push that is left out of the fit, s. By judgement.
-pub(super) const CONTACT_MARGIN_S: f64 = 0.15;
-
 /// The force of a contact must exceed the rms value of a residual that follows the time at the same drive by this factor
 /// (1): a ringing joint reaches 2.3 (`flexible-motor-encoder`). By judgement.
 pub(super) const CONTACT_LEAST_RESIDUAL_RATIO: f64 = 4.0;

@@ -7,6 +7,7 @@ use modelmill_identify::diagnose::{
 };
 
 use crate::faults::{SuspectedFault, is_suspicion};
+use crate::text::names::joined_by_and;
 use crate::text::table::{percent, significant};
 
 use super::disturbance_words::what_changes;
@@ -61,15 +62,6 @@ pub fn effect(effect: &LocatedEffect) -> String {
 /// Effects as a list for a sentence: `x, y and z`.
 pub fn effects(effects: &[LocatedEffect]) -> String {
     joined_by_and(&effects.iter().map(effect).collect::<Vec<_>>())
-}
-
-/// Names as a list whose last entry is joined by `and`.
-pub(crate) fn joined_by_and(names: &[String]) -> String {
-    match names {
-        [] => "nothing".to_owned(),
-        [one] => one.clone(),
-        [first @ .., last] => format!("{} and {last}", first.join(", ")),
-    }
 }
 
 /// Effects that were found, as a list for a sentence. One that is less likely than not is named with its alternatives.
@@ -242,7 +234,6 @@ pub fn verdict(diagnosis: &ModelDiagnosis, channels: &[String], judged: Validati
     let found = &diagnosis.effects;
     // The first step is the model as it is, the last one has all effects.
     let falls = error_reduction_text(first, last, channels, judged);
-    let them = if found.len() == 1 { "it" } else { "them" };
     // Each verdict states the error and compares it with the noise.
     let says = match diagnosis.verdict {
         // After a correction nothing is left to explain, but the recordings as they are stay unexplained.
@@ -251,12 +242,7 @@ pub fn verdict(diagnosis: &ModelDiagnosis, channels: &[String], judged: Validati
             explained_text("The model explains the recordings", diagnosis, last.check, judged)
         ),
         DiagnosisVerdict::Adequate => explained_text("The model is adequate", diagnosis, last.check, judged),
-        DiagnosisVerdict::MissingEffect => {
-            format!(
-                "The model lacks {}. With {them} {falls}. {noise}",
-                found_effects(found, channels)
-            )
-        }
+        DiagnosisVerdict::MissingEffect => lacking_text(found, channels, &falls, &noise),
         DiagnosisVerdict::Unexplained => unexplained_verdict(diagnosis, channels, judged, found, &falls),
     };
     // Suspicions come first, since they may make the verdict wrong.
@@ -283,6 +269,15 @@ pub(super) fn geometry_alternative_text(alternatives: &[GeometryAlternative]) ->
 /// An error of the geometry with its value.
 pub(crate) fn geometry_error_text(error: &GeometryError) -> String {
     format!("{} off by {} {}", error.name(), significant(error.value, 3), error.unit)
+}
+
+/// What the model lacks, and how the error falls (`falls`) with it.
+fn lacking_text(found: &[IdentifiedEffect], channels: &[String], falls: &str, noise: &str) -> String {
+    let them = if found.len() == 1 { "it" } else { "them" };
+    format!(
+        "The model lacks {}. With {them} {falls}. {noise}",
+        found_effects(found, channels)
+    )
 }
 
 /// The verdict where something stays unexplained: effects that were found and how the error falls (`falls`), then what
@@ -341,13 +336,7 @@ fn unexplained_verdict(
              {noise}",
             judged.phrase()
         )],
-        (found, _) => {
-            let them = if found.len() == 1 { "it" } else { "them" };
-            vec![format!(
-                "The model lacks {}. With {them} {falls}. {noise}",
-                found_effects(found, channels)
-            )]
-        }
+        (found, _) => vec![lacking_text(found, channels, falls, &noise)],
     };
     if !found.is_empty() && !sits.is_empty() {
         says.push(format!(

@@ -206,20 +206,20 @@ impl Model {
         let mut options = request.options.clone();
         let plant = ModelPlant::new(self, &all_limits);
         // Effects that no motion can distinguish are refused before the search.
-        let asked = match &request.separate {
-            Some(asked) => Some(separated::prepare_separation(
+        let separation = match &request.separate {
+            Some(separation) => Some(separated::prepare_separation(
                 self,
                 &plant,
                 &coordinates,
                 &options,
-                asked,
+                separation,
                 recordings,
             )?),
             None => None,
         };
-        let of_asked = asked.iter().flat_map(|asked| asked.notes.clone());
+        let of_asked = separation.iter().flat_map(|separation| separation.notes.clone());
         let notes = as_recorded.into_iter().chain(of_asked).collect();
-        let separating = asked.as_ref().map(|asked| asked.plant(&plant, self));
+        let separating = separation.as_ref().map(|separation| separation.plant(&plant, self));
         // The goal of the search: effects, or else the unknown base parameters.
         if separating.is_some() {
             options.criterion = ExcitationCriterion::Separation;
@@ -250,15 +250,15 @@ impl Model {
         };
         drop(separating);
         // The result keeps the task, for its texts.
-        let separated = match (asked, apart) {
-            (Some(asked), Some(apart)) => Some(SeparationResult {
+        let separated = match (separation, apart) {
+            (Some(separation), Some(apart)) => Some(SeparationResult {
                 distance: apart,
                 random: (-found.start_value).exp(),
-                before: asked.distance_along_recordings(self)?,
+                before: separation.distance_along_recordings(self)?,
                 unit: separated::common_force_unit(self),
                 drives: self.drives().len(),
                 samples,
-                task: asked,
+                task: separation,
             }),
             _ => None,
         };

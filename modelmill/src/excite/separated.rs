@@ -67,7 +67,7 @@ pub(crate) fn prepare_separation(
     plant: &ModelPlant<'_>,
     limits: &[ExcitationLimits],
     options: &Options,
-    asked: &SeparationRequest,
+    request: &SeparationRequest,
     recordings: &[&PreparedRecording],
 ) -> Outcome<SeparationTask> {
     let mut notes = Vec::new();
@@ -77,8 +77,8 @@ pub(crate) fn prepare_separation(
         notes.push(note);
     };
     // Values, noise and recordings of the request.
-    let mut pair = SeparationSetup::new(model, &asked.effect, &asked.from, &asked.common_effects)?;
-    if let Some(size) = asked.noise {
+    let mut pair = SeparationSetup::new(model, &request.effect, &request.from, &request.common_effects)?;
+    if let Some(size) = request.noise {
         pair.set_noise(size, model.drives().len());
     }
     let [data, _] = recording::segments(model, recordings, &[]);

@@ -2,11 +2,10 @@
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, OptionSetting};
-use modelmill_spec::DriveKind;
 
 use super::bench::FaultBench;
 use super::correction::{ColumnOperation, ForceChange, MotionChange};
-use super::{FaultHypothesis, FaultSubject, RecordingFaultEntry, RecordingFaultKind};
+use super::{FaultHypothesis, FaultSubject, RecordingFaultEntry, RecordingFaultKind, drive_of_coordinate};
 
 /// The entry for forces.
 pub(super) struct ExchangedForces;
@@ -54,15 +53,6 @@ impl RecordingFaultEntry for ExchangedCoordinates {
         let names = subject.model.active_coordinate_types();
         let joints = subject.model.joint_coordinates();
         let mechanism = &subject.model.derivation.mechanism;
-        // The drive that acts on a coordinate itself, if there is one.
-        let drive_of = |name: &str| {
-            let is_its =
-                |kind: DriveKind| matches!(kind, DriveKind::Joint(k) if mechanism.coordinates[k.0].name == name);
-            mechanism
-                .drives
-                .iter()
-                .position(|drive| drive.is_driven && is_its(drive.kind))
-        };
         let mut hypotheses = Vec::new();
         for (k, a) in joints.iter().enumerate() {
             for b in &joints[k + 1..] {
@@ -86,7 +76,10 @@ impl RecordingFaultEntry for ExchangedCoordinates {
                     is_implausible_now: false,
                 });
                 // The order of two joints may be exchanged as a whole.
-                if let (Some(c), Some(d)) = (drive_of(one), drive_of(other)) {
+                if let (Some(c), Some(d)) = (
+                    drive_of_coordinate(mechanism, one),
+                    drive_of_coordinate(mechanism, other),
+                ) {
                     // Drives have names of their own, which need not be those of the coordinates.
                     let [force, other_force] = [c, d].map(|k| mechanism.drives[k].name.clone());
                     let mut all = maps;

@@ -25,9 +25,11 @@ mod time_base;
 use modelmill_boundary::text::{Message, OptionName, OptionSetting, Remedy, RemedySpelling};
 use modelmill_identify::SignalRecording;
 use modelmill_identify::diagnose::Disturbance;
+use modelmill_spec::{DriveKind, Mechanism};
 
 use crate::model::Model;
 use crate::segment::RecordingSegment;
+use crate::text::names::joined_by_and;
 
 use bench::FaultBench;
 pub(crate) use correction::{ColumnOperation, FaultCorrection};
@@ -122,6 +124,15 @@ impl SuspectedFault {
         }
     }
 
+    /// What comes before the advice in a list of next steps.
+    pub(crate) fn advice_heading(&self) -> &'static str {
+        match self.kind {
+            // It may be an error of the model file.
+            RecordingFaultKind::GravityDirection => "Before the next diagnosis",
+            _ => "Correct the recording first",
+        }
+    }
+
     /// The fault with its advice as JSON.
     pub fn json(&self, spelling: &dyn RemedySpelling) -> serde_json::Value {
         serde_json::json!({
@@ -130,6 +141,7 @@ impl SuspectedFault {
             "recordings": self.recordings,
             "says": self.clause,
             "todo": self.advice.spell(spelling),
+            "heading": self.advice_heading(),
         })
     }
 
@@ -137,6 +149,12 @@ impl SuspectedFault {
     pub fn is_correctable(&self) -> bool {
         self.correction.is_some()
     }
+}
+
+/// Whether the verdict of a diagnosis names a disturbance, so that lists do not repeat it: the direction of gravity may be
+/// an error of the model file.
+pub(crate) fn is_named_by_verdict(one: &Disturbance) -> bool {
+    one.kind == RecordingFaultKind::GravityDirection.name()
 }
 
 /// Whether a disturbance is a suspected fault that makes all other findings doubtful until it is corrected.
@@ -225,9 +243,12 @@ const ENTRIES: [&dyn RecordingFaultEntry; 8] = [
 /// Names in words: `a`, `a and b`, `a, b and c`, each in backquotes.
 fn name_list(names: &[String]) -> String {
     let quoted: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
-    match quoted.as_slice() {
-        [] => String::new(),
-        [one] => one.clone(),
-        [first @ .., last] => format!("{} and {last}", first.join(", ")),
-    }
+    joined_by_and(&quoted)
+}
+
+/// The drive that acts on the coordinate with a name itself, if there is one.
+fn drive_of_coordinate(mechanism: &Mechanism, name: &str) -> Option<usize> {
+    let is_its = |kind: DriveKind| matches!(kind, DriveKind::Joint(k) if mechanism.coordinates[k.0].name == name);
+    let mut drives = mechanism.drives.iter();
+    drives.position(|drive| drive.is_driven && is_its(drive.kind))
 }

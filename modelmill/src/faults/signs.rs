@@ -3,11 +3,10 @@
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, OptionSetting};
-use modelmill_spec::DriveKind;
 
 use super::bench::FaultBench;
 use super::correction::{ColumnOperation, ForceChange, MotionChange};
-use super::{FaultHypothesis, FaultSubject, RecordingFaultEntry, RecordingFaultKind, name_list};
+use super::{FaultHypothesis, FaultSubject, RecordingFaultEntry, RecordingFaultKind, drive_of_coordinate, name_list};
 
 /// The entry for forces.
 pub(super) struct ForceSign;
@@ -79,14 +78,7 @@ impl RecordingFaultEntry for CoordinateSign {
                 operations: vec![ColumnOperation::scale(present().cloned(), -1.0)],
                 is_implausible_now: false,
             };
-            // The drive of the joint itself, if it has one.
-            let is_its =
-                |kind: DriveKind| matches!(kind, DriveKind::Joint(k) if mechanism.coordinates[k.0].name == *name);
-            let drive = mechanism
-                .drives
-                .iter()
-                .position(|drive| drive.is_driven && is_its(drive.kind));
-            if let Some(d) = drive {
+            if let Some(d) = drive_of_coordinate(mechanism, name) {
                 let force = &mechanism.drives[d].name;
                 let mut operations = alone.operations.clone();
                 operations.extend(ColumnOperation::scale_force(force, -1.0));

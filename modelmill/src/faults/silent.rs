@@ -314,8 +314,7 @@ impl<'a> SilenceFit<'a> {
         let mut residual = vec![0.0; n];
         let mut size = vec![[0.0_f64; 2]; n];
         let mut used = vec![0_usize; n];
-        for (row, is_used) in counts.iter().enumerate().filter(|(_, is_used)| **is_used) {
-            debug_assert!(*is_used);
+        for (row, _) in counts.iter().enumerate().filter(|(_, is_used)| **is_used) {
             let d = row % n;
             used[d] += 1;
             residual[d] += (measured[row] - fitted[row]).powi(2);

@@ -53,8 +53,8 @@ pub(super) fn fault_influence(
         let deviations = |((a, b), std): &((&f64, &f64), &f64)| (**b - **a).abs() / **std;
         deviations(one).total_cmp(&deviations(other))
     });
-    let (((sound, faulty), std), k) = most?;
-    let deviations = (faulty - sound).abs() / std;
+    let (((intact, faulty), std), k) = most?;
+    let deviations = (faulty - intact).abs() / std;
     let files = files.join(", ");
     // A change below one standard deviation needs no name.
     let says = if deviations < FAULT_INFLUENCE_LEAST_SIGMAS {
@@ -68,7 +68,7 @@ pub(super) fn fault_influence(
         format!(
             "Without their repair, the sensor faults in {files} would have changed {name} from {} to {} {unit} ({} standard \
              deviations), and all other base parameters by fewer standard deviations.",
-            number(*sound),
+            number(*intact),
             number(*faulty),
             significant(deviations, 3)
         )

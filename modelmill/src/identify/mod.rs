@@ -22,6 +22,7 @@ use modelmill_spec::Sign;
 use crate::along;
 use crate::compare;
 use crate::error::{Error, Outcome};
+use crate::faults::SuspectedFault;
 use crate::model::Model;
 use crate::recording::{self, PreparedRecording};
 use crate::segment::RecordingSegment;
@@ -42,6 +43,8 @@ pub struct Identification {
     pub nominal_fit: ErrorFigures,
     /// Error metrics of the nominal parameters on the validation runs; `None` if there are none.
     pub nominal_check: Option<ErrorFigures>,
+    /// The suspected fault of the first recording that has one: until it is corrected, all values are doubtful.
+    pub suspect: Option<SuspectedFault>,
     /// The solution of the least-squares problem, with its statistics.
     pub found: RegressionEstimate,
     /// The options of the estimator, with automatic weights replaced by the chosen ones.
@@ -95,7 +98,7 @@ impl Model {
         check: &[&PreparedRecording],
         options: &EstimatorOptions,
     ) -> Outcome<Identification> {
-        let recordings = fit;
+        let (recordings, validations) = (fit, check);
         // Segments are copied, since some of their equations may be excluded.
         let [mut fit, check] = recording::segments(self, fit, check);
         // Equations at standstill are excluded before instruments are assigned.
@@ -109,6 +112,7 @@ impl Model {
             ..options.clone()
         };
         let mut found = identify(self, &fit, &instruments, &check, &options)?;
+        found.suspect = compare::first_suspect(recordings).or_else(|| compare::first_suspect(validations));
         found.by_rate = compare::residual_dependences(self, &fit, &found.values())?;
         // The influence of faults costs a second fit, which instruments do not support.
         if instruments.is_empty()
@@ -214,6 +218,7 @@ pub fn identify(
         },
         nominal_fit,
         nominal_check,
+        suspect: None,
         found,
         options: options.clone(),
         notes,

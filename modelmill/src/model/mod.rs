@@ -139,14 +139,14 @@ impl Host {
             notes.push(RecordingNote::warning(format!("{place}: {says}")));
         }
         let found = derivation.identified_base();
-        let said = derivation.mechanism.identified_base.len();
+        let stated = derivation.mechanism.identified_base.len();
         // Identified values are matched by expression: those of another geometry have no base
         // parameter here.
-        if found.len() < said {
+        if found.len() < stated {
             notes.push(RecordingNote::warning(message!(
-                "{path}: {} of the {said} values of `identified.base` belong to no base parameter of this model and are ignored; \
+                "{path}: {} of the {stated} values of `identified.base` belong to no base parameter of this model and are ignored; \
                  identify the model again and write the values with {}",
-                said - found.len(),
+                stated - found.len(),
                 Remedy::command(CommandName::Adopt)
             )));
         }

@@ -40,8 +40,8 @@ pub fn colour_diff(difference: &str, style: TerminalStyle) -> String {
 /// An effect as JSON: kind, places, parameters with name and nominal value, constants with value.
 pub fn effect_json(effect: &NewEffect) -> Value {
     let parameters = effect.parameters.iter().map(|one| {
-        let said = json!({ "name": one.name, "nominal": one.nominal });
-        (one.symbol.clone(), said)
+        let stated = json!({ "name": one.name, "nominal": one.nominal });
+        (one.symbol.clone(), stated)
     });
     let constants = effect.constants.iter();
     json!({

@@ -6,7 +6,7 @@ use serde_json::{Map, Value, json};
 
 use super::laws;
 use crate::diagnose::{DiagnosisFindings, EffectEstimate, MissingEffect, UndecidedEffect, words};
-use crate::faults::RecordingFaultKind;
+use crate::faults::is_named_by_verdict;
 use crate::print::{OptionName, Remedy, StepSpelling, notes};
 use crate::text::TerminalStyle;
 use crate::text::table::{ColumnAlignment, all_digits, number, percent, significant, table};
@@ -59,7 +59,7 @@ impl DiagnosisFindings {
                     "support": missing.support,
                     "indistinguishable_from": missing.indistinguishable_from,
                     "separate_by": missing.separating_experiment,
-                    "separate_command": separation.and_then(|asked| spelling.spell_separation(model, asked)),
+                    "separate_command": separation.and_then(|proposal| spelling.spell_separation(model, proposal)),
                 })
             });
             described.collect()
@@ -109,6 +109,7 @@ impl DiagnosisFindings {
                     }).collect::<Vec<_>>(),
                     "recordings": one.recordings,
                     "interval": one.interval,
+                    "in_verdict": is_named_by_verdict(one),
                 })
             })
             .collect();
@@ -217,24 +218,17 @@ impl DiagnosisFindings {
         // depending on the reader.
         let at_fault = self.corrected.iter().chain(&self.unresolved);
         let mut next: Vec<String> = at_fault
-            .map(|fault| {
-                // The direction of gravity may be an error of the model file.
-                let first = match fault.kind {
-                    RecordingFaultKind::GravityDirection => "Before the next diagnosis",
-                    _ => "Correct the recording first",
-                };
-                format!("{first}: {}.", fault.advice.spell(spelling))
-            })
+            .map(|fault| format!("{}: {}.", fault.advice_heading(), fault.advice.spell(spelling)))
             .collect();
-        let entries = self.entries_to_add();
-        next.extend(
-            entries
-                .iter()
-                .map(|entry| spelling.spell_effect(&self.before.model, entry)),
-        );
-        // A model is completed only once the faults are corrected.
-        if entries.len() > 1 && self.corrected.is_empty() {
-            next.push(format!("{}.", spelling.spell_completion()));
+        // Steps that were done at once are no next steps.
+        if !spelling.has_added_effects() {
+            let entries = self.entries_to_add();
+            let steps = entries.iter();
+            next.extend(steps.map(|entry| spelling.spell_effect(&self.before.model, entry)));
+            // A model is completed only once the faults are corrected.
+            if entries.len() > 1 && self.corrected.is_empty() {
+                next.push(format!("{}.", spelling.spell_completion()));
+            }
         }
         next.extend(self.further_action().map(str::to_owned));
         if !next.is_empty() {
@@ -243,9 +237,7 @@ impl DiagnosisFindings {
             lines.extend(next.iter().map(|line| format!("  {line}")));
         }
         // Effects that were found may contradict the model file.
-        if let Err(says) = &self.after
-            && !says.is_empty()
-        {
+        if let Some(says) = self.after.refusal() {
             lines.push(format!(
                 "  The model with the added effects cannot be built: {}",
                 says.spell(spelling)
@@ -277,8 +269,7 @@ impl DiagnosisFindings {
     fn disturbances_text(&self, style: TerminalStyle, lines: &mut Vec<String>) {
         let diagnosis = &self.diagnosis;
         let mut disturbances = self.disturbances();
-        // The verdict names the direction of gravity, which may be an error of the model file.
-        disturbances.retain(|one| one.kind != RecordingFaultKind::GravityDirection.name());
+        disturbances.retain(|one| !is_named_by_verdict(one));
         if !disturbances.is_empty() {
             lines.push(String::new());
             lines.push(style.bold("Disturbances in the recordings (not model errors)"));
@@ -369,8 +360,8 @@ impl DiagnosisFindings {
                     let wrapped = words::lines(says, 96);
                     lines.extend(wrapped.iter().map(|line| style.dim(&format!("    {line}"))));
                 }
-                if let Some(asked) = &found.separation
-                    && let Some(command) = spelling.spell_separation(&self.before.model, asked)
+                if let Some(proposal) = &found.separation
+                    && let Some(command) = spelling.spell_separation(&self.before.model, proposal)
                 {
                     lines.push("    To plan a motion that distinguishes them:".to_owned());
                     lines.push(format!("      {command}"));
@@ -561,8 +552,8 @@ pub(crate) fn values_text(estimates: &[EffectEstimate]) -> String {
             .std
             .map_or_else(String::new, |std| format!(" ± {}", significant(std, 2)));
         let unit = if e.unit == "1" { "" } else { &e.unit };
-        let said = format!("{} = {}{std} {unit}", e.name, all_digits(e.value));
-        said.trim_end().to_owned()
+        let estimate = format!("{} = {}{std} {unit}", e.name, all_digits(e.value));
+        estimate.trim_end().to_owned()
     });
     values.collect::<Vec<String>>().join(", ")
 }

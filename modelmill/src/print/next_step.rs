@@ -6,9 +6,10 @@ use modelmill_boundary::text::{CommandName, Message, OptionName, Remedy};
 use modelmill_identify::{ErrorFigures, ParameterStatus, RateDependence, RateTerm};
 
 use crate::compare::ModelComparison;
-use crate::diagnose::words::joined_by_and;
+use crate::faults::SuspectedFault;
 use crate::identify::{Identification, RefinementResult};
-use crate::text::table::percent;
+use crate::text::names::joined_by_and;
+use crate::text::table::{percent, significant};
 
 /// A parameter is uncertain if its standard deviation is above this part of its value. By judgement.
 const VAGUE: f64 = 0.5;
@@ -23,6 +24,9 @@ const CORRELATED: f64 = 0.5;
 /// Neighbours that are correlated by more than this are a function of the motion, whatever the size of the error. The
 /// bundled recording `with-rods-fit`, whose error is 1.1 %, has 0.999.
 const NEARLY_EQUAL: f64 = 0.95;
+/// From this multiple of the force on, an error is no matter of a few wrong values: a wrong unit makes a factor of 57
+/// (degrees) or 1000. By judgement.
+const HUGE_ERROR: f64 = 10.0;
 /// Errors below this part of the force are rounding or the error of smoothing. By judgement.
 const NO_ERROR: f64 = 1e-3;
 
@@ -36,6 +40,8 @@ pub(crate) struct ResidualLook<'a> {
     pub(crate) by_rate: &'a [RateDependence],
     /// Correlation of neighbouring residuals, by drive.
     pub(crate) correlations: &'a [f64],
+    /// The suspected fault of a recording.
+    pub(crate) suspect: Option<&'a SuspectedFault>,
 }
 
 impl ResidualLook<'_> {
@@ -44,6 +50,30 @@ impl ResidualLook<'_> {
         let signs = [self.friction_text(), self.worse_text(), self.correlation_text()];
         let signs: Vec<Message> = signs.into_iter().flatten().map(Message::from).collect();
         (!signs.is_empty()).then(|| Message::join(signs, " "))
+    }
+
+    /// The next step if a recording has a fault that makes all figures doubtful: its correction, before any other step.
+    pub(crate) fn correction_step(&self) -> Option<Message> {
+        let fault = self.suspect?;
+        Some(message!(
+            "All figures are doubtful: in {} {}. Next: correct this first: {}. Then run the command again.",
+            joined_by_and(&fault.recordings),
+            fault.clause,
+            fault.advice.clone()
+        ))
+    }
+
+    /// The next step if the model's forces are larger than the measured ones by orders of magnitude: a look at the units.
+    pub(crate) fn unit_step(&self) -> Option<Message> {
+        let errors = self.figures.channels.iter();
+        let huge = errors.filter_map(|(drive, one)| Some((drive, one.nrms.filter(|nrms| *nrms > HUGE_ERROR)?)));
+        let (drive, error) = huge.max_by(|a, b| a.1.total_cmp(&b.1))?;
+        Some(message!(
+            "The error of {drive} is {} times its force. The units of a column, or values of the model, are wrong by orders of \
+             magnitude. Next: check the units of positions and forces of the recording ({}) and those of the model file.",
+            significant(error, 2),
+            Remedy::option(OptionName::Columns)
+        ))
     }
 
     /// The next step if something is missing: the diagnosis, before anything is recorded again.
@@ -175,8 +205,12 @@ impl ModelComparison {
             nominal: None,
             by_rate: &self.places.by_rate,
             correlations: &[],
+            suspect: self.suspect.as_ref(),
         };
-        look.diagnosis_step().or_else(|| look.identification_step())
+        look.correction_step()
+            .or_else(|| look.unit_step())
+            .or_else(|| look.diagnosis_step())
+            .or_else(|| look.identification_step())
     }
 }
 
@@ -190,8 +224,9 @@ impl Identification {
             nominal: self.nominal_check.as_ref().filter(|_| self.has_nominal),
             by_rate: &self.by_rate,
             correlations: &self.found.deviations.residual_lag1,
+            suspect: self.suspect.as_ref(),
         };
-        if let Some(step) = look.diagnosis_step() {
+        if let Some(step) = look.correction_step().or_else(|| look.diagnosis_step()) {
             return step;
         }
         let parameters = &self.fit.parameters;
@@ -246,6 +281,7 @@ mod tests {
     use serde_json::json;
 
     use super::*;
+    use crate::faults::RecordingFaultKind;
 
     fn figures(errors: [f64; 2]) -> ErrorFigures {
         let channel =
@@ -283,9 +319,57 @@ mod tests {
             nominal: nominal.as_ref(),
             by_rate,
             correlations: &[0.0, correlation],
+            suspect: None,
         };
         let step = look.diagnosis_step().or_else(|| look.identification_step());
         step.map(|step| step.spell(&LibrarySpelling))
+    }
+
+    /// A fault of the recording is corrected before anything else, whatever the residual looks like.
+    #[test]
+    fn a_fault_of_the_recording_is_corrected_first() {
+        let fault = SuspectedFault {
+            kind: RecordingFaultKind::WrongSign,
+            at: vec!["a".to_owned()],
+            recordings: vec!["run.csv".to_owned()],
+            clause: "the force of a has the wrong sign".to_owned(),
+            advice: Message::from("turn it".to_owned()),
+            evidence: String::new(),
+            fit_gain: 1.0,
+            correction: None,
+        };
+        let friction = [dependence("a", RateTerm::Sign)];
+        let look = ResidualLook {
+            figures: &figures([0.9, 0.1]),
+            nominal: None,
+            by_rate: &friction,
+            correlations: &[0.99, 0.0],
+            suspect: Some(&fault),
+        };
+        let text = look.correction_step().expect("a step").spell(&LibrarySpelling);
+        assert_eq!(
+            text,
+            "All figures are doubtful: in run.csv the force of a has the wrong sign. Next: correct this first: turn it. Then run \
+             the command again."
+        );
+    }
+
+    /// An error of a thousand times the force is one of units.
+    #[test]
+    fn a_huge_error_leads_to_the_units() {
+        let look = |error: f64| {
+            let look = ResidualLook {
+                figures: &figures([error, 0.1]),
+                nominal: None,
+                by_rate: &[],
+                correlations: &[],
+                suspect: None,
+            };
+            look.unit_step().map(|step| step.spell(&LibrarySpelling))
+        };
+        assert_eq!(look(3.0), None);
+        let text = look(9e4).expect("a step");
+        assert!(text.starts_with("The error of a is 90000 times its force."), "{text}");
     }
 
     /// White noise, and small errors whatever their correlation, are no reason for a diagnosis.

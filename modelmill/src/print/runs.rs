@@ -248,9 +248,9 @@ impl RunsComparison {
                     String::new()
                 },
             ));
-            let mut said = Vec::new();
-            write_changes(&point.changes, &mut said);
-            lines.extend(said.iter().map(|line| format!("  {line}")));
+            let mut change_lines = Vec::new();
+            write_changes(&point.changes, &mut change_lines);
+            lines.extend(change_lines.iter().map(|line| format!("  {line}")));
         }
     }
 
@@ -306,7 +306,7 @@ pub(crate) fn verdict_text(run: &RunReport) -> Message {
 
 /// What the runs cannot show, why, and what to do.
 fn undecided_text(undecided: &[UndecidedDrive]) -> Message {
-    let mut told = Vec::new();
+    let mut sentences = Vec::new();
     let named = |is: &dyn Fn(UndecidedReason) -> bool| -> Vec<&UndecidedDrive> {
         undecided.iter().filter(|one| is(one.reason)).collect()
     };
@@ -333,7 +333,7 @@ fn undecided_text(undecided: &[UndecidedDrive]) -> Message {
     }
     let unexplained = named(&|one| matches!(one, UndecidedReason::UnexplainedForce { .. }));
     if !unexplained.is_empty() {
-        told.push(message!(
+        sentences.push(message!(
             "The model leaves most of the force of {} unexplained, so that parameters fitted to it mean nothing. Find what is wrong \
              with {}, then compare the runs again.",
             list(&unexplained),
@@ -342,21 +342,21 @@ fn undecided_text(undecided: &[UndecidedDrive]) -> Message {
     }
     let standing = named(&|one| matches!(one, UndecidedReason::Standstill));
     if !standing.is_empty() {
-        told.push(message!(
+        sentences.push(message!(
             "At standstill friction may have any value: {} hardly moves in one of the runs. Record runs in which it moves.",
             list(&standing)
         ));
     }
     let insensitive = named(&|one| matches!(one, UndecidedReason::SmallestChange { .. }));
     if !insensitive.is_empty() {
-        told.push(message!(
+        sentences.push(message!(
             "Even a change of most of its force would be within noise and model error at {}. Run {} first; if it finds nothing, \
              record longer or faster motions.",
             list(&insensitive),
             Remedy::command(CommandName::Diagnose)
         ));
     }
-    Message::join(told, " ")
+    Message::join(sentences, " ")
 }
 
 /// A drive whose forces cannot show a change, as JSON: the reason with its number.

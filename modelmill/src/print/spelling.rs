@@ -25,6 +25,11 @@ pub trait StepSpelling: RemedySpelling {
         format!("{effect}, with the library {library}")
     }
 
+    /// Whether the effects found were added already, so that this is no next step.
+    fn has_added_effects(&self) -> bool {
+        false
+    }
+
     /// Step: add all effects found at once.
     fn spell_completion(&self) -> String;
 

@@ -1,7 +1,8 @@
 //! Output of `check`: contents of a model file as JSON and as text for people, and the errors of an invalid
 //! file as JSON.
 
-use modelmill_boundary::text::plain;
+use modelmill_boundary::message;
+use modelmill_boundary::text::{CommandName, Message, Remedy, plain};
 use modelmill_codegen::review::NumericMethod;
 use modelmill_codegen::{BaseReduction, Derivation, ReductionMethod};
 use modelmill_emit::module_name;
@@ -41,14 +42,49 @@ impl ModelCheck {
         warnings.extend(judged.map(|says| json!({ "severity": "warning", "says": says, "file": model.path })));
         let mut object = self.summary.json(&model.name, &model.derivation, &warnings);
         object["numeric_rank"] = self.rank.as_ref().map_or(Value::Null, SampledRank::json);
+        object["next"] = json!(self.next_step().map(|step| step.spell(spelling)));
         object
     }
 
-    /// The same for people.
+    /// The same for people, without the next step.
     pub fn text(&self, style: TerminalStyle) -> String {
         let model = &self.model;
         self.summary
             .text(&model.name, &model.derivation, self.rank.as_ref(), style)
+    }
+
+    /// The same for people, with the next step.
+    pub fn text_with_next_step(&self, style: TerminalStyle, spelling: &dyn RemedySpelling) -> String {
+        let text = self.text(style);
+        match self.next_step() {
+            Some(step) => format!("{text}\n\n{}", step.spell(spelling)),
+            None => text,
+        }
+    }
+
+    /// The next step: values for a model that has not all of them, else the comparison with a recording; `None` for a model
+    /// without parameters that drives can show.
+    pub fn next_step(&self) -> Option<Message> {
+        let model = &self.model;
+        if model.base.is_empty() || model.drives().is_empty() {
+            return None;
+        }
+        let excite = Remedy::command(CommandName::Excite);
+        Some(if (0..model.base.len()).all(|k| model.has_nominal(k)) {
+            message!(
+                "Next: {} compares the forces of the model with those of a recording, and finds what the model lacks; {} plans a \
+                 motion for one.",
+                Remedy::command(CommandName::Diagnose),
+                excite
+            )
+        } else {
+            message!(
+                "The file does not give all values of the base parameters. Next: {} estimates them from a recording; {} plans a \
+                 motion for one.",
+                Remedy::command(CommandName::Identify),
+                excite
+            )
+        })
     }
 }
 

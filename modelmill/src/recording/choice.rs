@@ -22,7 +22,7 @@ use modelmill_identify::{
 use nalgebra::DMatrix;
 
 use super::free;
-use super::friction_rows::{PickedStates, regressor_with_friction};
+use super::friction_rows::regressor_with_friction;
 use super::held_out::{
     FOLDS, FoldSums, HeldOutResidual, OctavePower, ROUNDING, TimeWindow, WindowSamples, fit_folds, margin,
 };
@@ -35,6 +35,7 @@ use super::thresholds::{
 };
 use crate::error::Outcome;
 use crate::model::Model;
+use crate::segment::picked_states::PickedStates;
 use crate::text::table::{percent, significant};
 
 /// Ratio of successive cut-offs.

@@ -1,68 +1,18 @@
 //! Rows of the model's regressor with friction and an offset of every drive added, as the preparation needs them: a
 //! choice must not depend on whether the model file knows friction. States go in; rows come out.
 
-use modelmill_codegen::{ModelEvaluator, MotionStates};
-use modelmill_identify::PreparedRun;
+use modelmill_codegen::ModelEvaluator;
 use nalgebra::{DMatrix, DVector};
 
 use crate::model::Model;
+use crate::segment::picked_states::{PickedStates, rate_sign};
 
 /// Columns that are added for each drive: rate, its sign, and a constant.
 pub(super) const FRICTION_COLUMNS: usize = 3;
 
-/// Positions, rates, accelerations and loads at some samples, `[coordinate or drive][sample]`, SI units.
-pub(super) struct PickedStates {
-    /// Positions.
-    q: Vec<Vec<f64>>,
-    /// Rates.
-    qd: Vec<Vec<f64>>,
-    /// Accelerations.
-    qdd: Vec<Vec<f64>>,
-    /// Measured forces.
-    load: Vec<Vec<f64>>,
-}
-
-impl PickedStates {
-    /// The states of a run at given samples.
-    pub(super) fn new(run: &PreparedRun, samples: &[usize]) -> Self {
-        let pick = |columns: &[Vec<f64>]| -> Vec<Vec<f64>> {
-            let pick = |column: &Vec<f64>| samples.iter().map(|k| column[*k]).collect();
-            columns.iter().map(pick).collect()
-        };
-        Self {
-            q: pick(&run.q),
-            qd: pick(&run.qd),
-            qdd: pick(&run.qdd),
-            load: pick(run.force.as_deref().unwrap_or(&[])),
-        }
-    }
-
-    /// The same states with all rates multiplied by a factor.
-    pub(super) fn with_scaled_rates(mut self, factor: f64) -> Self {
-        for rate in self.qd.iter_mut().flatten() {
-            *rate *= factor;
-        }
-        self
-    }
-
-    /// The states as the evaluator reads them.
-    fn as_motion(&self) -> MotionStates<'_> {
-        MotionStates {
-            q: self.q.iter().map(Vec::as_slice).collect(),
-            qd: self.qd.iter().map(Vec::as_slice).collect(),
-            qdd: self.qdd.iter().map(Vec::as_slice).collect(),
-            load: self.load.iter().map(Vec::as_slice).collect(),
-        }
-    }
-}
-
 /// Rates of the drives at some states, `[drive][sample]`, rad/s or m/s; `None` at a pose without solution.
 pub(super) fn rates_of_drives(model: &Model, states: &PickedStates) -> Option<Vec<Vec<f64>>> {
-    let evaluator = ModelEvaluator::new(&model.derivation);
-    let n = model.drives().len();
-    // Columns are ordered: positions, rates, Jacobian.
-    let motion = evaluator.drive_motion(&states.as_motion()).ok()?;
-    Some(motion.get(n..2 * n)?.to_vec())
+    states.drive_motion(model).map(|[_, rates]| rates)
 }
 
 /// The model's regressor with friction and an offset of every drive added; row `sample * n_drives + drive`. `None` at a
@@ -76,17 +26,12 @@ pub(super) fn regressor_with_friction(model: &Model, states: &PickedStates) -> O
     let mut more = regressor.resize_horizontally(width + FRICTION_COLUMNS * n, 0.0);
     for (d, rate) in rates.iter().enumerate() {
         for (i, rate) in rate.iter().enumerate() {
-            for (k, value) in [*rate, sign(*rate), 1.0].into_iter().enumerate() {
+            for (k, value) in [*rate, rate_sign(*rate), 1.0].into_iter().enumerate() {
                 more[(i * n + d, width + FRICTION_COLUMNS * d + k)] = value;
             }
         }
     }
     more.iter().all(|x| x.is_finite()).then_some(more)
-}
-
-/// The sign of a rate; zero at exact standstill, where dry friction has no direction.
-pub(super) fn sign(rate: f64) -> f64 {
-    if rate == 0.0 { 0.0 } else { rate.signum() }
 }
 
 /// Solves scaled normal equations with a small ridge, since columns may be equal. Only the lower triangle is read.

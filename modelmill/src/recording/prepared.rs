@@ -279,9 +279,9 @@ impl PreparedRecording {
         let mut stretches = prepare(model, &faulty, &self.reading, delay).ok()?;
         self.sticks.all.mark(self.sticks.index, &mut stretches);
         // Weights of other exclusions are kept.
-        for (faulty, sound) in stretches.iter_mut().zip(&self.segments) {
-            if faulty.samples() == sound.samples() {
-                faulty.weights.clone_from(&sound.weights);
+        for (faulty, repaired) in stretches.iter_mut().zip(&self.segments) {
+            if faulty.samples() == repaired.samples() {
+                faulty.weights.clone_from(&repaired.weights);
             }
         }
         Some(stretches)

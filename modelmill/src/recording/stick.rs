@@ -15,7 +15,7 @@ use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_identify::{PreparedRun, RecordingNote};
 use nalgebra::{DMatrix, DVector};
 
-use super::friction_rows::{PickedStates, rates_of_drives, regressor_with_friction, sign, solve_scaled};
+use super::friction_rows::{rates_of_drives, regressor_with_friction, solve_scaled};
 use super::options::StandstillRule;
 use super::thresholds::{
     BLUR_LEAST_SLOW_SHARE, BLUR_MOST_SHARE, DRY_FRICTION_LEAST_SHARE, DRY_FRICTION_LEAST_SIGMAS,
@@ -24,6 +24,7 @@ use super::thresholds::{
 };
 use crate::model::Model;
 use crate::segment::RecordingSegment;
+use crate::segment::picked_states::{PickedStates, rate_sign};
 use crate::text::table::{number, percent, significant};
 
 /// Largest number of samples of all runs that are evaluated for the fit.
@@ -55,6 +56,8 @@ pub(super) struct StickPhases {
     intervals: Vec<Vec<Vec<[f64; 2]>>>,
     /// `[recording][drive]`: forces without sticking at the times in these intervals, s and N or N m, in order of time.
     fills: Vec<Vec<Vec<(f64, f64)>>>,
+    /// Drives whose forces are kept, because what would be left out is mostly the blur of reversals.
+    blurred: Vec<usize>,
 }
 
 impl StickPhases {
@@ -123,6 +126,7 @@ impl StickPhases {
                 continue;
             }
             self.bounds[d] = None;
+            self.blurred.push(d);
             for (intervals, fills) in self.intervals.iter_mut().zip(&mut self.fills) {
                 intervals[d].clear();
                 fills[d].clear();
@@ -196,6 +200,10 @@ impl StickPhases {
     pub(super) fn leave_out(&self, model: &Model, recording: usize, data: &mut [RecordingSegment]) {
         let drives = model.drives();
         let out = self.mark(recording, data);
+        // One note for all recordings: the decision is common to them.
+        if let (0, Some(first)) = (recording, data.first_mut()) {
+            self.note_kept_forces(model, first);
+        }
         let samples: usize = data.iter().map(RecordingSegment::samples).sum();
         // One note for all drives of the recording.
         let each: Vec<String> = (drives.iter().zip(&self.bounds).zip(&out).enumerate())
@@ -221,6 +229,25 @@ impl StickPhases {
              largest rate; 0 keeps all.",
             first.run.file,
             each.join(", "),
+            Remedy::option(OptionName::Standstill)
+        );
+        first.note(model, RecordingNote::info(says));
+    }
+}
+
+impl StickPhases {
+    /// Adds a note on drives whose forces are kept at reversals.
+    fn note_kept_forces(&self, model: &Model, first: &mut RecordingSegment) {
+        if self.blurred.is_empty() {
+            return;
+        }
+        let drives = model.drives();
+        let names: Vec<String> = self.blurred.iter().map(|d| format!("`{}`", drives[*d])).collect();
+        let says = message!(
+            "Forces about reversals of {} are kept in all recordings: most of what would be left out is the blur of the \
+             smoothing, and the rest would not represent the motion. Dry friction is less accurate for that reason. {} \
+             leaves them out.",
+            names.join(", "),
             Remedy::option(OptionName::Standstill)
         );
         first.note(model, RecordingNote::info(says));
@@ -376,7 +403,7 @@ impl FrictionRows {
                 continue;
             }
             let residual = self.forces[row] - (self.regressor.row(row) * values)[(0, 0)];
-            let shortfall = -residual * sign(*rate) / friction;
+            let shortfall = -residual * rate_sign(*rate) / friction;
             bin.samples += 1;
             bin.sum += shortfall;
             bin.squares += shortfall * shortfall;
@@ -575,7 +602,7 @@ fn dry_frictions(
         });
         let change = with? - against?;
         for (d, all) in all.iter_mut().enumerate() {
-            all.extend((0..samples.len()).map(|i| 0.5 * change[i * drives + d] * sign(rates[d][i])));
+            all.extend((0..samples.len()).map(|i| 0.5 * change[i * drives + d] * rate_sign(rates[d][i])));
         }
     }
     let median = |mut values: Vec<f64>| {

@@ -38,7 +38,7 @@ pub fn page(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> Outcom
         (
             "frequency",
             "Spectrum of the error",
-            spectrum::figures(&findings.before, findings.after.as_ref().ok()),
+            spectrum::figures(&findings.before, findings.after.version()),
         ),
         ("candidates", "All candidates", candidates(findings)),
         ("parameters", "Parameters", parameters(findings)),
@@ -217,7 +217,7 @@ fn effects(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String 
     }
     // The effects with values, then the steps.
     let mut html = tables::effects(findings);
-    if let Err(says) = &findings.after {
+    if let Some(says) = findings.after.refusal() {
         let _ = writeln!(
             html,
             "<p class=\"alias\">The model with these effects could not be built: {}</p>",
@@ -247,7 +247,7 @@ fn curves_section(findings: &DiagnosisFindings) -> String {
          Keys: + and −, arrows, 0. Click on a name to hide its curve. Click on a number of a table to copy it.</p>\n{}",
         curves::section(
             &findings.before,
-            findings.after.as_ref().ok(),
+            findings.after.version(),
             ["given model", "model with the effects"]
         )
     )
@@ -256,7 +256,7 @@ fn curves_section(findings: &DiagnosisFindings) -> String {
 /// Regions of the error before and after the effects, and error maps.
 fn location(findings: &DiagnosisFindings) -> String {
     // Both models are shown if the second one could be built.
-    let after = findings.after.as_ref().ok();
+    let after = findings.after.version();
     let mut html = String::new();
     html.push_str(&sentences(&findings.places, "The error of the given model"));
     if !findings.places.regions.is_empty() {
@@ -344,8 +344,8 @@ fn parameters(findings: &DiagnosisFindings) -> String {
         return tables::parameters(&findings.before);
     }
     let mut html = String::new();
-    match &findings.after {
-        Ok(after) => {
+    match findings.after.version() {
+        Some(after) => {
             html.push_str("<p>Base parameters of the model with the effects, fitted by weighted least squares: the equations of each drive are divided by the standard deviation of its residual. The standard deviations below take into account that residuals are correlated in time.</p>\n");
             html.push_str(&tables::parameters(after));
             let _ = writeln!(
@@ -354,7 +354,7 @@ fn parameters(findings: &DiagnosisFindings) -> String {
                 tables::parameters(&findings.before)
             );
         }
-        Err(_) => {
+        None => {
             html.push_str("<p>Base parameters, fitted by weighted least squares: the equations of each drive are divided by the standard deviation of its residual. The standard deviations below take into account that residuals are correlated in time.</p>\n");
             html.push_str(&tables::parameters(&findings.before));
         }
@@ -377,7 +377,7 @@ fn embed_equations(findings: &DiagnosisFindings, page: &str) -> String {
             .replace(&format!("</{from}>"), &format!("</{to}>"));
     }
     // The summary of the folded part names the model.
-    let what = if findings.after.is_ok() {
+    let what = if findings.after.version().is_some() {
         "The model with the effects"
     } else {
         "The model"

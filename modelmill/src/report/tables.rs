@@ -132,7 +132,7 @@ pub(crate) fn drives(findings: &DiagnosisFindings) -> String {
             let mut row = vec![TableCell::text(drive)];
             let first = nrms(before, d);
             row.push(TableCell::number(&percent(Some(first)), first));
-            if let Ok(after) = &findings.after {
+            if let Some(after) = findings.after.version() {
                 let last = nrms(after, d);
                 row.push(TableCell::number(&percent(Some(last)), last));
             }
@@ -142,7 +142,7 @@ pub(crate) fn drives(findings: &DiagnosisFindings) -> String {
         .collect();
     // The column of the model with effects exists only if it could be built.
     let mut head = vec!["drive", "#error of the given model"];
-    if findings.after.is_ok() {
+    if findings.after.version().is_some() {
         head.push("#error with the effects");
     }
     head.push("#noise of the force");

@@ -52,9 +52,7 @@ use points::DriveDoubts;
 pub use points::{ChangePoint, ParameterStep};
 use rows::{MeasuredMoments, RunRows, UnexplainedShares, WhitenedRun};
 pub use sums::{ReferenceFit, RunSums};
-use thresholds::{
-    CHANGE_LEAST_FORCE_SHARE, CHANGE_VALUE_SIGMAS, PARAMETER_CHANGE_SIGMAS, PUSH_LONGEST_GAP_S, PUSH_MARGIN_SHARE,
-};
+use thresholds::{CHANGE_LEAST_FORCE_SHARE, CHANGE_VALUE_SIGMAS, PARAMETER_CHANGE_SIGMAS, PUSH_LONGEST_GAP_S};
 use time_base::{TimeBase, correct_clock, time_scaling};
 use verdict::{RunKnowledge, undecided_reasons};
 pub use verdict::{RunVerdict, UndecidedDrive, UndecidedReason};
@@ -152,7 +150,7 @@ impl Model {
     /// that there may be hundreds of runs. Runs that cannot be read or prepared are listed in the result.
     ///
     /// Fails with fewer than two runs, if the first or all later runs cannot be read, if no force was measured, or
-    /// if `asked` names something that the model does not have.
+    /// if `options` names something that the model does not have.
     ///
     /// ```no_run
     /// use modelmill::Model;
@@ -173,13 +171,13 @@ impl Model {
     pub fn runs<R: Borrow<PreparedRecording>>(
         &self,
         recordings: impl IntoIterator<Item = Result<R, UnreadRun>>,
-        asked: &RunsOptions,
+        options: &RunsOptions,
     ) -> Outcome<RunsComparison> {
         // Columns and hypotheses are the same for all runs.
         let payloads = PayloadColumns::new(self)?;
         let bench = RunAnalyser::new(self, &payloads);
         let layout = bench.layout;
-        let mut shared = per_run::SharedFitBuilder::new(self, &payloads, layout, asked)?;
+        let mut shared = per_run::SharedFitBuilder::new(self, &payloads, layout, options)?;
         let mut recordings = recordings.into_iter();
         let total = recordings.size_hint().0;
         self.host().run_job("comparing runs with the first", total, |job| {
@@ -197,7 +195,7 @@ impl Model {
             let mut withins = vec![before.within];
             let mut doubts = DriveDoubts::new(&before);
             let mut unread = Vec::new();
-            shared.add_run(&before.file, &before.white);
+            shared.add_run(&before.file, &before.white, &[]);
             job.step(1)?;
             // Stage 2: each later run is compared with it.
             for recording in recordings {
@@ -211,11 +209,12 @@ impl Model {
                 job.step(1)?;
                 match looked_at {
                     Ok(run) => {
-                        all.push(bench.compare_with_first(&before, &all[0], &run));
+                        let report = bench.compare_with_first(&before, &all[0], &run);
+                        shared.add_run(&run.file, &run.white, &report.changes);
+                        all.push(report);
                         doubts.add(&run);
                         wholes.push(run.white.total());
                         withins.push(run.within);
-                        shared.add_run(&run.file, &run.white);
                     }
                     Err(UnreadRun {
                         error: Error::Cancelled,
@@ -426,7 +425,7 @@ impl<'a> RunAnalyser<'a> {
             scaling.fill(TimeScaling::KNOWN);
         }
         // Stage 2: contacts and standstill, whose forces show nothing of the machine.
-        let told = self.exclude_contacts(&mut stretches);
+        let contacts = self.exclude_contacts(&mut stretches);
         let stands = standstill::exclude_uncertain_friction(self.model, &mut stretches)?;
         // Stage 3: the sums.
         let values = reference.map(|one| one.values);
@@ -440,7 +439,7 @@ impl<'a> RunAnalyser<'a> {
                 .iter()
                 .map(|one| one.samples().div_ceil(one.decimation()))
                 .sum(),
-            events: told,
+            events: contacts,
             within: within_run_spread(&white.blocks, &self.search),
             white,
             values,
@@ -454,26 +453,16 @@ impl<'a> RunAnalyser<'a> {
 
     /// Excludes contacts and pushes from the forces of a run, and returns those that last.
     fn exclude_contacts(&self, stretches: &mut [RecordingSegment]) -> Vec<RunChange> {
-        let mut told = Vec::new();
+        let mut contacts = Vec::new();
         for stretch in stretches {
             let found = events::events(self.model, stretch);
             let found = merged_contact_events(found, stretch);
-            // The start and the end of a push hardly exceed the usual residual, so that its interval is widened.
-            let wide = found.iter().map(|event| {
-                let room = PUSH_MARGIN_SHARE * (event.to - event.from);
-                ContactEvent {
-                    from: event.from - room,
-                    to: event.to + room,
-                    drives: Vec::new(),
-                    is_confirmed: event.is_confirmed,
-                }
-            });
-            events::leave_out_events(stretch, &wide.collect::<Vec<_>>());
+            events::leave_out_events(stretch, &found);
             // Events that are only possible are excluded, but not reported.
             let lasting = found.iter().filter(|event| event.is_confirmed);
-            told.extend(lasting.map(|event| changes::event(self.model, event)));
+            contacts.extend(lasting.map(|event| changes::event(self.model, event)));
         }
-        told
+        contacts
     }
 
     /// The report of a run fitted alone: values and events.
@@ -604,8 +593,8 @@ impl<'a> RunAnalyser<'a> {
 
     /// Changes with their physical values and texts.
     fn identified_changes(&self, found: &[SelectedChange], values: &DVector<f64>) -> Vec<RunChange> {
-        let told = found.iter();
-        told.map(|one| changes::identified_change(self.model, &self.possible, one, values))
+        let each = found.iter();
+        each.map(|one| changes::identified_change(self.model, &self.possible, one, values))
             .collect()
     }
 }

@@ -5,6 +5,7 @@ use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_identify::ParameterInfo;
 use modelmill_identify::changes::{JointFit, JointRun, JointValues, fit_jointly};
+use modelmill_spec::{FrameStep, Mechanism, ModelSymbol};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
@@ -12,7 +13,7 @@ use crate::runs::changes::{friction, offset, viscous_unit};
 use crate::runs::layout::RunColumnLayout;
 use crate::runs::payload::{PayloadColumns, TEN};
 use crate::runs::rows::WhitenedRun;
-use crate::runs::{ChangeEstimate, FittedValue, centre};
+use crate::runs::{ChangeEstimate, FittedValue, PhysicalChange, RunChange, centre};
 
 /// Kinds of values that may be separate for each run.
 const KINDS: [&str; 6] = ["payload", "friction", "offset", "gain", "clock", "zero"];
@@ -156,6 +157,16 @@ struct PerRunColumns {
     origin: f64,
 }
 
+/// A run of the fit.
+struct SharedRun {
+    /// Name of the file.
+    file: String,
+    /// Its sums: one for each drive if there are loads, else one.
+    sums: Vec<modelmill_identify::changes::NormalEquations>,
+    /// Columns of what was found to differ from the first run.
+    changed: Vec<usize>,
+}
+
 /// Collects the runs of the fit.
 pub(crate) struct SharedFitBuilder<'a> {
     /// The model.
@@ -168,10 +179,12 @@ pub(crate) struct SharedFitBuilder<'a> {
     loads: &'a [KnownLoad],
     /// First column of each load's body.
     loaded: Vec<usize>,
+    /// Names of the frames that may carry a load, in the order of the columns.
+    frames: Vec<String>,
     /// Columns that the fit uses, ascending.
     used: Vec<usize>,
-    /// File name and sums of each run: one for each drive if there are loads, else one.
-    runs: Vec<(String, Vec<modelmill_identify::changes::NormalEquations>)>,
+    /// The runs in their order.
+    runs: Vec<SharedRun>,
 }
 
 impl<'a> SharedFitBuilder<'a> {
@@ -182,27 +195,27 @@ impl<'a> SharedFitBuilder<'a> {
         model: &'a Model,
         payloads: &PayloadColumns,
         layout: RunColumnLayout,
-        asked: &'a super::RunsOptions,
+        request: &'a super::RunsOptions,
     ) -> Outcome<Self> {
         let infos = model.parameter_infos();
         let mut own: Vec<PerRunColumns> = Vec::new();
         // Two requests of the same columns count once.
-        for one in &asked.per_run {
+        for one in &request.per_run {
             for further in per_run_columns(model, payloads, layout, &infos, one)? {
                 if own.iter().all(|other| other.columns != further.columns) {
                     own.push(further);
                 }
             }
         }
-        let loaded: Outcome<Vec<usize>> = (asked.loads.iter())
-            .map(|load| Ok(layout.payload(frame(payloads, &load.frame)?)))
+        let loaded: Outcome<Vec<usize>> = (request.loads.iter())
+            .map(|load| Ok(layout.payload(loaded_frame(model, payloads, &load.frame)?)))
             .collect();
         let loaded = loaded?;
-        // Of all possible changes, only the requested columns are kept.
-        let of_base = 0..layout.base;
-        let mut used: Vec<usize> = of_base
+        // Of all possible changes, only the requested columns are kept. With loads anything may have changed in a run.
+        let further = layout.base..if loaded.is_empty() { layout.base } else { layout.total() };
+        let mut used: Vec<usize> = (0..layout.base)
             .chain(own.iter().flat_map(|one| one.columns.iter().copied()))
-            .chain(loaded.iter().flat_map(|at| *at..*at + TEN))
+            .chain(further)
             .collect();
         used.sort_unstable();
         used.dedup();
@@ -210,8 +223,9 @@ impl<'a> SharedFitBuilder<'a> {
             model,
             layout,
             own,
-            loads: &asked.loads,
+            loads: &request.loads,
             loaded,
+            frames: payloads.frames.clone(),
             used,
             runs: Vec::new(),
         })
@@ -222,8 +236,8 @@ impl<'a> SharedFitBuilder<'a> {
         !self.own.is_empty() || !self.loads.is_empty()
     }
 
-    /// Adds a run, by the sums of its used columns.
-    pub(crate) fn add_run(&mut self, file: &str, white: &WhitenedRun) {
+    /// Adds a run, by the sums of its used columns. `changes` are those that were found relative to the first run.
+    pub(crate) fn add_run(&mut self, file: &str, white: &WhitenedRun, changes: &[RunChange]) {
         if !self.is_requested() {
             return;
         }
@@ -233,7 +247,36 @@ impl<'a> SharedFitBuilder<'a> {
         } else {
             white.drives.iter().map(|one| one.select_columns(&self.used)).collect()
         };
-        self.runs.push((file.to_owned(), sums));
+        self.runs.push(SharedRun {
+            file: file.to_owned(),
+            sums,
+            changed: changes
+                .iter()
+                .flat_map(|one| self.changed_columns(&one.change))
+                .collect(),
+        });
+    }
+
+    /// The columns of a change.
+    fn changed_columns(&self, change: &PhysicalChange) -> Vec<usize> {
+        let (layout, drives) = (self.layout, self.model.drives());
+        let at = |names: &[String], name: &String| names.iter().position(|one| one == name);
+        let columns = match change {
+            PhysicalChange::Payload { frame, .. } => {
+                at(&self.frames, frame).map(|k| layout.payload(k)..layout.payload(k) + TEN)
+            }
+            PhysicalChange::Friction { drive, .. } => {
+                at(&drives, drive).map(|d| layout.friction(d)..layout.friction(d) + 2)
+            }
+            PhysicalChange::Offset { drive, .. } => at(&drives, drive).map(|d| layout.offset(d)..layout.offset(d) + 1),
+            PhysicalChange::Scale { drive, .. } => at(&drives, drive).map(|d| layout.scale(d)..layout.scale(d) + 1),
+            PhysicalChange::EncoderZero { coordinate, .. } => {
+                at(&self.model.active_coordinates(), coordinate).map(|i| layout.zero(i)..layout.zero(i) + 1)
+            }
+            // A clock is corrected before the sums, and contacts are left out of them.
+            PhysicalChange::Clock { .. } | PhysicalChange::ContactEvent { .. } => None,
+        };
+        columns.map_or_else(Vec::new, Iterator::collect)
     }
 
     /// The index of a column among the used ones.
@@ -269,8 +312,8 @@ impl<'a> SharedFitBuilder<'a> {
         let names = self.runs.iter().enumerate();
         // The name must be complete path components at the end of the file name.
         let found: Vec<usize> = names
-            .filter(|(_, (file, _))| {
-                let before = file.strip_suffix(load.run.as_str());
+            .filter(|(_, run)| {
+                let before = run.file.strip_suffix(load.run.as_str());
                 before.is_some_and(|before| before.is_empty() || before.ends_with(['/', '\\']))
             })
             .map(|(r, _)| r)
@@ -284,7 +327,7 @@ impl<'a> SharedFitBuilder<'a> {
                 if found.is_empty() { "none" } else { "several" },
                 self.runs
                     .iter()
-                    .map(|(file, _)| file.as_str())
+                    .map(|run| run.file.as_str())
                     .collect::<Vec<_>>()
                     .join(", ")
             ))),
@@ -296,6 +339,13 @@ impl<'a> SharedFitBuilder<'a> {
         let owns: Vec<&PerRunColumns> = (self.own.iter()).filter(|one| r > 0 || !one.is_against_first).collect();
         let mut own: Vec<usize> = owns.iter().flat_map(|one| one.columns.clone()).collect();
         let mut known = Vec::new();
+        // What else differs from the first run has values of its own: a load of unknown mass would count as none, and make
+        // the factors of the forces wrong. Of a run with a known load, the load explains what was found.
+        if !self.loads.is_empty() && !loads.contains(&r) {
+            let further = self.runs[r].changed.iter().filter(|k| !own.contains(k));
+            let further: Vec<usize> = further.copied().collect();
+            own.extend(further);
+        }
         for ((load, at), _) in (self.loads.iter().zip(&self.loaded))
             .zip(loads)
             .filter(|(_, run)| **run == r)
@@ -309,7 +359,7 @@ impl<'a> SharedFitBuilder<'a> {
         let is_known = |k: &usize| known.iter().any(|(at, _)| at == k);
         let own = own.into_iter().map(|k| self.place(k));
         let part = JointRun {
-            channels: self.runs[r].1.clone(),
+            channels: self.runs[r].sums.clone(),
             own: own.filter(|k| !is_known(k)).collect(),
             known,
         };
@@ -350,9 +400,9 @@ impl<'a> SharedFitBuilder<'a> {
             shared: (0..self.model.base.len()).map(of_base).collect(),
             gains: (drives.filter(|_| !self.loads.is_empty())).map(gain).collect(),
             runs: runs
-                .map(|((((file, _), part), owns), values)| {
+                .map(|(((run, part), owns), values)| {
                     let own = owns.iter().flat_map(|own| self.values(own, part, values));
-                    (file.clone(), own.collect())
+                    (run.file.clone(), own.collect())
                 })
                 .collect(),
         }
@@ -372,7 +422,7 @@ impl<'a> SharedFitBuilder<'a> {
             is_against_first: own.is_against_first,
             value,
         };
-        let mut told: Vec<RunValue> = (own.names.iter().zip(&places))
+        let mut run_values: Vec<RunValue> = (own.names.iter().zip(&places))
             .filter_map(|((name, unit), place)| {
                 let mut one = fitted_value(values, (*place)?);
                 one.value += own.origin;
@@ -390,13 +440,13 @@ impl<'a> SharedFitBuilder<'a> {
                 determined: places.iter().map(|k| values.determined[*k]).collect(),
             };
             let axes = ["x", "y", "z"].into_iter().zip(centre(&four));
-            told.extend(axes.filter_map(|(axis, at)| {
+            run_values.extend(axes.filter_map(|(axis, at)| {
                 let ChangeEstimate { value, deviation } = at?;
                 let deviation = Some(deviation);
                 Some(valued(axis, "m", FittedValue { value, deviation }))
             }));
         }
-        told
+        run_values
     }
 }
 
@@ -417,6 +467,43 @@ fn frame(payloads: &PayloadColumns, name: &str) -> Outcome<usize> {
     at.ok_or_else(|| unknown_name_error("body", name, &payloads.frames))
 }
 
+/// Index of a frame with a known load among those that may carry one: also a frame without a body of its own counts, such
+/// as the flange of a link, if it is rigidly connected to one of them.
+///
+/// Fails when there is no such frame; the message lists those with bodies.
+fn loaded_frame(model: &Model, payloads: &PayloadColumns, name: &str) -> Outcome<usize> {
+    let mechanism = &model.derivation.mechanism;
+    let index = |name: &str| mechanism.frames.iter().position(|frame| frame.name == name);
+    let root = |name: &str| index(name).map(|k| rigid_root(mechanism, k));
+    let is_connected = |other: &String| root(name).is_some_and(|at| at > 0 && root(other) == Some(at));
+    let exact = payloads.frames.iter().position(|frame| frame == name);
+    let connected = payloads.frames.iter().position(is_connected);
+    exact
+        .or(connected)
+        .ok_or_else(|| unknown_name_error("body", name, &payloads.frames))
+}
+
+/// The first frame on the way to the base to which a frame is rigidly connected.
+fn rigid_root(mechanism: &Mechanism, frame: usize) -> usize {
+    let mut at = frame;
+    while at > 0 && mechanism.frames[at].steps.iter().all(is_fixed_step) {
+        at = mechanism.frames[at].parent.0;
+    }
+    at
+}
+
+/// Whether no coordinate moves a step between frames.
+fn is_fixed_step(step: &FrameStep) -> bool {
+    match step {
+        FrameStep::Rotate(_, angle) => {
+            let mut symbols = angle.terms.iter().map(|(symbol, _)| symbol);
+            !symbols.any(|symbol| matches!(symbol, ModelSymbol::Coordinate(_)))
+        }
+        FrameStep::Translate(_, length) => length.coordinates.is_empty(),
+        FrameStep::Free(_) => false,
+    }
+}
+
 /// The error of an unknown name.
 fn unknown_name_error(what: &str, name: &str, names: &[String]) -> Error {
     Error::options(format!("there is no {what} `{name}`; there are {}", names.join(", ")))
@@ -430,9 +517,9 @@ fn per_run_columns(
     payloads: &PayloadColumns,
     layout: RunColumnLayout,
     infos: &[ParameterInfo],
-    asked: &PerRunSelection,
+    request: &PerRunSelection,
 ) -> Outcome<Vec<PerRunColumns>> {
-    let PerRunSelection { what, at } = asked;
+    let PerRunSelection { what, at } = request;
     // Without a place, all places of the kind are used.
     let places = |what: &str, names: Vec<String>| match at {
         None => Ok((0..names.len()).collect::<Vec<usize>>()),

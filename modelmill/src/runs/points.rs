@@ -82,13 +82,13 @@ pub(crate) fn find_change_points(
     // Stage 1: steps of each parameter over the order of the runs.
     let mut steps: Vec<(usize, ParameterStep)> = Vec::new();
     for parameter in &parameters {
-        let told: Vec<Option<UncertainValue>> = runs.iter().map(|run| known_value(run[*parameter])).collect();
-        let mut bounds = change_points(&told, parameters.len());
+        let known: Vec<Option<UncertainValue>> = runs.iter().map(|run| known_value(run[*parameter])).collect();
+        let mut bounds = change_points(&known, parameters.len());
         bounds.insert(0, 0);
         bounds.push(runs.len());
         for three in bounds.windows(3) {
             let [before, now] = [three[0]..three[1], three[1]..three[2]].map(|some| {
-                let (value, deviation) = weighted_mean(&told[some])?;
+                let (value, deviation) = weighted_mean(&known[some])?;
                 let deviation = Some(deviation);
                 Some(FittedValue { value, deviation })
             });

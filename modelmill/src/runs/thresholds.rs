@@ -75,8 +75,5 @@ pub(super) const KNOWN_VALUE_SIGMAS: f64 = 3.0;
 /// Pushes with less time between them are one, s. By judgement.
 pub(super) const PUSH_LONGEST_GAP_S: f64 = 0.25;
 
-/// Share of the length of an event (1) that is excluded before and after it as well. By judgement.
-pub(super) const PUSH_MARGIN_SHARE: f64 = 0.2;
-
 /// Steps of parameters that begin at most this many runs apart belong to one change point. By judgement.
 pub(super) const CHANGE_POINT_RUNS: usize = 1;

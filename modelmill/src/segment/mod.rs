@@ -1,6 +1,7 @@
 //! A segment of a recording without gaps in time, prepared for a model. States are visited block by block, and faults
 //! name the time and the line of the recording.
 
+pub(crate) mod picked_states;
 pub mod variances;
 
 use modelmill_boundary::message;

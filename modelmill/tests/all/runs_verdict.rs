@@ -191,3 +191,42 @@ fn a_known_load_corrects_other_loads() {
     assert!((value - 3.0).abs() < 5.0 * deviation, "{value} +- {deviation}");
     assert!(deviation > certain / 1.1, "{deviation} {certain}");
 }
+
+/// Runs with loads that nobody declared do not count as unloaded where a known load determines the factors of the forces.
+/// The known load is declared on a frame that carries no body of its own.
+#[test]
+fn undeclared_loads_do_not_spoil_the_factors_of_forces() {
+    let plate = "\n[[frame]]\nname = \"plate\"\non = \"link6\"\nmodified_dh = { d = \"0.1\" }\n";
+    let model = arm_with_friction("puma560", plate);
+    let record = |seed: u64, mass: f64| {
+        let machine = match mass {
+            0.0 => model.clone(),
+            _ => arm_with_friction("puma560", &tool("link6", mass)),
+        };
+        let plan = RunPlan {
+            decimate: 4,
+            scales: vec![1.1; 6],
+            ..RunPlan::new(seed)
+        };
+        plan.record(&model, &machine)
+    };
+    let runs = [(420, 0.0), (421, 2.0), (422, 3.0), (423, 3.0)].map(|(seed, mass)| record(seed, mass));
+    let options = |text: &str| RunsOptions {
+        per_run: Vec::new(),
+        loads: vec![KnownLoad::parse(text).expect("a load")],
+    };
+    let all: Vec<&PreparedRecording> = runs.iter().collect();
+    let found = compare_runs(&model, &all, &options("run-421 (table)=2.0@plate"));
+    for report in &found.runs[2..] {
+        let [value, deviation] = only_load(report);
+        assert!(
+            (value - 3.0).abs() < (5.0 * deviation).min(0.3),
+            "{value} +- {deviation}"
+        );
+    }
+    for (drive, gain) in &found.shared.expect("a fit").gains[..3] {
+        assert!((gain.value - 1.0 / 1.1).abs() < 0.05, "{drive}: {gain:?}");
+    }
+    let error = model.runs(all.into_iter().map(Ok), &options("run-421 (table)=2.0@nowhere"));
+    assert!(error.err().expect("a refusal").to_string().contains("link6"));
+}

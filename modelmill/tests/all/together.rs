@@ -89,6 +89,17 @@ fn recordings_of_the_fit_decide_for_all() {
     let [fit, _] = model.prepare_recordings([&one_file_each(&[&folder.join("none.csv"), slow]), &[]], &reading);
     assert!(fit[0].is_err());
     assert_eq!(fit[1].as_ref().map(prepared).ok(), Some(alone(slow)));
+    // Neither does a file that is too short to be prepared: the others are still prepared together.
+    let short = folder.join("short.csv");
+    std::fs::write(&short, "t,x,motor\n0,0,0\n0.002,0,0\n").expect("a file");
+    let [fit, _] = model.prepare_recordings([&one_file_each(&[slow, &short, fast]), &[]], &reading);
+    let [first, second, third] = &fit[..] else {
+        panic!("{} recordings", fit.len());
+    };
+    assert!(second.is_err());
+    let both = together(&[slow, fast], &[]);
+    let found: Vec<_> = [first, third].map(|one| one.as_ref().map(prepared).ok()).into();
+    assert_eq!(found, both.into_iter().map(Some).collect::<Vec<_>>());
     std::fs::remove_dir_all(&folder).expect("the folder");
 }
 

@@ -212,7 +212,7 @@ impl TourText {
     pub(super) fn steps(&mut self, findings: &DiagnosisFindings) {
         self.heading("5  Identify again: the error falls");
         self.bars(findings);
-        if let Ok(after) = &findings.after
+        if let Some(after) = findings.after.version()
             && let Some(result) = &after.identified
         {
             self.line("Base parameters of the completed model, identified from the recording:");

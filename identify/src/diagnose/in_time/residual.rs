@@ -15,10 +15,10 @@ use super::super::problem::DiagnosisProblem;
 use super::super::thresholds::{
     LARGE_RESIDUAL_LEAST_NOISE_RATIO, LARGE_RESIDUAL_LEAST_SHARE, LOUD_LEAST_RATIO, LOUD_LEAST_SHARE,
     LOUD_MOST_DURATION, RESONANCE_HALF_WIDTH, RESONANCE_LEAST_SHARE, RESONANCE_LOWEST_HZ, RESONANCE_MOST_LOW_SHARE,
-    STANDSTILL_RATE_SHARE, TIME_RESIDUAL_LEAST_NOISE_RATIO, WINDOW_FEWEST_SAMPLES,
+    STANDSTILL_RATE_SHARE, TIME_RESIDUAL_LEAST_NOISE_RATIO, TOP_SPEED_QUANTILE, WINDOW_FEWEST_SAMPLES,
 };
 use super::ChangeInterval;
-use crate::signal::{hann_power, median};
+use crate::signal::{float_to_count, hann_power, median};
 
 /// Independent samples of a window.
 const INDEPENDENT: f64 = 8.0;
@@ -103,9 +103,18 @@ pub(crate) fn standstill_samples(problem: &DiagnosisProblem, channel: usize) -> 
     let Some(rates) = rates.and_then(|column| column.0[channel].as_ref()) else {
         return Vec::new();
     };
-    let fastest = rates.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
-    let is_slow = |v: &f64| v.abs() < STANDSTILL_RATE_SHARE * fastest;
-    rates.iter().map(is_slow).collect()
+    let bound = STANDSTILL_RATE_SHARE * top_speed(rates);
+    rates.iter().map(|v| v.abs() < bound).collect()
+}
+
+/// The rate that a drive exceeds in few samples only: a single spike of a rate would make slow motion a standstill.
+fn top_speed(rates: &[f64]) -> f64 {
+    let mut speeds: Vec<f64> = rates.iter().map(|v| v.abs()).collect();
+    if speeds.is_empty() {
+        return 0.0;
+    }
+    let at = float_to_count(TOP_SPEED_QUANTILE * (speeds.len() - 1) as f64);
+    *speeds.select_nth_unstable_by(at, f64::total_cmp).1
 }
 
 /// A residual with zeros where the drive of its channel stands still or nearly so.

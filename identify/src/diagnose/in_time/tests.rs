@@ -138,3 +138,15 @@ fn a_resonance_is_no_noise_of_derivatives() {
         assert!((found - 6.0).abs() < 0.3, "{seed}: {found}");
     }
 }
+
+/// One spike of a rate does not turn slow motion into standstill.
+#[test]
+fn a_spike_of_a_rate_is_no_top_speed() {
+    let mut problem = problem(1, |_, _, _| 0.0);
+    let mut rate: Vec<f64> = (0..2000).map(|i| (0.01 * f64::from(i)).sin()).collect();
+    rate[700] = 1e3;
+    problem.friction = vec![ForceColumn(vec![Some(rate)])];
+    let standing = standstill_samples(&problem, 0).iter().filter(|stands| **stands).count();
+    // A sine is below 2 % of its amplitude for 1.3 % of the time.
+    assert!((10..60).contains(&standing), "{standing}");
+}

@@ -135,8 +135,8 @@ impl<R: Read> ZstdReader<R> {
 
     /// Compares the checksum of a frame, if it has one.
     fn check_sum(&self) -> io::Result<()> {
-        let said = self.decoder.get_checksum_from_data();
-        if said.is_some() && said != self.decoder.get_calculated_checksum() {
+        let stored = self.decoder.get_checksum_from_data();
+        if stored.is_some() && stored != self.decoder.get_calculated_checksum() {
             return Err(io::Error::other("its checksum is wrong"));
         }
         Ok(())

@@ -9,9 +9,9 @@ use crate::audit::thresholds::{
 };
 
 /// Half of the time that an edge may take, s.
-const EDGE_RISE_S: f64 = 0.04;
+pub(super) const EDGE_RISE_S: f64 = 0.04;
 /// Time over which the level at either side of an edge is taken, s.
-const EDGE_LEVEL_S: f64 = 0.08;
+pub(super) const EDGE_LEVEL_S: f64 = 0.08;
 
 /// Whether the mean of the residual in a segment hardly exceeds what noise of its size there would give. The noise is
 /// that between neighbouring samples, half of which are taken to be independent.

@@ -3,6 +3,7 @@
 
 use super::ContactEvent;
 use super::levels::SearchedResidual;
+use super::peak::largest_force;
 use super::segments::DriveSegment;
 use super::trace::ResidualTrace;
 use crate::audit::thresholds::{
@@ -134,14 +135,10 @@ fn joined_event(
         return None;
     }
     let mut drives: Vec<(usize, f64, f64)> = Vec::new();
+    let step = time(1) - time(0);
     for one in agreeing {
         let rest = &rests[one.drive];
-        let largest = if one.is_at_standstill {
-            one.force.abs()
-        } else {
-            let values = rest.forms[0].values[one.start..one.end].iter();
-            values.fold(0.0, |most: f64, x| most.max(x.abs()))
-        };
+        let largest = largest_force(rest, one, step);
         match drives.iter_mut().find(|(d, ..)| *d == one.drive) {
             Some((_, most, _)) => *most = most.max(largest),
             None => drives.push((one.drive, largest, one.force.abs() / one.deviations)),

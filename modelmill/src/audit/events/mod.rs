@@ -7,7 +7,7 @@
 //! 4. `segments`, `steps`: segments of one drive that stand out, in motion and at standstill.
 //! 5. `doubts`, `similar_states`: drop noise that is large for a while, friction that switches, and what repeats at
 //!    similar states, which is a law that the model lacks.
-//! 6. `grouping`: joins the drives.
+//! 6. `grouping`, `peak`: joins the drives, each with its largest force.
 //!
 //! Decision: an event has a start and an end within the run. What lasts until the end is a change of the machine, such
 //! as a payload.
@@ -17,6 +17,7 @@ mod fit;
 mod grouping;
 mod levels;
 mod notes;
+mod peak;
 mod regimes;
 mod rows;
 mod search;
@@ -32,8 +33,8 @@ use crate::model::Model;
 use crate::segment::RecordingSegment;
 
 pub(super) use notes::event_notes;
-pub(crate) use notes::{event_disturbance, leave_out_events};
-pub(crate) use rows::slowest_rate;
+pub(crate) use notes::{event_disturbance, leave_out_events, left_out_interval};
+pub(crate) use rows::{motion_of_drives, slowest_rate, standing_states};
 pub(crate) use search::find_events;
 pub(crate) use trace::ResidualTrace;
 

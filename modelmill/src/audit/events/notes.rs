@@ -8,6 +8,7 @@ use modelmill_identify::RecordingNote;
 use modelmill_identify::diagnose::{Disturbance, EstimatedQuantity};
 
 use super::{ContactEvent, events};
+use crate::audit::thresholds::{EVENT_LEAST_MARGIN_S, EVENT_MARGIN_SHARE};
 use crate::model::Model;
 use crate::segment::RecordingSegment;
 use crate::text::table::significant;
@@ -85,6 +86,13 @@ pub(crate) fn event_disturbance(model: &Model, file: &str, event: &ContactEvent)
     }
 }
 
+/// The interval that is left out for an event that lasts between two times, s: with a margin, wherever events are left
+/// out.
+pub(crate) fn left_out_interval([from, to]: [f64; 2]) -> [f64; 2] {
+    let margin = EVENT_LEAST_MARGIN_S.max(EVENT_MARGIN_SHARE * (to - from));
+    [from - margin, to + margin]
+}
+
 /// Excludes the forces of all drives during events. Their values are replaced by a line between the samples around: they
 /// count nowhere, but a filter of all forces would carry the real ones into the samples around.
 pub(crate) fn leave_out_events(data: &mut RecordingSegment, events: &[ContactEvent]) {
@@ -97,8 +105,9 @@ pub(crate) fn leave_out_events(data: &mut RecordingSegment, events: &[ContactEve
         run.left_out = vec![vec![false; run.time.len()]; drives];
     }
     for event in events {
-        let start = run.time.partition_point(|time| *time < event.from);
-        let end = run.time.partition_point(|time| *time <= event.to);
+        let [from, to] = left_out_interval([event.from, event.to]);
+        let start = run.time.partition_point(|time| *time < from);
+        let end = run.time.partition_point(|time| *time <= to);
         for out in &mut run.left_out {
             out[start..end].fill(true);
         }

@@ -1,18 +1,18 @@
 //! The residual in which a first look searches events: the rows of the model, with friction, inertia and an offset of
 //! every drive added, and the motion of the drives.
 
-use modelmill_codegen::{ModelEvaluator, MotionStates};
-use modelmill_identify::ChannelRegressor;
+use modelmill_codegen::ModelEvaluator;
+use modelmill_identify::{ChannelRegressor, PreparedRun};
 use nalgebra::DMatrix;
 
 use super::fit::fit_without_events;
 use super::regimes::standing_mask;
 use super::smoothing::{floor_to_count, sample_quantile};
 use super::trace::ResidualTrace;
-use crate::audit::rows::select_samples;
 use crate::audit::thresholds::{EVENT_FEWEST_SAMPLES, LONGEST_SMEAR_S, SLOWEST_ANGULAR_RATE, SLOWEST_LINEAR_RATE};
 use crate::model::Model;
 use crate::segment::RecordingSegment;
+use crate::segment::picked_states::{PickedStates, rate_sign};
 
 /// Samples per second that are evaluated in a run of usual length.
 const FINE_PER_S: f64 = 120.0;
@@ -102,38 +102,28 @@ impl EventRows {
     fn new(model: &Model, data: &RecordingSegment, samples: &[usize]) -> Option<Self> {
         let run = &data.run;
         let time: Vec<f64> = samples.iter().map(|k| run.time[*k]).collect();
-        let mut motion = [&run.q, &run.qd, &run.qdd].map(|columns| select_samples(columns, samples));
-        stop_standing_coordinates(model, &time, &mut motion);
-        let load = select_samples(run.force.as_deref().unwrap_or(&[]), samples);
-        let states = MotionStates {
-            q: column_slices(&motion[0]),
-            qd: column_slices(&motion[1]),
-            qdd: column_slices(&motion[2]),
-            load: column_slices(&load),
-        };
-        let evaluator = ModelEvaluator::new(&model.derivation);
-        let rows = evaluator.regressor(&states).ok()?;
-        // Positions come first, rates behind them, the Jacobian last.
-        let n = model.drives().len();
-        let mut positions = evaluator.drive_motion(&states).ok()?;
-        positions.truncate(2 * n);
-        let rates = positions.split_off(n);
-        let accelerations: Vec<Vec<f64>> = rates.iter().map(|rate| time_derivative(rate, &time)).collect();
-        let rows = with_friction_columns(rows, &rates, &accelerations);
+        let states = standing_states(model, run, samples, &time);
+        let rows = ModelEvaluator::new(&model.derivation)
+            .regressor(&states.as_motion())
+            .ok()?;
+        let motion = motion_of_drives(model, &states, &time)?;
+        let [_, rates, accelerations] = &motion;
+        let rows = with_friction_columns(rows, rates, accelerations);
         rows.iter().all(|x| x.is_finite()).then(|| Self {
-            regressor: ChannelRegressor::new(&rows, n),
-            motion: [positions, rates, accelerations],
+            regressor: ChannelRegressor::new(&rows, model.drives().len()),
+            motion,
         })
     }
 }
 
-/// Sets rates and accelerations of coordinates at standstill to zero.
-fn stop_standing_coordinates(model: &Model, time: &[f64], motion: &mut [Vec<Vec<f64>>; 3]) {
+/// The states of a run at some samples. Coordinates at standstill have no rate: the noise of their readings would switch
+/// friction.
+pub(crate) fn standing_states(model: &Model, run: &PreparedRun, samples: &[usize], time: &[f64]) -> PickedStates {
     let n = time.len();
     let per_second = (n - 1) as f64 / (time[n - 1] - time[0]);
-    let [_, rates, accelerations] = motion;
+    let mut states = PickedStates::new(run, samples);
     let types = model.active_coordinate_types();
-    for ((rate, acceleration), (_, is_angle)) in rates.iter_mut().zip(accelerations).zip(types) {
+    for ((rate, acceleration), (_, is_angle)) in states.qd.iter_mut().zip(&mut states.qdd).zip(types) {
         let slowest = if is_angle {
             SLOWEST_ANGULAR_RATE
         } else {
@@ -145,11 +135,15 @@ fn stop_standing_coordinates(model: &Model, time: &[f64], motion: &mut [Vec<Vec<
             acceleration[i] = 0.0;
         }
     }
+    states
 }
 
-/// Columns as slices.
-fn column_slices(columns: &[Vec<f64>]) -> Vec<&[f64]> {
-    columns.iter().map(Vec::as_slice).collect()
+/// Positions, rates and accelerations of the drives at some states, `[order][drive][sample]`; `None` at a pose without
+/// solution.
+pub(crate) fn motion_of_drives(model: &Model, states: &PickedStates, time: &[f64]) -> Option<[Vec<Vec<f64>>; 3]> {
+    let [positions, rates] = states.drive_motion(model)?;
+    let accelerations = rates.iter().map(|rate| time_derivative(rate, time)).collect();
+    Some([positions, rates, accelerations])
 }
 
 /// The derivative of a signal by central differences, one-sided at the ends.
@@ -168,8 +162,7 @@ fn with_friction_columns(rows: DMatrix<f64>, rates: &[Vec<f64>], accelerations: 
     let mut rows = rows.resize_horizontally(width + FRICTION_COLUMNS * n, 0.0);
     for d in 0..n {
         for (i, (v, acceleration)) in rates[d].iter().zip(&accelerations[d]).enumerate() {
-            let sign = if *v == 0.0 { 0.0 } else { v.signum() };
-            let values = [*v, sign, *acceleration, 1.0, v * v.abs(), v.abs()];
+            let values = [*v, rate_sign(*v), *acceleration, 1.0, v * v.abs(), v.abs()];
             for (k, value) in values.into_iter().enumerate() {
                 rows[(i * n + d, width + FRICTION_COLUMNS * d + k)] = value;
             }

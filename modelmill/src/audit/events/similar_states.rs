@@ -1,6 +1,7 @@
 //! Whether the residual of a segment repeats at similar states of its drive. If it does, it is a law that the model
 //! lacks and no contact.
 
+use super::doubts::{EDGE_LEVEL_S, EDGE_RISE_S};
 use super::levels::SearchedResidual;
 use super::segments::DriveSegment;
 use super::smoothing::{differences_per_sample, range_median, running_mean, sample_quantile};
@@ -18,10 +19,6 @@ const NEIGHBOURS: usize = 5;
 const AROUND_S: f64 = 0.1;
 /// Time over which the jerk is averaged, s.
 const JERK_MEAN_S: f64 = 0.05;
-/// Time over which the level at either side of an edge is taken, s.
-const EDGE_LEVEL_S: f64 = 0.08;
-/// Half of the time that an edge may take, s.
-const EDGE_RISE_S: f64 = 0.05;
 
 /// What other samples with similar states show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

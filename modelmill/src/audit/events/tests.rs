@@ -18,8 +18,13 @@ const NOISE: f64 = 0.015;
 
 /// A residual without events: of drives that move along sums of sines, or from point to point.
 fn calm_trace(seed: u64, from_point_to_point: bool) -> ResidualTrace {
+    sampled_trace(seed, from_point_to_point, RATE)
+}
+
+/// As [`calm_trace`], with other samples per second.
+fn sampled_trace(seed: u64, from_point_to_point: bool, rate: f64) -> ResidualTrace {
     let mut draws = RandomBits::new(seed);
-    let time: Vec<f64> = (0..SAMPLES).map(|i| i as f64 / RATE).collect();
+    let time: Vec<f64> = (0..SAMPLES).map(|i| i as f64 / rate).collect();
     let (mut positions, mut rates, mut accelerations) = (Vec::new(), Vec::new(), Vec::new());
     for _ in 0..DRIVES {
         let waves: Vec<[f64; 3]> = (1..4)
@@ -140,6 +145,58 @@ fn pushes_are_found_with_their_times() {
         10 * found >= 9 * planted && wrong == 0,
         "{found} of {planted}, {wrong} wrong"
     );
+}
+
+/// Hits of half a sine of 60 ms at 250 Hz are found with their times and their true peaks. A drive that reverses at the
+/// time of a hit may not show it.
+#[test]
+fn short_hits_are_found_with_their_peaks() {
+    let (rate, peaks) = (250.0, [1.5, 0.9]);
+    let mut errors = Vec::new();
+    for seed in 0..20_u64 {
+        let mut trace = sampled_trace(700 + seed, false, rate);
+        let (from, length) = (4.0 + 0.1013 * seed as f64, 0.06);
+        for (d, peak) in peaks.into_iter().enumerate() {
+            add_force(&mut trace, d, |i| {
+                let part = (i as f64 / rate - from) / length;
+                if (0.0..1.0).contains(&part) {
+                    peak * (0.5 * TAU * part).sin()
+                } else {
+                    0.0
+                }
+            });
+        }
+        let events = find_events(&trace);
+        assert!(
+            events.len() == 1 && has_event(&events, from, from + length),
+            "{seed}: {events:?}"
+        );
+        let of_drives = events[0].drives.iter();
+        errors.extend(of_drives.map(|(d, largest, _)| largest / peaks[*d] - 1.0));
+    }
+    let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+    assert!(
+        errors.len() > 30 && mean.abs() < 0.02 && errors.iter().all(|error| error.abs() < 0.08),
+        "{mean}: {errors:?}"
+    );
+}
+
+/// The size of long pushes is not that of the largest noise.
+#[test]
+fn long_pushes_have_their_size() {
+    for seed in 0..10_u64 {
+        let mut trace = calm_trace(800 + seed, seed % 2 == 0);
+        push(&mut trace, &[0.4, 0.3, 0.0], 7.9, 8.8);
+        let events = find_events(&trace);
+        assert!(has_event(&events, 7.9, 8.8), "{seed}: {events:?}");
+        let largest = events[0]
+            .drives
+            .iter()
+            .find(|(d, ..)| *d == 0)
+            .expect("the first drive")
+            .1;
+        assert!((0.39..0.4 + 4.0 * NOISE).contains(&largest), "{seed}: {largest}");
+    }
 }
 
 /// A force that is a function of the state is no contact, nor is one that lasts until the end.

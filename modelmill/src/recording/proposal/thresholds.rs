@@ -31,7 +31,8 @@ pub(super) const FIT_LEAST_SHARE: f64 = 0.6;
 /// judgement.
 pub(super) const FIT_MARGIN: f64 = 0.3;
 
-/// Angles beyond this magnitude are probably degrees, rad: two turns. By judgement.
+/// Angles beyond this magnitude are probably degrees, rad: two turns. It is larger than the bound of the search for faults,
+/// which compares both units with the forces, whereas here nothing else decides. By judgement.
 pub(super) const LARGEST_ANGLE: f64 = 4.0 * std::f64::consts::PI;
 
 /// Most samples that the model is compared with. By judgement.

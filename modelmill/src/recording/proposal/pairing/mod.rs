@@ -98,7 +98,22 @@ impl<'a> ColumnPairing<'a> {
         self.pair_forces_by_fit()?;
         self.pair_by_order(SignalRole::Force);
         self.check_rates();
+        self.doubt_foreign_units();
         Ok(())
+    }
+
+    /// Marks pairs of columns whose header has a unit of something else: their numbers would be used as they are.
+    fn doubt_foreign_units(&mut self) {
+        for one in &mut self.ours {
+            let Some(pair) = &mut one.pair else { continue };
+            let unit = split_header_unit(&self.signals[pair.signal].name).map(|(_, unit)| unit);
+            // The remark on a current states more.
+            if let Some(unit) = unit.filter(|unit| *unit != "A" && unit_factor(unit, one.quantity).is_none()) {
+                pair.reasons
+                    .push(format!("the unit {unit} is no unit of `{}`", one.name));
+                pair.is_guess = true;
+            }
+        }
     }
 
     /// The time of the recording, or its number of samples where there is none.
@@ -423,7 +438,7 @@ impl<'a> ColumnPairing<'a> {
                     signal: j,
                     unit: stated_unit(&self.signals[j].parts),
                     is_reversed: false,
-                    reasons: vec![format!("the model explains {} of it", percent_text(share))],
+                    reasons: vec![explained_text(share)],
                     is_guess: true,
                 });
             }
@@ -442,8 +457,7 @@ impl<'a> ColumnPairing<'a> {
                 continue;
             };
             let share = shares[*row][own];
-            pair.reasons
-                .push(format!("the model explains {} of it", percent_text(share)));
+            pair.reasons.push(explained_text(share));
             if agreement.nominal[*row][own] < -SIGN_LEAST_CORRELATION {
                 pair.reasons
                     .push("its sign is opposite to the forces of the nominal parameters".to_owned());
@@ -617,6 +631,14 @@ fn stated_unit(parts: &NameParts) -> Option<String> {
 /// The name of the position of a rate of the model. It may end in `_d` itself.
 fn position_of_rate(rate: &str) -> &str {
     rate.strip_suffix("_d").unwrap_or(rate)
+}
+
+/// How much of a force the model explains. Friction and an offset are added, since they are often missing in a model.
+fn explained_text(share: f64) -> String {
+    format!(
+        "the model explains {} of it, with friction and an offset added",
+        percent_text(share)
+    )
 }
 
 /// A share in percent.

@@ -74,3 +74,19 @@ fn rates_of_names_that_end_like_rates_are_checked() {
         );
     }
 }
+
+#[test]
+fn a_unit_of_something_else_makes_a_pair_uncertain() {
+    let arm = model([("q1", "q1"), ("q2", "q2")]);
+    for (header, is_guess) in [("q1 [kg]", true), ("q1 [deg]", false), ("q1", false)] {
+        let mut pairing = ColumnPairing::new(&arm, signals(vec![(header, Vec::new())]));
+        pairing.pair_by_name(SignalRole::Position);
+        pairing.doubt_foreign_units();
+        let pair = pair(&pairing, "q1").unwrap();
+        assert_eq!(pair.is_guess, is_guess, "{header}: {:?}", pair.reasons);
+        assert_eq!(
+            pair.reasons.iter().any(|reason| reason.contains("kg is no unit")),
+            is_guess
+        );
+    }
+}
