@@ -66,13 +66,14 @@ fn read_raw(model: &Model, file: &RecordingFiles, reading: &RecordingOptions) ->
     raw.unwrap_angles(&model.active_coordinate_types());
     // Force peaks near singular poses are no outliers.
     let leverage = DriveLeverage::new(model, &raw);
+    let coordinates = model.measured_coordinates();
     raw.repair(
-        &model.active_coordinates(),
+        &coordinates,
         &model.drives(),
         reading.skip_bad_samples,
         &|drive, sample| leverage.is_peak(drive, sample),
     );
-    raw.set_late_rates_aside(&model.active_coordinates());
+    raw.set_late_rates_aside(&coordinates);
     Ok(raw)
 }
 
@@ -168,10 +169,13 @@ fn prepare(model: &Model, recording: &Raw, args: &RecordingOptions, delay: f64) 
             .flat_map(|body| body.position.iter().chain(&body.quaternion))
             .map(|i| model.derivation.mechanism.coordinates[i.0].name.as_str())
             .collect();
-        coordinates.retain(|(name, _)| !free.contains(&name.as_str()));
+        let measured = model.measured_coordinates();
+        coordinates.retain(|(name, _)| !free.contains(&name.as_str()) && measured.contains(name));
         let suspicions = recording.suspicious_columns(&coordinates, preparation.source);
         first.notes.splice(0..0, suspicions);
-        let oddities = recording.signal_notes(&model.active_coordinate_types(), &model.drives());
+        let mut coordinates = model.active_coordinate_types();
+        coordinates.retain(|(name, _)| measured.contains(name));
+        let oddities = recording.signal_notes(&coordinates, &model.drives());
         first.notes.splice(0..0, oddities);
     }
     // Models with actuators may have recordings without forces, which few operations can use.
@@ -205,7 +209,7 @@ fn prepare(model: &Model, recording: &Raw, args: &RecordingOptions, delay: f64) 
     let faults: Vec<Disturbance> = if is_examined {
         let unwrapped = recording.unwrapped_angles().iter();
         let unwrapped = unwrapped.map(|angle| sensor_faults::wrapped_angle(recording.file(), angle));
-        (recording.position_faults(&model.active_coordinates()).into_iter())
+        (recording.position_faults(&model.measured_coordinates()).into_iter())
             .map(|fault| sensor_faults::position_fault(model, recording.file(), &fault))
             .chain(unwrapped)
             .chain(sensor_faults::late_rates_fault(recording))
