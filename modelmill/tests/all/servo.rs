@@ -564,3 +564,46 @@ fn ranks(bare: &Model, actuators: &[Vec<GainColumn>], seed: u64) -> (usize, usiz
     }
     (rank(&stacked[0]), rank(&stacked[1]))
 }
+
+/// A current that jumps is no fault of a sensor: it is used as it was recorded, and the torque constant is right.
+#[test]
+fn jumps_of_a_current_are_kept() {
+    let text = pendulum(&[("ml", 0.15)])
+        .replace("kp = { unit = \"N m\" }", "kt = { unit = \"N m/A\" }")
+        .replace("kd = { unit = \"N m s\" }\n", "")
+        .replace("kind = \"position_servo\"\nkp = \"kp\"\nkd = \"kd\"", "kind = \"current\"\ntorque_constant = \"kt\"\ndelay = 0");
+    let servo = servo(&text);
+    assert!(servo.scale.freedoms.is_empty());
+    let current = |t: f64| (0.9 * t).sin() + if (4.4 * t).sin() > 0.0 { 1.5 } else { -1.5 };
+    let (kt, j, coulomb, viscous) = (0.4, 0.05, 0.05, 0.15);
+    let (mut q, mut v) = (0.0_f64, 0.0_f64);
+    let mut log: [Vec<f64>; 3] = Default::default();
+    let h = 2.5e-5;
+    for k in 0..6000 {
+        let t = 0.005 * f64::from(k);
+        for (column, x) in log.iter_mut().zip([t, q, current(t)]) {
+            column.push(x);
+        }
+        for i in 0..200 {
+            let torque = kt * current(t + f64::from(i) * h);
+            v += h * (torque - 0.15 * 9.81 * q.sin() - viscous * v - coulomb * v.signum()) / j;
+            q += h * v;
+        }
+    }
+    let names = ["t", "q", "motor_current"].map(str::to_owned);
+    let found = identify(&servo, names.into_iter().zip(log).collect());
+    assert!(matches!(found.estimator, ServoEstimator::LeastSquares { .. }), "{:?}", found.estimator);
+    for (expression, truth) in [("kt", kt), ("J", j), ("Fv_motor", viscous), ("Fc_motor", coulomb)] {
+        let (value, std) = value(&found, expression);
+        assert!((value - truth).abs() < (2.5 * std).max(0.03 * truth), "{expression}: {value} +- {std}, {truth}");
+    }
+}
+
+/// A feed-forward torque adds to a servo, and fixes its scale.
+#[test]
+fn a_feed_forward_torque_fixes_the_scale() {
+    let forward = "[[actuator]]\ndrive = \"motor\"\nkind = \"current\"\ntorque_constant = 1\n";
+    let servo = servo(&(pendulum(&[]) + forward));
+    assert!(servo.scale.freedoms.is_empty(), "{:?}", servo.scale);
+    assert_eq!(servo.actuators().len(), 2);
+}
