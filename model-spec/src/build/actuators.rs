@@ -4,7 +4,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::actuators::{ActuatorGain, GainEntry, ModelActuator};
+use crate::actuators::{ActuatorGain, ActuatorKind, GainEntry, ModelActuator};
 use crate::build::actuation::DriveRows;
 use crate::build::symbols::SymbolTable;
 use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
@@ -23,16 +23,16 @@ pub(super) fn actuators(
     log: &mut DiagnosticLog,
 ) -> Vec<ModelActuator> {
     let entries = model.actuator.iter().flat_map(|list| &list.entries);
-    let mut seen: BTreeMap<usize, SourceSpan> = BTreeMap::new();
+    let mut seen: BTreeMap<(usize, Option<&str>), SourceSpan> = BTreeMap::new();
     let mut actuators: Vec<ModelActuator> = Vec::new();
     for entry in entries {
         let Some(drive) = find_drive(entry, drives, log) else {
             continue;
         };
         let span = entry.drive.as_ref().map_or(entry.span, |name| name.span);
-        if let Some(first) = seen.insert(drive.0, span) {
+        if let Some(first) = seen.insert((drive.0, entry.kind.map(ActuatorKind::name)), span) {
             log.push(
-                Diagnostic::error(span, "this drive has two actuators")
+                Diagnostic::error(span, "this drive has two actuators of one kind")
                     .label("the second one")
                     .related(first, "the first one")
                     .help("put both into one actuator"),

@@ -417,6 +417,18 @@ impl Model {
         self.coordinates(false)
     }
 
+    /// Names of the active coordinates that sensors measure: all but the signals of actuators, which may jump.
+    pub(crate) fn measured_coordinates(&self) -> Vec<String> {
+        let mechanism = &self.derivation.mechanism;
+        let mut names = self.active_coordinates();
+        let signals = mechanism.servo_forces.iter();
+        let signals: Vec<&str> = signals
+            .map(|force| mechanism.coordinates[force.signal.0].name.as_str())
+            .collect();
+        names.retain(|name| !signals.contains(&name.as_str()));
+        names
+    }
+
     /// Names of the passive coordinates, in the order of the file.
     pub fn passive_coordinates(&self) -> Vec<String> {
         self.coordinates(true)

@@ -109,12 +109,13 @@ pub(super) fn read_raw(model: &Model, file: &RecordingFiles, reading: &Recording
     raw.unwrap_angles(&model.active_coordinate_types());
     // Force peaks near singular poses are no outliers.
     let leverage = DriveLeverage::new(model, &raw);
+    let coordinates = model.measured_coordinates();
     raw.repair(
-        &model.active_coordinates(),
+        &coordinates,
         &model.drives(),
         reading.skip_bad_samples,
         &|drive, sample| leverage.is_peak(drive, sample),
     );
-    raw.set_late_rates_aside(&model.active_coordinates());
+    raw.set_late_rates_aside(&coordinates);
     Ok(raw)
 }

@@ -116,10 +116,13 @@ pub(super) fn prepare(
             .flat_map(|body| body.position.iter().chain(&body.quaternion))
             .map(|i| model.derivation.mechanism.coordinates[i.0].name.as_str())
             .collect();
-        coordinates.retain(|(name, _)| !free.contains(&name.as_str()));
+        let measured = model.measured_coordinates();
+        coordinates.retain(|(name, _)| !free.contains(&name.as_str()) && measured.contains(name));
         let suspicions = recording.suspicious_columns(&coordinates, preparation.source);
         first.notes.splice(0..0, suspicions);
-        let oddities = recording.signal_notes(&model.active_coordinate_types(), &model.drives());
+        let mut coordinates = model.active_coordinate_types();
+        coordinates.retain(|(name, _)| measured.contains(name));
+        let oddities = recording.signal_notes(&coordinates, &model.drives());
         first.notes.splice(0..0, oddities);
     }
     // Models with actuators may have recordings without forces, which few operations can use.
@@ -153,7 +156,7 @@ pub(super) fn prepare(
     let faults: Vec<Disturbance> = if is_examined {
         let unwrapped = recording.unwrapped_angles().iter();
         let unwrapped = unwrapped.map(|angle| sensor_faults::wrapped_angle(recording.file(), angle));
-        (recording.position_faults(&model.active_coordinates()).into_iter())
+        (recording.position_faults(&model.measured_coordinates()).into_iter())
             .map(|fault| sensor_faults::position_fault(model, recording.file(), &fault))
             .chain(unwrapped)
             .chain(sensor_faults::late_rates_fault(recording))

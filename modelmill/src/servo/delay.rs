@@ -9,7 +9,7 @@ use modelmill_identify::estimate::LeastSquares;
 
 use super::ServoModel;
 use super::rows::UsedSamples;
-use super::thresholds::{DELAY_SAMPLES, DELAY_STEP, INTERVAL_FALL, LARGEST_DELAY};
+use super::thresholds::{DELAY_SAMPLES, DELAY_STEP, DELAY_STEPS, INTERVAL_FALL};
 use crate::error::{Error, Outcome};
 use crate::segment::RecordingSegment;
 
@@ -37,10 +37,9 @@ pub(super) fn delays(servo: &ServoModel, segments: &[RecordingSegment]) -> Outco
         .map(|one| UsedSamples::new(servo, one, DELAY_SAMPLES))
         .collect::<Outcome<_>>()?;
     let actuators = servo.actuators();
-    let steps = (LARGEST_DELAY / DELAY_STEP).round() as usize;
     let mut profiles: Vec<Vec<ResidualLevel>> = vec![Vec::new(); actuators.len()];
     if actuators.iter().any(|actuator| actuator.delay.is_none()) {
-        for step in 0..=steps {
+        for step in 0..=DELAY_STEPS {
             let delay = step as f64 * DELAY_STEP;
             let rows = residuals(servo, &samples, delay)?;
             for (profile, level) in profiles.iter_mut().zip(rows) {

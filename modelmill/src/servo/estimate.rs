@@ -8,12 +8,14 @@ use modelmill_boundary::message;
 use modelmill_identify::estimate::{EstimateOptions, RowVisitor, estimate, estimate_with_instruments};
 use modelmill_identify::{LeastSquaresError, ParameterUncertainty, RecordingNote, RegressionSolution};
 
+use modelmill_spec::Sign;
+
 use super::ServoModel;
 use super::delay::{ServoDelay, delays};
 use super::instruments::commanded_segment;
 use super::rows::{EquationRows, UsedSamples};
 use super::scale::ServoScale;
-use super::thresholds::{INSTRUMENT_CORRELATION, MOST_SAMPLES};
+use super::thresholds::{IMPOSSIBLE_SIGMAS, INSTRUMENT_CORRELATION, MOST_SAMPLES};
 use crate::error::{Error, Outcome};
 use crate::recording::PreparedRecording;
 use crate::segment::RecordingSegment;
@@ -504,6 +506,16 @@ fn remarks(servo: &ServoModel, unknown: &[usize], solved: &ServoSolution, delays
             "Least squares was used, because {reason}: noise of the positions makes its estimates too small; record the command \
              of a position controller, or filter more strongly."
         )));
+    }
+    for (at, k) in unknown.iter().enumerate() {
+        let (value, std) = (solved.solution.values[at], solved.uncertainty.std[at]);
+        if servo.equations.sign(*k) == Sign::Positive && value < -IMPOSSIBLE_SIGMAS * std {
+            notes.push(RecordingNote::warning(message!(
+                "{} is negative, which is not possible: the model of the servo or of the machine is wrong; check the kind of \
+                 actuator, its signal, and whether the controller adds a feed-forward force.",
+                servo.equations.base[*k].expression
+            )));
+        }
     }
     let names: Vec<String> = unknown
         .iter()

@@ -8,6 +8,7 @@
 
 use modelmill_codegen::{ModelEvaluator, MotionStates};
 use modelmill_runtime::RandomBits;
+use modelmill_spec::ServoForce;
 use nalgebra::DMatrix;
 
 use super::thresholds::{NULL_ENTRY, NULL_SHARE, SCALE_ROWS_PER_COLUMN};
@@ -83,9 +84,18 @@ fn consistent_rows(model: &Model, n_unknown: usize) -> Result<DMatrix<f64>, Stri
     let active: Vec<usize> = (0..mechanism.coordinates.len())
         .filter(|i| !mechanism.coordinates[*i].passive)
         .collect();
+    // The first signal of each drive follows from its equation; further ones are free, such as a feed-forward force.
+    let is_first = |k: usize| {
+        let drive = mechanism.servo_forces[k].drive;
+        mechanism.servo_forces[..k].iter().all(|force| force.drive != drive)
+    };
+    let first: Vec<&ServoForce> = (0..mechanism.servo_forces.len())
+        .filter(|k| is_first(*k))
+        .map(|k| &mechanism.servo_forces[k])
+        .collect();
     // Every row is affine in its signal, so that two evaluations give the signal that obeys the equation.
     let evaluate = |at: Option<f64>, columns: &mut [Vec<Vec<f64>>; 4]| {
-        for servo in &mechanism.servo_forces {
+        for servo in &first {
             let signal = active.iter().position(|i| *i == servo.signal.0).unwrap_or(0);
             if let Some(at) = at {
                 columns[0][signal].fill(at);
@@ -102,7 +112,7 @@ fn consistent_rows(model: &Model, n_unknown: usize) -> Result<DMatrix<f64>, Stri
     };
     let zero = evaluate(Some(0.0), &mut columns)?;
     let one = evaluate(Some(1.0), &mut columns)?;
-    for servo in &mechanism.servo_forces {
+    for servo in &first {
         let signal = active.iter().position(|i| *i == servo.signal.0).unwrap_or(0);
         for sample in 0..wanted {
             let row = sample * n_drives + servo.drive.0;
@@ -173,8 +183,9 @@ fn groups(null: &DMatrix<f64>, unknown: &[usize]) -> Vec<(Vec<usize>, usize)> {
     (0..n_groups)
         .map(|g| {
             let members: Vec<usize> = (0..unknown.len()).filter(|i| group[*i] == Some(g)).collect();
-            let open: f64 = members.iter().map(|i| projector[(*i, *i)]).sum();
-            (members.into_iter().map(|i| unknown[i]).collect(), open.round() as usize)
+            // As many directions are open as the rows of the group span.
+            let open = null.select_rows(&members).rank(NULL_ENTRY);
+            (members.into_iter().map(|i| unknown[i]).collect(), open)
         })
         .collect()
 }

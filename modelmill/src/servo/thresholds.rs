@@ -7,10 +7,12 @@ pub(super) const NULL_SHARE: f64 = 1e-9;
 pub(super) const NULL_ENTRY: f64 = 1e-6;
 /// Equations for each unknown in the search for directions without effect. By judgement.
 pub(super) const SCALE_ROWS_PER_COLUMN: usize = 6;
-/// Largest delay of a servo that is searched, s: field buses and controllers of machines need less. By judgement.
-pub(super) const LARGEST_DELAY: f64 = 0.1;
 /// Step of the search for a delay, s; the minimum is interpolated by a parabola. By judgement.
 pub(super) const DELAY_STEP: f64 = 0.001;
+/// Steps of the search.
+pub(super) const DELAY_STEPS: usize = 100;
+/// Largest delay of a servo that is searched, s: field buses and controllers of machines need less. By judgement.
+pub(super) const LARGEST_DELAY: f64 = DELAY_STEPS as f64 * DELAY_STEP;
 /// Most samples for the search of a delay. By judgement.
 pub(super) const DELAY_SAMPLES: usize = 4000;
 /// Fall of the log likelihood, times two, at the ends of an interval of 95 % of one parameter.
@@ -28,5 +30,7 @@ pub(super) const INSTRUMENT_LAGS: [f64; 8] = [0.0, 0.01, 0.02, 0.04, 0.08, 0.16,
 pub(super) const INSTRUMENT_CORRELATION: f64 = 0.2;
 /// Ridge of the fit of instruments, as a share of the trace: lagged commands are nearly dependent. By judgement.
 pub(super) const INSTRUMENT_RIDGE: f64 = 1e-10;
+/// A value of an impossible sign is reported if it is this many standard deviations beyond zero. By judgement.
+pub(super) const IMPOSSIBLE_SIGMAS: f64 = 3.0;
 /// Most samples of the estimate; more are thinned evenly. By judgement.
 pub(super) const MOST_SAMPLES: usize = 40_000;

@@ -84,17 +84,18 @@ fn command(t: f64, phases: &[f64]) -> f64 {
         .sum()
 }
 
+/// Columns of a log by name.
 type Columns = Vec<(String, Vec<f64>)>;
 
 /// A log of a servo at 200 Hz: command and noisy position, simulated by small steps of the closed-form equation.
-fn simulate(planted: &Planted, seed: u64, seconds: f64) -> Columns {
+fn simulate(planted: &Planted, seed: u64, samples: usize) -> Columns {
     let mut draws = Draws::new(seed);
     let phases: Vec<f64> = (0..4).map(|_| std::f64::consts::TAU * draws.uniform()).collect();
     let (mut q, mut v) = (0.0, 0.0);
     let (mut time, mut position, mut given) = (Vec::new(), Vec::new(), Vec::new());
     let (step, inner) = (0.005, 200);
     let h = step / f64::from(inner);
-    for k in 0..(seconds / step) as usize {
+    for k in 0..samples {
         let t = k as f64 * step;
         time.push(t);
         position.push(q + 5e-5 * draws.normal());
@@ -170,7 +171,7 @@ fn gains_and_delay_are_recovered_with_a_known_gravity_load() {
             coulomb: 0.05 + 0.1 * draws.uniform(),
             delay: 0.004 + 0.012 * draws.uniform(),
         };
-        let found = identify(&servo, simulate(&planted, seed, 30.0));
+        let found = identify(&servo, simulate(&planted, seed, 6000));
         let wanted = [
             ("kp", planted.kp),
             ("J", planted.j),
@@ -248,7 +249,7 @@ delay = 0
 
 /// A log of the arm at 200 Hz; the equations are those of a textbook (Craig, "Introduction to Robotics", 6.7).
 /// `planted` has ZZ1 + l^2 M2, MX1 + l M2, ZZ2, MX2, kp1, kd1, kp2, kd2.
-fn simulate_arm(planted: &[f64; 8], seed: u64, seconds: f64) -> Columns {
+fn simulate_arm(planted: &[f64; 8], seed: u64, samples: usize) -> Columns {
     let [a1, b1, zz2, mx2, kp1, kd1, kp2, kd2] = *planted;
     let mut draws = Draws::new(seed);
     let phases: Vec<Vec<f64>> = (0..2)
@@ -272,7 +273,7 @@ fn simulate_arm(planted: &[f64; 8], seed: u64, seconds: f64) -> Columns {
     let mut log: [Vec<f64>; 5] = Default::default();
     let (step, inner) = (0.005, 20);
     let h = step / f64::from(inner);
-    for k in 0..(seconds / step) as usize {
+    for k in 0..samples {
         let t = k as f64 * step;
         let r = reference(t);
         let row = [
@@ -309,7 +310,7 @@ fn one_known_gain_determines_masses_and_gains_of_two_joints() {
     let (mut inside, mut all) = (0, 0);
     for seed in 0..5 {
         let planted = [0.9, 1.1, 0.2, 0.5, 60.0, 4.0, 25.0, 1.5];
-        let found = identify(&servo, simulate_arm(&planted, seed, 20.0));
+        let found = identify(&servo, simulate_arm(&planted, seed, 4000));
         assert!(
             matches!(found.estimator, ServoEstimator::Instruments { .. }),
             "{:?}",
@@ -359,7 +360,7 @@ fn without_a_known_number_only_ratios_are_reported() {
         coulomb: 0.1,
         delay: 0.008,
     };
-    let found = identify(&servo, simulate(&planted, 3, 30.0));
+    let found = identify(&servo, simulate(&planted, 3, 6000));
     let kp = found.parameters.iter().find(|p| p.expression == "kp").unwrap();
     assert_eq!(
         (kp.status, kp.value.to_bits()),
@@ -394,11 +395,14 @@ fn random_states(model: &Model, draws: &mut Draws, n: usize) -> [Vec<Vec<f64>>; 
     })
 }
 
+/// The factor of a gain at a position, a rate and a signal.
+type GainColumn = fn(f64, f64, f64) -> f64;
+
 /// An actuator of a test: its entry, and its columns at a position, a rate and a signal, one for each gain. Written
 /// without the library of kinds.
-fn test_actuator(kind: usize, drive: &str, name: &str) -> (String, Vec<fn(f64, f64, f64) -> f64>) {
+fn test_actuator(kind: usize, drive: &str, name: &str) -> (String, Vec<GainColumn>) {
     let head = format!("[[actuator]]\ndrive = \"{drive}\"\nsignal = \"{name}_signal\"\ndelay = 0\n");
-    let (entry, columns): (String, Vec<fn(f64, f64, f64) -> f64>) = match kind {
+    let (entry, columns): (String, Vec<GainColumn>) = match kind {
         0 => (
             format!("kind = \"position_servo\"\nkp = \"{name}_a\"\nkd = \"{name}_b\"\n"),
             vec![|q, _, s| s - q, |_, v, _| -v],
@@ -476,19 +480,20 @@ fn base_parameters_with_gains_agree_with_independent_ranks() {
         let bare = Model::open(&file).unwrap();
         for offset in 0..5 {
             let (mut parameters, mut entries, mut columns) =
-                (String::from("[parameters]\n"), String::new(), Vec::new());
+                (vec!["[parameters]\n".to_owned()], String::new(), Vec::new());
             for (d, drive) in bare.drives().iter().enumerate() {
                 let kind = (d + offset + m) % 5;
                 let (entry, its) = test_actuator(kind, drive, &format!("gain{d}"));
                 let [a, b] = units(kind, bare.force_unit(d));
-                parameters += &format!("gain{d}_a = {{ unit = \"{a}\" }}\n");
+                parameters.push(format!("gain{d}_a = {{ unit = \"{a}\" }}\n"));
                 if its.len() > 1 {
-                    parameters += &format!("gain{d}_b = {{ unit = \"{b}\" }}\n");
+                    parameters.push(format!("gain{d}_b = {{ unit = \"{b}\" }}\n"));
                 }
                 entries += &entry;
                 columns.push(its);
             }
             let path = scratch.join("variant.toml");
+            let parameters = parameters.concat();
             let text = format!("schema = 1\nname = \"variant\"\nextends = \"{file}\"\n{parameters}{entries}");
             std::fs::write(&path, text).unwrap();
             let model = Model::open(&path).unwrap_or_else(|error| panic!("{name} {offset}: {error}"));
@@ -508,14 +513,12 @@ fn base_parameters_with_gains_agree_with_independent_ranks() {
 }
 
 /// The rank of `[H, -S]` at random states and signals, and at signals that obey the equations for random parameters.
-fn ranks(bare: &Model, actuators: &[Vec<fn(f64, f64, f64) -> f64>], seed: u64) -> (usize, usize) {
+fn ranks(bare: &Model, actuators: &[Vec<GainColumn>], seed: u64) -> (usize, usize) {
     let mut draws = Draws::new(seed);
     let n = 200;
     let [q, qd, qdd] = random_states(bare, &mut draws, n);
     let drives = bare.drives().len();
     let load = vec![vec![0.0; n]; drives];
-    let slices = |all: &'_ [Vec<f64>]| -> Vec<Vec<f64>> { all.to_vec() };
-    let (q, qd, qdd) = (slices(&q), slices(&qd), slices(&qdd));
     let states = modelmill_codegen::MotionStates {
         q: q.iter().map(Vec::as_slice).collect(),
         qd: qd.iter().map(Vec::as_slice).collect(),
@@ -525,17 +528,16 @@ fn ranks(bare: &Model, actuators: &[Vec<fn(f64, f64, f64) -> f64>], seed: u64) -
     let evaluator = modelmill_codegen::ModelEvaluator::new(&bare.derivation);
     let h = evaluator.full_regressor(&states).unwrap();
     let motion = evaluator.drive_motion(&states).unwrap();
-    let mut parameters: Vec<f64> = (0..h.ncols()).map(|_| 0.5 + draws.uniform()).collect();
-    parameters.iter_mut().for_each(|p| *p *= 1.0);
+    let parameters: Vec<f64> = (0..h.ncols()).map(|_| 0.5 + draws.uniform()).collect();
     let gains: Vec<Vec<f64>> = actuators
         .iter()
         .map(|its| its.iter().map(|_| 0.5 + draws.uniform()).collect())
         .collect();
-    let mut stacked = [Vec::new(), Vec::new()];
+    let mut stacked: [Vec<Vec<f64>>; 2] = [Vec::new(), Vec::new()];
     for column in h.column_iter() {
-        stacked
-            .iter_mut()
-            .for_each(|all: &mut Vec<Vec<f64>>| all.push(column.iter().copied().collect()));
+        for all in &mut stacked {
+            all.push(column.iter().copied().collect::<Vec<f64>>());
+        }
     }
     for (d, its) in actuators.iter().enumerate() {
         let mut own = vec![vec![vec![0.0; n * drives]; its.len()]; 2];
@@ -561,4 +563,47 @@ fn ranks(bare: &Model, actuators: &[Vec<fn(f64, f64, f64) -> f64>], seed: u64) -
         }
     }
     (rank(&stacked[0]), rank(&stacked[1]))
+}
+
+/// A current that jumps is no fault of a sensor: it is used as it was recorded, and the torque constant is right.
+#[test]
+fn jumps_of_a_current_are_kept() {
+    let text = pendulum(&[("ml", 0.15)])
+        .replace("kp = { unit = \"N m\" }", "kt = { unit = \"N m/A\" }")
+        .replace("kd = { unit = \"N m s\" }\n", "")
+        .replace("kind = \"position_servo\"\nkp = \"kp\"\nkd = \"kd\"", "kind = \"current\"\ntorque_constant = \"kt\"\ndelay = 0");
+    let servo = servo(&text);
+    assert!(servo.scale.freedoms.is_empty());
+    let current = |t: f64| (0.9 * t).sin() + if (4.4 * t).sin() > 0.0 { 1.5 } else { -1.5 };
+    let (kt, j, coulomb, viscous) = (0.4, 0.05, 0.05, 0.15);
+    let (mut q, mut v) = (0.0_f64, 0.0_f64);
+    let mut log: [Vec<f64>; 3] = Default::default();
+    let h = 2.5e-5;
+    for k in 0..6000 {
+        let t = 0.005 * f64::from(k);
+        for (column, x) in log.iter_mut().zip([t, q, current(t)]) {
+            column.push(x);
+        }
+        for i in 0..200 {
+            let torque = kt * current(t + f64::from(i) * h);
+            v += h * (torque - 0.15 * 9.81 * q.sin() - viscous * v - coulomb * v.signum()) / j;
+            q += h * v;
+        }
+    }
+    let names = ["t", "q", "motor_current"].map(str::to_owned);
+    let found = identify(&servo, names.into_iter().zip(log).collect());
+    assert!(matches!(found.estimator, ServoEstimator::LeastSquares { .. }), "{:?}", found.estimator);
+    for (expression, truth) in [("kt", kt), ("J", j), ("Fv_motor", viscous), ("Fc_motor", coulomb)] {
+        let (value, std) = value(&found, expression);
+        assert!((value - truth).abs() < (2.5 * std).max(0.03 * truth), "{expression}: {value} +- {std}, {truth}");
+    }
+}
+
+/// A feed-forward torque adds to a servo, and fixes its scale.
+#[test]
+fn a_feed_forward_torque_fixes_the_scale() {
+    let forward = "[[actuator]]\ndrive = \"motor\"\nkind = \"current\"\ntorque_constant = 1\n";
+    let servo = servo(&(pendulum(&[]) + forward));
+    assert!(servo.scale.freedoms.is_empty(), "{:?}", servo.scale);
+    assert_eq!(servo.actuators().len(), 2);
 }
