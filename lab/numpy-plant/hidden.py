@@ -142,11 +142,10 @@ def judge(answer, items):
             errors.add(("zero", error["point"]) if error["point"] else ("constant", error["constant"]))
         if errors | rest == truth or errors | rest | covered == truth:
             return "right"
+    if any(not any(a <= truth for a in alternatives) for alternatives in claimed):
+        return "false"
     if covered == truth:
         return "right"
-    false = any(not any(a <= truth for a in alternatives) for alternatives in claimed)
-    if false:
-        return "false"
     last = answer["steps"][-1]["check"]
     if not own and last is not None and last < 1.05 * NOISE:
         return "invisible"

@@ -28,7 +28,7 @@ const STEP: f64 = 1e-3;
 const ROUNDS: usize = 5;
 /// Sets are fitted if their residual would be below the limit by linear slopes, with this part of the given squared
 /// residual as margin.
-const LINEAR_MARGIN: f64 = 0.02;
+const LINEAR_MARGIN: f64 = 0.1;
 /// Most sets of one size that are fitted.
 const MOST_FITS: usize = 10;
 /// A set of two errors ranks before one if it leaves less than this part of its squared residual.
