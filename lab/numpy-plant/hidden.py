@@ -134,19 +134,17 @@ def judge(answer, items):
         fitting = [a for a in alternatives if a <= truth]
         if fitting:
             covered |= max(fitting, key=len)
-    constants = {name for name in own if name[0] == "constant"}
-    rest = own - constants
+    # Errors of the geometry that are named stand for all claims together.
     for one in answer.get("geometry_alternatives", []):
         errors = set()
         for error in one["errors"]:
             errors.add(("zero", error["point"]) if error["point"] else ("constant", error["constant"]))
-        if errors | rest == truth or errors | rest | covered == truth:
+        if errors == truth:
             return "right"
+    if any(not any(a <= truth for a in alternatives) for alternatives in claimed):
+        return "false"
     if covered == truth:
         return "right"
-    false = any(not any(a <= truth for a in alternatives) for alternatives in claimed)
-    if false:
-        return "false"
     last = answer["steps"][-1]["check"]
     if not own and last is not None and last < 1.05 * NOISE:
         return "invisible"

@@ -459,9 +459,7 @@ fn alternatives_to_effects(
     named: Option<&NamedZeros>,
     held: FixedParameters,
 ) -> Outcome<Vec<GeometryAlternative>> {
-    // Zeros that are claimed were compared with the others by the search.
-    let is_zero = |one: &MissingEffect| named.is_some_and(|named| named.has_place(&one.effect.at));
-    if findings.missing.is_empty() || findings.missing.iter().any(is_zero) {
+    if findings.missing.is_empty() {
         return Ok(Vec::new());
     }
     let wrong = findings.missing.iter().filter(|one| one.effect.kind == CONSTANT_ERROR);
@@ -473,7 +471,8 @@ fn alternatives_to_effects(
         Vec::new()
     };
     let remaining = findings.answer.mean_square_residual();
-    geometry_alternatives(&findings.before, named, held, &constants, remaining)
+    let n_effects = findings.missing.len();
+    geometry_alternatives(&findings.before, named, held, &constants, n_effects, remaining)
 }
 
 /// Effects with estimates, alternatives and the experiment that separates them.

@@ -28,7 +28,7 @@ const STEP: f64 = 1e-3;
 const ROUNDS: usize = 5;
 /// Sets are fitted if their residual would be below the limit by linear slopes, with this part of the given squared
 /// residual as margin.
-const LINEAR_MARGIN: f64 = 0.02;
+const LINEAR_MARGIN: f64 = 0.1;
 /// Most sets of one size that are fitted.
 const MOST_FITS: usize = 10;
 /// A set of two errors ranks before one if it leaves less than this part of its squared residual.
@@ -59,8 +59,8 @@ pub struct GeometryAlternative {
 }
 
 /// The alternatives to the effects that were found, the best first. `constants` are the names of all of them if they are
-/// wrong constants, else empty; `remaining` is the mean square residual with them, relative to the forces. Empty if there
-/// are none, or if the model has no nominal values.
+/// wrong constants, else empty, and `n_effects` is their number. `remaining` is the mean square residual with them,
+/// relative to the forces. Empty if there are none, or if the model has no nominal values.
 ///
 /// Fails only when the job is cancelled.
 pub(super) fn geometry_alternatives(
@@ -68,11 +68,12 @@ pub(super) fn geometry_alternatives(
     named: Option<&NamedZeros>,
     held: FixedParameters,
     constants: &[&str],
+    n_effects: usize,
     remaining: f64,
 ) -> Outcome<Vec<GeometryAlternative>> {
     let job = (version.model.host()).run_job("comparing errors of the geometry", 0, |_| {
         let comparison = GeometryComparison::new(version, named, held)?;
-        Some(comparison.alternatives(named, constants, remaining))
+        Some(comparison.alternatives(named, constants, n_effects, remaining))
     })?;
     Ok(job.unwrap_or_default())
 }
@@ -274,14 +275,20 @@ impl<'a> GeometryComparison<'a> {
 
     /// Sets of one error, or of two, that leave no more than the effects found. Wrong constants are compared by the same
     /// fit; for other effects, `remaining` is the mean square residual relative to the forces.
-    fn alternatives(&self, named: Option<&NamedZeros>, constants: &[&str], remaining: f64) -> Vec<GeometryAlternative> {
+    fn alternatives(
+        &self,
+        named: Option<&NamedZeros>,
+        constants: &[&str],
+        n_effects: usize,
+        remaining: f64,
+    ) -> Vec<GeometryAlternative> {
         let name = |k: usize| {
             self.varied.derivation.mechanism.constants[self.errors[k].constant]
                 .name
                 .as_str()
         };
-        let all = 0..self.errors.len();
-        let (known, others): (Vec<usize>, Vec<usize>) = all.partition(|k| constants.contains(&name(*k)));
+        let all: Vec<usize> = (0..self.errors.len()).collect();
+        let known: Vec<usize> = all.iter().copied().filter(|k| constants.contains(&name(*k))).collect();
         let by_constants = self.fit(&known).filter(|_| known.len() == constants.len());
         let n_samples = self.target.len() as f64 / self.weights.len().max(1) as f64;
         let found = by_constants.map_or(n_samples * remaining, |fit| fit.residual);
@@ -290,7 +297,11 @@ impl<'a> GeometryComparison<'a> {
             return Vec::new();
         }
         let most = ALTERNATIVE_MOST_RESIDUAL * found + ALTERNATIVE_ROUNDING * self.given;
-        let mut fits = self.sufficient_fits(&others, most);
+        let mut fits = self.sufficient_fits(&all, most);
+        // What was found is no alternative, with or without another error; a part of it is one.
+        fits.retain(|fit| known.is_empty() || !known.iter().all(|k| fit.set.contains(k)));
+        // More errors than effects found must explain much more.
+        fits.retain(|fit| fit.set.len() <= n_effects || SECOND_ERROR_GAIN * fit.residual < found);
         // A second error must reduce the residual much to be worth it.
         let rank = |fit: &ErrorFit| fit.residual * SECOND_ERROR_GAIN.powi(i32::from(fit.set.len() > 1));
         fits.sort_by(|a, b| rank(a).total_cmp(&rank(b)));

@@ -7,6 +7,7 @@ mod hanging;
 mod made;
 mod mechanisms;
 mod missing;
+mod permuted_entries;
 mod run_plans;
 mod runs;
 mod runs_verdict;

@@ -32,7 +32,6 @@ mod no_numbers;
 mod on_request;
 mod operation_counts;
 mod packages;
-mod permuted_entries;
 mod pinocchio;
 mod poses;
 mod published_groupings;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use modelmill_boundary::files::DiskFiles;
 use modelmill_codegen::{Derivation, ModelEvaluator, MotionStates};
-use modelmill_tests::stream::Stream;
+use modelmill_runtime::RandomBits;
 
 /// Models of one degree of freedom or few, each derived within a second.
 const QUICK: [&str; 9] = [
@@ -24,15 +24,16 @@ fn models() -> std::path::PathBuf {
 }
 
 /// Numbers of a list in a random order.
-fn shuffle<T>(list: &mut [T], stream: &mut Stream) {
+fn shuffle<T>(list: &mut [T], stream: &mut RandomBits) {
     for k in (1..list.len()).rev() {
-        list.swap(k, stream.below(k + 1));
+        let other = usize::try_from(stream.bits() % (k as u64 + 1)).expect("a remainder fits");
+        list.swap(k, other);
     }
 }
 
 /// The text with its tables `[[...]]` in a random order, and the lines of its tables of constants, parameters and
 /// coordinates as well. Tables that belong to an entry stay behind it.
-fn permuted(text: &str, stream: &mut Stream) -> String {
+fn permuted(text: &str, stream: &mut RandomBits) -> String {
     let mut head = Vec::new();
     let mut tables: Vec<Vec<&str>> = Vec::new();
     let mut entries: Vec<Vec<&str>> = Vec::new();
@@ -91,7 +92,7 @@ fn forces(derivation: &Derivation) -> Vec<Option<Vec<f64>>> {
         let seed = name
             .bytes()
             .fold(k, |sum, byte| sum.wrapping_mul(131).wrapping_add(u64::from(byte)));
-        Stream::new(seed).between(-1.0, 1.0)
+        2.0 * RandomBits::new(seed).below_one() - 1.0
     };
     let parameters: Vec<f64> = mechanism
         .parameters
@@ -130,7 +131,7 @@ fn check(name: &str, seeds: u64) {
     let expected = forces(&given);
     assert!(expected.iter().flatten().count() > 5, "{name}: too few states");
     for seed in 0..seeds {
-        let text = permuted(&text, &mut Stream::new(seed));
+        let text = permuted(&text, &mut RandomBits::new(seed));
         let other = derived(name, &text);
         let [a, b] = [&given, &other].map(|one| one.reduction.retained.len());
         assert_eq!(a, b, "{name}, seed {seed}: base parameters\n{text}");
