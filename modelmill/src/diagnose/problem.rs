@@ -139,7 +139,7 @@ pub(crate) fn find_missing_effects(
     further.extend(encoders::zeros(model, &slopes));
     further.extend(encoders(model, &all, &problem, &slopes));
     further.extend(gears(model, &all, &values, &slopes)?);
-    further.extend(constants(model, &all, asked.zeros, &|k| is_fixed(model, held, k)));
+    further.extend(constants(model, &all, query.zeros, &|k| is_fixed(model, held, k)));
     further.extend(other_friction);
     if query.in_full {
         if held == FixedParameters::All || problem.base.is_empty() {

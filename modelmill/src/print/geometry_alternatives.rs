@@ -4,6 +4,7 @@ use serde_json::{Value, json};
 
 use crate::diagnose::{DiagnosisFindings, words};
 use crate::text::TerminalStyle;
+use crate::text::names::joined_by_and;
 
 impl DiagnosisFindings {
     /// Errors of the geometry that explain as much as the effects found, as JSON.
@@ -35,7 +36,7 @@ impl DiagnosisFindings {
             let errors: Vec<String> = one.errors.iter().map(words::geometry_error_text).collect();
             lines.push(format!(
                 "  {} ({:.1} % of what the effects explain)",
-                words::joined_by_and(&errors),
+                joined_by_and(&errors),
                 100.0 * one.share
             ));
         }

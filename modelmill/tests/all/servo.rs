@@ -571,7 +571,10 @@ fn jumps_of_a_current_are_kept() {
     let text = pendulum(&[("ml", 0.15)])
         .replace("kp = { unit = \"N m\" }", "kt = { unit = \"N m/A\" }")
         .replace("kd = { unit = \"N m s\" }\n", "")
-        .replace("kind = \"position_servo\"\nkp = \"kp\"\nkd = \"kd\"", "kind = \"current\"\ntorque_constant = \"kt\"\ndelay = 0");
+        .replace(
+            "kind = \"position_servo\"\nkp = \"kp\"\nkd = \"kd\"",
+            "kind = \"current\"\ntorque_constant = \"kt\"\ndelay = 0",
+        );
     let servo = servo(&text);
     assert!(servo.scale.freedoms.is_empty());
     let current = |t: f64| (0.9 * t).sin() + if (4.4 * t).sin() > 0.0 { 1.5 } else { -1.5 };
@@ -592,10 +595,17 @@ fn jumps_of_a_current_are_kept() {
     }
     let names = ["t", "q", "motor_current"].map(str::to_owned);
     let found = identify(&servo, names.into_iter().zip(log).collect());
-    assert!(matches!(found.estimator, ServoEstimator::LeastSquares { .. }), "{:?}", found.estimator);
+    assert!(
+        matches!(found.estimator, ServoEstimator::LeastSquares { .. }),
+        "{:?}",
+        found.estimator
+    );
     for (expression, truth) in [("kt", kt), ("J", j), ("Fv_motor", viscous), ("Fc_motor", coulomb)] {
         let (value, std) = value(&found, expression);
-        assert!((value - truth).abs() < (2.5 * std).max(0.03 * truth), "{expression}: {value} +- {std}, {truth}");
+        assert!(
+            (value - truth).abs() < (2.5 * std).max(0.03 * truth),
+            "{expression}: {value} +- {std}, {truth}"
+        );
     }
 }
 
