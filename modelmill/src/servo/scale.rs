@@ -199,7 +199,7 @@ fn freedom(model: &Model, (base, open): (Vec<usize>, usize)) -> ScaleFreedom {
     let of_effects: Vec<usize> = effects.map(|term| term.parameter.0).collect();
     // A base parameter that is one parameter to the first power is fixed by that number.
     let single = |k: usize| match model.products_of(k).as_slice() {
-        [(product, factor)] if *factor == 1.0 => match product.0.as_slice() {
+        [(product, _)] => match product.0.as_slice() {
             [(p, 1)] => Some(*p),
             _ => None,
         },

@@ -617,3 +617,71 @@ fn a_feed_forward_torque_fixes_the_scale() {
     assert!(servo.scale.freedoms.is_empty(), "{:?}", servo.scale);
     assert_eq!(servo.actuators().len(), 2);
 }
+
+/// The EMPS axis with its voltage in place of the force, and with its mass as the known number: the force per volt is
+/// that of the data set, 35.15 N/V, and friction is that of the published least squares on forces.
+#[test]
+fn the_emps_axis_is_identified_from_its_voltage() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data/emps");
+    let [train, pulses] = ["emps_train.csv", "emps_pulses.csv"].map(|name| format!("{folder}/{name}"));
+    if !std::path::Path::new(&train).exists() {
+        println!("skipped: {train} is absent");
+        return;
+    }
+    let text = r#"
+schema = 1
+name = "emps_voltage"
+[parameters]
+gain = { unit = "N/A" }
+[coordinates]
+x = { nominal = 0 }
+[[frame]]
+name = "carriage"
+on = "base"
+joint = { prismatic = "x", axis = "x" }
+[[part]]
+on = "carriage"
+mass = "95.1089"
+[[drive]]
+name = "screw"
+joint = "x"
+[[effect]]
+kind = "viscous_friction"
+at = "screw"
+[[effect]]
+kind = "coulomb_friction"
+at = "screw"
+[[effect]]
+kind = "force_offset"
+at = "screw"
+[[actuator]]
+drive = "screw"
+kind = "voltage"
+torque_constant = "gain"
+resistance = 1
+delay = 0
+[recording.columns]
+t = "t_s"
+x = "q_meas_m"
+screw_voltage = "u_V"
+"#;
+    let servo = servo(text);
+    let [fit, check] = [train, pulses].map(|path| servo.equations.recording(path, &options()).unwrap());
+    let found = servo.identify(&[&fit], &[&check]).unwrap();
+    for (expression, published, share) in [
+        ("gain", 35.150_651_882, 0.02),
+        ("Fv_screw", 203.503_4, 0.04),
+        ("Fc_screw", 20.393_5, 0.04),
+    ] {
+        let (value, std) = value(&found, expression);
+        println!("{expression} {value} +- {std}, published {published}");
+        assert!(
+            (value - published).abs() < share * published,
+            "{expression}: {value} +- {std}"
+        );
+    }
+    for row in found.fit.iter().chain(&found.check) {
+        println!("{row:?}");
+        assert!(row.error < 0.09 * row.force, "{row:?}");
+    }
+}
