@@ -33,7 +33,7 @@ pub(crate) enum PythonInput<'py> {
 pub(crate) type RecordingOrError = (Option<PythonRecording>, Option<PyErr>);
 
 /// A recording that is to be prepared, independent of the interpreter.
-pub(crate) enum RecordingInput {
+pub(crate) enum PassedRecording {
     /// Files of one run.
     Files(Vec<PathBuf>, RecordingOptions),
     /// Name and columns of a table.
@@ -42,7 +42,7 @@ pub(crate) enum RecordingInput {
     Read(UnpreparedRecording),
 }
 
-impl RecordingInput {
+impl PassedRecording {
     /// A source of Python with its options; fails with the first invalid option.
     pub(crate) fn new(
         py: Python<'_>,

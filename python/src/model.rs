@@ -22,7 +22,7 @@ use pyo3::prelude::*;
 
 use crate::arrays::state_matrix;
 use crate::errors::{input_error, library_error};
-use crate::inputs::{PythonInput, RecordingInput, RecordingOrError};
+use crate::inputs::{PassedRecording, PythonInput, RecordingOrError};
 use crate::options::{self, EstimationOptions, ExcitationOptions, OptionResult};
 use crate::results::{PythonExcitation, PythonRecording, PythonResult, RemarkList, remarks};
 use crate::spelling::PythonSpelling;
@@ -156,7 +156,7 @@ impl CoreModel {
     fn prepare_inputs(
         &self,
         py: Python<'_>,
-        runs: [Vec<RecordingInput>; 2],
+        runs: [Vec<PassedRecording>; 2],
         progress: ProgressCallback<'_, '_>,
     ) -> PyResult<[Vec<Outcome<Arc<PreparedRecording>>>; 2]> {
         let model = &self.model;
@@ -386,8 +386,8 @@ impl CoreModel {
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<[Vec<RecordingOrError>; 2]> {
         let input = |one: PythonInput<'py>| match one {
-            PythonInput::Prepared(one) => Ok(RecordingInput::Read(one.recording.before_preparation())),
-            PythonInput::Source(name, source, options) => RecordingInput::new(py, &name, source, &options),
+            PythonInput::Prepared(one) => Ok(PassedRecording::Read(one.recording.before_preparation())),
+            PythonInput::Source(name, source, options) => PassedRecording::new(py, &name, source, &options),
         };
         let [fit, check] = runs.map(|run| run.into_iter().map(input).collect::<PyResult<Vec<_>>>());
         let prepared = self.prepare_inputs(py, [fit?, check?], progress.as_ref())?;
