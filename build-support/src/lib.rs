@@ -111,7 +111,7 @@ pub fn try_generate_with(pattern: &str, options: Options, out: &Path) -> Result<
     let mut text = String::new();
     let mut faults = String::new();
     let mut names = BTreeSet::new();
-    let cache = ModuleCache::beside(out);
+    let cache = ModuleCache::in_folder_of(out);
     for file in &files {
         match generate_module(file, options, cache.as_ref()) {
             Ok((name, module)) if names.insert(name.clone()) => text.push_str(&module),
