@@ -70,8 +70,8 @@ impl Options {
 
 /// Generates a module for every model file that `pattern` names: a file, or a folder with `/*.toml`.
 ///
-/// Writes `models.rs` to the build's output folder, derives only models that changed since, reruns when a model file or one that it extends changes, and ends the
-/// build with the model's own diagnostics if one is at fault.
+/// Writes `models.rs` to the build's output folder, and derives only models that changed since the last build. Reruns when
+/// a model file or one that it extends changes, and ends the build with the model's own diagnostics if one is at fault.
 pub fn generate(pattern: &str) {
     generate_with(pattern, Options::default());
 }
