@@ -70,8 +70,8 @@ impl Options {
 
 /// Generates a module for every model file that `pattern` names: a file, or a folder with `/*.toml`.
 ///
-/// Writes `models.rs` to the build's output folder, derives only models that changed since, reruns when a model file or one that it extends changes, and ends the
-/// build with the model's own diagnostics if one is at fault.
+/// Writes `models.rs` to the build's output folder, and derives only models that changed since the last build. Reruns when
+/// a model file or one that it extends changes, and ends the build with the model's own diagnostics if one is at fault.
 pub fn generate(pattern: &str) {
     generate_with(pattern, Options::default());
 }
@@ -111,7 +111,7 @@ pub fn try_generate_with(pattern: &str, options: Options, out: &Path) -> Result<
     let mut text = String::new();
     let mut faults = String::new();
     let mut names = BTreeSet::new();
-    let cache = ModuleCache::beside(out);
+    let cache = ModuleCache::in_folder_of(out);
     for file in &files {
         match generate_module(file, options, cache.as_ref()) {
             Ok((name, module)) if names.insert(name.clone()) => text.push_str(&module),

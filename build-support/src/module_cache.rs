@@ -28,7 +28,7 @@ pub(crate) struct ModuleKey([u64; 2]);
 
 impl ModuleCache {
     /// The cache in the folder of the generated file; `None` if the running program cannot be read.
-    pub(crate) fn beside(out: &Path) -> Option<Self> {
+    pub(crate) fn in_folder_of(out: &Path) -> Option<Self> {
         let program = std::fs::read(std::env::current_exe().ok()?).ok()?;
         let mut hasher = DefaultHasher::new();
         program.hash(&mut hasher);

@@ -287,8 +287,8 @@ impl<'a> GeometryComparison<'a> {
                 .name
                 .as_str()
         };
-        let all: Vec<usize> = (0..self.errors.len()).collect();
-        let known: Vec<usize> = all.iter().copied().filter(|k| constants.contains(&name(*k))).collect();
+        let all = 0..self.errors.len();
+        let (known, others): (Vec<usize>, Vec<usize>) = all.partition(|k| constants.contains(&name(*k)));
         let by_constants = self.fit(&known).filter(|_| known.len() == constants.len());
         let n_samples = self.target.len() as f64 / self.weights.len().max(1) as f64;
         let found = by_constants.map_or(n_samples * remaining, |fit| fit.residual);
@@ -297,9 +297,10 @@ impl<'a> GeometryComparison<'a> {
             return Vec::new();
         }
         let most = ALTERNATIVE_MOST_RESIDUAL * found + ALTERNATIVE_ROUNDING * self.given;
-        let mut fits = self.sufficient_fits(&all, most);
-        // What was found is no alternative, with or without another error; a part of it is one.
-        fits.retain(|fit| known.is_empty() || !known.iter().all(|k| fit.set.contains(k)));
+        let mut fits = self.sufficient_fits(&others, most);
+        // What was found is no alternative, but a part of it is one.
+        let parts = self.sufficient_fits(&known, most);
+        fits.extend(parts.into_iter().filter(|fit| fit.set.len() < known.len()));
         // More errors than effects found must explain much more.
         fits.retain(|fit| fit.set.len() <= n_effects || SECOND_ERROR_GAIN * fit.residual < found);
         // A second error must reduce the residual much to be worth it.

@@ -14,7 +14,7 @@ use modelmill_codegen::review::NumericRank;
 use modelmill_codegen::{ModelEvaluator, MotionStates, PoseFault, PoseReason, ReductionMethod};
 use modelmill_identify::estimate::{condition_number, numeric_rank};
 use modelmill_runtime::RandomBits;
-use modelmill_spec::{CoordinateMotion, Kinematics};
+use modelmill_spec::CoordinateMotion;
 use nalgebra::DMatrix;
 
 use crate::error::Outcome;
@@ -42,8 +42,6 @@ const SLOW: f64 = 0.1;
 /// nominal pose is near a fold. A four-bar linkage reaches it at 5e-4 rad from its fold: rates grow as the reciprocal
 /// square root of this distance. By judgement.
 const NEAR_FOLD: f64 = 30.0;
-/// Gap of a loop above which a pose is on another branch, m or rad. Rounded lengths leave 1e-7 of the size of a loop.
-const OPEN: f64 = 1e-5;
 /// Number of states at which it is determined how fast each coordinate moves the others. By judgement.
 const TRAVEL_SAMPLES: usize = 8;
 
@@ -299,10 +297,6 @@ struct StateSampling {
     refused: usize,
     /// Number of states that were left out as singular or undefined.
     left_out: usize,
-    /// Positions of frames and points.
-    kinematics: Kinematics,
-    /// Whether each coordinate is passive.
-    are_passive: Vec<bool>,
 }
 
 impl StateSampling {
@@ -326,14 +320,6 @@ impl StateSampling {
             reach: REACH,
             refused: 0,
             left_out: 0,
-            kinematics: Kinematics::new(&model.derivation.mechanism),
-            are_passive: model
-                .derivation
-                .mechanism
-                .coordinates
-                .iter()
-                .map(|c| c.passive)
-                .collect(),
         }
     }
 
@@ -440,8 +426,7 @@ impl StateSampling {
                 load: resting(self.n_drives),
             };
             // Every refused pose narrows the range around the nominal pose.
-            let is_closed = || self.is_closed(evaluator, &still, &q);
-            if evaluator.full_regressor(&still).is_err() || !is_closed() {
+            if evaluator.full_regressor(&still).is_err() {
                 self.refused += 1;
                 if self.refused > 20 * wanted {
                     return Err(format!(
@@ -471,26 +456,6 @@ impl StateSampling {
             }
         }
         Ok(())
-    }
-
-    /// Whether all equations of the loops hold at a pose. Where loops have more equations than needed, those that are
-    /// solved may also have a solution on a branch on which the others do not hold.
-    fn is_closed(&self, evaluator: &ModelEvaluator<'_>, still: &MotionStates<'_>, active: &[f64]) -> bool {
-        let Ok(motion) = evaluator.passive_motion(still) else {
-            return false;
-        };
-        let (mut active, mut passive) = (active.iter(), motion.iter());
-        let value = |is_passive: &bool| {
-            let found = if *is_passive {
-                passive.next().and_then(|column| column.first())
-            } else {
-                active.next()
-            };
-            found.copied().unwrap_or(f64::NAN)
-        };
-        let q: Vec<f64> = self.are_passive.iter().map(value).collect();
-        let gaps = self.kinematics.gaps(&self.kinematics.poses(&q), &q);
-        gaps.iter().all(|gap| gap.abs() < OPEN)
     }
 
     /// All states.
