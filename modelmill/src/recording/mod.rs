@@ -11,6 +11,7 @@ mod held_out;
 mod leverage;
 mod options;
 mod proposal;
+mod raised_cutoff;
 mod sensor_faults;
 mod smoother;
 mod stick;
