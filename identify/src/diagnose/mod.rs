@@ -146,6 +146,12 @@ pub struct IdentifiedEffect {
     pub support: EffectSupport,
     /// Effects that explain the data equally well.
     pub indistinguishable_from: Vec<LocatedEffect>,
+    /// Other places whose value the model uses here too; the effect is then the difference from that value. Empty if
+    /// the model has no such effect here. The caller, who knows the model, sets it.
+    pub shared_with: Vec<String>,
+    /// Whether it was measured in the positions instead of estimated from the forces; the errors of the steps are then
+    /// those without it. The caller sets it.
+    pub is_measured: bool,
 }
 
 /// A candidate with the result of the search.

@@ -41,6 +41,7 @@ mod gears;
 mod held_friction;
 mod laws;
 mod long_recordings;
+mod measured_play;
 mod memory;
 mod model_versions;
 pub(crate) mod numbers;
