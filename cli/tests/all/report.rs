@@ -82,6 +82,7 @@ fn the_page_holds_what_diagnose_says_and_needs_nothing_else() {
             "probability",
             "support",
             "indistinguishable_from",
+            "shared_with",
             "separate_by",
             "separate_command",
         ];

@@ -16,6 +16,8 @@ use crate::signal::median;
 const SIDE: usize = 5;
 /// Number of samples on either side of a jump that are used to estimate it.
 const JUMP_NEIGHBOURS: usize = 10;
+/// Samples on either side of a jump that the load may need to cross the play. They do not count for its width.
+const CROSSING_SAMPLES: usize = 5;
 /// Largest number of samples that are used, from the start.
 const MAX_SAMPLES: usize = 20_000;
 
@@ -33,6 +35,8 @@ pub enum PositionFault {
         coordinate: String,
         /// The jump, rad or m.
         width: f64,
+        /// Standard deviation of the width, rad or m.
+        deviation: f64,
     },
 }
 
@@ -62,9 +66,10 @@ impl SignalRecording {
         if faults.is_empty() {
             for name in coordinates {
                 let width = position(name).and_then(|q| backlash_width(time, q));
-                faults.extend(width.map(|width| PositionFault::Backlash {
+                faults.extend(width.map(|[width, deviation]| PositionFault::Backlash {
                     coordinate: name.clone(),
                     width,
+                    deviation,
                 }));
             }
         }
@@ -171,8 +176,8 @@ fn timing_jitter(all: &[CubicResidual]) -> Option<f64> {
     (mean > 0.0).then(|| mean.sqrt())
 }
 
-/// Length of the backlash, rad or m, if the jumps have one size and alternate; else `None`.
-fn backlash_width(time: &[f64], q: &[f64]) -> Option<f64> {
+/// Length of the backlash with its standard deviation, rad or m, if the jumps have one size and alternate; else `None`.
+fn backlash_width(time: &[f64], q: &[f64]) -> Option<[f64; 2]> {
     // The factor of the step is half of the jump, since the step goes from -1 to 1.
     let jump = |i: usize| {
         let about = (i - JUMP_NEIGHBOURS..=i + JUMP_NEIGHBOURS).filter(|k| *k != i);
@@ -182,12 +187,14 @@ fn backlash_width(time: &[f64], q: &[f64]) -> Option<f64> {
     // Robust standard deviation of the jump estimates.
     let noise = 1.4826 * median(jumps.iter().map(|x| x.abs()).collect());
     let mut found: Vec<f64> = Vec::new();
+    let mut places: Vec<usize> = Vec::new();
     for (i, own) in jumps.iter().enumerate() {
         let near = i.saturating_sub(JUMP_NEIGHBOURS)..(i + JUMP_NEIGHBOURS + 1).min(jumps.len());
         // Only the largest jump of a neighbourhood counts.
         let is_largest = jumps[near].iter().all(|x| x.abs() <= own.abs());
         if is_largest && own.abs() > BACKLASH_JUMP_SIGMAS * noise {
             found.push(*own);
+            places.push(i + JUMP_NEIGHBOURS);
         }
     }
     // Size of a typical jump, compared with encoder steps and travel.
@@ -204,7 +211,19 @@ fn backlash_width(time: &[f64], q: &[f64]) -> Option<f64> {
     let is_play = found.len() >= BACKLASH_FEWEST_JUMPS
         && 5 * found.iter().filter(is_alike).count() >= BACKLASH_ALIKE_OF_FIVE * found.len()
         && 5 * alternate >= BACKLASH_ALTERNATING_OF_FIVE * (found.len() - 1);
-    is_play.then_some(middle)
+    // The width of each jump without the samples at which the load crosses the play.
+    let across = |i: usize| {
+        let reach = CROSSING_SAMPLES + JUMP_NEIGHBOURS;
+        let about = i.saturating_sub(reach)..(i + reach + 1).min(q.len());
+        let beyond = about.filter(|k| k.abs_diff(i) > CROSSING_SAMPLES);
+        2.0 * fit_cubic(beyond.map(|k| (time[k] - time[i], q[k] - q[i])), 1.0)[0].abs()
+    };
+    let widths: Vec<f64> = places.into_iter().map(across).collect();
+    let width = median(widths.clone());
+    // Robust standard deviation of a median.
+    let spread = 1.4826 * median(widths.iter().map(|one| (one - width).abs()).collect());
+    let deviation = 1.25 * spread / (widths.len() as f64).sqrt();
+    is_play.then_some([width, deviation])
 }
 
 /// The smallest change of a position between samples, which is the step of an encoder; 0 if it does not move.
@@ -265,7 +284,24 @@ mod tests {
         let read: Vec<f64> = (time().iter())
             .map(|t| motion(*t, 0) + 2e-4 * (1.9 * t + 0.3).sin().signum() + 5e-6 * noise.normal())
             .collect();
-        let found = backlash_width(&time(), &read).unwrap();
-        assert!((3e-4..5e-4).contains(&found), "{found}");
+        let [found, _] = backlash_width(&time(), &read).unwrap();
+        assert!((3.8e-4..4.2e-4).contains(&found), "{found}");
+    }
+
+    /// The load needs some samples to cross the play; its width is that before and after them.
+    #[test]
+    fn the_width_of_play_does_not_depend_on_the_time_to_cross_it() {
+        for crossing in [1e-3, 5e-3, 10e-3] {
+            let mut noise = TestNoise::new(5);
+            let read: Vec<f64> = (time().iter())
+                .map(|t| {
+                    let side = ((1.9 * t + 0.3).sin() / (1.9 * crossing)).clamp(-1.0, 1.0);
+                    motion(*t, 0) + 1e-3 * side + 5e-6 * noise.normal()
+                })
+                .collect();
+            let [found, deviation] = backlash_width(&time(), &read).unwrap();
+            assert!((found - 2e-3).abs() < 1e-4, "{crossing} s: {found}");
+            assert!(deviation < 1e-4, "{deviation}");
+        }
     }
 }

@@ -3,8 +3,11 @@
 
 use super::bench::{EffectSelector, ScoredEffectSet, SelectedEffect, n_columns};
 use super::conditional::ConditioningSet;
-use super::problem::{CandidateEffect, ColumnSource, LocatedEffect};
-use super::thresholds::{MIN_DISTINCTION, MIN_SUBSTITUTE_SHARE, NEGLIGIBLE_EFFECT_SHARE, SUBSTITUTE_MOST_RATIO};
+use super::problem::{CandidateEffect, ColumnSource, LocatedEffect, ReadingFaultKind};
+use super::thresholds::{
+    MIN_DISTINCTION, MIN_SUBSTITUTE_SHARE, NEGLIGIBLE_EFFECT_SHARE, SIGNAL_FAULT_LEAST_DIFFERENCE,
+    SIGNAL_FAULT_MOST_PLACE, SUBSTITUTE_MOST_RATIO,
+};
 
 /// An effect that cannot be distinguished from one that was found.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,9 +43,9 @@ impl EffectSelector<'_> {
             let channels: Vec<usize> = (0..rest.len()).collect();
             let worth = self.effective_equations(&rest, &channels);
             let table = self.projected_gram(picks);
-            // Loss of the criterion with another set; `None` if it is distinguishable or does not explain what the
-            // effect adds to `fewer`.
-            let in_place = |bench: &Self, fewer: &[SelectedEffect], trial: &ScoredEffectSet| -> Option<f64> {
+            // Loss of the criterion with another set; `None` if it is above a bound or the set does not explain what
+            // the effect adds to `fewer`.
+            let substitute = |bench: &Self, fewer: &[SelectedEffect], trial: &ScoredEffectSet, most_loss: f64| {
                 // Squared residual without the effect, and without its partner if `fewer` lacks two.
                 let left = bench.fit_from_gram(&table, fewer.to_vec()).squares;
                 let worse = worth * (trial.squares / squares.max(f64::MIN_POSITIVE)).ln();
@@ -50,7 +53,11 @@ impl EffectSelector<'_> {
                 let own = left - squares;
                 let stands_in =
                     own > NEGLIGIBLE_EFFECT_SHARE * left && left - trial.squares > MIN_SUBSTITUTE_SHARE * own;
-                (worse < MIN_DISTINCTION && stands_in && trial.is_possible()).then_some(worse)
+                (worse < most_loss && stands_in && trial.is_possible()).then_some(worse)
+            };
+            // The same with the bound from which on a set is distinguishable.
+            let in_place = |bench: &Self, fewer: &[SelectedEffect], trial: &ScoredEffectSet| {
+                substitute(bench, fewer, trial, MIN_DISTINCTION)
             };
             let mut found: Vec<EffectAlias> = Vec::new();
             // Stage 1: single candidates in place of the effect.
@@ -78,10 +85,17 @@ impl EffectSelector<'_> {
                 set.push(candidate.clone());
                 let tried = self.fit_from_gram(&table, set);
                 let trial = self.refit_at_size(candidate, tried, squares);
-                if let Some(worse) = in_place(self, &others, &trial) {
+                // Neither of two signal faults is shown if the forces lie between both.
+                let most_loss = if self.are_between(&pick, candidate, &rest, &trial) {
+                    f64::INFINITY
+                } else {
+                    MIN_DISTINCTION
+                };
+                if let Some(worse) = substitute(self, &others, &trial, most_loss) {
                     found.push(EffectAlias {
                         effect: self.candidate(candidate).effect.clone(),
-                        criterion_loss: worse,
+                        // What lies between both counts for neither.
+                        criterion_loss: if most_loss > MIN_DISTINCTION { 0.0 } else { worse },
                         // With an offset, friction that depends on the direction is the same as friction.
                         is_equivalent_form: more && self.is_refinement_of(candidate, &pick),
                     });
@@ -130,6 +144,46 @@ impl EffectSelector<'_> {
             all.push(found);
         }
         all
+    }
+
+    /// Whether an effect and another one in its place are a delay and a low-pass of the same forces, and the forces
+    /// lie between both or beyond either, or both fits hardly differ. Both shift a force by the same time and differ
+    /// only in the curvature of the force. `rest` is the residual with the effect, `trial` the set with the other
+    /// one.
+    ///
+    /// On the line through both fits, the fit with the effect is at 0 and the other one at 1. A true delay lies at 0, a
+    /// true low-pass at 1. What lies elsewhere was bent by something else, such as the smoothing of positions, and the
+    /// difference of the errors shows neither of them. A difference that is small relative to the residual may be bent
+    /// from one end to the other.
+    fn are_between(
+        &self,
+        pick: &SelectedEffect,
+        candidate: &SelectedEffect,
+        rest: &[Vec<f64>],
+        trial: &ScoredEffectSet,
+    ) -> bool {
+        let [one, other] = [pick, candidate].map(|pick| match self.candidate(pick).source {
+            ColumnSource::ReadingFault(fault) if fault.kind != ReadingFaultKind::Scaled => Some(fault),
+            _ => None,
+        });
+        let (Some(one), Some(other)) = (one, other) else {
+            return false;
+        };
+        if one.channel != other.channel || one.kind == other.kind {
+            return false;
+        }
+        let (factors, _) = self.fit(&trial.picks, super::pool::FitScope::All);
+        let rest_of_other = self.residual(&trial.picks, &factors);
+        // Squares of the residual, of the difference of both fits, and the product of both.
+        let (mut total, mut squares, mut product) = (0.0, 0.0, 0.0);
+        for ((rest, other), weight) in rest.iter().zip(&rest_of_other).zip(&self.weights) {
+            for (r, o) in rest.iter().zip(other) {
+                total += weight * r * r;
+                product += weight * r * (r - o);
+                squares += weight * (r - o).powi(2);
+            }
+        }
+        squares < SIGNAL_FAULT_LEAST_DIFFERENCE * total || product.abs() > SIGNAL_FAULT_MOST_PLACE * squares
     }
 
     /// Whether one of two effects at the same places is the general form of the other.

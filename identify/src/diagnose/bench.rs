@@ -177,20 +177,30 @@ impl<'a> EffectSelector<'a> {
         // Mean square of a series.
         let size = |values: &[f64]| dot(values, values) / values.len().max(1) as f64;
         let measured = self.pool.column(self.measured);
-        // The least relative error of the driven channels, as a square.
+        for (d, values) in rest.iter().enumerate() {
+            let noise = self.problem.noise[d].powi(2);
+            let rounding = measured.0[d].as_deref().map_or(0.0, size) * 1e-14;
+            let idle = self.idle_variance(d, &rest);
+            let variance = self.pool.mean_square(d, values).max(noise).max(rounding).max(idle);
+            self.weights[d] = if variance > 0.0 { 1.0 / variance } else { 1.0 };
+        }
+        self.base_set = self.conditioning_set(&[]);
+    }
+
+    /// Mean square below which the residual of an idle channel shows nothing: the size of its terms times the least
+    /// relative error of the driven channels. Zero for a driven channel. `rest` is the residual of all channels.
+    pub(crate) fn idle_variance(&self, channel: usize, rest: &[Vec<f64>]) -> f64 {
+        let Some(terms) = self.problem.idle_squares.get(channel).filter(|terms| **terms > 0.0) else {
+            return 0.0;
+        };
+        let size = |values: &[f64]| dot(values, values) / values.len().max(1) as f64;
+        let measured = self.pool.column(self.measured);
         let relative = (rest.iter().enumerate())
             .filter(|(d, _)| !self.problem.is_idle(*d))
             .filter_map(|(d, values)| Some(self.pool.mean_square(d, values) / size(measured.0[d].as_deref()?)))
             .filter(|relative| relative.is_finite())
             .fold(1.0, f64::min);
-        for (d, values) in rest.iter().enumerate() {
-            let noise = self.problem.noise[d].powi(2);
-            let rounding = measured.0[d].as_deref().map_or(0.0, size) * 1e-14;
-            let idle = self.problem.idle_squares.get(d).copied().unwrap_or(0.0) * relative;
-            let variance = self.pool.mean_square(d, values).max(noise).max(rounding).max(idle);
-            self.weights[d] = if variance > 0.0 { 1.0 / variance } else { 1.0 };
-        }
-        self.base_set = self.conditioning_set(&[]);
+        terms * relative
     }
 
     /// Number of independent equations to which the residual of a set is equivalent on some channels, at least 2.

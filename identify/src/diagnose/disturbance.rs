@@ -160,7 +160,8 @@ impl EffectSelector<'_> {
         let mut budgets = Vec::new();
         let mut coloured = Vec::new();
         let mut in_time = Vec::new();
-        for (d, rest) in rest.iter().enumerate() {
+        let all = rest;
+        for (d, rest) in all.iter().enumerate() {
             // Force of all members of the set that are disturbances.
             let mut disturbed = vec![0.0; rest.len()];
             // Factors of the effects follow those of the base.
@@ -195,6 +196,8 @@ impl EffectSelector<'_> {
             };
             match found {
                 Some(found) => in_time.push(found),
+                // An idle channel has no noise of its own.
+                None if left <= self.idle_variance(d, all) => {}
                 None => coloured.extend(self.coloured_noise(d, rest, again[d])),
             }
             budgets.push(budget);

@@ -146,6 +146,12 @@ pub struct IdentifiedEffect {
     pub support: EffectSupport,
     /// Effects that explain the data equally well.
     pub indistinguishable_from: Vec<LocatedEffect>,
+    /// Other places whose value the model uses here too; the effect is then the difference from that value. Empty if
+    /// the model has no such effect here. The caller, who knows the model, sets it.
+    pub shared_with: Vec<String>,
+    /// Whether it was measured in the positions instead of estimated from the forces; the errors of the steps are then
+    /// those without it. The caller sets it.
+    pub is_measured: bool,
 }
 
 /// A candidate with the result of the search.
@@ -317,7 +323,7 @@ fn diagnose_cleaned(
     for proposal in &laws {
         for d in &proposal.channels {
             again[*d] = again[*d].max(proposal.law.gain);
-            if !unexplained.contains(d) && bench.is_unexplained(*d, &rest[*d], again[*d]) {
+            if !unexplained.contains(d) && bench.is_unexplained(*d, &rest, again[*d]) {
                 unexplained.push(*d);
             }
         }
@@ -426,7 +432,7 @@ impl EffectSelector<'_> {
         let problem = self.problem;
         let again = repeatable_shares(&problem.layout, &problem.variables, &rest);
         let unexplained = (0..rest.len())
-            .filter(|d| self.is_unexplained(*d, &rest[*d], again[*d]))
+            .filter(|d| self.is_unexplained(*d, &rest, again[*d]))
             .collect();
         SetResidual {
             residual: rest,
@@ -503,10 +509,12 @@ impl EffectSelector<'_> {
     }
 
     /// Whether the residual of a channel is more than noise: a part of it is repeatable, and that share would be enough
-    /// to add an effect. `again` is the repeatable share.
-    fn is_unexplained(&self, channel: usize, rest: &[f64], again: f64) -> bool {
-        let noise = self.problem.noise[channel].powi(2);
-        self.pool.mean_square(channel, rest) > noise && again > LEAST_GAIN
+    /// to add an effect. `rest` is the residual of all channels, `again` the repeatable share of this one.
+    fn is_unexplained(&self, channel: usize, rest: &[Vec<f64>], again: f64) -> bool {
+        let noise = self.problem.noise[channel]
+            .powi(2)
+            .max(self.idle_variance(channel, rest));
+        self.pool.mean_square(channel, &rest[channel]) > noise && again > LEAST_GAIN
     }
 
     /// Share of the squared error of the unchanged model that each candidate explains alone, `[candidate]`, 0 to 1.

@@ -73,6 +73,8 @@ impl AssessedEffects {
                     probability: support.probability(),
                     support: *support,
                     indistinguishable_from: aliases.iter().map(|alias| alias.effect.clone()).collect(),
+                    shared_with: Vec::new(),
+                    is_measured: false,
                 }
             })
             .collect()

@@ -188,6 +188,15 @@ pub(super) const EFFECT_LEAST_UNEXPLAINED_RATIO: f64 = 1.0;
 /// likelihood, with the effective number of samples. By judgement.
 pub(super) const MIN_DISTINCTION: f64 = 9.0;
 
+/// Place of the forces on the line from the fit with a delay (0) to that with a low-pass (1), or the other way round,
+/// up to which the fit at 0 is shown (1). By judgement: a quarter of the way to the other one.
+pub(super) const SIGNAL_FAULT_MOST_PLACE: f64 = 0.25;
+
+/// Squares of the difference between the fits with a delay and with a low-pass, relative to those of the residual,
+/// from which on they can be distinguished (1). By judgement: smoothing of positions causes errors of a fifth of the
+/// noise. A true low-pass of 35 Hz on the spidermill, at some 0.02, was bent to a delay.
+pub(super) const SIGNAL_FAULT_LEAST_DIFFERENCE: f64 = 0.05;
+
 /// An alternative must explain at least this share of what the effect explains (1). By judgement.
 pub(super) const MIN_SUBSTITUTE_SHARE: f64 = 0.8;
 

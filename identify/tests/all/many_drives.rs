@@ -255,3 +255,59 @@ fn a_scale_near_minus_one_is_no_scale() {
         assert_eq!(found(&answer(&problem)), expected, "scale {scale}");
     }
 }
+
+/// A force signal after a mixture of a delay and a low-pass of the same time, in samples; `share` is that of the
+/// low-pass.
+fn shifted(force: &[f64], time: usize, share: f64) -> Vec<f64> {
+    let constant = time as f64;
+    let keeps = (-constant.recip()).exp();
+    let mut state = force[0];
+    let mut before = force[0];
+    (0..force.len())
+        .map(|i| {
+            // Exact for a force that is linear between its samples.
+            let slope = force[i] - before;
+            state = force[i] - slope * constant + (state - before + slope * constant) * keeps;
+            before = force[i];
+            (1.0 - share) * force[i.saturating_sub(time)] + share * state
+        })
+        .collect()
+}
+
+/// A delay or a low-pass is stated alone where the forces show it. A short one bends the force too little for that: either
+/// may be true, and they share the probability.
+#[test]
+fn a_short_delay_is_not_distinguished_from_a_low_pass() {
+    let zero = |motion: &DriveMotion| vec![0.0; motion.rate.len()];
+    for (time, share, kinds, is_clear) in [
+        (8, 0.0, &["time_delay"][..], true),
+        (8, 1.0, &["force_lag"][..], true),
+        (1, 0.0, &["time_delay", "force_lag"][..], false),
+    ] {
+        let mut problem = arm(40, 3, &zero);
+        let signal = problem.measured.0[1].clone().unwrap();
+        let mut changed: Vec<f64> = signal
+            .chunks(SAMPLES)
+            .flat_map(|run| shifted(run, time, share))
+            .collect();
+        let mut draw = Draw::new(41);
+        for x in &mut changed {
+            *x += NOISE * draw.normal();
+        }
+        problem.measured.0[1] = Some(changed);
+        problem.effects_only = false;
+        problem.candidates = reading_fault_candidates(&problem);
+        let diagnosis = answer(&problem);
+        let [effect] = &diagnosis.effects[..] else {
+            panic!("{share}: {:?}", found(&diagnosis));
+        };
+        assert!(kinds.contains(&effect.effect.kind.as_str()), "{share}: {effect:?}");
+        let others: Vec<&str> = effect
+            .indistinguishable_from
+            .iter()
+            .map(|other| other.kind.as_str())
+            .collect();
+        assert_eq!(others.is_empty(), is_clear, "{share}: {others:?}");
+        assert_eq!(effect.probability > 0.9, is_clear, "{share}: {}", effect.probability);
+    }
+}

@@ -3,7 +3,7 @@
 //! The table `effect` goes in; effects with their places, terms, constants and bodies come out. Parameters that they
 //! introduce are added to those of the file.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::build::bodies::check_unique;
 use crate::build::effect_places::{EffectTargets, common_load, find_place};
@@ -80,14 +80,14 @@ fn check_single<'a>(entries: impl Iterator<Item = &'a EffectEntry>, kinds: &Kind
 /// is a variant that is meant to override an effect without a name. Effects that couple two places are compared by
 /// both places; `couples` states whether the order of the places matters (`Some(false)`) or not (`Some(true)`).
 fn warn_of_twins<'a>(
-    entries: impl Iterator<Item = &'a EffectEntry>,
+    entries: impl Iterator<Item = &'a EffectEntry> + Clone,
     couples: &dyn Fn(&EffectEntry) -> Option<bool>,
     log: &mut DiagnosticLog,
 ) {
     // Each kind at each place, with the first effect that has it.
     let mut seen: BTreeMap<(&str, Vec<&str>), (&EffectEntry, &SpannedName)> = BTreeMap::new();
     // With own constants the columns differ, so that both effects can be meant.
-    for entry in entries.filter(|entry| entry.constants.is_none()) {
+    for entry in entries.clone().filter(|entry| entry.constants.is_none()) {
         let Some(kind) = &entry.kind else { continue };
         let mut all: Vec<&str> = (entry.at.iter().flat_map(|at| &at.entries))
             .map(|place| place.text.as_str())
@@ -107,8 +107,9 @@ fn warn_of_twins<'a>(
             };
             let known = *seen.entry((&kind.text, key)).or_insert((entry, place));
             let (first, first_place) = known;
-            // The places of one effect are checked elsewhere.
-            if std::ptr::eq(first, entry) {
+            // The places of one effect are checked elsewhere. Places that share a value with others may have a second
+            // effect that is their difference from it.
+            if std::ptr::eq(first, entry) || together.is_none() && shares_differ(first, entry, entries.clone()) {
                 continue;
             }
             // An unnamed effect of another file was probably meant to be overridden.
@@ -125,6 +126,49 @@ fn warn_of_twins<'a>(
             );
         }
     }
+}
+
+/// Whether the parameters of one of two effects act at all places of those of the other and at further ones: then their
+/// columns differ.
+fn shares_differ<'a>(
+    one: &'a EffectEntry,
+    other: &'a EffectEntry,
+    entries: impl Iterator<Item = &'a EffectEntry> + Clone,
+) -> bool {
+    let places = |entry: &'a EffectEntry| {
+        entry
+            .at
+            .iter()
+            .flat_map(|at| &at.entries)
+            .map(|place| place.text.as_str())
+    };
+    let name = |entry: &'a EffectEntry, key: &str| {
+        let mut said = entry.parameters.iter().flat_map(|table| &table.entries);
+        said.find(|(known, _)| known.name == key)
+            .and_then(|(_, said)| said.name.as_ref())
+    };
+    // An effect of the same kind shares the parameters that have the same names in the file.
+    let is_shared = |entry: &'a EffectEntry, other: &'a EffectEntry| {
+        let keys = entry
+            .parameters
+            .iter()
+            .flat_map(|table| &table.entries)
+            .map(|(key, _)| &key.name);
+        let is_kind = entry.kind.as_ref().map(|kind| &kind.text) == other.kind.as_ref().map(|kind| &kind.text);
+        let mut keys = keys.peekable();
+        is_kind
+            && keys.peek().is_some()
+            && keys.all(|key| match (name(entry, key), name(other, key)) {
+                (Some(one), Some(other)) => one.text == other.text,
+                _ => false,
+            })
+    };
+    let reach = |entry: &'a EffectEntry| -> BTreeSet<&str> {
+        let sharing = entries.clone().filter(|other| is_shared(entry, other));
+        places(entry).chain(sharing.flat_map(places)).collect()
+    };
+    let [one, other] = [one, other].map(reach);
+    one != other && (one.is_subset(&other) || one.is_superset(&other))
 }
 
 /// Kinds by name, each with whether it has no faults.

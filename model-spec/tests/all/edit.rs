@@ -367,3 +367,31 @@ proptest! {
         prop_assert_eq!(found.to_bits(), nominal.unwrap_or(0.0).to_bits());
     }
 }
+
+/// Where places share a value, an effect at some of them is the difference of their values; it is no twin.
+#[test]
+fn a_place_that_shares_a_value_may_get_its_difference() {
+    let shared = "schema = 1\nname = \"mine\"\nextends = \"puma560.toml\"\n\n[[effect]]\nkind = \"viscous_friction\"\n\
+                  at = [\"joint1\", \"joint2\", \"joint3\"]\n";
+    let (text, loaded) = add(shared, &effect("viscous_friction", &["joint2"])).unwrap();
+    assert_eq!(loaded.mechanism.effects.len(), 2);
+    assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
+    // A second difference at the same place, and one at all places, would have a column that the model has.
+    for places in [&["joint2"][..], &["joint1", "joint2", "joint3"][..]] {
+        let says = add(&text, &effect("viscous_friction", places)).unwrap_err();
+        assert!(says.contains("acts at `joint"), "{says}");
+    }
+    // Separate effects that name one parameter share it as well.
+    let alike = |place: &str| {
+        format!(
+            "\n[[effect]]\nkind = \"viscous_friction\"\nat = \"{place}\"\nparameters = {{ Fv = {{ name = \"Fv\" }} }}\n"
+        )
+    };
+    let shared = format!(
+        "schema = 1\nname = \"mine\"\nextends = \"puma560.toml\"\n{}{}",
+        alike("joint1"),
+        alike("joint2")
+    );
+    let (_, loaded) = add(&shared, &effect("viscous_friction", &["joint2"])).unwrap();
+    assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
+}

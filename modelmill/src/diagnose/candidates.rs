@@ -108,8 +108,12 @@ pub(crate) fn candidates(model: &Model) -> Outcome<DerivedCandidates> {
         let fitting: Vec<&CandidatePlace> = all
             .iter()
             .filter(|spot| is_applicable(mechanism, kind, spot))
-            // Effects that the model has already are no candidates; pairs are checked below.
-            .filter(|spot| kind.places == Some(2) || !has_effect(mechanism, kind, &[*spot]))
+            // Effects that the model has already are no candidates, unless their values are shared with other places;
+            // pairs are checked below.
+            .filter(|spot| {
+                let is_shared = || mechanism.sharing_places(&kind.name, &[spot.place]).is_some();
+                kind.places == Some(2) || !has_effect(mechanism, kind, &[*spot]) || is_shared()
+            })
             .collect();
         // Tilt and delay change all columns of the model, so they are derived separately.
         if let Some(mechanics @ (Mechanics::Tilt | Mechanics::Delay)) = kind.mechanics {

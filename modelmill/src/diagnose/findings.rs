@@ -145,6 +145,9 @@ pub struct MissingEffect {
     pub support: EffectSupport,
     /// Its alternatives: effects that explain the recordings equally well.
     pub indistinguishable_from: Vec<LocatedEffect>,
+    /// Other places whose value the model uses here too: the estimates are the difference from that value. Empty if the
+    /// model has no such effect here.
+    pub shared_with: Vec<String>,
     /// Experiment that distinguishes the effect from its alternatives, as described in the effect library. `None` if
     /// there are no alternatives, or the library describes no experiment.
     pub separating_experiment: Option<String>,
@@ -485,6 +488,7 @@ fn described_effects(findings: &DiagnosisFindings, effects: &[IdentifiedEffect])
             probability: found.probability,
             support: found.support,
             indistinguishable_from: found.indistinguishable_from.clone(),
+            shared_with: found.shared_with.clone(),
             separating_experiment: separating_experiment(findings, found),
             separation: separation(findings, found),
         })

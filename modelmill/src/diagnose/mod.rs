@@ -45,6 +45,7 @@ mod geometry_alternatives;
 mod held_friction;
 mod laws;
 mod long_recordings;
+mod measured_play;
 mod memory;
 mod model_versions;
 mod named_zeros;

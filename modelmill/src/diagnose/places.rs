@@ -1,5 +1,6 @@
 //! Places at which effects of a kind may act, alone, in pairs, and alike at several.
 
+use modelmill_identify::diagnose::LocatedEffect;
 use modelmill_spec::{
     ActsOn, DriveIdx, DriveKind, EffectKind, EffectPlace, Mechanics, Mechanism, PartIdx, PlaceLoad, PointIdx,
 };
@@ -60,6 +61,19 @@ pub(crate) fn candidate_places(mechanism: &Mechanism) -> Vec<CandidatePlace> {
     spots.push(spot("base", PlaceLoad::Elsewhere, ActsOn::Base, EffectPlace::Base));
     spots.push(spot("force", PlaceLoad::Elsewhere, ActsOn::Force, EffectPlace::Force));
     spots
+}
+
+/// Names of the other places whose parameters the model uses for an effect at its places too; empty if it has none
+/// there.
+pub(crate) fn sharing_places(mechanism: &Mechanism, effect: &LocatedEffect) -> Vec<String> {
+    let spots = candidate_places(mechanism);
+    let its = spots.iter().filter(|spot| effect.at.contains(&spot.name));
+    let its: Vec<EffectPlace> = its.map(|spot| spot.place).collect();
+    let sharing = mechanism.sharing_places(&effect.kind, &its).unwrap_or_default();
+    sharing
+        .into_iter()
+        .map(|place| mechanism.place_name(place).to_owned())
+        .collect()
 }
 
 /// Whether a coordinate belongs to a free body, which has no joint that could rub.

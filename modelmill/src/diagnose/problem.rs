@@ -28,10 +28,12 @@ use super::faults::subtract_known;
 use super::gears::gears;
 use super::held_friction;
 use super::laws::sites;
+use super::measured_play;
 use super::memory::dahl_candidates;
 use super::named_zeros::NamedZeros;
 use super::numbers::{layout, stack, variables};
 use super::payloads::{frame_loads, load_changes, payloads, reach};
+use super::places::sharing_places;
 use super::thresholds::FEWEST_SAMPLES;
 use super::words;
 use crate::regressors::{SegmentList, regressor};
@@ -181,7 +183,13 @@ pub(crate) fn find_missing_effects(
         &diagnosis.time_residuals,
         &problem.layout.channels,
     );
-    // Stage 5: texts, and candidates that could not be evaluated.
+    measured_play::report_as_effects(model, &problem.candidates, &mut diagnosis);
+    // Stage 5: texts, values that the model shares, and candidates that could not be evaluated.
+    let mechanism = &model.derivation.mechanism;
+    let found = diagnosis.effects.iter_mut().chain(&mut diagnosis.possible_effects);
+    for one in found {
+        one.shared_with = sharing_places(mechanism, &one.effect);
+    }
     for one in &mut diagnosis.disturbances {
         describe_disturbance(one, model);
     }

@@ -64,13 +64,30 @@ pub fn effects(effects: &[LocatedEffect]) -> String {
     joined_by_and(&effects.iter().map(effect).collect::<Vec<_>>())
 }
 
-/// Effects that were found, as a list for a sentence. One that is less likely than not is named with its alternatives.
+/// What an effect means at places whose value the model shares with others.
+pub fn shared_value(effect: &LocatedEffect, sharing: &[String]) -> String {
+    let at = joined_by_and(&effect.at);
+    let all: Vec<String> = effect.at.iter().chain(sharing).cloned().collect();
+    format!(
+        "The model uses one value for {}. {at} differs from it by the figure above and needs a value of its own.",
+        joined_by_and(&all)
+    )
+}
+
+/// Effects that were found, as a list for a sentence. One that is less likely than not is named with its alternatives,
+/// and one that the model has with a shared value as a separate one.
 fn found_effects(found: &[IdentifiedEffect], channels: &[String]) -> String {
+    let (sharing, found): (Vec<&IdentifiedEffect>, Vec<&IdentifiedEffect>) =
+        found.iter().partition(|one| !one.shared_with.is_empty());
     let is_ambiguous =
         |one: &&IdentifiedEffect| one.probability < LACKING_LEAST_PROBABILITY && !one.indistinguishable_from.is_empty();
-    let (ambiguous, clear): (Vec<&IdentifiedEffect>, Vec<&IdentifiedEffect>) = found.iter().partition(is_ambiguous);
-    let clear: Vec<LocatedEffect> = clear.iter().map(|one| one.effect.clone()).collect();
-    let mut names = grouped_effects(&clear, channels);
+    let (ambiguous, clear): (Vec<&IdentifiedEffect>, Vec<&IdentifiedEffect>) =
+        found.into_iter().partition(is_ambiguous);
+    let located =
+        |some: &[&IdentifiedEffect]| -> Vec<LocatedEffect> { some.iter().map(|one| one.effect.clone()).collect() };
+    let mut names = grouped_effects(&located(&clear), channels);
+    let separate = grouped_effects(&located(&sharing), channels);
+    names.extend(separate.iter().map(|name| format!("separate values of {name}")));
     names.extend(ambiguous.iter().map(|one| {
         let all: Vec<String> = [&one.effect]
             .into_iter()
@@ -242,6 +259,13 @@ pub fn verdict(diagnosis: &ModelDiagnosis, channels: &[String], judged: Validati
             explained_text("The model explains the recordings", diagnosis, last.check, judged)
         ),
         DiagnosisVerdict::Adequate => explained_text("The model is adequate", diagnosis, last.check, judged),
+        DiagnosisVerdict::MissingEffect if found.iter().all(|one| one.is_measured) => format!(
+            "The model lacks {}, which the positions show. The forces hardly depend on it: the error {} is {} of the \
+             force. {noise}",
+            found_effects(found, channels),
+            judged.phrase(),
+            percent(Some(last.check))
+        ),
         DiagnosisVerdict::MissingEffect => lacking_text(found, channels, &falls, &noise),
         DiagnosisVerdict::Unexplained => unexplained_verdict(diagnosis, channels, judged, found, &falls),
     };

@@ -28,7 +28,8 @@ impl DiagnosisFindings {
     ///   all other findings hold for the corrected recordings
     /// - `unresolved`: faults of the recordings that could not be corrected; nothing else is stated then
     /// - `steps`: errors after each added effect, on fitted (`fit`) and validation data (`check`)
-    /// - `effects`: missing effects with estimates, probability, what supports them, and alternatives
+    /// - `effects`: missing effects with estimates, probability, what supports them, alternatives, and the places whose
+    ///   value the model uses there too (`shared_with`): the estimates are then the difference from that value
     /// - `geometry_alternatives`: errors of the geometry that explain as much as the effects found (`share`, 1 for as
     ///   much): each a constant, or a coordinate of a point that the file writes as zero
     /// - `possible`: the same for effects with a probability below 0.5, which the model is not said to lack
@@ -58,6 +59,7 @@ impl DiagnosisFindings {
                     "probability": missing.probability,
                     "support": missing.support,
                     "indistinguishable_from": missing.indistinguishable_from,
+                    "shared_with": missing.shared_with,
                     "separate_by": missing.separating_experiment,
                     "separate_command": separation.and_then(|proposal| spelling.spell_separation(model, proposal)),
                 })
@@ -346,6 +348,11 @@ impl DiagnosisFindings {
             let meaning = kind.map_or_else(|| words::meaning(&found.effect.kind), |kind| Some(kind.says.as_str()));
             if let Some(meaning) = meaning.filter(|_| is_first) {
                 lines.push(style.dim(&format!("    {meaning}")));
+            }
+            if !found.shared_with.is_empty() {
+                let says = words::shared_value(&found.effect, &found.shared_with);
+                let wrapped = words::lines(&says, 96);
+                lines.extend(wrapped.iter().map(|line| format!("    {line}")));
             }
             // Alternatives follow with the motion that would distinguish them.
             if !found.indistinguishable_from.is_empty() {

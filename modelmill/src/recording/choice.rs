@@ -16,6 +16,7 @@
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{Message, OptionName, Remedy};
+use modelmill_identify::diagnose::white_noise;
 use modelmill_identify::{
     DECIMATION_PASSBAND, LowPass, PreparationChoices, PreparedRun, RecordingNote, SignalRecording as Raw,
 };
@@ -27,6 +28,7 @@ use super::held_out::{
     FOLDS, FoldSums, HeldOutResidual, OctavePower, ROUNDING, TimeWindow, WindowSamples, fit_folds, margin,
 };
 use super::options::RecordingOptions;
+use super::raised_cutoff::{ComparedBand, RaisedWindow, is_harmless};
 use super::smoother::{SmootherCandidate, floor_to_count, series_up_to};
 use super::stick::StickPhases;
 use super::thresholds::{
@@ -386,12 +388,60 @@ impl<'a> SmootherSearch<'a> {
                 break;
             }
             let left = judged(suited)?;
-            if left.relative <= (1.0 + SUITED_MOST_GROWTH) * plain.relative {
+            let is_small = left.relative <= (1.0 + SUITED_MOST_GROWTH) * plain.relative;
+            if is_small && self.is_harmless([smoother, suited], passed, looked_at).unwrap_or(true) {
                 let left = self.held_out_residual(suited, passed, self.open.band_hz, looked_at)?;
                 return Some((suited, left));
             }
         }
         None
+    }
+
+    /// Whether a smoother with a higher cut-off lets in motion, or little noise, within a passband, Hz; `None` if there
+    /// are too few samples.
+    fn is_harmless(
+        &self,
+        [lower, higher]: [SmootherCandidate; 2],
+        passed: f64,
+        groups: &[Vec<TimeWindow>],
+    ) -> Option<bool> {
+        let runs = [self.runs(lower)?, self.runs(higher)?];
+        let every = self.evaluation_step();
+        let band = ComparedBand {
+            passed,
+            rate: self.open.rate_hz / every as f64,
+        };
+        for windows in groups {
+            let rows = windows.iter().map(|window| {
+                let [lower, higher] = [&runs[0], &runs[1]].map(|runs| {
+                    let run = self.run_of_window(runs, window)?;
+                    self.samples(run, window, every)
+                });
+                Some(RaisedWindow {
+                    lower: lower?,
+                    higher: higher?,
+                })
+            });
+            let rows: Vec<RaisedWindow> = rows.collect::<Option<_>>()?;
+            let run = self.run_of_window(&runs[0], windows.first()?)?;
+            let noise: Vec<f64> = run.force.as_ref()?.iter().map(|force| white_noise(force)).collect();
+            if !is_harmless(&rows, band, &noise, self.open.rate_hz)? {
+                return Some(false);
+            }
+        }
+        Some(true)
+    }
+
+    /// The run that contains a window; its times have one sample of tolerance.
+    fn run_of_window<'r>(&self, runs: &'r [Vec<PreparedRun>], window: &TimeWindow) -> Option<&'r PreparedRun> {
+        let slack = 1.0 / self.open.rate_hz;
+        (runs[window.recording].iter())
+            .find(|run| run.time[0] <= window.from + slack && run.time[run.time.len() - 1] >= window.to - slack)
+    }
+
+    /// Number of samples per sample at which the model is evaluated.
+    fn evaluation_step(&self) -> usize {
+        floor_to_count(self.open.rate_hz / self.evaluation_rate()).max(1)
     }
 
     /// The runs of each recording prepared with a smoother; `None` if that fails.
@@ -500,18 +550,12 @@ impl<'a> SmootherSearch<'a> {
         band: f64,
         windows: &[TimeWindow],
     ) -> Option<HeldOutResidual> {
-        let every = floor_to_count(self.open.rate_hz / self.evaluation_rate()).max(1);
+        let every = self.evaluation_step();
         let rate = self.open.rate_hz / every as f64;
-        // Windows are found again in each run by their times, with one sample of tolerance.
-        let slack = 1.0 / self.open.rate_hz;
+        // Windows are found again in each run by their times.
         let samples = windows
             .iter()
-            .map(|window| {
-                let run = runs[window.recording].iter().find(|run| {
-                    run.time[0] <= window.from + slack && run.time[run.time.len() - 1] >= window.to - slack
-                })?;
-                self.samples(run, window, every)
-            })
+            .map(|window| self.samples(self.run_of_window(runs, window)?, window, every))
             .collect::<Option<Vec<WindowSamples>>>()?;
         let total: usize = samples.iter().map(|one| one.forces.nrows()).sum();
         // Stage 1: sums of each fold, and the parts of windows that belong to it.

@@ -17,6 +17,7 @@ mod leverage;
 mod options;
 mod prepared;
 mod proposal;
+mod raised_cutoff;
 mod read;
 mod sensor_faults;
 mod smoother;

@@ -31,6 +31,7 @@ pub(super) fn late_rates_fault(recording: &Raw) -> Option<Disturbance> {
 /// A fault of the positions as a disturbance for the diagnosis.
 pub(super) fn position_fault(model: &Model, file: &str, fault: &PositionFault) -> Disturbance {
     // Both faults have one number with a unit.
+    let mut standard_deviation = None;
     let (kind, at, name, value, unit, says) = match fault {
         PositionFault::Jitter { time } => (
             "time_jitter",
@@ -44,7 +45,12 @@ pub(super) fn position_fault(model: &Model, file: &str, fault: &PositionFault) -
                 significant(1e3 * time, 2)
             ),
         ),
-        PositionFault::Backlash { coordinate, width } => {
+        PositionFault::Backlash {
+            coordinate,
+            width,
+            deviation,
+        } => {
+            standard_deviation = Some(*deviation);
             let is_angle = |(name, is): &(String, bool)| name == coordinate && *is;
             let unit = if model.active_coordinate_types().iter().any(is_angle) {
                 "rad"
@@ -67,7 +73,10 @@ pub(super) fn position_fault(model: &Model, file: &str, fault: &PositionFault) -
     Disturbance {
         kind: kind.to_owned(),
         at: vec![at.to_owned()],
-        estimates: vec![EstimatedQuantity::new(name, value, unit)],
+        estimates: vec![EstimatedQuantity {
+            standard_deviation,
+            ..EstimatedQuantity::new(name, value, unit)
+        }],
         recordings: vec![file.to_owned()],
         interval: None,
         description: Some(says),

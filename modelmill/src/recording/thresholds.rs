@@ -96,5 +96,16 @@ pub(super) const SUITED_CUTOFF_PASSBANDS: [f64; 3] = [3.0, 2.0, 1.5];
 /// pendulum with coarse encoders it grows by 65 % and the inertia falls to a sixth.
 pub(super) const SUITED_MOST_GROWTH: f64 = 0.02;
 
+/// Largest mean square of what such a cut-off changes in the model's forces, unless it is motion, relative to the white
+/// noise of the measured forces in the same band (1): noise of the positions then stays below that of the forces. By
+/// judgement.
+pub(super) const RAISED_MOST_NOISE_RATIO: f64 = 1.0;
+
+/// The change is motion if the residual falls by this share of it (1); by noise it does not fall at all. By judgement.
+pub(super) const RAISED_LEAST_MOTION_SHARE: f64 = 0.5;
+
+/// Standard deviations by which it must exceed this share. By judgement.
+pub(super) const RAISED_MOTION_SIGMAS: f64 = 2.0;
+
 /// Sampling rates that differ by less than this share count as equal (1). By judgement.
 pub(super) const SAME_RATE_TOLERANCE: f64 = 0.02;

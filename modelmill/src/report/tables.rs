@@ -221,6 +221,10 @@ fn effect(found: &MissingEffect, label: &str) -> String {
     if !all.is_empty() || !label.is_empty() {
         let _ = writeln!(html, "<p>{}{}</p>", escape(label), all.join(", "));
     }
+    if !found.shared_with.is_empty() {
+        let says = words::shared_value(&found.effect, &found.shared_with);
+        let _ = writeln!(html, "<p>{}</p>", escape(&says));
+    }
     // Alternatives belong to the effect, since either may be true.
     if !found.indistinguishable_from.is_empty() {
         let others = found.indistinguishable_from.iter().map(words::effect);

@@ -230,6 +230,36 @@ fn friction_of_another_day_is_no_further_friction() {
     }
 }
 
+/// Joints whose friction the model describes by one value, while one of them has more: the value of that joint is
+/// missing, and no other law of friction.
+#[test]
+fn a_value_that_joints_share_is_separated_where_one_differs() {
+    let text = std::fs::read_to_string(bundled(ARM)).expect("a model");
+    let drives = Model::open(bundled(ARM)).expect("the model").drives();
+    let kind = |kind: &str, places: &[String]| format!("\n[[effect]]\nkind = \"{kind}\"\nat = {places:?}\n");
+    let text = format!(
+        "{text}{}{}",
+        kind("viscous_friction", &drives[..3]),
+        kind("coulomb_friction", &drives[1..2])
+    );
+    let model = Model::from_text("shared friction", &text).expect("the model");
+    let file = run(ARM, 770, Made::Friction(1, 5.0, 7.0));
+    let recording = model.recording(&file, &RecordingOptions::default());
+    let recording = recording.expect("the recording");
+    let findings = (model.diagnose(&[&recording], &[], &DiagnosisOptions::default())).expect("an answer");
+    let found = only(&findings, "viscous_friction", &drives[1]);
+    near(found, "Fv", 7.0, 0.1);
+    let mut sharing = found.shared_with.clone();
+    sharing.sort_unstable();
+    assert_eq!(sharing, [drives[0].clone(), drives[2].clone()]);
+    assert_eq!(findings.diagnosis.verdict, DiagnosisVerdict::MissingEffect);
+    // The completed model has both values, and explains the recording.
+    let completed = findings.after.as_ref().expect("the completed model");
+    assert_eq!(completed.model.base.len(), model.base.len() + 1);
+    let says = findings.verdict_text();
+    assert!(says.contains("separate values of viscous friction"), "{says}");
+}
+
 /// No polynomial is like a pull that gives way: it is one effect all the same, with one place.
 #[test]
 fn a_hose_that_gives_way_is_one_effect() {

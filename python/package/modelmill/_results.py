@@ -266,6 +266,9 @@ class Effect:
         Probability that the effect exists.
     indistinguishable_from : list of dict
         Effects that explain the data equally well: ``kind`` and ``at``.
+    shared_with : list of str
+        Other places whose value the model uses here too; the estimates are the difference from that value. Empty if the
+        model has no such effect here.
     """
 
     kind: str
@@ -273,6 +276,14 @@ class Effect:
     estimates: list[dict[str, Any]]
     probability: float | None
     indistinguishable_from: list[dict[str, Any]]
+    shared_with: list[str]
+
+
+def _effect(found: dict[str, Any]) -> Effect:
+    """An effect from its entry in the JSON."""
+    others = found.get("indistinguishable_from", [])
+    sharing = found.get("shared_with", [])
+    return Effect(found["kind"], found["at"], found["estimates"], found.get("probability"), others, sharing)
 
 
 class Diagnosis(Result):
@@ -304,7 +315,7 @@ class Diagnosis(Result):
     def effects(self) -> list[Effect]:
         """The effects that the model lacks."""
         return [
-            Effect(one["kind"], one["at"], one["estimates"], one.get("probability"), one.get("indistinguishable_from", []))
+            _effect(one)
             for one in self._object["effects"]
         ]
 
@@ -312,7 +323,7 @@ class Diagnosis(Result):
     def possible(self) -> list[Effect]:
         """Effects with a probability below 0.5; the model is not said to lack them."""
         return [
-            Effect(one["kind"], one["at"], one["estimates"], one.get("probability"), one.get("indistinguishable_from", []))
+            _effect(one)
             for one in self._object.get("possible", [])
         ]
 
