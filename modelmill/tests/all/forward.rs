@@ -185,7 +185,9 @@ fn a_mass_stops_and_breaks_away_as_by_hand() {
     for i in 0..samples {
         let i = usize::try_from(i).expect("a count");
         let (a, b) = (made.q[0][i], moved[0][0][i]);
-        assert!((a - b).abs() < 2e-5, "sample {i}: {a} instead of {b}");
+        // A place breaks away at the start of a step, up to 1 ms late.
+        let most = if i <= 1000 { 2e-5 } else { 1e-4 };
+        assert!((a - b).abs() < most, "sample {i}: {a} instead of {b}");
         // Stuck means at standstill, without creeping.
         if (470..1000).contains(&i) {
             assert!(made.qd[0][i].abs() < 1e-12, "sample {i}: {}", made.qd[0][i]);
@@ -198,6 +200,15 @@ fn a_mass_stops_and_breaks_away_as_by_hand() {
 #[test]
 fn friction_of_linear_drives_holds_a_closed_loop() {
     let model = Model::open("../recordings/spidermill-days/spidermill-friction.toml").expect("a model");
+    // The file gives no friction.
+    let mut values = model.nominal.clone();
+    for (value, base) in values.iter_mut().zip(&model.base) {
+        match base.expression.as_str() {
+            "Fc_spindle_left" => *value = 20.0,
+            "Fc_spindle_right" => *value = 32.0,
+            _ => {}
+        }
+    }
     let samples = 120;
     let moved = motion(&model, samples, 1);
     let still = |order: usize| -> Vec<Vec<f64>> {
@@ -217,7 +228,7 @@ fn friction_of_linear_drives_holds_a_closed_loop() {
         let forces = columns(&held, 2).into_iter();
         let forces: Vec<Vec<f64>> = forces.map(|force| force.iter().map(|f| f + offset).collect()).collect();
         let run = recording(&model, &slow, &forces);
-        let made = model.simulate_motion(&run, &model.nominal).expect("a simulation");
+        let made = model.simulate_motion(&run, &values).expect("a simulation");
         let moved_by = (0..2)
             .map(|k| (made.q[k][samples - 1] - made.q[k][0]).abs())
             .fold(0.0, f64::max);
