@@ -178,7 +178,7 @@ fn divergence_horizon(plants: &[MotionPlant<'_>], segments: &[&RecordingSegment]
     for (plant, segment) in plants.iter().zip(segments) {
         let n = segment.run.q.len();
         // Neighbours are disturbed in the same direction, then in opposite ones.
-        let alternating = |k: usize| if k % 2 == 0 { DISTURBANCE } else { -DISTURBANCE };
+        let alternating = |k: usize| if k.is_multiple_of(2) { DISTURBANCE } else { -DISTURBANCE };
         let offsets = [vec![0.0; n], vec![DISTURBANCE; n], (0..n).map(alternating).collect()];
         let cursors = offsets.iter().map(|offset| SimulationCursor::new(segment, 0, offset));
         let mut cursors = cursors.collect::<Outcome<Vec<_>>>()?;
