@@ -1,8 +1,8 @@
 //! Simulated positions compared with recorded ones over horizons: recordings go in, rms errors for each horizon and
 //! coordinate come out, with the horizon up to which they say something about the model.
 //!
-//! Decision: the growth of a small disturbance of the first state bounds the horizons. Beyond this bound, errors come from the
-//! encoder and the first state, whatever the model.
+//! Decision: the growth of a small disturbance of the first state bounds the horizons. Beyond this bound, errors come
+//! from the encoder and the first state, whatever the model.
 
 use rayon::prelude::*;
 
@@ -24,8 +24,9 @@ pub struct ForwardComparison {
     pub is_angle: Vec<bool>,
     /// The errors, the shortest horizon first; the last one is the longest whole run.
     pub horizons: Vec<HorizonError>,
-    /// The longest time over which a disturbance of the first state grows by less than a factor of 100, s: over longer
-    /// horizons, errors say nothing about the model. `None` if it does not grow that much within the recordings.
+    /// The longest time over which a disturbance of the first state grows by less than a factor of 100, s: over
+    /// longer horizons, errors say nothing about the model. `None` if it does not grow that much within the
+    /// recordings.
     pub longest_horizon: Option<f64>,
 }
 
@@ -40,8 +41,8 @@ pub struct HorizonError {
     pub windows: usize,
     /// Simulations that ended early, since the motion left the reach of the mechanism.
     pub ended_early: usize,
-    /// Rms error of each coordinate over all samples of all simulations, rad or m; `None` if none was finished, or the horizon
-    /// is not judged.
+    /// Rms error of each coordinate over all samples of all simulations, rad or m; `None` if none was finished, or
+    /// the horizon is not judged.
     pub rms: Option<Vec<f64>>,
     /// Largest error of each coordinate, rad or m; `None` as for `rms`.
     pub largest: Option<Vec<f64>>,

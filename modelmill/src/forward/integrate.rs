@@ -1,9 +1,9 @@
-//! Integration of the equation of motion over one sampling interval: classical Runge-Kutta steps of the fourth order, with
-//! reversals located and drives that stick.
+//! Integration of the equation of motion over one sampling interval: classical Runge-Kutta steps of the fourth order,
+//! with reversals located and drives that stick.
 //!
-//! Decision: the integrator is written here. Kept crates (`diffsol`, `ode_solvers`, `differential-equations`) integrate smooth
-//! equations with events; dry friction needs a set of sticking places that changes at events, which none of them has. The rest
-//! is one page.
+//! Decision: the integrator is written here. Kept crates (`diffsol`, `ode_solvers`, `differential-equations`)
+//! integrate smooth equations with events; dry friction needs a set of sticking places that changes at events, which
+//! none of them has. The rest is one page.
 
 use modelmill_codegen::PoseFault;
 
@@ -29,7 +29,7 @@ pub(super) struct ForceInterval<'a> {
 
 impl ForceInterval<'_> {
     /// Forces at a part of the interval, 0 to 1.
-    fn at(&self, part: f64) -> Vec<f64> {
+    fn forces_at(&self, part: f64) -> Vec<f64> {
         let pairs = self.start.iter().zip(self.end);
         pairs.map(|(a, b)| a + part * (b - a)).collect()
     }
@@ -86,12 +86,12 @@ fn advance_step(
         return Ok(());
     }
     for event in 0..=MOST_EVENTS {
-        release(plant, state, &forces.at(start))?;
+        release(plant, state, &forces.forces_at(start))?;
         let next = runge_kutta(plant, state, duration, [start, end], forces)?;
         let before = plant.place_rates(&state.q, &state.qd)?;
-        // Stages beyond a reversal turn the friction around, so that the end of the step may not show it. The slope at the start
-        // does.
-        let slope = plant.accelerations(&state.q, &state.qd, &forces.at(start), &state.stuck)?;
+        // Stages beyond a reversal turn the friction around, so that the end of the step may not show it. The slope
+        // at the start does.
+        let slope = plant.accelerations(&state.q, &state.qd, &forces.forces_at(start), &state.stuck)?;
         let h = duration * (end - start);
         let predicted: Vec<f64> = state.qd.iter().zip(&slope).map(|(v, a)| v + h * a).collect();
         let predicted = plant.place_rates(&state.q, &predicted)?;
@@ -107,7 +107,7 @@ fn advance_step(
             }
             let part = before[place] / (before[place] - after[place]);
             if first.is_none_or(|(other, _)| part < other)
-                && plant.has_dry_friction(&next.q, &next.qd, &forces.at(end), place)?
+                && plant.has_dry_friction(&next.q, &next.qd, &forces.forces_at(end), place)?
             {
                 first = Some((part, place));
             }
@@ -165,7 +165,7 @@ fn runge_kutta(
     let h = duration * (end - start);
     let sum =
         |a: &[f64], factor: f64, b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a + factor * b).collect() };
-    let slope = |q: &[f64], qd: &[f64], part: f64| plant.accelerations(q, qd, &forces.at(part), &state.stuck);
+    let slope = |q: &[f64], qd: &[f64], part: f64| plant.accelerations(q, qd, &forces.forces_at(part), &state.stuck);
     let middle = 0.5 * (start + end);
     let a1 = slope(&state.q, &state.qd, start)?;
     let v2 = sum(&state.qd, 0.5 * h, &a1);

@@ -1,7 +1,8 @@
-//! Forward simulation of a model: a recording goes in, the motion that the model makes under its recorded forces comes out.
+//! Forward simulation of a model: a recording goes in, the motion that the model makes under its recorded forces
+//! comes out.
 //!
-//! `plant` is the equation of motion with dry friction, `integrate` advances a state, `horizons` compares simulated with
-//! recorded positions.
+//! `plant` is the equation of motion with dry friction, `integrate` advances a state, `horizons` compares simulated
+//! with recorded positions.
 
 mod horizons;
 mod integrate;
@@ -68,11 +69,11 @@ impl SimulatedMotion {
 
 impl Model {
     /// Simulates the model under the forces of a recording, from its first state. `values` are those of the base
-    /// parameters. Forces are interpolated linearly between samples. Drives and coordinates with dry friction stick when
-    /// friction can keep them at standstill.
+    /// parameters. Forces are interpolated linearly between samples. Drives and coordinates with dry friction stick
+    /// when friction can keep them at standstill.
     ///
-    /// Fails if the recording has gaps or no forces, if the model has free bodies, and when the simulated motion leaves
-    /// the reach of the mechanism.
+    /// Fails if the recording has gaps or no forces, if the model has free bodies, and when the simulated motion
+    /// leaves the reach of the mechanism.
     pub fn simulate_motion(&self, recording: &PreparedRecording, values: &[f64]) -> Outcome<SimulatedMotion> {
         let [segment] = recording.segments.as_slice() else {
             return Err(Error::input(format!(
@@ -145,8 +146,8 @@ struct SimulationCursor<'a> {
 }
 
 impl<'a> SimulationCursor<'a> {
-    /// A simulation that starts at the recorded state of a sample. `offset` is added to its positions; it is empty if there
-    /// is none.
+    /// A simulation that starts at the recorded state of a sample. `offset` is added to its positions; it is empty if
+    /// there is none.
     ///
     /// Fails when the recording has no forces.
     fn new(segment: &'a RecordingSegment, sample: usize, offset: &[f64]) -> Outcome<Self> {

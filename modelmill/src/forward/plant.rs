@@ -1,12 +1,12 @@
-//! The equation of motion at one state, with drives that stick. State, forces of the drives and sticking places go in,
-//! accelerations come out.
+//! The equation of motion at one state, with drives that stick. State, forces of the drives and sticking places go
+//! in, accelerations come out.
 //!
 //! With the independent coordinates z: `M z'' + b(z, z') = J' f`, where b has dry friction. At a sticking place, dry
-//! friction may take any value between those of the two directions. It takes the value that keeps the place at standstill
-//! (F. Pfeiffer and C. Glocker 1996, "Multibody Dynamics with Unilateral Contacts", chapter 5).
+//! friction may take any value between those of the two directions. It takes the value that keeps the place at
+//! standstill (F. Pfeiffer and C. Glocker 1996, "Multibody Dynamics with Unilateral Contacts", chapter 5).
 //!
-//! Decision: dry friction is not read from the effects. It is the jump of b between two small rates of opposite sign, so that
-//! every kind of friction is included, also those of a user's library.
+//! Decision: dry friction is not read from the effects. It is the jump of b between two small rates of opposite sign,
+//! so that every kind of friction is included, also those of a user's library.
 
 use modelmill_codegen::{DynamicsPrograms, ModelEvaluator, MotionStates, PoseFault};
 use modelmill_spec::{DriveKind, EffectPlace};
@@ -202,7 +202,8 @@ impl<'a> MotionPlant<'a> {
         stuck: &[usize],
     ) -> Result<StickEquation, PoseFault> {
         let rows = self.rows(q, stuck)?;
-        // The first state has all places at the positive side; in each further one, one place is at the negative side.
+        // The first state has all places at the positive side; in each further one, one place is at the negative
+        // side.
         let mut offsets = DMatrix::from_element(stuck.len(), stuck.len() + 1, self.direction_rate);
         for i in 0..stuck.len() {
             offsets[(i, i + 1)] = -self.direction_rate;
