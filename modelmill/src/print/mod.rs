@@ -9,6 +9,7 @@ pub mod effects;
 mod estimation;
 mod excitation;
 mod findings;
+mod forward;
 mod identification;
 mod interpretation;
 pub(crate) mod laws;
