@@ -59,8 +59,9 @@
 //! | [`Model::evaluate`] | forces along a recording |
 //! | [`Model::functions`] | forces, regressor, mass matrix and other functions at given states |
 //! | [`Model::identify`] | base parameters from recordings by least squares, eq. (12) |
-//! | [`Model::identify_servo`] | base parameters and gains from commands or currents, without forces |
+//! | [`ServoModel::identify`] | base parameters and gains from commands or currents, without forces |
 //! | [`Model::compare`] | error metrics (such as the NRMS), and the ranges of coordinates, rates, loads and time in which errors are large |
+//! | [`Model::simulate_motion`], [`Model::compare_forward`] | the motion under recorded forces, and its position errors over horizons |
 //! | [`Model::diagnose`] | the physical effects that are missing |
 //! | [`Model::verify`] | a test of the model: checks of drives, parameters and effects with the states pass, fail, not evaluated |
 //! | [`Model::runs`] | changes between recordings of one machine |
@@ -180,8 +181,8 @@
 //! The modules are listed in the order of the data flow. Each module uses only modules before it.
 //!
 //! [`text`], [`error`], [`progress`], [`host`], [`model`], [`picture`], [`atlas`], [`segment`], [`along`], [`audit`],
-//! [`recording`], [`compare`], [`evaluate`], [`states`], [`identify`], [`servo`], [`runs`], [`diagnose`], [`verify`],
-//! [`add`], [`adopt`],
+//! [`recording`], [`compare`], [`evaluate`], [`states`], [`forward`], [`identify`], [`servo`], [`runs`], [`diagnose`],
+//! [`verify`], [`add`], [`adopt`],
 //! [`interpret`], [`excite`], [`variants`], [`generate`], [`simulate`], [`reduce`], [`mod@import`], [`mod@export`],
 //! [`mod@print`], [`report`].
 
@@ -198,6 +199,7 @@ pub mod excite;
 #[cfg(feature = "import")]
 pub mod export;
 pub mod faults;
+pub mod forward;
 pub mod generate;
 pub mod host;
 pub mod identify;

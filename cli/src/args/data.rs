@@ -167,6 +167,9 @@ pub(crate) struct CompareArgs {
     /// Values of the base parameters: `nominal`, or a file that `identify` wrote
     #[arg(long, value_name = "nominal|FIT.json", default_value = "nominal", value_parser = ParameterSource::parse)]
     pub(crate) parameters: ParameterSource,
+    /// Also simulate the model under the recorded forces, and compare positions over horizons of 0.1 s, 1 s and the whole run
+    #[arg(long)]
+    pub(crate) forward: bool,
     /// Print one JSON object on standard output
     #[arg(long)]
     pub(crate) json: bool,

@@ -163,7 +163,9 @@ pub(crate) enum ProgramCommand {
         modelmill compare model-spec/models/spidermill.toml \\\n      \
         --data recordings/spidermill-mbs/with-rods-check.csv\n  \
         modelmill compare model-spec/models/spidermill.toml \\\n      \
-        --data recordings/spidermill-mbs/with-rods-check.csv --parameters fit.json --json")]
+        --data recordings/spidermill-mbs/with-rods-check.csv --parameters fit.json --json\n  \
+        modelmill compare model-spec/models/spidermill.toml \\\n      \
+        --data recordings/spidermill-mbs/with-rods-check.csv --forward")]
     Compare(CompareArgs),
     /// Find which physical effect the model lacks, from recordings
     #[command(after_help = "Examples (from the project's root):\n  \
@@ -188,7 +190,7 @@ pub(crate) enum ProgramCommand {
     /// Open a workbench in the browser: edit the model file; mechanism, equations, error and findings are updated
     #[command(after_help = work::HELP)]
     Work(WorkArgs),
-    /// Simulate a full-body rig along a trajectory and record its sensors
+    /// Simulate a full-body rig along a trajectory and record its sensors, or a model under the forces of a recording
     #[command(
         after_help = "The trajectory (CSV) has a column t and one per coordinate of the rig. Rates and accelerations are read from \
         columns with _d and _dd; if there are none, they are computed by differences over five samples. \
@@ -196,7 +198,9 @@ pub(crate) enum ProgramCommand {
         Examples (from the project's root):\n  \
         modelmill simulate model-spec/rigs/spidermill-full.toml \\\n      \
         --trajectory recordings/spidermill-mbs/plain-fit.csv --out run.csv\n  \
-        modelmill simulate rig.toml --trajectory traj.csv --out run.csv --seed 7"
+        modelmill simulate rig.toml --trajectory traj.csv --out run.csv --seed 7\n  \
+        modelmill simulate model-spec/models/spidermill.toml \\\n      \
+        --data recordings/spidermill-mbs/plain-check.csv --out motion.csv     the motion that the model makes"
     )]
     Simulate(SimulateArgs),
     /// Reduce a full-body rig to a planar model file, and report the size of every approximation

@@ -12,18 +12,24 @@ use crate::args::separate::SeparateArgs;
 /// `simulate`.
 #[derive(Debug, Args)]
 pub(crate) struct SimulateArgs {
-    /// Rig file (TOML)
+    /// Rig file (TOML), or a model file with --data
     pub(crate) rig: PathBuf,
-    /// Trajectory (CSV): time t and the coordinates, with or without derivatives
-    #[arg(long, value_name = "TRAJ.csv")]
-    pub(crate) trajectory: PathBuf,
+    /// Trajectory of the rig (CSV): time t and the coordinates, with or without derivatives
+    #[arg(long, value_name = "TRAJ.csv", required_unless_present = "data")]
+    pub(crate) trajectory: Option<PathBuf>,
+    /// Recording whose forces drive a model, from its first state
+    #[arg(long, value_name = "RUN", conflicts_with_all = ["trajectory", "seed"])]
+    pub(crate) data: Option<PathBuf>,
+    /// Values of the base parameters of a model: `nominal`, or a file that `identify` wrote
+    #[arg(long, value_name = "nominal|FIT.json", default_value = "nominal", value_parser = ParameterSource::parse)]
+    pub(crate) parameters: ParameterSource,
     /// Write the recording to this file
     #[arg(long, value_name = "RUN.csv")]
     pub(crate) out: PathBuf,
     /// Seed of the noise; the rig's own if not given
     #[arg(long, value_name = "N")]
     pub(crate) seed: Option<u64>,
-    /// Column of the trajectory for a name of the rig, e.g. `--map theta1=pos_left`; may be repeated
+    /// Column of the trajectory or recording for a name of the rig or model, e.g. `--map theta1=pos_left`; may be repeated
     #[arg(long, value_name = "OURS=THEIRS", value_parser = preparation::parse_map)]
     pub(crate) map: Vec<(String, String)>,
     /// Print one JSON object on standard output

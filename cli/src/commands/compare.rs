@@ -12,11 +12,21 @@ pub(crate) fn run(host: &Host, args: &CompareArgs) -> CommandOutcome {
     let model = commands::model(host, &args.model)?;
     let values = args.parameters.values(host, &model)?;
     let [data, _] = commands::recordings(&model, [&args.data, &[]], &args.preparation.reading())?;
-    let compared = model.compare(&data.iter().collect::<Vec<_>>(), &values)?;
+    let data: Vec<_> = data.iter().collect();
+    let compared = model.compare(&data, &values)?;
+    let forward = (args.forward.then(|| model.compare_forward(&data, &values))).transpose()?;
     // The name states in the output which values were used.
     let name = args.parameters.name();
     if args.json {
-        return terminal::print_json(&compared.json(&name, &FlagSpelling)?);
+        let mut object = compared.json(&name, &FlagSpelling)?;
+        if let Some(forward) = &forward {
+            object["forward"] = forward.json();
+        }
+        return terminal::print_json(&object);
     }
-    terminal::print(&compared.text(&name, terminal::style(), &FlagSpelling))
+    terminal::print(&compared.text(&name, terminal::style(), &FlagSpelling))?;
+    match &forward {
+        Some(forward) => terminal::print(&format!("\n{}", forward.text(terminal::style()))),
+        None => Ok(()),
+    }
 }

@@ -1,24 +1,74 @@
-//! `simulate`: simulates a rig along a trajectory and writes the recording of its sensors.
+//! `simulate`: simulates a rig along a trajectory and writes the recording of its sensors, or a model under the forces of a
+//! recording.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use modelmill::Host;
+use modelmill::recording::RecordingOptions;
 use modelmill::text::table::count;
 use serde_json::json;
 
 use crate::args::SimulateArgs;
-use crate::failure::CommandOutcome;
+use crate::failure::{CommandFailure, CommandOutcome};
 use crate::output::OutputFile;
-use crate::terminal;
+use crate::{commands, terminal};
 
-/// Writes `t`, the coordinates and one column per drive.
+/// Writes `t`, the coordinates and one column per drive; for a model also the rates.
 pub(crate) fn run(host: &Host, args: &SimulateArgs) -> CommandOutcome {
+    match (&args.data, &args.trajectory) {
+        (Some(data), _) => simulate_model(host, args, data),
+        (None, Some(trajectory)) => simulate_rig(host, args, trajectory),
+        (None, None) => Err(CommandFailure::Usage(
+            "--trajectory of a rig or --data of a model is needed".to_owned(),
+        )),
+    }
+}
+
+/// The motion of a model under the forces of a recording.
+fn simulate_model(host: &Host, args: &SimulateArgs, data: &Path) -> CommandOutcome {
+    let model = commands::model(host, &args.rig)?;
+    let inputs = commands::files_of(data);
+    let inputs = model.files().chain(inputs.iter().map(PathBuf::as_path));
+    let inputs: Vec<&Path> = inputs.chain(args.parameters.file().map(PathBuf::as_path)).collect();
+    let target = OutputFile::new(&args.out, inputs)?;
+    let values = args.parameters.values(host, &model)?;
+    let reading = RecordingOptions {
+        columns: args.map.clone(),
+        ..RecordingOptions::default()
+    };
+    let [recordings, _] = commands::recordings(&model, [&[data.to_owned()], &[]], &reading)?;
+    let Some(recording) = recordings.first() else {
+        return Err(CommandFailure::Input(format!("{} has no samples", data.display())));
+    };
+    let made = model.simulate_motion(recording, &values)?;
+    target.write(&made.csv())?;
+    if args.json {
+        return terminal::print_json(&json!({
+            "model": model.name,
+            "parameters": args.parameters.name(),
+            "out": args.out.display().to_string(),
+            "samples": made.samples(),
+            "coordinates": made.coordinates,
+        }));
+    }
+    terminal::note(&format!(
+        "{}: {} of {} under the forces of {}",
+        target.path().display(),
+        count(made.samples(), "sample", "samples"),
+        made.coordinates.join(", "),
+        data.display()
+    ));
+    Ok(())
+}
+
+/// The sensors of a rig along a trajectory.
+fn simulate_rig(host: &Host, args: &SimulateArgs, trajectory: &Path) -> CommandOutcome {
     let loaded = host.rig(&args.rig)?;
     let mut inputs: Vec<&Path> = loaded.sources.paths().collect();
-    inputs.push(&args.trajectory);
+    inputs.push(trajectory);
     let target = OutputFile::new(&args.out, inputs)?;
     // The seed of the rig file is used without --seed.
-    let made = host.simulate(&args.rig, &args.trajectory, &args.map, args.seed)?;
+    let made = host.simulate(&args.rig, trajectory, &args.map, args.seed)?;
     target.write(&made.csv())?;
     if args.json {
         let columns = made.run.columns.iter();

@@ -51,7 +51,7 @@ pub(crate) fn run(host: &Host, args: &VerifyArgs) -> CommandOutcome {
     }
 }
 
-/// The files that are read besides the model.
+/// The files that are read in addition to the model.
 fn inputs(args: &VerifyArgs) -> Vec<(FileRole, PathBuf)> {
     let data = args.data.iter().flat_map(|path| commands::files_of(path));
     let mut files: Vec<(FileRole, PathBuf)> = data.map(|path| (FileRole::Data, path)).collect();

@@ -9,6 +9,7 @@ pub mod effects;
 mod estimation;
 mod excitation;
 mod findings;
+mod forward;
 mod geometry_alternatives;
 mod identification;
 mod interpretation;

@@ -21,7 +21,8 @@ struct DriveError {
     band_hz: Option<f64>,
 }
 
-/// The errors of all drives along a recording, for the nominal values of the model; `None` for a drive without samples.
+/// The errors of all drives along a recording, for the nominal values of the model; `None` for a drive without
+/// samples.
 ///
 /// Fails when the recording has no forces, or contains a pose that the mechanism cannot reach.
 fn errors(model: &Model, recording: &PreparedRecording) -> Outcome<Vec<Option<DriveError>>> {
@@ -55,8 +56,8 @@ fn errors(model: &Model, recording: &PreparedRecording) -> Outcome<Vec<Option<Dr
     Ok(model.drives().into_iter().map(of_drive).collect())
 }
 
-/// The checks of all drives along a recording. The diagnosis, if there is one, gives the noise of each drive and the causes
-/// of failures.
+/// The checks of all drives along a recording. The diagnosis, if there is one, gives the noise of each drive and the
+/// causes of failures.
 ///
 /// Fails when the job is cancelled.
 pub(super) fn check_drives(

@@ -1,5 +1,5 @@
-//! Checks of missing effects: findings of a diagnosis go in, a check for each effect that is too probable comes out, or one
-//! check that passes.
+//! Checks of missing effects: findings of a diagnosis go in, a check for each effect that is too probable comes out,
+//! or one check that passes.
 
 use std::fmt::Write as _;
 

@@ -1,8 +1,9 @@
-//! `verify`: tests a model against recordings. A model, recordings and limits go in; checks with the states pass, fail and
-//! not evaluated come out, each failure with its cause from the diagnosis.
+//! `verify`: tests a model against recordings. A model, recordings and limits go in; checks with the states pass,
+//! fail and not evaluated come out, each failure with its cause from the diagnosis.
 //!
-//! The modules, in the order of the data flow: `limits` reads limits, `recordings`, `drives`, `parameters` and `effects` make the
-//! checks of their scopes, `causes` explains failures, `fingerprints` states which files were used.
+//! The modules, in the order of the data flow: `limits` reads limits, `recordings`, `drives`, `parameters` and
+//! `effects` make the checks of their scopes, `causes` explains failures, `fingerprints` states which files were
+//! used.
 
 mod causes;
 mod checks;
@@ -38,7 +39,8 @@ pub struct ModelVerification {
 }
 
 impl Model {
-    /// Tests the model, with the values of [`Model::nominal`], against recordings. All recordings are diagnosed together.
+    /// Tests the model, with the values of [`Model::nominal`], against recordings. All recordings are diagnosed
+    /// together.
     ///
     /// Fails when the job is cancelled, or when a recording contains a pose that the mechanism cannot reach.
     ///
@@ -77,8 +79,8 @@ impl Model {
 }
 
 impl ModelVerification {
-    /// The result: fail if a check fails. Pass if some checks pass, and all those with a limit of the user do. Otherwise
-    /// the model is not evaluated.
+    /// The result: fail if a check fails. Pass if some checks pass, and all those with a limit of the user do.
+    /// Otherwise the model is not evaluated.
     pub fn state(&self) -> CheckState {
         let count = |state: CheckState| self.count(state);
         let is_open = |one: &VerificationCheck| !one.is_default && one.state == CheckState::NotEvaluated;

@@ -1,8 +1,8 @@
-//! Checks of base parameters: estimates of the diagnosis are compared with the values of the model, or with intervals of
-//! the user.
+//! Checks of base parameters: estimates of the diagnosis are compared with the values of the model, or with intervals
+//! of the user.
 //!
-//! Decision: an estimate whose uncertainty reaches over a limit is neither a pass nor a failure. It is not evaluated, and the
-//! sentence states the uncertainty.
+//! Decision: an estimate whose uncertainty reaches over a limit is neither a pass nor a failure. It is not evaluated,
+//! and the sentence states the uncertainty.
 
 use modelmill_identify::{FitParameter, ParameterStatus};
 
@@ -87,7 +87,8 @@ struct DeterminedValue {
     std: f64,
 }
 
-/// The estimate of a base parameter, with the effects that the diagnosis found; the reason why there is none as error.
+/// The estimate of a base parameter, with the effects that the diagnosis found; the reason why there is none as
+/// error.
 fn determined_estimate(model: &Model, findings: &DiagnosisFindings, k: usize) -> Result<DeterminedValue, String> {
     if !findings.unresolved.is_empty() {
         return Err("a fault of the recordings must be corrected first".to_owned());
@@ -116,8 +117,8 @@ fn determined_estimate(model: &Model, findings: &DiagnosisFindings, k: usize) ->
     }
 }
 
-/// Compares an estimate with the interval of the check, or with the nominal value. `share` is the largest change of the
-/// force of a drive, relative to its rms force, for a change of the parameter by one unit.
+/// Compares an estimate with the interval of the check, or with the nominal value. `share` is the largest change of
+/// the force of a drive, relative to its rms force, for a change of the parameter by one unit.
 fn evaluate(check: &mut VerificationCheck, said: &str, estimate: &DeterminedValue, nominal: Option<f64>, share: f64) {
     let DeterminedValue { value, std } = *estimate;
     check.value = Some(value);

@@ -3,6 +3,7 @@
 mod draws;
 mod events;
 mod every_model;
+mod forward;
 mod hanging;
 mod made;
 mod mechanisms;

@@ -1,0 +1,235 @@
+//! Forward simulation of a model: a recording goes in, the motion that the model makes under its recorded forces
+//! comes out.
+//!
+//! `plant` is the equation of motion with dry friction, `integrate` advances a state, `horizons` compares simulated
+//! with recorded positions.
+
+mod horizons;
+mod integrate;
+mod plant;
+mod thresholds;
+
+use modelmill_codegen::{DynamicsPrograms, PoseFault, PoseReason};
+
+use crate::error::{Error, Outcome};
+use crate::model::Model;
+use crate::recording::PreparedRecording;
+use crate::segment::RecordingSegment;
+use crate::text::csv::csv;
+
+pub use horizons::{ForwardComparison, HorizonError};
+use integrate::{ForceInterval, MotionState, advance};
+use plant::MotionPlant;
+
+/// A simulated motion at the times of a recording.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SimulatedMotion {
+    /// Times, s.
+    pub time: Vec<f64>,
+    /// Names of the independent coordinates.
+    pub coordinates: Vec<String>,
+    /// `q[coordinate][sample]`, rad or m.
+    pub q: Vec<Vec<f64>>,
+    /// `qd[coordinate][sample]`, rad/s or m/s.
+    pub qd: Vec<Vec<f64>>,
+    /// Names of the drives and their forces, N or N m, as recorded.
+    pub forces: Vec<(String, Vec<f64>)>,
+}
+
+impl SimulatedMotion {
+    /// The motion as a recording (CSV): time, positions, rates and forces.
+    pub fn csv(&self) -> String {
+        let rates: Vec<String> = self.coordinates.iter().map(|name| format!("{name}_d")).collect();
+        let mut columns = vec![("t", self.time.as_slice())];
+        columns.extend(
+            self.coordinates
+                .iter()
+                .zip(&self.q)
+                .map(|(name, q)| (name.as_str(), q.as_slice())),
+        );
+        columns.extend(
+            rates
+                .iter()
+                .zip(&self.qd)
+                .map(|(name, qd)| (name.as_str(), qd.as_slice())),
+        );
+        columns.extend(
+            self.forces
+                .iter()
+                .map(|(name, force)| (name.as_str(), force.as_slice())),
+        );
+        csv(&columns)
+    }
+
+    /// Number of samples.
+    pub fn samples(&self) -> usize {
+        self.time.len()
+    }
+}
+
+impl Model {
+    /// Simulates the model under the forces of a recording, from its first state. `values` are those of the base
+    /// parameters. Forces are interpolated linearly between samples. Drives and coordinates with dry friction stick
+    /// when friction can keep them at standstill.
+    ///
+    /// Fails if the recording has gaps or no forces, if the model has free bodies, and when the simulated motion
+    /// leaves the reach of the mechanism.
+    pub fn simulate_motion(&self, recording: &PreparedRecording, values: &[f64]) -> Outcome<SimulatedMotion> {
+        let [segment] = recording.segments.as_slice() else {
+            return Err(Error::input(format!(
+                "{} has {} parts with gaps in time between them; a simulation needs one part without gaps",
+                recording.file(),
+                recording.segments.len()
+            )));
+        };
+        let dynamics = self.forward_programs()?;
+        let plant = MotionPlant::new(self, &dynamics, values, fastest_rate(segment));
+        let n = segment.samples();
+        let found = self
+            .host()
+            .run_job("simulating", 0, |_| rollout(&plant, segment, [0, n]))?;
+        let found = found?;
+        if let Some(PoseFault { reason, .. }) = found.fault {
+            let end = segment.run.time[found.samples.saturating_sub(1).min(n - 1)];
+            return Err(Error::input(format!(
+                "{}: the simulated motion leaves the reach of the mechanism after t = {end} s ({}); compare over shorter \
+                 horizons, or check the values of the parameters",
+                recording.file(),
+                reason_text(&reason)
+            )));
+        }
+        let measured = segment.run.measured_forces()?;
+        Ok(SimulatedMotion {
+            time: segment.run.time.clone(),
+            coordinates: self.active_coordinates(),
+            q: found.q,
+            qd: found.qd,
+            forces: self.drives().into_iter().zip(measured.iter().cloned()).collect(),
+        })
+    }
+
+    /// The equation of motion, derived.
+    ///
+    /// Fails for free bodies, which are not simulated, and when the derivation fails.
+    fn forward_programs(&self) -> Outcome<DynamicsPrograms> {
+        if self.joint_coordinates().len() < self.active_coordinates().len() {
+            return Err(Error::input(format!(
+                "{} has a free body, whose orientation is a quaternion; only mechanisms with joints can be simulated",
+                self.path
+            )));
+        }
+        let what = "deriving the equation of motion";
+        let derived = self.host().run_job(what, 0, |_| self.derivation.dynamics())?;
+        derived.map_err(|error| Error::derivation(&self.path, error))
+    }
+}
+
+/// The motion over some samples of a segment.
+struct MotionRollout {
+    /// Number of samples that were reached.
+    samples: usize,
+    /// `q[coordinate][sample]`.
+    q: Vec<Vec<f64>>,
+    /// `qd[coordinate][sample]`.
+    qd: Vec<Vec<f64>>,
+    /// Why the motion ended early.
+    fault: Option<PoseFault>,
+}
+
+/// A simulation between two samples of a segment.
+struct SimulationCursor<'a> {
+    segment: &'a RecordingSegment,
+    forces: &'a [Vec<f64>],
+    state: MotionState,
+    /// The sample of the state.
+    sample: usize,
+}
+
+impl<'a> SimulationCursor<'a> {
+    /// A simulation that starts at the recorded state of a sample. `offset` is added to its positions; it is empty if
+    /// there is none.
+    ///
+    /// Fails when the recording has no forces.
+    fn new(segment: &'a RecordingSegment, sample: usize, offset: &[f64]) -> Outcome<Self> {
+        let run = &segment.run;
+        let mut q = values_at(&run.q, sample);
+        for (q, offset) in q.iter_mut().zip(offset) {
+            *q += offset;
+        }
+        Ok(Self {
+            segment,
+            forces: run.measured_forces()?,
+            state: MotionState::new(q, values_at(&run.qd, sample)),
+            sample,
+        })
+    }
+
+    /// Simulates to the next sample.
+    ///
+    /// Fails when the motion leaves the reach of the mechanism.
+    fn step(&mut self, plant: &MotionPlant<'_>) -> Result<(), PoseFault> {
+        let sample = self.sample;
+        let [start, end] = [sample, sample + 1].map(|sample| values_at(self.forces, sample));
+        let forces = ForceInterval {
+            start: &start,
+            end: &end,
+        };
+        let time = &self.segment.run.time;
+        advance(plant, &mut self.state, time[sample + 1] - time[sample], &forces)?;
+        self.sample += 1;
+        if self.state.is_finite() {
+            return Ok(());
+        }
+        let reason = PoseReason::Undefined;
+        Err(PoseFault { sample, reason })
+    }
+}
+
+/// The values of all columns at one sample.
+fn values_at(columns: &[Vec<f64>], sample: usize) -> Vec<f64> {
+    columns.iter().map(|column| column[sample]).collect()
+}
+
+/// Simulates from the recorded state at sample `start` to `end`, exclusive.
+///
+/// Fails when the recording has no forces.
+fn rollout(plant: &MotionPlant<'_>, segment: &RecordingSegment, [start, end]: [usize; 2]) -> Outcome<MotionRollout> {
+    let n = segment.run.q.len();
+    let mut cursor = SimulationCursor::new(segment, start, &[])?;
+    let mut found = MotionRollout {
+        samples: 0,
+        q: vec![Vec::with_capacity(end - start); n],
+        qd: vec![Vec::with_capacity(end - start); n],
+        fault: None,
+    };
+    loop {
+        for k in 0..n {
+            found.q[k].push(cursor.state.q[k]);
+            found.qd[k].push(cursor.state.qd[k]);
+        }
+        found.samples += 1;
+        if cursor.sample + 1 >= end {
+            return Ok(found);
+        }
+        if let Err(fault) = cursor.step(plant) {
+            found.fault = Some(fault);
+            return Ok(found);
+        }
+    }
+}
+
+/// Why a motion ended early, as a clause.
+fn reason_text(reason: &PoseReason) -> &'static str {
+    match reason {
+        PoseReason::OutOfReach => "a loop cannot close",
+        PoseReason::Singular => "the mechanism is singular",
+        PoseReason::Undefined | PoseReason::NotFinite { .. } => "a value is not finite",
+    }
+}
+
+/// The fastest rate of a coordinate in a segment, rad/s or m/s; 1 if nothing moves.
+fn fastest_rate(segment: &RecordingSegment) -> f64 {
+    let rates = segment.run.qd.iter().flatten().map(|rate| rate.abs());
+    let fastest = rates.fold(0.0, f64::max);
+    if fastest > 0.0 { fastest } else { 1.0 }
+}
