@@ -59,7 +59,7 @@
 //! | [`Model::evaluate`] | forces along a recording |
 //! | [`Model::functions`] | forces, regressor, mass matrix and other functions at given states |
 //! | [`Model::identify`] | base parameters from recordings by least squares, eq. (12) |
-//! | [`ServoModel::identify`] | base parameters and gains from commands or currents, without forces |
+//! | [`servo::ServoModel::identify`] | base parameters and gains from commands or currents, without forces |
 //! | [`Model::compare`] | error metrics (such as the NRMS), and the ranges of coordinates, rates, loads and time in which errors are large |
 //! | [`Model::simulate_motion`], [`Model::compare_forward`] | the motion under recorded forces, and its position errors over horizons |
 //! | [`Model::diagnose`] | the physical effects that are missing |
