@@ -56,6 +56,23 @@ pub(crate) enum WeightsArg {
 }
 
 impl EstimatorArgs {
+    /// The flags that differ from their defaults.
+    pub(crate) fn given_flags(&self) -> Vec<&'static str> {
+        let flags = [
+            (self.weights != WeightsArg::Auto, "--weights"),
+            (self.robust.is_some(), "--robust"),
+            (self.prior.is_some(), "--prior"),
+            (self.physical, "--physical"),
+            (self.essential, "--essential"),
+            (!self.instruments.is_empty(), "--instruments"),
+        ];
+        flags
+            .iter()
+            .filter(|(given, _)| *given)
+            .map(|(_, flag)| *flag)
+            .collect()
+    }
+
     /// The same as options of the library.
     pub(crate) fn options(&self, standstill: Option<f64>) -> EstimatorOptions {
         EstimatorOptions {

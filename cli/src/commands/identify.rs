@@ -108,6 +108,14 @@ fn identify_from_signals(
             return if has_forces { Ok(None) } else { Err(error) };
         }
     };
+    // An option without effect would be taken for one that was applied.
+    let unused = args.estimators.given_flags();
+    if !unused.is_empty() {
+        return Err(CommandFailure::Usage(format!(
+            "{} cannot be used with actuators: their estimator chooses weights and instruments itself; leave it out",
+            unused.join(", ")
+        )));
+    }
     let [data, check] = [&data, &check].map(|all| all.iter().collect::<Vec<_>>());
     Ok(Some(servo.identify(&data, &check)?))
 }

@@ -299,3 +299,36 @@ fn what_cannot_be_estimated_so_is_said() {
         weak.err
     );
 }
+
+/// Options that the estimator of servo logs does not have are refused, and not ignored.
+#[test]
+fn options_without_effect_on_servo_logs_are_refused() {
+    let model = scratch("servo.toml");
+    let text = r#"
+        schema = 1
+        name = "servo"
+        parameters = { J = {}, kp = {} }
+        coordinates = { q = { nominal = 0 } }
+        frame = [{ name = "rod", on = "base", joint = { revolute = "q", axis = "z" } }]
+        part = [{ on = "rod", linear = { ZZ = "J" } }]
+        drive = [{ name = "motor", joint = "q" }]
+        actuator = [{ drive = "motor", kind = "position_servo", kp = "kp", kd = 0.5 }]
+    "#;
+    std::fs::write(&model, text).expect("written");
+    let data = scratch("servo.csv");
+    let mut rows = "t,q,motor_command\n".to_owned();
+    for k in 0..1000 {
+        let t = 0.01 * f64::from(k);
+        let (position, command) = ((2.0 * t).sin(), 1.1 * (2.0 * t + 0.1).sin());
+        writeln!(rows, "{t},{position},{command}").expect("a line");
+    }
+    std::fs::write(&data, rows).expect("written");
+    let says = refused(
+        2,
+        &["identify", &model, "--data", &data, "--robust", "--weights", "none"],
+    );
+    assert!(
+        says.contains("--weights, --robust cannot be used with actuators"),
+        "{says}"
+    );
+}
