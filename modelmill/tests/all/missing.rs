@@ -254,7 +254,7 @@ fn a_value_that_joints_share_is_separated_where_one_differs() {
     assert_eq!(sharing, [drives[0].clone(), drives[2].clone()]);
     assert_eq!(findings.diagnosis.verdict, DiagnosisVerdict::MissingEffect);
     // The completed model has both values, and explains the recording.
-    let completed = findings.after.as_ref().expect("the completed model");
+    let completed = findings.after.version().expect("the completed model");
     assert_eq!(completed.model.base.len(), model.base.len() + 1);
     let says = findings.verdict_text();
     assert!(says.contains("separate values of viscous friction"), "{says}");
