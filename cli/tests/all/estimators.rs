@@ -307,7 +307,7 @@ fn options_without_effect_on_servo_logs_are_refused() {
     let text = r#"
         schema = 1
         name = "servo"
-        parameters = { J = {}, kp = {} }
+        parameters = { J = { unit = "kg m^2" }, kp = { unit = "N m" } }
         coordinates = { q = { nominal = 0 } }
         frame = [{ name = "rod", on = "base", joint = { revolute = "q", axis = "z" } }]
         part = [{ on = "rod", linear = { ZZ = "J" } }]

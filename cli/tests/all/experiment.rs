@@ -78,7 +78,7 @@ fn the_error_of_the_papers_treatment_is_the_force_of_the_misplaced_mass() {
         assert!(of("spidermill_full", "explained/correlation") > 0.999);
         // Much of what the paper's own identification changed is the same force, also about the mean.
         let correlation = of("spidermill_full", "paper_change/correlation");
-        assert!((0.6..0.85).contains(&correlation), "{run}: {correlation}");
+        assert!((0.5..0.85).contains(&correlation), "{run}: {correlation}");
         let variation = of("spidermill_full", "paper_change/explained_variation");
         assert!(variation > 0.1 && variation < 0.9, "{variation}");
         // The check could fail: with rods much is left.

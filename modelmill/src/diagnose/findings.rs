@@ -24,7 +24,7 @@ use super::constants::CONSTANT_ERROR;
 use super::corrected::CorrectedRecordings;
 use super::estimates::{EffectEstimate, effect_estimates};
 use super::faults;
-use super::geometry_alternatives::{GeometryAlternative, geometry_alternatives};
+use super::geometry_alternatives::{GeometryAlternative, GeometryError, geometry_alternatives};
 use super::laws::{self, LawHypothesis};
 use super::long_recordings;
 use super::model_versions::ModelVersion;
@@ -32,7 +32,7 @@ use super::named_zeros::{self, NamedZeros};
 use super::off_nominal::{OffNominalParameter, off_nominal_parameters, reversed_sign_note};
 use super::problem::{self, DiagnosisQuery, DiagnosisSolution, FixedParameters};
 use super::requested_effects::NamedEffect;
-use super::thresholds::{DIFFERENCE_LEAST_GAIN, MOST_VALIDATION_ERROR};
+use super::thresholds::{DIFFERENCE_LEAST_GAIN, EQUAL_ALTERNATIVE_LEAST_SHARE, MOST_VALIDATION_ERROR};
 use super::words::{self, ValidationMethod};
 
 /// Fails if the fitted model predicts validation data worse than a model without any force: findings of the fit
@@ -314,6 +314,7 @@ impl Model {
         }
         findings.regions = regions(&findings);
         findings.geometry_alternatives = alternatives_to_effects(&findings, named.as_ref(), held)?;
+        findings.share_with_geometry();
         if options.repeat_with_nominal && held != FixedParameters::All && !findings.off_nominal.is_empty() {
             findings.with_nominal = Some(nominal_diagnosis(&findings, &between)?);
         }
@@ -322,6 +323,30 @@ impl Model {
 }
 
 impl DiagnosisFindings {
+    /// Effects share their probability with an error of the geometry that explains as much with no more parts: the
+    /// recordings cannot distinguish them.
+    fn share_with_geometry(&mut self) {
+        let n_effects = self.missing.len();
+        let is_equal =
+            |one: &&GeometryAlternative| one.errors.len() <= n_effects && one.share >= EQUAL_ALTERNATIVE_LEAST_SHARE;
+        let Some(best) = self.geometry_alternatives.iter().find(is_equal) else {
+            return;
+        };
+        let alternatives: Vec<LocatedEffect> = best.errors.iter().map(GeometryError::as_effect).collect();
+        let found = self.diagnosis.effects.iter_mut().zip(&mut self.missing);
+        for (found, missing) in found.filter(|(found, _)| found.effect.kind != CONSTANT_ERROR) {
+            // With n equal explanations each has 1/n; one more makes it 1/(n + 1).
+            let shared = found.probability / (1.0 + found.probability);
+            for (probability, others) in [
+                (&mut found.probability, &mut found.indistinguishable_from),
+                (&mut missing.probability, &mut missing.indistinguishable_from),
+            ] {
+                *probability = shared;
+                others.extend(alternatives.iter().cloned());
+            }
+        }
+    }
+
     /// The model with the effects found, or the given model if there is none.
     pub fn final_version(&self) -> &ModelVersion {
         self.after.version().unwrap_or(&self.before)

@@ -6,7 +6,7 @@
 //! parameters are projected out, and sets of one or two errors are tried.
 
 use modelmill_codegen::ModelEvaluator;
-use modelmill_identify::diagnose::ForceColumn;
+use modelmill_identify::diagnose::{ForceColumn, LocatedEffect};
 use nalgebra::{DMatrix, DVector};
 
 use crate::error::Outcome;
@@ -14,6 +14,7 @@ use crate::model::Model;
 use crate::regressors::regressor;
 use crate::segment::RecordingSegment;
 
+use super::constants::CONSTANT_ERROR;
 use super::model_versions::{ForceComparison, ModelVersion};
 use super::named_zeros::NamedZeros;
 use super::payloads::reach;
@@ -370,6 +371,14 @@ impl GeometryError {
             (Some(constant), _) => constant.clone(),
             (None, Some((point, axis))) => format!("{axis} of {point}"),
             (None, None) => String::new(),
+        }
+    }
+
+    /// The same as an effect, for lists of explanations that the recordings do not distinguish.
+    pub(super) fn as_effect(&self) -> LocatedEffect {
+        LocatedEffect {
+            kind: CONSTANT_ERROR.to_owned(),
+            at: vec![self.name()],
         }
     }
 }

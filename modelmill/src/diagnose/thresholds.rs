@@ -37,8 +37,8 @@ pub(super) const BODY_PARAMETER_FACTOR: f64 = 3.0;
 pub(super) const SIGN_TRIALS: usize = 200;
 
 /// The force of a contact must exceed the rms value of a residual that follows the time at the same drive by this factor
-/// (1): a ringing joint reaches 2.3 (`flexible-motor-encoder`). By judgement.
-pub(super) const CONTACT_LEAST_RESIDUAL_RATIO: f64 = 4.0;
+/// (1): the peaks of a ringing joint reach 4.6 (`flexible-motor-encoder`). By judgement.
+pub(super) const CONTACT_LEAST_RESIDUAL_RATIO: f64 = 5.5;
 
 /// Contacts with less time between them are reported as one, s. By judgement.
 pub(super) const CONTACT_GAP_S: f64 = 0.3;
@@ -104,6 +104,10 @@ pub(super) const ALTERNATIVE_MOST_ERROR: f64 = 0.1;
 /// Alternatives are searched only if the effects found explain at least this part of the squared residual (1): with
 /// less, any error would seem to explain as much. By judgement.
 pub(super) const ALTERNATIVE_LEAST_GAIN: f64 = 0.1;
+
+/// An error of the geometry that explains at least this part of what the effects found explain (1) cannot be
+/// distinguished from them. By judgement.
+pub(super) const EQUAL_ALTERNATIVE_LEAST_SHARE: f64 = 0.97;
 
 /// A search with zeros as candidates replaces the one without, if it needs fewer effects and its mean square residual is
 /// at most this many times as large (1). By judgement.
