@@ -47,7 +47,7 @@ pub(super) fn effects(
         })
     };
     // Checks that compare effects with each other come first.
-    warn_of_twins(entries.clone(), &couples, log);
+    warn_of_twins(&entries, &couples, log);
     check_single(entries.clone(), &kinds, log);
     entries
         .filter_map(|entry| effect(entry, &kinds, symbols, scene, log))
@@ -80,7 +80,7 @@ fn check_single<'a>(entries: impl Iterator<Item = &'a EffectEntry>, kinds: &Kind
 /// is a variant that is meant to override an effect without a name. Effects that couple two places are compared by
 /// both places; `couples` states whether the order of the places matters (`Some(false)`) or not (`Some(true)`).
 fn warn_of_twins<'a>(
-    entries: impl Iterator<Item = &'a EffectEntry> + Clone,
+    entries: &(impl Iterator<Item = &'a EffectEntry> + Clone),
     couples: &dyn Fn(&EffectEntry) -> Option<bool>,
     log: &mut DiagnosticLog,
 ) {
@@ -109,7 +109,7 @@ fn warn_of_twins<'a>(
             let (first, first_place) = known;
             // The places of one effect are checked elsewhere. Places that share a value with others may have a second
             // effect that is their difference from it.
-            if std::ptr::eq(first, entry) || together.is_none() && shares_differ(first, entry, entries.clone()) {
+            if std::ptr::eq(first, entry) || together.is_none() && shares_differ(first, entry, entries) {
                 continue;
             }
             // An unnamed effect of another file was probably meant to be overridden.
@@ -133,7 +133,7 @@ fn warn_of_twins<'a>(
 fn shares_differ<'a>(
     one: &'a EffectEntry,
     other: &'a EffectEntry,
-    entries: impl Iterator<Item = &'a EffectEntry> + Clone,
+    entries: &(impl Iterator<Item = &'a EffectEntry> + Clone),
 ) -> bool {
     let places = |entry: &'a EffectEntry| {
         entry
@@ -143,9 +143,10 @@ fn shares_differ<'a>(
             .map(|place| place.text.as_str())
     };
     let name = |entry: &'a EffectEntry, key: &str| {
-        let mut said = entry.parameters.iter().flat_map(|table| &table.entries);
-        said.find(|(known, _)| known.name == key)
-            .and_then(|(_, said)| said.name.as_ref())
+        let mut named = entry.parameters.iter().flat_map(|table| &table.entries);
+        named
+            .find(|(known, _)| known.name == key)
+            .and_then(|(_, value)| value.name.as_ref())
     };
     // An effect of the same kind shares the parameters that have the same names in the file.
     let is_shared = |entry: &'a EffectEntry, other: &'a EffectEntry| {

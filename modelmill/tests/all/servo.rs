@@ -55,8 +55,7 @@ fn pendulum(known: &[(&str, f64)]) -> String {
             text = text
                 .lines()
                 .filter(|line| !line.starts_with(&format!("{name} = {{ unit")))
-                .map(|l| format!("{l}\n"))
-                .collect();
+                .fold(String::new(), |kept, line| kept + line + "\n");
         }
     }
     text
