@@ -34,9 +34,6 @@ use crate::tree::expressions::ParameterMonomial;
 const DEPENDENT: f64 = 1e-13;
 /// The same for loops with rounded lengths: as a multiple of their closure error, relative to the size of a loop.
 const PER_OFF: f64 = 100.0;
-/// A column counts as zero, and its residual as none, below this multiple of its change where loops close with another
-/// error of the same size. Bennett linkages with rounded lengths reach 2, and their least independent columns 1e6.
-const PER_CHANGE: f64 = 20.0;
 /// Largest residual of a column at further states with the factors as written, relative to its terms.
 const SHOWN: f64 = 1e-10;
 /// The same for loops with rounded lengths, as a multiple of their closure error.
@@ -49,8 +46,9 @@ const HALVINGS: u32 = 7;
 /// How often states are added if dependences are not valid further along the motion.
 const ROUNDS: usize = 4;
 
+/// the exact reduction failed.
 /// Reduces `columns[k][d]` (product by drive), trying them as retained ones in the given order. `because` is the reason
-/// why the exact reduction failed.
+/// why
 ///
 /// # Errors
 /// [`DeriveError::NotConfirmed`] if the factors are not valid at further states, or the errors of [`WalkSampler`].
@@ -78,13 +76,8 @@ pub(super) fn reduce(
         };
         let sizes: Vec<f64> = (0..columns.len()).map(sized).collect();
         let largest = sizes.iter().fold(0.0, |a: f64, b| a.max(*b));
-        // A column that is no larger than the changes that inexact closure causes is zero up to rounding of the file.
-        let changes = states.closure_changes();
-        let is_effective = |k: &usize| sizes[*k] > limit * largest && w.norms[*k] > PER_CHANGE * changes[*k];
+        let is_effective = |k: &usize| sizes[*k] > limit * largest;
         let tried: Vec<usize> = order.iter().copied().filter(is_effective).collect();
-        // What inexact closure changes of a column is no part of it that others lack.
-        let change = (tried.iter()).map(|k| changes[*k] / w.norms[*k]).fold(0.0, f64::max);
-        let limit = limit.max(PER_CHANGE * change);
         let base = NumericBase::new(&w, &tried, limit);
         // Contributions below the residual of dropped columns are rounding errors.
         let rounding = (1e3 * base.most_dropped).clamp(1e-60, 1e-9);
@@ -94,12 +87,7 @@ pub(super) fn reduce(
         let residual = ObservationColumns::new(&further, columns.len()).largest_residual(&found, &effective, &values);
         // Terms below the rounding error are dropped, each by itself.
         let left_out = rounding * base.kept.len() as f64;
-        if residual
-            <= SHOWN
-                .max(SHOWN_PER_OFF * states.closure_error())
-                .max(limit)
-                .max(left_out)
-        {
+        if residual <= SHOWN.max(SHOWN_PER_OFF * states.closure_error()).max(left_out) {
             found.method = ReductionMethod::Numeric {
                 least_kept: base.least_kept,
                 most_dropped: base.most_dropped,
@@ -497,30 +485,6 @@ mod tests {
             for base in found.base_parameters() {
                 assert!(!base.expression.contains('.'), "{name}: {}", base.expression);
             }
-        }
-    }
-
-    /// A Bennett linkage whose second length is rounded to 16 digits: equations that are nearly singular enlarge the
-    /// rounding in rates and accelerations, but no column consists of it.
-    #[test]
-    fn enlarged_rounding_is_no_column() {
-        for (al, be) in [(0.9_f64, 0.5_f64), (0.6, 1.01), (1.3, 0.2)] {
-            let length = 0.4 * be.sin() / al.sin();
-            // Equation of both angles of a Bennett linkage at the first angle of 1 rad (G. T. Bennett, 1903).
-            let ratio = (0.5 * (al + be)).sin() / (0.5 * (al - be)).sin();
-            let angle = -2.0 * (ratio / 0.5_f64.tan()).atan();
-            let [first, second] = [format!("value = {al}"), format!("value = {be}")];
-            let nominal = format!("nominal = {angle}");
-            let changes = [
-                ("a*sin(be)/sin(al)", format!("{length}")),
-                ("value = 0.9", first),
-                ("value = 0.5", second),
-                ("nominal = -2.807781", nominal),
-            ];
-            let changes: Vec<(&str, &str)> = changes.iter().map(|(old, new)| (*old, new.as_str())).collect();
-            let found = crate::derive(&judged("bennett", &changes)).expect("a derivation");
-            assert_eq!(found.reduction.retained.len(), 7, "{al} {be}");
-            assert!(matches!(found.reduction.method, ReductionMethod::Numeric { .. }));
         }
     }
 

@@ -13,10 +13,6 @@ use crate::loops::numeric_poses::{NumericLoops, uniform_symmetric};
 use crate::loops::walk::{NEARLY_CLOSED, PoseWalk, all_residuals};
 use crate::regressor::projection::LoopProjection;
 
-/// Changes of a row by inexact closure, relative to the row and in units of the closure error, above which its state counts
-/// as nearly singular. Most states of Bennett linkages are below 300. By judgement.
-const MOST_ENLARGED: f64 = 1e3;
-
 /// Evaluates rows of the regressor at successive states of one walk.
 pub(super) struct WalkSampler<'a> {
     /// Kinds of coordinates and values of the file.
@@ -47,10 +43,6 @@ pub(super) struct WalkSampler<'a> {
     stream: RandomStream,
     /// Largest residual so far of equations that are not selected, relative to the size of the loops.
     off: f64,
-    /// For each column, the sum of the squares of its changes if loops close as inexactly as `off` states.
-    squared_changes: Vec<f64>,
-    /// Random directions of these inexact closures. A stream of its own keeps the states of exact loops.
-    shift_stream: RandomStream,
 }
 
 impl<'a> WalkSampler<'a> {
@@ -99,8 +91,6 @@ impl<'a> WalkSampler<'a> {
             constants,
             stream: RandomStream::new(SEED),
             off: 0.0,
-            squared_changes: vec![0.0; columns.len()],
-            shift_stream: RandomStream::new(SEED),
             mechanism,
             walk,
         })
@@ -128,15 +118,9 @@ impl<'a> WalkSampler<'a> {
                 continue;
             };
             stuck = 0;
-            let Some((values, shifted)) = self.evaluate_at(&pose) else {
+            let Some(values) = self.evaluate_at(&pose) else {
                 continue;
             };
-            // Other states are preferred to those that are nearly singular, as long as there are enough.
-            let off = self.off;
-            let is_enlarged = |other: &Vec<BigFloat>| largest_difference(&values, other) > MOST_ENLARGED * off;
-            if 2 * tries < TRIES * n_states && shifted.as_ref().is_some_and(is_enlarged) {
-                continue;
-            }
             let largest = values.iter().map(|x| x.to_f64().abs()).fold(0.0, f64::max);
             if !largest.is_normal() {
                 continue;
@@ -146,10 +130,6 @@ impl<'a> WalkSampler<'a> {
             // Scaling by a power of two is exact.
             let scale = -(largest.log2() as i64);
             let scaled: Vec<BigFloat> = values.iter().map(|x| x.scale_by_power_of_two(scale)).collect();
-            for (k, (value, other)) in values.iter().zip(shifted.iter().flatten()).enumerate() {
-                let change = (value - other).scale_by_power_of_two(scale).to_f64();
-                self.squared_changes[k % self.n_columns.max(1)] += change * change;
-            }
             rows.extend(scaled.chunks(self.n_columns.max(1)).map(<[BigFloat]>::to_vec));
         }
         Ok(rows)
@@ -166,62 +146,35 @@ impl<'a> WalkSampler<'a> {
         self.off
     }
 
-    /// For each column, the norm over all rows so far of its change if the loops close as inexactly as
-    /// [`Self::closure_error`] states. Equations that are nearly singular enlarge it. Zero if the loops close exactly.
-    pub(super) fn closure_changes(&self) -> Vec<f64> {
-        self.squared_changes.iter().map(|sum| sum.sqrt()).collect()
-    }
-
-    /// Values of the outputs at a pose, with random rates, accelerations and loads; `None` where they do not exist. If
-    /// the loops do not close exactly, also the values where they are closed with another error of the same size.
-    fn evaluate_at(&mut self, q: &[f64]) -> Option<(Vec<BigFloat>, Option<Vec<BigFloat>>)> {
-        let n = self.passive.len();
-        let (mut point, off) = self.close_loops(q, &vec![0.0; n])?;
-        let mut inputs = Vec::new();
+    /// Values of the outputs at a pose, with random rates, accelerations and loads; `None` where they do not exist.
+    fn evaluate_at(&mut self, q: &[f64]) -> Option<Vec<BigFloat>> {
+        let (mut point, off) = self.close_loops(q)?;
         for i in self.active.clone() {
             let unit = self.walk.coordinate_unit(i);
             let mut random = |most: f64| BigFloat::from_f64(most * unit * uniform_symmetric(&mut self.stream));
-            inputs.push((Atom::Rate(i), random(2.0)?));
-            inputs.push((Atom::Acceleration(i), random(5.0)?));
+            point.set(Atom::Rate(i), random(2.0)?, false)?;
+            point.set(Atom::Acceleration(i), random(5.0)?, false)?;
         }
         // Loads of the size of forces in N.
         for d in 0..self.n_drives {
             let load = BigFloat::from_f64(100.0 * uniform_symmetric(&mut self.stream))?;
-            inputs.push((Atom::Load(d), load));
-        }
-        let values = self.outputs_at(&mut point, &inputs)?;
-        let mut shifted = None;
-        if off > BigFloat::ROUNDING.sqrt() {
-            let size = off * self.walk.loop_size();
-            let shift: Vec<f64> = (0..n)
-                .map(|_| size * uniform_symmetric(&mut self.shift_stream))
-                .collect();
-            let (mut point, _) = self.close_loops(q, &shift)?;
-            shifted = Some(self.outputs_at(&mut point, &inputs)?);
-        }
-        self.off = self.off.max(off);
-        Some((values, shifted))
-    }
-
-    /// Values of the outputs at a closed pose for given rates, accelerations and loads.
-    fn outputs_at(&self, point: &mut BigFloatPoint, inputs: &[(Atom, BigFloat)]) -> Option<Vec<BigFloat>> {
-        for (atom, value) in inputs {
-            point.set(*atom, value.clone(), false)?;
+            point.set(Atom::Load(d), load, false)?;
         }
         // Passive rates come before the accelerations, which depend on them.
-        for (p, value) in self.passive.iter().zip(self.rates.evaluate(point)?) {
+        for (p, value) in self.passive.iter().zip(self.rates.evaluate(&point)?) {
             point.set(Atom::Rate(*p), value, false)?;
         }
-        for (p, value) in self.passive.iter().zip(self.accelerations.evaluate(point)?) {
+        for (p, value) in self.passive.iter().zip(self.accelerations.evaluate(&point)?) {
             point.set(Atom::Acceleration(*p), value, false)?;
         }
-        self.outputs.evaluate(point)
+        let values = self.outputs.evaluate(&point)?;
+        self.off = self.off.max(off);
+        Some(values)
     }
 
     /// A pose with its passive coordinates to all digits, and the largest residual of equations that are not selected,
-    /// relative to the size of the loops. `None` if the loops do not close. The selected equations get the values in
-    /// `shift` as their residuals.
-    fn close_loops(&self, q: &[f64], shift: &[f64]) -> Option<(BigFloatPoint, f64)> {
+    /// relative to the size of the loops. `None` if the loops do not close.
+    fn close_loops(&self, q: &[f64]) -> Option<(BigFloatPoint, f64)> {
         /// Largest number of Newton steps. Each adds as many correct digits as the inverse has in double precision.
         const ROUNDS: usize = 40;
         let mut point = self.constants.clone();
@@ -241,11 +194,10 @@ impl<'a> WalkSampler<'a> {
         }
         // The derivatives stay those of the first pose: its inverse is accurate enough for linear convergence.
         let inverse: DMatrix<f64> = jacobian.try_inverse()?;
-        let targets: Vec<BigFloat> = shift.iter().map(|x| BigFloat::from_f64(*x)).collect::<Option<_>>()?;
         for _ in 0..ROUNDS {
             let values = self.residual.evaluate(&point)?;
             let (kept, all) = values.split_at(self.passive.len());
-            let gaps = DVector::from_iterator(kept.len(), kept.iter().zip(&targets).map(|(x, to)| (x - to).to_f64()));
+            let gaps = DVector::from_iterator(kept.len(), kept.iter().map(BigFloat::to_f64));
             let step = &inverse * gaps;
             // Converged: the other equations must be satisfied as well.
             if step.amax() < BigFloat::ROUNDING {
@@ -262,13 +214,6 @@ impl<'a> WalkSampler<'a> {
         }
         None
     }
-}
-
-/// The largest difference between two rows, relative to the largest value.
-fn largest_difference(a: &[BigFloat], b: &[BigFloat]) -> f64 {
-    let largest = a.iter().map(|x| x.to_f64().abs()).fold(f64::MIN_POSITIVE, f64::max);
-    let differences = a.iter().zip(b).map(|(x, y)| (x - y).to_f64().abs());
-    differences.fold(0.0, f64::max) / largest
 }
 
 /// A constant angle with all digits: a multiple of a quarter of a degree if the value equals one up to rounding, else

@@ -45,15 +45,6 @@ fn overconstrained_loops_may_be_moved_by_a_slide() {
     }
 }
 
-/// A loop with more equations than needed whose lengths are rounded: the numeric rank agrees with the number of base
-/// parameters.
-#[test]
-fn base_and_numeric_rank_of_a_rounded_loop_agree() {
-    let Some(text) = text("bennett.toml") else { return };
-    let (retained, rank, warnings) = counts(&text);
-    assert_eq!((retained, rank), (7, 7), "{warnings:?}");
-}
-
 /// A screw of 10 mm per turn moves the links behind it by degrees in many turns.
 #[test]
 fn numeric_ranks_are_sampled_along_the_travel_of_a_screw() {
