@@ -122,7 +122,7 @@ fn the_error_of_the_papers_treatment_is_the_force_of_the_misplaced_mass() {
     // Table 2 with other lengths is closer than with those assumed, where errors differ by factors of 3 and more; and each
     // excitation has a condition number.
     let factor = number(found, "/lengths_for_table_2/largest_factor");
-    assert!((1.0..2.0).contains(&factor), "{factor}");
+    assert!((1.0..2.5).contains(&factor), "{factor}");
     let conditions = found["conditions"].as_array().unwrap();
     assert!(conditions.len() >= 8 && conditions.iter().all(|one| number(one, "/condition_number") > 1.0));
 
