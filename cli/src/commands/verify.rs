@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use modelmill::Host;
 use modelmill::print::VerificationContext;
-use modelmill::verify::{CheckState, FileFingerprint, FileRole, Sha256, VerificationLimits};
+use modelmill::verify::{CheckState, FileFingerprint, FileRole, VerificationLimits, hash_file};
 
 use crate::args::{ParameterSource, VerifyArgs};
 use crate::failure::{CommandFailure, CommandOutcome};
@@ -75,5 +75,5 @@ fn junit_file(args: &VerifyArgs, files: &[(FileRole, PathBuf)]) -> CommandOutcom
 /// SHA-256 of the program file; `None` if the system does not give its path.
 fn program_sha256() -> Option<String> {
     let path: PathBuf = std::env::current_exe().ok()?;
-    Sha256::hash_file(output::disk(), Path::new(&path)).ok().flatten()
+    hash_file(output::disk(), Path::new(&path)).ok().flatten()
 }

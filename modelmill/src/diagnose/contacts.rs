@@ -112,8 +112,8 @@ fn residual_trace(
     })
 }
 
-/// Leaves out contacts and pushes for all drives, since a push acts through the mechanism. What is left out of a drive
-/// for another reason, such as its own standstill, stays left out of this drive alone.
+/// Excludes contacts and pushes for all drives, since a push acts through the mechanism. Samples of a drive that are
+/// excluded for another reason, such as its standstill, stay excluded for this drive only.
 fn leave_out_contacts(problem: &mut DiagnosisProblem, all: &SegmentList<'_>, contacts: Vec<Disturbance>) {
     let samples = ContactSamples::new(all);
     let about = |contacts: &[Disturbance]| -> Vec<bool> {

@@ -157,6 +157,10 @@ impl ServoIdentification {
         );
         lines.push(String::new());
         lines.extend(self.parameter_table());
+        lines.push(
+            "  The standard deviations (std) contain noise and the uncertainty of delays, not the error of numeric derivatives."
+                .to_owned(),
+        );
         lines.push(String::new());
         lines.extend(self.delays.iter().map(|delay| format!("  {}", delay_line(delay))));
         lines.push(format!(
@@ -209,7 +213,7 @@ impl ServoIdentification {
                 ("parameter", ColumnAlignment::Left),
                 ("value", ColumnAlignment::Right),
                 ("std", ColumnAlignment::Right),
-                ("std", ColumnAlignment::Right),
+                ("relative std", ColumnAlignment::Right),
                 ("meaning", ColumnAlignment::Left),
                 ("unit", ColumnAlignment::Left),
             ],

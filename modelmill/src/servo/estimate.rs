@@ -15,11 +15,11 @@ use super::delay::{ServoDelay, delays};
 use super::instruments::commanded_segment;
 use super::rows::{EquationRows, UsedSamples};
 use super::scale::ServoScale;
-use super::thresholds::{IMPOSSIBLE_SIGMAS, INSTRUMENT_CORRELATION, MOST_SAMPLES};
+use super::thresholds::{IMPOSSIBLE_SIGMAS, INSTRUMENT_CORRELATION, LARGE_BALANCE_ERROR, MOST_SAMPLES};
 use crate::error::{Error, Outcome};
 use crate::recording::PreparedRecording;
 use crate::segment::RecordingSegment;
-use crate::text::table::{count, number};
+use crate::text::table::{count, number, percent};
 
 /// The estimator that was used.
 #[derive(Clone, Debug, PartialEq)]
@@ -131,7 +131,10 @@ impl ServoModel {
             let system = ServoSystem::new(self, &check)?;
             system.row_errors(&system.equations(&values)?.0, &base)
         };
+        let fitted = system.row_errors(&solved.equations, &base);
         let mut notes = remarks(self, &system.unknown, &solved, &delays);
+        notes.extend(large_errors(&fitted, "the fitted recordings"));
+        notes.extend(large_errors(&checked, "the validation run"));
         for note in &notes {
             self.equations.host().note(note);
         }
@@ -141,7 +144,7 @@ impl ServoModel {
             samples: system.samples.iter().map(|one| one.segment.samples()).sum(),
             parameters: system.parameters(&solved, &spread, &base),
             scaled_condition_number: Some(solved.solution.scaled_condition_number).filter(|c| c.is_finite()),
-            fit: system.row_errors(&solved.equations, &base),
+            fit: fitted,
             check: checked,
             estimator: solved.estimator,
             delays,
@@ -480,6 +483,20 @@ impl EquationRows {
         self.regressor.extend(other.regressor);
         self.measured.extend(other.measured);
     }
+}
+
+/// A note on each drive whose balance error is no small part of its force. `place` states the recordings.
+fn large_errors(rows: &[ServoRowError], place: &str) -> Vec<RecordingNote> {
+    let is_large = |row: &&ServoRowError| row.error > LARGE_BALANCE_ERROR * row.force;
+    let note = |row: &ServoRowError| {
+        RecordingNote::warning(message!(
+            "The balance of {} misses {} of the force on {place}: the values may be wrong by more than their standard deviations. \
+             Look for a limit or dead band of the servo, and for friction that the model lacks.",
+            row.drive,
+            percent(Some(row.error / row.force))
+        ))
+    };
+    rows.iter().filter(is_large).map(note).collect()
 }
 
 /// Notes on the result.

@@ -32,5 +32,8 @@ pub(super) const INSTRUMENT_CORRELATION: f64 = 0.2;
 pub(super) const INSTRUMENT_RIDGE: f64 = 1e-10;
 /// A value of an impossible sign is reported if it is this many standard deviations beyond zero. By judgement.
 pub(super) const IMPOSSIBLE_SIGMAS: f64 = 3.0;
+/// A balance error above this share of the force of a drive (1) is reported. By judgement: the EMPS axis has 0.044 on
+/// the fitted recording and 0.089 on another one.
+pub(super) const LARGE_BALANCE_ERROR: f64 = 0.1;
 /// Most samples of the estimate; more are thinned evenly. By judgement.
 pub(super) const MOST_SAMPLES: usize = 40_000;

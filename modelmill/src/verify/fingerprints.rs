@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 
-use super::digest::Sha256;
+use super::digest::{hash_bytes, hash_file};
 
 /// What a file is used for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -49,18 +49,14 @@ impl FileFingerprint {
     /// Fails when one of the other files cannot be read.
     pub fn all<'a>(model: &Model, others: impl IntoIterator<Item = (FileRole, &'a Path)>) -> Outcome<Vec<Self>> {
         // The text that was derived counts, even if the file has changed since.
-        let own = model.loaded.sources.files.iter().map(|file| {
-            let mut hash = Sha256::default();
-            hash.update(file.text.as_bytes());
-            Self {
-                role: FileRole::Model,
-                file: file.path.display().to_string(),
-                sha256: Some(hash.finish()),
-            }
+        let own = model.loaded.sources.files.iter().map(|file| Self {
+            role: FileRole::Model,
+            file: file.path.display().to_string(),
+            sha256: Some(hash_bytes(file.text.as_bytes())),
         });
         let mut all: Vec<Self> = own.collect();
         for (role, path) in others {
-            let sha256 = Sha256::hash_file(model.host().files(), path).map_err(|error| {
+            let sha256 = hash_file(model.host().files(), path).map_err(|error| {
                 let [fault, remedy] = [error.fault.to_string(), error.fault.remedy().to_string()];
                 Error::input(format!("{} cannot be read: {fault}; {remedy}", path.display()))
             })?;

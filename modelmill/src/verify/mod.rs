@@ -22,7 +22,7 @@ use crate::model::Model;
 use crate::recording::PreparedRecording;
 
 pub use checks::{CheckScope, CheckState, VerificationCheck};
-pub use digest::Sha256;
+pub use digest::hash_file;
 pub use fingerprints::{FileFingerprint, FileRole};
 pub use limits::{DriveErrorLimit, VerificationLimits};
 

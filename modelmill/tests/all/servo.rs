@@ -1,9 +1,9 @@
 //! Servo logs without forces: planted gains are recovered from simulations with closed-form dynamics, and what fixes
 //! the scale is compared with an independent rank.
 
-use modelmill::Model;
 use modelmill::recording::{DerivativeSource, RecordingOptions, SmoothingMethod, StatePreparation};
 use modelmill::servo::{ServoEstimator, ServoIdentification, ServoModel, ServoStatus};
+use modelmill::{Model, RecordingNote};
 
 use crate::draws::Draws;
 
@@ -189,6 +189,29 @@ fn gains_and_delay_are_recovered_with_a_known_gravity_load() {
     }
     println!("{inside} of {all}");
     assert!(inside >= all - 5, "{inside} of {all}");
+}
+
+/// A friction that the model lacks is no noise: the values come with a warning, and not where nothing is lacking.
+#[test]
+fn a_balance_with_large_errors_is_reported() {
+    let text = pendulum(&[("ml", 0.15)]);
+    let without_friction = text.replace("[[effect]]\nkind = \"coulomb_friction\"\nat = \"motor\"\n", "");
+    assert!(without_friction.len() < text.len());
+    let planted = Planted {
+        j: 0.05,
+        ml: 0.15,
+        kp: 20.0,
+        kd: 0.4,
+        viscous: 0.05,
+        coulomb: 1.0,
+        delay: 0.005,
+    };
+    let log = simulate(&planted, 20, 6000);
+    for (text, is_reported) in [(text, false), (without_friction, true)] {
+        let found = identify(&servo(&text), log.clone());
+        let misses = |note: &RecordingNote| note.says.in_library_words().contains("The balance of motor misses");
+        assert_eq!(found.notes.iter().any(misses), is_reported, "{:?}", found.fit);
+    }
 }
 
 /// A planar arm of two links in a vertical plane, with servos on both joints.
