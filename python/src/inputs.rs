@@ -22,6 +22,7 @@ pub(crate) enum PythonSource<'py> {
 
 /// A recording that is to be prepared together with others.
 #[derive(FromPyObject)]
+#[expect(clippy::large_enum_variant, reason = "a call has a few of them")]
 pub(crate) enum PythonInput<'py> {
     /// One that was prepared before.
     Prepared(PyRef<'py, PythonRecording>),
