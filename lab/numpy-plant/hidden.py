@@ -134,13 +134,17 @@ def judge(answer, items):
         fitting = [a for a in alternatives if a <= truth]
         if fitting:
             covered |= max(fitting, key=len)
-    # Errors of the geometry that are named stand for all claims together.
+    # Errors of the geometry that are named stand for all claims together, if none of the wrong ones is thought likely.
+    def is_wrong(one):
+        return not any(a <= truth for a in claims([{**one, "indistinguishable_from": []}])[0])
+
+    likely = any(one["probability"] > 0.5 and is_wrong(one) for one in answer["effects"])
     for one in answer.get("geometry_alternatives", []):
         errors = set()
         for error in one["errors"]:
             errors.add(("zero", error["point"]) if error["point"] else ("constant", error["constant"]))
         if errors == truth:
-            return "right"
+            return "false" if likely else "right"
     if any(not any(a <= truth for a in alternatives) for alternatives in claimed):
         return "false"
     if covered == truth:

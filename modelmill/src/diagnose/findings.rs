@@ -332,17 +332,25 @@ impl DiagnosisFindings {
         let Some(best) = self.geometry_alternatives.iter().find(is_equal) else {
             return;
         };
+        let claimed: Vec<LocatedEffect> = self.missing.iter().map(|one| one.effect.clone()).collect();
         let alternatives: Vec<LocatedEffect> = best.errors.iter().map(GeometryError::as_effect).collect();
+        let others: Vec<LocatedEffect> = (alternatives.iter().filter(|one| !claimed.contains(*one)).cloned()).collect();
+        if others.is_empty() {
+            return;
+        }
         let found = self.diagnosis.effects.iter_mut().zip(&mut self.missing);
-        for (found, missing) in found.filter(|(found, _)| found.effect.kind != CONSTANT_ERROR) {
+        // What both explanations have in common stays as certain as before.
+        for (found, missing) in found.filter(|(found, _)| !alternatives.contains(&found.effect)) {
             // With n equal explanations each has 1/n; one more makes it 1/(n + 1).
             let shared = found.probability / (1.0 + found.probability);
-            for (probability, others) in [
+            for (probability, list) in [
                 (&mut found.probability, &mut found.indistinguishable_from),
                 (&mut missing.probability, &mut missing.indistinguishable_from),
             ] {
                 *probability = shared;
-                others.extend(alternatives.iter().cloned());
+                let new = others.iter().filter(|one| !list.contains(*one)).cloned();
+                let new: Vec<LocatedEffect> = new.collect();
+                list.extend(new);
             }
         }
     }

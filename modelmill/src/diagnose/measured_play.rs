@@ -14,7 +14,7 @@ use crate::model::Model;
 /// Kind of the effect, and of the disturbance that is replaced by it.
 const KIND: &str = "backlash";
 
-/// The t value of what is measured directly: any that counts as certain.
+/// The t value of a width without a standard deviation: any that counts as certain.
 const CERTAIN_T: f64 = 100.0;
 
 /// Turns play that was measured in the positions of driven joints into effects. Forces that show the same play keep
@@ -49,7 +49,7 @@ pub(crate) fn report_as_effects(model: &Model, candidates: &[CandidateEffect], d
         // What is measured directly is certain, as far as anything is.
         let support = EffectSupport {
             white_residual: true,
-            t: CERTAIN_T,
+            t: deviation.filter(|std| *std > 0.0).map_or(CERTAIN_T, |std| width / std),
             gain: 1.0,
             unexplained: 0.0,
             share: 1.0,
