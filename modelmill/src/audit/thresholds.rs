@@ -118,6 +118,10 @@ pub(super) const EVENTS_MOST_DURATION_SHARE: f64 = 0.6;
 /// The mean residual of an event exceeds the noise within it by this many standard deviations (1).
 pub(super) const LOCAL_NOISE_LEAST_DEVIATIONS: f64 = 8.0;
 
+/// Errors of the time stamps that count as possible: half a sample, but at most this time, s. By judgement: clocks of
+/// loggers jitter by some milliseconds.
+pub(super) const TIME_ERROR_MOST_S: f64 = 0.005;
+
 /// A switch of friction is near the start or end of an event if there is less time between them, s.
 pub(super) const SWITCH_NEAR_S: f64 = 0.05;
 

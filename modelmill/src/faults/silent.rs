@@ -15,9 +15,9 @@ use nalgebra::DVector;
 
 use super::RecordingFaultKind;
 use super::thresholds::{
-    SILENCE_FEWEST_SAMPLES, SILENCE_LEAST_FORCE_SHARE, SILENCE_MOST_INTERVALS, SILENCE_MOTION_SHARE,
-    SILENCE_NOISE_SIGMAS, SILENCE_RESIDUAL_FACTOR, SILENCE_SHORTEST_S, SILENCE_STANDSTILL_SHARE,
-    SILENCE_VARIATION_FACTOR,
+    BRAKED_FORCE_SHARE, BRAKED_NOISE_FACTOR, FROZEN_MOST_REPEATS, SILENCE_FEWEST_SAMPLES, SILENCE_LEAST_FORCE_SHARE,
+    SILENCE_MOST_INTERVALS, SILENCE_MOTION_SHARE, SILENCE_NOISE_SIGMAS, SILENCE_RESIDUAL_FACTOR, SILENCE_SHORTEST_S,
+    SILENCE_STANDSTILL_SHARE, SILENCE_VARIATION_FACTOR,
 };
 use crate::audit::rows::AuditRows;
 use crate::model::Model;
@@ -119,6 +119,8 @@ struct FlatInterval {
     level: f64,
     /// Standard deviation of white noise of the force.
     noise: f64,
+    /// Whether all values are the same number, while values outside of such intervals hardly ever repeat.
+    is_frozen: bool,
 }
 
 /// Intervals of a segment in which forces were not measured; none if forces are missing or a pose has no solution.
@@ -218,6 +220,7 @@ fn flat_intervals(drive: usize, force: &[f64], time: &[f64]) -> Vec<FlatInterval
     let shortest = count(SILENCE_SHORTEST_S / step).max(SILENCE_FEWEST_SAMPLES);
     let largest = force.iter().fold(0.0_f64, |most, f| most.max(f.abs()));
     let noise = white_noise(force).max(1e-9 * largest);
+    let repeated = repeated_share(force);
     // The mean of a block has less noise than a sample.
     let tolerance = SILENCE_NOISE_SIGMAS * noise / (block as f64).sqrt();
     let near = |sample: usize, level: f64| (force[sample] - level).abs() <= SILENCE_NOISE_SIGMAS * noise;
@@ -247,15 +250,29 @@ fn flat_intervals(drive: usize, force: &[f64], time: &[f64]) -> Vec<FlatInterval
         while end < n && near(end, level) {
             end += 1;
         }
+        let is_frozen = repeated(start..end) == 1.0 && repeated(0..start).max(repeated(end..n)) < FROZEN_MOST_REPEATS;
         found.push(FlatInterval {
             drive,
             range: from..end,
             level,
             noise,
+            is_frozen,
         });
         start = end;
     }
     found
+}
+
+/// The share of values in a range that are the same number as the one before (1).
+fn repeated_share(force: &[f64]) -> impl Fn(Range<usize>) -> f64 {
+    |range| {
+        let values = &force[range];
+        let repeats = values
+            .windows(2)
+            .filter(|pair| pair[0].total_cmp(&pair[1]).is_eq())
+            .count();
+        repeats as f64 / values.len().saturating_sub(1).max(1) as f64
+    }
 }
 
 /// A count that was computed, rounded down; at most a million.
@@ -354,34 +371,47 @@ impl<'a> SilenceFit<'a> {
         let moved = moved_share(model, data, one);
         let is_zero = one.is_zero(forces);
         let stands = moved <= SILENCE_STANDSTILL_SHARE;
-        if !stands && moved < SILENCE_MOTION_SHARE {
+        if !stands && moved < SILENCE_MOTION_SHARE && !one.is_frozen {
             return None;
         }
         // A stuck channel misses changes, not only a level, which friction may cause.
         let middle = mean(&|x| x);
         let variation = mean(&|x| (x - middle).powi(2)).sqrt();
-        if !is_zero && variation < SILENCE_VARIATION_FACTOR * self.residual[d].max(one.noise) {
+        if !is_zero && !one.is_frozen && variation < SILENCE_VARIATION_FACTOR * self.residual[d].max(one.noise) {
             return None;
         }
         match (stands, is_zero) {
             // Dry friction may hold a joint without any force.
             (true, true) if mean(&f64::abs) <= self.dry[d] => None,
-            // Brakes hold all joints.
-            (true, true)
-                if data
-                    .run
-                    .q
-                    .iter()
-                    .all(|q| travel_share(q, &one.range) <= SILENCE_STANDSTILL_SHARE) =>
-            {
-                Some((RecordingFaultKind::Brakes, size))
-            }
+            (true, true) if is_braked(model, data, &one.range) => Some((RecordingFaultKind::Brakes, size)),
+            // Friction or another joint may hold a joint without force while others work.
+            (true, true) => None,
             // At standstill friction may take any part of the force.
             (true, false) => None,
-            (_, true) => Some((RecordingFaultKind::DeadChannel, size)),
+            (false, true) => Some((RecordingFaultKind::DeadChannel, size)),
             (false, false) => Some((RecordingFaultKind::FrozenForce, size)),
         }
     }
+}
+
+/// Whether brakes hold the machine during an interval: all joints stand, and no drive works.
+fn is_braked(model: &Model, data: &RecordingSegment, range: &Range<usize>) -> bool {
+    let forces = data.run.force.as_deref().unwrap_or_default();
+    let drives = model.derivation.mechanism.drives.iter();
+    let works = |force: &[f64]| {
+        let rms = |force: &[f64]| (force.iter().map(|f| f * f).sum::<f64>() / force.len().max(1) as f64).sqrt();
+        let noise = white_noise(force);
+        rms(&force[range.clone()]) > (BRAKED_NOISE_FACTOR * noise).max(BRAKED_FORCE_SHARE * rms(force))
+    };
+    let is_driven = drives.map(|drive| drive.is_driven);
+    data.run
+        .q
+        .iter()
+        .all(|q| travel_share(q, range) <= SILENCE_STANDSTILL_SHARE)
+        && !forces
+            .iter()
+            .zip(is_driven)
+            .any(|(force, is_driven)| is_driven && works(force))
 }
 
 /// The share of its travel by which the joint of a drive moves during an interval; for a drive between points the

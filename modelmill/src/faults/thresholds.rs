@@ -129,6 +129,16 @@ pub(super) const SILENCE_STANDSTILL_SHARE: f64 = 0.002;
 /// joint. By judgement.
 pub(super) const SILENCE_MOTION_SHARE: f64 = 0.05;
 
+/// A channel whose values repeat exactly is stuck if elsewhere at most this share of its values repeats (1). By
+/// judgement: readings with a dead band or coarse steps repeat often.
+pub(super) const FROZEN_MOST_REPEATS: f64 = 0.05;
+
+/// With brakes on, no drive has a force above this many times its white noise (1) ...
+pub(super) const BRAKED_NOISE_FACTOR: f64 = 3.0;
+
+/// ... or this share of its rms force, since sensors have an offset (1). By judgement.
+pub(super) const BRAKED_FORCE_SHARE: f64 = 0.03;
+
 /// While a channel is stuck, the predicted force varies by at least this many times the residual of the rest of the
 /// recording (1). By judgement.
 pub(super) const SILENCE_VARIATION_FACTOR: f64 = 2.0;

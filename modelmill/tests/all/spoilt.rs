@@ -147,6 +147,41 @@ fn forces_that_were_not_measured_are_left_out() {
     }
 }
 
+/// A reading that repeats one number is stuck, also while its joint moves so little that friction could hold it.
+#[test]
+fn a_number_that_repeats_is_stuck_though_the_joint_hardly_moves() {
+    let model = Model::open(bundled("two_link")).expect("a model");
+    let (names, drives) = (model.active_coordinates(), model.drives());
+    let sound = Table::made("two_link", 5);
+    let (position, force) = (sound.place(&names[1]), sound.place(&drives[1]));
+    let travel = |rows: &[Vec<f64>]| {
+        let q = rows.iter().map(|row| row[position]);
+        q.clone().fold(f64::MIN, f64::max) - q.fold(f64::MAX, f64::min)
+    };
+    // About the turning point at which the joint moves least.
+    let length = (0.5 / STEP).ceil() as usize;
+    let starts = (SAMPLES / 4..SAMPLES * 3 / 4).min_by(|a, b| {
+        let [a, b] = [*a, *b].map(|k| travel(&sound.rows[k..k + length]));
+        a.total_cmp(&b)
+    });
+    let from = starts.expect("a turning point");
+    let share = travel(&sound.rows[from..from + length]) / travel(&sound.rows);
+    assert!((0.002..0.05).contains(&share), "{share}");
+    let level = sound.rows.iter().map(|row| row[force]).fold(f64::MIN, f64::max);
+    let spoilt = sound.changed(&drives[1], &|k, x| {
+        if (from..from + length).contains(&k) {
+            0.8 * level
+        } else {
+            x
+        }
+    });
+    let read = spoilt.read(&model);
+    let faults: Vec<&str> = (read.segments.iter().flat_map(|one| &one.faults))
+        .map(|fault| fault.kind.as_str())
+        .collect();
+    assert_eq!(faults, ["frozen_force"]);
+}
+
 /// The verdict names the fault, the rest holds for the corrected recording, and two faults are both found.
 #[test]
 fn a_diagnosis_runs_on_the_corrected_recordings() {

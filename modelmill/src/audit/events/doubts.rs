@@ -1,4 +1,5 @@
-//! Doubts about a segment of one drive: a noise that is large there, and a switch of friction at its start or end.
+//! Doubts about a segment of one drive: a noise that is large there, a switch of friction at its start or end, and a
+//! force so steep that an error of the time stamps explains it.
 
 use super::levels::SearchedResidual;
 use super::segments::DriveSegment;
@@ -6,6 +7,7 @@ use super::smoothing::{range_median, sample_quantile};
 use super::trace::ResidualTrace;
 use crate::audit::thresholds::{
     LOCAL_NOISE_LEAST_DEVIATIONS, STICK_LONGEST_S, STICK_MOST_FRICTIONS, SWITCH_FRICTION_SHARE, SWITCH_NEAR_S,
+    TIME_ERROR_MOST_S,
 };
 
 /// Half of the time that an edge may take, s.
@@ -49,6 +51,17 @@ pub(super) fn may_be_friction(trace: &ResidualTrace, rest: &SearchedResidual, se
     let is_between_switches = has_switch(segment.start) || has_switch(segment.end);
     let is_short = lasted < STICK_LONGEST_S && rest.is_masked[about].contains(&true);
     (is_between_switches || is_short) && segment.force.abs() < SWITCH_FRICTION_SHARE * friction
+}
+
+/// Whether an error of the time stamps explains a segment: the force changes so fast there that a shift by half a sample
+/// gives an error of this size. Then another drive must confirm it.
+pub(super) fn may_be_time_error(trace: &ResidualTrace, segment: &DriveSegment) -> bool {
+    let fitted = trace.fitted_force(segment.drive);
+    let last = segment.end.min(trace.samples()) - 1;
+    let steps = (segment.start..last).map(|i| (fitted[i + 1] - fitted[i]).abs());
+    let rate = trace.sample_rate();
+    let slope = rate * steps.sum::<f64>() / (last - segment.start).max(1) as f64;
+    segment.force.abs() < slope * (0.5 / rate).min(TIME_ERROR_MOST_S)
 }
 
 /// How much the residual changes at the start and at the end of a segment, in units of its force (1): 1 for a push that

@@ -56,7 +56,8 @@ fn accept_segment(
     }
     segment.masked_share = true_share(masked);
     segment.edge_contrast = doubts::edge_contrast(trace, rest, &segment);
-    segment.needs_support = doubts::may_be_friction(trace, rest, &segment) && !segment.is_sharp();
+    let may_be_friction = doubts::may_be_friction(trace, rest, &segment) && !segment.is_sharp();
+    segment.needs_support = may_be_friction || doubts::may_be_time_error(trace, &segment);
     let comparison = similar_states::compare_with_similar_states(trace, rest, states, &segment);
     segment.is_confirmed = comparison == StateComparison::Alone;
     match comparison {

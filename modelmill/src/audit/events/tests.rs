@@ -4,6 +4,8 @@ use std::f64::consts::TAU;
 
 use modelmill_runtime::RandomBits;
 
+use super::doubts::may_be_time_error;
+use super::segments::DriveSegment;
 use super::trace::ResidualTrace;
 use super::{ContactEvent, find_events};
 
@@ -109,6 +111,37 @@ fn push(trace: &mut ResidualTrace, forces: &[f64], from: f64, to: f64) {
 fn has_event(events: &[ContactEvent], from: f64, to: f64) -> bool {
     let is_it = |event: &&ContactEvent| (event.from - from).abs() < 0.1 && (event.to - to).abs() < 0.1;
     events.iter().filter(is_it).count() == 1
+}
+
+/// A residual that a shift of the force by a fourth of a sample explains may be an error of the time stamps; three times
+/// that cannot be.
+#[test]
+fn small_residuals_of_steep_forces_may_be_errors_of_time() {
+    let trace = calm_trace(7, false);
+    for start in (100..2000).step_by(50) {
+        let fitted = trace.fitted_force(1);
+        let steps = (start..start + 19).map(|i| (fitted[i + 1] - fitted[i]).abs());
+        let step = steps.sum::<f64>() / 19.0;
+        for (force, expected) in [(0.25 * step, true), (-0.25 * step, true), (0.75 * step, false)] {
+            let segment = DriveSegment {
+                drive: 1,
+                start,
+                end: start + 20,
+                force,
+                deviations: 10.0,
+                masked_share: 0.0,
+                edge_contrast: 1.0,
+                is_confirmed: true,
+                needs_support: false,
+                is_at_standstill: false,
+            };
+            assert_eq!(
+                may_be_time_error(&trace, &segment),
+                expected,
+                "{start}: {force} of {step}"
+            );
+        }
+    }
 }
 
 #[test]
