@@ -15,7 +15,7 @@ use crate::text::table::count;
 pub struct FitAdoption {
     /// Text of the file.
     pub text: String,
-    /// The file as it is read after the edit.
+    /// The edited file, read and validated.
     pub loaded: LoadedModel,
     /// The values that were written.
     pub adopted: AdoptedValues,

@@ -12,6 +12,7 @@ use crate::faults::SuspectedFault;
 use crate::model::Model;
 use crate::recording::{self, PreparedRecording};
 use crate::segment::RecordingSegment;
+use crate::text::table::significant;
 
 /// Errors of a model along recordings.
 pub struct ModelComparison {
@@ -200,7 +201,7 @@ pub fn error_locations(
                 let error = errors_of(k, *d);
                 let mut found = locate_errors(&[(drive, &error)], &[(TIME_COLUMN, &time)], &LocateOptions::default());
                 for region in &mut found {
-                    region.says = format!("{}: {}", one.run.file, region.says);
+                    region.says = format!("{}: {}", one.run.file, region_sentence(model, region));
                 }
                 in_time.extend(found);
             }
@@ -229,12 +230,65 @@ pub fn error_locations(
     let mut regions = model.host().run_job("locating errors", 0, |_| {
         locate_errors(&errors, &variables, &LocateOptions::default())
     })?;
+    for region in &mut regions {
+        region.says = region_sentence(model, region);
+    }
     regions.extend(in_time);
     Ok(ErrorLocations {
         regions,
         rounding,
         by_rate: residuals_by_rate(model, data, measured, forces, &drives)?,
     })
+}
+
+/// A region as a sentence without full stop. The range has its unit, which only the model knows.
+fn region_sentence(model: &Model, region: &ErrorRegion) -> String {
+    format!(
+        "{:.0} % of the squared error of {} is in the samples with {} {} ({:.0} % of all samples)",
+        100.0 * region.share,
+        region.channel,
+        region.variable,
+        region_range(region, &variable_unit(model, &region.variable)),
+        100.0 * region.samples
+    )
+}
+
+/// The range of a region as a phrase, such as `between 0.1 and 0.2 m/s`.
+pub(crate) fn region_range(region: &ErrorRegion, unit: &str) -> String {
+    let [low, high] = region.range;
+    // A range of equal size on both sides of zero is a range of magnitudes, as for rates near standstill.
+    let is_around_zero = low < 0.0 && low.to_bits() == (-high).to_bits();
+    let around = if is_around_zero { ", around zero" } else { "" };
+    let [low, high] = [low, high].map(|end| significant(end, 3));
+    let separator = if unit.is_empty() { "" } else { " " };
+    format!("between {low} and {high}{separator}{unit}{around}")
+}
+
+/// Unit of a variable by its name: a coordinate or the length of a drive, their rates and accelerations, a force, the
+/// time. Empty for a quaternion.
+pub(crate) fn variable_unit(model: &Model, name: &str) -> String {
+    let mechanism = &model.derivation.mechanism;
+    if name == TIME_COLUMN {
+        return "s".to_owned();
+    }
+    if let Some(d) = mechanism.drives.iter().position(|d| d.name == name) {
+        return model.force_unit(d).to_owned();
+    }
+    let (of, per) = if let Some(of) = name.strip_suffix("_dd") {
+        (of, "/s^2")
+    } else if let Some(of) = name.strip_suffix("_d") {
+        (of, "/s")
+    } else {
+        (name, "")
+    };
+    let of = of.strip_suffix("_length").unwrap_or(of);
+    let coordinate = mechanism.coordinates.iter().find(|c| c.name == of);
+    match coordinate.map_or("m", |c| c.motion.unit()) {
+        "1" if per.is_empty() => String::new(),
+        // The rates of a quaternion are components of an angular velocity.
+        "1" => format!("rad{per}"),
+        unit => format!("{unit}{per}"),
+    }
 }
 
 /// How the residuals of a model with some values of its base parameters depend on the rates of their drives.

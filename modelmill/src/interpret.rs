@@ -144,7 +144,7 @@ impl InterpretationResult {
         names.map(|u| parameters[*u].name.clone()).collect()
     }
 
-    /// All real solutions; none where something is not determined.
+    /// All real solutions; empty if some direction is not determined.
     pub fn solutions(&self) -> &[PhysicalSolution] {
         match &self.found {
             PhysicalInterpretation::Exact { solutions } | PhysicalInterpretation::LeastSquares { solutions, .. } => {

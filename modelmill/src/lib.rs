@@ -181,9 +181,8 @@
 //! The modules are listed in the order of the data flow. Each module uses only modules before it.
 //!
 //! [`text`], [`error`], [`progress`], [`host`], [`model`], [`picture`], [`atlas`], [`segment`], [`along`], [`audit`],
-//! [`recording`], [`compare`], [`evaluate`], [`states`], [`forward`], [`identify`], [`servo`], [`runs`], [`diagnose`],
-//! [`verify`], [`add`], [`adopt`],
-//! [`interpret`], [`excite`], [`variants`], [`generate`], [`simulate`], [`reduce`], [`mod@import`], [`mod@export`],
+//! [`faults`], [`recording`], [`compare`], [`evaluate`], [`states`], [`forward`], [`identify`], [`servo`], [`runs`], [`diagnose`],
+//! [`verify`], [`add`], [`adopt`], [`interpret`], [`excite`], [`variants`], [`generate`], [`simulate`], [`reduce`], [`mod@import`], [`mod@export`],
 //! [`mod@print`], [`report`].
 
 pub mod add;

@@ -88,8 +88,8 @@ impl TerminalCurve<'_> {
 pub(crate) fn time_axis(time: &[f64]) -> String {
     let first = format!("{:.1} s", time.first().copied().unwrap_or(0.0));
     let last = format!("{:.1} s", time.last().copied().unwrap_or(0.0));
-    let gap = WIDTH.saturating_sub(first.len() + last.len());
-    format!("{:>SCALE$} +{first}{}{last}", "", "-".repeat(gap))
+    let gap = WIDTH.saturating_sub(first.len() + last.len() + 4);
+    format!("{:>SCALE$} +- {first} {} {last}", "", "-".repeat(gap))
 }
 
 /// A horizontal bar: `value` of `limit` over some characters, in eighths of a character.

@@ -173,6 +173,24 @@ fn identify_and_compare_give_figures_by_channel() {
         for key in ["channel", "in", "says"] {
             assert!(region[key].is_string(), "{region}");
         }
+        // Ranges have their unit; that of a coordinate differs from that of a drive's force.
+        let unit = match region["in"].as_str().expect("a variable") {
+            "t" => "s",
+            "spindle_left" | "spindle_right" => "N",
+            "theta1" | "theta2" | "gamma1" | "gamma2" => "rad",
+            "spindle_left_length" | "spindle_right_length" => "m",
+            "spindle_left_d" | "spindle_right_d" => "m/s",
+            rate if rate.ends_with("_dd") => "rad/s^2",
+            _ => "rad/s",
+        };
+        let says = region["says"].as_str().expect("a sentence");
+        let before_share = says.rsplit_once(" (").expect("a share of the samples").0;
+        assert!(
+            before_share
+                .trim_end_matches(", around zero")
+                .ends_with(&format!(" {unit}")),
+            "{says}"
+        );
         assert!(number(region, "/range/0") < number(region, "/range/1"));
         assert!((0.0..=1.0).contains(&number(region, "/share")));
     }

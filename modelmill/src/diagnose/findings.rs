@@ -85,7 +85,7 @@ pub struct DiagnosisFindings {
     pub diagnosis: ModelDiagnosis,
     /// The effects found: those that the model lacks.
     pub missing: Vec<MissingEffect>,
-    /// Effects with a probability below 0.5. The model is not said to lack them, and they are added to no model.
+    /// Effects with a probability below 0.5. The verdict does not name them, and they are not added to the model.
     pub possible: Vec<MissingEffect>,
     /// Hypotheses: force laws that are in no library and would explain the residual.
     pub laws: Vec<LawHypothesis>,

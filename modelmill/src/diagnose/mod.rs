@@ -10,8 +10,8 @@
 //! 2. `places`: lists the places of the mechanism on which effects may act.
 //! 3. `candidates`: derives the effects that `add` could add to the model file.
 //! 4. `columns`, `numbers`: evaluate the forces of these effects along the recordings.
-//! 5. `faults`, `contacts`: find faults of recordings. Before the search, their forces are subtracted or their samples
-//!    excluded; contacts are searched in its residual once more.
+//! 5. `faults`, `contacts`: find faults of recordings and contacts before the search, and subtract their forces or
+//!    exclude their samples. After the search, contacts are searched once more, in its residual.
 //! 6. `encoders`, `gears`, `memory`, `payloads`, `constants`, `tilt`, `held_friction`: add candidates that a model file
 //!    cannot contain.
 //! 7. `problem`: formulates the search with all of these, and solves it.

@@ -2,12 +2,13 @@
 //! gravity, dead channels. A prepared recording goes in; faults come out, each with what was found, what to do, and the
 //! operation that corrects it.
 //!
-//! The faults are entries of one list. An entry proposes hypotheses. All hypotheses are judged alike: by the fall of
-//! the error of the model, with all parameters fitted and with nominal values. A hypothesis must be decisive, and no
-//! other one may explain the recording equally well.
+//! The faults are entries of one list. An entry proposes hypotheses. The criterion is the same for all hypotheses: how
+//! much the correction lowers the error of the model, with all parameters fitted and with nominal values. The decrease
+//! must be clear, and no other hypothesis may explain the recording equally well.
 //!
-//! Decision: a fault is only reported where a recording is read, and corrected nowhere but in a diagnosis, which states
-//! it first. Exceptions are wrapped angles and forces that were not measured: they are mended with a note.
+//! Decision: reading a recording reports faults and does not correct them. Only a diagnosis corrects them, and its
+//! verdict begins with them. Exceptions are wrapped angles, which are unwrapped, and forces that were not measured,
+//! which are left out, both with a note.
 
 mod angle_units;
 mod bench;
@@ -103,7 +104,7 @@ pub struct SuspectedFault {
     pub clause: String,
     /// What to do, as a sentence.
     pub advice: Message,
-    /// Errors of the best fit as it is and after the correction, as a sentence; empty if they show nothing.
+    /// Errors of the best fit before and after the correction, as a sentence; empty if they do not differ clearly.
     pub evidence: String,
     /// Sum over the drives of the logarithms by which the fitted errors fall with the correction.
     pub(crate) fit_gain: f64,

@@ -1,5 +1,5 @@
 //! Simulated positions compared with recorded ones over horizons: recordings go in, rms errors for each horizon and
-//! coordinate come out, with the horizon up to which they say something about the model.
+//! coordinate come out, with the longest horizon over which they depend on the model.
 //!
 //! Decision: the growth of a small disturbance of the first state bounds the horizons. Beyond this bound, errors come
 //! from the encoder and the first state, whatever the model.
@@ -25,7 +25,7 @@ pub struct ForwardComparison {
     /// The errors, the shortest horizon first; the last one is the longest whole run.
     pub horizons: Vec<HorizonError>,
     /// The longest time over which a disturbance of the first state grows by less than a factor of 100, s: over
-    /// longer horizons, errors say nothing about the model. `None` if it does not grow that much within the
+    /// longer horizons, the errors do not show whether the model is correct. `None` if it does not grow that much within the
     /// recordings.
     pub longest_horizon: Option<f64>,
 }

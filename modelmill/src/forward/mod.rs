@@ -1,4 +1,4 @@
-//! Forward simulation of a model: a recording goes in, the motion that the model makes under its recorded forces
+//! Forward simulation of a model: a recording goes in, the motion of the model under the recorded forces
 //! comes out.
 //!
 //! `plant` is the equation of motion with dry friction, `integrate` advances a state, `horizons` compares simulated

@@ -103,10 +103,10 @@ impl Host {
         self
     }
 
-    /// The host with this setting: whether constants are replaced by their numeric values before the derivation
+    /// Sets whether constants are replaced by their numeric values before the derivation
     /// ([`modelmill_spec::Mechanism::with_numeric_constants`]).
     ///
-    /// If they are, the model is valid for this geometry only. Special geometry can reduce the number of base
+    /// If they are replaced, the model is valid for this geometry only. Special geometry can reduce the number of base
     /// parameters, and generated code has no geometric constants as inputs.
     #[must_use]
     pub fn at_values(mut self, is_wanted: bool) -> Self {

@@ -54,7 +54,7 @@ pub struct Identification {
     /// File names of the periodic recordings, each with the period and the noise floor.
     pub repeats: Vec<(String, RunRepeatability)>,
     /// How the residuals of the fitted recordings depend on the velocities of their drives. Empty if there is no such
-    /// dependence, and if a model is identified from segments.
+    /// dependence, or if the model was identified from segments instead of recordings.
     pub by_rate: Vec<RateDependence>,
     /// Whether the model has nominal values, so that their errors mean something.
     pub(crate) has_nominal: bool,

@@ -282,7 +282,7 @@ impl DiagnosisFindings {
         }
         if !diagnosis.time_residuals.is_empty() {
             lines.push(String::new());
-            lines.push(style.bold("Residuals that follow the time and not the state"));
+            lines.push(style.bold("Residuals that vary with time and not with the state"));
             for one in &diagnosis.time_residuals {
                 let unit = self.before.model.force_unit(one.channel);
                 let says = words::time_residual(one, &self.channels()[one.channel], unit);
@@ -296,7 +296,7 @@ impl DiagnosisFindings {
         // Parts of the residual of each drive, relative to its force.
         let rows: Vec<Vec<String>> = (self.channels().iter().zip(&diagnosis.budgets))
             .map(|(channel, budget)| {
-                // Noise, what follows the time, and what a model could explain; disturbances are no part of the residual.
+                // Noise, what varies with time, and what a model could explain; disturbances are no part of the residual.
                 let of = |x: f64| part(x, budget.force);
                 vec![
                     channel.clone(),
@@ -311,10 +311,10 @@ impl DiagnosisFindings {
             2,
             &[
                 ("drive", ColumnAlignment::Left),
-                ("noise", ColumnAlignment::Right),
-                ("follows the time", ColumnAlignment::Right),
+                ("noise or rounding", ColumnAlignment::Right),
+                ("varies with time", ColumnAlignment::Right),
                 ("repeatable, unexplained", ColumnAlignment::Right),
-                ("(subtracted disturbances)", ColumnAlignment::Right),
+                ("disturbances (subtracted)", ColumnAlignment::Right),
             ],
             &rows,
         ));

@@ -246,8 +246,8 @@ impl ModelVerification {
         }
         if has_default(CheckScope::Parameter) {
             says.push(format!(
-                "parameters: estimates within {} % of the model's value, or with less than {} % effect on the force of every \
-                 drive; a failure needs {DEFAULT_SIGMAS} standard deviations",
+                "parameters: estimates within {} % of the model's value. A larger difference fails if it changes the force of a \
+                 drive by more than {} % and exceeds {DEFAULT_SIGMAS} standard deviations",
                 100.0 * DEFAULT_RELATIVE_DIFFERENCE,
                 100.0 * DEFAULT_FORCE_SHARE
             ));

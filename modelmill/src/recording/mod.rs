@@ -79,8 +79,8 @@ impl Model {
     }
 
     /// As [`Model::recording_of`], for several recordings of one machine: those of a fit, and those of its validation.
-    /// Cut-off, smoothing and decimation are chosen for those of the fit together, and are the same for the validation;
-    /// drives stick below the same rate in all.
+    /// Cut-off, smoothing and decimation are chosen from those of the fit together, and are the same for the validation.
+    /// The rate below which a drive counts as sticking is the same in all recordings.
     ///
     /// Each recording has its own result, since some of them may be unreadable.
     pub fn prepare_recordings(
@@ -92,8 +92,9 @@ impl Model {
         self.prepare_together(runs.map(|runs| runs.iter().map(read).collect()))
     }
 
-    /// As [`Model::prepare_recordings`], for recordings that were read: those of a fit, and those of its validation. A
-    /// choice is common to all that are prepared with the same options. Errors of reading are passed on.
+    /// As [`Model::prepare_recordings`], for recordings that were already read: those of a fit, and those of its
+    /// validation. Recordings with the same options get the same cut-off, smoothing and decimation. A recording that
+    /// could not be read keeps its error.
     pub fn prepare_together(
         &self,
         runs: [Vec<Outcome<UnpreparedRecording>>; 2],

@@ -26,15 +26,15 @@ pub struct RecordingOptions {
     pub standstill: StandstillRule,
 }
 
-/// Which forces are left out of fits and error figures because a drive sticks or reverses, where dry friction takes any
-/// value up to its size.
+/// Which forces are left out of fits and error figures because a drive sticks or reverses. Dry friction may have any
+/// value there, between zero and its value in motion.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum StandstillRule {
-    /// Those in phases in which the forces show that the drive sticks.
+    /// Forces in phases in which the recording shows that the drive sticks.
     #[default]
     Automatic,
-    /// Those at rates below this fraction of the largest rate of the drive.
+    /// Forces at rates below this fraction of the largest rate of the drive.
     Below(f64),
-    /// None.
+    /// No forces are left out.
     KeepAll,
 }

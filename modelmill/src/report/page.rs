@@ -132,7 +132,9 @@ fn steps_section(findings: &DiagnosisFindings) -> String {
         "<figure class=\"still\"><figcaption><b>Error relative to the force</b> <span class=\"key c-fit\">fit</span> \
          <span class=\"key c-after\">{}</span></figcaption>\n{}</figure>\n{}\n\
          <p>All errors are nrms: rms of measured minus calculated force, divided by rms of the measured force. Each step was \
-         tested {}.</p>\n{}",
+         tested {}. <i>t value of the decrease</i>: the mean decrease of the squared error over blocks of time, divided by its \
+         standard error. <i>effective samples</i>: the number of independent samples that are worth as much as the correlated \
+         residuals.</p>\n{}",
         findings.validation.phrase(),
         steps::picture(findings),
         tables::steps(findings),
@@ -262,7 +264,7 @@ fn location(findings: &DiagnosisFindings) -> String {
     if !findings.places.regions.is_empty() {
         let _ = writeln!(
             html,
-            "<p>Each picture shows mean and standard deviation of the error over one variable. The range named in its caption is shaded. Each picture looks at one variable alone, so the ranges overlap. {}</p>",
+            "<p>Each picture shows mean and standard deviation of the error over one variable. The range named in its caption is shaded. The same samples may be in the ranges of several variables, so the percentages do not add up to 100 %. {}</p>",
             legend(after.is_some())
         );
         html.push_str(&regions::figures(
@@ -330,9 +332,10 @@ fn sentences(places: &ErrorLocations, what: &str) -> String {
 /// Table of all candidates with an explanation of its columns.
 fn candidates(findings: &DiagnosisFindings) -> String {
     format!(
-        "<p>The table has every kind of effect and fault at every place (drive, joint, point, part) where it can act. The first share is \
-         the part of the squared error that the candidate alone would remove. The gain is the part of the squared residual that it \
-         removes in addition to the effects found; for an effect that was found, in addition to the other effects.\
+        "<p>The table lists every kind of effect and disturbance at every place (drive, joint, point, body) where it can act. \
+         <i>alone it would explain</i>: the share of the squared error that the candidate would remove without any other effect. \
+         <i>gain in addition to the effects found</i>: the share of the squared residual that it would remove if it were added to \
+         them; for an effect that was found, to the other effects found.\
          <span class=\"script-only\"> Click on the heading of a column to sort.</span></p>\n{}",
         tables::candidates(findings)
     )

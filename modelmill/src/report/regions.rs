@@ -9,10 +9,10 @@ use modelmill_identify::{ErrorRegion, TIME_COLUMN};
 use super::draw::{PlotAxis, SvgPicture, range, with_room};
 use super::maps::MapVariable;
 use super::units::{force_unit, variable_unit};
+use crate::compare::region_range;
 use crate::diagnose::ModelVersion;
 use crate::model::Model;
 use crate::text::svg::escape;
-use crate::text::table::significant;
 
 /// Segments of the variable in a picture.
 const BINS: usize = 44;
@@ -48,20 +48,12 @@ pub(crate) fn figures(
 pub(crate) fn sentence(region: &ErrorRegion, model: &Model) -> String {
     let unit = variable_unit(model, &region.variable);
     // Units make the sentence readable without the picture.
-    let [low, high] = region.range;
     let name = if region.variable == TIME_COLUMN {
         "time"
     } else {
         &region.variable
     };
-    // A range of equal size on both sides of zero is a range of magnitudes, as for rates near standstill.
-    let is_around_zero = low < 0.0 && low.to_bits() == (-high).to_bits();
-    let around = if is_around_zero { ", around zero" } else { "" };
-    let interval = format!(
-        "{name} between {} and {} {unit}{around}",
-        significant(low, 3),
-        significant(high, 3)
-    );
+    let interval = format!("{name} {}", region_range(region, &unit));
     // Times of several recordings overlap, so a region in time names its file.
     let file = region.says.split_once(": ").map(|(file, _)| file);
     let of = match file {

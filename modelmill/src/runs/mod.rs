@@ -6,8 +6,8 @@
 //! needs no parameters for loads. For each body, the columns of a load with ten inertial parameters are derived from
 //! the model.
 //!
-//! A clock is an exception where rates were recorded: it follows from these and the positions without forces, and the
-//! motion is corrected before anything else. Where the forces could not show a change, no verdict is given.
+//! The clock is an exception if rates were recorded. Its error is then found by comparing recorded rates with positions,
+//! and the motion is corrected first. A drive whose forces could not show a change gets no verdict.
 
 mod changes;
 mod columns;
@@ -90,8 +90,8 @@ pub struct RunReport {
     pub drives: usize,
     /// Drives whose forces cannot show a change relative to the first run.
     pub undecided: Vec<UndecidedDrive>,
-    /// Factor by which differences of parameters are less certain than the two fits, since the model does not fit
-    /// parts of one run with the same parameters; 1 if it does.
+    /// Factor on the standard deviation of a difference of parameters. It is above 1 if the model needs different
+    /// parameters for different parts of one run; otherwise it is 1.
     pub difference_factor: f64,
     /// Changes relative to the first run, the largest first, and events within this run.
     pub changes: Vec<RunChange>,

@@ -1,7 +1,7 @@
 //! The verdict on a run compared with the first: what changed, that nothing did, or that the runs cannot show it.
 //!
-//! Decision: the verdict is computed from the changes, the moved parameters and the drives without knowledge whenever
-//! it is needed, and is stored nowhere. So no sentence can contradict the table below it.
+//! Decision: the verdict is not stored. It is computed whenever it is needed, from the changes, the moved parameters and
+//! the drives whose forces cannot show a change. So no sentence can contradict the table below it.
 
 use modelmill_identify::changes::SearchSensitivity;
 
@@ -16,7 +16,7 @@ pub enum RunVerdict {
     Changed,
     /// Base parameters differ, but no change that is searched explains it.
     DifferentWithoutCause,
-    /// No change was found, although it would have been on at least one drive.
+    /// No change was found, and the forces of at least one drive would have shown one.
     Unchanged,
     /// No drive could show a change.
     CannotTell,
@@ -54,7 +54,7 @@ pub enum UndecidedReason {
         /// The smallest change that would be, as a share of the force (1); infinite if none would.
         share: f64,
     },
-    /// The drive stands nearly all the time, so that its friction is unknown.
+    /// The drive is at standstill nearly all the time, so that its friction is unknown.
     Standstill,
 }
 

@@ -70,7 +70,7 @@ pub struct ServoParameter {
     pub relative_to: Option<String>,
 }
 
-/// The balance of one drive.
+/// The error of the equation of one drive.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ServoRowError {
     /// Name of the drive.

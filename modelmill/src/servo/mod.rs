@@ -77,8 +77,8 @@ impl ServoModel {
         &self.mechanism().drives[actuator.drive.0].name
     }
 
-    /// Options for reading recordings of signals: positions and signals pass through the same filter, since rates that
-    /// were recorded have another one.
+    /// Options for reading recordings of signals: rates are computed from the positions, so that positions, rates and
+    /// signals pass through the same filter. The filter of recorded rates is unknown.
     pub fn reading(options: &RecordingOptions) -> RecordingOptions {
         RecordingOptions {
             preparation: StatePreparation {

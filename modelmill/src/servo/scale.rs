@@ -27,7 +27,7 @@ pub struct ServoScale {
 pub struct ScaleFreedom {
     /// Indices of the base parameters of the group.
     pub base: Vec<usize>,
-    /// How many numbers must be given to fix the group; 1 if only its scale is open.
+    /// How many values must be known so that all values of the group can be identified; 1 if only its scale is unknown.
     pub open: usize,
     /// Names of parameters of which a known number fixes the scale.
     pub fixed_by: Vec<String>,

@@ -10,7 +10,8 @@ use crate::model::Model;
 /// Largest file of limits, bytes.
 const LARGEST_FILE: u64 = 1 << 20;
 
-/// Limits of a verification. Without any ([`VerificationLimits::default`]), default limits are used.
+/// Limits of a verification that the user chooses. [`VerificationLimits::default`] has none. Default limits are used for
+/// everything that has no limit here.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct VerificationLimits {
     /// Limits of the errors of all drives that have no limit of their own.
@@ -28,9 +29,9 @@ pub struct VerificationLimits {
 /// Limits of the error of a drive.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DriveErrorLimit {
-    /// Most rms error, in % of the rms force of the drive.
+    /// Largest accepted rms error, in % of the rms force of the drive.
     pub percent: Option<f64>,
-    /// Most rms error, N or N m.
+    /// Largest accepted rms error, N or N m.
     pub rms: Option<f64>,
 }
 

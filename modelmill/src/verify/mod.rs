@@ -79,8 +79,8 @@ impl Model {
 }
 
 impl ModelVerification {
-    /// The result: fail if a check fails. Pass if some checks pass, and all those with a limit of the user do.
-    /// Otherwise the model is not evaluated.
+    /// The result. Fail: at least one check fails. Pass: no check fails, the error of at least one drive passes, and all
+    /// checks with a limit of the user are evaluated. Otherwise: not evaluated.
     pub fn state(&self) -> CheckState {
         let count = |state: CheckState| self.count(state);
         let is_open = |one: &VerificationCheck| !one.is_default && one.state == CheckState::NotEvaluated;

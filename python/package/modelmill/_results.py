@@ -353,7 +353,7 @@ class Diagnosis(Result):
 
     @property
     def budget(self) -> dict[str, dict[str, Any]]:
-        """The error of each drive, divided into noise, a part that follows the time, and a repeatable part that nothing explains."""
+        """The error of each drive, divided into noise, a part that varies with time and not with the state, and a repeatable part that nothing explains."""
         budget: dict[str, dict[str, Any]] = self._object["budget"]
         return budget
 

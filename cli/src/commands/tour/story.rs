@@ -92,10 +92,10 @@ impl TourText {
     pub(super) fn compare(&mut self, place: &TourFolder, model: &Model, seen: &TourComparison) {
         self.heading("2  Compare: where is the error large?");
         self.paragraph(&format!(
-            "A third-party multibody program simulated the complete robot (eleven groups of bodies) to make this recording. The \
-             simulation contains one effect that the model file lacks. With the nominal parameters of the model file the error \
-             is {} of the force (nrms: rms of the error divided by rms of the measured force). First the force of one ball screw, \
-             then the error, on its own scale:",
+            "This recording is simulated: a third-party multibody program computed the motion and the forces of the complete robot. \
+             Its robot has one effect that the model file lacks. With the nominal parameters of the model file the error \
+             is {} of the force (nrms: rms of the error divided by rms of the measured force). The upper curve is the force of \
+             one ball screw, the lower curve is its error. Each curve has its own scale:",
             percent(seen.compared.figures.nrms)
         ));
         // The curves of the first drive are an example; the table below lists where all errors are largest.
@@ -135,9 +135,10 @@ impl TourText {
         let all = &findings.diagnosis.candidates;
         self.paragraph(&format!(
             "modelmill tries every effect of its library at every place of this mechanism, {} in all: friction of many kinds, \
-             springs, inertias, offsets, delays, rods. It fits sets of them, each together with the base parameters, to one run. \
-             It accepts an effect only if the error also falls on a validation run, which is not used for the fit. The base \
-             parameters are estimated here, so the first error below is smaller than that with nominal values.",
+             springs, inertias, offsets, delays, rods. It fits different sets of them, each together with the base parameters, to one \
+             recording. It accepts an effect only if the error also falls on a second recording that the fit does not use (the \
+             validation run). The base parameters are estimated here. Therefore the error without the \
+             effect is smaller than in step 2, where they had their nominal values.",
             count(all.len(), "candidate", "candidates")
         ));
         self.paragraph(&verdict(findings));
@@ -278,13 +279,12 @@ impl TourText {
         self.paragraph(
             "The paper that describes this robot reports an error of its model. It names two causes: mainly the positions of the \
              point masses that replace the coupling elements and the platform, and to a lesser extent the contact points of the \
-             screws on the cranks. In its equations each coupler carries half of the platform's mass m4: in the force balance at \
-             the joint between the couplers, but in the moment balance at the coupler's centre. The page docs/experiment.html \
-             examines both causes: these bodies only translate, so the positions of their centres have no effect on the \
-             forces; contact points beside the axes of the cranks leave an error such as the paper has after its \
-             identification. The diagnosis uses a recording \
-             from a simulation of the same robot. It does not estimate base parameters, but fixes them at their nominal values \
-             (`--held`), so the first error below is that of the nominal model, as in step 2 and unlike steps 3 and 5:",
+             screws on the cranks. The page docs/experiment.html examines both causes. The first one has no effect: these bodies only translate, so \
+             the positions of their centres do not change the forces. The second one leaves an error similar to that of the \
+             paper after its identification. There is a third cause, in the equations of the paper. They give half of the \
+             platform's mass m4 to each coupler. In the force balance this mass is at the joint between the couplers, but in \
+             the moment balance it is at the coupler's centre. The recording below is from a simulation of \
+             the same robot. Here the base parameters are fixed at their nominal values (`--held`), as in step 2:",
         );
         self.paragraph(&verdict(findings));
         let diagnosis = &findings.diagnosis;
