@@ -35,6 +35,7 @@
 //! assert!(picture.starts_with("<svg"));
 //! ```
 
+mod free_body;
 mod labels;
 mod loads;
 pub mod page;
@@ -44,6 +45,7 @@ mod scene;
 mod symbols;
 mod view;
 
+pub use free_body::{CutArrow, CutArrowKind, FreeBodyDrawing, free_body_svg};
 pub use loads::DriveArrow;
 pub use paint::{DrawingStyle, inline_svg, loaded_svg, svg};
 pub use scene::{JointActuation, JointMark, MarkShape, MechanismScene, SceneMark};

@@ -102,7 +102,7 @@ fn straight_arrow(from: [f64; 2], along: [f64; 2], force: f64) -> String {
 }
 
 /// An arrow around a joint, counter-clockwise for a positive force, which begins at the right of the joint.
-fn circular_arrow(at: [f64; 2], force: f64) -> String {
+pub(crate) fn circular_arrow(at: [f64; 2], force: f64) -> String {
     let turn = LARGEST_ARC * force;
     if turn.abs() * ARC_RADIUS < SHORTEST_ARROW {
         return String::new();
@@ -124,7 +124,7 @@ fn circular_arrow(at: [f64; 2], force: f64) -> String {
 }
 
 /// A triangle at the tip of an arrow.
-fn arrow_head(tip: [f64; 2], along: [f64; 2]) -> String {
+pub(crate) fn arrow_head(tip: [f64; 2], along: [f64; 2]) -> String {
     let across = [-along[1], along[0]];
     let corner = |back: f64, side: f64| [0, 1].map(|k| tip[k] + back * along[k] + side * across[k]);
     polygon("head", &[corner(5.0, 0.0), corner(-5.0, 4.5), corner(-5.0, -4.5)])

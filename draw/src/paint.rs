@@ -73,14 +73,20 @@ pub fn loaded_svg(
     body.push_str(&paper.paint_drive_arrows(scene, loads));
     body.push_str(&paper.paint_axes_and_scale_bar(scene));
     body.push_str(&paper.paint_labels(scene));
+    let says = describe_scene(scene);
+    frame_picture(style, NAMESPACE, &says, &body)
+}
+
+/// A picture from its content and a description for readers who cannot see it; `namespace` is empty inside a page.
+pub(crate) fn frame_picture(style: &DrawingStyle, namespace: &str, says: &str, body: &str) -> String {
     let names = if style.names { " named" } else { "" };
     format!(
-        "<svg{NAMESPACE} class=\"mechanism{names}\" role=\"img\" \
+        "<svg{namespace} class=\"mechanism{names}\" role=\"img\" \
          viewBox=\"0 0 {:.0} {:.0}\">\n<title>{}</title>\n<style>{STYLE}</style>\n\
          <rect class=\"paper\" width=\"100%\" height=\"100%\"/>\n{body}</svg>\n",
         style.width,
         style.height,
-        escape(&describe_scene(scene)),
+        escape(says),
     )
 }
 
@@ -113,7 +119,7 @@ fn describe_scene(scene: &MechanismScene) -> String {
 }
 
 /// The sheet of a picture: the projection of metres onto it.
-struct DrawingSheet<'a> {
+pub(crate) struct DrawingSheet<'a> {
     /// The direction of view.
     view: &'a ViewDirection,
     /// Options of the picture.
@@ -129,6 +135,16 @@ struct DrawingSheet<'a> {
 impl<'a> DrawingSheet<'a> {
     /// A sheet on which all scenes fit.
     fn new(scenes: &[&MechanismScene], view: &'a ViewDirection, style: &'a DrawingStyle) -> Self {
+        Self::with_margin(scenes, view, style, MARGIN)
+    }
+
+    /// A sheet on which all scenes fit within a margin, in units of the picture.
+    pub(crate) fn with_margin(
+        scenes: &[&MechanismScene],
+        view: &'a ViewDirection,
+        style: &'a DrawingStyle,
+        margin: f64,
+    ) -> Self {
         // The projected range of all marks.
         let mut range = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
         let mut heaviest = 0.0_f64;
@@ -143,7 +159,7 @@ impl<'a> DrawingSheet<'a> {
             }
         }
         // The scale at which that range fits within the margins.
-        let room = [style.width - 2.0 * MARGIN, style.height - 2.0 * MARGIN - 16.0];
+        let room = [style.width - 2.0 * margin, style.height - 2.0 * margin - 16.0];
         let scales = [0, 1].map(|k| room[k].max(1.0) / (range[k][1] - range[k][0]).max(1e-9));
         let smallest = scales[0].min(scales[1]);
         let middle = range.map(|[low, high]| 0.5 * (low + high));
@@ -162,7 +178,7 @@ impl<'a> DrawingSheet<'a> {
     }
 
     /// The place of a point in the picture.
-    fn project_point(&self, at: &Vector3<f64>) -> [f64; 2] {
+    pub(crate) fn project_point(&self, at: &Vector3<f64>) -> [f64; 2] {
         let [right, up] = self.view.project(at);
         [
             0.5 * self.style.width + self.scale * (right - self.middle[0]),
@@ -171,13 +187,13 @@ impl<'a> DrawingSheet<'a> {
     }
 
     /// The projection of a direction, with y downwards.
-    fn project_direction(&self, v: &Vector3<f64>) -> [f64; 2] {
+    pub(crate) fn project_direction(&self, v: &Vector3<f64>) -> [f64; 2] {
         let [right, up] = self.view.project(v);
         [right, -up]
     }
 
     /// All marks of a scene, in the order in which they are drawn.
-    fn paint_scene(&self, scene: &MechanismScene) -> String {
+    pub(crate) fn paint_scene(&self, scene: &MechanismScene) -> String {
         let towards = self.view.viewer_direction();
         let mut drawn: Vec<(u8, f64, String)> = Vec::new();
         for mark in &scene.marks {

@@ -4,11 +4,13 @@
 //! opinion on their dynamics that shares no code with the mill, and [`published`] reads regroupings from the literature
 //! as exact linear maps.
 
+pub mod balances;
 pub mod base_parameters;
 pub mod counts;
 pub mod equation_of_motion;
 pub mod fixtures;
 pub mod free_bodies;
+pub mod infix;
 pub mod laws;
 pub mod mechanics;
 pub mod published;

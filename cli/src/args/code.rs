@@ -32,6 +32,9 @@ pub(crate) struct EquationsArgs {
     /// The same as --format json
     #[arg(long, conflicts_with = "format")]
     pub(crate) json: bool,
+    /// Print the balances of forces and of moments of this part (or frame), cut free, instead of the reduced model
+    #[arg(long, value_name = "PART")]
+    pub(crate) balances: Option<String>,
     /// Write to this file instead of standard output
     #[arg(long, value_name = "FILE")]
     pub(crate) out: Option<PathBuf>,

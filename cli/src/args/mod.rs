@@ -115,7 +115,8 @@ pub(crate) enum ProgramCommand {
     #[command(
         after_help = "Examples (from the project's root):\n  modelmill equations model-spec/models/spidermill-paper.toml\n  \
         modelmill equations model-spec/models/panda.toml --format html --out panda.html\n  \
-        modelmill equations model-spec/models/panda.toml --format json | jq .rank"
+        modelmill equations model-spec/models/panda.toml --format json | jq .rank\n  \
+        modelmill equations model-spec/models/spidermill-paper.toml --balances crank_left     one part, cut free"
     )]
     Equations(EquationsArgs),
     /// Write the model as Rust source, the same that `cargo build` generates, or as a crate for C or Python

@@ -17,16 +17,21 @@ pub(crate) fn run(host: &Host, args: &EquationsArgs) -> CommandOutcome {
         .map(|path| OutputFile::new(path, model.files()))
         .transpose()?;
     let format = if args.json { EquationsFormat::Json } else { args.format };
+    let page = match format {
+        EquationsFormat::Text => PageFormat::Text,
+        EquationsFormat::Markdown => PageFormat::Markdown,
+        EquationsFormat::Latex => PageFormat::Latex,
+        EquationsFormat::Html => PageFormat::Html,
+        EquationsFormat::Json => PageFormat::Json,
+    };
     // Long expressions can take seconds.
-    let written = match format {
-        EquationsFormat::Text => model.equations(PageFormat::Text),
-        EquationsFormat::Markdown => model.equations(PageFormat::Markdown),
-        EquationsFormat::Latex => model.equations(PageFormat::Latex),
-        EquationsFormat::Html => model.equations(PageFormat::Html),
-        EquationsFormat::Json => model.equations_json(),
-    }?;
+    let text = match (&args.balances, format) {
+        (Some(part), _) => model.balances(part, page)?,
+        (None, EquationsFormat::Json) => model.equations_json()?.text,
+        (None, _) => model.equations(page)?.text,
+    };
     match target {
-        Some(target) => target.write(&written.text),
-        None => terminal::print(&written.text),
+        Some(target) => target.write(&text),
+        None => terminal::print(&text),
     }
 }

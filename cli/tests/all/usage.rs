@@ -283,3 +283,10 @@ fn a_reader_that_goes_away_is_no_error() {
     assert!(child.wait().expect("an end").success());
     assert_eq!(err, "");
 }
+
+#[test]
+fn an_unknown_part_is_answered_with_the_parts_of_the_model() {
+    let file = model("spidermill-paper.toml");
+    let says = refused(1, &["equations", &file, "--balances", "nothing"]);
+    assert!(says.contains("crank_left") && says.contains("coupler_right"), "{says}");
+}

@@ -3,6 +3,7 @@
 //!
 //! Equation numbers 5, 6 and 16 are those of the paper on the parameter-minimal model of the SpiderMill.
 
+mod balances;
 mod base_parameters;
 mod document;
 mod effects;
@@ -21,6 +22,7 @@ mod render_text;
 #[cfg(test)]
 pub(crate) mod tests;
 
+pub use balances::{BalanceEquation, BalanceVector, BodyBalances, CutFreeError, balance_page, body_balances};
 pub use base_parameters::{base_expression, base_summand, factored_base_expression};
 pub use equations::{
     BaseParameterLine, DependencyLine, NumericMethod, ProgramOperations, RankSummary, ReducedEquations,

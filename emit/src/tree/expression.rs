@@ -260,7 +260,8 @@ fn unary(function: FormulaFunction) -> Unary {
         FormulaFunction::Cos => Unary::Cos,
         FormulaFunction::Sqrt => Unary::Sqrt,
         FormulaFunction::Sign => Unary::Sign,
-        FormulaFunction::Abs | FormulaFunction::Atan2 => Unary::Abs,
+        // The last two have two arguments: one is treated before, and the other has vectors, which no program has.
+        FormulaFunction::Abs | FormulaFunction::Atan2 | FormulaFunction::Cross => Unary::Abs,
         FormulaFunction::Tanh => Unary::Tanh,
         FormulaFunction::Exp => Unary::Exp,
     }

@@ -34,6 +34,14 @@ fn scale(limit: f64) -> PanelStyle<'static> {
     }
 }
 
+/// A panel without the curve of the rig, in which the other curves keep their colours.
+fn without_rig(limit: f64) -> PanelStyle<'static> {
+    PanelStyle {
+        first_colour: 1,
+        ..scale(limit)
+    }
+}
+
 /// A figure with the six panels of Fig. 6 and 7: angles of the cranks (a, b), forces of the spindles (c, d), and
 /// relative errors of the paper's treatment (e, f), left and right.
 pub(crate) fn panels(title: &str, periodic: &PeriodicTrajectory, along: &TreatmentRun) -> String {
@@ -72,7 +80,7 @@ pub(crate) fn panels(title: &str, periodic: &PeriodicTrajectory, along: &Treatme
         figure.panel_with(
             &format!("({letter}) relative error of the {side} spindle force, per cent, cut off at {PANEL_RELATIVE}"),
             &[("calculated", &calculated), ("estimated", &estimated)],
-            &scale(PANEL_RELATIVE),
+            &without_rig(PANEL_RELATIVE),
         );
     }
     figure.finish()
@@ -100,12 +108,12 @@ pub(crate) fn errors(title: &str, along: &TreatmentRun, drives: &[String]) -> St
         figure.panel_with(
             &format!("{drive}: error of the paper's treatment, N"),
             &[("calculated", &calculated[0][d]), ("estimated", &estimated[0][d])],
-            &scale(error),
+            &without_rig(error),
         );
         figure.panel_with(
             &format!("{drive}: error of the consistent treatment, N"),
             &[("calculated", &calculated[1][d]), ("estimated", &estimated[1][d])],
-            &scale(error),
+            &without_rig(error),
         );
     }
     figure.finish()
@@ -169,6 +177,8 @@ pub(crate) fn peaks(title: &str, along: &TreatmentRun, drive: usize, name: &str)
         &[("rig", &along.measured[drive])],
         &look,
     );
+    // Errors of the calculated forces have their colour.
+    look.first_colour = 1;
     figure.panel_with(
         "error of the paper's treatment, calculated, N: no peaks",
         &[("error", &error[drive])],
@@ -176,7 +186,7 @@ pub(crate) fn peaks(title: &str, along: &TreatmentRun, drive: usize, name: &str)
     );
     look.limit = Some(100.0 * RELATIVE);
     figure.panel_with(
-        "the same divided by the force, per cent, cut off at 100: a peak at every dashed line",
+        "error / force, per cent, cut off at 100: a peak at every dashed line",
         &[("error / force", &relative)],
         &look,
     );

@@ -71,8 +71,8 @@ const STATEMENTS: [[&str; 3]; 35] = [
     ],
     [
         "Eq. (2), (3) and Fig. 5: balances of a part cut free",
-        "the same equations, solved recursively from part to part and not printed one by one",
-        "`evaluate --reactions` computes the forces at the cuts",
+        "right, part by part; solved recursively from part to part",
+        "`equations --balances crank_left` prints them with the picture of the part; `evaluate --reactions` computes the forces at the cuts",
     ],
     [
         "Eq. (4), (5): linear in eleven parameters",

@@ -1,9 +1,9 @@
 //! `equations`: the reduced model as a page or as JSON.
 
-use modelmill_codegen::review::{PageFormat, ReducedEquations, page};
+use modelmill_codegen::review::{CutFreeError, PageFormat, ReducedEquations, balance_page, page};
 use modelmill_identify::RecordingNote;
 
-use crate::error::Outcome;
+use crate::error::{Error, Outcome};
 use crate::model::Model;
 use crate::model::sampled_rank::{SampledRank, judge_rank};
 
@@ -51,6 +51,31 @@ impl Model {
         Ok(EquationsText {
             text: equations.json(),
             notes,
+        })
+    }
+
+    /// The balances of forces and of moments of a part that is cut free: Newton's and Euler's equations of the body that
+    /// carries it, with the reactions of its joints, its weight, drives and effects.
+    ///
+    /// Fails if no part and no frame has this name, or if it does not move; the message lists the parts.
+    ///
+    /// ```
+    /// use modelmill::Model;
+    /// use modelmill::model::PageFormat;
+    ///
+    /// let arm = Model::open("../model-spec/models/two_link.toml")?;
+    /// let parts = arm.balances("no such part", PageFormat::Text).expect_err("unknown").to_string();
+    /// assert!(parts.contains("choose one of"));
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
+    pub fn balances(&self, part: &str, format: PageFormat) -> Outcome<String> {
+        let what = format!("writing the balances of {part}");
+        let written = self
+            .host()
+            .run_job(&what, 0, |_| balance_page(&self.derivation, part, format))?;
+        written.map_err(|error| match error {
+            CutFreeError::Derivation(error) => Error::derivation(&self.path, error),
+            other => Error::input(format!("{}: {other}", self.path)),
         })
     }
 

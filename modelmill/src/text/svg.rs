@@ -6,8 +6,15 @@ use std::fmt::Write as _;
 const WIDTH: f64 = 900.0;
 /// Height of a panel.
 const PANEL: f64 = 150.0;
-/// Room between panels, for the names of curves.
-const GAP: f64 = 34.0;
+/// Space between panels, for a line with the title and a line with the names of curves, also in the letters of a narrow
+/// screen.
+const GAP: f64 = 56.0;
+/// Distance of a panel's title from its upper edge.
+const TITLE_ABOVE: f64 = 31.0;
+/// Distance of the names of curves from the upper edge of their panel.
+const NAMES_ABOVE: f64 = 8.0;
+/// Width of a letter of a name on a narrow screen.
+const LETTER: f64 = 11.0;
 /// Margin left of the panels, for the scale.
 const LEFT: f64 = 80.0;
 /// Margin right of the panels.
@@ -34,6 +41,7 @@ const STYLE: &str = "\
 .figure text.c0{fill:var(--c0)}.figure text.c1{fill:var(--c1)}.figure text.c2{fill:var(--c2)}
 .figure text.title{font-size:17px}
 .figure text.scale{font-size:11px;fill:var(--faint)}
+@media screen and (max-width:640px){.figure text{font-size:18px}.figure text.title{font-size:20px}.figure text.scale{font-size:16px}.panels text{font-size:22px}.panels text.scale{font-size:20px}}
 ";
 
 /// Options of a panel.
@@ -43,6 +51,9 @@ pub struct PanelStyle<'a> {
     pub limit: Option<f64>,
     /// Times of vertical lines, s.
     pub marks: &'a [f64],
+    /// Colour of the first curve, 0 to 2; the next curves have the next colours. It lets a quantity keep its colour in
+    /// panels without the curves before it.
+    pub first_colour: usize,
 }
 
 /// A figure under construction.
@@ -92,7 +103,7 @@ impl<'a> SvgFigure<'a> {
 <text x="{LEFT}" y="{2:.1}">{3}</text>"#,
             WIDTH - RIGHT,
             y(0.0),
-            top - 8.0,
+            top - TITLE_ABOVE,
             escape(title)
         );
         let (first, last) = (
@@ -123,10 +134,10 @@ impl<'a> SvgFigure<'a> {
             );
         }
         // Names stand side by side, the last at the right end.
-        let width = |name: &str| (6.5 * name.chars().count() as f64 + 15.0).max(80.0);
+        let width = |name: &str| LETTER * name.chars().count() as f64 + 20.0;
         for (k, (name, values)) in curves.iter().enumerate() {
             let behind: f64 = curves[k + 1..].iter().map(|(name, _)| width(name)).sum();
-            let colour = k % COLOURS;
+            let colour = (look.first_colour + k) % COLOURS;
             let n = values.len().max(2) - 1;
             // Long curves are thinned out, which keeps all peaks.
             let mut points = String::new();
@@ -140,7 +151,7 @@ impl<'a> SvgFigure<'a> {
 <text class="c{colour}" x="{:.1}" y="{:.1}" text-anchor="end">{}</text>"#,
                 points.trim_end(),
                 WIDTH - RIGHT - behind,
-                top - 8.0,
+                top - NAMES_ABOVE,
                 escape(name)
             );
         }
@@ -160,10 +171,10 @@ impl<'a> SvgFigure<'a> {
 <text x="{2:.1}" y="{1:.1}" text-anchor="end" class="scale">{last} s</text>
 "#,
             self.body,
-            bottom - GAP + 16.0,
+            bottom - GAP + 22.0,
             WIDTH - RIGHT,
         );
-        sheet(&self.title, LEFT, height, &body)
+        write_sheet("figure panels", &self.title, LEFT, height, &body)
     }
 }
 
@@ -173,8 +184,13 @@ impl<'a> SvgFigure<'a> {
 /// CSS classes for `body`: `c0`, `c1` and `c2` set the colour of curves, of filled circles and of their labels. `zero`
 /// is for lines, `scale` for small text, and `part` for marked areas.
 pub fn sheet(title: &str, left: f64, height: f64, body: &str) -> String {
+    write_sheet("figure", title, left, height, body)
+}
+
+/// The same with the classes of the figure; `panels` has larger letters on narrow screens.
+fn write_sheet(class: &str, title: &str, left: f64, height: f64, body: &str) -> String {
     format!(
-        r#"<svg xmlns="http://www.w3.org/2000/svg" class="figure" role="img" aria-label="{title}" viewBox="0 0 {WIDTH} {height:.0}">
+        r#"<svg xmlns="http://www.w3.org/2000/svg" class="{class}" role="img" aria-label="{title}" viewBox="0 0 {WIDTH} {height:.0}">
 <style>
 {STYLE}</style>
 <rect class="paper" width="{WIDTH}" height="{height:.0}"/>

@@ -14,6 +14,7 @@ mod fixture_models {
 }
 
 mod awkward_mechanisms;
+mod balances;
 mod benchmark_page;
 mod blocks;
 mod build_graph;

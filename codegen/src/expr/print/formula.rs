@@ -32,6 +32,8 @@ pub enum FormulaFunction {
     Exp,
     /// Angle of the point with the second operand as abscissa and the first as ordinate.
     Atan2,
+    /// Cross product of two vectors.
+    Cross,
 }
 
 impl FormulaFunction {
@@ -46,6 +48,7 @@ impl FormulaFunction {
             Self::Tanh => "tanh",
             Self::Exp => "exp",
             Self::Atan2 => "atan2",
+            Self::Cross => "cross",
         }
     }
 }
@@ -289,6 +292,11 @@ impl PrintedFormula {
     #[must_use]
     pub fn negate(self) -> Self {
         Self::product(Rational::MINUS_ONE, [self])
+    }
+
+    /// The cross product of two vectors.
+    pub fn cross(a: Self, b: Self) -> Self {
+        Self::Apply(FormulaFunction::Cross, vec![a, b])
     }
 
     /// A function of one operand.

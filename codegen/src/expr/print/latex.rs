@@ -139,6 +139,13 @@ fn power(out: &mut String, base: &PrintedFormula, n: u32) {
 
 /// Writes a function with its operands; an exponent stands behind the function's name.
 fn apply(out: &mut String, function: FormulaFunction, exponent: Option<u32>, operands: &[PrintedFormula]) {
+    // The sign of a cross product stands between its operands.
+    if let (FormulaFunction::Cross, [a, b]) = (function, operands) {
+        write(out, a, true);
+        out.push_str(" \\times ");
+        write_cross_operand(out, b);
+        return;
+    }
     // Operands are separated by commas.
     let arguments: Vec<String> = operands.iter().map(PrintedFormula::latex).collect();
     let arguments = arguments.join(", ");
@@ -158,6 +165,7 @@ fn apply(out: &mut String, function: FormulaFunction, exponent: Option<u32>, ope
         FormulaFunction::Exp => "\\exp",
         FormulaFunction::Sign => "\\operatorname{sign}",
         FormulaFunction::Atan2 => "\\operatorname{atan2}",
+        FormulaFunction::Cross => "\\operatorname{cross}",
     };
     // The exponent belongs to the function's name, as in sin^2.
     out.push_str(command);
@@ -170,6 +178,15 @@ fn apply(out: &mut String, function: FormulaFunction, exponent: Option<u32>, ope
             _ = write!(out, "{{{arguments}}}");
         }
         _ => _ = write!(out, "\\left({arguments}\\right)"),
+    }
+}
+
+/// Writes the second operand of a cross product, which is enclosed unless it is a name.
+fn write_cross_operand(out: &mut String, operand: &PrintedFormula) {
+    if matches!(operand, PrintedFormula::Symbol(_)) {
+        write(out, operand, true);
+    } else {
+        _ = write!(out, "\\left({}\\right)", operand.latex());
     }
 }
 

@@ -271,6 +271,19 @@ fn apply(out: &mut MathmlWriter, function: FormulaFunction, exponent: Option<u32
             write_fenced(out, "|", "|", arguments);
             return;
         }
+        // The sign of a cross product stands between its operands; the second one is enclosed unless it is a name.
+        FormulaFunction::Cross => {
+            if let [a, b] = operands {
+                write(out, a, true);
+                out.push_str("<mo form=\"infix\">&#xD7;</mo>");
+                if matches!(b, PrintedFormula::Symbol(_)) {
+                    write(out, b, true);
+                } else {
+                    write_fenced(out, "(", ")", |out| write(out, b, false));
+                }
+            }
+            return;
+        }
         _ => {}
     }
     let name = format!("<mi>{}</mi>", function.name());

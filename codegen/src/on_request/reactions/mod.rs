@@ -335,7 +335,7 @@ fn coordinates_of(mechanism: &Mechanism, tree: &KinematicTree, link: usize) -> V
 }
 
 /// Names of all links: the name of the frame, with coordinates where a frame has several joints.
-fn link_names(mechanism: &Mechanism, tree: &KinematicTree) -> Vec<String> {
+pub(crate) fn link_names(mechanism: &Mechanism, tree: &KinematicTree) -> Vec<String> {
     let frames = link_frames(tree);
     let moving = |i: &usize| tree.links[*i].is_moving();
     (0..tree.links.len())
@@ -367,6 +367,18 @@ fn reaction_joints(
             coordinates: coordinates_of(mechanism, tree, link),
         })
         .collect()
+}
+
+/// Names of the loops that transmit a force, each with whether its pin could also transmit moments across its axis.
+#[cfg(any(test, feature = "review"))]
+pub(crate) fn cut_loop_names(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    equations: &UnreducedEquations,
+) -> Result<Vec<(String, bool)>, DeriveError> {
+    let free = free_links(mechanism, equations);
+    let cuts = loads::cut_loops(graph, mechanism, equations, &free)?;
+    Ok(cuts.into_iter().map(|cut| (cut.name, cut.moment.is_some())).collect())
 }
 
 /// Links of floating bodies: frames with six coordinates of their own on which no drive and no effect acts.
