@@ -44,7 +44,7 @@ mod scene;
 mod symbols;
 mod view;
 
-pub use loads::DriveArrow;
+pub use loads::{DriveArrow, ERROR_SHADES};
 pub use paint::{DrawingStyle, inline_svg, loaded_svg, svg};
 pub use scene::{JointActuation, JointMark, MarkShape, MechanismScene, SceneMark};
 pub use view::ViewDirection;

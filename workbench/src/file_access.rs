@@ -83,9 +83,24 @@ impl FileAccessPolicy {
     }
 }
 
-/// The path without links and `..`; unchanged if nothing exists there.
+/// The path without links and `..`. If nothing exists there, its folder decides, so that a missing file in the folder
+/// of the model counts as missing, not as forbidden.
 fn canonical_path(path: &Path) -> PathBuf {
-    path.canonicalize().unwrap_or_else(|_| path.to_owned())
+    if let Ok(real) = path.canonicalize() {
+        return real;
+    }
+    // A link to a missing file may lead anywhere.
+    match (path.parent(), path.file_name()) {
+        (Some(parent), Some(name)) if !path.is_symlink() => {
+            let parent = if parent == Path::new("") {
+                Path::new(".")
+            } else {
+                parent
+            };
+            canonical_path(parent).join(name)
+        }
+        _ => path.to_owned(),
+    }
 }
 
 impl FileSource for FileAccessPolicy {
@@ -128,12 +143,25 @@ mod tests {
         let read = |name: &str| file_access.read(&inside.join(name), 100).is_ok();
         assert!(read("arm.toml") && read("base.toml"));
         assert!(!read("../secret") && !read("../run.csv") && !read("/etc/passwd"));
+        // A missing file in the folder is missing, and one outside of it is outside.
+        let says = |name: &str| {
+            let error = file_access.read(&inside.join(name), 100).unwrap_err();
+            error.to_string()
+        };
+        for name in ["none.toml", "sub/none.toml", "../models/none.toml"] {
+            assert!(!says(name).contains("outside of"), "{}", says(name));
+        }
+        for name in ["../none.toml", "../../none/none.toml", "none/../../run.csv"] {
+            assert!(says(name).contains("outside of"), "{}", says(name));
+        }
         file_access.allow_file(&folder.join("run.csv"));
         assert!(read("../run.csv") && !read("../secret"));
         #[cfg(unix)]
         {
-            std::os::unix::fs::symlink("../secret", inside.join("link")).unwrap();
-            assert!(!read("link"));
+            for (to, link) in [("../secret", "link"), ("../none", "dangling")] {
+                std::os::unix::fs::symlink(to, inside.join(link)).unwrap();
+                assert!(!read(link) && says(link).contains("outside of"));
+            }
         }
         std::fs::remove_dir_all(&folder).unwrap();
     }

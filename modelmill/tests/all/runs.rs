@@ -368,7 +368,9 @@ fn what_changed_and_stayed_is_told_with_its_run() {
         .filter(|k| !lasting.contains(k))
         .collect();
     assert!(!single.is_empty(), "{:?} {lasting:?}", found.runs[4].moved);
-    let folded = page.split_once("without a detected change").map_or("", |(_, after)| after);
+    let folded = page
+        .split_once("without a detected change")
+        .map_or("", |(_, after)| after);
     for k in single {
         let heading = format!("<figcaption><b>{}</b>", found.parameters[k].name);
         assert!(page.contains(&heading) && !folded.contains(&heading), "{heading}");
