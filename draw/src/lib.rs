@@ -43,6 +43,7 @@ mod plane;
 mod scene;
 mod symbols;
 mod view;
+mod virtual_chain;
 
 pub use loads::{DriveArrow, ERROR_SHADES};
 pub use paint::{DrawingStyle, inline_svg, loaded_svg, svg};
