@@ -30,7 +30,9 @@ pub(crate) fn mark_virtual_frames(mechanism: &Mechanism, poses: &MechanismPoses)
             !mechanism.coordinates[moved.coordinate].passive && !is_driven
         });
         if next == 0 && is_free && moves.len() > 1 && moves.iter().any(|moved| !moved.is_rotation) {
-            chain.into_iter().for_each(|f| is_virtual[f] = true);
+            for f in chain {
+                is_virtual[f] = true;
+            }
         }
     }
     is_virtual
