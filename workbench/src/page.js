@@ -18,8 +18,23 @@
     box.hidden = !words;
   };
 
+  // Downloads the text, for a program that cannot save it any more.
+  const rescue = () => {
+    const link = make('a');
+    link.href = URL.createObjectURL(new Blob([text.value], { type: 'application/toml' }));
+    link.download = view ? view.file.split(/[\\/]/).pop() : 'model.toml';
+    link.click();
+    URL.revokeObjectURL(link.href);
+  };
   // Shows an error. If the program did not answer, the sentence disappears once it answers again.
-  const say_error = (error, who) => say(error.message, error.isUnanswered ? 'connection' : who);
+  const say_error = (error, who) => {
+    say(error.message, error.isUnanswered ? 'connection' : who);
+    if (!error.isUnanswered) return;
+    const button = make('button', 'Download the text');
+    button.type = 'button';
+    button.addEventListener('click', rescue);
+    by('says').append(' ', button);
+  };
 
   // Runs work that may fail; shows its error above the panes. Work that is repeated automatically (`who`) removes its sentence
   // once it succeeds.
@@ -151,7 +166,8 @@
     if (told.version < version || told.revision < base) return;
     const theirs = plain(told.text);
     sent = words;
-    const merged = window.texts.merge(sent, text.value, theirs);
+    // Edits of one model are not edits of another one.
+    const merged = told.opened === opened ? window.texts.merge(sent, text.value, theirs) : theirs;
     [base, sent] = [told.revision, theirs];
     replace(merged === null ? theirs : merged);
     show(told);

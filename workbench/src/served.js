@@ -2,7 +2,7 @@
 (() => {
   'use strict';
   const token = new URLSearchParams(location.search).get('token');
-  const UNANSWERED = 'The program does not answer; it may have ended. Keep this page open: it still has your text. Copy the text to a file before you close the page.';
+  const UNANSWERED = 'The program does not answer; it may have ended. Keep this page open: it still has your text. Download the text, or copy it to a file, before you close the page.';
   const ask = async (question, body) => {
     const answer = await fetch(`/api/${question}`, {
       method: body === undefined ? 'GET' : 'POST',

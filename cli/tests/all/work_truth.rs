@@ -274,13 +274,17 @@ fn a_program_that_ended_is_named() {
          document.execCommand('insertText', false, '# mine');
          await until('a sentence', () => !at('says').hidden);
          await until('another', () => at('state').textContent.includes('Keep this page open'));
-         return [at('says').textContent, at('state').textContent, at('text').value.slice(0, 6)];",
+         const blobs = [], create = URL.createObjectURL;
+         URL.createObjectURL = (blob) => { blobs.push(blob); return create(blob); };
+         at('says').querySelector('button').click();
+         const text = await blobs[0].text();
+         return [at('says').textContent, at('state').textContent, at('text').value.slice(0, 6), text === at('text').value];",
     );
     for says in [&found[0], &found[1]] {
         let says = says.as_str().expect("a sentence");
         assert!(says.contains("does not answer") && !says.contains("fetch"), "{says}");
     }
-    assert_eq!(found[2], "# mine");
+    assert_eq!((&found[2], &found[3]), (&json!("# mine"), &json!(true)));
 }
 
 /// Named with `--beside`, the other model is what the page shows first. Until the first comparison, its buttons wait.
