@@ -29,7 +29,7 @@ impl FileAccessPolicy {
         };
         Arc::new(Self {
             disk: DiskFiles::default(),
-            folder: canonical_path(folder),
+            folder: canonical_path(folder).unwrap_or_else(|| folder.to_owned()),
             named: RwLock::default(),
         })
     }
@@ -61,7 +61,7 @@ impl FileAccessPolicy {
             Ok(named) => named,
             Err(poisoned) => poisoned.into_inner(),
         };
-        named.push(canonical_path(path));
+        named.extend(canonical_path(path));
     }
 
     /// Fails if a path leads to a file that is not permitted, also through links.
@@ -71,7 +71,7 @@ impl FileAccessPolicy {
             Ok(named) => named,
             Err(poisoned) => poisoned.into_inner(),
         };
-        if real.starts_with(&self.folder) || named.contains(&real) {
+        if real.is_some_and(|real| real.starts_with(&self.folder) || named.contains(&real)) {
             return Ok(());
         }
         let says = format!(
@@ -84,23 +84,22 @@ impl FileAccessPolicy {
 }
 
 /// The path without links and `..`. If nothing exists there, its folder decides, so that a missing file in the folder
-/// of the model counts as missing, not as forbidden.
-fn canonical_path(path: &Path) -> PathBuf {
+/// of the model counts as missing, not as forbidden. `None` if it cannot be known where the path leads.
+fn canonical_path(path: &Path) -> Option<PathBuf> {
     if let Ok(real) = path.canonicalize() {
-        return real;
+        return Some(real);
     }
     // A link to a missing file may lead anywhere.
-    match (path.parent(), path.file_name()) {
-        (Some(parent), Some(name)) if !path.is_symlink() => {
-            let parent = if parent == Path::new("") {
-                Path::new(".")
-            } else {
-                parent
-            };
-            canonical_path(parent).join(name)
-        }
-        _ => path.to_owned(),
+    if path.is_symlink() {
+        return None;
     }
+    let (parent, name) = (path.parent()?, path.file_name()?);
+    let parent = if parent == Path::new("") {
+        Path::new(".")
+    } else {
+        parent
+    };
+    Some(canonical_path(parent)?.join(name))
 }
 
 impl FileSource for FileAccessPolicy {
