@@ -1,4 +1,5 @@
-//! Places of names in a picture: next to the object that they name, and without overlap with other names and joints.
+//! Places of names in a picture: next to the object that they name, and without overlap with other names. A name that
+//! has no room there stands farther away, at the end of a thin line.
 
 /// Height of letters, in units of the picture.
 pub(crate) const LETTER_HEIGHT: f64 = 12.0;
@@ -26,34 +27,53 @@ impl LabelBox {
 pub(crate) struct LabelLayout {
     /// Width and height of the picture.
     sheet: [f64; 2],
-    /// Rectangles that are occupied.
-    taken: Vec<LabelBox>,
+    /// Rectangles of symbols; a name may cover a part of one.
+    symbols: Vec<LabelBox>,
+    /// Rectangles of names; no two names overlap.
+    names: Vec<LabelBox>,
 }
+
+/// The place of a name.
+#[derive(Clone, Copy)]
+pub(crate) struct LabelPlace {
+    /// Start of the base line.
+    pub(crate) at: [f64; 2],
+    /// Anchor of the text.
+    pub(crate) anchor: &'static str,
+    /// Near end of the line to the object, if the name stands farther away.
+    pub(crate) leader: Option<[f64; 2]>,
+}
+
+/// Distances from the object at which a name is tried. From the third one on, a line leads to it.
+const DISTANCES: [f64; 7] = [13.0, 22.0, 34.0, 48.0, 64.0, 82.0, 104.0];
+/// Share of a name's area that may cover symbols before a place farther away is tried. By judgement.
+const LITTLE: f64 = 0.08;
+/// Largest distance without a line.
+const NEAR: f64 = 22.0;
 
 impl LabelLayout {
     /// An empty picture.
     pub(crate) fn new(width: f64, height: f64) -> Self {
         Self {
             sheet: [width, height],
-            taken: Vec::new(),
+            symbols: Vec::new(),
+            names: Vec::new(),
         }
     }
 
     /// Marks the square around a disc as occupied.
     pub(crate) fn occupy(&mut self, [x, y]: [f64; 2], radius: f64) {
-        self.taken.push(LabelBox {
+        self.symbols.push(LabelBox {
             x: [x - radius, x + radius],
             y: [y - radius, y + radius],
         });
     }
 
-    /// The place of a name with a number of letters next to a point: the start of its base line, and its anchor. `None`
-    /// if all places near the point are occupied.
-    pub(crate) fn place_label(&mut self, [x, y]: [f64; 2], letters: usize) -> Option<(f64, f64, &'static str)> {
+    /// The place of a name with a number of letters next to a point. `None` if all places are occupied.
+    pub(crate) fn place_label(&mut self, [x, y]: [f64; 2], letters: usize) -> Option<LabelPlace> {
         let width = LETTER_WIDTH * letters as f64;
-        let mut best: Option<(f64, (f64, f64, &'static str), LabelBox)> = None;
-        // Eight directions at two distances.
-        for away in [13.0, 22.0] {
+        let mut best: Option<(f64, LabelPlace, LabelBox)> = None;
+        for away in DISTANCES {
             let slanted = 0.75 * away;
             let ways = [
                 (slanted, -slanted, "start"),
@@ -65,29 +85,27 @@ impl LabelLayout {
                 (0.0, -away, "middle"),
                 (0.0, away + 9.0, "middle"),
             ];
-            // The place with the least overlap is used; names must be inside the picture.
             for (dx, dy, anchor) in ways {
-                let (at_x, at_y) = (x + dx, y + dy);
-                let left = match anchor {
-                    "start" => at_x,
-                    "end" => at_x - width,
-                    _ => at_x - 0.5 * width,
-                };
-                let room = LabelBox {
-                    x: [left, left + width],
-                    y: [at_y - 0.8 * LETTER_HEIGHT, at_y + 0.2 * LETTER_HEIGHT],
-                };
-                let is_outside = room.x[0] < 2.0
-                    || room.x[1] > self.sheet[0] - 2.0
-                    || room.y[0] < 2.0
-                    || room.y[1] > self.sheet[1] - 2.0;
-                if is_outside {
+                let at = [x + dx, y + dy];
+                let Some((cost, room)) = self.label_cost(at, anchor, width) else {
                     continue;
-                }
-                let cost: f64 = self.taken.iter().map(|other| room.overlap_area(other)).sum();
+                };
                 if best.as_ref().is_none_or(|(least, ..)| cost < *least) {
-                    best = Some((cost, (at_x, at_y, anchor), room));
+                    let middle = [0.5 * (room.x[0] + room.x[1]), 0.5 * (room.y[0] + room.y[1])];
+                    let near = [
+                        x.clamp(room.x[0], room.x[1]),
+                        if y > middle[1] { room.y[1] } else { room.y[0] },
+                    ];
+                    let leader = (away > NEAR).then_some(near);
+                    best = Some((cost, LabelPlace { at, anchor, leader }, room));
                 }
+            }
+            // A near place that covers little of a symbol is better than a far one.
+            if best
+                .as_ref()
+                .is_some_and(|(cost, ..)| *cost < LITTLE * width * LETTER_HEIGHT)
+            {
+                break;
             }
         }
         let (cost, place, room) = best?;
@@ -95,7 +113,27 @@ impl LabelLayout {
         if cost > 0.4 * width * LETTER_HEIGHT {
             return None;
         }
-        self.taken.push(room);
+        self.names.push(room);
         Some(place)
+    }
+
+    /// The area of symbols that a name would cover, and its rectangle; `None` if it would leave the picture or overlap
+    /// another name.
+    fn label_cost(&self, [x, y]: [f64; 2], anchor: &str, width: f64) -> Option<(f64, LabelBox)> {
+        let left = match anchor {
+            "start" => x,
+            "end" => x - width,
+            _ => x - 0.5 * width,
+        };
+        let room = LabelBox {
+            x: [left, left + width],
+            y: [y - 0.8 * LETTER_HEIGHT, y + 0.2 * LETTER_HEIGHT],
+        };
+        let is_outside =
+            room.x[0] < 2.0 || room.x[1] > self.sheet[0] - 2.0 || room.y[0] < 2.0 || room.y[1] > self.sheet[1] - 2.0;
+        if is_outside || self.names.iter().any(|other| room.overlap_area(other) > 0.0) {
+            return None;
+        }
+        Some((self.symbols.iter().map(|other| room.overlap_area(other)).sum(), room))
     }
 }

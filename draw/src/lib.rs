@@ -44,9 +44,10 @@ mod plane;
 mod scene;
 mod symbols;
 mod view;
+mod virtual_chain;
 
 pub use free_body::{CutArrow, CutArrowKind, FreeBodyDrawing, free_body_svg};
-pub use loads::DriveArrow;
+pub use loads::{DriveArrow, ERROR_SHADES};
 pub use paint::{DrawingStyle, inline_svg, loaded_svg, svg};
 pub use scene::{JointActuation, JointMark, MarkShape, MechanismScene, SceneMark};
 pub use view::ViewDirection;

@@ -9,11 +9,16 @@ use crate::symbols::polygon;
 pub struct DriveArrow {
     /// Name of the drive.
     pub drive: String,
-    /// The force as a share of the largest one in the picture, from -1 to 1.
+    /// The force as a share of the largest one with the same unit, from -1 to 1.
     pub force: f64,
-    /// The error of a model as a share of the largest error in the picture, from 0 to 1.
+    /// The error of a model as a share of the same force, from 0.
     pub error: f64,
 }
+
+/// Shares of the largest force at which the colour of an arrow changes. The style has a colour below the first one,
+/// one above the last one, and one between each two. By judgement: a good model has an error of 1 to 5 %, and this
+/// range must not look like no error, so the steps are even on a logarithmic scale.
+pub const ERROR_SHADES: [f64; 5] = [0.01, 0.02, 0.05, 0.1, 0.2];
 
 /// Length of the longest straight arrow, in units of the picture.
 const LONGEST_ARROW: f64 = 60.0;
@@ -21,8 +26,6 @@ const LONGEST_ARROW: f64 = 60.0;
 const ARC_RADIUS: f64 = 19.0;
 /// Largest angle of an arrow around a joint, rad.
 const LARGEST_ARC: f64 = 5.0;
-/// Number of shades from no error to the largest one; the style has a colour for each.
-const SHADES: f64 = 6.0;
 /// Shorter arrows are left out, in units of the picture.
 const SHORTEST_ARROW: f64 = 3.0;
 
@@ -58,13 +61,11 @@ pub(crate) fn drive_arrow(
         ),
         _ => return String::new(),
     };
-    let error = if load.error.is_finite() {
-        load.error.clamp(0.0, 1.0)
-    } else {
-        1.0
-    };
-    let shade = (error * SHADES).floor().min(SHADES - 1.0);
-    format!("<g class=\"load e{shade:.0}\">{drawn}</g>\n")
+    // An error that is not finite exceeds all bounds.
+    let shade = (ERROR_SHADES.iter())
+        .filter(|bound| load.error.is_nan() || load.error >= **bound)
+        .count();
+    format!("<g class=\"load e{shade}\">{drawn}</g>\n")
 }
 
 /// The arrow of a joint: along its axis if it is prismatic, else around it.

@@ -19,6 +19,8 @@ const MARGIN: f64 = 46.0;
 const NAMESPACE: &str = " xmlns=\"http://www.w3.org/2000/svg\"";
 /// Distance of each layer of symbols in front of the one below it, in units of the picture.
 const LAYER_SPACING: f64 = 8.0;
+/// Length of a rail beyond its ends, in units of the picture.
+const RAIL_OVERHANG: f64 = 30.0;
 /// Number of colours of bodies in the style.
 const COLOURS: usize = 8;
 
@@ -126,6 +128,8 @@ pub(crate) struct DrawingSheet<'a> {
     style: &'a DrawingStyle,
     /// Units of the picture per metre.
     scale: f64,
+    /// Whether all marks are at one point.
+    is_point: bool,
     /// The projected centre of all marks, m to the right and up.
     middle: [f64; 2],
     /// The largest mass, kg, relative to which others are drawn.
@@ -162,16 +166,14 @@ impl<'a> DrawingSheet<'a> {
         let room = [style.width - 2.0 * margin, style.height - 2.0 * margin - 16.0];
         let scales = [0, 1].map(|k| room[k].max(1.0) / (range[k][1] - range[k][0]).max(1e-9));
         let smallest = scales[0].min(scales[1]);
+        let is_point = smallest > 1e8 || !smallest.is_finite();
         let middle = range.map(|[low, high]| 0.5 * (low + high));
         Self {
             view,
             style,
             // A mechanism without extent, such as one joint alone, is drawn at 1 m.
-            scale: if smallest > 1e8 || !smallest.is_finite() {
-                room[1]
-            } else {
-                smallest
-            },
+            scale: if is_point { room[1] } else { smallest },
+            is_point,
             middle: middle.map(|m| if m.is_finite() { m } else { 0.0 }),
             heaviest,
         }
@@ -209,7 +211,11 @@ impl<'a> DrawingSheet<'a> {
             let group = format!("<g class=\"{colour}\"><title>{title}</title>{drawing}</g>\n");
             // In a plane nothing is hidden, so the kinds of marks are drawn in a fixed order. In space, symbols are
             // drawn slightly in front of the bars on which they are.
-            let layer = drawing_layer(&mark.shape);
+            let layer = match &mark.shape {
+                // Lines of the base must not cut the bodies in front of it.
+                MarkShape::Bar(_) if mark.body == 0 => 0,
+                shape => drawing_layer(shape),
+            };
             if scene.plane.is_some() {
                 drawn.push((layer, 0.0, group));
             } else {
@@ -248,9 +254,18 @@ impl<'a> DrawingSheet<'a> {
         match &mark.shape {
             MarkShape::Bar(ends) => self.paint_segment("bar", ends, mark.body == 0),
             MarkShape::Arm(ends) => self.paint_segment("arm", ends, false),
-            MarkShape::Rail(at, axis) => {
-                let along = self.project_direction(axis);
-                symbols::rail(self.project_point(at), along)
+            MarkShape::Rail(ends, axis) => {
+                // On an empty sheet the rail shows what moves.
+                let beyond = if self.is_point {
+                    0.35 * self.style.width
+                } else {
+                    RAIL_OVERHANG
+                };
+                symbols::rail(
+                    ends.each_ref().map(|at| self.project_point(at)),
+                    self.project_direction(axis),
+                    beyond,
+                )
             }
             MarkShape::Plate(corners) => {
                 let corners: Vec<[f64; 2]> = corners.iter().map(|at| self.project_point(at)).collect();
@@ -313,7 +328,13 @@ impl<'a> DrawingSheet<'a> {
             ));
         }
         let axes = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| self.project_direction(&axis));
-        out.push_str(&symbols::axes([26.0, height - 24.0], &axes, 28.0, ["x", "y", "z"]));
+        // Axes to the left or downwards need room for their names.
+        let beyond = |along: fn(&[f64; 2]) -> f64| axes.iter().map(along).fold(0.0, f64::max);
+        let origin = [
+            (36.0 * beyond(|a| -a[0]) + 10.0).max(26.0),
+            height - (36.0 * beyond(|a| a[1]) + 12.0).max(24.0),
+        ];
+        out.push_str(&symbols::axes(origin, &axes, 28.0, ["x", "y", "z"]));
         // A round length of about a fifth of the width.
         let length = round_length(0.2 * width / self.scale);
         let (x, y) = (width - 14.0, height - 14.0);
@@ -336,7 +357,7 @@ impl<'a> DrawingSheet<'a> {
         for mark in &scene.marks {
             let taken = match &mark.shape {
                 MarkShape::Joint(joint) => Some((&joint.at, 12.0)),
-                MarkShape::Lump(at, mass) => Some((at, self.mass_radius(*mass))),
+                MarkShape::Lump(at, mass) | MarkShape::Centre(at, mass) => Some((at, self.mass_radius(*mass))),
                 MarkShape::Closing(at) | MarkShape::Ground(at) => Some((at, 9.0)),
                 _ => None,
             };
@@ -358,7 +379,15 @@ impl<'a> DrawingSheet<'a> {
             if mark.name.is_empty() {
                 continue;
             }
-            if let Some((x, y, anchor)) = labels.place_label(at, mark.name.chars().count()) {
+            if let Some(place) = labels.place_label(at, mark.name.chars().count()) {
+                let ([x, y], anchor) = (place.at, place.anchor);
+                if let Some([to_x, to_y]) = place.leader {
+                    let [from_x, from_y] = at;
+                    _ = write!(
+                        out,
+                        "<path class=\"leader\" d=\"M{from_x:.1} {from_y:.1}L{to_x:.1} {to_y:.1}\"/>"
+                    );
+                }
                 _ = write!(
                     out,
                     "<text class=\"{class}\" x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{LETTER_HEIGHT}\" text-anchor=\"{anchor}\">{}</text>",

@@ -7,6 +7,7 @@ use modelmill_spec::{
 use nalgebra::Vector3;
 
 use crate::plane::{convex_hull, plane_of_motion};
+use crate::virtual_chain::{drive_ends, mark_virtual_frames};
 
 /// A mechanism at one pose, as shapes to draw.
 #[derive(Clone, Debug)]
@@ -41,8 +42,8 @@ pub enum MarkShape {
     Bar([Vector3<f64>; 2]),
     /// A piece of a body that leads to a point at which nothing is connected.
     Arm([Vector3<f64>; 2]),
-    /// The guide of a prismatic joint: a place on it, and its direction.
-    Rail(Vector3<f64>, Vector3<f64>),
+    /// The guide of a prismatic joint: its zero and the place of the joint on it, and its direction.
+    Rail([Vector3<f64>; 2], Vector3<f64>),
     /// A flat body between three or more joints: its corners in order.
     Plate(Vec<Vector3<f64>>),
     /// A joint with its axis.
@@ -95,11 +96,10 @@ impl MarkShape {
     /// All places of the shape, m.
     pub fn places(&self) -> Vec<Vector3<f64>> {
         match self {
-            Self::Bar(ends) | Self::Arm(ends) | Self::Drive(ends) => ends.to_vec(),
+            Self::Bar(ends) | Self::Arm(ends) | Self::Drive(ends) | Self::Rail(ends, _) => ends.to_vec(),
             Self::Plate(corners) => corners.clone(),
             Self::Joint(joint) => vec![joint.at],
-            Self::Rail(at, _)
-            | Self::Closing(at)
+            Self::Closing(at)
             | Self::Ground(at)
             | Self::Point(at)
             | Self::Lump(at, _)
@@ -122,8 +122,10 @@ impl MechanismScene {
             bodies: vec![0; mechanism.frames.len()],
             n_bodies: 1,
             anchors: vec![Vec::new()],
+            is_virtual: Vec::new(),
             marks: Vec::new(),
         };
+        builder.is_virtual = mark_virtual_frames(mechanism, &builder.poses);
         // Frames come first, because they assign bodies to everything else.
         for frame in 1..mechanism.frames.len() {
             builder.add_frame(frame);
@@ -131,6 +133,7 @@ impl MechanismScene {
         builder.add_points();
         builder.add_drives();
         builder.add_masses();
+        builder.end_last_links();
         builder.add_plates();
         builder.add_ground();
         let joints = builder.marks.iter().filter_map(|mark| match &mark.shape {
@@ -173,6 +176,8 @@ struct Builder<'a> {
     n_bodies: usize,
     /// Places at which each body is connected to others, m.
     anchors: Vec<Vec<Vector3<f64>>>,
+    /// Frames of virtual chains, which are not drawn.
+    is_virtual: Vec<bool>,
     /// All shapes so far.
     marks: Vec<SceneMark>,
 }
@@ -210,7 +215,8 @@ impl Builder<'_> {
         let pose = self.frame_pose(frame).clone();
         let mut body = self.bodies[own.parent.0];
         let mut from = Vector3::from(self.frame_pose(own.parent.0).origin);
-        if own.steps.iter().any(|step| matches!(step, FrameStep::Free(_))) {
+        let is_free = own.steps.iter().any(|step| matches!(step, FrameStep::Free(_)));
+        if is_free || self.is_virtual[frame] {
             // A free body is not connected to its parent, so no bar leads there.
             body = self.n_bodies;
             self.n_bodies += 1;
@@ -220,7 +226,7 @@ impl Builder<'_> {
         // Translations become bars and coordinates become joints, in the order of the frame's steps.
         let mut next = 0;
         let mut way = pose.translations.iter().peekable();
-        loop {
+        while !self.is_virtual[frame] {
             while let Some((at, _)) = way.next_if(|(_, behind)| *behind <= next) {
                 let to = Vector3::from(*at);
                 self.add_bar(body, from, to, frame);
@@ -237,8 +243,17 @@ impl Builder<'_> {
             };
             let count = pose.joint_axes[next..].iter().take_while(|m| is_same(m)).count();
             let together = &pose.joint_axes[next..next + count];
-            self.add_joint(together, frame, &mut body);
             next += count;
+            // Where the translation of a prismatic joint leads to.
+            let moved = way.peek().filter(|(_, behind)| *behind <= next);
+            let moved = moved.map_or(from, |(at, _)| Vector3::from(*at));
+            // The rail of a slide on the base replaces the bar along it.
+            let is_block = body == 0 && together.iter().all(|one| !one.is_rotation);
+            self.add_joint(together, moved, frame, &mut body);
+            if is_block {
+                way.next_if(|(_, behind)| *behind <= next);
+                from = moved;
+            }
         }
         self.bodies[frame] = body;
         // The axes of the frame are the columns of its rotation.
@@ -261,8 +276,14 @@ impl Builder<'_> {
         self.add_mark(MarkShape::Bar([from, to]), body, "", says);
     }
 
-    /// Adds a joint. Behind it a new body begins, whose index `body` gets.
-    fn add_joint(&mut self, together: &[modelmill_spec::CoordinateAxis], frame: usize, body: &mut usize) {
+    /// Adds a joint; a prismatic one leads to the place `moved`. Behind it a new body begins, whose index `body` gets.
+    fn add_joint(
+        &mut self,
+        together: &[modelmill_spec::CoordinateAxis],
+        moved: Vector3<f64>,
+        frame: usize,
+        body: &mut usize,
+    ) {
         let coordinates = &self.mechanism.coordinates;
         let names: Vec<&str> = (together.iter())
             .map(|moved| coordinates[moved.coordinate].name.as_str())
@@ -298,8 +319,16 @@ impl Builder<'_> {
         let name = &self.mechanism.frames[frame].name;
         let says = format!("{names}: {kind} joint of {name}, {whose}");
         let at = Vector3::from(together[0].origin);
+        let is_slide = slides && !turns;
+        // A slide on the base is the block that moves along the rail. Else the sleeve is between both ends, so that it
+        // covers neither of the other joints of the two bodies.
+        let place = match (is_slide, *body) {
+            (true, 0) => moved,
+            (true, _) => 0.5 * (at + moved),
+            _ => at,
+        };
         let joint = JointMark {
-            at,
+            at: place,
             axis: Vector3::from(together[0].axis),
             is_revolute: turns,
             is_prismatic: slides,
@@ -309,11 +338,11 @@ impl Builder<'_> {
         // The joint connects the body before it with the new one.
         self.anchors[*body].push(at);
         if slides {
-            self.add_mark(MarkShape::Rail(at, joint.axis), *body, "", says.clone());
+            self.add_mark(MarkShape::Rail([at, place], joint.axis), *body, "", says.clone());
         }
         *body = self.n_bodies;
         self.n_bodies += 1;
-        self.anchors.push(vec![at]);
+        self.anchors.push(vec![if is_slide { moved } else { at }]);
         self.add_mark(MarkShape::Joint(joint), *body, &names, says);
     }
 
@@ -450,6 +479,21 @@ impl Builder<'_> {
         }
     }
 
+    /// Draws the last bodies of chains, which nothing else ends, as bars from their joint to their centre of mass.
+    fn end_last_links(&mut self) {
+        for body in 1..self.n_bodies {
+            let has_bar = |mark: &SceneMark| mark.body == body && matches!(mark.shape, MarkShape::Bar(_));
+            if self.anchors[body].len() > 1 || self.marks.iter().any(has_bar) {
+                continue;
+            }
+            for mark in self.marks.iter_mut().filter(|mark| mark.body == body) {
+                if let MarkShape::Arm(ends) = mark.shape {
+                    mark.shape = MarkShape::Bar(ends);
+                }
+            }
+        }
+    }
+
     /// Adds plates for bodies that are connected at three or more places of one plane.
     fn add_plates(&mut self) {
         for body in 1..self.n_bodies {
@@ -473,13 +517,5 @@ impl Builder<'_> {
         for at in places {
             self.add_mark(MarkShape::Ground(at), 0, "", "ground".to_owned());
         }
-    }
-}
-
-/// The points of a drive between points; empty for a drive on a joint.
-fn drive_ends(kind: DriveKind) -> Vec<PointIdx> {
-    match kind {
-        DriveKind::Linear { from, to } => vec![from, to],
-        DriveKind::Joint(_) => Vec::new(),
     }
 }

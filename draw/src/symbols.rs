@@ -25,7 +25,7 @@ pub(crate) struct SymbolPlace {
 pub(crate) fn line(class: &str, a: [f64; 2], b: [f64; 2]) -> String {
     let d = format!("M{:.1} {:.1}L{:.1} {:.1}", a[0], a[1], b[0], b[1]);
     let line = format!("<path class=\"{class}\" d=\"{d}\"/>");
-    if class == "arm" {
+    if class == "arm" || class == "base" {
         return line;
     }
     format!("<path class=\"halo\" d=\"{d}\"/>{line}")
@@ -113,10 +113,20 @@ fn sleeve(class: &str, at: [f64; 2], axis: [f64; 2], length: f64) -> String {
     polygon(class, &corners)
 }
 
-/// The guide of a prismatic joint, on both sides of the joint.
-pub(crate) fn rail(at: [f64; 2], along: [f64; 2]) -> String {
-    let end = |by: f64| [0, 1].map(|k| at[k] + by * along[k]);
-    line("rail", end(-30.0), end(30.0))
+/// The guide of a prismatic joint between two places on it, and beyond both of them along its projected direction.
+pub(crate) fn rail(ends: [[f64; 2]; 2], along: [f64; 2], beyond: f64) -> String {
+    let [a, b] = ends;
+    // The second place may lie in the negative direction.
+    let sign = if (0..2).map(|k| (b[k] - a[k]) * along[k]).sum::<f64>() < 0.0 {
+        -beyond
+    } else {
+        beyond
+    };
+    line(
+        "rail",
+        [0, 1].map(|k| a[k] - sign * along[k]),
+        [0, 1].map(|k| b[k] + sign * along[k]),
+    )
 }
 
 /// The symbol of a closed loop: two rings at the common point.

@@ -2,7 +2,18 @@
 
 use nalgebra::Vector3;
 
-use crate::scene::MechanismScene;
+use crate::scene::{MarkShape, MechanismScene};
+
+/// Azimuth of the oblique view unless another one shows more, rad.
+const USUAL_AZIMUTH: f64 = -0.9;
+/// Elevation of the oblique view, rad.
+const ELEVATION: f64 = 0.42;
+/// Number of azimuths that are tried.
+const AZIMUTHS: u8 = 12;
+/// Increase of the mean logarithm of visible shares from which another azimuth is used: 5 %. By judgement.
+const CLEARLY_MORE: f64 = 0.05;
+/// Share of its length below which a link counts as hidden. By judgement.
+const HIDDEN_SHARE: f64 = 0.1;
 
 /// A direction of view, by the two axes of the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,10 +57,11 @@ impl ViewDirection {
 }
 
 impl MechanismScene {
-    /// The most informative view: onto the plane of motion if there is one, else obliquely from above.
+    /// The most informative view: onto the plane of motion if there is one, else obliquely from above, from the side
+    /// from which the links are longest.
     pub fn best_view(&self) -> ViewDirection {
         let Some(normal) = self.plane else {
-            return ViewDirection::from_angles(self, -0.9, 0.42);
+            return self.best_oblique_view();
         };
         let within = |v: Vector3<f64>| (v - normal * v.dot(&normal)).try_normalize(0.1);
         // Up is opposite to gravity, as far as it lies in the plane, else y or z of the base.
@@ -62,5 +74,38 @@ impl MechanismScene {
             right: up.cross(&normal),
             up,
         }
+    }
+
+    /// The oblique view in which no link is seen from its end, as far as possible. Each link counts with the logarithm
+    /// of the share of its length that is seen, so that one hidden link is worse than many shortened ones.
+    fn best_oblique_view(&self) -> ViewDirection {
+        let links: Vec<Vector3<f64>> = (self.marks.iter())
+            .filter_map(|mark| match &mark.shape {
+                MarkShape::Bar([a, b]) | MarkShape::Drive([a, b]) if mark.body != 0 => Some(b - a),
+                _ => None,
+            })
+            .filter(|link| link.norm() > 1e-9)
+            .collect();
+        let weight: f64 = links.iter().map(|link| link.norm().sqrt()).sum();
+        let visibility = |view: &ViewDirection| -> f64 {
+            let seen = links.iter().map(|link| {
+                let [right, up] = view.project(link);
+                let share = right.hypot(up) / link.norm();
+                link.norm().sqrt() / weight * (HIDDEN_SHARE + share).ln()
+            });
+            seen.sum()
+        };
+        let mut best = ViewDirection::from_angles(self, USUAL_AZIMUTH, ELEVATION);
+        // Another side must show clearly more, so that small changes of a model do not turn its picture.
+        let mut least = visibility(&best) + CLEARLY_MORE;
+        for k in 1..AZIMUTHS {
+            let azimuth = USUAL_AZIMUTH + f64::from(k) * std::f64::consts::TAU / f64::from(AZIMUTHS);
+            let view = ViewDirection::from_angles(self, azimuth, ELEVATION);
+            let visible = visibility(&view);
+            if visible > least {
+                (best, least) = (view, visible);
+            }
+        }
+        best
     }
 }

@@ -3,7 +3,7 @@
 use modelmill_codegen::{ModelEvaluator, MotionStates};
 use modelmill_draw::{MechanismScene, ViewDirection, loaded_svg};
 
-pub use modelmill_draw::{DrawingStyle, DriveArrow};
+pub use modelmill_draw::{DrawingStyle, DriveArrow, ERROR_SHADES};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;

@@ -155,8 +155,8 @@
     const { text } = await finding.ask('add', { entry });
     return edit({ text, did: `+ ${kind.replaceAll('_', ' ')} (${at.join(', ')})` });
   };
-  const save = async () => {
-    const told = heard(await answering.ask('save'));
+  const save = async (body) => {
+    const told = heard(await answering.ask('save', body));
     const link = document.createElement('a');
     link.href = URL.createObjectURL(new Blob([told.text], { type: 'application/toml' }));
     link.download = desk.model;

@@ -67,6 +67,14 @@ struct EditRequest {
     did: Option<String>,
 }
 
+/// Body of `save`.
+#[derive(Default, Deserialize)]
+struct SaveRequest {
+    /// The revision that the page shows; without it the current text is saved.
+    #[serde(default)]
+    base: Option<u64>,
+}
+
 /// Body of `choose`, which resolves a conflict between two texts.
 #[derive(Deserialize)]
 struct ConflictRequest {
@@ -115,12 +123,12 @@ pub(crate) fn answer_request(
         "edit" => {
             let EditRequest { base, text, did } = parse_body(body)?;
             let view_json = session.edit(base, &text, did.as_deref());
-            view_json.ok_or_else(|| {
-                let says = "the text was changed in another window";
-                RequestRefusal(RequestFault::Conflict, says.to_owned())
-            })?
+            view_json.ok_or_else(refuse_outdated)?
         }
-        "save" => session.save()?,
+        "save" => {
+            let SaveRequest { base } = parse_body(body)?;
+            session.save(base)?.ok_or_else(refuse_outdated)?
+        }
         "choose" => session.resolve_conflict(parse_body::<ConflictRequest>(body)?.theirs),
         "picture" => {
             return Ok(PageResponse::Svg(
@@ -155,6 +163,12 @@ pub(crate) fn answer_request(
             return Err(RequestRefusal(RequestFault::Unknown, says));
         }
     }))
+}
+
+/// The refusal of a request that refers to an earlier text.
+fn refuse_outdated() -> RequestRefusal {
+    let says = "the text was changed in another window";
+    RequestRefusal(RequestFault::Conflict, says.to_owned())
 }
 
 /// Reads a JSON body; refuses one that does not fit the request.

@@ -29,7 +29,7 @@ impl FileAccessPolicy {
         };
         Arc::new(Self {
             disk: DiskFiles::default(),
-            folder: canonical_path(folder),
+            folder: canonical_path(folder).unwrap_or_else(|| folder.to_owned()),
             named: RwLock::default(),
         })
     }
@@ -61,7 +61,7 @@ impl FileAccessPolicy {
             Ok(named) => named,
             Err(poisoned) => poisoned.into_inner(),
         };
-        named.push(canonical_path(path));
+        named.extend(canonical_path(path));
     }
 
     /// Fails if a path leads to a file that is not permitted, also through links.
@@ -71,7 +71,7 @@ impl FileAccessPolicy {
             Ok(named) => named,
             Err(poisoned) => poisoned.into_inner(),
         };
-        if real.starts_with(&self.folder) || named.contains(&real) {
+        if real.is_some_and(|real| real.starts_with(&self.folder) || named.contains(&real)) {
             return Ok(());
         }
         let says = format!(
@@ -83,9 +83,23 @@ impl FileAccessPolicy {
     }
 }
 
-/// The path without links and `..`; unchanged if nothing exists there.
-fn canonical_path(path: &Path) -> PathBuf {
-    path.canonicalize().unwrap_or_else(|_| path.to_owned())
+/// The path without links and `..`. If nothing exists there, its folder decides, so that a missing file in the folder
+/// of the model counts as missing, not as forbidden. `None` if it cannot be known where the path leads.
+fn canonical_path(path: &Path) -> Option<PathBuf> {
+    if let Ok(real) = path.canonicalize() {
+        return Some(real);
+    }
+    // A link to a missing file may lead anywhere.
+    if path.is_symlink() {
+        return None;
+    }
+    let (parent, name) = (path.parent()?, path.file_name()?);
+    let parent = if parent == Path::new("") {
+        Path::new(".")
+    } else {
+        parent
+    };
+    Some(canonical_path(parent)?.join(name))
 }
 
 impl FileSource for FileAccessPolicy {
@@ -128,12 +142,25 @@ mod tests {
         let read = |name: &str| file_access.read(&inside.join(name), 100).is_ok();
         assert!(read("arm.toml") && read("base.toml"));
         assert!(!read("../secret") && !read("../run.csv") && !read("/etc/passwd"));
+        // A missing file in the folder is missing, and one outside of it is outside.
+        let says = |name: &str| {
+            let error = file_access.read(&inside.join(name), 100).unwrap_err();
+            error.to_string()
+        };
+        for name in ["none.toml", "sub/none.toml", "../models/none.toml"] {
+            assert!(!says(name).contains("outside of"), "{}", says(name));
+        }
+        for name in ["../none.toml", "../../none/none.toml", "none/../../run.csv"] {
+            assert!(says(name).contains("outside of"), "{}", says(name));
+        }
         file_access.allow_file(&folder.join("run.csv"));
         assert!(read("../run.csv") && !read("../secret"));
         #[cfg(unix)]
         {
-            std::os::unix::fs::symlink("../secret", inside.join("link")).unwrap();
-            assert!(!read("link"));
+            for (to, link) in [("../secret", "link"), ("../none", "dangling")] {
+                std::os::unix::fs::symlink(to, inside.join(link)).unwrap();
+                assert!(!read(link) && says(link).contains("outside of"));
+            }
         }
         std::fs::remove_dir_all(&folder).unwrap();
     }

@@ -6,7 +6,8 @@
   const by = (id) => document.getElementById(id);
   const text = by('text');
   let view = null, pane = 'mechanism', version = 0;
-  let base = 0, sent = null, isSending = false, isTyped = false, opened = null;
+  // `sent` is the last text of the server that this window knows, `base` its revision.
+  let base = 0, sent = null, opened = null;
 
   // Shows a sentence above the panes. A caller that updates automatically (`who`) removes only its own sentence.
   const say = (words, who) => {
@@ -17,13 +18,33 @@
     box.hidden = !words;
   };
 
-  // Runs work that may fail; shows its error above the panes.
+  // Downloads the text, for a program that cannot save it any more.
+  const rescue = () => {
+    const link = make('a');
+    link.href = URL.createObjectURL(new Blob([text.value], { type: 'application/toml' }));
+    link.download = view ? view.file.split(/[\\/]/).pop() : 'model.toml';
+    link.click();
+    URL.revokeObjectURL(link.href);
+  };
+  // Shows an error. If the program did not answer, the sentence disappears once it answers again.
+  const say_error = (error, who) => {
+    say(error.message, error.isUnanswered ? 'connection' : who);
+    if (!error.isUnanswered) return;
+    const button = make('button', 'Download the text');
+    button.type = 'button';
+    button.addEventListener('click', rescue);
+    by('says').append(' ', button);
+  };
+
+  // Runs work that may fail; shows its error above the panes. Work that is repeated automatically (`who`) removes its sentence
+  // once it succeeds.
   const tried = async (work, who) => {
     try {
       await work();
+      if (who) say('', who);
       return true;
     } catch (error) {
-      say(error.message, who);
+      say_error(error, who);
       return false;
     }
   };
@@ -48,27 +69,21 @@
 
   const plain = (words) => words.replace(/\r\n/g, '\n');
 
-  const differs_at = (one, other) => {
-    let at = 0;
-    while (at < one.length && one[at] === other[at]) at++;
-    return at;
-  };
-
   // Replaces the text by an edit that the browser can undo; only the part that differs is edited.
   const replace = (words) => {
     const old = text.value, top = text.scrollTop;
     words = plain(words);
     if (old === words) return;
-    const from = differs_at(old, words);
-    let end = 0;
-    while (end < old.length - from && end < words.length - from && old[old.length - 1 - end] === words[words.length - 1 - end]) end++;
+    const { from, to, put } = window.texts.edit_between(old, words);
     const held = document.activeElement;
+    // The caret stays at its letter.
+    const moved = (at) => (at <= from ? at : at >= to ? at + put.length - (to - from) : from + put.length);
+    const caret = [text.selectionStart, text.selectionEnd].map(moved);
     text.focus({ preventScroll: true });
-    text.setSelectionRange(from, old.length - end);
-    const piece = words.slice(from, words.length - end);
-    isTyped = false;
-    const isDone = document.execCommand(piece ? 'insertText' : 'delete', false, piece);
+    text.setSelectionRange(from, to);
+    const isDone = document.execCommand(put ? 'insertText' : 'delete', false, put);
     if (!isDone || text.value !== words) text.value = words;
+    text.setSelectionRange(...caret);
     if (held && held !== text) held.focus({ preventScroll: true });
     text.scrollTop = top;
     lines();
@@ -119,52 +134,58 @@
   };
 
   const slow = window.mill.slow || (() => {});
-  // Sends the current text, and again if it was changed meanwhile.
-  const send = async () => {
-    if (isSending || !view) return;
-    isSending = true;
+  // Sends the current text, and again if it was changed meanwhile. Who waits for it waits for a send that is under way as well.
+  let sending = null;
+  const send = () => {
+    if (view && !sending) sending = deliver().finally(() => { sending = null; });
+    return sending || Promise.resolve();
+  };
+  const deliver = async () => {
     while (sent !== text.value) {
       const words = text.value;
       const late = setTimeout(() => slow(true), 1500);
       try {
         const told = await ask('edit', { base, text: words });
-        sent = words;
-        base = told.revision;
-        show(told);
+        // The view may have an edit of another window already, which came after this one.
+        follow(told, words);
       } catch (error) {
-        if (error.status === 409) {
-          // Another window sent a text first: it is loaded, unless this window has typed text that was not sent.
-          const told = await news(0).catch(() => null);
-          if (!told) { say(error.message); break; }
-          if (isTyped) {
-            base = told.revision;
-            say('The text was changed in another window while you typed. This window keeps your text.');
-          } else follow(told);
-          continue;
-        }
-        say(error.message);
-        break;
+        if (error.status !== 409) { say_error(error); break; }
+        // Another window sent a text first.
+        const told = await news(0).catch(() => null);
+        if (!told) { say_error(error); break; }
+        follow(told);
       } finally {
         clearTimeout(late);
         slow(false);
       }
     }
-    isTyped = false;
-    isSending = false;
   };
 
-  const follow = (told) => {
-    base = told.revision;
-    replace(told.text);
-    sent = text.value;
-    isTyped = false;
+  // Shows a view and its text. Edits of this window that were not sent are kept, unless another window edited the same line.
+  const follow = (told, words = sent) => {
+    if (told.version < version || told.revision < base) return;
+    const theirs = plain(told.text);
+    sent = words;
+    // Edits of one model are not edits of another one.
+    const merged = told.opened === opened ? window.texts.merge(sent, text.value, theirs) : theirs;
+    [base, sent] = [told.revision, theirs];
+    replace(merged === null ? theirs : merged);
     show(told);
+    if (merged === null) say('Another window changed the line in which you typed. Its text is shown and yours is not in it. Undo (Ctrl+Z) brings yours back.');
+    if (sent !== text.value) send();
+  };
+  // The same for the response to a button; an edit that is under way comes first.
+  const take = async (told) => {
+    await sending;
+    follow(told);
   };
 
   // ---- the view
 
   const show = (told) => {
     if (told.version < version) return;
+    // The list of faults explains why work on the text failed.
+    if (!told.valid && by('says').dataset.who && by('says').dataset.who !== 'connection') say('');
     version = told.version;
     view = told;
     document.title = `${view.changed ? '\u2022 ' : ''}${view.file}`;
@@ -206,11 +227,14 @@
     say('');
     errors = motion = recorded = planned = null;
     loads = [];
+    by('load-key').hidden = true;
     by('diagnose').disabled = !view.data;
-    for (const id of ['places', 'draw']) by(id).disabled = !view.data;
+    // There is nothing to search or draw before the first comparison.
+    for (const id of ['places', 'draw']) by(id).disabled = true;
     for (const id of ['curves', 'where', 'written', 'found']) { by(id).replaceChildren(); mark_stale(id); }
     by('motion').hidden = true;
-    if (view.data) load(); else by('errors').textContent = window.mill.hint;
+    by('errors').textContent = !view.data ? window.mill.hint
+      : view.valid ? 'Reading and comparing the recordings\u2026' : 'The recordings are compared once the text has no faults.';
   };
 
   const equations = () => {
@@ -270,19 +294,28 @@
 
   const draw = asker('picture', async () => {
     if (pane !== 'mechanism' || !view || !view.valid) return;
+    // A picture of another pose must not look like the one of the requested pose.
     const svg = await ask('picture', {
       at: Object.entries(at), from, names: by('names').checked, frames: by('frames').checked, shadow: by('shadow').checked, loads,
+    }).catch((error) => {
+      by('picture').classList.add('stale');
+      if (error.status === 422) error.message += '. The picture still shows the last pose that could be drawn.';
+      throw error;
     });
+    by('picture').classList.remove('stale');
     by('picture').innerHTML = svg;
     looked.again();
     by('picture').dataset.drawn = Number(by('picture').dataset.drawn || 0) + 1;
-    say('', 'picture');
   });
 
   const compare = asker('errors', async () => {
     if (!view || !view.valid || !view.data) return;
     if (errors && errors.revision === view.revision) return;
-    compared(await ask('compare', { places: false, afresh: false }));
+    if (!errors) by('errors').textContent = 'Reading and comparing the recordings\u2026';
+    compared(await ask('compare', { places: false, afresh: false }).catch((error) => {
+      if (!errors) by('errors').textContent = 'The recordings cannot be compared; the reason is above.';
+      throw error;
+    }));
     // Remarks on the recordings may depend on values: they are updated when typing stops.
     clearTimeout(rest);
     if (!errors.afresh) rest = setTimeout(again, 700);
@@ -297,9 +330,9 @@
     errors = told;
     const notes = told.notes.filter((note) => note.severity === 'warning').map((note) => make('p', note.says, 'alias'));
     by('errors').replaceChildren(figures(told), ...notes);
+    for (const id of ['places', 'draw']) by(id).disabled = false;
     by('comparison').dataset.revision = told.revision;
     stepErrors();
-    say('', 'errors');
   };
 
   // Results of a button stay until the button is used again; a note says that the text has changed since.
@@ -316,7 +349,8 @@
   const refresh = () => {
     draw();
     compare();
-    errors_of_now();
+    clearTimeout(waiting);
+    if (!recorded) load(); else if (pane === 'mechanism' && by('forces').checked) waiting = setTimeout(load, 400);
     document.dispatchEvent(new CustomEvent('stands', { detail: { view, pane, seen: { at: Object.entries(at), from } } }));
     for (const old of ['curves', 'where', 'written', 'found']) mark_stale(old);
   };
@@ -339,23 +373,43 @@
     return table;
   };
 
+  // The range of a slider: the limits of the model file if it has any; it always contains the nominal value.
+  const range = ({ angle, nominal, limits }) => {
+    const reach = angle ? Math.PI : Math.max(0.5, Math.abs(nominal));
+    const [low, high] = limits || [nominal - reach, nominal + reach];
+    return { min: Math.min(low, nominal), max: Math.max(high, nominal) };
+  };
   const sliders = () => {
     const { coordinates } = view.model;
-    const names = coordinates.map((one) => one.name).join();
-    if (by('coordinates').dataset.names === names) return;
-    by('coordinates').dataset.names = names;
-    for (const name in at) delete at[name];
-    by('coordinates').replaceChildren(...coordinates.map((one) => {
-      const label = make('label', one.name);
-      const input = make('input');
-      const reach = one.angle ? Math.PI : Math.max(0.5, Math.abs(one.nominal));
-      Object.assign(input, { type: 'range', min: one.nominal - reach, max: one.nominal + reach, step: 'any', value: one.nominal });
-      input.dataset.name = one.name;
-      const told = make('output', number(one.nominal));
-      input.addEventListener('input', () => { at[one.name] = Number(input.value); told.textContent = number(at[one.name]); draw(); });
-      label.append(input, told);
-      return label;
-    }));
+    const names = coordinates.map((one) => one.name);
+    // A pose that was set stays for all coordinates that the edited text still has.
+    for (const name in at) if (!names.includes(name)) delete at[name];
+    if (by('coordinates').dataset.names !== names.join()) {
+      by('coordinates').dataset.names = names.join();
+      by('coordinates').replaceChildren(...names.map((name) => {
+        const label = make('label', name);
+        const input = make('input');
+        Object.assign(input, { type: 'range', step: 'any' });
+        input.dataset.name = name;
+        const told = make('output');
+        input.addEventListener('input', () => {
+          at[name] = Number(input.value);
+          told.textContent = number(at[name]);
+          // Forces belong to a moment of the recording, not to this pose.
+          loads = [];
+          by('load-key').hidden = true;
+          draw();
+        });
+        label.append(input, told);
+        return label;
+      }));
+    }
+    coordinates.forEach((one, i) => {
+      const [input, told] = by('coordinates').children[i].children;
+      const value = one.name in at ? at[one.name] : one.nominal;
+      Object.assign(input, range(one), { value });
+      told.textContent = number(value);
+    });
   };
 
   const turn = (azimuth, elevation) => {
@@ -390,15 +444,32 @@
     }
     return low;
   };
-  const largest = (all) => Math.max(...all.map((one) => one.reduce((most, v) => Math.max(most, Math.abs(v)), 0)), 1e-300);
-  // An error of this share of the largest force has the full colour.
-  const FAR_OFF = 0.2;
-  // Forces at a time as shares of the largest of the run, and errors as shares of the error with full colour.
+  // The largest measured force of a run for each unit. Forces and torques have no common scale.
+  const scales = (run) => {
+    run.scales = run.scales || motion.units.reduce((all, unit, d) => {
+      all[unit] = run.forces.measured[d].reduce((most, v) => Math.max(most, Math.abs(v)), all[unit] || 0);
+      return all;
+    }, {});
+    return run.scales;
+  };
+  // Forces and errors at a time, as shares of the largest force with the same unit.
   const shares = (run, time) => {
     if (!run.forces || !by('forces').checked) return [];
-    run.largest = run.largest || largest(run.forces.measured);
     const k = place(run.forces.time, time);
-    return motion.drives.map((drive, d) => [drive, (run.forces.measured[d][k] || 0) / run.largest, Math.min(1, Math.abs(run.forces.error[d][k] || 0) / (FAR_OFF * run.largest))]);
+    return motion.drives.map((drive, d) => {
+      const full = scales(run)[motion.units[d]] || 1e-300;
+      return [drive, (run.forces.measured[d][k] || 0) / full, Math.abs(run.forces.error[d][k] || 0) / full];
+    });
+  };
+  // The scale of the arrows, and the meaning of their colours.
+  const load_key = (run) => {
+    by('load-key').hidden = !loads.length;
+    if (!loads.length) return;
+    const full = Object.entries(scales(run)).map(([unit, most]) => `${number(Number(most.toPrecision(4)))} ${unit}`).join(' or ');
+    const bounds = motion.shades.map((share) => `${100 * share} %`);
+    const words = [`below ${bounds[0]}`, ...bounds.slice(1).map((bound, i) => `${bounds[i]} to ${bound}`), `above ${bounds[bounds.length - 1]}`];
+    by('load-key').replaceChildren(`The longest arrow is ${full}, the largest measured force of this recording. Error of the model relative to it: `,
+      ...words.map((one, i) => { const key = make('span', one, `e${i}`); key.prepend(make('i')); return key; }));
   };
   const pose = (k) => {
     const run = chosen();
@@ -409,6 +480,7 @@
     });
     by('moment').textContent = `${run.time[k].toFixed(2)} s`;
     loads = shares(run, run.time[k]);
+    load_key(run);
     draw();
   };
   const choose = () => {
@@ -417,32 +489,39 @@
     by('time').value = 0;
     by('with-forces').hidden = !run.forces;
   };
+  // Lists recordings and planned motion; the selected run and its time stay selected.
   const offer = () => {
     const runs = [...(recorded ? recorded.runs : []), ...(planned ? planned.runs : [])];
-    motion = runs.length ? { names: (recorded || planned).names, drives: recorded ? recorded.drives : [], runs } : null;
+    const { names, drives, units, shades } = recorded || { drives: [], units: [], ...planned };
+    const [was, when] = [motion && by('run').selectedIndex, by('time').value];
+    motion = runs.length ? { names, drives, units, shades, runs } : null;
     by('motion').hidden = !motion;
     by('run').replaceChildren(...runs.map((run) => make('option', run.file)));
-    if (motion) choose();
+    if (!motion) return;
+    if (was > 0 && was < runs.length) by('run').selectedIndex = was;
+    choose();
+    by('time').value = when;
   };
+  // Reads the motion of the recordings, then again for the errors of a changed text.
   let shown_of = null, waiting = null;
-  const load = () => tried(async () => {
-    shown_of = view.derived;
-    recorded = await ask('motion', {});
+  const load = asker('motion', async () => {
+    if (!view || !view.valid || !view.data || view.derived !== view.revision || (recorded && shown_of === view.derived)) return;
+    const { derived, opened: whose } = view;
+    const told = await ask('motion', {});
+    if (whose !== view.opened) return;
+    shown_of = derived;
+    recorded = told;
     offer();
+    // Only a picture that follows the recording has arrows.
+    if (loads.length && !playing) pose(Number(by('time').value));
   });
-  // Errors are updated to the current text when typing stops.
-  const errors_of_now = () => {
-    if (!recorded || shown_of === view.derived || pane !== 'mechanism' || !by('forces').checked) return;
-    clearTimeout(waiting);
-    waiting = setTimeout(() => tried(async () => {
-      const of = view.derived;
-      const told = await ask('motion', {});
-      shown_of = of;
-      told.runs.forEach((run, i) => { if (recorded.runs[i]) recorded.runs[i].forces = run.forces; });
-      if (motion && !playing) pose(Number(by('time').value));
-    }), 400);
-  };
-  by('forces').addEventListener('change', () => pose(Number(by('time').value)));
+  // Arrows need a moment of the recording; without them the pose stays.
+  by('forces').addEventListener('change', () => {
+    if (by('forces').checked) { pose(Number(by('time').value)); load(); return; }
+    loads = [];
+    by('load-key').hidden = true;
+    draw();
+  });
   by('run').addEventListener('change', () => { choose(); pose(0); });
   by('time').addEventListener('input', () => pose(Number(by('time').value)));
   by('play').addEventListener('click', () => {
@@ -489,96 +568,27 @@
     say('');
   }));
 
-  // ---- diagnosis
-
-  let shown = -1;
-  const findings = (told) => {
-    const box = by('found');
-    box.replaceChildren();
-    listed(box, told);
-    made_of('found', told.of_this_text ? String(view.revision) : '');
-  };
-  const listed = (box, told) => {
-    if (told.cancelled) box.append(make('p', 'The diagnosis was cancelled.'));
-    if (told.failed) box.append(make('p', told.failed, 'alias'));
-    const { found } = told;
-    if (!found) return;
-    const verdict = { adequate: ' adequate', unexplained: ' unexplained' }[found.verdict] || '';
-    box.append(make('p', found.says, `verdict${verdict}`));
-    found.entries.forEach((entry, k) => {
-      const one = make('div', undefined, 'finding');
-      one.append(make('b', `${entry.kind.replaceAll('_', ' ')} (${entry.at.join(', ')}) `));
-      const values = [...Object.entries(entry.parameters).map(([name, p]) => [name, p.nominal]), ...Object.entries(entry.constants)];
-      one.append(make('span', values.filter(([, v]) => v !== null).map(([name, v]) => `${name} = ${number(v)}`).join(', ')), ' ');
-      const button = make('button', 'Add');
-      button.type = 'button';
-      button.addEventListener('click', () => tried(async () => {
-        button.disabled = true;
-        try {
-          const before = text.value;
-          // The new text may arrive by a notification before the response does.
-          follow(await ask('add', { entry: k }));
-          say('');
-          go(line_of(differs_at(before, text.value)));
-        } catch (error) { button.disabled = false; throw error; }
-      }));
-      one.append(button, make('br'), make('code', entry.command));
-      box.append(one);
-    });
-    for (const effect of found.effects) {
-      if (!effect.indistinguishable_from.length) continue;
-      const others = effect.indistinguishable_from.map((o) => `${o.kind.replaceAll('_', ' ')} (${o.at.join(', ')})`).join(', ');
-      box.append(make('p', `These recordings cannot distinguish ${effect.kind.replaceAll('_', ' ')} from ${others}. ${effect.separate_by || ''}`));
-      if (effect.separate_command) box.append(make('code', effect.separate_command));
-    }
-    for (const one of found.corrected) box.append(make('p', `${one.heading}: ${one.todo}.`));
-    for (const one of found.disturbances.filter((one) => !one.in_verdict)) box.append(make('p', `Disturbance in the recordings: ${one.says}.`));
-    const figure = make('figure', undefined, 'still');
-    figure.innerHTML = found.picture;
-    figure.prepend(make('figcaption', `Error relative to the force ${found.judged}`));
-    box.append(figure);
-    window.enlivenPictures(box);
-    const list = make('ul');
-    for (const one of found.where) list.append(make('li', `${one.says}.`));
-    box.append(list);
-    for (const note of found.data) if (note.severity === 'warning') box.append(make('p', note.says, 'alias'));
-  };
-  const follow_diagnosis = async () => {
-    for (;;) {
-      const told = await ask('diagnosis', {});
-      const { going } = told;
-      by('diagnose').disabled = Boolean(going) || !view.data;
-      by('cancel').hidden = by('progress').hidden = !going;
-      if (!going) {
-        by('going').textContent = '';
-        if (told.number > 0 && shown !== told.number) { shown = told.number; findings(told); }
-        return;
-      }
-      by('going').textContent = `${going.what}, ${going.seconds.toFixed(0)} s`;
-      if (going.total) Object.assign(by('progress'), { max: going.total, value: going.done });
-      else by('progress').removeAttribute('value');
-      await new Promise((done) => setTimeout(done, 200));
-    }
-  };
-  by('diagnose').addEventListener('click', () => tried(async () => {
-    await send();
-    by('found').replaceChildren();
-    mark_stale('found');
-    await ask('diagnose', {});
-    say('');
-    await follow_diagnosis();
-  }));
-  by('cancel').addEventListener('click', () => tried(() => ask('cancel', {})));
-
   // ---- the rest
 
-  const save = () => tried(async () => { await send(); show(await ask('save', {})); say(''); });
+  // Only the text that this window shows is saved.
+  const save = () => tried(async () => {
+    await send();
+    if (sent !== text.value) return;
+    try {
+      await take(await ask('save', { base }));
+      say('');
+    } catch (error) {
+      if (error.status !== 409) throw error;
+      await take(await news(0));
+      throw new Error('Nothing is saved, because another window changed the text at this moment. The text with both edits is shown. Save again.');
+    }
+  });
   by('save').addEventListener('click', save);
   document.addEventListener('keydown', (event) => {
     if ((event.ctrlKey || event.metaKey) && event.key === 's') { event.preventDefault(); save(); }
   });
-  by('theirs').addEventListener('click', () => tried(async () => follow(await ask('choose', { theirs: true }))));
-  by('mine').addEventListener('click', () => tried(async () => show(await ask('choose', { theirs: false }))));
+  by('theirs').addEventListener('click', () => tried(async () => take(await ask('choose', { theirs: true }))));
+  by('mine').addEventListener('click', () => tried(async () => take(await ask('choose', { theirs: false }))));
   by('copy').addEventListener('click', () => window.copied(by('command').textContent, 'the command'));
   const open = (name) => {
     // A message of one pane is not for another one.
@@ -598,13 +608,13 @@
     next.focus();
     open(next.dataset.pane);
   });
-  text.addEventListener('input', () => { lines(); isTyped = true; send(); });
+  text.addEventListener('input', () => { lines(); send(); });
   text.addEventListener('scroll', () => { by('lines').scrollTop = text.scrollTop; });
   window.addEventListener('beforeunload', (event) => { if (view && (view.changed || sent !== text.value)) event.preventDefault(); });
 
   // Functions for the scripts of single panes.
   window.workbench = {
-    ask, make, number, percent, cell, amount, asker, say, tried, others, send, told_command,
+    ask, make, number, percent, cell, amount, asker, say, tried, others, send, told_command, take, go, line_of, mark_stale, made_of,
     view: () => view,
     // Adds a trajectory along which the mechanism can be moved; `true` plays it.
     animate: (names, run, isShown) => {
@@ -623,15 +633,15 @@
     for (;;) {
       try {
         const told = await news(version);
-        if (told.version <= version || isSending) {
+        say('', 'connection');
+        if (told.version <= version || sending) {
           // The response that is awaited has the new view; until then the request is repeated.
-          if (isSending) await new Promise((done) => setTimeout(done, 50));
+          if (sending) await new Promise((done) => setTimeout(done, 50));
           continue;
         }
-        if (told.revision !== base) follow(told); else show(told);
-        follow_diagnosis().catch(() => {});
+        follow(told);
       } catch (error) {
-        by('state').textContent = `the program does not answer (${error.message}). Keep this page open: it still has your text`;
+        by('state').textContent = error.message;
         await new Promise((done) => setTimeout(done, 2000));
       }
     }
@@ -646,7 +656,7 @@
     text.setSelectionRange(0, 0);
     text.scrollTop = 0;
     lines();
+    if (told.beside) open('variant');
     watch();
-    await follow_diagnosis();
   });
 })();

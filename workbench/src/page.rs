@@ -61,8 +61,10 @@ fn compress_to_base64(bytes: &[u8]) -> String {
 }
 
 /// Scripts that only the workbench has, in the order in which they run.
-const SCRIPTS: [&str; 4] = [
+const SCRIPTS: [&str; 6] = [
+    include_str!("merge.js"),
     include_str!("page.js"),
+    include_str!("diagnosis.js"),
     include_str!("completion.js"),
     include_str!("excitation.js"),
     include_str!("variant.js"),

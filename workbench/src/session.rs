@@ -9,7 +9,7 @@ use modelmill::diagnose::{FixedParameters, ModelVersion};
 use modelmill::files::FileError;
 use modelmill::identify::EstimatorOptions;
 use modelmill::model::PageFormat;
-use modelmill::picture::{DrawingStyle, DriveArrow, PictureOptions};
+use modelmill::picture::{DrawingStyle, DriveArrow, ERROR_SHADES, PictureOptions};
 use modelmill::recording::PreparedRecording;
 use modelmill::segment::RecordingSegment;
 use modelmill::{Error, Host, Model, Outcome, report};
@@ -104,7 +104,7 @@ pub(crate) struct PictureRequest {
     shadow: bool,
     /// Another model to draw as the shadow, by its name in `models`.
     beside: Option<String>,
-    /// Drives with their forces and errors, as shares of the largest.
+    /// Drives with their forces and errors, as shares of the largest force with the same unit.
     loads: Vec<(String, f64, f64)>,
 }
 
@@ -191,6 +191,7 @@ impl WorkbenchSession {
         view_json["unreadable"] = json!(state.unreadable);
         view_json["data"] = json!(!self.options.data.is_empty());
         view_json["opened"] = json!(self.options.first);
+        view_json["beside"] = json!(self.options.beside.is_some());
         view_json["session_steps"] = state.steps.view();
         view_json["commands"] = json!({
             "picture": self.commands.step_command(WorkbenchStep::Picture),
@@ -246,12 +247,16 @@ impl WorkbenchSession {
         self.notify_pages();
     }
 
-    /// Writes the text to the file atomically.
+    /// Writes the text to the file atomically. `base` is the revision that the page shows: another one is not saved,
+    /// and the result is `None`.
     ///
     /// Fails with a sentence if another program changed the file meanwhile, or the file cannot be written.
-    pub(crate) fn save(&self) -> Result<Value, String> {
+    pub(crate) fn save(&self, base: Option<u64>) -> Result<Option<Value>, String> {
         let disk = read_model_text(&self.host, &self.options.model);
         let mut state = self.state();
+        if base.is_some_and(|base| base != state.document.revision()) {
+            return Ok(None);
+        }
         if let Ok(disk) = disk {
             state.document.update_from_disk(&disk);
         }
@@ -277,7 +282,7 @@ impl WorkbenchSession {
         }
         drop(state);
         self.notify_pages();
-        Ok(self.view())
+        Ok(Some(self.view()))
     }
 
     /// Resolves a conflict with another program: its text replaces that of the page, or may be overwritten by the next
@@ -497,6 +502,7 @@ impl WorkbenchSession {
         let [fit, check] = self.recordings(&model).map_err(|e| self.error_text(&e))?;
         let names = model.active_coordinates();
         let drives = model.drives();
+        let units: Vec<&str> = (0..drives.len()).map(|drive| model.force_unit(drive)).collect();
         let stretches = |all: Vec<PreparedRecording>| -> Vec<RecordingSegment> {
             all.into_iter().flat_map(|one| one.segments).collect()
         };
@@ -519,7 +525,7 @@ impl WorkbenchSession {
                 });
             }
         }
-        Ok(json!({ "names": names, "drives": drives, "runs": runs }))
+        Ok(json!({ "names": names, "drives": drives, "units": units, "shades": ERROR_SHADES, "runs": runs }))
     }
 
     /// The text of an error, with commands in the spelling of the user.

@@ -1,6 +1,7 @@
 //! JSON views for the page: the model with its base parameters and those of the saved file, errors, findings.
 
 use modelmill::diagnose::DiagnosisFindings;
+use modelmill::excite::limits;
 use modelmill::identify::Identification;
 use modelmill::model::ModelCheck;
 use modelmill::print::{self, RemedySpelling, edit};
@@ -69,10 +70,22 @@ pub(crate) fn equations(model: &Model, saved: Option<&Model>) -> Value {
         "coordinates": model.active_coordinate_types().iter().map(|(name, is_angle)| {
             let mut all = model.derivation.mechanism.coordinates.iter();
             let nominal = all.find(|c| c.name == *name).map_or(0.0, |c| c.nominal);
-            json!({ "name": name, "angle": is_angle, "nominal": nominal })
+            let limits = position_limits(model, name);
+            json!({ "name": name, "angle": is_angle, "nominal": nominal, "limits": limits })
         }).collect::<Vec<_>>(),
         "drives": model.drives(),
     })
+}
+
+/// Smallest and largest position of a coordinate by the limits of the model file, rad or m.
+fn position_limits(model: &Model, name: &str) -> Option<[f64; 2]> {
+    let known = limits::merged_limits(model, &[]).ok()?;
+    let coordinates = &model.derivation.mechanism.coordinates;
+    let mut all = known.coordinates.iter();
+    let (_, found) = all.find(|(i, _)| coordinates[i.0].name == name)?;
+    found
+        .position
+        .filter(|[low, high]| low.is_finite() && high.is_finite() && low < high)
 }
 
 /// View of the errors along recordings, with nominal and with identified values, and of the remarks on recordings and

@@ -1,6 +1,6 @@
 //! Watches the jobs of the library for a page: their names, their progress, and requests to cancel.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use modelmill::progress::{JobHandle, ProgressListener};
@@ -14,6 +14,9 @@ pub(crate) struct JobWatch {
     surroundings: Arc<dyn SessionEnvironment>,
     /// The running jobs, outer ones first.
     jobs: Mutex<Vec<RunningJob>>,
+    /// Counts the jobs that have started. Most jobs of a diagnosis do not count their steps, so this shows that it goes
+    /// on.
+    started: AtomicUsize,
     /// Whether the user cancelled; jobs that start later are cancelled at once.
     is_cancelled: AtomicBool,
 }
@@ -34,6 +37,7 @@ impl JobWatch {
         Self {
             surroundings,
             jobs: Mutex::default(),
+            started: AtomicUsize::default(),
             is_cancelled: AtomicBool::default(),
         }
     }
@@ -52,7 +56,8 @@ impl JobWatch {
         let counting = jobs.iter().find(|going| going.total > 0);
         match counting.or(jobs.last()) {
             Some(going) => {
-                json!({ "what": going.what, "done": going.job.done(), "total": going.total })
+                let step = self.started.load(Ordering::Relaxed);
+                json!({ "what": going.what, "done": going.job.done(), "total": going.total, "step": step })
             }
             None => json!({ "what": "starting", "done": 0, "total": 0 }),
         }
@@ -70,6 +75,7 @@ impl ProgressListener for JobWatch {
         if self.is_cancelled.load(Ordering::Relaxed) {
             job.cancel();
         }
+        self.started.fetch_add(1, Ordering::Relaxed);
         jobs.push(RunningJob {
             what: what.to_owned(),
             total,
@@ -98,7 +104,7 @@ mod tests {
         outer.add(3);
         assert_eq!(
             watch.progress_view(),
-            json!({ "what": "searching", "done": 3, "total": 10 })
+            json!({ "what": "searching", "done": 3, "total": 10, "step": 2 })
         );
         watch.cancel();
         watch.on_job_end();

@@ -3,6 +3,8 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::time::Duration;
 
 use modelmill::diagnose::SeparationProposal;
 use modelmill::edit::NewEffect;
@@ -17,6 +19,9 @@ use crate::commands;
 use crate::failure::{CommandFailure, CommandOutcome};
 use crate::flags::{CommandLineSpelling, library_flags, quote_word};
 use crate::terminal;
+
+/// Time before the program states that the derivation goes on.
+const PATIENCE: Duration = Duration::from_millis(1500);
 
 /// Serves the page until the program is stopped.
 pub(crate) fn run(host: &Host, args: &WorkArgs) -> CommandOutcome {
@@ -54,7 +59,9 @@ pub(crate) fn run(host: &Host, args: &WorkArgs) -> CommandOutcome {
         first: 0,
     };
     let spelled = WorkbenchAdvice::new(host, args);
+    let opening = announce_long_derivation(&args.model);
     serve(host, options, Arc::new(spelled), |link| {
+        drop(opening);
         // If standard output is closed, the server continues: a browser that has the link can still use it.
         let _ = if args.json {
             terminal::print_json(&json!({ "url": link }))
@@ -63,6 +70,23 @@ pub(crate) fn run(host: &Host, args: &WorkArgs) -> CommandOutcome {
         };
     })?;
     Ok(())
+}
+
+/// Prints a line if the workbench does not open within [`PATIENCE`], because a large model takes minutes to derive.
+/// The caller drops the result once it is open.
+fn announce_long_derivation(model: &Path) -> Sender<()> {
+    let (opening, waiting) = channel::<()>();
+    let says = format!(
+        "Deriving the equations of {}. A model with closed loops in space can take minutes. The link is printed when \
+         they are ready.",
+        model.display()
+    );
+    std::thread::spawn(move || {
+        if waiting.recv_timeout(PATIENCE) == Err(RecvTimeoutError::Timeout) {
+            terminal::print_to_stderr(&says);
+        }
+    });
+    opening
 }
 
 /// Spells the steps of the workbench as command lines. All fields are quoted for a shell; flags begin with a space.

@@ -53,3 +53,4 @@ mod variants;
 mod verify;
 mod weights;
 mod work;
+mod work_truth;

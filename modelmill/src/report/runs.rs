@@ -215,25 +215,33 @@ fn shared_fit_section(shared: &SharedFit) -> String {
     html
 }
 
-/// Pictures of base parameters over the runs: those with lasting changes first, the others folded.
+/// Pictures of base parameters over the runs: those that changed for good or in single runs first, the others folded.
 fn parameters(compared: &RunsComparison) -> String {
-    let has_changed = |k: &usize| {
+    let has_lasting_change = |k: &usize| {
         let mut steps = compared.points.iter().flat_map(|point| &point.steps);
         steps.any(|step| step.parameter == *k)
     };
+    // A change that did not last is a change too: it must not be folded among those that did not change.
+    let differs_in_a_run = |k: &usize| compared.runs.iter().any(|run| run.moved.contains(k));
     // A parameter that no run determines has no picture.
     let is_determined = |k: &usize| compared.runs.iter().any(|run| determined(run.alone[*k]).is_some());
     let all = (0..compared.parameters.len()).filter(is_determined);
-    // Parameters with a lasting change are shown first, the others folded.
-    let (changed, same): (Vec<usize>, Vec<usize>) = all.partition(has_changed);
+    let (lasting, others): (Vec<usize>, Vec<usize>) = all.partition(has_lasting_change);
+    let (single, same): (Vec<usize>, Vec<usize>) = others.into_iter().partition(differs_in_a_run);
     let mut html = String::from(
         "<p>Each run is fitted separately. Bars are two standard deviations, lines are means between the changes above.</p>\n",
     );
-    for k in changed {
+    for k in lasting {
         html.push_str(&picture(compared, k));
     }
+    if !single.is_empty() {
+        html.push_str("<h3>Different in single runs</h3>\n");
+        for k in single {
+            html.push_str(&picture(compared, k));
+        }
+    }
     if !same.is_empty() {
-        html.push_str("<details>\n<summary>Parameters that did not change</summary>\n");
+        html.push_str("<details>\n<summary>Parameters without a detected change</summary>\n");
         for k in same {
             html.push_str(&picture(compared, k));
         }

@@ -362,4 +362,17 @@ fn what_changed_and_stayed_is_told_with_its_run() {
         "{}",
         page.len()
     );
+    // The scaled run moves parameters that return: these are not among those without a change.
+    let lasting: Vec<usize> = point.steps.iter().map(|step| step.parameter).collect();
+    let single: Vec<usize> = (found.runs[4].moved.iter().copied())
+        .filter(|k| !lasting.contains(k))
+        .collect();
+    assert!(!single.is_empty(), "{:?} {lasting:?}", found.runs[4].moved);
+    let folded = page
+        .split_once("without a detected change")
+        .map_or("", |(_, after)| after);
+    for k in single {
+        let heading = format!("<figcaption><b>{}</b>", found.parameters[k].name);
+        assert!(page.contains(&heading) && !folded.contains(&heading), "{heading}");
+    }
 }
