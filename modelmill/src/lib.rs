@@ -68,6 +68,8 @@
 //! | [`report::page`] | a diagnosis as one page |
 //! | [`Host::simulate`] | simulation of a rig (a numeric model of the complete machine, used in place of hardware) along a trajectory |
 //! | [`Host::reduce`] | the reduction of a rig to a planar model |
+//! | [`Host::propose_plan`] | a plan for this reduction |
+//! | [`Host::check_rig`] | the contents of a rig, and whether its joints close |
 //! | [`Host::import`] | a model file from a URDF, MJCF or SDF |
 //! | [`export::description`], [`Model::export`] | a URDF or MJCF from a model file, or from a fit |
 //! | [`Model::adopt`] | the model file with the values of a fit |
@@ -214,6 +216,8 @@ pub mod recording;
 pub mod reduce;
 mod regressors;
 pub mod report;
+#[cfg(feature = "rig")]
+pub mod rig_check;
 pub mod runs;
 pub mod segment;
 pub mod servo;

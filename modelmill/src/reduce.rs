@@ -6,14 +6,18 @@ use modelmill_boundary::files::MemoryFiles;
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_codegen::{ModelEvaluator, MotionStates};
-use modelmill_reduction::{PlanarReduction, sampled_forces};
-use modelmill_rig::{Rig, RigState};
+use modelmill_identify::RecordingNote;
+use modelmill_reduction::{ImportOptions, LARGEST_DESCRIPTION, PlanarReduction, sampled_forces};
+use modelmill_rig::{LoadedRig, Rig, RigState};
 
 use crate::error::{Error, Outcome};
 use crate::host::Host;
 
 /// Number of random poses for the comparison with the rig, and their largest distance from the nominal pose, rad or m.
 const POSES: (usize, f64) = (100, 0.2);
+
+/// Endings of robot descriptions.
+const DESCRIPTION_ENDINGS: [&str; 4] = ["urdf", "xml", "mjcf", "sdf"];
 
 /// The planar model of a rig.
 pub struct RigReduction {
@@ -25,6 +29,18 @@ pub struct RigReduction {
     pub forces: Vec<DriveForceError>,
     /// Number of poses of that comparison.
     pub poses: usize,
+    /// Number of base parameters of the model.
+    pub n_base: usize,
+}
+
+/// A plan that was proposed for a rig, with the model that it makes.
+pub struct ProposedReduction {
+    /// The text of the plan file.
+    pub plan: String,
+    /// What the plan proposes, one sentence each.
+    pub proposes: Vec<String>,
+    /// The model of this plan.
+    pub reduced: RigReduction,
 }
 
 impl Host {
@@ -35,7 +51,7 @@ impl Host {
     /// Fails with all errors and warnings of rig and plan, each with its place, and when the reduction does not support
     /// the mechanism.
     pub fn reduce(&self, path: &Path, plan: Option<&Path>) -> Outcome<RigReduction> {
-        let loaded = self.rig(path)?;
+        let loaded = self.noted_rig(path)?;
         // The plan names parts and their bodies; the default plan has one part for each body.
         let made = match plan {
             Some(plan) => modelmill_reduction::plan_file_with(plan, self.files())?,
@@ -56,14 +72,101 @@ impl Host {
                     Remedy::option(OptionName::Plan)
                 )),
             })?;
-        let forces = self.run_job("comparing the model with the rig", 0, |_| compare(rig, &reduction))??;
+        self.compare_reduction(rig, reduction)
+    }
+
+    /// Proposes a plan for a rig whose bodies move in one plane: bodies that move alike become one part, bodies that only
+    /// translate become point masses, and equal values share a symbol. The plan is carried out, so that its price is
+    /// known.
+    ///
+    /// Fails with the errors of the rig, and when no plan can be proposed for it.
+    ///
+    /// ```no_run
+    /// use std::path::Path;
+    ///
+    /// let rig = Path::new("model-spec/rigs/spidermill-seventeen.toml");
+    /// let proposed = modelmill::Host::new().propose_plan(rig)?;
+    /// std::fs::write("plan.toml", &proposed.plan).unwrap();
+    /// assert!(proposed.reduced.forces.iter().all(|force| force.nrms < 1e-6));
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
+    pub fn propose_plan(&self, path: &Path) -> Outcome<ProposedReduction> {
+        let loaded = self.noted_rig(path)?;
+        let rig = &loaded.rig;
+        let refuse = |says: String| Error::input(format!("{}: {says}", path.display()));
+        let proposal = self
+            .run_job(&format!("proposing a plan for {}", rig.name), 0, |_| {
+                modelmill_reduction::propose_plan(rig)
+            })?
+            .map_err(refuse)?;
+        let plan = modelmill_reduction::plan("the proposed plan", &proposal.text)?;
+        let reduction = self.run_job(&format!("reducing {}", rig.name), 0, |_| {
+            modelmill_reduction::reduce(rig, &plan)
+        })??;
+        Ok(ProposedReduction {
+            plan: proposal.text,
+            proposes: proposal.remarks,
+            reduced: self.compare_reduction(rig, reduction)?,
+        })
+    }
+
+    /// Reads a rig file, or makes a rig from a URDF, MJCF or SDF of a planar mechanism.
+    ///
+    /// Fails with the errors of the file.
+    pub fn rig_or_description(&self, path: &Path) -> Outcome<LoadedRig> {
+        if is_description(path) {
+            Ok(self.rig_of_description(path)?.0)
+        } else {
+            self.rig(path)
+        }
+    }
+
+    /// The same; what a description has in addition is noted.
+    fn noted_rig(&self, path: &Path) -> Outcome<LoadedRig> {
+        if !is_description(path) {
+            return self.rig(path);
+        }
+        let (loaded, remarks) = self.rig_of_description(path)?;
+        for says in remarks {
+            self.note(&RecordingNote::warning(format!("{}: {says}", path.display())));
+        }
+        Ok(loaded)
+    }
+
+    /// The rig of a robot description, with what was left out or assumed.
+    fn rig_of_description(&self, path: &Path) -> Outcome<(LoadedRig, Vec<String>)> {
+        let refuse = |says: String| Error::input(format!("{}: {says}", path.display()));
+        let read = |file: &Path| {
+            let text = self.files().read_text(file, LARGEST_DESCRIPTION as u64);
+            text.map_err(|error| format!("{} cannot be read: {}", file.display(), error.fault))
+        };
+        let text = read(path).map_err(Error::input)?;
+        let read_included = |file: &str| read(&path.with_file_name(file));
+        let text = modelmill_reduction::expand_includes(&text, &read_included).map_err(refuse)?;
+        let made = modelmill_reduction::rig_of_description(&text, &ImportOptions::default())
+            .map_err(|error| refuse(error.to_string()))?;
+        // Faults show lines of the rig that was made from the description.
+        let loaded = modelmill_rig::load(&path.to_string_lossy(), &made.text, self.files())?;
+        Ok((loaded, made.remarks))
+    }
+
+    /// A reduction with the errors of its forces.
+    fn compare_reduction(&self, rig: &Rig, reduction: PlanarReduction) -> Outcome<RigReduction> {
+        let (forces, n_base) = self.run_job("comparing the model with the rig", 0, |_| compare(rig, &reduction))??;
         Ok(RigReduction {
             rig: rig.name.clone(),
             reduction,
             forces,
             poses: POSES.0,
+            n_base,
         })
     }
+}
+
+/// Whether a file is a robot description by its ending.
+fn is_description(path: &Path) -> bool {
+    let ending = path.extension().and_then(|end| end.to_str());
+    ending.is_some_and(|end| DESCRIPTION_ENDINGS.iter().any(|known| known.eq_ignore_ascii_case(end)))
 }
 
 /// Error of the forces of a drive relative to the rig's.
@@ -76,10 +179,10 @@ pub struct DriveForceError {
 }
 
 /// Compares the model's forces at its nominal values with the rig's. Both programs share no mechanics, so that the
-/// comparison is independent.
+/// comparison is independent. Returns the number of base parameters too.
 ///
 /// Fails when the reduced model cannot be loaded or derived, or when the rig cannot be sampled.
-fn compare(rig: &Rig, reduction: &PlanarReduction) -> Outcome<Vec<DriveForceError>> {
+fn compare(rig: &Rig, reduction: &PlanarReduction) -> Outcome<(Vec<DriveForceError>, usize)> {
     let loaded = modelmill_spec::load("the reduced model", &reduction.model, &MemoryFiles::default())?;
     let derivation =
         modelmill_codegen::derive(&loaded.mechanism).map_err(|error| Error::derivation("the reduced model", error))?;
@@ -114,7 +217,7 @@ fn compare(rig: &Rig, reduction: &PlanarReduction) -> Outcome<Vec<DriveForceErro
         .inverse_dynamics(&states, &derivation.nominal_base_values())
         .map_err(|fault| Error::input(format!("the reduced model does not follow the rig: {fault}")))?;
     let norm = |values: &mut dyn Iterator<Item = f64>| values.map(|x| x * x).sum::<f64>().sqrt();
-    Ok(mechanism
+    let errors = mechanism
         .drives
         .iter()
         .zip(model.iter().zip(&truth))
@@ -122,7 +225,8 @@ fn compare(rig: &Rig, reduction: &PlanarReduction) -> Outcome<Vec<DriveForceErro
             drive: drive.name.clone(),
             nrms: norm(&mut model.iter().zip(truth).map(|(x, y)| x - y)) / norm(&mut truth.iter().copied()),
         })
-        .collect())
+        .collect();
+    Ok((errors, derivation.reduction.retained.len()))
 }
 
 /// Columns as slices.

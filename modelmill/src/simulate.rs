@@ -6,6 +6,7 @@ use modelmill_boundary::files::PathKind;
 use modelmill_boundary::message;
 use modelmill_boundary::text::{CommandName, Remedy};
 use modelmill_identify::{ReadOptions, RecordingFile, SignalRecording};
+pub use modelmill_rig::LoadedRig;
 use modelmill_rig::{CoordinateSamples, Rig, RigRecording, SimulationError, Trajectory, TrajectoryError};
 
 use crate::error::{Error, Outcome};

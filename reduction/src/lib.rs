@@ -22,6 +22,7 @@ mod plan;
 mod plan_for;
 mod planar;
 mod planar_draft;
+mod propose;
 mod reduce;
 mod reduce_drives;
 mod reduce_parts;
@@ -31,11 +32,12 @@ mod write;
 
 pub use export::{DescriptionExport, DescriptionFormat as ExportFormat, ExportError, export};
 pub use import::{
-    DescriptionImport, ImportError, ImportedJoint, LARGEST_DESCRIPTION, Options as ImportOptions, expand_includes,
-    import,
+    DescriptionImport, DescriptionRig, ImportError, ImportedJoint, LARGEST_DESCRIPTION, Options as ImportOptions,
+    expand_includes, import, rig_of_description,
 };
 pub use plan::{ReductionPlan, plan, plan_file, plan_file_with};
 pub use plan_for::default_plan;
+pub use propose::{PlanProposal, propose_plan};
 pub use reduce::{PlanarReduction, reduce};
 pub use report::{AssumptionSize, ReductionFinding, ReductionReport};
 pub use samples::sampled_forces;

@@ -79,24 +79,18 @@ impl<'a> PlanNames<'a> {
             .iter()
             .find(|(model, _)| model.get_ref() == name.get_ref());
         let wanted = renamed.map_or(name, |(_, rig)| rig);
-        let found = self.rig.points.iter().find(|point| &point.name == wanted.get_ref());
+        let found = find_rig_point(self.rig, wanted.get_ref());
         if found.is_none() {
             let known: Vec<&str> = self.rig.points.iter().map(|point| point.name.as_str()).collect();
             log.unknown_name(0, wanted, "point of the rig", &known);
         }
-        found.map(|point| point.anchor)
+        found
     }
 
     /// The name in the model of a point of the rig; none if the point has no name.
     pub(crate) fn point_name(&self, anchor: &BodyAnchor) -> Option<String> {
-        // Whether a point of the rig has this name and this anchor.
-        let here = |name: &str| {
-            self.rig
-                .points
-                .iter()
-                .any(|point| point.name == name && &point.anchor == anchor)
-        };
-        let renamed = self.plan.points.iter().find(|(_, rig)| here(rig.get_ref()));
+        let is_here = |name: &str| find_rig_point(self.rig, name).as_ref() == Some(anchor);
+        let renamed = self.plan.points.iter().find(|(_, rig)| is_here(rig.get_ref()));
         // The name in the rig can be used only if no other point of the model has it.
         let free = |name: &str| self.plan.points.keys().all(|model| model.get_ref() != name);
         renamed.map(|(model, _)| model.get_ref().clone()).or_else(|| {
@@ -140,6 +134,24 @@ impl<'a> PlanNames<'a> {
         }
         part.map(Some).ok_or(UnknownName)
     }
+}
+
+/// A point of the rig by its name; or `JOINT@BODY`, the place of a revolute joint on one of its bodies or on `base`; or
+/// `centre@BODY`, the centre of mass of a body.
+pub(crate) fn find_rig_point(rig: &Rig, name: &str) -> Option<BodyAnchor> {
+    if let Some(point) = rig.points.iter().find(|point| point.name == name) {
+        return Some(point.anchor);
+    }
+    let (what, on) = name.split_once('@')?;
+    let body = match on {
+        "base" => None,
+        on => Some(rig.bodies.iter().position(|body| body.name == on)?),
+    };
+    if let Some(joint) = rig.joints.iter().position(|joint| joint.name == what) {
+        return rig.hinge(joint)?.into_iter().find(|anchor| anchor.body == body);
+    }
+    let centre = rig.bodies.get(body?)?.centre;
+    (what == "centre").then_some(BodyAnchor { body, at: centre })
 }
 
 /// Reports a body or group that is used twice.

@@ -76,7 +76,7 @@ pub(crate) fn rotation(angle: f64) -> Matrix2<f64> {
 }
 
 /// The rotation of a body about the normal since the nominal configuration, rad.
-fn body_rotation(body: usize, moment: &MotionSample, plane: &MotionPlane, samples: &MotionSamples) -> f64 {
+pub(crate) fn body_rotation(body: usize, moment: &MotionSample, plane: &MotionPlane, samples: &MotionSamples) -> f64 {
     // The direction of the body that was along x of the plane in the nominal configuration.
     let then = samples.nominal.motion.bodies[body].R_WB.transpose() * plane.x;
     let now = plane.components(&(moment.motion.bodies[body].R_WB * then));
@@ -142,7 +142,7 @@ pub(crate) fn substitute(
 
 /// Fits the motion of a point that is carried by a part, `joint + rotation * arm + shift`, by least squares. Returns
 /// arm, shift and the largest residual, m.
-fn fit_carried_point(
+pub(crate) fn fit_carried_point(
     part: &SubstitutionPart,
     at: &BodyAnchor,
     plane: &MotionPlane,

@@ -33,6 +33,10 @@ pub fn default_plan(rig: &Rig) -> Result<ReductionPlan, Message> {
     }
     // Tables of the parts, and those of the loops, which stand last.
     let mut text = format!("schema = 1\nname = \"{}_reduced\"\n", rig.name);
+    // The plane z = 0 is the default; mechanisms in another plane have the axes of their joints along its normal.
+    if let Some(plane) = tilted_plane(&rig) {
+        let _ = writeln!(text, "\n[plane]\n{plane}");
+    }
     let mut loops = String::new();
     let mut carried = vec![false; rig.bodies.len()];
     let is_carried = |carried: &[bool], body: Option<usize>| body.is_none_or(|body| carried[body]);
@@ -86,6 +90,13 @@ pub fn default_plan(rig: &Rig) -> Result<ReductionPlan, Message> {
     let mut plan = plan("the plan generated for this rig", &text).map_err(|failure| failure.render(false))?;
     plan.rig = Some(Box::new(rig));
     Ok(plan)
+}
+
+/// The plane of motion as keys of a plan, if its normal is not z of the base.
+fn tilted_plane(rig: &Rig) -> Option<String> {
+    let plane = crate::propose::motion_plane(rig)?;
+    let [normal, x] = [plane.normal, plane.x].map(|v| format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z));
+    (plane.normal != Vector3::z()).then(|| format!("normal = {normal}\nx = {x}"))
 }
 
 /// The next joint of a coordinate that adds a body to the tree, else `next`. Coordinates come first, in whichever order

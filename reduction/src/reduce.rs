@@ -57,6 +57,20 @@ pub fn reduce(rig: &Rig, plan: &ReductionPlan) -> Result<PlanarReduction, LoadFa
     }
 }
 
+/// The draft of the model file of a rig and a plan, with the report; for a comparison of its symbols.
+///
+/// Fails with the faults of the plan.
+pub(crate) fn draft(rig: &Rig, plan: &ReductionPlan) -> Result<(PlanarDraft, ReductionReport), LoadFailure> {
+    let mut log = RigLog::default();
+    match run(rig, plan, &mut log) {
+        Some(outcome) if log.0.is_empty() => Ok(outcome),
+        _ => Err(LoadFailure {
+            diagnostics: log.0,
+            sources: plan.sources.clone(),
+        }),
+    }
+}
+
 /// Runs all steps; `None` if the log has faults after which the others make no sense.
 fn run(rig: &Rig, plan: &ReductionPlan, log: &mut RigLog) -> Option<(PlanarDraft, ReductionReport)> {
     let entry = &plan.entry;

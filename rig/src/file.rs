@@ -30,6 +30,9 @@ pub(crate) struct RigEntry {
     pub(crate) seed: Option<u64>,
     /// Sampling of the recording.
     pub(crate) sampling: Option<SamplingEntry>,
+    /// Files of mass properties from a CAD program.
+    #[serde(default)]
+    pub(crate) mass_properties: Vec<MassPropertiesEntry>,
     #[serde(default)]
     pub(crate) body: Vec<BodyEntry>,
     #[serde(default)]
@@ -50,6 +53,38 @@ pub(crate) struct RigEntry {
     pub(crate) force_sensor: Vec<SensorEntry>,
 }
 
+/// A file of mass properties from a CAD program: a table of bodies, or a report of one.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct MassPropertiesEntry {
+    /// The file, relative to this one: a table if it ends in `.csv` or `.tsv`, else a report.
+    pub(crate) file: RigName,
+    /// Name of the body of a report, in place of the one that the report states.
+    pub(crate) body: Option<RigName>,
+    /// `assembly` if all values are in the base frame in the nominal configuration, `part` if they are in the frame of
+    /// the body.
+    pub(crate) coordinates: RigName,
+    /// `centre` or `origin`: the point of the inertia, if the file does not state it.
+    pub(crate) inertia: Option<RigName>,
+    /// `positive` if products are integrals of `x y dm`, `negative` if they are entries of the tensor; needed if the
+    /// file does not determine it.
+    pub(crate) products: Option<RigName>,
+    /// Units that the file does not state.
+    #[serde(default)]
+    pub(crate) units: CadUnits,
+    #[serde(rename = "note")]
+    _note: Option<String>,
+}
+
+/// Units of values whose file states none.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(crate) struct CadUnits {
+    pub(crate) mass: Option<String>,
+    pub(crate) length: Option<String>,
+    pub(crate) inertia: Option<String>,
+}
+
 /// A rigid body, as CAD gives it.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -68,6 +103,21 @@ pub(crate) struct BodyEntry {
     pub(crate) inertia: Option<Spanned<RigInertiaEntry>>,
     #[serde(rename = "note")]
     _note: Option<String>,
+}
+
+impl BodyEntry {
+    /// A body without values, named at a place of the file.
+    pub(crate) fn with_name(name: RigName) -> Self {
+        Self {
+            name,
+            at: None,
+            rpy: None,
+            mass: None,
+            centre: None,
+            inertia: None,
+            _note: None,
+        }
+    }
 }
 
 /// Inertia about the centre of mass along the body's axes, kg m^2. Entries off the diagonal are the negative products

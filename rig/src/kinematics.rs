@@ -186,6 +186,14 @@ impl<'r> RigTracker<'r> {
         Ok(())
     }
 
+    /// The largest displacement of a body's centre of mass from its pose in the file, m.
+    pub fn largest_displacement(&self) -> f64 {
+        let pairs = self.rig.bodies.iter().zip(&self.poses);
+        let place = |pose: &BodyPose, at: &Vector3<f64>| pose.q_WB * at + pose.p_WB_W;
+        let moves = pairs.map(|(body, pose)| (place(pose, &body.centre) - place(&body.nominal, &body.centre)).norm());
+        moves.fold(0.0, f64::max)
+    }
+
     /// Values of the coordinates at the last pose.
     pub fn coordinates(&self) -> &[f64] {
         &self.last

@@ -15,6 +15,7 @@
 
 mod assemble;
 mod assemble_sensors;
+mod closure;
 mod dynamics;
 mod effect;
 mod effect_by_name;
@@ -23,17 +24,20 @@ mod joint;
 mod kinematics;
 mod load;
 mod log;
+mod mass_properties;
 mod massive;
 mod merge;
 mod noise;
 mod pair;
 mod plant;
+mod plausible;
 mod pose;
 mod rig;
 mod sensor;
 mod simulate;
 mod trajectory;
 
+pub use closure::JointGap;
 pub use dynamics::{ScalarMotion, energy};
 pub use effect::{RigEffect, RigLaw, RigPlace, ValueOfKind, ValueSign};
 pub use effect_by_name::{EffectFault, EffectPart};

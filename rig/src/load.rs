@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use modelmill_boundary::files::{DiskFiles, FileSource, normalise_path};
+use modelmill_boundary::text::RemedySpelling;
 use modelmill_spec::{
     Diagnostic, DiagnosticSeverity, LARGEST_FILE, LoadFailure, SourceFile, SourceFiles, SourceSpan, read_referenced,
     read_text,
@@ -10,6 +11,9 @@ use modelmill_spec::{
 
 use crate::assemble::assemble;
 use crate::file::RigEntry;
+use crate::log::RigLog;
+use crate::mass_properties::read_mass_properties;
+use crate::plausible::size_remark;
 use crate::rig::Rig;
 
 /// Longest chain of variants.
@@ -22,6 +26,19 @@ pub struct LoadedRig {
     pub rig: Rig,
     /// The files that were read.
     pub sources: SourceFiles,
+    /// Remarks about mass properties: conventions that were assumed, and values that are improbable.
+    pub remarks: Vec<Diagnostic>,
+}
+
+impl LoadedRig {
+    /// The remarks as text with their source lines and advice.
+    pub fn render_remarks(&self, color: bool, spelling: &dyn RemedySpelling) -> String {
+        let found = LoadFailure {
+            diagnostics: self.remarks.clone(),
+            sources: self.sources.clone(),
+        };
+        found.render_spelled(color, spelling)
+    }
 }
 
 /// Reads a rig file from disk, and those that it extends.
@@ -61,6 +78,7 @@ pub fn load_file_with(path: &Path, files: &dyn FileSource) -> Result<LoadedRig, 
 pub fn load(path_name: &str, text: &str, files: &dyn FileSource) -> Result<LoadedRig, LoadFailure> {
     let mut sources = SourceFiles::default();
     let mut chain = Vec::new();
+    let (mut log, mut remarks) = (RigLog::default(), Vec::new());
     let mut next = Some((PathBuf::from(path_name), text.to_owned()));
     while let Some((path, text)) = next.take() {
         let file = sources.files.len();
@@ -68,7 +86,7 @@ pub fn load(path_name: &str, text: &str, files: &dyn FileSource) -> Result<Loade
             path: path.clone(),
             text: text.clone(),
         });
-        let entry: RigEntry = match parse(&text, file) {
+        let mut entry: RigEntry = match parse(&text, file) {
             Ok(entry) => entry,
             Err(found) => return Err(failure(sources, *found)),
         };
@@ -76,7 +94,7 @@ pub fn load(path_name: &str, text: &str, files: &dyn FileSource) -> Result<Loade
             let span = Some(source_span(file, &extends.span()));
             let folder = path.parent().unwrap_or(Path::new(""));
             let other = normalise_path(&folder.join(extends.get_ref()));
-            if file + 1 == LONGEST_CHAIN {
+            if chain.len() + 1 == LONGEST_CHAIN {
                 let help = "check whether two files extend each other".into();
                 let found = plain_error(span, "this chain of variants is too long");
                 return Err(failure(
@@ -103,10 +121,22 @@ pub fn load(path_name: &str, text: &str, files: &dyn FileSource) -> Result<Loade
                 }
             }
         }
+        let folder = path.parent().unwrap_or(Path::new(""));
+        read_mass_properties(file, folder, &mut entry, files, &mut sources, &mut log, &mut remarks);
         chain.push((file, entry));
     }
+    // Without their masses, bodies would have faults of their own.
+    if !log.0.is_empty() {
+        return Err(LoadFailure {
+            diagnostics: log.0,
+            sources,
+        });
+    }
     match assemble(chain) {
-        Ok(rig) => Ok(LoadedRig { rig, sources }),
+        Ok(rig) => {
+            remarks.extend(size_remark(&rig));
+            Ok(LoadedRig { rig, sources, remarks })
+        }
         Err(diagnostics) => Err(LoadFailure { diagnostics, sources }),
     }
 }

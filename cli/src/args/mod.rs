@@ -212,6 +212,7 @@ pub(crate) enum ProgramCommand {
         Examples (from the project's root):\n  \
         modelmill reduce model-spec/rigs/spidermill-full.toml \\\n      \
         --plan model-spec/rigs/spidermill-plan.toml --out reduced.toml\n  \
+        modelmill reduce model-spec/rigs/spidermill-seventeen.toml --propose plan.toml\n  \
         modelmill reduce linkage.toml --out model.toml --json"
     )]
     Reduce(ReduceArgs),
@@ -282,7 +283,7 @@ pub(crate) enum ProgramCommand {
 /// `check`.
 #[derive(Debug, Args)]
 pub(crate) struct CheckArgs {
-    /// Model file (TOML)
+    /// Model file or rig file (TOML)
     pub(crate) model: PathBuf,
     #[command(flatten)]
     pub(crate) drawing: DrawingArgs,

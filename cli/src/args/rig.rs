@@ -10,14 +10,18 @@ use super::drawing::parse_value;
 /// `reduce`.
 #[derive(Debug, Args)]
 pub(crate) struct ReduceArgs {
-    /// Rig file (TOML)
+    /// Rig file (TOML), or a planar mechanism as URDF, MJCF or SDF
     pub(crate) rig: PathBuf,
     /// Plan of the reduction (TOML); without it every body becomes a separate part
     #[arg(long, value_name = "PLAN.toml")]
     pub(crate) plan: Option<PathBuf>,
+    /// Measure which bodies move alike, which only translate and which values are equal, and write a plan for them to this
+    /// file, to be edited
+    #[arg(long, value_name = "PLAN.toml", conflicts_with = "plan")]
+    pub(crate) propose: Option<PathBuf>,
     /// Write the model to this file
-    #[arg(long, value_name = "MODEL.toml")]
-    pub(crate) out: PathBuf,
+    #[arg(long, value_name = "MODEL.toml", required_unless_present = "propose")]
+    pub(crate) out: Option<PathBuf>,
     /// Print one JSON object on standard output
     #[arg(long)]
     pub(crate) json: bool,

@@ -1,4 +1,4 @@
-//! `check`: validates a model file and prints a summary of its contents.
+//! `check`: validates a model file, or a rig, and prints a summary of its contents.
 
 use modelmill::{Error, Host, print};
 
@@ -9,18 +9,10 @@ use crate::{commands, terminal};
 
 /// Validates and derives the model, and prints a summary.
 pub(crate) fn run(host: &Host, args: &CheckArgs) -> CommandOutcome {
-    let model = match commands::model(host, &args.model) {
-        Err(CommandFailure::Library(fault)) if args.json && !matches!(fault, Error::Cancelled) => {
-            // Editors read faults as JSON from standard output, in addition to the text on standard error.
-            let told = match &fault {
-                Error::Model(faults) => print::faults(faults, &FlagSpelling),
-                fault => print::refusal(&fault.spell(&FlagSpelling), &args.model.display().to_string()),
-            };
-            terminal::print_json(&told)?;
-            return Err(CommandFailure::Library(fault));
-        }
-        model => model?,
-    };
+    if host.is_rig_file(&args.model) {
+        return check_rig(host, args);
+    }
+    let model = print_fault(args, commands::model(host, &args.model))?;
     let picture = args.drawing.target(model.files())?;
     let checked = model.check()?;
     let servo = if model.actuators().is_empty() {
@@ -45,5 +37,35 @@ pub(crate) fn run(host: &Host, args: &CheckArgs) -> CommandOutcome {
             terminal::print(&servo.text(terminal::style()))
         }
         None => terminal::print(&checked.text_with_next_step(terminal::style(), &FlagSpelling)),
+    }
+}
+
+/// Closes the joints of a rig and prints its contents.
+fn check_rig(host: &Host, args: &CheckArgs) -> CommandOutcome {
+    if args.drawing.picture.is_some() {
+        return Err(CommandFailure::Usage(
+            "--picture draws a model, and this file is a rig; `modelmill reduce` makes a model from it".to_owned(),
+        ));
+    }
+    let loaded = print_fault(args, commands::rig(host, &args.model))?;
+    let checked = print_fault(args, host.check_rig(&loaded).map_err(CommandFailure::Library))?;
+    if args.json {
+        return terminal::print_json(&checked.json());
+    }
+    terminal::print(&checked.text())
+}
+
+/// Prints a fault as JSON if requested: editors read it from standard output, in addition to the text on standard error.
+fn print_fault<T>(args: &CheckArgs, outcome: CommandOutcome<T>) -> CommandOutcome<T> {
+    match outcome {
+        Err(CommandFailure::Library(fault)) if args.json && !matches!(fault, Error::Cancelled) => {
+            let object = match &fault {
+                Error::Model(faults) => print::faults(faults, &FlagSpelling),
+                fault => print::refusal(&fault.spell(&FlagSpelling), &args.model.display().to_string()),
+            };
+            terminal::print_json(&object)?;
+            Err(CommandFailure::Library(fault))
+        }
+        outcome => outcome,
     }
 }

@@ -35,6 +35,7 @@ use modelmill::diagnose::{DiagnosisFindings, DiagnosisOptions, FixedParameters};
 use modelmill::files::{DiskFiles, FileSource, PathKind};
 use modelmill::model::LoadedModel;
 use modelmill::recording::{PreparedRecording, RecordingOptions};
+use modelmill::simulate::LoadedRig;
 use modelmill::{Host, Model};
 
 use crate::args::{DiagnosisArgs, ParameterSource};
@@ -64,6 +65,21 @@ pub(crate) fn load(host: &Host, path: &Path) -> CommandOutcome<LoadedModel> {
         terminal::print_to_stderr(text.trim_end());
     }
     Ok(loaded)
+}
+
+/// Reads a rig file; remarks about its mass properties go to standard error.
+pub(crate) fn rig(host: &Host, path: &Path) -> CommandOutcome<LoadedRig> {
+    let loaded = host.rig(path)?;
+    print_remarks(&loaded);
+    Ok(loaded)
+}
+
+/// Prints the remarks about a rig to standard error.
+pub(crate) fn print_remarks(loaded: &LoadedRig) {
+    if !loaded.remarks.is_empty() {
+        let text = loaded.render_remarks(terminal::is_stderr_coloured(), &FlagSpelling);
+        terminal::print_to_stderr(text.trim_end());
+    }
 }
 
 /// Reads a model file without printing its warnings. If the path is no file, the error lists model files nearby.

@@ -5,23 +5,58 @@ use std::path::Path;
 use modelmill::Host;
 
 use crate::args::ReduceArgs;
-use crate::failure::CommandOutcome;
+use crate::failure::{CommandFailure, CommandOutcome};
 use crate::output::OutputFile;
-use crate::terminal;
+use crate::{commands, terminal};
 
-/// Writes the model file and prints the report.
+/// Writes the model file and prints the report; or proposes a plan.
 pub(crate) fn run(host: &Host, args: &ReduceArgs) -> CommandOutcome {
-    let loaded = host.rig(&args.rig)?;
+    let loaded = host.rig_or_description(&args.rig)?;
+    commands::print_remarks(&loaded);
     let mut inputs: Vec<&Path> = loaded.sources.paths().collect();
     inputs.extend(args.plan.as_deref());
-    let target = OutputFile::new(&args.out, inputs)?;
+    let target = args
+        .out
+        .as_deref()
+        .map(|out| OutputFile::new(out, inputs.iter().copied()))
+        .transpose()?;
+    if let Some(propose) = &args.propose {
+        let plan = OutputFile::for_flag("--propose", propose, inputs)?;
+        return write_proposal(host, args, &plan, target.as_ref());
+    }
+    let Some(target) = target else {
+        return Err(CommandFailure::Usage("--out or --propose is needed".to_owned()));
+    };
     let reduced = host.reduce(&args.rig, args.plan.as_deref())?;
     // The model is written before the report, so that it exists even if standard output is closed.
     target.write(&reduced.reduction.model)?;
     if args.json {
-        return terminal::print_json(&reduced.json(&args.out.display().to_string()));
+        return terminal::print_json(&reduced.json(&target.path().display().to_string()));
     }
     terminal::print(&reduced.text())?;
     terminal::note(&format!("{}: a model of {}", target.path().display(), reduced.rig));
+    Ok(())
+}
+
+/// Writes a proposed plan, and its model if requested.
+fn write_proposal(host: &Host, args: &ReduceArgs, plan: &OutputFile, target: Option<&OutputFile>) -> CommandOutcome {
+    let proposed = host.propose_plan(&args.rig)?;
+    plan.write(&proposed.plan)?;
+    if let Some(target) = target {
+        target.write(&proposed.reduced.reduction.model)?;
+    }
+    let name = |file: &OutputFile| file.path().display().to_string();
+    if args.json {
+        return terminal::print_json(&proposed.json(&name(plan), target.map(name).as_deref()));
+    }
+    terminal::print(&proposed.text())?;
+    let rig = &proposed.reduced.rig;
+    terminal::note(&format!(
+        "{}: a plan for {rig}; edit it, then use it with --plan",
+        name(plan)
+    ));
+    if let Some(target) = target {
+        terminal::note(&format!("{}: a model of {rig}", name(target)));
+    }
     Ok(())
 }

@@ -63,7 +63,7 @@ fn simulate_model(host: &Host, args: &SimulateArgs, data: &Path) -> CommandOutco
 
 /// The sensors of a rig along a trajectory.
 fn simulate_rig(host: &Host, args: &SimulateArgs, trajectory: &Path) -> CommandOutcome {
-    let loaded = host.rig(&args.rig)?;
+    let loaded = commands::rig(host, &args.rig)?;
     let mut inputs: Vec<&Path> = loaded.sources.paths().collect();
     inputs.push(trajectory);
     let target = OutputFile::new(&args.out, inputs)?;

@@ -113,3 +113,62 @@ fn a_urdf_becomes_a_model() {
     let says = refused(1, &["import", "no/such.urdf", "--out", &out]);
     assert!(says.contains("no/such.urdf"), "{says}");
 }
+
+/// From a table of masses and a list of joints to the structure of eq. (16): checked, proposed, edited and reduced.
+#[test]
+fn a_table_of_masses_becomes_the_structure_of_the_paper() {
+    let rig = rigs("spidermill-seventeen.toml");
+    let checked = json(&["check", &rig, "--json"]);
+    assert_eq!(checked["bodies"].as_array().map(Vec::len), Some(17));
+    // The masses of the bundled rig of eleven groups.
+    let whole = json(&["check", &rigs("spidermill-full.toml"), "--json"]);
+    let difference = number(&checked, "/mass") - number(&whole, "/mass");
+    assert!(difference.abs() < 1e-9, "{difference}");
+    let (plan, out) = (scratch("proposed.toml"), scratch("seventeen.toml"));
+    let proposed = json(&["reduce", &rig, "--propose", &plan, "--json"]);
+    assert_eq!(proposed["out"], serde_json::Value::Null);
+    // The names of the model are the user's: a part gets another one.
+    let text = std::fs::read_to_string(&plan).expect("a plan");
+    let edited = text.replace("\"q_G9F\"", "\"gamma1\"");
+    assert_ne!(text, edited);
+    std::fs::write(&plan, edited).expect("written");
+    let reduced = json(&["reduce", &rig, "--plan", &plan, "--out", &out, "--json"]);
+    let bundled = json(&["equations", &model("spidermill.toml"), "--format", "json"]);
+    let found = json(&["equations", &out, "--format", "json"]);
+    let count = |object: &serde_json::Value| object["base"].as_array().map(Vec::len);
+    assert_eq!(count(&found), count(&bundled));
+    for told in [&proposed, &reduced] {
+        assert!((number(told, "/base_parameters") - 4.0).abs() < 0.5);
+        for drive in 0..2 {
+            let nrms = number(told, &format!("/forces/{drive}/nrms"));
+            assert!(nrms < 1e-9, "{nrms}");
+        }
+    }
+    // The proposal does not overwrite what it reads.
+    let says = refused(2, &["reduce", &rig, "--propose", &rig]);
+    assert!(says.contains("would overwrite"), "{says}");
+}
+
+/// A rig that does not close states by how much and at which joint.
+#[test]
+fn open_joints_are_reported_with_their_gap() {
+    let path = scratch("open.toml");
+    let text = std::fs::read_to_string(rigs("spidermill-full.toml")).expect("a rig");
+    let open = text.replacen("at = [1.13, 0, 0]", "at = [1.23, 0, 0]", 1);
+    assert_ne!(text, open);
+    std::fs::write(&path, open).expect("written");
+    let says = refused(1, &["check", &path]);
+    assert!(says.contains("do not close") && says.contains("100.000 mm"), "{says}");
+}
+
+/// A planar mechanism as MJCF is reduced like a rig.
+#[test]
+fn a_description_is_reduced() {
+    let (description, out) = (scratch("linkage.xml"), scratch("linkage.toml"));
+    printed(&["export", &model("five_bar.toml"), "--out", &description]);
+    let reduced = json(&["reduce", &description, "--out", &out, "--json"]);
+    for drive in 0..2 {
+        let nrms = number(&reduced, &format!("/forces/{drive}/nrms"));
+        assert!(nrms < 1e-9, "{nrms}");
+    }
+}

@@ -18,6 +18,8 @@ mod next_step;
 mod proposal;
 #[cfg(feature = "import")]
 mod reduction;
+#[cfg(feature = "rig")]
+mod rig_contents;
 pub(crate) mod runs;
 mod servo;
 mod spelling;

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use modelmill_reduction::ReductionReport;
 use serde_json::{Value, json};
 
-use crate::reduce::RigReduction;
+use crate::reduce::{ProposedReduction, RigReduction};
 
 impl RigReduction {
     /// Findings and forces as one JSON object; `out` is where the model file goes.
@@ -16,16 +16,43 @@ impl RigReduction {
             "findings": findings(&self.reduction.report),
             "forces": self.forces.iter().map(|f| json!({ "drive": f.drive, "nrms": f.nrms })).collect::<Vec<_>>(),
             "poses": self.poses,
+            "base_parameters": self.n_base,
         })
     }
 
     /// The same as text: the report of the reduction, and the error of each drive's force.
     pub fn text(&self) -> String {
-        let mut text = self.reduction.report.text();
-        text.push_str("Error - forces of the model compared with those of the rig, relative (nrms)\n");
+        self.reduction.report.text() + &self.errors_text()
+    }
+
+    /// The error of each drive's force.
+    fn errors_text(&self) -> String {
+        let mut text = "Error - forces of the model compared with those of the rig, relative (nrms)\n".to_owned();
         for one in &self.forces {
             let _ = writeln!(text, "  {:<16}{:.1e}", one.drive, one.nrms);
         }
+        text
+    }
+}
+
+impl ProposedReduction {
+    /// Proposal, findings and forces as one JSON object; `plan` and `out` are where plan and model go.
+    pub fn json(&self, plan: &str, out: Option<&str>) -> Value {
+        let mut object = self.reduced.json(out.unwrap_or_default());
+        object["out"] = json!(out);
+        object["plan"] = json!(plan);
+        object["proposes"] = json!(self.proposes);
+        object
+    }
+
+    /// The same as text.
+    pub fn text(&self) -> String {
+        let mut text = "Proposed plan\n".to_owned();
+        for says in &self.proposes {
+            let _ = writeln!(text, "  {says}");
+        }
+        text.push_str(&self.reduced.errors_text());
+        let _ = writeln!(text, "Base parameters of the model: {}", self.reduced.n_base);
         text
     }
 }

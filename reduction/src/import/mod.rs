@@ -18,6 +18,7 @@ mod mjcf_equalities;
 mod mjcf_include;
 mod model_text;
 mod placed;
+mod rig_text;
 mod sdf;
 mod unread;
 mod urdf;
@@ -29,6 +30,7 @@ pub use mjcf_include::expand_includes;
 
 use std::fmt;
 
+use description::RobotDescription;
 use modelmill_boundary::files::MemoryFiles;
 use modelmill_boundary::text::Message;
 use roxmltree::Document;
@@ -94,6 +96,47 @@ pub const LARGEST_DESCRIPTION: usize = 16 << 20;
 /// Fails if the text is not URDF, MJCF or SDF, or contains something that models cannot express; the message names
 /// element and line.
 pub fn import(text: &str, options: &Options) -> Result<DescriptionImport, ImportError> {
+    let mut description = read_description(text, options)?;
+    welds::cut_at_joints(&mut description);
+    // The result is loaded like any model file, so that faults of the description appear here and not later.
+    let imported = model_text::model_text(description, options).map_err(ImportError)?;
+    match modelmill_spec::load("the model made from it", &imported.model, &MemoryFiles::default()) {
+        Ok(_) => Ok(imported),
+        Err(failure) => Err(ImportError(format!(
+            "the model file made from this description is not valid:\n{}",
+            failure.render(false)
+        ))),
+    }
+}
+
+/// A rig file made from a robot description.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DescriptionRig {
+    /// The text of the rig file.
+    pub text: String,
+    /// What was left out or assumed; one sentence each.
+    pub remarks: Vec<String>,
+}
+
+/// Converts the description of a planar mechanism into a rig file, for a reduction.
+///
+/// Fails as [`import`](fn@import) does, and if the description has what rigs cannot express.
+pub fn rig_of_description(text: &str, options: &Options) -> Result<DescriptionRig, ImportError> {
+    let mut description = read_description(text, options)?;
+    let text = rig_text::rig_text(&description).map_err(ImportError)?;
+    let mut remarks = std::mem::take(&mut description.remarks);
+    let joints = description.links.iter().flat_map(|link| &link.joints);
+    for joint in joints.filter(|joint| joint.stiffness != 0.0) {
+        remarks.push(format!(
+            "the spring of the joint `{}` is left out; add it to the model",
+            joint.name
+        ));
+    }
+    Ok(DescriptionRig { text, remarks })
+}
+
+/// Reads a description in the format that its root element determines.
+fn read_description(text: &str, options: &Options) -> Result<RobotDescription, ImportError> {
     if text.len() > LARGEST_DESCRIPTION {
         return Err(ImportError("this file is too large for a robot description".to_owned()));
     }
@@ -130,7 +173,6 @@ pub fn import(text: &str, options: &Options) -> Result<DescriptionImport, Import
         description.pose.retain(|(known, _)| known != name);
         description.pose.push((name.clone(), *value));
     }
-    welds::cut_at_joints(&mut description);
     // Options for URDF only would have no effect on other formats.
     let is_urdf = description.format == "URDF";
     if !is_urdf && (options.floating || options.closures.is_some()) {
@@ -139,13 +181,5 @@ pub fn import(text: &str, options: &Options) -> Result<DescriptionImport, Import
             description.format
         )));
     }
-    // The result is loaded like any model file, so that faults of the description appear here and not later.
-    let imported = model_text::model_text(description, options).map_err(ImportError)?;
-    match modelmill_spec::load("the model made from it", &imported.model, &MemoryFiles::default()) {
-        Ok(_) => Ok(imported),
-        Err(failure) => Err(ImportError(format!(
-            "the model file made from this description is not valid:\n{}",
-            failure.render(false)
-        ))),
-    }
+    Ok(description)
 }

@@ -2,11 +2,13 @@
 
 mod approximations;
 mod couplings;
+mod descriptions;
 mod export;
 mod extensions;
 mod faulty;
 mod mjcf;
 mod order_of_entries;
+mod propose;
 mod spidermill;
 mod urdf;
 mod welds;

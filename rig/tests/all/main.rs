@@ -4,6 +4,7 @@ mod common;
 mod effects;
 mod faulty;
 mod hand;
+mod mass_properties;
 mod plant;
 mod sensors;
 mod spidermill;

@@ -1,0 +1,111 @@
+//! `check` of a rig: whether its joints close, and what it contains.
+
+use std::path::Path;
+
+use modelmill_rig::{JointGap, LoadedRig, Rig, RigTracker};
+use toml::Table;
+
+use crate::error::{Error, Outcome};
+use crate::host::Host;
+
+/// Gaps of joints (m, rad) below this are rounding, as in the closing of joints itself.
+const ROUNDING: f64 = 1e-9;
+/// Number of joints that an error lists.
+const LISTED_GAPS: usize = 5;
+
+/// Contents of a rig whose joints close.
+#[derive(Clone, Debug)]
+pub struct RigCheck {
+    /// Name of the rig.
+    pub name: String,
+    /// Title; may be empty.
+    pub title: String,
+    /// Names of the bodies with their masses, kg.
+    pub bodies: Vec<(String, f64)>,
+    /// Mass of all bodies and of masses at points, kg.
+    pub mass: f64,
+    /// Number of joints.
+    pub joints: usize,
+    /// Names of the coordinates.
+    pub coordinates: Vec<String>,
+    /// Names of the drives.
+    pub drives: Vec<String>,
+    /// The joint with the largest gap with the poses of the file, before joints are closed; absent without joints.
+    pub largest_gap: Option<JointGap>,
+    /// The largest displacement of a body that closed the joints, m.
+    pub largest_move: f64,
+}
+
+impl Host {
+    /// Whether a file has the tables of a rig and not those of a model.
+    pub fn is_rig_file(&self, path: &Path) -> bool {
+        let Ok(text) = self.files().read_text(path, modelmill_spec::LARGEST_FILE as u64) else {
+            return false;
+        };
+        // Recordings and pictures are no TOML.
+        let Ok(table) = text.parse::<Table>() else {
+            return false;
+        };
+        let has = |key: &str| table.contains_key(key);
+        // A variant may have few tables; the file that it extends decides.
+        let is_variant = has("extends") && !has("part") && self.load(path).is_err() && self.rig(path).is_ok();
+        has("body") || has("mass_properties") || is_variant
+    }
+
+    /// Closes the joints of a rig and describes its contents.
+    ///
+    /// Fails when the joints do not close, with the gaps of the joints as the file states them.
+    pub fn check_rig(&self, loaded: &LoadedRig) -> Outcome<RigCheck> {
+        let rig = &loaded.rig;
+        let mut gaps = rig.nominal_gaps();
+        gaps.sort_by(|a, b| size_of_gap(b).total_cmp(&size_of_gap(a)));
+        let tracker = RigTracker::new(rig).map_err(|error| {
+            let open: Vec<String> = gaps
+                .iter()
+                .filter(|gap| size_of_gap(gap) > ROUNDING)
+                .take(LISTED_GAPS)
+                .map(describe_gap)
+                .collect();
+            let note = match open.len() {
+                0 => String::new(),
+                _ => format!("\nnote: gaps with the poses of the file: {}", open.join("; ")),
+            };
+            Error::input(format!("{}: {error}{note}", rig.name))
+        })?;
+        Ok(RigCheck {
+            name: rig.name.clone(),
+            title: rig.title.clone(),
+            bodies: rig.bodies.iter().map(|body| (body.name.clone(), body.mass)).collect(),
+            mass: total_mass(rig),
+            joints: rig.joints.len(),
+            coordinates: rig.coordinates.iter().map(|c| c.name.clone()).collect(),
+            drives: rig.drives.iter().map(|drive| drive.name.clone()).collect(),
+            largest_gap: gaps.into_iter().next(),
+            largest_move: tracker.largest_displacement(),
+        })
+    }
+}
+
+impl RigCheck {
+    /// Whether the joints are closed with the poses of the file, up to rounding.
+    pub fn is_closed_as_stated(&self) -> bool {
+        self.largest_gap.as_ref().is_none_or(|gap| size_of_gap(gap) <= ROUNDING)
+    }
+}
+
+/// The larger of distance (m) and angle (rad).
+fn size_of_gap(gap: &JointGap) -> f64 {
+    gap.distance.max(gap.angle)
+}
+
+/// A gap as text.
+pub(crate) fn describe_gap(gap: &JointGap) -> String {
+    format!("`{}` {:.3} mm, {:.1e} rad", gap.joint, 1e3 * gap.distance, gap.angle)
+}
+
+/// Mass of all bodies and of masses at points, kg.
+fn total_mass(rig: &Rig) -> f64 {
+    let bodies = rig.bodies.iter().map(|body| body.mass);
+    let points = rig.lumped_masses.iter().map(|lumped| lumped.mass);
+    bodies.chain(points).sum()
+}

@@ -1,0 +1,382 @@
+//! Mass properties as a table in CSV: one row per body, with units in the header or from the rig file.
+
+use nalgebra::Vector3;
+
+use super::StatedConventions;
+use super::fault::{CadFault, CadRow};
+use super::tensor::{InertiaPoint, PrintedBody, PrintedInertia};
+use super::units::{
+    KNOWN_UNITS, UnitFactorSearch, UnknownCadUnit, inertia_factor, length_factor, mass_factor, volume_factor,
+};
+use crate::file::CadUnits;
+
+/// What a column contains.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum CadColumn {
+    /// Name of the body.
+    Name,
+    /// Mass.
+    Mass,
+    /// Volume, for the density only.
+    Volume,
+    /// A coordinate of the centre of mass, 0 to 2.
+    Centre(usize),
+    /// A moment of inertia, 0 to 2, perhaps with its point.
+    Moment(usize, Option<InertiaPoint>),
+    /// A product of inertia: 0 xy, 1 xz, 2 yz.
+    Product(usize, Option<InertiaPoint>),
+}
+
+/// A column with its factor to SI units.
+struct ScaledColumn {
+    kind: CadColumn,
+    factor: f64,
+}
+
+/// A field of a line, with its place in the text.
+type Field<'t> = (usize, &'t str);
+
+/// Reads a table; each row becomes a body.
+pub(super) fn read_table(
+    text: &str,
+    units: &CadUnits,
+    stated: StatedConventions,
+) -> Result<Vec<CadRow>, Vec<CadFault>> {
+    let separator = find_separator(text);
+    let mut lines = lines_with_places(text).filter(|(_, line)| {
+        let line = line.trim();
+        !line.is_empty() && !line.starts_with('#')
+    });
+    let Some((at, header)) = lines.next() else {
+        return Err(vec![CadFault::new(
+            0..0,
+            "this table is empty",
+            "a header and one row per body",
+        )]);
+    };
+    let header = split_fields(at, header, separator);
+    let columns = read_header(&header, units, stated)?;
+    let mut rows = Vec::new();
+    let mut faults = Vec::new();
+    for (at, line) in lines {
+        let fields = split_fields(at, line, separator);
+        if fields.len() > columns.len() {
+            faults.push(CadFault::new(
+                at..at + line.trim_end().len(),
+                format!(
+                    "this row has {} fields, and the header has {}",
+                    fields.len(),
+                    columns.len()
+                ),
+                "as many fields as in the header; a decimal comma needs `;` between fields",
+            ));
+            continue;
+        }
+        match read_row(at, line, &fields, &columns, separator, stated) {
+            Ok(row) => rows.push(row),
+            Err(fault) => faults.push(fault),
+        }
+    }
+    if rows.is_empty() && faults.is_empty() {
+        faults.push(CadFault::new(
+            at..at,
+            "this table has no row",
+            "one row per body below the header",
+        ));
+    }
+    if faults.is_empty() { Ok(rows) } else { Err(faults) }
+}
+
+/// The columns of a header. Columns that are not known are ignored, as notes and materials are.
+fn read_header(
+    header: &[Field<'_>],
+    units: &CadUnits,
+    stated: StatedConventions,
+) -> Result<Vec<Option<ScaledColumn>>, Vec<CadFault>> {
+    let mut columns: Vec<Option<ScaledColumn>> = Vec::new();
+    let mut faults = Vec::new();
+    for (at, text) in header {
+        let range = *at..at + text.len();
+        let (name, unit) = split_unit(text);
+        let Some(kind) = column_of(name) else {
+            columns.push(None);
+            continue;
+        };
+        let is_known = columns.iter().flatten().any(|known| known.kind == kind);
+        // A table of all nine entries has each product twice.
+        if is_known && matches!(kind, CadColumn::Product(..)) {
+            columns.push(None);
+            continue;
+        }
+        if is_known {
+            faults.push(CadFault::new(
+                range,
+                format!("there are two columns for `{name}`"),
+                "one column for each quantity; delete one of them",
+            ));
+            continue;
+        }
+        let (given, factor): (Option<&str>, UnitFactorSearch) = match kind {
+            CadColumn::Name => {
+                columns.push(Some(ScaledColumn { kind, factor: 1.0 }));
+                continue;
+            }
+            CadColumn::Mass => (unit.or(units.mass.as_deref()), mass_factor),
+            CadColumn::Volume => (unit, volume_factor),
+            CadColumn::Centre(_) => (unit.or(units.length.as_deref()), length_factor),
+            CadColumn::Moment(..) | CadColumn::Product(..) => (unit.or(units.inertia.as_deref()), inertia_factor),
+        };
+        match given.map(factor) {
+            Some(Ok(factor)) => columns.push(Some(ScaledColumn { kind, factor })),
+            Some(Err(UnknownCadUnit(unit))) => faults.push(CadFault::new(
+                range,
+                format!("the unit `{unit}` of `{name}` is not known"),
+                format!("a unit in brackets, such as `mass [kg]` or `Ixx [kg m^2]`; {KNOWN_UNITS}"),
+            )),
+            // A volume serves as a check only.
+            None if kind == CadColumn::Volume => columns.push(None),
+            None => faults.push(CadFault::new(
+                range,
+                format!("the unit of `{name}` is missing"),
+                "a unit in brackets, such as `mass [kg]`, or `units = { mass = \"kg\", length = \"mm\", inertia = \
+                 \"kg mm^2\" }` in the rig file",
+            )),
+        }
+    }
+    let has = |wanted: &dyn Fn(CadColumn) -> bool| columns.iter().flatten().any(|column| wanted(column.kind));
+    let whole = header.first().map_or(0..0, |first| {
+        let last = header.last().unwrap_or(first);
+        first.0..last.0 + last.1.len()
+    });
+    let mut require = |is_there: bool, what: &str, help: &str| {
+        if !is_there {
+            faults.push(CadFault::new(
+                whole.clone(),
+                format!("this table has no column {what}"),
+                help,
+            ));
+        }
+    };
+    require(has(&|kind| kind == CadColumn::Name), "of names", "a column `name`");
+    require(
+        has(&|kind| kind == CadColumn::Mass),
+        "of masses",
+        "a column such as `mass [kg]`",
+    );
+    for (k, axis) in ["x", "y", "z"].into_iter().enumerate() {
+        require(
+            has(&|kind| kind == CadColumn::Centre(k)),
+            &format!("`{axis}` of the centre of mass"),
+            "columns such as `x [mm]`, `y [mm]`, `z [mm]`",
+        );
+    }
+    let open = |kind: CadColumn| matches!(kind, CadColumn::Moment(_, None) | CadColumn::Product(_, None));
+    require(
+        stated.point.is_some() || !has(&open),
+        "that states the point of the inertia",
+        "`inertia = \"centre\"` (about the centre of mass) or `inertia = \"origin\"` in `[[mass_properties]]`, or columns \
+         `Lxx`, `Lxy` ... about the centre of mass",
+    );
+    if faults.is_empty() { Ok(columns) } else { Err(faults) }
+}
+
+/// One row.
+fn read_row(
+    at: usize,
+    line: &str,
+    fields: &[Field<'_>],
+    columns: &[Option<ScaledColumn>],
+    separator: char,
+    stated: StatedConventions,
+) -> Result<CadRow, CadFault> {
+    let span = at..at + line.trim_end().len();
+    let mut name = String::new();
+    let (mut mass, mut volume) = (None, None);
+    let mut centre = [None; 3];
+    // Moments and products about the centre, and about the origin.
+    let mut moments = [[None; 3]; 2];
+    let mut products = [[0.0; 3]; 2];
+    for ((place, text), column) in fields.iter().zip(columns) {
+        let Some(column) = column else { continue };
+        if column.kind == CadColumn::Name {
+            (*text).clone_into(&mut name);
+            continue;
+        }
+        if text.is_empty() {
+            continue;
+        }
+        let number = if separator == ',' {
+            text.parse()
+        } else {
+            text.replace(',', ".").parse::<f64>()
+        };
+        let value = match number {
+            Ok(value) if f64::is_finite(value) => value * column.factor,
+            _ => {
+                return Err(CadFault::new(
+                    *place..place + text.len(),
+                    format!("`{}` is not a number", text.chars().take(40).collect::<String>()),
+                    "a finite number, without a unit",
+                ));
+            }
+        };
+        let index = |point: Option<InertiaPoint>| usize::from(point.or(stated.point) == Some(InertiaPoint::Origin));
+        match column.kind {
+            CadColumn::Name => {}
+            CadColumn::Mass => mass = Some(value),
+            CadColumn::Volume => volume = Some(value),
+            CadColumn::Centre(k) => centre[k] = Some(value),
+            CadColumn::Moment(k, point) => moments[index(point)][k] = Some(value),
+            CadColumn::Product(k, point) => products[index(point)][k] = value,
+        }
+    }
+    let missing = |what: &str| {
+        CadFault::new(
+            span.clone(),
+            format!("this row states no {what}"),
+            "a number in this column",
+        )
+    };
+    let mass = mass.ok_or_else(|| missing("mass"))?;
+    let [Some(x), Some(y), Some(z)] = centre else {
+        return Err(missing("complete centre of mass"));
+    };
+    let mut inertias = Vec::new();
+    for (k, about) in [InertiaPoint::Centre, InertiaPoint::Origin].into_iter().enumerate() {
+        let told = moments[k];
+        // A planar table has zz alone.
+        if told.iter().all(Option::is_none) {
+            continue;
+        }
+        inertias.push(PrintedInertia {
+            about,
+            moments: Vector3::from(told.map(Option::unwrap_or_default)),
+            products: Vector3::from(products[k]),
+        });
+    }
+    Ok(CadRow {
+        name,
+        span: span.clone(),
+        volume,
+        body: PrintedBody {
+            mass,
+            centre: Vector3::new(x, y, z),
+            inertias,
+            principal: None,
+            stated: stated.sign,
+        },
+    })
+}
+
+/// The quantity of a column by its name, without regard to case and signs.
+fn column_of(name: &str) -> Option<CadColumn> {
+    let key: String = name.to_lowercase().chars().filter(|c| c.is_alphanumeric()).collect();
+    Some(match key.as_str() {
+        "name" | "body" | "part" | "component" | "partname" | "bodyname" => CadColumn::Name,
+        "mass" | "m" => CadColumn::Mass,
+        "volume" | "vol" => CadColumn::Volume,
+        _ => {
+            let prefixes = [
+                "centreofmass",
+                "centerofmass",
+                "centerofgravity",
+                "centreofgravity",
+                "centre",
+                "center",
+                "com",
+                "cog",
+                "cg",
+                "c",
+            ];
+            let axis = |text: &str| ["x", "y", "z"].iter().position(|axis| *axis == text);
+            // `x`, `cx`, `com_x`, `x_com`.
+            let bare = prefixes
+                .iter()
+                .find_map(|prefix| key.strip_prefix(prefix).or(key.strip_suffix(prefix)))
+                .and_then(axis);
+            if let Some(k) = axis(&key).or(bare) {
+                return Some(CadColumn::Centre(k));
+            }
+            let (key, point) = match (
+                key.strip_suffix("origin"),
+                key.strip_suffix("centre").or(key.strip_suffix("center")),
+            ) {
+                (Some(rest), _) => (rest, Some(InertiaPoint::Origin)),
+                (_, Some(rest)) => (rest, Some(InertiaPoint::Centre)),
+                _ => (key.as_str(), None),
+            };
+            let (rest, point) = match key.strip_prefix('l') {
+                // As in reports of SolidWorks, L is about the centre.
+                Some(rest) => (rest, Some(InertiaPoint::Centre)),
+                None => (key.strip_prefix('i')?, point),
+            };
+            match rest {
+                "xx" => CadColumn::Moment(0, point),
+                "yy" => CadColumn::Moment(1, point),
+                "zz" => CadColumn::Moment(2, point),
+                "xy" | "yx" => CadColumn::Product(0, point),
+                "xz" | "zx" => CadColumn::Product(1, point),
+                "yz" | "zy" => CadColumn::Product(2, point),
+                _ => return None,
+            }
+        }
+    })
+}
+
+/// A header such as `mass [kg]` or `Ixx (kg*m^2)` as name and unit.
+fn split_unit(text: &str) -> (&str, Option<&str>) {
+    for (open, close) in [('[', ']'), ('(', ')')] {
+        if let Some((name, rest)) = text.split_once(open)
+            && let Some(unit) = rest.trim_end().strip_suffix(close)
+        {
+            return (name.trim(), Some(unit.trim()));
+        }
+    }
+    (text.trim(), None)
+}
+
+/// The separator of the first line that is no comment.
+fn find_separator(text: &str) -> char {
+    let header = text
+        .lines()
+        .find(|line| !line.trim().is_empty() && !line.trim_start().starts_with('#'))
+        .unwrap_or_default();
+    let count = |c: char| header.matches(c).count();
+    [';', '\t']
+        .into_iter()
+        .find(|c| count(*c) > 0 && count(*c) >= count(','))
+        .unwrap_or(',')
+}
+
+/// The lines of a text with their places.
+pub(super) fn lines_with_places(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    let mut at = 0;
+    text.split_inclusive('\n').map(move |line| {
+        let here = at;
+        at += line.len();
+        (here, line.trim_end_matches(['\n', '\r']))
+    })
+}
+
+/// The fields of a line without blanks and quotes. Quotes protect a separator.
+fn split_fields(at: usize, line: &str, separator: char) -> Vec<Field<'_>> {
+    let mut fields = Vec::new();
+    let (mut start, mut is_quoted) = (0, false);
+    let mut push = |from: usize, to: usize| {
+        let field = &line[from..to];
+        let inner = field.trim().trim_matches('"').trim();
+        // The place of the trimmed text in its line.
+        let offset = inner.as_ptr() as usize - line.as_ptr() as usize;
+        fields.push((at + offset, inner));
+    };
+    for (k, c) in line.char_indices() {
+        if c == '"' {
+            is_quoted = !is_quoted;
+        } else if c == separator && !is_quoted {
+            push(start, k);
+            start = k + c.len_utf8();
+        }
+    }
+    push(start, line.len());
+    fields
+}
