@@ -5,6 +5,7 @@ mod couplings;
 mod export;
 mod extensions;
 mod faulty;
+mod locks;
 mod mjcf;
 mod order_of_entries;
 mod spidermill;
