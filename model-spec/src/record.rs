@@ -156,8 +156,8 @@ pub(crate) use {first, need, record};
 
 /// Reads one field of a table, of which `title` is the name in messages and `keys` are all keys.
 ///
-/// Returns `None` if the field is absent or faulty. A misspelt key, which [`check_keys`] reports, is read as the one that
-/// is meant, so that one mistake gives one error. A missing required field is reported.
+/// Returns `None` if the field is absent or faulty. A misspelt key, which [`check_keys`] reports, is read as the one
+/// that is meant, so that one mistake gives one error. A missing required field is reported.
 pub(crate) fn read_field<T: SchemaValue>(
     table: &TomlTable,
     key: &str,

@@ -346,7 +346,7 @@ pub(super) fn warn_of_negative(model: &ModelEntry, mechanism: &Mechanism, log: &
         let [m, x, y, z] = formulas.map(|formula| place(formula, or));
         let part = &part.name;
         look(mass, &format!("the mass of `{part}`"), "kg", m, true);
-        // Moments of linear parameters may be regrouped: moved to a neighbouring body, of which drives see the sum only.
+        // Moments of linear parameters may be regrouped: moved to a neighbouring body, since only their sum has effect.
         let is_regrouped = entry.linear.is_some();
         // Positions of the diagonal in xx, xy, xz, yy, yz, zz.
         for (axis, i, span) in [("x", 0, x), ("y", 3, y), ("z", 5, z)] {

@@ -2,8 +2,8 @@
 
 use std::ops::RangeInclusive;
 
-/// Magnitudes of gravity that occur on the Earth, m/s^2: 9.764 to 9.834, and 10 as a round number. Wrong units and other
-/// planets are outside.
+/// Magnitudes of gravity that occur on the Earth, m/s^2: 9.764 to 9.834, and 10 as a round number. Wrong units and
+/// other planets are outside.
 pub(super) const EARTH_GRAVITY: RangeInclusive<f64> = 9.75..=10.0;
 
 /// Components of gravity below this share of its magnitude count as zero where its direction is named. By judgement.

@@ -75,8 +75,8 @@ pub struct Options<'a> {
     pub pose: &'a [(String, f64)],
     /// Joints by name that are fixed at a value, rad or m from the description's own zero: they are no coordinates.
     pub locked: &'a [(String, f64)],
-    /// The joints that move; all others are fixed at the pose of the description, except those that are coupled with one
-    /// of these. Without it all joints move.
+    /// The joints that move; all others are fixed at the pose of the description, except those that are coupled with
+    /// one of these. Without it all joints move.
     pub kept: Option<&'a [String]>,
 }
 

@@ -1,5 +1,5 @@
-//! Joints of a description that are locked at a value: the rest of the robot moves as the complete robot does with these
-//! joints at standstill.
+//! Joints of a description that are locked at a value: the rest of the robot moves as the complete robot does with
+//! these joints at standstill.
 
 use modelmill_boundary::files::MemoryFiles;
 use modelmill_codegen::{Derivation, ModelEvaluator, MotionStates};

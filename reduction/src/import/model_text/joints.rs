@@ -398,8 +398,8 @@ fn plain_number(ratio: f64) -> String {
     }
 }
 
-/// Pose of the link behind a revolute or prismatic joint that is fixed, in the frame that carries it. `at` is the pose of
-/// the joint's frame there, `turned` its axes in those of the link, and `moved` its distance from the pose of the
+/// Pose of the link behind a revolute or prismatic joint that is fixed, in the frame that carries it. `at` is the pose
+/// of the joint's frame there, `turned` its axes in those of the link, and `moved` its distance from the pose of the
 /// description, rad or m.
 fn pose_behind_fixed(
     joint: &DescriptionJoint,
