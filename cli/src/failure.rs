@@ -11,6 +11,8 @@ pub(crate) enum CommandFailure {
     Usage(String),
     /// The model fails a verification, or could not be verified: exit status 1. The output states why.
     NotVerified,
+    /// The model file has values that no machine can have: exit status 1. The output states them.
+    ImpossibleValues,
     /// The reader of standard output closed it: exit status 0 and no message.
     BrokenPipe,
 }
@@ -24,7 +26,7 @@ impl CommandFailure {
         match self {
             Self::BrokenPipe => 0,
             Self::Usage(_) | Self::Library(modelmill::Error::Options(_)) => 2,
-            Self::NotVerified | Self::Input(_) | Self::Library(_) => 1,
+            Self::NotVerified | Self::ImpossibleValues | Self::Input(_) | Self::Library(_) => 1,
         }
     }
 }

@@ -48,7 +48,7 @@ fn main() -> ExitCode {
                 }
                 CommandFailure::Library(error) => terminal::error(&error.spell(&FlagSpelling)),
                 CommandFailure::Input(says) | CommandFailure::Usage(says) => terminal::error(says),
-                CommandFailure::NotVerified | CommandFailure::BrokenPipe => {}
+                CommandFailure::NotVerified | CommandFailure::ImpossibleValues | CommandFailure::BrokenPipe => {}
             }
             ExitCode::from(failure.status())
         }

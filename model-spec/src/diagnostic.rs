@@ -50,6 +50,9 @@ pub struct Diagnostic {
     pub related: Option<(SourceSpan, String)>,
     /// What to do, one sentence each.
     pub help: Vec<Message>,
+    /// True for a warning of values that no machine can have, such as a negative mass. Equations are still right, but
+    /// the values of the file are not.
+    pub is_impossible: bool,
 }
 
 impl Diagnostic {
@@ -62,6 +65,7 @@ impl Diagnostic {
             label: String::new(),
             related: None,
             help: Vec::new(),
+            is_impossible: false,
         }
     }
 
@@ -71,6 +75,12 @@ impl Diagnostic {
             severity: DiagnosticSeverity::Warning,
             ..Self::error(span, message)
         }
+    }
+
+    /// Marks a warning of values that no machine can have, if `is_impossible`.
+    #[must_use]
+    pub(crate) fn impossible_if(self, is_impossible: bool) -> Self {
+        Self { is_impossible, ..self }
     }
 
     /// Sets the text at the marked place: what was expected there.
@@ -226,6 +236,7 @@ impl DiagnosticLog {
                 label: String::new(),
                 related: None,
                 help: Vec::new(),
+                is_impossible: false,
             });
         }
         self.diagnostics

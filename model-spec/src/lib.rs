@@ -45,6 +45,7 @@ mod record;
 mod schema;
 mod scope;
 mod suggest;
+mod total_mass;
 mod unclosed;
 mod unit;
 mod values;

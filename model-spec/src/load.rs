@@ -153,6 +153,9 @@ pub fn load_with(
         end: 0,
     };
     let model = ModelEntry::from_table(&table, whole, &mut log);
+    if has_unread_section(&table, &model) {
+        log.syntax_broken = true;
+    }
     let (mechanism, kinds) = if log.syntax_broken {
         // Names that a broken line would define would all be reported as unknown.
         (None, Vec::new())
@@ -177,6 +180,17 @@ pub fn load_with(
             .collect(),
         entries: Arc::new(FileEntries { model, libraries }),
     })
+}
+
+/// Whether a section of quantities could not be read at all, so that uses of its names would be reported as unknown.
+fn has_unread_section(table: &TomlTable, model: &ModelEntry) -> bool {
+    let sections = [
+        ("constants", model.constants.is_none()),
+        ("parameters", model.parameters.is_none()),
+        ("coordinates", model.coordinates.is_none()),
+    ];
+    let mut unread = sections.iter().filter(|(_, is_unread)| *is_unread);
+    unread.any(|(key, _)| find_key(table, key).is_some())
 }
 
 /// The kinds of effects of the program's library, followed by those of further libraries.

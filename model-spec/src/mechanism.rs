@@ -143,6 +143,20 @@ pub enum FrameStep {
     Free(FreeBody),
 }
 
+impl FrameStep {
+    /// Whether a coordinate changes the step.
+    pub(crate) fn is_moving(&self) -> bool {
+        match self {
+            Self::Rotate(_, angle) => angle
+                .terms
+                .iter()
+                .any(|(symbol, _)| matches!(symbol, ModelSymbol::Coordinate(_))),
+            Self::Translate(_, length) => !length.coordinates.is_empty(),
+            Self::Free(_) => true,
+        }
+    }
+}
+
 /// The coordinates of a free body: its position, a unit quaternion, and the axes of its twist.
 ///
 /// The rates of `position` are the velocity of the frame's origin, and those of the quaternion's vector part are the

@@ -477,9 +477,26 @@ impl FormulaParser<'_> {
             ',' => diagnostic
                 .label("a comma cannot stand here: decimals have a point, functions have one operand")
                 .help("write decimals with a point (`0.5`), one expression per entry: `[\"ax\", \"-ay\"]`"),
-            _ if found.is_alphanumeric() || found == '(' => diagnostic.label("expected an operator: `+ - * / ^`"),
+            _ if found.is_alphanumeric() || found == '(' => {
+                diagnostic.label("expected an operator: `+ - * / ^`").help_if(
+                    self.spaced_name()
+                        .map(|(text, name)| format!("names have no blanks: if `{text}` is one name, call it `{name}`")),
+                )
+            }
             _ => diagnostic.label("expected a number, a name or a parenthesis"),
         })
+    }
+
+    /// Two words with a blank between them around the current position, and the name that they could be: `my mass` and
+    /// `my_mass`.
+    fn spaced_name(&self) -> Option<(String, String)> {
+        let is_letter = |found: char| found.is_ascii_alphanumeric() || found == '_';
+        let before = self.text[..self.at].trim_end();
+        let first = before.rsplit(|found| !is_letter(found)).next()?;
+        let second = self.text[self.at..].split(|found| !is_letter(found)).next()?;
+        let both = [first, second];
+        let is_word = |word: &&str| word.starts_with(|found: char| found.is_ascii_alphabetic());
+        both.iter().all(is_word).then(|| (both.join(" "), both.join("_")))
     }
 
     /// The fault of an exponent that starts at `start`; the mark extends to the end of the word.

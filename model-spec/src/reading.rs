@@ -50,6 +50,7 @@ fn unreadable_file(error: &FileError, advice: &str) -> Diagnostic {
         label: String::new(),
         related: None,
         help: vec![help.into()],
+        is_impossible: false,
     }
 }
 

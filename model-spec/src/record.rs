@@ -16,6 +16,9 @@ use crate::values::check_name;
 
 /// Most entries of one list or table.
 const MOST_ENTRIES: usize = 1000;
+/// Most unknown keys of one table that are read as misspelt ones: comparing names takes time.
+const MOST_MISSPELT: usize = 16;
+
 /// A type of the schema.
 /// Reading never stops at the first fault: faults go to the log, so that one run reports all of them.
 pub(crate) trait SchemaValue: Sized {
@@ -23,6 +26,8 @@ pub(crate) trait SchemaValue: Sized {
     const EXPECTED: &'static str;
     /// An example of it as TOML.
     const EXAMPLE: &'static str;
+    /// Whether it is a table with fixed keys.
+    const IS_RECORD: bool = false;
 
     /// Reads a value; a fault goes to the log and gives `None`.
     /// The place of the node is kept in the value where later messages need it.
@@ -79,8 +84,8 @@ macro_rules! record {
                     $( $field: $crate::record::read_field::<$type>(
                         table,
                         $key,
-                        $crate::record::need!($need).then_some(Self::KEYS),
-                        $title,
+                        $crate::record::need!($need),
+                        ($title, Self::KEYS),
                         span,
                         log,
                     ), )*
@@ -93,6 +98,7 @@ macro_rules! record {
         impl $crate::record::SchemaValue for $name {
             const EXPECTED: &'static str = concat!("a table: ", $title);
             const EXAMPLE: &'static str = concat!("{ ", $crate::record::first!($($key),*), " = ... }");
+            const IS_RECORD: bool = true;
 
             fn read(node: &$crate::document::TomlNode, log: &mut $crate::diagnostic::DiagnosticLog) -> Option<Self> {
                 let $crate::document::TomlValue::Table(table) = &node.value else {
@@ -148,30 +154,32 @@ macro_rules! first {
 }
 pub(crate) use {first, need, record};
 
-/// Reads one field of a table; `required_of` lists all keys of the table if the field must be there.
-/// Returns `None` if the field is absent or faulty. A missing required field is reported, unless a misspelt key may
-/// be it.
+/// Reads one field of a table, of which `title` is the name in messages and `keys` are all keys.
+///
+/// Returns `None` if the field is absent or faulty. A misspelt key, which [`check_keys`] reports, is read as the one
+/// that is meant, so that one mistake gives one error. A missing required field is reported.
 pub(crate) fn read_field<T: SchemaValue>(
     table: &TomlTable,
     key: &str,
-    required_of: Option<&[&str]>,
-    title: &str,
+    is_required: bool,
+    (title, keys): (&str, &[&str]),
     span: SourceSpan,
     log: &mut DiagnosticLog,
 ) -> Option<T> {
     if let Some((_, node)) = find_key(table, key) {
         return T::read(node, log);
     }
-    // An unknown key close to this one is reported as misspelt, so it is not reported as missing as well.
-    let misspelt = |keys: &[&str]| {
-        table.iter().take(MOST_ENTRIES).any(|(other, _)| {
-            !keys.contains(&other.name.as_str()) && suggest::nearest(&other.name, keys.iter().copied()) == Some(key)
-        })
-    };
-    if let Some(keys) = required_of
-        && !log.syntax_broken
-        && !misspelt(keys)
-    {
+    if log.syntax_broken {
+        return None;
+    }
+    if let Some(node) = find_misspelt(table, key, keys) {
+        // A table is certainly meant, so its faults are reported; a single value may belong to something else.
+        return match node.value {
+            TomlValue::Table(_) | TomlValue::Array(_) => T::read(node, log),
+            _ => T::read(node, &mut DiagnosticLog::default()),
+        };
+    }
+    if is_required {
         log.push(
             Diagnostic::error(span, format!("{title} lacks `{key}`"))
                 .label(format!("expected `{key}`, {}", T::EXPECTED))
@@ -179,6 +187,13 @@ pub(crate) fn read_field<T: SchemaValue>(
         );
     }
     None
+}
+
+/// The value under an unknown key that is close to `key`.
+fn find_misspelt<'a>(table: &'a TomlTable, key: &str, keys: &[&str]) -> Option<&'a TomlNode> {
+    let mut unknown = table.iter().filter(|(other, _)| !keys.contains(&other.name.as_str()));
+    let meant = |(other, _): &&(TomlKey, TomlNode)| suggest::nearest(&other.name, keys.iter().copied()) == Some(key);
+    unknown.by_ref().take(MOST_MISSPELT).find(meant).map(|(_, node)| node)
 }
 
 /// Reports keys that a table does not have.
@@ -234,7 +249,14 @@ impl<T: SchemaValue> SchemaValue for EntryList<T> {
                     .label(format!("expected a list, each entry {}", T::EXPECTED))
                     .help("lists of tables are headed by double brackets, `[[frame]]`; short ones stand in `[ ]`"),
             );
-            return None;
+            // A table in single brackets is its only entry, so that what it defines is known.
+            let is_entry = T::IS_RECORD && matches!(node.value, TomlValue::Table(_));
+            let only = is_entry.then(|| T::read(node, log)).flatten()?;
+            return Some(Self {
+                entries: vec![only],
+                span: node.span,
+                faulty: true,
+            });
         };
         // Very long lists are refused as a unit, so that reading stays fast.
         if too_many(array.len(), node.span, log) {

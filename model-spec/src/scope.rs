@@ -151,6 +151,12 @@ impl FormulaScope {
                 format!("`{name}` is {}, which cannot stand here", meaning.sort.name()),
             )
             .label(format!("expected {list}"));
+            let needs_value = meaning.sort == SymbolSort::Parameter && sorts.contains(&SymbolSort::Constant);
+            let advice = format!(
+                "geometry and other known quantities are constants: move `{name}` to `[constants]`, with `value` in place of \
+                 `nominal`; masses and inertias may contain constants, too"
+            );
+            let diagnostic = diagnostic.help_if(needs_value.then_some(advice));
             log.push(match meaning.declared {
                 Some(declared) => diagnostic.related(declared, "defined here"),
                 None => diagnostic,

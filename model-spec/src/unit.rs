@@ -36,13 +36,14 @@ const UNITS: [(&str, [i32; 4]); 17] = [
 ];
 
 /// Common units that would need a factor, each with the SI unit to use instead.
-const FOREIGN: [(&str, &str); 14] = [
+const FOREIGN: [(&str, &str); 15] = [
     ("mm", "m"),
     ("cm", "m"),
     ("km", "m"),
     ("g", "kg"),
     ("t", "kg"),
     ("deg", "rad"),
+    ("\u{b0}", "rad"),
     ("rpm", "rad/s"),
     ("min", "s"),
     ("ms", "s"),
@@ -213,13 +214,15 @@ impl ModelUnit {
             end: inner + fault.end,
         });
         let found = &text[fault.start..fault.end];
-        let mut diagnostic = Diagnostic::error(place, fault.message)
+        let mut diagnostic = Diagnostic::error(place, fault.message.as_str())
             .label("expected SI units such as `kg`, `m`, `rad`, `kg m^2`, `N s/m`, `m/s^2`, or `1`");
         // Prefixed units are refused, because no factor is ever applied.
         if let Some((_, si)) = FOREIGN.iter().find(|(foreign, _)| *foreign == found) {
             diagnostic = diagnostic.help(format!(
                 "write `{si}` and convert the value; modelmill uses SI units without prefixes"
             ));
+        } else if let Some(text) = corrected_unit(text, &fault) {
+            diagnostic = diagnostic.help(format!("write `{text}`"));
         } else if let Some(near) = suggest::nearest(found, UNITS.iter().map(|(name, _)| *name)) {
             diagnostic = diagnostic.help(format!("did you mean `{near}`?"));
         }
@@ -283,6 +286,61 @@ struct UnitFault {
     end: usize,
     /// What is wrong, for the title of the diagnostic.
     message: String,
+}
+
+/// The unit that a text with a fault probably means: `m/s^2` for `m/s2`, `m/s/s` and `m s\u{207b}\u{b2}`.
+fn corrected_unit(text: &str, fault: &UnitFault) -> Option<String> {
+    // Divisors one after the other divide by their product.
+    if let [above, below @ ..] = text.split('/').collect::<Vec<_>>().as_slice()
+        && below.len() > 1
+    {
+        return parse_unit(&format!("{above}/({})", below.join(" ")))
+            .ok()
+            .map(|dimension| dimension.to_string());
+    }
+    let separated = separate_units(&text[fault.start..fault.end])?;
+    let corrected = format!("{}{separated}{}", &text[..fault.start], &text[fault.end..]);
+    parse_unit(&corrected).is_ok().then_some(corrected)
+}
+
+/// Known units that stand together as one word, with exponents that lack their `^`: `kg m^2` for `kgm2`.
+fn separate_units(word: &str) -> Option<String> {
+    let mut rest = word;
+    let mut units = Vec::new();
+    while !rest.is_empty() {
+        // Other programs separate units by points and hyphens.
+        if let Some(behind) = rest.strip_prefix(['.', '-', '\u{22c5}']) {
+            rest = behind;
+            continue;
+        }
+        let known = UNITS.iter().map(|(name, _)| *name).filter(|name| *name != "1");
+        let unit = known
+            .filter(|name| rest.starts_with(name))
+            .max_by_key(|name| name.len())?;
+        rest = &rest[unit.len()..];
+        let is_exponent = |found: char| found.is_ascii_digit() || superscript(found).is_some();
+        let end = rest.find(|found| !is_exponent(found)).unwrap_or(rest.len());
+        let exponent: String = rest[..end].chars().map(|c| superscript(c).unwrap_or(c)).collect();
+        rest = &rest[end..];
+        units.push(if exponent.is_empty() {
+            unit.to_owned()
+        } else {
+            format!("{unit}^{exponent}")
+        });
+    }
+    Some(units.join(" "))
+}
+
+/// The character that a superscript stands for.
+fn superscript(found: char) -> Option<char> {
+    let known = [
+        ('\u{207b}', '-'),
+        ('\u{b9}', '1'),
+        ('\u{b2}', '2'),
+        ('\u{b3}', '3'),
+        ('\u{2074}', '4'),
+    ];
+    known.iter().find(|(sign, _)| *sign == found).map(|(_, plain)| *plain)
 }
 
 /// The dimension of a unit: factors separated by blanks or `*`; after one `/` a single unit or a bracket.

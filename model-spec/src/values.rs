@@ -77,10 +77,27 @@ pub(crate) fn check_name(text: &str, span: SourceSpan, log: &mut DiagnosticLog) 
     if !fine {
         log.push(
             Diagnostic::error(span, format!("`{}` cannot be a name", quote(text)))
-                .label("expected a letter, then letters, digits and `_`, at most 60"),
+                .label("expected a letter, then letters, digits and `_`, at most 60")
+                .help_if(similar_name(text).map(|name| format!("write `{name}`, wherever it is used"))),
         );
     }
     fine
+}
+
+/// The nearest text that can be a name: `my_arm` for `my arm`.
+fn similar_name(text: &str) -> Option<String> {
+    let is_allowed = |found: char| found.is_ascii_alphanumeric() || found == '_';
+    let words: Vec<&str> = text
+        .split(|found| !is_allowed(found))
+        .filter(|word| !word.is_empty())
+        .collect();
+    let joined = words.join("_");
+    let name = if joined.starts_with(|first: char| first.is_ascii_digit() || first == '_') {
+        format!("n{joined}")
+    } else {
+        joined
+    };
+    is_name(&name).then_some(name)
 }
 
 /// Reports a name that is a word of the expression language; true if it is not one.

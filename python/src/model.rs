@@ -93,6 +93,8 @@ pub(crate) fn import_text(
     round_angles: bool,
     closures: Option<PathBuf>,
     pose: Vec<(String, f64)>,
+    locked: Vec<(String, f64)>,
+    kept: Option<Vec<String>>,
 ) -> PyResult<(String, RemarkList)> {
     let (host, listener) = new_host(Vec::new(), false);
     // Text of a file of limited size.
@@ -115,6 +117,8 @@ pub(crate) fn import_text(
             round_angles,
             closures: closures.as_deref(),
             pose: &pose,
+            locked: &locked,
+            kept: kept.as_deref(),
         };
         host.import(name, &text, &options)
     })?;

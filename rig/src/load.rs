@@ -194,5 +194,6 @@ pub fn plain_error(span: Option<SourceSpan>, message: impl Into<String>) -> Diag
         label: String::new(),
         related: None,
         help: Vec::new(),
+        is_impossible: false,
     }
 }

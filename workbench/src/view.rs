@@ -61,6 +61,7 @@ pub(crate) fn equations(model: &Model, saved: Option<&Model>) -> Value {
         summary: model.summary(),
         rank: None,
         warnings: Vec::new(),
+        magnitudes: model.magnitudes(),
     };
     json!({
         "base": base,

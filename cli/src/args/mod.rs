@@ -222,6 +222,8 @@ pub(crate) enum ProgramCommand {
         them. Every body gets its ten linear parameters.\n\n\
         Examples:\n  \
         modelmill import robot.urdf --out robot.toml\n  \
+        modelmill import robot.urdf --out arm.toml --joints shoulder,elbow,wrist\n  \
+        modelmill import robot.urdf --out arm.toml --lock torso=0.2,gripper=0.01\n  \
         modelmill check robot.toml"
     )]
     Import(ImportArgs),

@@ -46,6 +46,13 @@ pub(crate) struct ImportArgs {
     /// assembly modes
     #[arg(long, value_name = "JOINT=VALUE,...", value_parser = parse_value, value_delimiter = ',', allow_hyphen_values = true)]
     pub(crate) at: Vec<(String, f64)>,
+    /// Fix these joints at a value, rad or m from the description's own zero; their links become one body with those
+    /// that carry them
+    #[arg(long, value_name = "JOINT=VALUE,...", value_parser = parse_value, value_delimiter = ',', allow_hyphen_values = true)]
+    pub(crate) lock: Vec<(String, f64)>,
+    /// Only these joints, and those coupled with them, move; all others are fixed at the pose of the description
+    #[arg(long, value_name = "JOINT,...", value_delimiter = ',')]
+    pub(crate) joints: Vec<String>,
     /// Write the model to this file
     #[arg(long, value_name = "MODEL.toml")]
     pub(crate) out: PathBuf,

@@ -1,5 +1,6 @@
 //! `check`: validates a model file, or a rig, and prints a summary of its contents.
 
+use modelmill::model::ModelCheck;
 use modelmill::{Error, Host, print};
 
 use crate::args::CheckArgs;
@@ -28,15 +29,26 @@ pub(crate) fn run(host: &Host, args: &CheckArgs) -> CommandOutcome {
         if let Some(servo) = &servo {
             object["servo"] = servo.json();
         }
-        return terminal::print_json(&object);
+        terminal::print_json(&object)?;
+        return require_possible_values(&checked);
     }
     // The scale of a servo's gains is the next question of its user.
     match servo {
         Some(servo) => {
             terminal::print(&checked.text(terminal::style()))?;
-            terminal::print(&servo.text(terminal::style()))
+            terminal::print(&servo.text(terminal::style()))?;
         }
-        None => terminal::print(&checked.text_with_next_step(terminal::style(), &FlagSpelling)),
+        None => terminal::print(&checked.text_with_next_step(terminal::style(), &FlagSpelling))?,
+    }
+    require_possible_values(&checked)
+}
+
+/// Fails for a model with values that no machine can have; the output states them already.
+fn require_possible_values(checked: &ModelCheck) -> CommandOutcome {
+    if checked.impossible_values().is_empty() {
+        Ok(())
+    } else {
+        Err(CommandFailure::ImpossibleValues)
     }
 }
 

@@ -25,6 +25,8 @@ pub(crate) fn run(host: &Host, args: &ImportArgs) -> CommandOutcome {
         round_angles: args.round_angles,
         closures: None,
         pose: &args.at,
+        locked: &args.lock,
+        kept: (!args.joints.is_empty()).then_some(args.joints.as_slice()),
     };
     let imported = import_description(host, file, closures.as_deref(), options)?;
     // A `robot.yaml` that was found automatically is mentioned, because it changes the result.

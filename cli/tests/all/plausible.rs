@@ -172,8 +172,21 @@ fn impossible_values_are_pointed_out() {
     let (err, _) = both(&["identify", &model, "--data", &whole("fine", 1500, 3.0, 0.5)]);
     assert!(!err.contains("physically possible"), "{err}");
     let model = cart("light", "\"M\"", &MASS.replace('3', "-3"));
-    let checked = json(&["check", &model, "--json"]);
+    // A mass below zero is no valid value, although the equations are right.
+    let ended = ran(&["check", &model, "--json"]);
+    let checked: Value = serde_json::from_str(&ended.out).expect("JSON");
+    assert_eq!(
+        (ended.status, &checked["valid"]),
+        (1, &Value::Bool(false)),
+        "{checked:#}"
+    );
     assert!(checked["diagnostics"].to_string().contains("is -3 kg"), "{checked:#}");
+    let text = ran(&["check", &model]);
+    assert!(
+        text.status == 1 && text.out.contains(": not valid: with nominal values the mass of"),
+        "{}",
+        text.out
+    );
 }
 
 #[test]
@@ -569,4 +582,43 @@ fn a_rank_without_a_clear_gap_is_said_to_be_none() {
     assert!(said.contains("note: ") && said.contains("condition number"), "{said}");
     let sound = ran(&["equations", &model("two_link.toml")]);
     assert_eq!(sound.err, "");
+}
+
+/// Wrong signs and units of a file show in three figures: gravity, mass and size.
+#[test]
+fn magnitudes_show_wrong_signs_and_units() {
+    let arm = std::fs::read_to_string(model("two_link.toml")).expect("a model");
+    let file = scratch("magnitudes.toml");
+    let checked = |text: &str| {
+        std::fs::write(&file, text).expect("written");
+        json(&["check", &file, "--json"])["magnitudes"].clone()
+    };
+    let found = checked(&arm);
+    assert!((number(&found, "/gravity/vector/1") + 9.81).abs() < 1e-12, "{found:#}");
+    assert!(found["gravity"]["remark"].is_null(), "{found:#}");
+    assert!((number(&found, "/total_mass") - 6.3).abs() < 1e-12, "{found:#}");
+    // All frames and points are within the first link of 0.5 m, in the plane.
+    for (axis, least, most) in [(0, 0.3, 1.0), (1, 0.2, 1.0), (2, 0.0, 0.0)] {
+        let [low, high] = [0, 1].map(|end| number(&found, &format!("/extent/{axis}/{end}")));
+        assert!(
+            (least..=most).contains(&(high - low)) && low >= -0.5 && high <= 0.5,
+            "{found:#}"
+        );
+    }
+    let up = checked(&arm.replace("\"-g\"", "\"g\""));
+    assert!(up["gravity"]["remark"].to_string().contains("points up"), "{up:#}");
+    let strong = checked(&arm.replace("9.81", "981"));
+    assert!(
+        strong["gravity"]["remark"]
+            .to_string()
+            .contains("not the gravity of the Earth"),
+        "{strong:#}"
+    );
+    // A length in millimetres is a thousand times as large.
+    let large = checked(&arm.replace("L = { value = 0.5", "L = { value = 500"));
+    let ratio = number(&large, "/extent/0/1") / number(&found, "/extent/0/1");
+    assert!((ratio - 1000.0).abs() < 1e-6, "{ratio}");
+    // A mass that the file does not give makes the sum unknown.
+    let partly = checked(&arm.replace(", M = 2.1", ""));
+    assert!(partly["total_mass"].is_null(), "{partly:#}");
 }

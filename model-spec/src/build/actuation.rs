@@ -20,7 +20,7 @@ use crate::build::symbols::SymbolTable;
 use crate::column;
 use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
 use crate::exact::{CoordinateIdx, ExactExpression, ModelSymbol};
-use crate::mechanism::{DriveKind, KinematicLoop, ModelDrive};
+use crate::mechanism::{DriveKind, KinematicLoop, ModelDrive, PointIdx};
 use crate::schema::ModelEntry;
 use crate::scope::SymbolSort;
 use crate::suggest;
@@ -119,7 +119,9 @@ pub(super) fn drives(
             (None, Some(linear)) => {
                 let from = linear.from.as_ref().and_then(|name| points.find(name, log));
                 let to = linear.to.as_ref().and_then(|name| points.find(name, log));
-                from.zip(to).map(|(from, to)| DriveKind::Linear { from, to })
+                from.zip(to)
+                    .filter(|(from, to)| acts_between_bodies([*from, *to], tree, points, linear.span, log))
+                    .map(|(from, to)| DriveKind::Linear { from, to })
             }
             _ if log.syntax_broken || entry.faulty => None,
             _ => {
@@ -185,6 +187,28 @@ pub(super) fn drives(
         check_drive_count(model, symbols, &drives.rows, places, log);
     }
     drives
+}
+
+/// Whether the two points of a drive are on bodies that can move relative to each other; reports it otherwise.
+fn acts_between_bodies(
+    ends: [PointIdx; 2],
+    tree: &FrameTree,
+    points: &PointTable,
+    span: SourceSpan,
+    log: &mut DiagnosticLog,
+) -> bool {
+    let bodies = ends.map(|point| tree.carrying_frame(points.points[point.0].frame));
+    // A frame with a fault may have lost its joint.
+    if bodies[0] != bodies[1] || log.n_errors() > 0 {
+        return true;
+    }
+    let [from, to] = ends.map(|point| &points.points[point.0].name);
+    log.push(
+        Diagnostic::error(span, format!("the points `{from}` and `{to}` are on the same body"))
+            .label(format!("both move with `{}`", tree.frames[bodies[0].0].name))
+            .help("a linear drive pushes two bodies apart: name points on frames with a joint between them"),
+    );
+    false
 }
 
 /// Reports a number of drives that differs from the number of degrees of freedom, with advice for each case.

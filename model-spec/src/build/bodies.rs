@@ -306,16 +306,17 @@ fn lumped_mass(
 }
 
 /// Warns of masses and moments of inertia whose values are negative at the nominal parameters.
-/// These are warnings only, because the equations stay valid.
+/// These are warnings only, because the equations are right for all values; `check` calls such values not valid.
 pub(super) fn warn_of_negative(model: &ModelEntry, mechanism: &Mechanism, log: &mut DiagnosticLog) {
     // Evaluates a quantity and reports it with its value if it is negative.
-    let mut look = |exact: &ExactExpression, what: &str, unit: &str, span: SourceSpan| {
+    let mut look = |exact: &ExactExpression, what: &str, unit: &str, span: SourceSpan, is_impossible: bool| {
         let value = exact.evaluate(&|symbol| mechanism.symbol_nominal(symbol));
         if value < 0.0 {
             log.push(
                 Diagnostic::warning(span, format!("with nominal values {what} is {value} {unit}"))
                     .label("expected a positive value")
-                    .help("check the sign of this entry and of the nominal values of the names in it"),
+                    .help("check the sign of this entry and of the nominal values of the names in it")
+                    .impossible_if(is_impossible),
             );
         }
     };
@@ -344,18 +345,20 @@ pub(super) fn warn_of_negative(model: &ModelEntry, mechanism: &Mechanism, log: &
         };
         let [m, x, y, z] = formulas.map(|formula| place(formula, or));
         let part = &part.name;
-        look(mass, &format!("the mass of `{part}`"), "kg", m);
+        look(mass, &format!("the mass of `{part}`"), "kg", m, true);
+        // Moments of linear parameters may be regrouped: moved to a neighbouring body, since only their sum has effect.
+        let is_regrouped = entry.linear.is_some();
         // Positions of the diagonal in xx, xy, xz, yy, yz, zz.
         for (axis, i, span) in [("x", 0, x), ("y", 3, y), ("z", 5, z)] {
             let what = format!("the moment of inertia of `{part}` about {axis}");
-            look(&inertia[i], &what, "kg m^2", span);
+            look(&inertia[i], &what, "kg m^2", span, !is_regrouped);
         }
     }
     // Lumped masses have no names that are always there, so the place in the file identifies them.
     let lumped = model.lumped_mass.iter().flat_map(|list| &list.entries);
     for (entry, lumped) in lumped.zip(&mechanism.lumped_masses) {
         let span = place(entry.mass.as_ref(), entry.span);
-        look(&lumped.mass, "this lumped mass", "kg", span);
+        look(&lumped.mass, "this lumped mass", "kg", span, true);
     }
 }
 

@@ -32,6 +32,16 @@ pub(super) struct FrameTree {
 
 // Later stages look up parents and carriers of points by name.
 impl FrameTree {
+    /// The frame that carries a frame without a joint in between: the same one if it moves relative to its parent.
+    pub(super) fn carrying_frame(&self, frame: FrameIdx) -> FrameIdx {
+        let mut at = frame;
+        // Parents come first in the tree, so this ends at the base.
+        while at != FrameIdx(0) && !self.frames[at.0].steps.iter().any(FrameStep::is_moving) {
+            at = self.frames[at.0].parent;
+        }
+        at
+    }
+
     /// The frame of a name; an unknown name is reported.
     pub(super) fn find(&self, name: &SpannedName, log: &mut DiagnosticLog) -> Option<FrameIdx> {
         let found = self.names.get(&name.text).copied();

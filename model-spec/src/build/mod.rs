@@ -7,6 +7,7 @@ mod actuation;
 mod actuators;
 mod bodies;
 mod couplings;
+mod degrees;
 pub(crate) mod effect_places;
 mod effects;
 mod frames;
@@ -16,6 +17,7 @@ mod joints;
 mod limits;
 mod retain;
 pub(crate) mod symbols;
+mod thresholds;
 
 use crate::build::effect_places::EffectTargets;
 use crate::diagnostic::{DiagnosticLog, SourceSpan};
@@ -130,6 +132,7 @@ pub(crate) fn build(
     };
     // These checks need the complete mechanism at its nominal values.
     bodies::warn_of_negative(model, &mechanism, log);
+    degrees::warn_of_degrees(model, &mechanism, log);
     pose::check_pose(&mut mechanism, &places, log);
     ((log.n_errors() == 0).then_some(mechanism), kinds)
 }

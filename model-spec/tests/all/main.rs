@@ -4,4 +4,5 @@ mod additions;
 mod edit;
 mod faulty;
 mod fuzz;
+mod mistakes;
 mod models;

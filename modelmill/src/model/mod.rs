@@ -4,8 +4,10 @@ mod changes;
 mod entries;
 mod equations;
 mod gravity_variants;
+mod magnitudes;
 mod sampled_rank;
 mod summary;
+mod thresholds;
 mod values;
 
 use std::path::Path;
@@ -28,6 +30,7 @@ use gravity_variants::GravityVariants;
 
 pub use changes::{EntryChange, ModelChanges};
 pub use equations::EquationsText;
+pub use magnitudes::ModelMagnitudes;
 pub use modelmill_codegen::review::PageFormat;
 pub use modelmill_spec::LoadedModel;
 pub use sampled_rank::SampledRank;

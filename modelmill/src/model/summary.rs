@@ -5,6 +5,7 @@ use modelmill_identify::RecordingNote;
 
 use crate::error::Outcome;
 use crate::model::Model;
+use crate::model::magnitudes::ModelMagnitudes;
 use crate::model::sampled_rank::{SampledRank, judge_rank};
 
 /// The result of a check.
@@ -18,12 +19,29 @@ pub struct ModelCheck {
     pub rank: Option<SampledRank>,
     /// Contradictions between the numeric rank and the exact reduction.
     pub warnings: Vec<String>,
+    /// Gravity, mass and size, by which wrong signs and units show.
+    pub magnitudes: ModelMagnitudes,
+}
+
+impl ModelCheck {
+    /// Values of the file that no machine can have, such as a negative mass, as phrases. With any of them the model is
+    /// not valid, although its equations are right.
+    pub fn impossible_values(&self) -> Vec<&str> {
+        let warnings = self.model.loaded.warnings.iter();
+        let impossible = warnings.filter(|warning| warning.is_impossible);
+        impossible.map(|warning| warning.message.as_str()).collect()
+    }
 }
 
 impl Model {
     /// Contents of the model, by names.
     pub fn summary(&self) -> ModelSummary {
         ModelSummary::new(&self.derivation)
+    }
+
+    /// Gravity, total mass and size at the values of the file, by which wrong signs and units show.
+    pub fn magnitudes(&self) -> ModelMagnitudes {
+        ModelMagnitudes::new(self)
     }
 
     /// Checks the model: its contents, and the numeric rank of its regressor (over random states) compared with the
@@ -54,6 +72,7 @@ impl Model {
             summary: self.summary(),
             rank,
             warnings,
+            magnitudes: self.magnitudes(),
         })
     }
 }

@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 use crate::model::{ModelCheck, ModelSummary, SampledRank, ineffective_retained};
 use crate::print::RemedySpelling;
 use crate::text::TerminalStyle;
-use crate::text::table::count;
+use crate::text::table::{count, significant};
 
 impl ModelCheck {
     /// Contents of the model as one JSON object, with all warnings.
@@ -41,6 +41,8 @@ impl ModelCheck {
         let judged = caution.iter().chain(&self.warnings);
         warnings.extend(judged.map(|says| json!({ "severity": "warning", "says": says, "file": model.path })));
         let mut object = self.summary.json(&model.name, &model.derivation, &warnings);
+        object["valid"] = json!(self.impossible_values().is_empty());
+        object["magnitudes"] = self.magnitudes.json();
         object["numeric_rank"] = self.rank.as_ref().map_or(Value::Null, SampledRank::json);
         object["next"] = json!(self.next_step().map(|step| step.spell(spelling)));
         object
@@ -49,8 +51,37 @@ impl ModelCheck {
     /// The same for people, without the next step.
     pub fn text(&self, style: TerminalStyle) -> String {
         let model = &self.model;
-        self.summary
-            .text(&model.name, &model.derivation, self.rank.as_ref(), style)
+        let headline = style.bold(&format!("{}: {}", plain(&model.name), plain(&self.validity())));
+        let contents = self.summary.text(&model.derivation);
+        [headline, contents, self.magnitudes_text()].join("\n")
+    }
+
+    /// Whether the model is valid, and otherwise why not, as a phrase.
+    fn validity(&self) -> String {
+        match self.impossible_values().as_slice() {
+            [] => "valid".to_owned(),
+            [only] => format!("not valid: {only}"),
+            [first, others @ ..] => format!("not valid: {first} ({} more above)", others.len()),
+        }
+    }
+
+    /// Figures at the values of the file: gravity, mass, size and rank.
+    fn magnitudes_text(&self) -> String {
+        let mass = self
+            .magnitudes
+            .total_mass
+            .map(|mass| format!("{} kg", significant(mass, 4)));
+        let lines = [
+            ("gravity", Some(self.magnitudes.gravity_text())),
+            ("total mass", mass),
+            ("size", self.magnitudes.extent_text()),
+            ("numeric rank", self.rank.as_ref().map(SampledRank::text)),
+        ];
+        let lines: Vec<String> = lines
+            .into_iter()
+            .filter_map(|(what, text)| Some(format!("  {what:<20}{}", text?)))
+            .collect();
+        lines.join("\n")
     }
 
     /// The same for people, with the next step.
@@ -63,10 +94,10 @@ impl ModelCheck {
     }
 
     /// The next step: values for a model that has not all of them, else the comparison with a recording; `None` for a model
-    /// without parameters that drives can show.
+    /// without parameters that drives can show, and for one with impossible values.
     pub fn next_step(&self) -> Option<Message> {
         let model = &self.model;
-        if model.base.is_empty() || model.drives().is_empty() {
+        if model.base.is_empty() || model.drives().is_empty() || !self.impossible_values().is_empty() {
             return None;
         }
         let excite = Remedy::command(CommandName::Excite);
@@ -161,10 +192,9 @@ impl ModelSummary {
     }
 
     /// Contents as lines of text, each with a name in front; lists are omitted if they are empty.
-    fn text(&self, name: &str, derivation: &Derivation, rank: Option<&SampledRank>, style: TerminalStyle) -> String {
+    fn text(&self, derivation: &Derivation) -> String {
         let m = &derivation.mechanism;
-        // The file is valid, otherwise its errors would be printed.
-        let mut lines = vec![style.bold(&format!("{}: valid", plain(name)))];
+        let mut lines = Vec::new();
         if let Some(title) = &m.title {
             lines.push(format!("  {}", plain(title)));
         }
@@ -231,9 +261,6 @@ impl ModelSummary {
                 line("reduced", "exactly, for the values of this file only".to_owned());
             }
             ReductionMethod::Exact { .. } | ReductionMethod::Unreduced => {}
-        }
-        if let Some(rank) = rank {
-            line("numeric rank", rank.text());
         }
         lines.join("\n")
     }

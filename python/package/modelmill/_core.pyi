@@ -141,6 +141,8 @@ def import_text(
     round_angles: bool,
     closures: str | PathLike[str] | None,
     pose: list[tuple[str, float]],
+    locked: list[tuple[str, float]],
+    kept: list[str] | None,
 ) -> tuple[str, _Remarks]: ...
 def contents(path: str | PathLike[str]) -> Result: ...
 def simulate(

@@ -1148,6 +1148,8 @@ def load(
     round_angles: bool = False,
     closures: PathText | None = None,
     pose: Mapping[str, float] | None = None,
+    locked: Mapping[str, float] | None = None,
+    joints: Sequence[str] | None = None,
     progress: Progress = None,
 ) -> Model:
     """Reads a model file (TOML) or a robot description (URDF, MJCF, SDF) and derives it.
@@ -1162,9 +1164,9 @@ def load(
         Libraries with additional kinds of effects.
     at_values : bool
         Derive only for the values of the file: fewer base parameters if the geometry is special.
-    floating, round_angles, closures, pose
+    floating, round_angles, closures, pose, locked, joints
         Only for robot descriptions: whether the base of a URDF is free; whether angles near right ones are rounded; a file of
-        loop closures; joint values that choose the assembly mode.
+        loop closures; joint values that choose the assembly mode; joints that are fixed at a value; the only joints that move.
 
     Returns
     -------
@@ -1187,7 +1189,14 @@ def load(
         if is_robot:
             stem = name or ("robot" if is_text else text)
             described, notes = _core.import_text(
-                stem, text if is_text else None, floating, round_angles, closures, list((pose or {}).items())
+                stem,
+                text if is_text else None,
+                floating,
+                round_angles,
+                closures,
+                list((pose or {}).items()),
+                list((locked or {}).items()),
+                None if joints is None else list(joints),
             )
             _warn(notes)
             core = _core.load_text(str(Path(stem).with_suffix(".toml")), described, libraries, at_values, hears)

@@ -11,6 +11,7 @@ mod closures_file;
 mod couplings;
 mod description;
 mod geoms;
+mod locks;
 mod mjcf;
 mod mjcf_actuators;
 mod mjcf_defaults;
@@ -74,6 +75,11 @@ pub struct Options<'a> {
     /// Joints by name with the values, rad or m from the description's own zero, from which loops are closed; others
     /// start at the pose of the description. They select one of several assembly modes.
     pub pose: &'a [(String, f64)],
+    /// Joints by name that are fixed at a value, rad or m from the description's own zero: they are no coordinates.
+    pub locked: &'a [(String, f64)],
+    /// The joints that move; all others are fixed at the pose of the description, except those that are coupled with
+    /// one of these. Without it all joints move.
+    pub kept: Option<&'a [String]>,
 }
 
 /// Why a robot description cannot be converted: one sentence with the place.
@@ -173,6 +179,7 @@ fn read_description(text: &str, options: &Options) -> Result<RobotDescription, I
         description.pose.retain(|(known, _)| known != name);
         description.pose.push((name.clone(), *value));
     }
+    locks::lock_joints(&mut description, options.locked, options.kept)?;
     // Options for URDF only would have no effect on other formats.
     let is_urdf = description.format == "URDF";
     if !is_urdf && (options.floating || options.closures.is_some()) {

@@ -6,6 +6,7 @@ mod descriptions;
 mod export;
 mod extensions;
 mod faulty;
+mod locks;
 mod mjcf;
 mod order_of_entries;
 mod propose;

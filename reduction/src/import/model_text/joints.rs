@@ -40,7 +40,7 @@ impl ModelTextBuilder<'_> {
             )
         })?;
         let is_turn = joint.kind == DescriptionJointKind::Revolute;
-        // Ratio and name of the coordinate; none if a coupling fixes the joint.
+        // Ratio and name of the coordinate; none if a coupling or the user fixes the joint.
         let moved = follows.variable.map(|variable| {
             let coordinate = self.variable(variable);
             self.add_joint_forces(description, joint, variable, follows.ratio, follows.offset);
@@ -48,6 +48,16 @@ impl ModelTextBuilder<'_> {
         });
         // Coordinates of the description are `zero` at the pose in which links are given.
         let constant = follows.offset - joint.zero;
+        if moved.is_none() {
+            // The links behind a fixed joint become one body with those before it.
+            self.remarks.push(message!(
+                "line {}: `{}` is fixed at {}",
+                joint.line,
+                joint.name,
+                follows.offset
+            ));
+            return Ok((on, pose_behind_fixed(joint, &at, &turned, constant)));
+        }
         // The constant part of the frame's pose.
         let shown = self.transform_text(&joint.name, &at);
         // A joint that cannot share the coordinate of its variable gets its own.
@@ -75,18 +85,7 @@ impl ModelTextBuilder<'_> {
         } else {
             format!(", axis = \"{axis}\"")
         };
-        // The `joint` of the frame; a joint that a coupling fixes has none.
-        let joint_text = if moved.is_some() {
-            format!("{kind} = \"{text}\"{axis_text}")
-        } else {
-            self.remarks.push(message!(
-                "line {}: a coupling fixes `{}` at {}",
-                joint.line,
-                joint.name,
-                follows.offset
-            ));
-            String::new()
-        };
+        let joint_text = format!("{kind} = \"{text}\"{axis_text}");
         // The same motion for the numeric kinematics.
         let direction = turned.transpose() * joint.axis.normalize();
         let motion = ChainMotion {
@@ -101,25 +100,6 @@ impl ModelTextBuilder<'_> {
             p: -(turned.transpose() * joint.anchor),
             r: turned.transpose(),
         };
-        if moved.is_none() {
-            // A fixed joint becomes a frame with a constant transform.
-            let held = DescriptionPose {
-                p: if is_turn {
-                    Vector3::zeros()
-                } else {
-                    direction * constant
-                },
-                r: if is_turn {
-                    super::super::placed::rotation_about(&direction, constant)
-                } else {
-                    Matrix3::identity()
-                },
-            };
-            let at = at.compose(&held);
-            let shown = self.transform_text(&format!("{}_held", joint.name), &at);
-            let frame = self.frame(own, on, at, &shown, "", Vec::new());
-            return Ok((Some(frame), back));
-        }
         // Tell the caller which coordinate belongs to the joint.
         if let Some((_, coordinate)) = &moved {
             let (coordinate, ratio, offset) = match &follower {
@@ -416,4 +396,33 @@ fn plain_number(ratio: f64) -> String {
     } else {
         toml_float(ratio)
     }
+}
+
+/// Pose of the link behind a revolute or prismatic joint that is fixed, in the frame that carries it. `at` is the pose
+/// of the joint's frame there, `turned` its axes in those of the link, and `moved` its distance from the pose of the
+/// description, rad or m.
+fn pose_behind_fixed(
+    joint: &DescriptionJoint,
+    at: &DescriptionPose,
+    turned: &Matrix3<f64>,
+    moved: f64,
+) -> DescriptionPose {
+    let direction = turned.transpose() * joint.axis.normalize();
+    let motion = if joint.kind == DescriptionJointKind::Revolute {
+        DescriptionPose {
+            p: Vector3::zeros(),
+            r: super::super::placed::rotation_about(&direction, moved),
+        }
+    } else {
+        DescriptionPose {
+            p: direction * moved,
+            r: Matrix3::identity(),
+        }
+    };
+    // Pose of the link in the frame: the inverse of shift and turn.
+    let back = DescriptionPose {
+        p: -(turned.transpose() * joint.anchor),
+        r: turned.transpose(),
+    };
+    at.compose(&motion).compose(&back)
 }
