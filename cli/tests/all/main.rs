@@ -53,3 +53,5 @@ mod variants;
 mod verify;
 mod weights;
 mod work;
+#[cfg(target_os = "linux")]
+mod write_faults;
