@@ -188,10 +188,7 @@ fn generated_code_is_written_completely_or_not_at_all() {
     };
     let c99 = generate("c99");
     let c99: Vec<&str> = c99.iter().map(String::as_str).collect();
-    check_all(
-        &[&["generate", &two_link, "--out", "out.rs"], &c99],
-        &|_| {},
-    );
+    check_all(&[&["generate", &two_link, "--out", "out.rs"], &c99], &|_| {});
 }
 
 #[test]
@@ -205,7 +202,15 @@ fn files_of_models_are_written_completely_or_not_at_all() {
             &["check", &two_link, "--picture", "out.svg"],
             &["export", &two_link, "--out", "out.urdf"],
             &["atlas", &two_link, &four_bar, "--out", "."],
-            &["add", &two_link, "viscous_friction", place[0], place[1], "--out", "out.toml"],
+            &[
+                "add",
+                &two_link,
+                "viscous_friction",
+                place[0],
+                place[1],
+                "--out",
+                "out.toml",
+            ],
         ],
         &|_| {},
     );
@@ -219,5 +224,8 @@ fn files_of_models_are_written_completely_or_not_at_all() {
 #[test]
 fn files_of_recordings_are_written_completely_or_not_at_all() {
     let [spidermill, data] = [model("spidermill.toml"), run("plain-fit.csv")];
-    check_all(&[&["evaluate", &spidermill, "--data", &data, "--out", "out.csv"]], &|_| {});
+    check_all(
+        &[&["evaluate", &spidermill, "--data", &data, "--out", "out.csv"]],
+        &|_| {},
+    );
 }
