@@ -2,7 +2,7 @@
 //! left behind, and the exit status is 1.
 //!
 //! A small library in C is loaded before the program (`LD_PRELOAD`). It lets the n-th call fail that creates, fills,
-//! flushes, links or renames a partial file.
+//! flushes or renames a partial file.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -62,10 +62,6 @@ ssize_t write(int fd, const void *from, size_t n) { return is_due(is_part(fd)) ?
 int fsync(int fd) { return is_due(is_part(fd)) ? -1 : NEXT(fsync)(fd); }
 int fchmod(int fd, mode_t mode) { return is_due(is_part(fd)) ? -1 : NEXT(fchmod)(fd, mode); }
 int rename(const char *from, const char *to) { return is_due(ends(from)) ? -1 : NEXT(rename)(from, to); }
-int linkat(int a, const char *from, int b, const char *to, int flags)
-{
-    return is_due(ends(to)) ? -1 : NEXT(linkat)(a, from, b, to, flags);
-}
 "#;
 
 /// Most steps of writing that a command of these tests needs.
