@@ -68,7 +68,6 @@ impl XmlTag {
         for (k, byte) in text.bytes().enumerate() {
             match (quote, byte) {
                 (Some(open), _) if open == byte => quote = None,
-                (Some(_), _) => {}
                 (None, b'"' | b'\'') => {
                     quote = Some(byte);
                     tag.attributes += 1;
@@ -78,7 +77,8 @@ impl XmlTag {
                     tag.is_empty = before == b'/' && !tag.closes;
                     break;
                 }
-                (None, _) => {}
+                // Anything else, and all characters of a text in quotes.
+                _ => {}
             }
             before = byte;
         }
