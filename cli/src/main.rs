@@ -8,6 +8,7 @@ mod flags;
 mod output;
 mod terminal;
 
+use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
 use std::sync::Arc;
 
@@ -24,10 +25,7 @@ fn main() -> ExitCode {
     let cli = match CommandLine::try_parse() {
         Ok(cli) => cli,
         Err(error) => {
-            // Help and version have status 0. A closed standard output is not reported.
-            let status = u8::try_from(error.exit_code()).unwrap_or(2);
-            let _ = error.print();
-            return ExitCode::from(status);
+            return print_help_or_usage(&error);
         }
     };
     // All files of the library are read through the disk of this run, which remembers them.
@@ -52,6 +50,19 @@ fn main() -> ExitCode {
             }
             ExitCode::from(failure.status())
         }
+    }
+}
+
+/// Prints help, version or a wrong usage. Help and version have status 0, unless they cannot be written. A closed
+/// standard output is not reported.
+fn print_help_or_usage(message: &clap::Error) -> ExitCode {
+    let status = u8::try_from(message.exit_code()).unwrap_or(2);
+    match message.print().and_then(|()| std::io::stdout().flush()) {
+        Err(error) if status == 0 && error.kind() != ErrorKind::BrokenPipe => {
+            terminal::error(&format!("standard output cannot be written: {error}"));
+            ExitCode::FAILURE
+        }
+        _ => ExitCode::from(status),
     }
 }
 

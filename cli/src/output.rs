@@ -70,6 +70,29 @@ impl OutputFile {
     }
 }
 
+/// Files that a command writes together: all of them or none.
+#[derive(Debug, Default)]
+pub(crate) struct OutputSet(Vec<(PathBuf, String)>);
+
+impl OutputSet {
+    /// Adds a file; nothing is written yet.
+    pub(crate) fn add(&mut self, target: &OutputFile, text: impl Into<String>) {
+        self.0.push((target.0.clone(), text.into()));
+    }
+
+    /// Adds a file of a folder that belongs to the program.
+    pub(crate) fn add_path(&mut self, path: PathBuf, text: impl Into<String>) {
+        self.0.push((path, text.into()));
+    }
+
+    /// Writes all files. If one cannot be written, all keep their old contents.
+    pub(crate) fn write(&self) -> CommandOutcome {
+        let files = self.0.iter();
+        let files: Vec<(&Path, &[u8])> = files.map(|(path, text)| (path.as_path(), text.as_bytes())).collect();
+        disk().write_together(&files).map_err(|error| write_failure(&error))
+    }
+}
+
 /// Creates the folder of `--out` with its parents. A folder that exists is no error.
 pub(crate) fn make_folder(folder: &Path) -> CommandOutcome {
     refuse_dash("--out", folder)?;

@@ -3,6 +3,7 @@
 //! `tree` turns the lowered programs into statements, the same for all languages. `language` prints them, and `wrap`
 //! adds interfaces for other languages to the printed Rust module.
 
+mod fingerprint;
 mod identifier;
 mod language;
 mod languages;

@@ -4,8 +4,7 @@
 //! published ones: with gravity and without. They are counted symbolically, for arbitrary values of the constants, and
 //! numerically, for the file's values.
 
-use std::fmt::Write as _;
-
+use modelmill_boundary::text::MarkdownText;
 use modelmill_codegen::{OperationCount, ProgramStage, ReductionMethod};
 use modelmill_spec::{CoordinateMotion, ExactExpression, LoadedModel, Mechanism};
 
@@ -102,26 +101,18 @@ impl Model {
 
     /// The page of one mechanism: picture, summary, and base parameters with the values of the file.
     pub fn atlas_page(&self, entry: &AtlasEntry) -> String {
-        let mut text = format!(
-            "# {}\n\n{}.\n\n![{}]({}.svg)\n\n{}.\n\n## Base parameters, eq. (16)\n\n| | expression | value | unit |\n|---|---|---:|---|\n",
-            entry.name,
-            entry.title,
-            entry.name,
-            entry.name,
-            entry.summary_text(),
-        );
+        let mut page = MarkdownText::default();
+        page.marks("# ").text(&entry.name).marks("\n\n").text(&entry.title);
+        page.marks(".\n\n").picture(&entry.name, &format!("{}.svg", entry.name));
+        page.marks("\n\n").text(&entry.summary_text());
+        page.marks(".\n\n## Base parameters, eq. (16)\n\n| | expression | value | unit |\n|---|---|---:|---|\n");
         for (base, value) in self.base.iter().zip(&self.nominal) {
-            let _ = writeln!(
-                text,
-                "| `{}` | `{}` | {} | {} |",
-                base.name,
-                base.expression.replace('|', "\\|"),
-                significant(*value, 6),
-                base.unit
-            );
+            page.marks("| ").code(&base.name).marks(" | ").code(&base.expression);
+            page.marks(" | ").text(&significant(*value, 6)).marks(" | ");
+            page.text(&base.unit).marks(" |\n");
         }
-        text.push_str("\n[All mechanisms](../atlas.md)\n");
-        text
+        page.marks("\n[All mechanisms](../atlas.md)\n");
+        page.into_string()
     }
 
     /// The model with another mechanism in place of its own, derived anew.
@@ -165,8 +156,8 @@ impl AtlasEntry {
         parts.join(" + ")
     }
 
-    /// The table line of the mechanism in Markdown.
-    fn row(&self) -> String {
+    /// Adds the table line of the mechanism.
+    fn write_row(&self, page: &mut MarkdownText) {
         let [with, without] = self.base;
         let operations = |count: &OperationCount| format!("{} + {}", count.add, count.mul);
         let [regressor, dynamics] = &self.operations;
@@ -174,26 +165,32 @@ impl AtlasEntry {
             [0, _] => "-".to_owned(),
             [n, base] => format!("{base} with {n}"),
         };
-        let name = &self.name;
-        let named = if self.is_imported {
-            format!("`{name}` (imported)")
+        // Pictures and pages are in a folder next to the table.
+        let file = |ending: &str| format!("atlas/{}.{ending}", self.name);
+        page.marks("| ").picture("", &file("svg")).marks(" | ");
+        if self.is_imported {
+            page.code(&self.name).marks(" (imported)");
         } else {
-            format!("[`{name}`]({name}.md)")
-        };
-        format!(
-            "| ![]({name}.svg) | {named} | {} | {} | {} | {} | {with}{} | {without} | {} | {effects} | {} | {} | {} |",
+            page.code_link(&self.name, &file("md"));
+        }
+        let base = format!("{with}{}", if self.is_exact { "" } else { " (numeric)" });
+        let cells = [
             self.joints_in_letters(),
-            self.passive,
-            self.loops,
-            self.drives,
-            if self.is_exact { "" } else { " (numeric)" },
-            self.at_values,
+            self.passive.to_string(),
+            self.loops.to_string(),
+            self.drives.to_string(),
+            base,
+            without.to_string(),
+            self.at_values.to_string(),
+            effects,
             operations(regressor),
             operations(dynamics),
             self.seconds.map_or_else(|| "-".to_owned(), |s| significant(s, 2)),
-        )
-        // Pictures and pages are in a folder next to the table.
-        .replace("](", "](atlas/")
+        ];
+        for cell in cells {
+            page.marks(" | ").text(&cell);
+        }
+        page.marks(" |\n");
     }
 }
 
@@ -211,15 +208,17 @@ pub(crate) const ABOUT: [&str; 2] = [
 
 /// The atlas as a page in Markdown; pictures and pages of the mechanisms are in the folder `atlas` next to it.
 pub fn page(entries: &[AtlasEntry]) -> String {
-    let mut text = format!(
-        "# Atlas of mechanisms\n\n{}\n\n\
-        | | mechanism | joints | passive | loops | drives | general | weightless | at values | with effects | regressor | \
-        inverse dynamics | s |\n|---|---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n",
-        ABOUT.join("\n\n")
+    let mut page = MarkdownText::default();
+    page.marks("# Atlas of mechanisms\n\n")
+        .marks(ABOUT[0])
+        .marks("\n\n")
+        .marks(ABOUT[1]);
+    page.marks(
+        "\n\n| | mechanism | joints | passive | loops | drives | general | weightless | at values | with effects | regressor | \
+         inverse dynamics | s |\n|---|---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n",
     );
     for entry in entries {
-        text.push_str(&entry.row());
-        text.push('\n');
+        entry.write_row(&mut page);
     }
-    text
+    page.into_string()
 }

@@ -24,6 +24,8 @@ mod view;
 mod watch;
 
 #[cfg(not(target_family = "wasm"))]
+mod connections;
+#[cfg(not(target_family = "wasm"))]
 mod file_access;
 #[cfg(not(target_family = "wasm"))]
 mod machine;

@@ -30,6 +30,7 @@ use serde_json::json;
 use tokio::net::TcpListener;
 
 use crate::answers::{PageResponse, RequestRefusal, answer_request};
+use crate::connections::LimitedListener;
 use crate::machine::{LocalMachine, STACK};
 use crate::page;
 use crate::session::{LONGEST, WorkbenchSession};
@@ -88,7 +89,7 @@ pub(crate) fn serve(
             port,
         });
         opened(&link);
-        axum::serve(listener, router(app))
+        axum::serve(LimitedListener::new(listener), router(app))
             .await
             .map_err(|error| Error::input(format!("the server ended: {error}")))
     })

@@ -14,7 +14,8 @@ use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use super::{FileError, FileFault, FileSource, OpenFile, PathKind, write};
+use super::write::write_with_timeout;
+use super::{FileError, FileFault, FileSource, OpenFile, PathKind, stream};
 
 /// The files of this machine. Clones share the list of files that were read.
 #[derive(Clone, Debug)]
@@ -39,7 +40,7 @@ enum FileIdentity {
 impl Default for DiskFiles {
     fn default() -> Self {
         Self {
-            pipe_timeout: Duration::from_secs(10),
+            pipe_timeout: stream::DEFAULT_PIPE_TIMEOUT,
             read: Arc::default(),
         }
     }
@@ -51,18 +52,24 @@ impl DiskFiles {
         identity(path).is_some_and(|found| self.lock_read_identities().contains(&found))
     }
 
-    /// Writes a file atomically (see [`write()`]). Fails when it is a file that was read here.
+    /// Writes a file atomically (see [`write()`](super::write())). Fails when it is a file that was read here.
     pub fn write(&self, path: &Path, bytes: &[u8]) -> Result<(), FileError> {
-        if self.has_read(path) {
+        self.write_together(&[(path, bytes)])
+    }
+
+    /// Writes several files as one act (see [`write_together()`](super::write_together())). Fails when one of them was
+    /// read here.
+    pub fn write_together(&self, files: &[(&Path, &[u8])]) -> Result<(), FileError> {
+        if let Some((path, _)) = files.iter().find(|(path, _)| self.has_read(path)) {
             return Err(FileError::new(path, FileFault::Input));
         }
-        write(path, bytes)
+        write_with_timeout(files, self.pipe_timeout)
     }
 
     /// Writes a file atomically over one that was read, for edits in place.
     pub fn replace(&self, path: &Path, bytes: &[u8]) -> Result<(), FileError> {
         let old = identity(path);
-        write(path, bytes)?;
+        write_with_timeout(&[(path, bytes)], self.pipe_timeout)?;
         // The old file is gone, and its number may be used for another one.
         let mut known = self.lock_read_identities();
         known.retain(|one| Some(one) != old.as_ref());
@@ -253,8 +260,10 @@ fn identity(path: &Path) -> Option<FileIdentity> {
 
 #[cfg(all(test, unix))]
 mod tests {
+    use std::fs::OpenOptions;
     use std::process::Command;
 
+    use super::super::write;
     use super::*;
 
     /// A folder of its own for a test, gone with it.
@@ -316,6 +325,25 @@ mod tests {
         let _ = endless.kill();
         let _ = endless.wait();
         assert_eq!(found, FileFault::TooLarge { most: 100_000 });
+    }
+
+    #[test]
+    fn a_named_pipe_that_nobody_reads_is_an_error_and_one_that_is_read_gets_all_bytes() {
+        let folder = Folder::new("output-pipe");
+        let pipe = folder.pipe();
+        let fault = hasty().write(&pipe, b"text").unwrap_err().fault;
+        assert_eq!(fault, FileFault::Unread { seconds: 0 });
+        let folder = Folder::new("output-pipe-reader");
+        let pipe = folder.pipe();
+        let reader = Command::new("sh")
+            .args(["-c", "sleep 0.1; wc -c < \"$0\""])
+            .arg(&pipe)
+            .stdout(std::process::Stdio::piped())
+            .spawn()
+            .unwrap();
+        DiskFiles::default().write(&pipe, &vec![b'x'; 200_000]).unwrap();
+        let counted = reader.wait_with_output().unwrap().stdout;
+        assert_eq!(String::from_utf8_lossy(&counted).trim(), "200000");
     }
 
     #[test]
@@ -386,6 +414,4 @@ mod tests {
             assert_eq!(full.fault.remedy(), "make room, or choose another place");
         }
     }
-
-    use std::fs::OpenOptions;
 }

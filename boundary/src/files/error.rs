@@ -32,6 +32,11 @@ pub enum FileFault {
         /// The timeout, s.
         seconds: u64,
     },
+    /// Nobody read bytes from a named pipe in time.
+    Unread {
+        /// The timeout, s.
+        seconds: u64,
+    },
     /// The bytes are not UTF-8.
     NoText {
         /// Position of the first invalid byte.
@@ -87,6 +92,7 @@ impl FileFault {
             Self::Device => "give an ordinary file, or a pipe that ends",
             Self::TooLarge { .. } => "check that this is the intended file, and that the pipe ends",
             Self::Silent { .. } => "start the program that writes into the pipe first",
+            Self::Unread { .. } => "start the program that reads from the pipe first",
             Self::NoText { .. } => "save it as UTF-8",
             Self::OtherKind { .. } => "name a file that was written for this",
             Self::NoList => "name the files one by one",
@@ -111,6 +117,9 @@ impl fmt::Display for FileFault {
             Self::TooLarge { most } => write!(f, "it has more than {most} bytes"),
             Self::Silent { seconds } => {
                 write!(f, "nothing came through this pipe for {seconds} s")
+            }
+            Self::Unread { seconds } => {
+                write!(f, "nothing was read from this pipe for {seconds} s")
             }
             Self::NoText { at } => write!(f, "byte {at} is not UTF-8 text"),
             Self::OtherKind { lacks } => {

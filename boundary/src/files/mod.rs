@@ -5,6 +5,8 @@
 mod disk;
 mod error;
 mod memory;
+mod partial;
+mod stream;
 mod write;
 
 use std::path::{Component, Path, PathBuf};
@@ -13,7 +15,7 @@ use std::sync::Arc;
 pub use disk::DiskFiles;
 pub use error::{FileError, FileFault};
 pub use memory::MemoryFiles;
-pub use write::write;
+pub use write::{write, write_together};
 
 /// A source of files.
 pub trait FileSource: Send + Sync {

@@ -5,12 +5,14 @@
 //! [`Message`] is text of the program with typed remedies.
 
 mod escape;
+mod markdown_text;
 mod message;
 mod remedy;
 
 use std::borrow::Cow;
 
 pub use escape::{code_in_markdown, comment, csv_field, csv_name, html, json, latex, markdown};
+pub use markdown_text::MarkdownText;
 pub use message::Message;
 #[doc(hidden)]
 pub use message::{MessageArgument, MessageSink, MessageSlot};

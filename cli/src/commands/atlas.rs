@@ -15,7 +15,7 @@ use modelmill::report::{self, AtlasMechanism};
 use crate::args::AtlasArgs;
 use crate::commands::{self, import};
 use crate::failure::{CommandFailure, CommandOutcome};
-use crate::output::{self, OutputFile};
+use crate::output::{self, OutputFile, OutputSet};
 use crate::terminal;
 
 /// Name of the table in the folder of `--out`.
@@ -30,9 +30,10 @@ pub(crate) fn run(host: &Host, args: &AtlasArgs) -> CommandOutcome {
     let folder = args.out.join(PAGES);
     output::make_folder(&folder)?;
     let mut names = BTreeSet::new();
+    let mut outputs = OutputSet::default();
     let mut entries = Vec::new();
     let mut mechanisms = Vec::new();
-    // Derive each model and write its picture and page; table and overview follow at the end.
+    // Derive each model for its picture and page; all files are written together at the end.
     for path in &args.models {
         let is_imported = import::is_description(path);
         let loaded = if is_imported {
@@ -61,10 +62,10 @@ pub(crate) fn run(host: &Host, args: &AtlasArgs) -> CommandOutcome {
         };
         // The picture is a file of its own and part of the overview page.
         let picture = model.picture(&PictureOptions::default(), None)?;
-        file("svg")?.write(&picture)?;
+        outputs.add(&file("svg")?, picture.as_str());
         // Imported robots have no page of expressions.
         if !is_imported {
-            file("md")?.write(&model.atlas_page(&entry))?;
+            outputs.add(&file("md")?, model.atlas_page(&entry));
         }
         entries.push(entry.clone());
         mechanisms.push(AtlasMechanism {
@@ -74,12 +75,10 @@ pub(crate) fn run(host: &Host, args: &AtlasArgs) -> CommandOutcome {
         });
     }
     // Table and page go into the folder itself, next to the folder of pictures.
-    let write = |name: &str, text: &str| {
-        let target = OutputFile::new(&args.out.join(name), args.models.iter().map(PathBuf::as_path))?;
-        target.write(text)
-    };
-    write(TABLE, &atlas::page(&entries))?;
-    write(PAGE, &report::atlas(&mechanisms))?;
+    let target = |name: &str| OutputFile::new(&args.out.join(name), args.models.iter().map(PathBuf::as_path));
+    outputs.add(&target(TABLE)?, atlas::page(&entries));
+    outputs.add(&target(PAGE)?, report::atlas(&mechanisms));
+    outputs.write()?;
     let table = args.out.join(TABLE);
     terminal::print(&format!(
         "{} lists {}; {} shows them on one page.",

@@ -10,7 +10,7 @@ use modelmill::text::table::count;
 use crate::args::{CriterionArg, ExciteArgs, PeriodArg};
 use crate::failure::{CommandFailure, CommandOutcome};
 use crate::flags::FlagSpelling;
-use crate::output::OutputFile;
+use crate::output::{OutputFile, OutputSet};
 use crate::{commands, terminal};
 
 /// Searches for the trajectory, and writes it (CSV) and its picture (SVG).
@@ -27,8 +27,10 @@ pub(crate) fn run(host: &Host, args: &ExciteArgs) -> CommandOutcome {
     let [data, _] = commands::recordings(&model, [&args.separate.data, &[]], &args.separate.reading())?;
     let found = model.excite(&args.request(), &data.iter().collect::<Vec<_>>())?;
     // Files are written before the text, so that they exist even if standard output is closed.
-    target.write(&found.csv())?;
-    figure.write(&found.picture)?;
+    let mut outputs = OutputSet::default();
+    outputs.add(&target, found.csv());
+    outputs.add(&figure, found.picture.as_str());
+    outputs.write()?;
     if args.json {
         terminal::print_json(&found.json())?;
     } else {

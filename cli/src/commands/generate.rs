@@ -10,7 +10,7 @@ use modelmill::text::table::count;
 
 use crate::args::GenerateArgs;
 use crate::failure::{CommandFailure, CommandOutcome};
-use crate::output::{OutputFile, refuse_dash, write};
+use crate::output::{OutputFile, OutputSet, refuse_dash};
 use crate::{commands, terminal};
 
 /// Writes the source that `cargo build` generates from the model, or a folder of sources, or a crate.
@@ -85,9 +85,13 @@ fn write_sources(args: &GenerateArgs, inputs: &[&Path], files: &[EmittedFile]) -
     refuse_dash("--out", folder)?;
     std::fs::create_dir_all(folder)
         .map_err(|error| CommandFailure::Input(format!("folder {} cannot be created: {error}", folder.display())))?;
+    // A header beside the source of another model would compute wrong forces, so both are replaced or none.
+    let mut outputs = OutputSet::default();
     for file in files {
-        OutputFile::new(&folder.join(&file.path), inputs.iter().copied())?.write(&file.text)?;
+        let target = OutputFile::new(&folder.join(&file.path), inputs.iter().copied())?;
+        outputs.add(&target, file.text.as_str());
     }
+    outputs.write()?;
     let names = files.iter().map(|file| file.path.as_str());
     terminal::note(&format!(
         "{}: {}",
@@ -115,6 +119,7 @@ fn write_crate(folder: &Path, files: &[EmittedFile]) -> CommandOutcome {
             folder.display()
         )));
     }
+    let mut outputs = OutputSet::default();
     // Files of a crate may be in subfolders, which are created as needed.
     for file in files {
         let path = folder.join(&file.path);
@@ -122,7 +127,7 @@ fn write_crate(folder: &Path, files: &[EmittedFile]) -> CommandOutcome {
         std::fs::create_dir_all(parent).map_err(|error| {
             CommandFailure::Input(format!("folder {} cannot be created: {error}", parent.display()))
         })?;
-        write(&path, &file.text)?;
+        outputs.add_path(path, file.text.as_str());
     }
-    Ok(())
+    outputs.write()
 }

@@ -4,11 +4,13 @@
 pub(crate) mod plot;
 pub(crate) mod progress;
 
+use std::borrow::Cow;
 use std::io::{self, ErrorKind, IsTerminal, Write};
+use std::sync::LazyLock;
 
 use modelmill::text::TerminalStyle;
 use modelmill::{NoteSeverity, RecordingNote};
-use modelmill_boundary::text;
+use modelmill_boundary::text::{self, plain};
 
 use crate::failure::{CommandFailure, CommandOutcome};
 use crate::flags::FlagSpelling;
@@ -41,7 +43,8 @@ pub(crate) fn is_stderr_coloured() -> bool {
 /// Writes the result of a command to standard output, with one line feed at its end.
 pub(crate) fn print(text: &str) -> CommandOutcome {
     // Names from files may contain control characters; these must not reach the terminal.
-    let text = text::terminal(text, is_colour_allowed() && io::stdout().is_terminal());
+    let text = join_lines_of_arguments(text);
+    let text = text::terminal(&text, is_colour_allowed() && io::stdout().is_terminal());
     let mut out = io::stdout().lock();
     let end = if text.ends_with('\n') { "" } else { "\n" };
     out.write_all(text.as_bytes())
@@ -58,9 +61,31 @@ pub(crate) fn print_json(value: &serde_json::Value) -> CommandOutcome {
     print(&text::json(&format!("{value:#}")))
 }
 
+/// The text with the arguments of the command line on one line each. The name of a file may contain line ends, and the
+/// rest of it would look like a message of this program.
+fn join_lines_of_arguments(text: &str) -> Cow<'_, str> {
+    static WITH_LINE_ENDS: LazyLock<Vec<String>> = LazyLock::new(|| {
+        let arguments = std::env::args_os().map(|argument| argument.to_string_lossy().into_owned());
+        arguments.filter(|argument| argument.contains(['\n', '\r'])).collect()
+    });
+    join_lines_of(text, &WITH_LINE_ENDS)
+}
+
+/// The text with each of these names on one line, wherever it occurs.
+fn join_lines_of<'a>(text: &'a str, names: &[String]) -> Cow<'a, str> {
+    let mut text = Cow::Borrowed(text);
+    for name in names {
+        if text.contains(name.as_str()) {
+            text = Cow::Owned(text.replace(name.as_str(), &plain(name)));
+        }
+    }
+    text
+}
+
 /// Writes to standard error; a closed standard error is ignored.
 pub(crate) fn print_to_stderr(text: &str) {
-    let text = text::terminal(text, is_stderr_coloured());
+    let text = join_lines_of_arguments(text);
+    let text = text::terminal(&text, is_stderr_coloured());
     let _ = writeln!(io::stderr(), "{text}");
 }
 

@@ -105,3 +105,26 @@ fn figures_of_imported_robots_are_those_of_the_mill() {
     let found = rows(&read(&Path::new(&out).join("atlas.md")));
     assert_eq!(found, written, "write the atlas again");
 }
+
+/// Titles and names of files have no meaning as Markdown.
+#[test]
+fn texts_of_models_are_no_markdown() {
+    let text = std::fs::read_to_string(crate::common::model("two_link.toml")).unwrap();
+    let hostile = "<script>alert(1)</script> [x](javascript:alert(1)) \\u001b[31m line\\nEVIL \\u202erev | `id`";
+    let title = text.lines().find(|line| line.starts_with("title")).unwrap();
+    let model = scratch("a_[b](c).toml");
+    std::fs::write(&model, text.replacen(title, &format!("title = \"{hostile}\""), 1)).unwrap();
+    let out = scratch("hostile-atlas");
+    printed(&["atlas", &model, "--out", &out]);
+    let table = std::fs::read_to_string(Path::new(&out).join("atlas.md")).unwrap();
+    assert!(table.contains("(atlas/a_%5Bb%5D%28c%29.md)"), "{table}");
+    let page = std::fs::read_to_string(Path::new(&out).join("atlas").join("a_[b](c).md")).unwrap();
+    assert!(
+        page.contains(r"\<script>") && page.contains(r"\[x\](javascript"),
+        "{page}"
+    );
+    assert!(
+        !page.contains(['\u{1b}', '\u{202e}']) && !page.contains("\nEVIL"),
+        "{page}"
+    );
+}

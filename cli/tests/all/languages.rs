@@ -387,3 +387,54 @@ fn a_folder_that_holds_something_else_is_left_alone() {
     );
     assert_eq!(std::fs::read_to_string(out.join("Cargo.toml")).unwrap(), "[package]\n");
 }
+
+/// Two models with the same names and sizes, in folders of their own; files of both do not belong together.
+#[test]
+fn files_of_different_models_do_not_compile_together() {
+    if !there("cc") {
+        println!("skipped: there is no C compiler `cc` on this machine");
+        return;
+    }
+    let text = std::fs::read_to_string(project().join("model-spec/models/two_link.toml")).unwrap();
+    // Gravity along the other axis: only numbers in the source differ, and every name is the same.
+    let other = text.replacen("9.81", "1.62", 1);
+    assert_ne!(text, other);
+    for language in ["c99", "c"] {
+        let [first, second] = [("first", &text), ("second", &other)].map(|(name, text)| {
+            let file = folder(&format!("mixed-{language}-{name}.toml"));
+            std::fs::create_dir_all(folder("")).unwrap();
+            std::fs::write(&file, text).unwrap();
+            written_of(&file, &format!("mixed-{language}-{name}"), language, &[])
+        });
+        // Each part of the second set is put beside the others of the first one.
+        let parts: &[&str] = match language {
+            "c99" => &["two_link.h", "two_link.c"],
+            _ => &["include/two_link.h", "src/model.rs", "src/lib.rs"],
+        };
+        assert!(compiles(&first, language));
+        for part in parts {
+            let own = std::fs::read(first.join(part)).unwrap();
+            std::fs::copy(second.join(part), first.join(part)).unwrap();
+            assert!(!compiles(&first, language), "{part} of another model compiled");
+            std::fs::write(first.join(part), own).unwrap();
+        }
+        assert!(compiles(&first, language));
+    }
+}
+
+/// Whether the sources of `two_link` in a folder compile.
+fn compiles(out: &Path, language: &str) -> bool {
+    let mut command = if language == "c99" {
+        let mut command = Command::new("cc");
+        command.args(STRICT).arg("-c").arg(out.join("two_link.c"));
+        command.arg("-o").arg(folder("mixed.o"));
+        command
+    } else {
+        let mut command = Command::new(env!("CARGO"));
+        command.args(["check", "--offline", "--quiet", "--manifest-path"]);
+        command.arg(out.join("Cargo.toml"));
+        command.env("CARGO_TARGET_DIR", folder("target"));
+        command
+    };
+    command.output().expect("the compiler runs").status.success()
+}

@@ -54,3 +54,5 @@ mod verify;
 mod weights;
 mod work;
 mod work_truth;
+#[cfg(target_os = "linux")]
+mod write_faults;

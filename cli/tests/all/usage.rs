@@ -290,3 +290,36 @@ fn an_unknown_part_is_answered_with_the_parts_of_the_model() {
     let says = refused(1, &["equations", &file, "--balances", "nothing"]);
     assert!(says.contains("crank_left") && says.contains("coupler_right"), "{says}");
 }
+
+/// A file name with line ends must not look like messages of the program.
+#[cfg(unix)]
+#[test]
+fn names_of_files_stay_on_one_line() {
+    let missing = "none\nerror: all is well\nwarning: x.csv";
+    for args in [
+        vec!["check", missing],
+        vec!["recordings", missing],
+        vec!["generate", missing, "--out", missing],
+    ] {
+        let ran = crate::common::ran(&args);
+        assert_ne!(ran.status, 0);
+        let forged = ran
+            .err
+            .lines()
+            .skip(1)
+            .find(|line| line.starts_with("error: all") || line.starts_with("warning: x"));
+        assert_eq!(forged, None, "{}", ran.err);
+    }
+}
+
+/// A disk without room is an error of help and version, too.
+#[cfg(target_os = "linux")]
+#[test]
+fn help_that_cannot_be_written_is_an_error() {
+    for args in [["help"], ["--version"]] {
+        let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let ended = crate::common::modelmill(&args).stdout(full).output().unwrap();
+        assert_eq!(ended.status.code(), Some(1), "{args:?}");
+        assert!(String::from_utf8_lossy(&ended.stderr).contains("standard output cannot be written"));
+    }
+}

@@ -6,6 +6,29 @@ use crate::common::browser::{Browser, Window};
 use crate::common::workbench::Workbench;
 use crate::common::{self, number, printed, refused, run, scratch};
 
+/// A program that opens connections and never completes a request must not keep a user out.
+#[test]
+fn half_open_connections_are_closed_and_a_user_is_answered() {
+    use std::io::{Read, Write};
+    let bench = Workbench::open("half-open", "two_link.toml", &[]);
+    let half_open = || {
+        let mut stream = std::net::TcpStream::connect(("127.0.0.1", bench.port)).expect("it listens");
+        stream.write_all(b"POST /api/view HTTP/1.1\r\n").expect("it reads");
+        stream
+    };
+    let mut waiting: Vec<_> = (0..300).map(|_| half_open()).collect();
+    bench.view();
+    let first = &mut waiting[0];
+    first
+        .set_read_timeout(Some(std::time::Duration::from_secs(4)))
+        .expect("a timeout");
+    let ended = first.read_to_end(&mut Vec::new()).map_err(|error| error.kind());
+    assert!(
+        matches!(ended, Ok(0) | Err(std::io::ErrorKind::ConnectionReset)),
+        "the oldest connection is still open: {ended:?}"
+    );
+}
+
 #[test]
 fn only_its_own_page_is_answered() {
     let bench = Workbench::open("guard", "two_link.toml", &[]);

@@ -6,7 +6,7 @@ use quote::{format_ident, quote};
 
 use super::c_header::header;
 use super::functions::{WrappedFunction, wrapped_functions};
-use super::{LanguageBinding, source_file};
+use super::{LanguageBinding, seal_files, source_file};
 use crate::language::c99::RESERVED;
 use crate::language::{EmissionRequest, EmittedFile};
 
@@ -33,7 +33,7 @@ pub(crate) fn emit_c(from: &EmissionRequest<'_>) -> Vec<EmittedFile> {
     let face = LanguageBinding::new(from, &RESERVED);
     let doc = "The model for C: see the header in `include`. All `unsafe` code is here. It only reads and writes the memory that \
                the caller's pointers point to.";
-    vec![
+    seal_files(vec![
         manifest(&face),
         source_file("src/lib.rs", doc, &items(&face)),
         face.emitted_module(),
@@ -41,7 +41,7 @@ pub(crate) fn emit_c(from: &EmissionRequest<'_>) -> Vec<EmittedFile> {
             path: format!("include/{}.h", face.name),
             text: header(&face),
         },
-    ]
+    ])
 }
 
 /// `Cargo.toml` of the crate. A panic aborts, because unwinding must not reach C.

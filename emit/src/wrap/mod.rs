@@ -15,10 +15,13 @@ mod python;
 pub(super) use c_abi::emit_c;
 pub(super) use python::emit_python;
 
+use std::fmt::Write as _;
+
 use modelmill_codegen::{Derivation, DynamicsPrograms, PassivePosition};
 use proc_macro2::{Ident, TokenStream};
 use quote::{format_ident, quote};
 
+use crate::fingerprint::Fingerprint;
 use crate::identifier::{field_identifier, module_identifier};
 use crate::language::rust::{doc_lines, emit, print_source};
 use crate::language::{EmissionRequest, EmittedFile};
@@ -138,6 +141,73 @@ impl<'a> LanguageBinding<'a> {
             }
         }
     }
+}
+
+/// Adds one fingerprint to the files of a crate, so that files of different models do not compile together: `src/lib.rs`
+/// compares itself with `src/model.rs` and, if there is one, with the first line of the header.
+pub(super) fn seal_files(mut files: Vec<EmittedFile>) -> Vec<EmittedFile> {
+    let fingerprint = Fingerprint::new(files.iter().map(|file| file.text.as_str()));
+    let header = files.iter().find(|file| file.path.ends_with(".h"));
+    let header = header.map(|file| file.path.clone());
+    for file in &mut files {
+        if file.path == "src/model.rs" {
+            _ = write!(
+                file.text,
+                "\n/// The number of the files that were written together; `src/lib.rs` has the same one.\n\
+                 pub const FINGERPRINT: u64 = {fingerprint};\n"
+            );
+        } else if file.path == "src/lib.rs" {
+            file.text.push_str(&comparisons(fingerprint, header.as_deref()));
+        } else if Some(&file.path) == header.as_ref() {
+            file.text.insert_str(0, &first_line(fingerprint));
+        }
+    }
+    files
+}
+
+/// The first line of a header with this fingerprint.
+fn first_line(fingerprint: Fingerprint) -> String {
+    format!("/* Fingerprint {fingerprint}: src/lib.rs has the same number and compiles with no other header. */\n")
+}
+
+/// The items of `src/lib.rs` that stop the compiler when another file has another fingerprint.
+fn comparisons(fingerprint: Fingerprint, header: Option<&str>) -> String {
+    let mut text = format!(
+        "
+// Files of different models must not be built together.
+const _: () = assert!(
+    model::FINGERPRINT == {fingerprint},
+    \"src/model.rs and src/lib.rs belong to different models or options; generate the crate again\"
+);
+"
+    );
+    if let Some(header) = header {
+        let start = first_line(fingerprint);
+        // Tools may convert the end of the line, so that it is not compared.
+        let start = start.trim_end();
+        _ = write!(
+            text,
+            "
+const _: () = assert!(
+    begins_with(include_bytes!(\"../{header}\"), b\"{start}\"),
+    \"{header} and src/lib.rs belong to different models or options; generate the crate again\"
+);
+
+/// Whether bytes begin with others; at compile time.
+const fn begins_with(bytes: &[u8], start: &[u8]) -> bool {{
+    let mut k = 0;
+    while k < start.len() {{
+        if k == bytes.len() || bytes[k] != start[k] {{
+            return false;
+        }}
+        k += 1;
+    }}
+    true
+}}
+"
+        );
+    }
+    text
 }
 
 /// A source file that begins with a documentation comment.

@@ -5,7 +5,7 @@ use proc_macro2::{Ident, TokenStream};
 use quote::{format_ident, quote};
 
 use super::functions::{WrappedFunction, wrapped_functions};
-use super::{LanguageBinding, source_file};
+use super::{LanguageBinding, seal_files, source_file};
 use crate::language::rust::doc_lines;
 use crate::language::{EmissionRequest, EmittedFile};
 
@@ -66,12 +66,12 @@ module-name = \"{name}\"
         path: path.to_owned(),
         text,
     };
-    vec![
+    seal_files(vec![
         file("Cargo.toml", cargo),
         file("pyproject.toml", pyproject),
         source_file("src/lib.rs", "The model for Python.", &items(&face)),
         face.emitted_module(),
-    ]
+    ])
 }
 
 /// The items of `src/lib.rs`: conversions of arrays, the functions, and the module.

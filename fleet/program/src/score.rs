@@ -1,7 +1,7 @@
 //! Compares results with the known changes of a simulated fleet: `results.json` and `truth.json` go in, a table of
 //! detection rates comes out.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
@@ -181,19 +181,51 @@ fn score_text(tallies: &BTreeMap<String, ScoreTally>, sound: u32, alarms: &[Stri
 }
 
 /// How many of the recordings that were cut off are reported, and how many others.
+///
+/// Names in `truth.json` begin in the folder of the fleet, those of results in the folder that was read, which may be
+/// one of its parents.
 fn bad_recordings_text(results: &Value, truth: &Value) -> String {
-    let mut bad: Vec<String> = list(&results["bad"])
-        .iter()
-        .map(|one| text(&one["recording"]))
-        .collect();
-    let mut planted: Vec<String> = list(&truth["bad"]).iter().map(text).collect();
-    bad.sort();
-    planted.sort();
-    // Both lists by name.
-    let missed = planted.iter().filter(|one| !bad.contains(one)).count();
-    let further = bad.iter().filter(|one| !planted.contains(one)).count();
+    let planted: BTreeSet<String> = list(&truth["bad"]).iter().map(text).collect();
+    let mut reported: BTreeSet<&String> = BTreeSet::new();
+    let mut further = 0;
+    for one in list(&results["bad"]) {
+        let name = text(&one["recording"]);
+        let known = path_ends(&name).find_map(|end| planted.get(end));
+        match known {
+            Some(known) => drop(reported.insert(known)),
+            None => further += 1,
+        }
+    }
     format!(
-        "bad recordings: {} simulated, {missed} not reported, {further} others reported\n",
-        planted.len()
+        "bad recordings: {} simulated, {} not reported, {further} others reported\n",
+        planted.len(),
+        planted.len() - reported.len()
     )
+}
+
+/// A path, and what remains of it without its first folder, its first two folders, and so on.
+fn path_ends(path: &str) -> impl Iterator<Item = &str> {
+    let below = path.match_indices('/').map(|(at, _)| &path[at + 1..]);
+    std::iter::once(path).chain(below)
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn bad_recordings_are_counted_from_any_parent_folder() {
+        let truth = json!({ "bad": ["robot=R1/day=1/a.parquet", "robot=R2/day=1/a.parquet"] });
+        for parent in ["", "fleet/", "data/fleet/"] {
+            let name = |path: &str| json!({ "recording": format!("{parent}{path}") });
+            let results = json!({ "bad": [name("robot=R1/day=1/a.parquet"), name("robot=R3/day=1/a.parquet")] });
+            assert_eq!(
+                bad_recordings_text(&results, &truth),
+                "bad recordings: 2 simulated, 1 not reported, 1 others reported\n",
+                "{parent}"
+            );
+        }
+    }
 }

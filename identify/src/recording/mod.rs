@@ -10,6 +10,8 @@ mod error;
 mod file;
 mod formats;
 mod gaps;
+#[cfg(any(feature = "hdf5", feature = "parquet"))]
+mod half;
 mod intake;
 mod join;
 mod joined_files;

@@ -8,7 +8,7 @@ use modelmill_identify::{
     ComputedColumn, NonFinitePolicy, ReadOptions, RecordingFault, SignalRecording, display_name_of_bytes,
 };
 use parquet::basic::Compression;
-use parquet::data_type::{DoubleType, FloatType, Int64Type};
+use parquet::data_type::{DoubleType, FixedLenByteArray, FixedLenByteArrayType, FloatType, Int64Type};
 use parquet::file::properties::WriterProperties;
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::parser::parse_message_type;
@@ -278,4 +278,86 @@ fn sums_of_columns_are_computed_and_keep_their_faults() {
     let left = read(&[("a", 2.0), ("b", -1.0)], NonFinitePolicy::LeaveOut).unwrap();
     assert_eq!(left.column("a").unwrap(), [-7.5, -23.5]);
     assert!(read(&[("c", 1.0)], NonFinitePolicy::Refuse).is_err());
+}
+
+/// Half floats of pyarrow: two bytes with the logical type FLOAT16.
+#[test]
+fn half_floats_of_parquet_are_numbers() {
+    let schema = parse_message_type(
+        "message run { required double t; optional fixed_len_byte_array(2) q (FLOAT16); \
+         required fixed_len_byte_array(2) raw; }",
+    )
+    .expect("a schema");
+    let path = scratch("half.parquet");
+    let file = File::create(&path).expect("a writable folder");
+    let properties = Arc::new(WriterProperties::builder().build());
+    let mut writer = SerializedFileWriter::new(file, Arc::new(schema), properties).expect("a writer");
+    let mut columns = writer.next_row_group().expect("a row group");
+    let mut column = columns.next_column().expect("no fault").expect("a column");
+    column
+        .typed::<DoubleType>()
+        .write_batch(&[0.0, 0.1, 0.2], None, None)
+        .expect("written");
+    column.close().expect("closed");
+    // 1.5, -2 and the smallest number above zero, in IEEE 754 binary16.
+    let halves: Vec<_> = [0x3e00_u16, 0xc000, 0x0001]
+        .map(|bits| FixedLenByteArray::from(bits.to_le_bytes().to_vec()))
+        .into();
+    for levels in [Some([1_i16; 3]), None] {
+        let mut column = columns.next_column().expect("no fault").expect("a column");
+        column
+            .typed::<FixedLenByteArrayType>()
+            .write_batch(&halves, levels.as_ref().map(<[i16; 3]>::as_slice), None)
+            .expect("written");
+        column.close().expect("closed");
+    }
+    columns.close().expect("closed");
+    writer.close().expect("closed");
+    let recording = SignalRecording::read_with(&path, &ReadOptions::default()).unwrap();
+    for (k, value) in [1.5, -2.0, 2_f64.powi(-24)].into_iter().enumerate() {
+        assert!((recording.column("q").unwrap()[k] - value).abs() < 1e-15);
+    }
+    // Two bytes without that type have no meaning.
+    assert!(recording.column("raw").is_err());
+}
+
+/// A file with many datasets is listed in a time that grows with their number.
+#[test]
+fn hdf5_files_of_many_datasets_and_groups_are_read() {
+    let mut builder = hdf5_pure::FileBuilder::new();
+    let numbers: Vec<f64> = (0..20).map(f64::from).collect();
+    for k in 0..2000 {
+        builder.create_dataset(&format!("x{k}")).with_f64_data(&numbers);
+        let mut group = builder.create_group(&format!("g{k}"));
+        group.create_dataset("y").with_f64_data(&numbers);
+        builder.add_group(group.finish());
+    }
+    let path = scratch("many.h5");
+    std::fs::write(&path, builder.finish().expect("a file")).expect("a writable folder");
+    let start = std::time::Instant::now();
+    let names = SignalRecording::names_in(&path).unwrap();
+    assert_eq!(names.len(), 4000);
+    assert!(start.elapsed().as_secs() < 4, "{:?}", start.elapsed());
+    let recording = SignalRecording::read_with(
+        &path,
+        &ReadOptions {
+            wanted: Some(vec!["x7".to_owned(), "g1999.y".to_owned()]),
+            ..ReadOptions::default()
+        },
+    )
+    .unwrap();
+    assert_eq!(recording.column("g1999.y").unwrap(), numbers);
+}
+
+/// Files whose stated sizes are lies are refused before memory is reserved for them.
+#[test]
+fn hdf5_chunks_beyond_the_end_of_the_file_are_refused() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/hostile");
+    if !folder.is_dir() {
+        println!("skipped: there is no folder shared/data/hostile");
+        return;
+    }
+    let path = folder.join("hdf5-panic.h5");
+    let fault = SignalRecording::read_with(&path, &ReadOptions::default()).unwrap_err();
+    assert!(fault.to_string().contains("it is damaged or incomplete"), "{fault}");
 }

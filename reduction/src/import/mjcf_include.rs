@@ -7,6 +7,7 @@
 use roxmltree::Document;
 
 use super::xml::{located_message, required_attribute};
+use super::xml_budget::check_xml_budget;
 
 /// Largest depth of nested includes.
 const DEEPEST: usize = 20;
@@ -26,7 +27,10 @@ fn expand_file(
     seen: &mut Vec<String>,
     depth: usize,
 ) -> Result<String, String> {
-    // Faults of the main file are reported by the import.
+    // Faults of the main file are reported by the import, also of one that is too deep to be parsed.
+    if check_xml_budget(text).is_err() {
+        return Ok(text.to_owned());
+    }
     let Ok(document) = Document::parse(text) else {
         return Ok(text.to_owned());
     };
@@ -53,6 +57,7 @@ fn expand_file(
         let other = read(&name).map_err(|fault| located_message(&node, &fault))?;
         let whole = expand_file(&other, read, seen, depth + 1)
             .map_err(|fault| located_message(&node, &format!("in `{name}`: {fault}")))?;
+        check_xml_budget(&whole).map_err(|fault| located_message(&node, &format!("in `{name}`: {fault}")))?;
         let inner = Document::parse(&whole)
             .map_err(|fault| located_message(&node, &format!("`{name}` is not readable XML ({fault})")))?;
         let children = inner.root_element().children();

@@ -21,13 +21,16 @@ mod model_text;
 mod placed;
 mod rig_text;
 mod sdf;
+mod thresholds;
 mod unread;
 mod urdf;
 mod urdf_extensions;
 mod welds;
 mod xml;
+mod xml_budget;
 
 pub use mjcf_include::expand_includes;
+pub use thresholds::LARGEST_DESCRIPTION;
 
 use std::fmt;
 
@@ -94,9 +97,6 @@ impl fmt::Display for ImportError {
 
 impl std::error::Error for ImportError {}
 
-/// Longest text that is read, bytes.
-pub const LARGEST_DESCRIPTION: usize = 16 << 20;
-
 /// Converts a robot description into a model file. The root element determines the format.
 ///
 /// Fails if the text is not URDF, MJCF or SDF, or contains something that models cannot express; the message names
@@ -146,6 +146,11 @@ fn read_description(text: &str, options: &Options) -> Result<RobotDescription, I
     if text.len() > LARGEST_DESCRIPTION {
         return Err(ImportError("this file is too large for a robot description".to_owned()));
     }
+    xml_budget::check_xml_budget(text).map_err(|fault| {
+        ImportError(format!(
+            "this file is too large a structure for a robot description ({fault}); check that it is the intended file"
+        ))
+    })?;
     // A frequent mistake is a file with macros or the YAML next to the description.
     let document = Document::parse(text).map_err(|error| {
         let expected = if text.trim_start().starts_with('<') {
@@ -157,6 +162,8 @@ fn read_description(text: &str, options: &Options) -> Result<RobotDescription, I
             "this is not a readable URDF, MJCF or SDF file ({error}); expected {expected}"
         ))
     })?;
+    // Lines in messages are looked up in a table while this value exists.
+    let _lines = xml::LineTable::install(&document);
     let read = match document.root_element().tag_name().name() {
         "robot" => urdf::read(&document, options.closures, options.floating),
         "mujoco" => mjcf::read(&document),

@@ -2,6 +2,8 @@
 //!
 //! Source of names and defaults: the URDF specification of ROS (wiki.ros.org/urdf/XML).
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use nalgebra::Vector3;
 use roxmltree::{Document, Node};
 
@@ -79,6 +81,17 @@ pub(crate) fn read(document: &Document, closures: Option<&str>, is_floating: boo
     // A tree needs unique names, one root, and one parent for each other link.
     check_names(&links, &joints)?;
     let root = root_link(&links, &joints)?;
+    // Names are looked up in tables, because a search per joint would take the square of their number.
+    let by_name: BTreeMap<&str, Node> = links
+        .iter()
+        .filter_map(|node| Some((node.attribute("name")?, *node)))
+        .collect();
+    let mut below: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
+    for (j, joint) in joints.iter().enumerate() {
+        below.entry(joint.parent.as_str()).or_default().push(j);
+    }
+    let mut places: BTreeMap<String, usize> = BTreeMap::new();
+    let mut reached: BTreeSet<&str> = root.attribute("name").into_iter().collect();
     // Breadth first from the root, so that parents stand before their children.
     let mut order = vec![(root, None)];
     let mut k = 0;
@@ -95,7 +108,7 @@ pub(crate) fn read(document: &Document, closures: Option<&str>, is_floating: boo
         // A link gets pose and joints of the joint through which it is reached.
         if let Some(j) = between {
             let joint = &joints[j];
-            link.parent = out.links.iter().position(|link| link.name == joint.parent);
+            link.parent = places.get(&joint.parent).copied();
             link.at = joint.origin;
             link.joints.clone_from(&joint.joints);
             if joint.joints.iter().any(|j| j.kind == DescriptionJointKind::Free)
@@ -114,36 +127,28 @@ pub(crate) fn read(document: &Document, closures: Option<&str>, is_floating: boo
                 line(&node),
             ));
         }
+        places.insert(name.clone(), out.links.len());
         out.links.push(link);
         // Children of this link follow in the order of their joints.
-        for (j, joint) in joints.iter().enumerate() {
-            if joint.parent != name {
-                continue;
-            }
-            if order
-                .iter()
-                .any(|(node, _)| node.attribute("name") == Some(joint.child.as_str()))
-            {
+        for &j in below.get(name.as_str()).into_iter().flatten() {
+            let joint = &joints[j];
+            if !reached.insert(&joint.child) {
                 return Err(format!(
                     "line {}: the link `{}` is the child of two joints; URDF describes trees only",
                     joint.line, joint.child
                 ));
             }
-            if let Some(node) = links
-                .iter()
-                .find(|node| node.attribute("name") == Some(joint.child.as_str()))
-            {
+            if let Some(node) = by_name.get(joint.child.as_str()) {
                 order.push((*node, Some(j)));
             }
         }
         k += 1;
     }
     // Links that were not reached.
-    if let Some(node) = links.iter().find(|node| {
-        out.links
-            .iter()
-            .all(|link| Some(link.name.as_str()) != node.attribute("name"))
-    }) {
+    if let Some(node) = links
+        .iter()
+        .find(|node| !node.attribute("name").is_some_and(|name| places.contains_key(name)))
+    {
         return Err(located_message(
             node,
             "it is part of a loop of joints that is not connected to the root",
@@ -220,27 +225,26 @@ fn resolve_fixed_couplings(out: &mut RobotDescription, joints: &[UrdfJoint]) {
 
 /// Checks that names of links and joints are unique, and that joints connect links that exist.
 fn check_names(links: &[Node], joints: &[UrdfJoint]) -> Result<(), String> {
-    for (i, node) in links.iter().enumerate() {
+    let mut names = BTreeSet::new();
+    for node in links {
         let name = required_attribute(node, "name")?;
-        if links[..i]
-            .iter()
-            .any(|other| other.attribute("name") == Some(name.as_str()))
-        {
+        if !names.insert(name.clone()) {
             return Err(located_message(
                 node,
                 &format!("two links have the name `{name}`; rename one"),
             ));
         }
     }
-    for (i, joint) in joints.iter().enumerate() {
-        if joints[..i].iter().any(|other| other.name == joint.name) {
+    let mut joint_names = BTreeSet::new();
+    for joint in joints {
+        if !joint_names.insert(joint.name.as_str()) {
             return Err(format!(
                 "line {}: two joints have the name `{}`; rename one",
                 joint.line, joint.name
             ));
         }
         for end in [&joint.parent, &joint.child] {
-            if links.iter().all(|node| node.attribute("name") != Some(end.as_str())) {
+            if !names.contains(end) {
                 return Err(format!(
                     "line {}: the joint `{}` names the link `{end}`, which does not exist",
                     joint.line, joint.name
@@ -254,11 +258,8 @@ fn check_names(links: &[Node], joints: &[UrdfJoint]) -> Result<(), String> {
 /// The link that is no joint's child. Fails if there is none or more than one.
 fn root_link<'a, 'i>(links: &[Node<'a, 'i>], joints: &[UrdfJoint]) -> Result<Node<'a, 'i>, String> {
     // A link is a child if a joint names it as such.
-    let is_child = |node: &&Node| {
-        joints
-            .iter()
-            .any(|joint| node.attribute("name") == Some(joint.child.as_str()))
-    };
+    let children: BTreeSet<&str> = joints.iter().map(|joint| joint.child.as_str()).collect();
+    let is_child = |node: &&Node| node.attribute("name").is_some_and(|name| children.contains(name));
     let mut roots = links.iter().filter(|node| !is_child(node));
     match (roots.next(), roots.next()) {
         (Some(root), None) => Ok(*root),

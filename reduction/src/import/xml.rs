@@ -1,7 +1,10 @@
 //! Access to elements and attributes of XML. Faults name the line and the element.
 
+use std::cell::RefCell;
+use std::marker::PhantomData;
+
 use nalgebra::{Matrix3, Vector3};
-use roxmltree::Node;
+use roxmltree::{Document, Node};
 
 /// The first child element with a tag, in any namespace.
 pub(crate) fn child<'a, 'i>(of: &Node<'a, 'i>, tag: &str) -> Option<Node<'a, 'i>> {
@@ -70,7 +73,52 @@ pub(crate) fn vector(of: [f64; 3]) -> Vector3<f64> {
 
 /// The line of an element in its file, from 1.
 pub(crate) fn line(node: &Node) -> u32 {
-    node.document().text_pos_at(node.range().start).row
+    let (text, start) = (node.document().input_text(), node.range().start);
+    LINE_STARTS.with_borrow(|table| match table {
+        Some(table) if std::ptr::eq(table.text, text) => table.line(start),
+        // The parser counts from the start of the text.
+        _ => node.document().text_pos_at(start).row,
+    })
+}
+
+thread_local! {
+    /// The lines of the document that this thread reads.
+    static LINE_STARTS: RefCell<Option<LineStarts>> = const { RefCell::new(None) };
+}
+
+/// Where the lines of a text start. The text is compared by its address, and is never read through it.
+struct LineStarts {
+    text: *const str,
+    starts: Vec<usize>,
+}
+
+impl LineStarts {
+    /// The line of a position, from 1.
+    fn line(&self, at: usize) -> u32 {
+        let line = self.starts.partition_point(|start| *start <= at);
+        u32::try_from(line).unwrap_or(u32::MAX)
+    }
+}
+
+/// While this value exists, [`line()`] looks up lines of the document in a table. Without it, each call would count the
+/// lines from the start of the text, and a file of `n` elements would take the time `n^2`.
+pub(crate) struct LineTable<'a, 'i>(PhantomData<&'a Document<'i>>);
+
+impl<'a, 'i> LineTable<'a, 'i> {
+    /// Makes the table of a document, which replaces that of another document.
+    pub(crate) fn install(document: &'a Document<'i>) -> Self {
+        let text = document.input_text();
+        let behind = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n');
+        let starts = std::iter::once(0).chain(behind.map(|(at, _)| at + 1)).collect();
+        LINE_STARTS.set(Some(LineStarts { text, starts }));
+        Self(PhantomData)
+    }
+}
+
+impl Drop for LineTable<'_, '_> {
+    fn drop(&mut self) {
+        LINE_STARTS.set(None);
+    }
 }
 
 /// A fault with line, tag and name of its element in front.

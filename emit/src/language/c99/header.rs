@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use super::statements::{CSyntax, comment};
 use super::{CFunction, TranslationUnit};
+use crate::fingerprint::Fingerprint;
 use crate::language::syntax::LanguageSyntax;
 
 /// Status codes in the order of their values: name after the prefix, and meaning.
@@ -19,9 +20,9 @@ const STATUS: [(&str, &str); 6] = [
     ),
 ];
 
-/// The text of the header.
+/// The text of the header without its end.
 #[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
-pub(super) fn header(unit: &TranslationUnit<'_>) -> String {
+pub(super) fn header_body(unit: &TranslationUnit<'_>) -> String {
     let TranslationUnit { name, upper, .. } = unit;
     let derivation = unit.source.derivation;
     let mechanism = &derivation.mechanism;
@@ -245,8 +246,26 @@ int {name}_prepare_reactions({name}_reactions *reactions, const {name}_geometry 
 int {name}_self_test(const {name}_geometry *geometry);"
         );
     }
-    text.push_str("\n#ifdef __cplusplus\n}\n#endif\n\n#endif\n");
     text
+}
+
+/// The header with its fingerprint, which the source compares with its own.
+pub(super) fn complete_header(unit: &TranslationUnit<'_>, mut body: String, fingerprint: Fingerprint) -> String {
+    _ = write!(
+        body,
+        "
+/* Header and source were written together: the source has the same number and compiles with no other header. */
+#define {}_FINGERPRINT {fingerprint}ULL
+
+#ifdef __cplusplus
+}}
+#endif
+
+#endif
+",
+        unit.upper
+    );
+    body
 }
 
 /// The meaning of each output of the reactions, with its axis.

@@ -11,8 +11,10 @@ mod statements;
 use modelmill_codegen::{PassivePosition, StraightLineProgram};
 
 use super::{EmissionRequest, EmittedFile};
+use crate::fingerprint::Fingerprint;
 use crate::identifier::module_identifier;
 use crate::tree::{NameScope, PrecomputedValues, StatementRoutine, reads_passive, uses_load};
+
 /// Names of standard headers, which `#include` would find instead, and `main`.
 pub(crate) const RESERVED: [&str; 30] = [
     "assert",
@@ -54,7 +56,12 @@ pub(crate) fn emit_sources(source: &EmissionRequest<'_>) -> Vec<EmittedFile> {
         path: format!("{}.{suffix}", unit.name),
         text,
     };
-    vec![file("h", header::header(&unit)), file("c", source::source(&unit))]
+    let (header, source) = (header::header_body(&unit), source::source_body(&unit));
+    let fingerprint = Fingerprint::new([header.as_str(), source.as_str()]);
+    vec![
+        file("h", header::complete_header(&unit, header, fingerprint)),
+        file("c", source::complete_source(&unit, &source, fingerprint)),
+    ]
 }
 
 /// All that header and source are printed from.

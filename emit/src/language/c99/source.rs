@@ -9,6 +9,7 @@ use modelmill_codegen::{OperationCount, ProgramStage};
 use super::header::{forward_dynamics_declaration, signature};
 use super::statements::{CSyntax, comment};
 use super::{CFunction, TranslationUnit, newton, self_test};
+use crate::fingerprint::Fingerprint;
 use crate::language::syntax::LanguageSyntax;
 use crate::tree::{BaseParameterCode, CodeExpression, PrecomputedValues, inputs_of_state};
 
@@ -17,20 +18,31 @@ pub(super) fn operation_count(function: &CFunction<'_>) -> OperationCount {
     function.program.count_operations(ProgramStage::State)
 }
 
-/// The text of the source file. Helpers that no statement calls are left out, so that no compiler warns of them.
-pub(super) fn source(unit: &TranslationUnit<'_>) -> String {
-    let name = &unit.name;
-    let mut text = format!(
+/// The source file: it compiles only with the header of the same fingerprint.
+pub(super) fn complete_source(unit: &TranslationUnit<'_>, body: &str, fingerprint: Fingerprint) -> String {
+    let TranslationUnit { name, upper, .. } = unit;
+    format!(
         "/* Written by modelmill; do not edit. See {name}.h. */
 #include \"{name}.h\"
+
+#if !defined({upper}_FINGERPRINT) || {upper}_FINGERPRINT != {fingerprint}ULL
+#error \"{name}.h and {name}.c belong to different models or options; generate both again\"
+#endif
 
 #include <float.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
 
-"
-    );
+{body}"
+    )
+}
+
+/// The text of the source file after its includes. Helpers that no statement calls are left out, so that no compiler
+/// warns of them.
+pub(super) fn source_body(unit: &TranslationUnit<'_>) -> String {
+    let name = &unit.name;
+    let mut text = String::new();
     // Helpers: checks of inputs, sines and cosines, signs, linear systems.
     text.push_str(&unit.expand_template(include_str!("support.c")));
     if has_call(unit, "_sin_cos") {

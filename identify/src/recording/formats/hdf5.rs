@@ -7,12 +7,15 @@
 use std::io::Cursor;
 
 use hdf5_pure::{
-    Datatype, DatatypeByteOrder, Error, File, FixedPointLayout, FloatingPointLayout, Group, ReadSeekSource,
+    Dataset, Datatype, DatatypeByteOrder, Error, File, FixedPointLayout, FloatingPointLayout, Group, ReadSeekSource,
 };
+
+use modelmill_boundary::nesting::NestingLevel;
 
 use crate::recording::column::SampleField;
 use crate::recording::error::RecordingFault;
 use crate::recording::formats::{RecordingFormat, RecordingInput, TableInfo, read_all};
+use crate::recording::half::decode_half;
 use crate::recording::intake::{IntakeFlow, SampleIntake};
 use crate::recording::notes::RecordingNote;
 use crate::recording::tables::{ColumnInfo, find_time_range};
@@ -29,6 +32,16 @@ const DEEPEST: usize = 16;
 const WINDOW: u64 = 8 << 20;
 /// Largest chunk in bytes; writers usually make chunks of about a megabyte.
 const LARGEST_CHUNK: u64 = 64 << 20;
+/// The layout of half floats (IEEE 754 binary16), `float16` of h5py.
+const BINARY16: FloatingPointLayout = FloatingPointLayout {
+    bit_offset: 0,
+    bit_precision: 16,
+    exponent_location: 10,
+    exponent_size: 5,
+    mantissa_location: 0,
+    mantissa_size: 10,
+    exponent_bias: 15,
+};
 /// Groups of MATLAB with internal data.
 const MATLAB_GROUPS: [&str; 2] = ["#refs#", "#subsystem#"];
 
@@ -185,7 +198,7 @@ impl HdfColumns {
     fn new(file: &File) -> Result<Self, RecordingFault> {
         let mut found = Vec::new();
         let mut others = Vec::new();
-        collect_datasets(&file.root(), "", 0, &mut found, &mut others)?;
+        collect_datasets(&file.root(), "", NestingLevel::top(DEEPEST), &mut found, &mut others)?;
         // The number of samples is the longest side of any dataset.
         let samples = found.iter().flat_map(|one| &one.shape).copied().max().unwrap_or(0);
         if samples == 0 {
@@ -260,29 +273,51 @@ struct HdfDataset {
 fn collect_datasets(
     group: &Group,
     path: &str,
-    depth: usize,
+    level: NestingLevel,
     found: &mut Vec<HdfDataset>,
     others: &mut Vec<String>,
 ) -> Result<(), RecordingFault> {
-    if depth > DEEPEST || found.len() + others.len() > MOST_DATASETS {
-        return Err(format_fault("its groups have no end"));
-    }
-    // First the datasets of this group.
-    for dataset in group.datasets().map_err(|error| unreadable_fault(&error))? {
-        let path = format!("{path}/{dataset}");
+    // All members are opened at once: to find each by its name would search the group again.
+    let datasets = group.iter_datasets().map_err(|error| unreadable_fault(&error))?;
+    for (name, dataset) in datasets {
+        if found.len() + others.len() >= MOST_DATASETS {
+            return Err(format_fault(format!("it has more than {MOST_DATASETS} datasets")));
+        }
+        let path = format!("{path}/{name}");
         let name = path[1..].replace('/', ".");
-        let dataset = group.dataset(&dataset).map_err(|error| unreadable_fault(&error))?;
+        match HdfDataset::new(name.clone(), path, &dataset)? {
+            Some(dataset) => found.push(dataset),
+            None => others.push(name),
+        }
+    }
+    // Then the groups in this group.
+    let groups = group.iter_groups().map_err(|error| unreadable_fault(&error))?;
+    for (name, within) in groups {
+        if MATLAB_GROUPS.contains(&name.as_str()) {
+            continue;
+        }
+        let level = level
+            .enter()
+            .map_err(|fault| format_fault(format!("its group `{name}` is too deep; {fault}")))?;
+        collect_datasets(&within, &format!("{path}/{name}"), level, found, others)?;
+    }
+    Ok(())
+}
+
+impl HdfDataset {
+    /// The dataset, if it has numbers; other types are skipped.
+    ///
+    /// Fails when it is stored in chunks that are too large to be read, or larger than the file.
+    fn new(name: String, path: String, dataset: &Dataset) -> Result<Option<Self>, RecordingFault> {
         // A type that the library does not know is skipped.
         let (Ok(kind), Ok(shape)) = (dataset.datatype(), dataset.shape()) else {
-            others.push(name);
-            continue;
+            return Ok(None);
         };
         // The numbers within an element, with the names of their fields.
         let mut numbers = Vec::new();
         HdfNumber::collect_numbers(&kind, String::new(), 0, u64::from(kind.type_size()), &mut numbers);
         if numbers.is_empty() || numbers.len() > MOST_COLUMNS {
-            others.push(name);
-            continue;
+            return Ok(None);
         }
         // The library reads complete chunks, so their size is limited.
         let chunk = dataset.chunk_shape().map_err(|error| unreadable_fault(&error))?;
@@ -295,20 +330,34 @@ fn collect_datasets(
                 "`{name}` is stored in chunks of {size} bytes; store it in smaller ones"
             )));
         }
-        found.push(HdfDataset {
+        Ok(Some(Self {
             name,
             path,
             shape,
             numbers,
-        });
+        }))
     }
-    // Then the groups in this group.
-    for inner in group.groups().map_err(|error| unreadable_fault(&error))? {
-        if MATLAB_GROUPS.contains(&inner.as_str()) {
-            continue;
+}
+
+/// Checks that the stored chunks of a dataset lie in the file. The library reserves memory of their stated sizes before
+/// it reads them, so that a damaged size of some bytes would reserve gigabytes.
+fn check_stored_chunks(dataset: &Dataset, name: &str, file_size: u64) -> Result<(), RecordingFault> {
+    // Other datasets are one block, whose size the library compares with the file. An index that cannot be listed
+    // cannot be read either, which its error states later.
+    if !dataset.is_chunked() {
+        return Ok(());
+    }
+    let Ok(chunks) = dataset.chunks() else {
+        return Ok(());
+    };
+    for chunk in chunks {
+        let end = chunk.address.saturating_add(chunk.storage_size);
+        if end > file_size {
+            return Err(format_fault(format!(
+                "a part of `{name}` has {} bytes at position {}, but the file has {file_size} bytes; it is damaged or incomplete",
+                chunk.storage_size, chunk.address
+            )));
         }
-        let within = group.group(&inner).map_err(|error| unreadable_fault(&error))?;
-        collect_datasets(&within, &format!("{path}/{inner}"), depth + 1, found, others)?;
     }
     Ok(())
 }
@@ -319,6 +368,7 @@ impl HdfColumn {
     /// Fails when the dataset is shorter than its declared size.
     fn read_numbers(&self, file: &File, samples: usize) -> Result<Vec<f64>, RecordingFault> {
         let dataset = file.dataset(&self.path).map_err(|error| unreadable_fault(&error))?;
+        check_stored_chunks(&dataset, &self.name, file.file_size())?;
         let mut values = Vec::new();
         // Bytes of an element of the dataset.
         let size = usize::try_from(self.number.element).unwrap_or(usize::MAX);
@@ -382,7 +432,7 @@ enum HdfNumberKind {
     Signed,
     /// Integer without a sign.
     Unsigned,
-    /// IEEE 754 float of 4 or 8 bytes.
+    /// IEEE 754 float of 2, 4 or 8 bytes.
     Float,
 }
 
@@ -413,7 +463,8 @@ impl HdfNumber {
             }
             // IEEE floats; other layouts are not supported.
             Datatype::FloatingPoint { byte_order, layout, .. }
-                if *layout == FloatingPointLayout::IEEE754_BINARY32
+                if *layout == BINARY16
+                    || *layout == FloatingPointLayout::IEEE754_BINARY32
                     || *layout == FloatingPointLayout::IEEE754_BINARY64 =>
             {
                 (*byte_order, HdfNumberKind::Float)
@@ -470,6 +521,10 @@ impl HdfNumber {
         match (self.kind, self.size) {
             (HdfNumberKind::Unsigned, _) => bits as f64,
             (HdfNumberKind::Signed, _) => ((bits << above).cast_signed() >> above) as f64,
+            (HdfNumberKind::Float, 2) => {
+                let [a, b, ..] = bytes;
+                decode_half(u16::from_le_bytes([a, b]))
+            }
             (HdfNumberKind::Float, 4) => {
                 let [a, b, c, d, ..] = bytes;
                 f64::from(f32::from_le_bytes([a, b, c, d]))
@@ -502,4 +557,26 @@ fn unreadable_fault(error: &Error) -> RecordingFault {
     format_fault(format!(
         "it cannot be read: {error}; is it complete, and was it closed by the program that wrote it?"
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn half_floats_are_numbers() {
+        let kind = Datatype::FloatingPoint {
+            size: 2,
+            byte_order: DatatypeByteOrder::BigEndian,
+            layout: BINARY16,
+        };
+        let mut numbers = Vec::new();
+        HdfNumber::collect_numbers(&kind, String::new(), 0, 2, &mut numbers);
+        let [(_, number)] = numbers.as_slice() else {
+            panic!("{numbers:?}");
+        };
+        assert_eq!(number.name(), "float16");
+        // 1.5 is the exponent 15 and half of the fraction.
+        assert!((number.value(&[0x3e, 0x00]) - 1.5).abs() < 1e-15);
+    }
 }

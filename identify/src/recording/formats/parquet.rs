@@ -471,6 +471,7 @@ fn kind_of(column: &ColumnDescriptor) -> String {
     let kind = match (ParquetValueKind::from_column(column), column.physical_type()) {
         (ParquetValueKind::Ticks { .. }, _) | (_, Type::INT96) => "time",
         (ParquetValueKind::Decimal(_), _) => "decimal",
+        (ParquetValueKind::HalfFloats, _) => "float16",
         (ParquetValueKind::Unusable, _) => "no number",
         (ParquetValueKind::Unsigned, Type::INT32) => "uint32",
         (ParquetValueKind::Unsigned, _) => "uint64",

@@ -18,6 +18,8 @@ const LARGEST_PAGE: u64 = 128 << 20;
 /// Largest page in the old form of LZ4, in bytes as stored. It may grow 255 times before its size is compared with
 /// that in the header.
 const LARGEST_OLD_LZ4: u64 = 2 << 20;
+/// Number of different half floats, which is the largest size of their dictionary. Each takes more memory than bytes.
+const MOST_HALVES: u64 = 1 << 16;
 /// Deepest nesting of structures in a header; Parquet has four levels.
 const DEEPEST: usize = 16;
 
@@ -44,9 +46,10 @@ pub(super) fn largest_page(stream: impl Read, length: u64, growth: PageGrowth) -
         if page.packed > stream.limit() {
             return Err(io::Error::other("a page is longer than its column"));
         }
-        // A number of a dictionary has four bytes at least.
+        // A number of a dictionary has four bytes at least; only half floats have two, and not many different values.
+        let bytes_of_word = if page.words <= MOST_HALVES { 2 } else { 4 };
         let is_too_large = page.unpacked > LARGEST_PAGE
-            || page.words.saturating_mul(4) > page.unpacked
+            || page.words.saturating_mul(bytes_of_word) > page.unpacked
             || (growth == PageGrowth::OldLz4 && page.packed > LARGEST_OLD_LZ4);
         if is_too_large {
             return Err(io::Error::other("a page would take too much memory"));

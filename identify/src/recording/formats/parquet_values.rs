@@ -8,6 +8,7 @@ use parquet::schema::types::ColumnDescriptor;
 use crate::recording::column::SampleField;
 use crate::recording::error::RecordingFault;
 use crate::recording::formats::parquet::parquet_fault;
+use crate::recording::half::decode_half;
 
 /// The meaning of the numbers of a column.
 pub(super) enum ParquetValueKind {
@@ -24,6 +25,8 @@ pub(super) enum ParquetValueKind {
     },
     /// Integers with this many decimal places.
     Decimal(i32),
+    /// Half floats, stored as two bytes.
+    HalfFloats,
     /// Texts, lists, and anything else that is not a number.
     Unusable,
 }
@@ -35,6 +38,14 @@ impl ParquetValueKind {
             per_second,
             first: None,
         };
+        // Half floats have a type of two bytes in the schema.
+        if column.max_rep_level() <= 1
+            && column.physical_type() == Type::FIXED_LEN_BYTE_ARRAY
+            && column.type_length() == 2
+            && matches!(column.logical_type_ref(), Some(LogicalType::Float16))
+        {
+            return Self::HalfFloats;
+        }
         // Texts are not numbers, and a few bytes of a dictionary may expand to very long ones.
         let is_text = matches!(column.physical_type(), Type::BYTE_ARRAY | Type::FIXED_LEN_BYTE_ARRAY);
         // Lists of lists have no fixed place for their numbers.
@@ -66,7 +77,7 @@ impl ParquetValueKind {
             Self::Ticks { per_second, first } => value.wrapping_sub(*first.get_or_insert(value)) as f64 / *per_second,
             Self::Decimal(scale) => value as f64 / 10.0_f64.powi(*scale),
             Self::Unsigned => value.cast_unsigned() as f64,
-            Self::Numbers | Self::Unusable => value as f64,
+            Self::Numbers | Self::HalfFloats | Self::Unusable => value as f64,
         }
     }
 
@@ -148,6 +159,12 @@ pub(super) fn read_batch(
             read_values(reader, n, place, |value| SampleField::finite(f64::from(*value)))
         }
         ColumnReader::DoubleColumnReader(reader) => read_values(reader, n, place, |value| SampleField::finite(*value)),
+        ColumnReader::FixedLenByteArrayColumnReader(reader) if matches!(kind, ParquetValueKind::HalfFloats) => {
+            read_values(reader, n, place, |value| match value.data() {
+                [low, high] => SampleField::finite(decode_half(u16::from_le_bytes([*low, *high]))),
+                _ => SampleField::Text,
+            })
+        }
         // Columns of texts are never read.
         ColumnReader::ByteArrayColumnReader(_) | ColumnReader::FixedLenByteArrayColumnReader(_) => {
             Ok(vec![SampleField::Text; n * place.list.map_or(1, |list| list.width)])
@@ -268,8 +285,9 @@ pub(super) fn longest_list(column: &mut ColumnReader, n: usize, element_level: i
         ColumnReader::Int96ColumnReader(reader) => levels(reader, n)?,
         ColumnReader::FloatColumnReader(reader) => levels(reader, n)?,
         ColumnReader::DoubleColumnReader(reader) => levels(reader, n)?,
-        // Columns of texts are never read.
-        ColumnReader::ByteArrayColumnReader(_) | ColumnReader::FixedLenByteArrayColumnReader(_) => return Ok(0),
+        // Half floats; other columns of bytes are never read.
+        ColumnReader::FixedLenByteArrayColumnReader(reader) => levels(reader, n)?,
+        ColumnReader::ByteArrayColumnReader(_) => return Ok(0),
     };
     let (mut longest, mut length) = (0, 0);
     for (defined, repeated) in defined.iter().zip(&repeated) {

@@ -1,0 +1,12 @@
+//! Limits of robot descriptions.
+
+/// Longest text that is read, bytes. By judgement: the largest published MJCF with meshes in other files has 1 MB.
+pub const LARGEST_DESCRIPTION: usize = 16 << 20;
+
+/// Deepest nesting of XML elements. Readers use some kilobytes of the stack per level, and threads have 2 MB: 600
+/// levels overflowed it. Published robots have less than 60 levels.
+pub(super) const DEEPEST_ELEMENT: usize = 200;
+
+/// Most attributes of one element; the formats define less than 60 for any element. The parser's cost per element is
+/// the square of their number.
+pub(super) const MOST_ATTRIBUTES: usize = 500;
