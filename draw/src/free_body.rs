@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use modelmill_boundary::text::html as escape;
 use nalgebra::Vector3;
 
-use crate::labels::{LETTER_HEIGHT, LabelLayout};
+use crate::labels::LabelLayout;
 use crate::loads::{arrow_head, circular_arrow};
 use crate::paint::{DrawingSheet, DrawingStyle, frame_picture};
 use crate::scene::{MarkShape, MechanismScene};
@@ -104,23 +104,15 @@ pub fn free_body_svg(
             "<g class=\"load {}\"><title>{title}</title>{}</g>",
             drawn.class, drawn.drawing
         );
-        if let Some((x, y, anchor)) = labels.place_label(drawn.tip, arrow.name.chars().count()) {
-            _ = write!(
-                text,
-                "<text class=\"{}\" x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{LETTER_HEIGHT}\" \
-                 text-anchor=\"{anchor}\">{title}</text>",
-                drawn.class
-            );
+        if let Some(place) = labels.place_label(drawn.tip, arrow.name.chars().count()) {
+            text.push_str(&place.paint(drawn.tip, &title, drawn.class));
         }
     }
     for arrow in drawing.arrows {
         inner.push_str(&symbols::point(sheet.project_point(&arrow.at)));
     }
-    if let Some((x, y, anchor)) = labels.place_label(origin, 1) {
-        _ = write!(
-            text,
-            "<text x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{LETTER_HEIGHT}\" text-anchor=\"{anchor}\">O</text>"
-        );
+    if let Some(place) = labels.place_label(origin, 1) {
+        text.push_str(&place.paint(origin, "O", ""));
     }
     _ = writeln!(inner, "<g class=\"names\">{text}</g>");
     let names: Vec<&str> = drawing.arrows.iter().map(|arrow| arrow.name.as_str()).collect();

@@ -44,6 +44,27 @@ pub(crate) struct LabelPlace {
     pub(crate) leader: Option<[f64; 2]>,
 }
 
+impl LabelPlace {
+    /// The name as SVG, with the line from its object if it stands farther away. The name must be escaped, the class may
+    /// be empty.
+    pub(crate) fn paint(&self, object: [f64; 2], name: &str, class: &str) -> String {
+        let ([x, y], anchor) = (self.at, self.anchor);
+        let line = self.leader.map_or_else(String::new, |[to_x, to_y]| {
+            let [from_x, from_y] = object;
+            format!("<path class=\"leader\" d=\"M{from_x:.1} {from_y:.1}L{to_x:.1} {to_y:.1}\"/>")
+        });
+        let class = if class.is_empty() {
+            String::new()
+        } else {
+            format!(" class=\"{class}\"")
+        };
+        format!(
+            "{line}<text{class} x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{LETTER_HEIGHT}\" \
+             text-anchor=\"{anchor}\">{name}</text>"
+        )
+    }
+}
+
 /// Distances from the object at which a name is tried. From the third one on, a line leads to it.
 const DISTANCES: [f64; 7] = [13.0, 22.0, 34.0, 48.0, 64.0, 82.0, 104.0];
 /// Share of a name's area that may cover symbols before a place farther away is tried. By judgement.

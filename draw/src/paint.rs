@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use modelmill_boundary::text::html as escape;
 use nalgebra::Vector3;
 
-use crate::labels::{LETTER_HEIGHT, LabelLayout};
+use crate::labels::LabelLayout;
 use crate::loads::{DriveArrow, drive_arrow};
 use crate::scene::{MarkShape, MechanismScene, SceneMark};
 use crate::symbols::{self, SymbolPlace};
@@ -380,19 +380,7 @@ impl<'a> DrawingSheet<'a> {
                 continue;
             }
             if let Some(place) = labels.place_label(at, mark.name.chars().count()) {
-                let ([x, y], anchor) = (place.at, place.anchor);
-                if let Some([to_x, to_y]) = place.leader {
-                    let [from_x, from_y] = at;
-                    _ = write!(
-                        out,
-                        "<path class=\"leader\" d=\"M{from_x:.1} {from_y:.1}L{to_x:.1} {to_y:.1}\"/>"
-                    );
-                }
-                _ = write!(
-                    out,
-                    "<text class=\"{class}\" x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{LETTER_HEIGHT}\" text-anchor=\"{anchor}\">{}</text>",
-                    escape(&mark.name)
-                );
+                out.push_str(&place.paint(at, &escape(&mark.name), class));
             }
         }
         out.push_str("</g>\n");

@@ -16,6 +16,7 @@ pub(super) use c_abi::emit_c;
 pub(super) use python::emit_python;
 
 use std::fmt::Write as _;
+use std::path::Path;
 
 use modelmill_codegen::{Derivation, DynamicsPrograms, PassivePosition};
 use proc_macro2::{Ident, TokenStream};
@@ -147,7 +148,9 @@ impl<'a> LanguageBinding<'a> {
 /// compares itself with `src/model.rs` and, if there is one, with the first line of the header.
 pub(super) fn seal_files(mut files: Vec<EmittedFile>) -> Vec<EmittedFile> {
     let fingerprint = Fingerprint::new(files.iter().map(|file| file.text.as_str()));
-    let header = files.iter().find(|file| file.path.ends_with(".h"));
+    let header = files
+        .iter()
+        .find(|file| Path::new(&file.path).extension().is_some_and(|end| end == "h"));
     let header = header.map(|file| file.path.clone());
     for file in &mut files {
         if file.path == "src/model.rs" {

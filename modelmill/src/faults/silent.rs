@@ -250,7 +250,7 @@ fn flat_intervals(drive: usize, force: &[f64], time: &[f64]) -> Vec<FlatInterval
         while end < n && near(end, level) {
             end += 1;
         }
-        let is_frozen = repeated(start..end) == 1.0 && repeated(0..start).max(repeated(end..n)) < FROZEN_MOST_REPEATS;
+        let is_frozen = repeated(start..end) >= 1.0 && repeated(0..start).max(repeated(end..n)) < FROZEN_MOST_REPEATS;
         found.push(FlatInterval {
             drive,
             range: from..end,
@@ -384,10 +384,8 @@ impl<'a> SilenceFit<'a> {
             // Dry friction may hold a joint without any force.
             (true, true) if mean(&f64::abs) <= self.dry[d] => None,
             (true, true) if is_braked(model, data, &one.range) => Some((RecordingFaultKind::Brakes, size)),
-            // Friction or another joint may hold a joint without force while others work.
-            (true, true) => None,
-            // At standstill friction may take any part of the force.
-            (true, false) => None,
+            // At standstill friction may take any part of the force, and another joint may hold this one.
+            (true, _) => None,
             (false, true) => Some((RecordingFaultKind::DeadChannel, size)),
             (false, false) => Some((RecordingFaultKind::FrozenForce, size)),
         }

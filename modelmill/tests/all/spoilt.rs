@@ -159,7 +159,7 @@ fn a_number_that_repeats_is_stuck_though_the_joint_hardly_moves() {
         q.clone().fold(f64::MIN, f64::max) - q.fold(f64::MAX, f64::min)
     };
     // About the turning point at which the joint moves least.
-    let length = (0.5 / STEP).ceil() as usize;
+    let length = 50;
     let starts = (SAMPLES / 4..SAMPLES * 3 / 4).min_by(|a, b| {
         let [a, b] = [*a, *b].map(|k| travel(&sound.rows[k..k + length]));
         a.total_cmp(&b)

@@ -39,7 +39,7 @@ fn deep_bodies_and_elements_of_many_attributes_are_refused_with_their_place() {
     );
     let fault = import(&deep, &ImportOptions::default()).unwrap_err().to_string();
     assert!(fault.contains("line 200") && fault.contains("too deep"), "{fault}");
-    let attributes: String = (0..200_000).map(|k| format!(" x{k}='1'")).collect();
+    let attributes = (0..200_000).fold(String::new(), |text, k| text + &format!(" x{k}='1'"));
     let wide = format!("<robot name='r'>\n<link name='a'{attributes}/></robot>");
     let fault = import(&wide, &ImportOptions::default()).unwrap_err().to_string();
     assert!(fault.contains("line 2") && fault.contains("attributes"), "{fault}");

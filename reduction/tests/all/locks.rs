@@ -103,7 +103,7 @@ fn check(options: &ImportOptions, expected: &[&str], still: &[(&str, f64)]) {
         let state = |name: &str| match still.iter().find(|(other, _)| *other == name) {
             Some((_, value)) => [*value, 0.0, 0.0],
             None => {
-                let k = 1.0 + 0.1 * f64::from(name.bytes().fold(0_u8, |sum, one| sum.wrapping_add(one)));
+                let k = 1.0 + 0.1 * f64::from(name.bytes().fold(0_u8, u8::wrapping_add));
                 [0.5 * wave(k), wave(1.7 * k), 3.0 * wave(2.3 * k)]
             }
         };
