@@ -78,6 +78,7 @@ impl Listener for LimitedListener {
                 let stream = LimitedStream {
                     inner,
                     wait,
+                    has_begun: false,
                     line_ends: 0,
                 };
                 return (stream, address);
@@ -134,6 +135,8 @@ pub(crate) struct LimitedStream {
     inner: TcpStream,
     /// Its state.
     wait: Arc<HeaderWait>,
+    /// Whether a byte that is no line end was read.
+    has_begun: bool,
     /// Line ends at the end of what was read; two of them end a header.
     line_ends: u8,
 }
@@ -143,9 +146,13 @@ impl LimitedStream {
     fn inspect(&mut self, bytes: &[u8]) {
         for byte in bytes {
             match byte {
-                b'\n' => self.line_ends += 1,
-                b'\r' => {}
-                _ => self.line_ends = 0,
+                // Empty lines before a request are no header.
+                b'\n' if self.has_begun => self.line_ends += 1,
+                b'\n' | b'\r' => {}
+                _ => {
+                    self.has_begun = true;
+                    self.line_ends = 0;
+                }
             }
             if self.line_ends == 2 {
                 return self.wait.is_complete.store(true, Ordering::Relaxed);

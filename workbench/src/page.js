@@ -24,7 +24,8 @@
     link.href = URL.createObjectURL(new Blob([text.value], { type: 'application/toml' }));
     link.download = view ? view.file.split(/[\\/]/).pop() : 'model.toml';
     link.click();
-    URL.revokeObjectURL(link.href);
+    // Some browsers start the download later.
+    setTimeout(() => URL.revokeObjectURL(link.href), 60000);
   };
   // Shows an error. If the program did not answer, the sentence disappears once it answers again.
   const say_error = (error, who) => {

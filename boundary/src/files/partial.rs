@@ -5,7 +5,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsStr;
-use std::fs::{File, Metadata, OpenOptions};
+use std::fs::{File, Metadata, OpenOptions, TryLockError};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -59,10 +59,10 @@ impl PartialFile {
             let path = target.with_file_name(own);
             match create(&path) {
                 Ok(file) => {
-                    // Where there are no locks, nobody removes the file either.
-                    let _ = file.try_lock();
-                    // Another program may have removed it before it was locked.
-                    if path.exists() {
+                    // Where there are no locks, nobody removes the file either. A lock of another program means that it
+                    // takes the new file for an abandoned one, and removes it.
+                    let is_taken = matches!(file.try_lock(), Err(TryLockError::WouldBlock));
+                    if !is_taken && path.exists() {
                         let is_kept = false;
                         return Ok(Self { file, path, is_kept });
                     }

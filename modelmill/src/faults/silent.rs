@@ -119,7 +119,7 @@ struct FlatInterval {
     level: f64,
     /// Standard deviation of white noise of the force.
     noise: f64,
-    /// Whether all values are the same number, while values outside of such intervals hardly ever repeat.
+    /// Whether one number repeats for most of it, while numbers outside of such intervals hardly ever repeat.
     is_frozen: bool,
 }
 
@@ -220,7 +220,6 @@ fn flat_intervals(drive: usize, force: &[f64], time: &[f64]) -> Vec<FlatInterval
     let shortest = count(SILENCE_SHORTEST_S / step).max(SILENCE_FEWEST_SAMPLES);
     let largest = force.iter().fold(0.0_f64, |most, f| most.max(f.abs()));
     let noise = white_noise(force).max(1e-9 * largest);
-    let repeated = repeated_share(force);
     // The mean of a block has less noise than a sample.
     let tolerance = SILENCE_NOISE_SIGMAS * noise / (block as f64).sqrt();
     let near = |sample: usize, level: f64| (force[sample] - level).abs() <= SILENCE_NOISE_SIGMAS * noise;
@@ -250,28 +249,37 @@ fn flat_intervals(drive: usize, force: &[f64], time: &[f64]) -> Vec<FlatInterval
         while end < n && near(end, level) {
             end += 1;
         }
-        let is_frozen = repeated(start..end) >= 1.0 && repeated(0..start).max(repeated(end..n)) < FROZEN_MOST_REPEATS;
         found.push(FlatInterval {
             drive,
             range: from..end,
             level,
             noise,
-            is_frozen,
+            is_frozen: false,
         });
         start = end;
     }
+    mark_frozen(&mut found, force, shortest);
     found
 }
 
-/// The share of values in a range that are the same number as the one before (1).
-fn repeated_share(force: &[f64]) -> impl Fn(Range<usize>) -> f64 {
-    |range| {
-        let values = &force[range];
-        let repeats = values
-            .windows(2)
-            .filter(|pair| pair[0].total_cmp(&pair[1]).is_eq())
-            .count();
-        repeats as f64 / values.len().saturating_sub(1).max(1) as f64
+/// Marks intervals in which one number repeats for at least `shortest` samples, while numbers outside of all intervals
+/// hardly ever repeat.
+fn mark_frozen(intervals: &mut [FlatInterval], force: &[f64], shortest: usize) {
+    let repeats = |k: usize| force[k].total_cmp(&force[k - 1]).is_eq();
+    let is_outside = |k: &usize| !intervals.iter().any(|one| one.range.contains(k));
+    let outside: Vec<usize> = (1..force.len()).filter(is_outside).collect();
+    let repeated = outside.iter().filter(|k| repeats(**k)).count();
+    if repeated as f64 >= FROZEN_MOST_REPEATS * outside.len() as f64 {
+        return;
+    }
+    for one in intervals {
+        let mut run = 1;
+        let mut longest = 1;
+        for k in one.range.start.max(1)..one.range.end {
+            run = if repeats(k) { run + 1 } else { 1 };
+            longest = longest.max(run);
+        }
+        one.is_frozen = longest >= shortest;
     }
 }
 

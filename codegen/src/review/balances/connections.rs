@@ -38,12 +38,13 @@ impl BalanceEquations<'_> {
         } else {
             format!("through the joint of {name}, on this body")
         };
-        let force = self.add_unknown(&format!("f_{name}"), [true; 3], format!("force {through}"), &name);
+        let force_says = format!("force {through}{}", self.force_clause(root));
+        let force = self.add_unknown(&format!("f_{name}"), [true; 3], force_says, &name);
         self.load.forces.insert(0, BalanceTerm::force(force));
         let mut marks = vec![(force, false)];
         let transmitted = self.transmitted_moments(root, true);
         if transmitted.iter().any(|k| *k) {
-            let says = format!("moment {through}, about O; {}", self.drive_words(root));
+            let says = format!("moment {through}, about O{}", self.moment_clause(root));
             let moment = self.add_unknown_moment(&format!("m_{name}"), transmitted, says, &name);
             self.load.moments.insert(0, BalanceTerm::force(moment));
             marks.push((moment, false));
@@ -64,12 +65,13 @@ impl BalanceEquations<'_> {
         let at = self.geometry.lever_arm(parent, &position);
         let arm = self.add_arm(&name, at, &format!("the joint of {name}"));
         let through = format!("through the joint of {name}, on {name}; this body receives the opposite");
-        let force = self.add_unknown(&format!("f_{name}"), [true; 3], format!("force {through}"), &name);
+        let force_says = format!("force {through}{}", self.force_clause(link));
+        let force = self.add_unknown(&format!("f_{name}"), [true; 3], force_says, &name);
         let mut marks = vec![(force, true)];
         self.push_force(BalanceTerm::force(force).negate(), arm);
         let transmitted = self.transmitted_moments(link, false);
         if transmitted.iter().any(|k| *k) {
-            let says = format!("moment {through}; {}", self.drive_words(link));
+            let says = format!("moment {through}{}", self.moment_clause(link));
             let moment = self.add_unknown_moment(&format!("m_{name}"), transmitted, says, &name);
             self.load.moments.push(BalanceTerm::force(moment).negate());
             marks.push((moment, true));
@@ -137,11 +139,26 @@ impl BalanceEquations<'_> {
         effects.any(|effect| effect.places.contains(&here) || effect.other == Some(here))
     }
 
-    /// What acts about or along the axis of a joint.
-    fn drive_words(&self, link: usize) -> String {
-        let link = &self.geometry.tree().links[link];
-        let turns = link.turns.iter().map(|(c, _)| *c);
-        let coordinates: Vec<usize> = turns.chain(link.slides.iter().map(|(c, _)| *c)).collect();
+    /// What is known of the moment of a joint, as a clause that follows it; empty if nothing is.
+    fn moment_clause(&self, link: usize) -> String {
+        let turns = self.geometry.tree().links[link].turns.iter().map(|(c, _)| *c);
+        if self.geometry.tree().links[link].free.is_some() {
+            "; it includes every drive on this body".to_owned()
+        } else if self.is_idle_revolute(link) {
+            "; it acts across the axis of the joint".to_owned()
+        } else {
+            self.axis_clause(&turns.collect::<Vec<usize>>())
+        }
+    }
+
+    /// What is known of the force of a joint, as a clause that follows it; empty if nothing is.
+    fn force_clause(&self, link: usize) -> String {
+        let slides = self.geometry.tree().links[link].slides.iter().map(|(c, _)| *c);
+        self.axis_clause(&slides.collect::<Vec<usize>>())
+    }
+
+    /// Drives and effects on coordinates of a joint, as a clause; empty if there are none.
+    fn axis_clause(&self, coordinates: &[usize]) -> String {
         let drives = coordinates.iter().filter_map(|c| self.drive_of(*c));
         let drives: Vec<&str> = drives
             .map(|d| self.geometry.mechanism.drives[d].name.as_str())
@@ -153,11 +170,13 @@ impl BalanceEquations<'_> {
         if coordinates.iter().any(|c| self.has_effect(*c)) {
             acting.push("friction and other effects on the joint".to_owned());
         }
-        match (acting.is_empty(), link.free.is_some()) {
-            (_, true) => "it includes every drive on this body".to_owned(),
-            (true, _) => "it acts across the axis of the joint".to_owned(),
-            (false, _) => format!("its component on the axis of the joint contains {}", acting.join(", ")),
+        if acting.is_empty() {
+            return String::new();
         }
+        format!(
+            "; its component on the axis of the joint contains {}",
+            acting.join(", ")
+        )
     }
 
     /// Adds drives between two points, of which one is on the body.
@@ -189,8 +208,8 @@ impl BalanceEquations<'_> {
             self.scalars.push(AxialForce {
                 symbol: magnitude.clone(),
                 meaning: format!(
-                    "force of drive {name} on its ends without the effects of the drive, such as friction; \
-                     positive if it pushes them apart"
+                    "force that drive {name} transmits to its ends: that of the drive less its friction and other \
+                     effects; positive if it pushes them apart"
                 ),
                 drive: name.clone(),
                 along: u,

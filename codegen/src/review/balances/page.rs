@@ -18,7 +18,9 @@ pub(super) fn compose(derivation: &Derivation, equations: &BalanceEquations<'_>)
     page.paragraph([
         text("Left: rates of momentum and of angular momentum about O. Right: what acts on the body. "),
         text("cross(a, b) is the cross product of two vectors. "),
-        text("They have the form of eq. (2) and (3) of the paper."),
+        text("They have the form of eq. (2) and (3) of the paper that "),
+        code("modelmill experiment"),
+        text(" reproduces."),
     ]);
     page.equations("balances", equations.with_vectors.clone());
     page.heading("Components");
@@ -58,9 +60,11 @@ fn describe_body(page: &mut PageDocument, derivation: &Derivation, equations: &B
         }
         line.push(code(&*mechanism.frames[frame].name));
     }
-    line.push(text(". Its origin O is the origin that the joint of "));
+    line.push(text(
+        ". All moments are about O, the origin of the body behind the joint of ",
+    ));
     line.push(code(&*geometry.names[geometry.root]));
-    line.push(text(" reaches. All components are along the axes of "));
+    line.push(text(". All components are along the axes of "));
     line.push(code(geometry.axes_name()));
     line.push(text("."));
     page.paragraph(line);
