@@ -105,12 +105,15 @@ fn two_windows_show_one_text() {
     type_after(&mut browser, &one, "q1 = { nominal = 0.4", "1");
     type_after(&mut browser, &other, "q1 = { nominal = 0.4", "2");
     let text = wait_for_one_text(&mut browser, [&one, &other], &bench);
-    // The edit that arrives first stays.
-    let is_first = text.contains("nominal = 0.41 }");
-    assert!(is_first || text.contains("nominal = 0.42 }"), "{text}");
-    let loser = if is_first { &other } else { &one };
-    let told = browser.run(loser, "return at('says').textContent;");
-    assert!(told.to_string().contains("Undo"), "{told}");
+    // The edit that arrives first stays. If it arrived in the other window before the second digit was typed there, the
+    // second edit is one of the new text.
+    if !text.contains("nominal = 0.421 }") {
+        let is_first = text.contains("nominal = 0.41 }");
+        assert!(is_first || text.contains("nominal = 0.42 }"), "{text}");
+        let loser = if is_first { &other } else { &one };
+        let told = browser.run(loser, "return at('says').textContent;");
+        assert!(told.to_string().contains("Undo"), "{told}");
+    }
     // Saved at the moment of an edit in the other window: the file has what the window shows when it says so.
     type_after(&mut browser, &one, "M = 4.2", "5");
     type_after(&mut browser, &other, "M = 2.1", "7");
