@@ -198,6 +198,16 @@ pub struct ModelFrame {
     pub convention: FrameConvention,
 }
 
+/// The frame that carries a frame without a joint in between: the same one if it moves relative to its parent.
+pub(crate) fn carrying_frame(frames: &[ModelFrame], frame: FrameIdx) -> FrameIdx {
+    let mut at = frame;
+    // Parents come first in the tree, so this ends at the base.
+    while at != FrameIdx(0) && !frames[at.0].steps.iter().any(FrameStep::is_moving) {
+        at = frames[at.0].parent;
+    }
+    at
+}
+
 /// How the file describes a frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FrameConvention {

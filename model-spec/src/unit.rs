@@ -36,7 +36,7 @@ const UNITS: [(&str, [i32; 4]); 17] = [
 ];
 
 /// Common units that would need a factor, each with the SI unit to use instead.
-const FOREIGN: [(&str, &str); 15] = [
+const FOREIGN: [(&str, &str); 29] = [
     ("mm", "m"),
     ("cm", "m"),
     ("km", "m"),
@@ -52,6 +52,20 @@ const FOREIGN: [(&str, &str); 15] = [
     ("Nm", "N m"),
     ("Nmm", "N m"),
     ("lb", "kg"),
+    ("mN", "N"),
+    ("mNm", "N m"),
+    ("mrad", "rad"),
+    ("mH", "H"),
+    ("mOhm", "Ohm"),
+    ("mA", "A"),
+    ("mV", "V"),
+    ("mW", "W"),
+    ("mJ", "J"),
+    ("mF", "F"),
+    ("mT", "T"),
+    ("mPa", "Pa"),
+    ("mC", "C"),
+    ("mHz", "Hz"),
 ];
 
 /// How common dimensions are printed: unit, single exponents of kg, m, s, A, and name.
@@ -318,6 +332,10 @@ fn separate_units(word: &str) -> Option<String> {
             .filter(|name| rest.starts_with(name))
             .max_by_key(|name| name.len())?;
         rest = &rest[unit.len()..];
+        // `mN` means millinewton, not `m N`.
+        if unit == "m" && rest.starts_with(|found: char| found.is_alphabetic()) {
+            return None;
+        }
         let is_exponent = |found: char| found.is_ascii_digit() || superscript(found).is_some();
         let end = rest.find(|found| !is_exponent(found)).unwrap_or(rest.len());
         let exponent: String = rest[..end].chars().map(|c| superscript(c).unwrap_or(c)).collect();

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use modelmill_boundary::files::PathKind;
 use modelmill_rig::{JointGap, LoadedRig, Rig, RigTracker};
 use toml::Table;
 
@@ -37,8 +38,11 @@ pub struct RigCheck {
 }
 
 impl Host {
-    /// Whether a file has the tables of a rig and not those of a model.
+    /// Whether a file has the tables of a rig and not those of a model. False for a pipe, which can be read only once.
     pub fn is_rig_file(&self, path: &Path) -> bool {
+        if self.files().kind(path) != PathKind::File {
+            return false;
+        }
         let Ok(text) = self.files().read_text(path, modelmill_spec::LARGEST_FILE as u64) else {
             return false;
         };
@@ -49,7 +53,9 @@ impl Host {
         let has = |key: &str| table.contains_key(key);
         // A variant may have few tables; the file that it extends decides.
         let is_variant = has("extends") && !has("part") && self.load(path).is_err() && self.rig(path).is_ok();
-        has("body") || has("mass_properties") || is_variant
+        // A model may have `[[body]]` by mistake; its faults are then those of a model.
+        let is_model = has("part") || has("frame");
+        ((has("body") || has("mass_properties")) && !is_model) || is_variant
     }
 
     /// Closes the joints of a rig and describes its contents.

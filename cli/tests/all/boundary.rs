@@ -199,6 +199,36 @@ fn what_never_ends_has_an_end() {
     assert!(says(&output).contains("has more than"), "{}", says(&output));
 }
 
+/// A pipe is read once, so that the question whether it is a rig must not use it up.
+#[cfg(unix)]
+#[test]
+fn a_model_may_come_from_a_pipe() {
+    let mut child = modelmill(&["check", "/dev/stdin"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    let mut stdin = child.stdin.take().expect("standard input");
+    stdin.write_all(pendulum("").as_bytes()).expect("written");
+    drop(stdin);
+    let output = child.wait_with_output().expect("an end");
+    assert_eq!(output.status.code(), Some(0), "{}", says(&output));
+    let shown = String::from_utf8_lossy(&output.stdout);
+    assert!(shown.contains("pendulum"), "{shown}");
+}
+
+/// A word of rigs in a model gives the fault of a model.
+#[test]
+fn a_model_with_a_body_is_no_rig() {
+    let folder = folder("body");
+    let model = written(&folder, "model.toml", &pendulum("").replace("[[part]]", "[[body]]"));
+    let ran = ran(&["check", &model]);
+    assert_eq!(ran.status, 1);
+    assert!(ran.err.contains("unknown key `body`"), "{}", ran.err);
+    assert!(!ran.err.contains("modified_dh"), "{}", ran.err);
+}
+
 #[test]
 fn nothing_is_told_of_files_that_are_no_models() {
     let folder = folder("secrets");

@@ -358,7 +358,11 @@ pub(super) fn warn_of_negative(model: &ModelEntry, mechanism: &Mechanism, log: &
     let lumped = model.lumped_mass.iter().flat_map(|list| &list.entries);
     for (entry, lumped) in lumped.zip(&mechanism.lumped_masses) {
         let span = place(entry.mass.as_ref(), entry.span);
-        look(&lumped.mass, "this lumped mass", "kg", span, true);
+        // A hole may be a negative mass in a full body; only the body must have a positive mass.
+        let is_impossible = mechanism
+            .nominal_mass_of_body(lumped.frame)
+            .is_some_and(|mass| mass < 0.0);
+        look(&lumped.mass, "this lumped mass", "kg", span, is_impossible);
     }
 }
 

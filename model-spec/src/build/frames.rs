@@ -13,7 +13,9 @@ use crate::build::symbols::{SymbolTable, vector};
 use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
 use crate::exact::{ExactAngle, ExactExpression, ExactLength};
 use crate::formula::SourceFormula;
-use crate::mechanism::{FrameAxis, FrameConvention, FrameIdx, FramePoint, FrameStep, ModelFrame, PointIdx};
+use crate::mechanism::{
+    FrameAxis, FrameConvention, FrameIdx, FramePoint, FrameStep, ModelFrame, PointIdx, carrying_frame,
+};
 use crate::schema::{DhEntry, FrameEntry, ModelEntry, TransformEntry};
 use crate::scope::{FormulaRequirement, FormulaScope, SymbolSort};
 use crate::suggest;
@@ -34,12 +36,7 @@ pub(super) struct FrameTree {
 impl FrameTree {
     /// The frame that carries a frame without a joint in between: the same one if it moves relative to its parent.
     pub(super) fn carrying_frame(&self, frame: FrameIdx) -> FrameIdx {
-        let mut at = frame;
-        // Parents come first in the tree, so this ends at the base.
-        while at != FrameIdx(0) && !self.frames[at.0].steps.iter().any(FrameStep::is_moving) {
-            at = self.frames[at.0].parent;
-        }
-        at
+        carrying_frame(&self.frames, frame)
     }
 
     /// The frame of a name; an unknown name is reported.

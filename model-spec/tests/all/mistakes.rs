@@ -122,6 +122,29 @@ fn a_unit_is_corrected() {
     }
 }
 
+/// A metre times a newton is another quantity than a millinewton.
+#[test]
+fn milli_units_are_not_split() {
+    for (written, si) in [
+        ("mN", "N"),
+        ("mrad", "rad"),
+        ("mH", "H"),
+        ("mOhm", "Ohm"),
+        ("mNm", "N m"),
+        ("mA", "A"),
+        ("mN/m", "N"),
+    ] {
+        let (_, shown) = only_fault(&changed("\"kg m^2\"", &format!("\"{written}\"")));
+        assert!(
+            shown.contains(&format!("write `{si}` and convert the value")),
+            "{written}: {shown}"
+        );
+    }
+    // Without advice there is no wrong one.
+    let (_, shown) = only_fault(&changed("\"kg m^2\"", "\"mN.m\""));
+    assert!(!shown.contains("write `m N"), "{shown}");
+}
+
 #[test]
 fn a_name_with_a_blank_is_corrected() {
     let (_, shown) = only_fault(&changed("\"pendulum\"", "\"my pendulum\""));
@@ -200,6 +223,39 @@ fn masses_and_moments_below_zero_are_impossible() {
     );
     let impossible = loaded(&text).warnings.into_iter().any(|warning| warning.is_impossible);
     assert!(!impossible);
+}
+
+/// A hole may be a full body with a negative lumped mass.
+#[test]
+fn a_lumped_mass_below_zero_is_impossible_only_in_a_body_below_zero() {
+    for (share, is_impossible) in [("1/2", false), ("3/2", true)] {
+        // The frame of the point `far` is fixed to the body of 2 kg, or is the body itself.
+        let hole = format!("\n[[lumped_mass]]\nmass = \"-m\"\nshare = \"{share}\"\nat = \"far\"\n");
+        let warnings = loaded(&(PENDULUM.to_owned() + &hole)).warnings;
+        assert!(
+            warnings.len() == 1 && warnings[0].is_impossible == is_impossible,
+            "{share}: {warnings:?}"
+        );
+    }
+}
+
+/// Bodies without a joint to the base do not move, and a mass at a point that moves does.
+#[test]
+fn the_total_mass_is_that_of_what_moves() {
+    let stand = "\n[[frame]]\nname = \"stand\"\non = \"base\"\ntransform = { xyz = [0, 0, 1] }\n\
+                 \n[[point]]\nname = \"foot\"\non = \"stand\"\nat = [0, 0.1, 0]\n\
+                 \n[[part]]\nname = \"column\"\non = \"stand\"\nmass = \"25*m\"\n";
+    assert_eq!(
+        loaded(&(PENDULUM.to_owned() + stand)).mechanism.total_nominal_mass(),
+        Some(2.0)
+    );
+    for (point, total) in [("far", 2.75), ("foot", 2.0)] {
+        let tool = format!(
+            "\n[[effect]]\nkind = \"point_mass\"\nat = [\"{point}\"]\nparameters = {{ m = {{ nominal = 0.75 }} }}\n"
+        );
+        let text = PENDULUM.to_owned() + stand + &tool;
+        assert_eq!(loaded(&text).mechanism.total_nominal_mass(), Some(total), "{point}");
+    }
 }
 
 #[test]

@@ -18,7 +18,7 @@ pub struct ModelMagnitudes {
     pub gravity: [f64; 3],
     /// What is unusual about gravity, as a sentence.
     pub gravity_remark: Option<String>,
-    /// Sum of the nominal masses of all bodies that move, kg; `None` if the file does not give
+    /// Sum of the nominal masses of all bodies that move, with masses at points, kg; `None` if the file does not give
     /// all of them.
     pub total_mass: Option<f64>,
     /// Box around the origins of all frames and all points at random poses, m: lower and upper end along x, y and z of

@@ -81,7 +81,7 @@ pub struct Options<'a> {
     /// Joints by name that are fixed at a value, rad or m from the description's own zero: they are no coordinates.
     pub locked: &'a [(String, f64)],
     /// The joints that move; all others are fixed at the pose of the description, except those that are coupled with
-    /// one of these. Without it all joints move.
+    /// one of these, and ball joints and free joints, which are remarked. Without it all joints move.
     pub kept: Option<&'a [String]>,
 }
 
@@ -131,12 +131,21 @@ pub fn rig_of_description(text: &str, options: &Options) -> Result<DescriptionRi
     let mut description = read_description(text, options)?;
     let text = rig_text::rig_text(&description).map_err(ImportError)?;
     let mut remarks = std::mem::take(&mut description.remarks);
-    let joints = description.links.iter().flat_map(|link| &link.joints);
-    for joint in joints.filter(|joint| joint.stiffness != 0.0) {
-        remarks.push(format!(
-            "the spring of the joint `{}` is left out; add it to the model",
-            joint.name
-        ));
+    for joint in description.links.iter().flat_map(|link| &link.joints) {
+        // Effects of rigs act at drives.
+        let at_drive = |value: f64| if joint.is_driven { 0.0 } else { value };
+        let left_out = [
+            ("spring", joint.stiffness),
+            ("viscous friction", at_drive(joint.damping)),
+            ("Coulomb friction", at_drive(joint.friction)),
+            ("rotor inertia", at_drive(joint.armature)),
+        ];
+        for (what, _) in left_out.into_iter().filter(|(_, value)| *value != 0.0) {
+            remarks.push(format!(
+                "the {what} of the joint `{}` is left out; add it to the model",
+                joint.name
+            ));
+        }
     }
     Ok(DescriptionRig { text, remarks })
 }
@@ -148,7 +157,7 @@ fn read_description(text: &str, options: &Options) -> Result<RobotDescription, I
     }
     xml_budget::check_xml_budget(text).map_err(|fault| {
         ImportError(format!(
-            "this file is too large a structure for a robot description ({fault}); check that it is the intended file"
+            "{fault}; no robot description needs that, so check that this is the intended file"
         ))
     })?;
     // A frequent mistake is a file with macros or the YAML next to the description.

@@ -10,3 +10,7 @@ pub(super) const DEEPEST_ELEMENT: usize = 200;
 /// Most attributes of one element; the formats define less than 60 for any element. The parser's cost per element is
 /// the square of their number.
 pub(super) const MOST_ATTRIBUTES: usize = 500;
+
+/// Largest difference (rad or m, and relative) between the value given for a joint and the one by its coupling. By
+/// judgement: typed values have few digits, and a difference that matters is larger.
+pub(super) const COUPLED_VALUES: f64 = 1e-4;

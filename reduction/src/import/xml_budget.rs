@@ -35,7 +35,7 @@ pub(super) fn check_xml_budget(text: &str) -> Result<(), String> {
         } else if !tag.is_empty {
             level = level
                 .enter()
-                .map_err(|fault| fail(&format!("an element is too deep; {fault}")))?;
+                .map_err(|_| fail(&format!("elements are nested more than {DEEPEST_ELEMENT} levels deep")))?;
         }
         at = start + 1 + tag.length;
     }
@@ -95,7 +95,7 @@ mod tests {
         let nested = |n: usize| format!("<a>\n{}{}</a>", "<b x='>'>".repeat(n), "</b>".repeat(n));
         assert_eq!(check_xml_budget(&nested(DEEPEST_ELEMENT - 1)), Ok(()));
         let fault = check_xml_budget(&nested(DEEPEST_ELEMENT)).unwrap_err();
-        assert!(fault.starts_with("line 2: an element is too deep"), "{fault}");
+        assert!(fault.starts_with("line 2: elements are nested more than"), "{fault}");
         let wide = |n: usize| format!("<a>\n<b {}/></a>", "x=\"1\" ".repeat(n));
         assert_eq!(check_xml_budget(&wide(MOST_ATTRIBUTES)), Ok(()));
         let fault = check_xml_budget(&wide(MOST_ATTRIBUTES + 1)).unwrap_err();

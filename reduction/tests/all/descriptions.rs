@@ -136,3 +136,23 @@ fn mechanisms_in_another_plane_are_recognised() {
     let error = largest_error(&rig, &derived(&reduced.model));
     assert!(error < 1e-9, "{error}\n{}", reduced.model);
 }
+
+/// Effects of rigs act at drives; what a joint without drive has is named.
+#[test]
+fn losses_of_joints_without_drive_are_remarked() {
+    let text = "<mujoco model='arm'><worldbody><body name='upper'>\
+        <joint name='shoulder' axis='0 1 0' damping='0.3' frictionloss='0.2' armature='0.1'/>\
+        <inertial pos='0.2 0 0' mass='2' diaginertia='0.02 0.02 0.01'/><body name='lower' pos='0.4 0 0'>\
+        <joint name='elbow' axis='0 1 0' damping='0.3' frictionloss='0.2' armature='0.1' stiffness='4'/>\
+        <inertial pos='0.2 0 0' mass='1' diaginertia='0.01 0.01 0.01'/></body></body></worldbody>\
+        <actuator><motor joint='shoulder'/></actuator></mujoco>";
+    let made = rig_of_description(text, &ImportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    let remarks = made.remarks.join("\n");
+    for what in ["spring", "viscous friction", "Coulomb friction", "rotor inertia"] {
+        let says = format!("the {what} of the joint `elbow` is left out");
+        assert!(remarks.contains(&says), "{remarks}");
+    }
+    // At a drive they are effects.
+    assert!(!remarks.contains("`shoulder`"), "{remarks}");
+    assert_eq!(made.text.matches("[[effect]]").count(), 3, "{}", made.text);
+}

@@ -154,6 +154,67 @@ fn only_the_named_joints_move() {
     check(&both, &["shoulder", "finger"], &[("lift", 0.0), ("elbow", -0.3)]);
 }
 
+/// A follower is locked with its leader, at the value by which the follower has its own.
+#[test]
+fn a_locked_follower_fixes_its_leader() {
+    // The other finger is the finger's value plus 0.01.
+    let locked = [("other_finger".to_owned(), 0.11)];
+    let options = ImportOptions {
+        locked: &locked,
+        ..ImportOptions::default()
+    };
+    check(&options, &["lift", "shoulder", "elbow"], &[("finger", 0.1)]);
+    // Both values may be given, if they agree.
+    let both = [("finger".to_owned(), 0.1), ("other_finger".to_owned(), 0.11)];
+    let options = ImportOptions {
+        locked: &both,
+        ..ImportOptions::default()
+    };
+    check(&options, &["lift", "shoulder", "elbow"], &[("finger", 0.1)]);
+    let against = [("finger".to_owned(), 0.1), ("other_finger".to_owned(), 0.5)];
+    let options = ImportOptions {
+        locked: &against,
+        ..ImportOptions::default()
+    };
+    let says = import(&arm(), &options).expect_err("a fault").to_string();
+    assert!(says.contains("`other_finger` follows `finger`"), "{says}");
+    // Joints that are fixed at the pose keep their coupling.
+    let kept = ["lift", "shoulder", "elbow"].map(str::to_owned);
+    let options = ImportOptions {
+        kept: Some(&kept),
+        ..ImportOptions::default()
+    };
+    check(&options, &["lift", "shoulder", "elbow"], &[("finger", 0.0)]);
+}
+
+/// Ball joints and free joints have no single value, and are named if they move without being listed.
+#[test]
+fn joints_without_a_single_value_are_remarked() {
+    let text = "<mujoco model='leg'><worldbody><body name='trunk'><freejoint name='trunk_free'/>\
+        <inertial pos='0 0 0' mass='5' diaginertia='0.1 0.1 0.1'/>\
+        <body name='thigh' pos='0 0 -0.1'><joint name='hip' type='ball'/>\
+        <inertial pos='0 0 -0.2' mass='2' diaginertia='0.02 0.02 0.01'/>\
+        <body name='shank' pos='0 0 -0.4'><joint name='knee' axis='0 1 0'/>\
+        <inertial pos='0 0 -0.2' mass='1' diaginertia='0.01 0.01 0.01'/></body></body></body></worldbody>\
+        <actuator><motor joint='knee'/></actuator></mujoco>";
+    let remarks = |kept: &[String]| {
+        let options = ImportOptions {
+            kept: Some(kept),
+            ..ImportOptions::default()
+        };
+        crate::lines(&import(text, &options).unwrap_or_else(|error| panic!("{error}")).remarks)
+    };
+    let few = remarks(&["knee".to_owned()]);
+    for says in [
+        "the free joint `trunk_free` moves too",
+        "the ball joint `hip` moves too",
+    ] {
+        assert!(few.contains(says), "{few}");
+    }
+    let all = remarks(&["knee", "hip", "trunk_free"].map(str::to_owned));
+    assert!(!all.contains("moves too"), "{all}");
+}
+
 #[test]
 fn joints_that_cannot_be_locked_are_refused() {
     let says = |locked: &[(String, f64)], kept: Option<&[String]>| {
@@ -171,6 +232,9 @@ fn joints_that_cannot_be_locked_are_refused() {
     );
     let elbow = ("elbow".to_owned(), 0.0);
     assert!(says(&[elbow.clone(), elbow.clone()], None).contains("named twice"));
+    let finger = ("finger".to_owned(), 0.0);
+    let coupled = says(&[finger], Some(&["other_finger".to_owned()]));
+    assert!(coupled.contains("coupled with a locked one"), "{coupled}");
     assert!(says(&[elbow], Some(&["elbow".to_owned()])).contains("named twice"));
     let all = ["lift", "shoulder", "elbow", "finger"].map(|name| (name.to_owned(), 0.0));
     assert!(says(&all, None).contains("no joint that moves"));
