@@ -7,6 +7,7 @@ use toml::Table;
 
 use crate::error::{Error, Outcome};
 use crate::host::Host;
+use crate::text::table::significant;
 
 /// Gaps of joints (m, rad) below this are rounding, as in the closing of joints itself.
 const ROUNDING: f64 = 1e-9;
@@ -100,7 +101,12 @@ fn size_of_gap(gap: &JointGap) -> f64 {
 
 /// A gap as text.
 pub(crate) fn describe_gap(gap: &JointGap) -> String {
-    format!("`{}` {:.3} mm, {:.1e} rad", gap.joint, 1e3 * gap.distance, gap.angle)
+    format!(
+        "`{}` {} mm, {:.1e} rad",
+        gap.joint,
+        significant(1e3 * gap.distance, 3),
+        gap.angle
+    )
 }
 
 /// Mass of all bodies and of masses at points, kg.

@@ -1,5 +1,7 @@
 //! Mass properties as a table in CSV: one row per body, with units in the header or from the rig file.
 
+use std::ops::Range;
+
 use nalgebra::Vector3;
 
 use super::StatedConventions;
@@ -161,11 +163,22 @@ fn read_header(
             )),
         }
     }
-    let has = |wanted: &dyn Fn(CadColumn) -> bool| columns.iter().flatten().any(|column| wanted(column.kind));
     let whole = header.first().map_or(0..0, |first| {
         let last = header.last().unwrap_or(first);
         first.0..last.0 + last.1.len()
     });
+    check_columns(&columns, whole, stated, &mut faults);
+    if faults.is_empty() { Ok(columns) } else { Err(faults) }
+}
+
+/// Faults of a header that lacks columns, or whose columns contradict the rig file.
+fn check_columns(
+    columns: &[Option<ScaledColumn>],
+    whole: Range<usize>,
+    stated: StatedConventions,
+    faults: &mut Vec<CadFault>,
+) {
+    let has = |wanted: &dyn Fn(CadColumn) -> bool| columns.iter().flatten().any(|column| wanted(column.kind));
     let mut require = |is_there: bool, what: &str, help: &str| {
         if !is_there {
             faults.push(CadFault::new(
@@ -207,7 +220,6 @@ fn read_header(
             "delete `inertia`, or rename the columns",
         ));
     }
-    if faults.is_empty() { Ok(columns) } else { Err(faults) }
 }
 
 /// Whether a name has the form of a moment or product of inertia, such as `Jxx`, `MOI_xy` or `Ixx_com`.
