@@ -115,3 +115,22 @@ fn total_mass(rig: &Rig) -> f64 {
     let points = rig.lumped_masses.iter().map(|lumped| lumped.mass);
     bodies.chain(points).sum()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A gap above rounding is listed, so that its size must not be printed as zero.
+    #[test]
+    fn small_gaps_are_not_printed_as_zero() {
+        for (distance, expected) in [(3e-8, "3.00e-5 mm"), (0.012, "12.0 mm"), (0.0, " 0 mm")] {
+            let gap = JointGap {
+                joint: "hinge".to_owned(),
+                distance,
+                angle: 0.0,
+            };
+            let says = describe_gap(&gap);
+            assert!(says.contains(expected), "{says}");
+        }
+    }
+}

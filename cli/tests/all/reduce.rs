@@ -144,7 +144,6 @@ fn a_table_of_masses_becomes_the_structure_of_the_paper() {
             assert!(nrms < 1e-9, "{nrms}");
         }
     }
-    // The proposal does not overwrite what it reads.
     // One file cannot be both; a path that is spelled differently is the same file.
     let fresh = scratch("fresh/both.toml");
     let folder = std::path::Path::new(&fresh).parent().expect("a folder");
@@ -155,6 +154,7 @@ fn a_table_of_masses_becomes_the_structure_of_the_paper() {
         assert!(says.contains("--propose and --out are the same file"), "{says}");
         assert!(!std::path::Path::new(&fresh).exists());
     }
+    // The proposal does not overwrite what it reads.
     let says = refused(2, &["reduce", &rig, "--propose", &rig]);
     assert!(says.contains("would overwrite"), "{says}");
 }

@@ -353,6 +353,7 @@ impl<'a> ReportReader<'a> {
             return Err(missing("centre of mass", "Center of mass: ( millimeters )"));
         };
         self.refuse_other_conventions(&span)?;
+        self.refuse_asymmetric_entries(&span)?;
         let has_products = self.inertias.iter().any(|(_, entries)| {
             [(0, 1), (0, 2), (1, 2)]
                 .iter()
@@ -403,6 +404,20 @@ impl<'a> ReportReader<'a> {
                 stated: self.sign.or(self.stated.sign),
             },
         })
+    }
+
+    /// Refuses products whose two places have different values.
+    fn refuse_asymmetric_entries(&self, span: &std::ops::Range<usize>) -> Result<(), CadFault> {
+        for (_, entries) in &self.inertias {
+            for (i, j) in [(0, 1), (0, 2), (1, 2)] {
+                let mut first = entries[i][j];
+                if let Some(second) = entries[j][i] {
+                    let what = format!("product of inertia {}", ["xy", "xz", "yz"][i + j - 1]);
+                    state_value(&mut first, second, &what, span)?;
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Refuses conventions of the rig file that the report contradicts.

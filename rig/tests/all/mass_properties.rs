@@ -521,6 +521,21 @@ fn values_that_are_stated_twice_are_refused() {
     }
     let twice = format!("{}\n{}", untitled(1), untitled(1));
     assert!(rig_with("coordinates = \"assembly\"\nbody = \"G1\"", "two.txt", &twice).is_ok());
+    let (mut lines, report) = (0, onshape(&planted(1)));
+    let asymmetric: String = report
+        .split_inclusive('\t')
+        .map(|word| {
+            lines += usize::from(word.starts_with("Lyx"));
+            if word.starts_with("Lyx") {
+                "Lyx: 0.123\t".to_owned()
+            } else {
+                word.to_owned()
+            }
+        })
+        .collect();
+    assert_eq!(lines, 1);
+    let says = failure_of("products = \"negative\"", "G1.txt", &asymmetric);
+    assert!(says.contains("product of inertia xy is stated twice"), "{says}");
     let several = solidworks(&planted(1), -1.0).replace("of G1", "of selected components");
     assert!(failure_of("", "some.txt", &several).contains("has no name"));
 }
