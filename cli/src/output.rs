@@ -59,6 +59,27 @@ impl OutputFile {
         Ok(Self(path.to_owned()))
     }
 
+    /// Refuses two targets that are the same file: the second would replace the first.
+    pub(crate) fn refuse_equal(pair: [(&str, &Self); 2]) -> CommandOutcome {
+        let [(flag, one), (other_flag, other)] = pair;
+        // A file that does not exist yet has a folder that does.
+        let place = |path: &Path| {
+            let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+            let folder = folder.unwrap_or(Path::new(".")).canonicalize().ok();
+            folder.zip(path.file_name().map(std::ffi::OsStr::to_owned))
+        };
+        if one.0 == other.0
+            || is_same_file(&one.0, &other.0)
+            || place(&one.0).is_some_and(|p| Some(p) == place(&other.0))
+        {
+            return Err(CommandFailure::Usage(format!(
+                "{flag} and {other_flag} are the same file, {}; choose two names",
+                one.0.display()
+            )));
+        }
+        Ok(())
+    }
+
     /// Writes the file.
     pub(crate) fn write(&self, text: &str) -> CommandOutcome {
         write(&self.0, text)

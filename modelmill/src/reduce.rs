@@ -76,8 +76,8 @@ impl Host {
     }
 
     /// Proposes a plan for a rig whose bodies move in one plane: bodies that move alike become one part, bodies that only
-    /// translate become point masses, and equal values share a symbol. The plan is carried out, so that its price is
-    /// known.
+    /// translate become point masses, and equal values share a symbol. The plan is carried out, so that its
+    /// error is known.
     ///
     /// Fails with the errors of the rig, and when no plan can be proposed for it.
     ///

@@ -8,6 +8,7 @@ use toml::Table;
 
 use crate::error::{Error, Outcome};
 use crate::host::Host;
+use crate::text::table::significant;
 
 /// Gaps of joints (m, rad) below this are rounding, as in the closing of joints itself.
 const ROUNDING: f64 = 1e-9;
@@ -106,7 +107,12 @@ fn size_of_gap(gap: &JointGap) -> f64 {
 
 /// A gap as text.
 pub(crate) fn describe_gap(gap: &JointGap) -> String {
-    format!("`{}` {:.3} mm, {:.1e} rad", gap.joint, 1e3 * gap.distance, gap.angle)
+    format!(
+        "`{}` {} mm, {:.1e} rad",
+        gap.joint,
+        significant(1e3 * gap.distance, 3),
+        gap.angle
+    )
 }
 
 /// Mass of all bodies and of masses at points, kg.
@@ -114,4 +120,23 @@ fn total_mass(rig: &Rig) -> f64 {
     let bodies = rig.bodies.iter().map(|body| body.mass);
     let points = rig.lumped_masses.iter().map(|lumped| lumped.mass);
     bodies.chain(points).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A gap above rounding is listed, so that its size must not be printed as zero.
+    #[test]
+    fn small_gaps_are_not_printed_as_zero() {
+        for (distance, expected) in [(3e-8, "3.00e-5 mm"), (0.012, "12.0 mm"), (0.0, " 0 mm")] {
+            let gap = JointGap {
+                joint: "hinge".to_owned(),
+                distance,
+                angle: 0.0,
+            };
+            let says = describe_gap(&gap);
+            assert!(says.contains(expected), "{says}");
+        }
+    }
 }

@@ -12,7 +12,7 @@ use modelmill_spec::{
 use crate::assemble::assemble;
 use crate::file::RigEntry;
 use crate::log::RigLog;
-use crate::mass_properties::read_mass_properties;
+use crate::mass_properties::{read_mass_properties, refuse_lost_poses};
 use crate::plausible::size_remark;
 use crate::rig::Rig;
 
@@ -79,6 +79,7 @@ pub fn load(path_name: &str, text: &str, files: &dyn FileSource) -> Result<Loade
     let mut sources = SourceFiles::default();
     let mut chain = Vec::new();
     let (mut log, mut remarks) = (RigLog::default(), Vec::new());
+    let mut added = Vec::new();
     let mut next = Some((PathBuf::from(path_name), text.to_owned()));
     while let Some((path, text)) = next.take() {
         let file = sources.files.len();
@@ -122,7 +123,17 @@ pub fn load(path_name: &str, text: &str, files: &dyn FileSource) -> Result<Loade
             }
         }
         let folder = path.parent().unwrap_or(Path::new(""));
-        read_mass_properties(file, folder, &mut entry, files, &mut sources, &mut log, &mut remarks);
+        // Before the bodies of this file are added: only those of a file that extends it can replace it.
+        refuse_lost_poses(&added, &entry, &path, &mut log);
+        added.extend(read_mass_properties(
+            file,
+            folder,
+            &mut entry,
+            files,
+            &mut sources,
+            &mut log,
+            &mut remarks,
+        ));
         chain.push((file, entry));
     }
     // Without their masses, bodies would have faults of their own.

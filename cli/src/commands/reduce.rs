@@ -6,7 +6,7 @@ use modelmill::Host;
 
 use crate::args::ReduceArgs;
 use crate::failure::{CommandFailure, CommandOutcome};
-use crate::output::OutputFile;
+use crate::output::{OutputFile, OutputSet};
 use crate::{commands, terminal};
 
 /// Writes the model file and prints the report; or proposes a plan.
@@ -22,6 +22,9 @@ pub(crate) fn run(host: &Host, args: &ReduceArgs) -> CommandOutcome {
         .transpose()?;
     if let Some(propose) = &args.propose {
         let plan = OutputFile::for_flag("--propose", propose, inputs)?;
+        if let Some(target) = &target {
+            OutputFile::refuse_equal([("--propose", &plan), ("--out", target)])?;
+        }
         return write_proposal(host, args, &plan, target.as_ref());
     }
     let Some(target) = target else {
@@ -41,10 +44,13 @@ pub(crate) fn run(host: &Host, args: &ReduceArgs) -> CommandOutcome {
 /// Writes a proposed plan, and its model if requested.
 fn write_proposal(host: &Host, args: &ReduceArgs, plan: &OutputFile, target: Option<&OutputFile>) -> CommandOutcome {
     let proposed = host.propose_plan(&args.rig)?;
-    plan.write(&proposed.plan)?;
+    // A plan beside the model of another one would mislead, so both are replaced or none.
+    let mut outputs = OutputSet::default();
+    outputs.add(plan, proposed.plan.as_str());
     if let Some(target) = target {
-        target.write(&proposed.reduced.reduction.model)?;
+        outputs.add(target, proposed.reduced.reduction.model.as_str());
     }
+    outputs.write()?;
     let name = |file: &OutputFile| file.path().display().to_string();
     if args.json {
         return terminal::print_json(&proposed.json(&name(plan), target.map(name).as_deref()));

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use serde_json::{Value, json};
 
 use crate::rig_check::{RigCheck, describe_gap};
-use crate::text::table::count;
+use crate::text::table::{count, significant};
 
 impl RigCheck {
     /// The contents as one JSON object.
@@ -52,8 +52,8 @@ impl RigCheck {
             Some(gap) if !self.is_closed_as_stated() => {
                 let _ = writeln!(
                     text,
-                    "  the joints close after bodies were moved by up to {:.3} mm; the largest gap of the file is at {}",
-                    1e3 * self.largest_move,
+                    "  the joints close after bodies were moved by up to {} mm; the largest gap of the file is at {}",
+                    significant(1e3 * self.largest_move, 3),
                     describe_gap(gap)
                 );
             }

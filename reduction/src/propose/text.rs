@@ -61,7 +61,7 @@ pub(super) struct SharedSymbols {
     parameters: BTreeMap<(String, &'static str), String>,
     /// Constants: names and quantities.
     constants: Vec<(String, Vec<String>)>,
-    /// Symbols that could be shared, each with its price.
+    /// Symbols that could be shared, each with the error of sharing it.
     similar: Vec<String>,
 }
 
@@ -353,7 +353,7 @@ fn heading(rig: &Rig, motion: &ClassifiedMotion, mechanism: &ProposedMechanism) 
     let triple = |v: &nalgebra::Vector3<f64>| format!("[{:?}, {:?}, {:?}]", v.x + 0.0, v.y + 0.0, v.z + 0.0);
     let mut text = format!(
         "# Proposed by modelmill from the motion of the rig {}. Edit names, groups and symbols;\n# `modelmill reduce` measures \
-         what each statement costs.\nschema = 1\nname = \"{}_reduced\"\n",
+         the error of each statement.\nschema = 1\nname = \"{}_reduced\"\n",
         rig.name,
         word_of(&rig.name)
     );
@@ -389,9 +389,7 @@ fn write_shared(text: &mut String, shared: &SharedSymbols) {
         }
     }
     if !shared.similar.is_empty() {
-        text.push_str(
-            "\n# Similar values. If they share a symbol, the model has fewer parameters and hides the difference:\n",
-        );
+        text.push_str("\n# Similar values. If they share a symbol, the model has fewer parameters, and this error:\n");
         for says in &shared.similar {
             let _ = writeln!(text, "# {says}");
         }
@@ -412,12 +410,12 @@ fn write_remarks(text: &mut String, known: Option<(&SharedSymbols, &ReductionRep
         if finding.says.starts_with("= ") {
             continue;
         }
-        let price = if sizes.is_empty() || finding.says.ends_with("change no force") {
+        let error = if sizes.is_empty() || finding.says.ends_with("change no force") {
             "exact".to_owned()
         } else {
             sizes.join(", ")
         };
-        let _ = writeln!(text, "# {}: {price}", finding.says);
+        let _ = writeln!(text, "# {}: {error}", finding.says);
     }
 }
 

@@ -13,6 +13,10 @@ pub(super) struct CadRow {
     pub(super) span: Range<usize>,
     /// Volume, m^3, if it is stated.
     pub(super) volume: Option<f64>,
+    /// Whether all three products of inertia are stated.
+    pub(super) has_products: bool,
+    /// The smallest last place of its moments and products of inertia, kg m^2; none without moments.
+    pub(super) place: Option<f64>,
     /// Its values.
     pub(super) body: PrintedBody,
 }

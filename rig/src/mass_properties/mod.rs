@@ -8,6 +8,7 @@
 //! since a wrong guess gives a model with plausible forces.
 
 mod fault;
+mod numbers;
 mod report;
 mod table;
 mod tensor;
@@ -27,7 +28,7 @@ use crate::log::RigLog;
 
 use fault::{CadFault, CadRow};
 use tensor::{InertiaFault, InertiaPoint, ProductSign, SignEvidence, determine_inertia};
-use thresholds::DENSITIES;
+use thresholds::{DENSITIES, FEWEST_UNITS};
 
 /// Conventions that the rig file states for a file of mass properties.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -39,7 +40,7 @@ struct StatedConventions {
 }
 
 /// Reads all files of mass properties that a rig file names, and adds their values to its bodies. Faults go to the log,
-/// assumptions to the remarks.
+/// assumptions to the remarks. Returns the bodies that only these files name, with their places.
 pub(crate) fn read_mass_properties(
     file: usize,
     folder: &Path,
@@ -48,7 +49,8 @@ pub(crate) fn read_mass_properties(
     sources: &mut SourceFiles,
     log: &mut RigLog,
     remarks: &mut Vec<Diagnostic>,
-) {
+) -> Vec<(String, SourceSpan)> {
+    let own = entry.body.len();
     for properties in std::mem::take(&mut entry.mass_properties) {
         let Some((rows, index)) = read_file(file, folder, &properties, files, sources, log) else {
             continue;
@@ -92,6 +94,29 @@ pub(crate) fn read_mass_properties(
         }
         if log.0.len() == n_faults {
             remarks.extend(sign_remark(index, &evidence));
+        }
+    }
+    let added = entry.body[own..].iter();
+    added
+        .map(|body| (body.name.get_ref().clone(), source_span(file, &body.name.span())))
+        .collect()
+}
+
+/// Refuses bodies that only mass properties of a variant name, if the file that it extends gives them a pose: the new
+/// entry would replace the whole body, and the pose would be lost.
+pub(crate) fn refuse_lost_poses(added: &[(String, SourceSpan)], extended: &RigEntry, path: &Path, log: &mut RigLog) {
+    for (name, place) in added {
+        let has_pose = |body: &BodyEntry| body.name.get_ref() == name && (body.at.is_some() || body.rpy.is_some());
+        if extended.body.iter().any(has_pose) {
+            log.error(
+                *place,
+                format!("these mass properties replace the body `{name}` of `{}`, which has a pose", path.display()),
+                "the pose would be lost",
+                &format!(
+                    "add `[[body]]` with `name = \"{name}\"` to this file: with `at` and `rpy` for `coordinates = \"part\"`, \
+                     without them for `coordinates = \"assembly\"`"
+                ),
+            );
         }
     }
 }
@@ -232,6 +257,7 @@ fn add_row(
         }
     };
     check_density(place, &name, row, remarks);
+    check_inertia(place, &name, row, &tensor, remarks);
     let spanned = |value: [f64; 3]| Spanned::new(properties.file.span(), value);
     let at = bodies
         .iter()
@@ -275,7 +301,7 @@ fn is_consistent(
         log.error(
             place,
             format!("`{name}` has mass properties already"),
-            "these are the second ones",
+            "the rig file or an earlier row states them",
             "rename or delete one of the two",
         );
         return false;
@@ -334,7 +360,7 @@ fn report_inertia(place: SourceSpan, name: &str, fault: &InertiaFault, log: &mut
         ),
         InertiaFault::Impossible(moments) => (
             format!(
-                "no body has the inertia of `{name}`: its principal moments are {:.4e}, {:.4e} and {:.4e} kg m^2",
+                "the inertia of `{name}` is impossible: its principal moments are {:.4e}, {:.4e} and {:.4e} kg m^2",
                 moments[0], moments[1], moments[2]
             ),
             "each moment must be positive and at most the sum of the two others; check the point of the inertia \
@@ -358,6 +384,52 @@ fn check_density(place: SourceSpan, name: &str, row: &CadRow, remarks: &mut Vec<
             help: vec!["check the units of mass and volume, and whether a material is assigned to the part".into()],
             ..plain_error(Some(place), format!("`{name}` has a density of {density:.3e} kg/m^3"))
         });
+    }
+}
+
+/// Remarks on an inertia that is absent or incomplete, or that has few digits.
+fn check_inertia(place: SourceSpan, name: &str, row: &CadRow, tensor: &Matrix3<f64>, remarks: &mut Vec<Diagnostic>) {
+    let printed = &row.body;
+    let mut remark = |message: String, help: &str| {
+        remarks.push(Diagnostic {
+            severity: DiagnosticSeverity::Warning,
+            help: vec![help.into()],
+            ..plain_error(Some(place), message)
+        });
+    };
+    if printed.mass == 0.0 {
+        return;
+    }
+    let Some(unit) = row.place else {
+        remark(
+            format!("no moments of inertia of `{name}` are stated: it is a point mass"),
+            "add the columns `Ixx` to `Iyz` if the body rotates, or 0 for a point mass",
+        );
+        return;
+    };
+    let moments = tensor.diagonal();
+    if printed.inertias.iter().all(|inertia| inertia.moments.amax() == 0.0) {
+        remark(
+            format!("all moments of inertia of `{name}` are zero: it is a point mass"),
+            "export with more decimals, or in smaller units, unless this is so",
+        );
+        return;
+    }
+    if moments
+        .iter()
+        .any(|moment| *moment != 0.0 && moment.abs() < FEWEST_UNITS * unit)
+    {
+        remark(
+            format!("moments of inertia of `{name}` about its centre of mass have fewer than three digits"),
+            "export with more decimals, or in smaller units; trailing zeros count as digits",
+        );
+    }
+    let is_spatial = moments.iter().filter(|moment| **moment != 0.0).count() > 1;
+    if is_spatial && !row.has_products {
+        remark(
+            format!("not all products of inertia of `{name}` are stated: those that are absent are taken as zero"),
+            "export the products too, or state 0",
+        );
     }
 }
 

@@ -10,8 +10,10 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::StatedConventions;
 use super::fault::{CadFault, CadRow};
+use super::numbers::{CLEAR_NUMBERS, PrintedNumber, PrintedNumberFault, read_number};
 use super::table::lines_with_places;
 use super::tensor::{InertiaPoint, PrintedBody, PrintedInertia, PrintedPrincipalMoments, ProductSign};
+use super::thresholds::SAME_VALUE;
 use super::units::{
     KNOWN_UNITS, UnitFactorSearch, UnknownCadUnit, inertia_factor, length_factor, mass_factor, volume_factor,
 };
@@ -36,7 +38,9 @@ enum ReportToken {
     /// A name such as `lxx` or `x`.
     Key(String),
     /// A number.
-    Number(f64),
+    Number(PrintedNumber),
+    /// What cannot be read as one number, with the reason.
+    Unclear(String),
     /// Anything else, such as a unit.
     Word(String),
 }
@@ -57,6 +61,7 @@ struct ReportReader<'a> {
     principal: [Option<f64>; 3],
     axes: [Option<[f64; 3]>; 3],
     sign: Option<ProductSign>,
+    place: Option<f64>,
 }
 
 /// Reads a file with one report, or with several that each begin with a title.
@@ -133,7 +138,10 @@ fn title_of(line: &str) -> Option<String> {
                 .strip_prefix("THE PART ")
                 .or(name.strip_prefix("THE ASSEMBLY "))
                 .unwrap_or(name);
-            // `Mass properties of selected components` has no name of a part.
+            // These are several parts.
+            if name.to_ascii_lowercase().starts_with("selected ") {
+                return Some(String::new());
+            }
             return Some(name.to_owned()).filter(|name| !name.is_empty());
         }
     }
@@ -154,6 +162,7 @@ impl<'a> ReportReader<'a> {
             principal: [None; 3],
             axes: [None; 3],
             sign: None,
+            place: None,
         }
     }
 
@@ -168,7 +177,8 @@ impl<'a> ReportReader<'a> {
         self.read_sign(&lower);
         if let Some(rest) = value_of(&lower, "mass") {
             let unit = &self.units.mass;
-            self.mass = Some(scaled_value(rest, unit.as_deref(), mass_factor, "mass", &span)?);
+            let mass = scaled_value(rest, unit.as_deref(), mass_factor, "mass", &span)?;
+            state_value(&mut self.mass, mass, "mass", &span)?;
             self.block = ReportBlock::Other;
             return Ok(());
         }
@@ -238,11 +248,15 @@ impl<'a> ReportReader<'a> {
 
     /// Reads the values of a line for the present block.
     fn values(&mut self, text: &str, span: &std::ops::Range<usize>) -> Result<(), CadFault> {
-        let tokens = tokens_of(text, span)?;
+        // Lines that are not needed may have numbers of any form.
+        if self.block == ReportBlock::Other {
+            return Ok(());
+        }
+        let found = assignments(&tokens_of(text), span)?;
         match self.block {
             ReportBlock::Other => Ok(()),
             ReportBlock::Centre(factor) => {
-                for (key, values, unit) in assignments(&tokens) {
+                for (key, values, unit) in found {
                     let Some(k) = ["x", "y", "z"].iter().position(|axis| *axis == key) else {
                         continue;
                     };
@@ -254,12 +268,12 @@ impl<'a> ReportReader<'a> {
                         "centre of mass",
                         span,
                     )?;
-                    self.centre[k] = values.first().map(|value| value * factor);
+                    state_value(&mut self.centre[k], values[0].value * factor, "centre of mass", span)?;
                 }
                 Ok(())
             }
             ReportBlock::Inertia(point, factor) => {
-                for (key, values, unit) in assignments(&tokens) {
+                for (key, values, unit) in found {
                     let Some((letter, row, column)) = entry_of(&key) else {
                         continue;
                     };
@@ -289,15 +303,17 @@ impl<'a> ReportReader<'a> {
                             self.inertias.push((about, Entries::default()));
                             self.inertias.len() - 1
                         });
-                    self.inertias[at].1[row][column] = values.first().map(|value| value * factor);
+                    let entry = &mut self.inertias[at].1[row][column];
+                    state_value(entry, values[0].value * factor, &format!("entry `{key}`"), span)?;
+                    self.place = Some(self.place.unwrap_or(f64::INFINITY).min(values[0].place * factor));
                 }
                 Ok(())
             }
             ReportBlock::Principal(factor) => {
-                for (key, values, unit) in assignments(&tokens) {
+                for (key, values, unit) in found {
                     let of = |names: [&str; 3]| names.iter().position(|name| *name == key);
                     if let (Some(k), [x, y, z]) = (of(["ix", "iy", "iz"]), &values[..]) {
-                        self.axes[k] = Some([*x, *y, *z]);
+                        self.axes[k] = Some([x.value, y.value, z.value]);
                     } else if let (Some(k), [value]) = (of(["px", "py", "pz"]).or(of(["i1", "i2", "i3"])), &values[..])
                     {
                         let factor = pick_factor(
@@ -308,7 +324,12 @@ impl<'a> ReportReader<'a> {
                             "inertia",
                             span,
                         )?;
-                        self.principal[k] = Some(value * factor);
+                        state_value(
+                            &mut self.principal[k],
+                            value.value * factor,
+                            &format!("entry `{key}`"),
+                            span,
+                        )?;
                     }
                 }
                 Ok(())
@@ -331,6 +352,13 @@ impl<'a> ReportReader<'a> {
         let [Some(x), Some(y), Some(z)] = self.centre else {
             return Err(missing("centre of mass", "Center of mass: ( millimeters )"));
         };
+        self.refuse_other_conventions(&span)?;
+        self.refuse_asymmetric_entries(&span)?;
+        let has_products = self.inertias.iter().any(|(_, entries)| {
+            [(0, 1), (0, 2), (1, 2)]
+                .iter()
+                .all(|&(i, j)| entries[i][j].or(entries[j][i]).is_some())
+        });
         let inertias: Vec<PrintedInertia> = self
             .inertias
             .iter()
@@ -366,6 +394,8 @@ impl<'a> ReportReader<'a> {
             name: self.name,
             span: span.clone(),
             volume: self.volume,
+            has_products,
+            place: self.place,
             body: PrintedBody {
                 mass,
                 centre: Vector3::new(x, y, z),
@@ -374,6 +404,54 @@ impl<'a> ReportReader<'a> {
                 stated: self.sign.or(self.stated.sign),
             },
         })
+    }
+
+    /// Refuses products whose two places have different values.
+    fn refuse_asymmetric_entries(&self, span: &std::ops::Range<usize>) -> Result<(), CadFault> {
+        for (_, entries) in &self.inertias {
+            for (i, j) in [(0, 1), (0, 2), (1, 2)] {
+                let mut first = entries[i][j];
+                if let Some(second) = entries[j][i] {
+                    let what = format!("product of inertia {}", ["xy", "xz", "yz"][i + j - 1]);
+                    state_value(&mut first, second, &what, span)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses conventions of the rig file that the report contradicts.
+    fn refuse_other_conventions(&self, span: &std::ops::Range<usize>) -> Result<(), CadFault> {
+        if let (Some(own), Some(stated)) = (self.sign, self.stated.sign)
+            && own != stated
+        {
+            let word = if own == ProductSign::Positive {
+                "positive"
+            } else {
+                "negative"
+            };
+            return Err(CadFault::new(
+                span.clone(),
+                format!(
+                    "this report states that its products of inertia are {word}, and `products` states the contrary"
+                ),
+                "no `products` in `[[mass_properties]]`, where the report states them; delete it",
+            ));
+        }
+        if let Some(stated) = self.stated.point
+            && self.inertias.iter().all(|(about, _)| *about != stated)
+        {
+            let (own, word) = match stated {
+                InertiaPoint::Centre => ("the origin", "centre"),
+                InertiaPoint::Origin => ("the centre of mass", "origin"),
+            };
+            return Err(CadFault::new(
+                span.clone(),
+                format!("this report states moments of inertia about {own}, and `inertia = \"{word}\"` the contrary"),
+                "no `inertia` in `[[mass_properties]]`, where the report states the point; delete it",
+            ));
+        }
+        Ok(())
     }
 }
 
@@ -387,6 +465,22 @@ fn value_of<'l>(lower: &'l str, name: &str) -> Option<&'l str> {
     rest.strip_prefix(['=', ':'])
 }
 
+/// Sets a value that is not yet known. Two values mean two parts, of which one would be lost.
+fn state_value(known: &mut Option<f64>, value: f64, what: &str, span: &std::ops::Range<usize>) -> Result<(), CadFault> {
+    if let Some(before) = *known
+        && (before - value).abs() > SAME_VALUE * before.abs()
+    {
+        return Err(CadFault::new(
+            span.clone(),
+            format!("the {what} is stated twice with different values"),
+            "one value per part; save the report of each part as its own file, or begin each report with a title such as \
+             `Mass properties of NAME`",
+        ));
+    }
+    *known = Some(value);
+    Ok(())
+}
+
 /// A number with its unit, in SI units.
 fn scaled_value(
     text: &str,
@@ -395,13 +489,17 @@ fn scaled_value(
     what: &str,
     span: &std::ops::Range<usize>,
 ) -> Result<f64, CadFault> {
-    let tokens = tokens_of(text, span)?;
-    let Some(ReportToken::Number(value)) = tokens.first() else {
-        return Err(CadFault::new(
-            span.clone(),
-            format!("this line has no number for the {what}"),
-            "a number with its unit",
-        ));
+    let tokens = tokens_of(text);
+    let value = match tokens.first() {
+        Some(ReportToken::Number(number)) => number.value,
+        Some(ReportToken::Unclear(says)) => return Err(CadFault::new(span.clone(), says, CLEAR_NUMBERS)),
+        _ => {
+            return Err(CadFault::new(
+                span.clone(),
+                format!("this line has no number for the {what}"),
+                "a number with its unit",
+            ));
+        }
     };
     let unit = unit_after(&tokens[1..]);
     Ok(value * unit_factor_of(&unit, default, factor, what, span)?)
@@ -495,7 +593,7 @@ fn entry_of(key: &str) -> Option<(char, usize, usize)> {
 }
 
 /// The words of a line. Commas are decimal signs or separate numbers.
-fn tokens_of(text: &str, span: &std::ops::Range<usize>) -> Result<Vec<ReportToken>, CadFault> {
+fn tokens_of(text: &str) -> Vec<ReportToken> {
     let mut tokens = Vec::new();
     // The note `(Relative Error = 0.01 %)` of Inventor contains no value.
     let mut pieces = text.split("(relative");
@@ -515,50 +613,27 @@ fn tokens_of(text: &str, span: &std::ops::Range<usize>) -> Result<Vec<ReportToke
             } else {
                 vec![word]
             };
-        for piece in pieces {
-            tokens.push(token_of(piece, span)?);
-        }
+        tokens.extend(pieces.into_iter().map(token_of));
     }
-    Ok(tokens)
+    tokens
 }
 
 /// One word as a token.
-fn token_of(word: &str, span: &std::ops::Range<usize>) -> Result<ReportToken, CadFault> {
+fn token_of(word: &str) -> ReportToken {
     let is_key = matches!(
         word,
         "x" | "y" | "z" | "ix" | "iy" | "iz" | "px" | "py" | "pz" | "i1" | "i2" | "i3"
     );
     if is_key || entry_of(word).is_some() {
-        return Ok(ReportToken::Key(word.to_owned()));
+        return ReportToken::Key(word.to_owned());
     }
-    let starts_as_number = word.starts_with(|c: char| c.is_ascii_digit() || matches!(c, '-' | '+' | '.' | ','));
-    if !starts_as_number {
-        return Ok(ReportToken::Word(word.to_owned()));
-    }
-    let text = match (word.contains(','), word.contains('.')) {
-        (true, true) => word.replace(',', ""),
-        (true, false) => {
-            let groups: Vec<&str> = word.trim_start_matches(['-', '+']).split(',').collect();
-            // `1,234` is either of two numbers.
-            if groups.len() > 2 || (groups[1].len() == 3 && groups[0] != "0") {
-                return Err(CadFault::new(
-                    span.clone(),
-                    format!("`{word}` has a decimal comma or separates thousands"),
-                    "numbers with a decimal point and without separators of thousands",
-                ));
-            }
-            word.replace(',', ".")
+    match read_number(word, false) {
+        Ok(number) => ReportToken::Number(number),
+        Err(PrintedNumberFault::NoNumber) => ReportToken::Word(word.to_owned()),
+        Err(PrintedNumberFault::Unclear) => {
+            ReportToken::Unclear(format!("`{word}` has a decimal comma or separates thousands"))
         }
-        _ => word.to_owned(),
-    };
-    match text.parse::<f64>() {
-        Ok(value) if value.is_finite() => Ok(ReportToken::Number(value)),
-        Ok(_) => Err(CadFault::new(
-            span.clone(),
-            format!("`{word}` is not a finite number"),
-            "a finite number",
-        )),
-        Err(_) => Ok(ReportToken::Word(word.to_owned())),
+        Err(PrintedNumberFault::Infinite) => ReportToken::Unclear(format!("`{word}` is not a finite number")),
     }
 }
 
@@ -576,8 +651,11 @@ fn unit_after(tokens: &[ReportToken]) -> String {
 
 /// Keys with their numbers and units. Keys may stand before all their numbers, as in `X Y Z 1 2 3`; a single key may
 /// have several numbers, as the axis in `Ix = (1, 0, 0)`.
-fn assignments(tokens: &[ReportToken]) -> Vec<(String, Vec<f64>, String)> {
-    let mut found: Vec<(String, Vec<f64>, String)> = Vec::new();
+fn assignments(
+    tokens: &[ReportToken],
+    span: &std::ops::Range<usize>,
+) -> Result<Vec<(String, Vec<PrintedNumber>, String)>, CadFault> {
+    let mut found: Vec<(String, Vec<PrintedNumber>, String)> = Vec::new();
     let mut at = 0;
     while at < tokens.len() {
         let mut keys = VecDeque::new();
@@ -590,8 +668,11 @@ fn assignments(tokens: &[ReportToken]) -> Vec<(String, Vec<f64>, String)> {
             numbers.push(*value);
             at += 1;
         }
+        if let (Some(ReportToken::Unclear(says)), false) = (tokens.get(at), keys.is_empty()) {
+            return Err(CadFault::new(span.clone(), says, CLEAR_NUMBERS));
+        }
         let unit = unit_after(&tokens[at..]);
-        while let Some(ReportToken::Word(_)) = tokens.get(at) {
+        while let Some(ReportToken::Word(_) | ReportToken::Unclear(_)) = tokens.get(at) {
             at += 1;
         }
         if keys.len() == 1 {
@@ -605,5 +686,5 @@ fn assignments(tokens: &[ReportToken]) -> Vec<(String, Vec<f64>, String)> {
         }
     }
     found.retain(|(_, values, _)| !values.is_empty());
-    found
+    Ok(found)
 }

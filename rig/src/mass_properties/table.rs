@@ -1,9 +1,12 @@
 //! Mass properties as a table in CSV: one row per body, with units in the header or from the rig file.
 
+use std::ops::Range;
+
 use nalgebra::Vector3;
 
 use super::StatedConventions;
 use super::fault::{CadFault, CadRow};
+use super::numbers::{CLEAR_NUMBERS, PrintedNumber, PrintedNumberFault, proves_decimal_comma, read_number};
 use super::tensor::{InertiaPoint, PrintedBody, PrintedInertia};
 use super::units::{
     KNOWN_UNITS, UnitFactorSearch, UnknownCadUnit, inertia_factor, length_factor, mass_factor, volume_factor,
@@ -56,10 +59,19 @@ pub(super) fn read_table(
     };
     let header = split_fields(at, header, separator);
     let columns = read_header(&header, units, stated)?;
+    let lines: Vec<(usize, &str, Vec<Field<'_>>)> = lines
+        .map(|(at, line)| (at, line, split_fields(at, line, separator)))
+        .collect();
+    let has_decimal_comma = lines.iter().any(|(_, _, fields)| {
+        let mut numbers = fields
+            .iter()
+            .zip(&columns)
+            .filter(|(_, column)| column.as_ref().is_some_and(|column| column.kind != CadColumn::Name));
+        separator != ',' && numbers.any(|((_, text), _)| proves_decimal_comma(text))
+    });
     let mut rows = Vec::new();
     let mut faults = Vec::new();
-    for (at, line) in lines {
-        let fields = split_fields(at, line, separator);
+    for (at, line, fields) in lines {
         if fields.len() > columns.len() {
             faults.push(CadFault::new(
                 at..at + line.trim_end().len(),
@@ -72,7 +84,7 @@ pub(super) fn read_table(
             ));
             continue;
         }
-        match read_row(at, line, &fields, &columns, separator, stated) {
+        match read_row(at, line, &fields, &columns, has_decimal_comma, stated) {
             Ok(row) => rows.push(row),
             Err(fault) => faults.push(fault),
         }
@@ -87,7 +99,7 @@ pub(super) fn read_table(
     if faults.is_empty() { Ok(rows) } else { Err(faults) }
 }
 
-/// The columns of a header. Columns that are not known are ignored, as notes and materials are.
+/// The columns of a header. Columns that are not known are ignored, as notes and materials are, but not inertias.
 fn read_header(
     header: &[Field<'_>],
     units: &CadUnits,
@@ -99,6 +111,14 @@ fn read_header(
         let range = *at..at + text.len();
         let (name, unit) = split_unit(text);
         let Some(kind) = column_of(name) else {
+            if looks_like_inertia(name) || unit.is_some_and(|unit| inertia_factor(unit).is_ok()) {
+                faults.push(CadFault::new(
+                    range,
+                    format!("the column `{name}` seems to be an inertia, but this name is not known"),
+                    "`Ixx`, `Iyy`, `Izz`, `Ixy`, `Ixz`, `Iyz`, or `Lxx` to `Lyz` about the centre of mass; rename this \
+                     column, or delete it if it is not needed",
+                ));
+            }
             columns.push(None);
             continue;
         };
@@ -143,11 +163,22 @@ fn read_header(
             )),
         }
     }
-    let has = |wanted: &dyn Fn(CadColumn) -> bool| columns.iter().flatten().any(|column| wanted(column.kind));
     let whole = header.first().map_or(0..0, |first| {
         let last = header.last().unwrap_or(first);
         first.0..last.0 + last.1.len()
     });
+    check_columns(&columns, whole, stated, &mut faults);
+    if faults.is_empty() { Ok(columns) } else { Err(faults) }
+}
+
+/// Faults of a header that lacks columns, or whose columns contradict the rig file.
+fn check_columns(
+    columns: &[Option<ScaledColumn>],
+    whole: Range<usize>,
+    stated: StatedConventions,
+    faults: &mut Vec<CadFault>,
+) {
+    let has = |wanted: &dyn Fn(CadColumn) -> bool| columns.iter().flatten().any(|column| wanted(column.kind));
     let mut require = |is_there: bool, what: &str, help: &str| {
         if !is_there {
             faults.push(CadFault::new(
@@ -177,7 +208,29 @@ fn read_header(
         "`inertia = \"centre\"` (about the centre of mass) or `inertia = \"origin\"` in `[[mass_properties]]`, or columns \
          `Lxx`, `Lxy` ... about the centre of mass",
     );
-    if faults.is_empty() { Ok(columns) } else { Err(faults) }
+    let about =
+        |wanted| has(&|kind| matches!(kind, CadColumn::Moment(_, point) if point.or(stated.point) == Some(wanted)));
+    let is_contradicted = stated
+        .point
+        .is_some_and(|point| has(&|kind| matches!(kind, CadColumn::Moment(..))) && !about(point));
+    if is_contradicted {
+        faults.push(CadFault::new(
+            whole,
+            "the columns of this table state another point of the inertia than `inertia` in `[[mass_properties]]`",
+            "delete `inertia`, or rename the columns",
+        ));
+    }
+}
+
+/// Whether a name has the form of a moment or product of inertia, such as `Jxx`, `MOI_xy` or `Ixx_com`.
+fn looks_like_inertia(name: &str) -> bool {
+    let lower = name.to_lowercase();
+    let is_pair = |text: &str| text.len() == 2 && text.bytes().all(|c| matches!(c, b'x' | b'y' | b'z'));
+    let is_entry = |word: &str| {
+        let rest = word.strip_prefix("moi").or(word.strip_prefix(['i', 'j', 'l', 'p']));
+        is_pair(word) || rest.is_some_and(|rest| rest.get(..2).is_some_and(is_pair))
+    };
+    lower.contains("inertia") || lower.split(|c: char| !c.is_alphanumeric()).any(is_entry)
 }
 
 /// One row.
@@ -186,7 +239,7 @@ fn read_row(
     line: &str,
     fields: &[Field<'_>],
     columns: &[Option<ScaledColumn>],
-    separator: char,
+    has_decimal_comma: bool,
     stated: StatedConventions,
 ) -> Result<CadRow, CadFault> {
     let span = at..at + line.trim_end().len();
@@ -195,7 +248,8 @@ fn read_row(
     let mut centre = [None; 3];
     // Moments and products about the centre, and about the origin.
     let mut moments = [[None; 3]; 2];
-    let mut products = [[0.0; 3]; 2];
+    let mut products = [[None; 3]; 2];
+    let mut least_place: Option<f64> = None;
     for ((place, text), column) in fields.iter().zip(columns) {
         let Some(column) = column else { continue };
         if column.kind == CadColumn::Name {
@@ -205,21 +259,11 @@ fn read_row(
         if text.is_empty() {
             continue;
         }
-        let number = if separator == ',' {
-            text.parse()
-        } else {
-            text.replace(',', ".").parse::<f64>()
-        };
-        let value = match number {
-            Ok(value) if f64::is_finite(value) => value * column.factor,
-            _ => {
-                return Err(CadFault::new(
-                    *place..place + text.len(),
-                    format!("`{}` is not a number", text.chars().take(40).collect::<String>()),
-                    "a finite number, without a unit",
-                ));
-            }
-        };
+        let PrintedNumber { value, place } = read_field(*place, text, has_decimal_comma)?;
+        let value = value * column.factor;
+        if matches!(column.kind, CadColumn::Moment(..) | CadColumn::Product(..)) {
+            least_place = Some(least_place.unwrap_or(f64::INFINITY).min(place * column.factor));
+        }
         let index = |point: Option<InertiaPoint>| usize::from(point.or(stated.point) == Some(InertiaPoint::Origin));
         match column.kind {
             CadColumn::Name => {}
@@ -227,7 +271,7 @@ fn read_row(
             CadColumn::Volume => volume = Some(value),
             CadColumn::Centre(k) => centre[k] = Some(value),
             CadColumn::Moment(k, point) => moments[index(point)][k] = Some(value),
-            CadColumn::Product(k, point) => products[index(point)][k] = value,
+            CadColumn::Product(k, point) => products[index(point)][k] = Some(value),
         }
     }
     let missing = |what: &str| {
@@ -242,22 +286,28 @@ fn read_row(
         return Err(missing("complete centre of mass"));
     };
     let mut inertias = Vec::new();
+    let mut has_products = false;
     for (k, about) in [InertiaPoint::Centre, InertiaPoint::Origin].into_iter().enumerate() {
         let told = moments[k];
         // A planar table has zz alone.
-        if told.iter().all(Option::is_none) {
-            continue;
+        match told.iter().flatten().count() {
+            0 => continue,
+            2 => return Err(missing("complete inertia, but two of three moments")),
+            _ => {}
         }
+        has_products |= products[k].iter().all(Option::is_some);
         inertias.push(PrintedInertia {
             about,
             moments: Vector3::from(told.map(Option::unwrap_or_default)),
-            products: Vector3::from(products[k]),
+            products: Vector3::from(products[k].map(Option::unwrap_or_default)),
         });
     }
     Ok(CadRow {
         name,
         span: span.clone(),
         volume,
+        has_products,
+        place: least_place,
         body: PrintedBody {
             mass,
             centre: Vector3::new(x, y, z),
@@ -265,6 +315,25 @@ fn read_row(
             principal: None,
             stated: stated.sign,
         },
+    })
+}
+
+/// The number of a field.
+fn read_field(place: usize, text: &str, has_decimal_comma: bool) -> Result<PrintedNumber, CadFault> {
+    read_number(text, has_decimal_comma).map_err(|fault| {
+        let short: String = text.chars().take(40).collect();
+        let (message, expected) = match fault {
+            PrintedNumberFault::Unclear if has_decimal_comma => (
+                format!("`{short}` has a point, and other numbers of this table have a decimal comma"),
+                "decimal signs of one kind, and no separators of thousands",
+            ),
+            PrintedNumberFault::Unclear => (
+                format!("`{short}` has a decimal comma or separates thousands"),
+                CLEAR_NUMBERS,
+            ),
+            _ => (format!("`{short}` is not a number"), "a finite number, without a unit"),
+        };
+        CadFault::new(place..place + text.len(), message, expected)
     })
 }
 

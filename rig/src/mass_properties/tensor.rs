@@ -38,6 +38,17 @@ pub(super) struct PrintedInertia {
     pub(super) products: Vector3<f64>,
 }
 
+impl PrintedInertia {
+    /// The axis of the only moment that is stated, as for a planar model; none if there are several or products.
+    fn lone_moment(&self) -> Option<usize> {
+        let stated: Vec<usize> = (0..3).filter(|k| self.moments[*k] != 0.0).collect();
+        match stated[..] {
+            [k] if self.products == Vector3::zeros() => Some(k),
+            _ => None,
+        }
+    }
+}
+
 /// Principal moments as they are printed, kg m^2, with the unit vectors of their axes if the report has them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct PrintedPrincipalMoments {
@@ -168,6 +179,16 @@ fn tensor_about_centre(body: &PrintedBody, printed: &PrintedInertia, sign: Produ
     };
     let [xy, xz, yz] = [0, 1, 2].map(|k| factor * printed.products[k]);
     let m = printed.moments;
+    if let Some(k) = printed.lone_moment() {
+        let shift = if printed.about == InertiaPoint::Origin {
+            steiner(body)[(k, k)]
+        } else {
+            0.0
+        };
+        let mut tensor = Matrix3::zeros();
+        tensor[(k, k)] = m[k] - shift;
+        return tensor;
+    }
     let tensor = Matrix3::new(m.x, xy, xz, xy, m.y, yz, xz, yz, m.z);
     match printed.about {
         InertiaPoint::Centre => tensor,
@@ -353,6 +374,32 @@ mod tests {
             ..body
         };
         assert!((determine_inertia(&stated).expect("an inertia").tensor - truth).amax() < 1e-12);
+    }
+
+    #[test]
+    fn a_lone_moment_is_moved_to_the_centre() {
+        // A body of a planar model: its moment about the origin is that about the centre and Steiner's term.
+        let (mass, centre, moment) = (2.5, Vector3::new(0.4, -0.3, 0.7), 0.06);
+        for k in 0..3 {
+            let distance = centre.norm_squared() - centre[k] * centre[k];
+            let mut moments = Vector3::zeros();
+            moments[k] = moment + mass * distance;
+            let body = PrintedBody {
+                mass,
+                centre,
+                inertias: vec![PrintedInertia {
+                    about: InertiaPoint::Origin,
+                    moments,
+                    products: Vector3::zeros(),
+                }],
+                principal: None,
+                stated: None,
+            };
+            let mut truth = Matrix3::zeros();
+            truth[(k, k)] = moment;
+            let found = determine_inertia(&body).expect("an inertia").tensor;
+            assert!((found - truth).amax() < 1e-12, "{found}");
+        }
     }
 
     #[test]

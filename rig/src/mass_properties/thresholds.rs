@@ -19,5 +19,12 @@ pub(super) const INERTIA_AGREEMENT: f64 = 0.01;
 /// A thin plate fulfils it with equality, and values are rounded to a few digits. By judgement.
 pub(super) const TRIANGLE_SLACK: f64 = 2e-3;
 
+/// Two statements of one value count as the same up to this share (1): conversions of units round.
+pub(super) const SAME_VALUE: f64 = 1e-9;
+
+/// Moments of inertia below this number of units of their last printed place are remarked (1): three digits, so that
+/// rounding changes them by at most 0.5 %. By judgement.
+pub(super) const FEWEST_UNITS: f64 = 100.0;
+
 /// Densities of solid parts, kg/m^3: from plastic foam and hollow sheet metal to tungsten (19 300) and osmium (22 600).
 pub(super) const DENSITIES: std::ops::RangeInclusive<f64> = 100.0..=25_000.0;

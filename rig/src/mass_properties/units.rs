@@ -58,8 +58,8 @@ pub(super) fn volume_factor(text: &str) -> Result<f64, UnknownCadUnit> {
 pub(super) fn inertia_factor(text: &str) -> Result<f64, UnknownCadUnit> {
     let unknown = || UnknownCadUnit(text.trim().to_owned());
     let lower = text.to_lowercase();
-    // A product of mass and length without the square is another quantity.
-    if !lower.contains(['2', '²']) && !lower.contains("square") {
+    // A product of mass and length without the square is another quantity, as is a mass per area.
+    if !lower.contains(['2', '²']) && !lower.contains("square") || lower.contains('/') {
         return Err(unknown());
     }
     let words: Vec<&str> = unit_words(&lower).filter(|word| *word != "square").collect();
@@ -121,6 +121,7 @@ mod tests {
         assert_close(volume_factor("cubic millimeters"), 1e-9);
         assert_close(mass_factor(" grams "), 1e-3);
         // A moment of mass is no inertia, and a bare number no unit.
+        assert!(inertia_factor("kg/m^2").is_err());
         assert!(inertia_factor("kg m").is_err() && inertia_factor("").is_err() && length_factor("kg").is_err());
     }
 }

@@ -341,7 +341,7 @@ fn missing_and_impossible_values_are_refused() {
             assembly,
             format!("{head}\nG1,1,0,0,0,1,1,3,0\n"),
             "all.csv:2:1",
-            "no body has the inertia",
+            "the inertia of `G1` is impossible",
         ),
         (
             assembly,
@@ -387,4 +387,234 @@ fn improbable_densities_are_remarked() {
     let loaded = rig_with("coordinates = \"assembly\"", "G1.txt", &text).expect("a rig");
     assert_eq!(loaded.remarks.len(), 1);
     assert!(loaded.remarks[0].message.contains("density"), "{:?}", loaded.remarks);
+}
+
+/// The failure of a rig with one file of mass properties.
+fn failure_of(entry: &str, name: &str, text: &str) -> String {
+    match rig_with(&format!("coordinates = \"assembly\"\n{entry}"), name, text) {
+        Ok(loaded) => panic!("accepted: {}\n{text}", loaded.rig.bodies[0].inertia),
+        Err(says) => says,
+    }
+}
+
+/// The remarks on a rig with one table about the centre of mass.
+fn remarks_on(text: &str) -> String {
+    let entry = "coordinates = \"assembly\"\ninertia = \"centre\"\nproducts = \"negative\"";
+    let loaded = rig_with(entry, "all.csv", text).unwrap_or_else(|says| panic!("{says}"));
+    let says: Vec<String> = loaded.remarks.iter().map(|remark| remark.message.clone()).collect();
+    says.join("\n")
+}
+
+/// A misspelt inertia would make a body a point mass without a word.
+#[test]
+fn columns_that_seem_to_be_inertias_are_refused() {
+    let head = "name,mass [kg],x [m],y [m],z [m]";
+    for column in [
+        "Ixx_com [kg m^2]",
+        "Jxx",
+        "MOI_xx",
+        "Pxy",
+        "inertia about x",
+        "third moment [g mm^2]",
+    ] {
+        let says = failure_of(
+            "inertia = \"centre\"",
+            "all.csv",
+            &format!("{head},{column}\nG1,1,0,0,0,1.00\n"),
+        );
+        assert!(
+            says.contains("seems to be an inertia") && says.contains("`Lxx`"),
+            "{says}"
+        );
+    }
+    // Other columns are notes.
+    let says = remarks_on(&format!(
+        "{head},max_x [mm],area [mm^2],areal weight [kg/m^2]\nG1,1,0,0,0,3,4,5\n"
+    ));
+    assert!(says.contains("`G1`") && says.contains("point mass"), "{says}");
+}
+
+/// What makes an inertia incomplete is remarked: absent products, zeros, few digits. Two of three moments are refused.
+#[test]
+fn incomplete_inertias_are_remarked() {
+    let head = "name,mass [kg],x [m],y [m],z [m],Ixx [kg m^2],Iyy [kg m^2],Izz [kg m^2]";
+    let full = format!("{head},Ixy [kg m^2],Ixz [kg m^2],Iyz [kg m^2]");
+    let cases = [
+        (head, "1.00,1.10,1.20", "not all products"),
+        (&full, "0.00,0.00,0.00,0,0,0", "all moments of inertia of `G1` are zero"),
+        (&full, "0.02,0.03,0.04,0,0,0", "fewer than three digits"),
+        (&full, "0.0212,0.0334,0.0413,0,0,0", ""),
+        (&full, "2.12e-5,3.34e-5,4.13e-5,0,0,0", ""),
+    ];
+    for (head, row, expected) in cases {
+        let says = remarks_on(&format!("{head}\nG1,1,0,0,0,{row}\n"));
+        assert!(
+            says.contains(expected) && (!expected.is_empty() || says.is_empty()),
+            "{row}: {says}"
+        );
+    }
+    let says = failure_of(
+        "inertia = \"centre\"",
+        "all.csv",
+        &format!("{head}\nG1,1,0,0,0,1.00,,1.00\n"),
+    );
+    assert!(says.contains("two of three moments"), "{says}");
+}
+
+/// A comma may separate thousands. One other number proves that it is a decimal sign.
+#[test]
+fn commas_that_may_separate_thousands_are_refused() {
+    let head = "name;mass [kg];x [m];y [m];z [m];Izz [kg m^2]";
+    let says = failure_of(
+        "inertia = \"centre\"",
+        "all.csv",
+        &format!("{head}\nG1;1,234;0;0;0;2\n"),
+    );
+    assert!(says.contains("separates thousands"), "{says}");
+    let entry = "coordinates = \"assembly\"\ninertia = \"centre\"";
+    let loaded = rig_with(entry, "all.csv", &format!("{head}\nG1;1,234;0,25;0;0;2\n")).expect("a rig");
+    assert!((loaded.rig.bodies[0].mass - 1.234).abs() < 1e-12);
+    let says = failure_of(
+        "inertia = \"centre\"",
+        "all.csv",
+        &format!("{head}\nG1;1.234;0,25;0;0;2\n"),
+    );
+    assert!(
+        says.contains("other numbers of this table have a decimal comma"),
+        "{says}"
+    );
+
+    let report = onshape(&planted(2));
+    let mass = report.lines().find(|line| line.starts_with("Mass:")).expect("a mass");
+    for number in ["1.234,56", "1,234", "1.234.567"] {
+        let says = failure_of("", "G1.txt", &report.replace(mass, &format!("Mass: {number} kg")));
+        assert!(
+            says.contains(&format!("`{number}` has a decimal comma or separates thousands")),
+            "{says}"
+        );
+    }
+    // A line that nobody needs may have any number.
+    let text = format!("{report}\nMass: ").replace("\nMass: ", "\nDensity: 7,850 g/cm^3\nMass: ");
+    let text = text.trim_end_matches("Mass: ");
+    let loaded = rig_with("coordinates = \"assembly\"\nproducts = \"negative\"", "G1.txt", text);
+    assert_body(
+        &loaded.unwrap_or_else(|says| panic!("{says}")),
+        &planted(2),
+        1e-6,
+        "density",
+    );
+}
+
+/// Two reports without a title that is known would become one body with the values of the last.
+#[test]
+fn values_that_are_stated_twice_are_refused() {
+    let untitled = |seed| solid_edge(&planted(seed));
+    let both = format!("{}\n{}", untitled(1), untitled(2));
+    let says = failure_of("body = \"G1\"", "two.txt", &both);
+    for what in [
+        "the mass is",
+        "the centre of mass is",
+        "entry `ixx` is",
+        "entry `ixy` is",
+    ] {
+        assert!(says.contains(&format!("{what} stated twice")), "{what}: {says}");
+    }
+    let twice = format!("{}\n{}", untitled(1), untitled(1));
+    assert!(rig_with("coordinates = \"assembly\"\nbody = \"G1\"", "two.txt", &twice).is_ok());
+    let (mut lines, report) = (0, onshape(&planted(1)));
+    let asymmetric: String = report
+        .split_inclusive('\t')
+        .map(|word| {
+            lines += usize::from(word.starts_with("Lyx"));
+            if word.starts_with("Lyx") {
+                "Lyx: 0.123\t".to_owned()
+            } else {
+                word.to_owned()
+            }
+        })
+        .collect();
+    assert_eq!(lines, 1);
+    let says = failure_of("products = \"negative\"", "G1.txt", &asymmetric);
+    assert!(says.contains("product of inertia xy is stated twice"), "{says}");
+    let several = solidworks(&planted(1), -1.0).replace("of G1", "of selected components");
+    assert!(failure_of("", "some.txt", &several).contains("has no name"));
+}
+
+/// SolidWorks since 2019 states its notation. The truth is the sum over the point masses, without the code under test.
+#[test]
+fn the_positive_notation_of_solidworks_is_read() {
+    let points = [
+        (1.0, [0.3, 0.1, 0.2]),
+        (2.0, [-0.2, -0.3, 0.1]),
+        (1.0, [0.1, 0.5, -0.4]),
+    ];
+    // All sums of m x, m y and m z vanish, so that the origin is the centre of mass.
+    let sum = |i: usize, j: usize| {
+        points
+            .iter()
+            .map(|(m, p): &(f64, [f64; 3])| m * p[i] * p[j])
+            .sum::<f64>()
+    };
+    for k in 0..3 {
+        assert!(points.iter().map(|(m, p)| m * p[k]).sum::<f64>().abs() < 1e-15);
+    }
+    let report = |notation: &str, sign: f64| {
+        let moment = |k: usize| sum((k + 1) % 3, (k + 1) % 3) + sum((k + 2) % 3, (k + 2) % 3);
+        format!(
+            "Mass properties of G1\nMass = 4.00 kilograms\nCenter of mass: ( meters )\n\tX = 0.00\n\tY = 0.00\n\tZ = 0.00\n\
+             Moments of inertia: ( kilograms * square meters )\nTaken at the center of mass and aligned with the output \
+             coordinate system. (Using {notation} tensor notation.)\n\tLxx = {:.6}\tLxy = {:.6}\tLxz = {:.6}\n\tLyx = \
+             {:.6}\tLyy = {:.6}\tLyz = {:.6}\n\tLzx = {:.6}\tLzy = {:.6}\tLzz = {:.6}\n",
+            moment(0),
+            sign * sum(0, 1),
+            sign * sum(0, 2),
+            sign * sum(0, 1),
+            moment(1),
+            sign * sum(1, 2),
+            sign * sum(0, 2),
+            sign * sum(1, 2),
+            moment(2)
+        )
+    };
+    assert!(sum(0, 1) > 0.1);
+    for (notation, sign) in [("positive", 1.0), ("negative", -1.0)] {
+        let text = report(notation, sign);
+        let loaded = rig_with("coordinates = \"assembly\"", "G1.txt", &text).unwrap_or_else(|says| panic!("{says}"));
+        let tensor = loaded.rig.bodies[0].inertia;
+        for (i, j) in [(0, 1), (0, 2), (1, 2)] {
+            assert!((tensor[(i, j)] + sum(i, j)).abs() < 1e-6, "{notation}: {tensor}");
+        }
+        // The rig file may not state the contrary, nor another point.
+        let other = if sign > 0.0 { "negative" } else { "positive" };
+        let says = failure_of(&format!("products = \"{other}\""), "G1.txt", &text);
+        assert!(says.contains("states the contrary"), "{says}");
+        let says = failure_of("inertia = \"origin\"", "G1.txt", &text);
+        assert!(says.contains("about the centre of mass"), "{says}");
+    }
+}
+
+/// Mass properties of a variant would replace the body of the base file with its pose.
+#[test]
+fn mass_properties_of_a_variant_keep_no_pose_silently() {
+    let truth = planted(4);
+    let base = "schema = 1\nname = \"arm\"\ngravity = [0, -9.81, 0]\n\n[[body]]\nname = \"G1\"\nat = [0.1, 0.2, 0]\nmass = 1\n\n\
+                [[joint]]\nname = \"hinge\"\nkind = \"revolute\"\nbetween = [\"base\", \"G1\"]\nat = [0.1, 0.2, 0]\n\n[[coordinate]]\n\
+                name = \"q\"\njoint = \"hinge\"\n\n[[drive]]\nname = \"motor\"\njoint = \"hinge\"\n";
+    let variant = |body: &str| {
+        let text = format!(
+            "schema = 1\nname = \"heavy\"\nextends = \"arm.toml\"\n\n[[mass_properties]]\nfile = \"G1.txt\"\ncoordinates = \
+             \"assembly\"\n{body}"
+        );
+        let files = MemoryFiles::default()
+            .with_file("arm.toml", base)
+            .with_file("G1.txt", solidworks(&truth, -1.0));
+        load("heavy.toml", &text, &files).map_err(|failure| failure.render(false))
+    };
+    let says = variant("").expect_err("a lost pose");
+    assert!(
+        says.contains("`G1` of `arm.toml`, which has a pose") && says.contains("heavy.toml:6:8"),
+        "{says}"
+    );
+    let loaded = variant("\n[[body]]\nname = \"G1\"\n").unwrap_or_else(|says| panic!("{says}"));
+    assert_body(&loaded, &truth, 1e-6, "variant");
 }
