@@ -38,7 +38,10 @@ fn deep_bodies_and_elements_of_many_attributes_are_refused_with_their_place() {
         "</body>".repeat(2500)
     );
     let fault = import(&deep, &ImportOptions::default()).unwrap_err().to_string();
-    assert!(fault.contains("line 200") && fault.contains("too deep"), "{fault}");
+    assert!(
+        fault.contains("line 200") && fault.contains("nested more than 200 levels deep"),
+        "{fault}"
+    );
     let attributes = (0..200_000).fold(String::new(), |text, k| text + &format!(" x{k}='1'"));
     let wide = format!("<robot name='r'>\n<link name='a'{attributes}/></robot>");
     let fault = import(&wide, &ImportOptions::default()).unwrap_err().to_string();
