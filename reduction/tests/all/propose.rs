@@ -79,6 +79,7 @@ fn seventeen_bodies_become_the_structure_of_the_paper() {
         let (model, plan) = proposed_model(&load(&path, &text));
         assert_eq!(structure(&model), expected, "seed {seed}\n{plan}\n{model}");
         if seed == 0 {
+            assert!(plan.contains("the error of each statement"), "{plan}");
             assert_eq!(n_base(&model), n_base(&bundled), "{plan}\n{model}");
         }
     }
