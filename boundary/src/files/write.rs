@@ -28,7 +28,7 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
     write_together(&[(path, bytes)])
 }
 
-/// Writes several files as one act: all of them, each as [`write`] does, or none.
+/// Writes several files as one act: all of them, each as [`write()`] does, or none.
 ///
 /// If the program is stopped between the replacements, some files are new and others are old; each is complete.
 pub fn write_together(files: &[(&Path, &[u8])]) -> Result<(), FileError> {
