@@ -58,6 +58,16 @@ impl ChannelRegressor {
         self.channels.first().map_or(0, |c| c.rows.nrows())
     }
 
+    /// The row of a channel at a sample, all columns.
+    pub(super) fn row(&self, channel: usize, sample: usize) -> DVector<f64> {
+        let channel = &self.channels[channel];
+        let mut row = DVector::zeros(self.columns);
+        for (own, k) in channel.column_indices.iter().enumerate() {
+            row[*k] = channel.rows[(sample, own)];
+        }
+        row
+    }
+
     /// The rows of some channels, in the order of `kept`, with all columns.
     #[must_use]
     pub fn select_channels(&self, kept: &[usize]) -> Self {

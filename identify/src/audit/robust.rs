@@ -29,6 +29,30 @@ pub struct RobustFit {
     pub weights: DVector<f64>,
 }
 
+impl RobustFit {
+    /// Standard deviation of the fitted value of a channel at some samples, as a multiple of the deviation of its
+    /// residual if all errors are independent (1). Rows without weight count as predicted. `None` if the normal equations
+    /// are not positive definite.
+    pub fn relative_deviations(
+        &self,
+        regressor: &ChannelRegressor,
+        channel: usize,
+        samples: &[usize],
+    ) -> Option<Vec<f64>> {
+        let nothing = DVector::zeros(self.weights.len());
+        let (normal, _) = regressor.normal_equations(&self.weights, &nothing, 0..regressor.samples());
+        let (factor, scale) = factor_normal(normal)?;
+        // The weight of a row without error is the inverse variance of its channel.
+        let weight = (channel..self.weights.len()).step_by(regressor.channels());
+        let weight = weight.fold(0.0_f64, |most, row| most.max(self.weights[row]));
+        let deviation = |sample: &usize| {
+            let row = regressor.row(channel, *sample).component_mul(&scale);
+            (weight * row.dot(&factor.solve(&row)).max(0.0)).sqrt()
+        };
+        Some(samples.iter().map(deviation).collect())
+    }
+}
+
 /// Fits measured values that are interleaved per sample, `row = sample * channels + channel`; only rows for which
 /// `counts` is true are used. `None` if a number is not finite or no row is used.
 pub fn robust_fit(regressor: &ChannelRegressor, measured: &DVector<f64>, counts: &[bool]) -> Option<RobustFit> {

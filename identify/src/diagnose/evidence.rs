@@ -25,8 +25,8 @@ use super::pool::{FitScope, dot, solve_gram};
 use super::rejection::RejectionReason;
 use super::thresholds::{
     BLOCKS_LEAST_T, EXPLICABLE_LEAST_NOISE_RATIO, GIVEN_BACK_LEAST_T, GIVEN_BACK_MOST_SHARE, LARGE_GAIN, LEAST_GAIN,
-    LEAST_SHARES_T, MATERIAL_LEAST_GAIN, MIN_SHARE_OF_FORCE, MIN_SHARE_OF_OTHERS, NOISE_LEAST_GAIN_VARIANCES,
-    NOISE_LEAST_T, WHITE_LEAST_EFFECTIVE_SHARE, WHITE_MOST_NOISE_RATIO,
+    LEAST_SHARES_T, MATERIAL_LEAST_GAIN, MIN_SHARE_OF_FORCE, MIN_SHARE_OF_OTHERS, MIN_SHARE_OF_REMOVED,
+    NOISE_LEAST_GAIN_VARIANCES, NOISE_LEAST_T, WHITE_LEAST_EFFECTIVE_SHARE, WHITE_MOST_NOISE_RATIO,
 };
 
 /// Number of blocks into which the error of a segment is divided.
@@ -170,7 +170,8 @@ impl EffectSelector<'_> {
             least_gain: {
                 // Weights are one over the variance of the residual, which is the noise where it is known.
                 let of_noise = NOISE_LEAST_GAIN_VARIANCES / total.max(f64::MIN_POSITIVE);
-                if !self.is_above_smoothing_error(old_squares - new_squares, channels) {
+                let less = old_squares - new_squares;
+                if !self.is_above_smoothing_error(less, channels) || !self.is_above_removed_error(less, channels) {
                     f64::INFINITY
                 } else if is_noise_known {
                     of_noise.clamp(MATERIAL_LEAST_GAIN, LEAST_GAIN)
@@ -210,6 +211,15 @@ impl EffectSelector<'_> {
         };
         let is_exact = self.problem.fixed_forces.is_some() && self.problem.prior.is_none();
         !is_exact || less > MIN_SHARE_OF_FORCE * channels.iter().map(squares).sum::<f64>()
+    }
+
+    /// Whether a decrease of the squares is larger than the error that subtracting disturbances may leave.
+    fn is_above_removed_error(&self, less: f64, channels: &[usize]) -> bool {
+        let removed = |d: &usize| {
+            let samples = self.problem.measured_force(*d).len() as f64;
+            self.weights[*d] * samples * self.problem.removed.get(*d).copied().unwrap_or(0.0)
+        };
+        less > MIN_SHARE_OF_REMOVED * channels.iter().map(removed).sum::<f64>()
     }
 
     /// Squares of a residual relative to the white noise, mean over some channels.

@@ -50,6 +50,10 @@ pub(super) const WHITE_MOST_NOISE_RATIO: f64 = 1.5;
 /// By judgement.
 pub(super) const MIN_SHARE_OF_OTHERS: f64 = 1e-4;
 
+/// A gain below this part of the squares of subtracted disturbances (1) may be what they leave: their sizes and times are
+/// estimates. By judgement: a payload that differs by 1.5 kg left a Dahl friction of 0.8 % of its force.
+pub(super) const MIN_SHARE_OF_REMOVED: f64 = 3e-4;
+
 /// A gain below this part of a force's squares (1) may come from the smoothing of the positions. By judgement.
 pub(super) const MIN_SHARE_OF_FORCE: f64 = 1e-5;
 
@@ -101,6 +105,9 @@ pub(super) const PLAUSIBLE_MOST_DELAY: f64 = 0.1;
 
 /// Largest plausible friction as a share of the load (1): a drive with more could not move. By judgement.
 pub(super) const PLAUSIBLE_MOST_LOAD_SHARE: f64 = 1.0;
+
+/// Largest plausible error of a clock or a sampling rate (1). By judgement: larger ones are other units.
+pub(super) const PLAUSIBLE_MOST_CLOCK_SHARE: f64 = 0.1;
 
 /// A constant above this part of the largest value of its grid (1) is at the end of its range. By judgement.
 pub(super) const GRID_END_SHARE: f64 = 0.99;

@@ -28,8 +28,7 @@ impl AuditRows {
     /// The rows at some samples; `None` if a pose has no solution, or a value is not finite.
     pub(crate) fn new(model: &Model, data: &RecordingSegment, samples: &[usize]) -> Option<Self> {
         let around = DriveStencil::new(model, data, samples)?;
-        let mut rows = regressor(model, data, samples)?;
-        around.add_extra_columns(&mut rows, |further| further.values);
+        let rows = around.rows(model, data, samples)?;
         let n = around.rates[1].len();
         let mut accelerations = vec![Vec::with_capacity(samples.len()); n];
         for (d, accelerations) in accelerations.iter_mut().enumerate() {
@@ -37,11 +36,34 @@ impl AuditRows {
         }
         let [_, rates, _] = around.rates;
         let [_, time, _] = around.times;
-        rows.iter().all(|x| x.is_finite()).then(|| Self {
+        Some(Self {
             time,
             regressor: ChannelRegressor::new(&rows, n),
             motion: [around.positions, rates, accelerations],
         })
+    }
+
+    /// The regressor and the further columns at samples of several segments, the rows of one segment behind those of
+    /// another; `None` as for [`Self::new`].
+    pub(crate) fn joined_regressor(
+        model: &Model,
+        segments: &[RecordingSegment],
+        samples: &[Vec<usize>],
+    ) -> Option<ChannelRegressor> {
+        let mut joined: Option<DMatrix<f64>> = None;
+        for (data, samples) in segments.iter().zip(samples) {
+            let rows = DriveStencil::new(model, data, samples)?.rows(model, data, samples)?;
+            joined = Some(match joined {
+                None => rows,
+                Some(above) => {
+                    let (top, more) = (above.nrows(), rows.nrows());
+                    let mut both = above.resize_vertically(top + more, 0.0);
+                    both.rows_mut(top, more).copy_from(&rows);
+                    both
+                }
+            });
+        }
+        Some(ChannelRegressor::new(&joined?, model.derivation.mechanism.drives.len()))
     }
 
     /// The time derivative of the regressor and the further columns, per s.
@@ -109,6 +131,14 @@ impl DriveStencil {
             positions,
             rates: [before, rates, after],
         })
+    }
+
+    /// The regressor of a model with the further columns, rows interleaved per sample; `None` if a pose has no solution,
+    /// or a value is not finite.
+    fn rows(&self, model: &Model, data: &RecordingSegment, samples: &[usize]) -> Option<DMatrix<f64>> {
+        let mut rows = regressor(model, data, samples)?;
+        self.add_extra_columns(&mut rows, |further| further.values);
+        rows.iter().all(|x| x.is_finite()).then_some(rows)
     }
 
     /// The time between the samples before and after sample `i`, s.

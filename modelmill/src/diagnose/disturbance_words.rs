@@ -113,6 +113,19 @@ pub fn disturbance(one: &Disturbance) -> String {
         "different_runs" => {
             format!("the friction of {at} differs from the fixed values of the model: {all}")
         }
+        "time_base" if one.estimates.iter().any(|value| value.name == "share") => {
+            let share = one.estimates.iter().find(|value| value.name == "share");
+            let (percent, deviation) = share.map_or((0.0, None), |e| {
+                (100.0 * e.value, e.standard_deviation.map(|std| 100.0 * std))
+            });
+            let deviation = deviation.map_or_else(String::new, |std| format!(" ± {}", significant(std, 2)));
+            let is = if percent > 0.0 { "longer" } else { "shorter" };
+            format!(
+                "recorded times are {}{deviation} % {is} than true ones, as with a clock or a sampling rate that is not the \
+                 stated one",
+                significant(percent.abs(), 3)
+            )
+        }
         "encoder_zero" => {
             format!("the encoder of {at} has a constant offset, since its zero differs from that of the model: {all}")
         }

@@ -242,7 +242,8 @@ impl Model {
             faults::run_differences(self, &recordings)
         })??;
         let mut between = between;
-        let (answer, named) = search_effects(self, &data, held, &mut between)?;
+        let is_clock_in_question = !recordings.iter().any(|one| one.has_recorded_derivatives(self));
+        let (answer, named) = search_effects(self, &data, held, is_clock_in_question, &mut between)?;
         let judged = if data[1].is_empty() {
             ValidationMethod::CrossValidation
         } else {
@@ -432,6 +433,7 @@ fn nominal_diagnosis(findings: &DiagnosisFindings, between: &[RecordingDifferenc
         fixed: FixedParameters::All,
         in_full: false,
         run_differences: between,
+        is_clock_in_question: false,
         zeros: None,
     };
     let answer = problem::find_missing_effects(&version.model, &of(false), &of(true), query)?;
@@ -452,6 +454,7 @@ fn search_effects(
     model: &Model,
     data: &[Vec<RecordingSegment>; 2],
     held: FixedParameters,
+    is_clock_in_question: bool,
     between: &mut Vec<RecordingDifference>,
 ) -> Outcome<(DiagnosisSolution, Option<NamedZeros>)> {
     let find = |between: &[RecordingDifference], zeros: Option<&NamedZeros>| {
@@ -459,6 +462,7 @@ fn search_effects(
             fixed: held,
             in_full: true,
             run_differences: between,
+            is_clock_in_question,
             zeros,
         };
         problem::find_missing_effects(model, &data[0], &data[1], asked)

@@ -14,6 +14,9 @@ use crate::error::{Error, Outcome};
 use crate::model::Model;
 use crate::recording::PreparedRecording;
 use crate::segment::RecordingSegment;
+use crate::text::table::significant;
+
+use super::thresholds::FEWEST_SAMPLES;
 
 /// Segments with fewer samples are not decimated here. By judgement.
 const LONG: usize = 150_000;
@@ -29,13 +32,48 @@ const ORDER: usize = 4;
 
 impl PreparedRecording {
     /// The recording with its long segments decimated to the samples that a diagnosis needs. This saves memory if the
-    /// recording is not needed for anything else. Segments that are not long stay unchanged.
+    /// recording is not needed for anything else. Segments that are not long stay unchanged. Segments between gaps that
+    /// are too short for a diagnosis are left out, with a note, if any is long enough.
     ///
     /// Fails if a segment cannot be filtered.
     pub fn for_diagnosis(&self, model: &Model) -> Outcome<Self> {
-        let stretches = self.segments.iter().map(|one| thin_out(model, one));
-        Ok(self.with_segments(stretches.collect::<Outcome<_>>()?))
+        let segments = self.segments.iter().map(|one| thin_out(model, one));
+        Ok(self.with_segments(without_short_ones(
+            model,
+            self.file(),
+            segments.collect::<Outcome<_>>()?,
+        )))
     }
+}
+
+/// The segments that have enough samples for a diagnosis; all of them if none has.
+fn without_short_ones(model: &Model, file: &str, segments: Vec<RecordingSegment>) -> Vec<RecordingSegment> {
+    let is_long = |one: &RecordingSegment| one.samples().div_ceil(one.decimation()) >= FEWEST_SAMPLES;
+    if segments.iter().all(is_long) || !segments.iter().any(is_long) {
+        return segments;
+    }
+    let all = segments.len();
+    let (mut kept, short): (Vec<_>, Vec<_>) = segments.into_iter().partition(is_long);
+    let kept_count = kept.len();
+    let lost: usize = short.iter().map(RecordingSegment::samples).sum();
+    let every: usize = lost + kept.iter().map(RecordingSegment::samples).sum::<usize>();
+    if let Some(first) = kept.first_mut() {
+        // What was found in the recording is noted at its first segment.
+        for one in short {
+            first.run.notes.extend(one.run.notes);
+            first.faults.extend(one.faults);
+        }
+        let share = significant(100.0 * lost as f64 / every as f64, 2);
+        first.note(
+            model,
+            RecordingNote::warning(format!(
+                "{} of the {all} segments between gaps of {file} are too short for a diagnosis and are left out, {share} % \
+                 of its samples: they have fewer than {FEWEST_SAMPLES} samples after decimation.",
+                all - kept_count,
+            )),
+        );
+    }
+    kept
 }
 
 /// A segment in fewer samples, if it is long and the parallel filter keeps few of them.

@@ -29,6 +29,7 @@
 
 pub(crate) mod added_effects;
 mod candidates;
+mod clock;
 mod columns;
 mod completed;
 mod completion;

@@ -19,6 +19,7 @@ use crate::text::table::count;
 use modelmill_identify::RecordingNote;
 
 use super::candidates::{DerivedCandidates, candidates};
+use super::clock::clock;
 use super::columns::{self, CandidateOrigin, load_dependent_columns, refined_columns};
 use super::constants::constants;
 use super::contacts::{drop_doubtful_contacts, leave_out_late_contacts};
@@ -92,6 +93,8 @@ pub(crate) struct DiagnosisQuery<'a> {
     pub in_full: bool,
     /// Differences between the recordings.
     pub run_differences: &'a [RecordingDifference],
+    /// Whether the clock of the recordings may be wrong: a recorded rate would show that by itself.
+    pub is_clock_in_question: bool,
     /// Zeros of the model file that are candidates as wrong constants.
     pub zeros: Option<&'a NamedZeros>,
 }
@@ -139,6 +142,9 @@ pub(crate) fn find_missing_effects(
     let values = encoders::values(model, &problem, held);
     let slopes = encoders::sensitivities(model, &all, &values);
     further.extend(encoders::zeros(model, &slopes));
+    if query.is_clock_in_question {
+        further.extend(clock(model, &all, &slopes));
+    }
     further.extend(encoders(model, &all, &problem, &slopes));
     further.extend(gears(model, &all, &values, &slopes)?);
     further.extend(constants(model, &all, query.zeros, &|k| is_fixed(model, held, k)));

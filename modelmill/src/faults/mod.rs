@@ -57,13 +57,15 @@ pub enum RecordingFaultKind {
     DeadChannel,
     /// A force stays at one value although the model predicts another.
     FrozenForce,
+    /// A force is cut off at a value, although the model predicts larger ones.
+    ForceLimit,
     /// Brakes hold the joints, and the drives are off.
     Brakes,
 }
 
 impl RecordingFaultKind {
     /// All kinds.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::TimeBase,
         Self::Units,
         Self::ExchangedColumns,
@@ -72,6 +74,7 @@ impl RecordingFaultKind {
         Self::Wrapped,
         Self::DeadChannel,
         Self::FrozenForce,
+        Self::ForceLimit,
         Self::Brakes,
     ];
 
@@ -86,6 +89,7 @@ impl RecordingFaultKind {
             Self::Wrapped => "wrapped",
             Self::DeadChannel => "dead_channel",
             Self::FrozenForce => "frozen_force",
+            Self::ForceLimit => "force_limit",
             Self::Brakes => "brakes",
         }
     }

@@ -133,6 +133,28 @@ pub(super) const SILENCE_MOTION_SHARE: f64 = 0.05;
 /// judgement: readings with a dead band or coarse steps repeat often.
 pub(super) const FROZEN_MOST_REPEATS: f64 = 0.05;
 
+/// ... and if at most this share of the readings is stuck (1). By judgement.
+pub(super) const FROZEN_MOST_SHARE: f64 = 0.5;
+
+/// Readings have noise if it exceeds this share of their rms value (1). By judgement: forces of a simulation without noise
+/// may repeat where a motion is uniform.
+pub(super) const FROZEN_LEAST_NOISE_SHARE: f64 = 1e-4;
+
+/// A force is at a limit if its largest or smallest value repeats for at least this many samples ...
+pub(super) const LIMIT_FEWEST_REPEATS: usize = 3;
+
+/// ... and is there for at least this many samples in all ...
+pub(super) const LIMIT_FEWEST_SAMPLES: usize = 20;
+
+/// ... which are this share of all samples (1). By judgement.
+pub(super) const LIMIT_LEAST_SHARE: f64 = 0.005;
+
+/// At a limit of a sensor the model predicts larger forces for at least this share of the samples (1). By judgement.
+pub(super) const LIMIT_LEAST_SHARE_BEYOND: f64 = 0.8;
+
+/// As many neighbouring samples have about the same error of the model. By judgement: 0.15 s at 200 Hz.
+pub(super) const SILENCE_DEPENDENT_SAMPLES: f64 = 30.0;
+
 /// With brakes on, no drive has a force above this many times its white noise (1) ...
 pub(super) const BRAKED_NOISE_FACTOR: f64 = 3.0;
 

@@ -85,8 +85,8 @@ impl PreparedRecording {
         // Forces that were not measured would spoil the choice of the preparation and every fit.
         let silent: Vec<Vec<SilentInterval>> = (prepared.iter())
             .map(|one| {
-                let segments = one.iter().flat_map(|one| &one.segments);
-                segments.flat_map(|one| silent_intervals(model, one)).collect()
+                let one = one.as_ref().ok();
+                one.map_or_else(Vec::new, |one| silent_intervals(model, &one.raw, &one.segments))
             })
             .collect();
         if silent.iter().any(|silent| !silent.is_empty()) {
@@ -248,6 +248,17 @@ impl PreparedRecording {
             suspect: self.suspect.clone(),
             sticks: self.sticks.clone(),
         }
+    }
+
+    /// Whether a rate or an acceleration of a coordinate is recorded and used.
+    pub(crate) fn has_recorded_derivatives(&self, model: &Model) -> bool {
+        let names = model.active_coordinates();
+        let is_recorded = |name: &String| {
+            ["_d", "_dd"]
+                .iter()
+                .any(|suffix| self.raw.has_column(&format!("{name}{suffix}")))
+        };
+        self.derivative_source() == DerivativeSource::RecordedFirst && names.iter().any(is_recorded)
     }
 
     /// Name of the file in messages.

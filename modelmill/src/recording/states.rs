@@ -185,9 +185,9 @@ pub(super) fn without_intervals(raw: &Arc<Raw>, silent: &[SilentInterval]) -> Ar
     }
     let mut raw = (**raw).clone();
     for one in silent {
-        let [from, to] = one.reach;
+        let is_out = |t: f64| one.reach.iter().any(|[from, to]| (*from..=*to).contains(&t));
         for drive in &one.drives {
-            raw.leave_out_samples(drive, &|t| (from..=to).contains(&t));
+            raw.leave_out_samples(drive, &is_out);
         }
     }
     Arc::new(raw)

@@ -182,6 +182,30 @@ fn a_number_that_repeats_is_stuck_though_the_joint_hardly_moves() {
     assert_eq!(faults, ["frozen_force"]);
 }
 
+/// A reading that is cut off is a limit, and the samples there are left out; commands at a limit that the model explains
+/// are none.
+#[test]
+fn a_force_that_is_cut_off_is_left_out_at_its_limit() {
+    let model = Model::open(bundled("two_link")).expect("a model");
+    let drives = model.drives();
+    let sound = Table::made("two_link", 5);
+    let place = sound.place(&drives[1]);
+    let mut sizes: Vec<f64> = sound.rows.iter().map(|row| row[place].abs()).collect();
+    sizes.sort_by(f64::total_cmp);
+    let limit = sizes[sizes.len() * 85 / 100];
+    let read = sound.changed(&drives[1], &|_, x| x.clamp(-limit, limit)).read(&model);
+    let faults: Vec<&str> = (read.segments.iter().flat_map(|one| &one.faults))
+        .map(|fault| fault.kind.as_str())
+        .collect();
+    assert!(
+        !faults.is_empty() && faults.iter().all(|kind| *kind == "force_limit"),
+        "{faults:?}"
+    );
+    let run = &read.segments[0].run;
+    let lost = (0..run.samples()).filter(|k| !run.is_force_measured(1, *k)).count();
+    assert!(lost as f64 > 0.1 * run.samples() as f64, "{lost}");
+}
+
 /// The verdict names the fault, the rest holds for the corrected recording, and two faults are both found.
 #[test]
 fn a_diagnosis_runs_on_the_corrected_recordings() {

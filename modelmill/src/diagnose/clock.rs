@@ -1,0 +1,59 @@
+//! A candidate for a clock that runs fast or slow in all recordings alike. Rates and accelerations follow from positions
+//! and times: if the recorded time is too long by a share e, true rates are larger by e and true accelerations by 2 e.
+//! All lengths of a mechanism too large by 2 e have the same forces, so that neither can be excluded without the other.
+
+use modelmill_identify::diagnose::{
+    CandidateEffect, CandidateNature, ColumnChoice, ColumnSource, EffectParameter, ForceColumn, LocatedEffect,
+    SignConstraint,
+};
+
+use crate::faults::RecordingFaultKind;
+use crate::model::Model;
+use crate::regressors::SegmentList;
+
+/// The candidate; `None` if a derivative is missing. `slopes` are the derivatives of the forces by position, rate and
+/// acceleration of each coordinate.
+pub(crate) fn clock(
+    model: &Model,
+    all: &SegmentList<'_>,
+    slopes: &[Option<[ForceColumn; 3]>],
+) -> Option<CandidateEffect> {
+    let mut column = ForceColumn(vec![None; model.drives().len()]);
+    for (i, slopes) in slopes.iter().enumerate() {
+        let [_, by_rate, by_acceleration] = slopes.as_ref()?;
+        for (order, slope) in [(1.0, by_rate), (2.0, by_acceleration)] {
+            let motion = all.iter().flat_map(|(one, _)| {
+                let values = if order > 1.0 { &one.run.qdd[i] } else { &one.run.qd[i] };
+                values.iter().copied().step_by(one.decimation())
+            });
+            let motion: Vec<f64> = motion.collect();
+            let mut part = slope.clone();
+            for values in part.0.iter_mut().flatten() {
+                for (value, motion) in values.iter_mut().zip(&motion) {
+                    *value *= motion;
+                }
+            }
+            column.add(order, &part);
+        }
+    }
+    (!column.is_zero()).then(|| CandidateEffect {
+        effect: LocatedEffect {
+            kind: RecordingFaultKind::TimeBase.name().to_owned(),
+            at: vec!["t".to_owned()],
+        },
+        parameters: vec![EffectParameter {
+            symbol: "share".to_owned(),
+            unit: "1".to_owned(),
+            sign: SignConstraint::Any,
+        }],
+        searched_constants: 0,
+        is_part_of_load: false,
+        refines: None,
+        nature: CandidateNature::Disturbance,
+        is_per_run: false,
+        source: ColumnSource::Columns(vec![ColumnChoice {
+            constants: Vec::new(),
+            columns: vec![column],
+        }]),
+    })
+}

@@ -1,0 +1,164 @@
+//! Readings that repeat one number exactly: a stuck channel, or a limit. The recorded forces of a drive go in, before any
+//! filter; the intervals come out.
+
+use modelmill_identify::diagnose::white_noise;
+
+use super::super::thresholds::{
+    FROZEN_LEAST_NOISE_SHARE, FROZEN_MOST_REPEATS, FROZEN_MOST_SHARE, LIMIT_FEWEST_REPEATS, LIMIT_FEWEST_SAMPLES,
+    LIMIT_LEAST_SHARE, SILENCE_FEWEST_SAMPLES, SILENCE_MOST_INTERVALS, SILENCE_SHORTEST_S,
+};
+
+/// Samples that have the same number exactly, one after the other.
+struct RepeatedRun {
+    /// First sample.
+    start: usize,
+    /// The first sample behind the last one.
+    end: usize,
+}
+
+/// Exact repetitions of the forces of one drive.
+#[derive(Default)]
+pub(super) struct ForceRepeats {
+    /// Intervals in which the reading is stuck at a value, each with its start and end, s, and the value.
+    pub(super) stuck: Vec<([f64; 2], f64)>,
+    /// Values that the readings do not exceed, each with the intervals in which they are there.
+    pub(super) limits: Vec<(f64, Vec<[f64; 2]>)>,
+    /// Whether the other readings have noise. If so, no motion explains an exact repetition.
+    pub(super) others_have_noise: bool,
+}
+
+/// Finds the exact repetitions of forces at times in s. Nothing is found where numbers repeat often, as those of coarse
+/// steps and of commands that are constant in pieces do.
+pub(super) fn find_repeats(force: &[f64], time: &[f64]) -> ForceRepeats {
+    let n = force.len().min(time.len());
+    let (Some(first), Some(last)) = (time.first(), time.last()) else {
+        return ForceRepeats::default();
+    };
+    let step = (last - first) / (n.max(2) - 1) as f64;
+    if n < SILENCE_FEWEST_SAMPLES || step.is_nan() || step <= 0.0 || force.iter().any(|x| !x.is_finite()) {
+        return ForceRepeats::default();
+    }
+    let runs = repeated_runs(&force[..n]);
+    let span = |run: &RepeatedRun| [time[run.start], time[run.end - 1]];
+    let low = force.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = force.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let is_long = |run: &RepeatedRun| {
+        run.end - run.start >= SILENCE_FEWEST_SAMPLES && span(run)[1] - span(run)[0] >= SILENCE_SHORTEST_S
+    };
+    // A channel that is stuck once at its largest value is no limit: a limit is met again and again.
+    let limits: Vec<(f64, Vec<&RepeatedRun>)> = [low, high]
+        .into_iter()
+        .filter_map(|level| Some((level, runs_at_limit(force, &runs, level)?)))
+        .collect();
+    let is_of_limit = |run: &RepeatedRun| {
+        limits
+            .iter()
+            .any(|(level, _)| force[run.start].total_cmp(level).is_eq())
+    };
+    let stuck: Vec<&RepeatedRun> = runs.iter().filter(|run| is_long(run) && !is_of_limit(run)).collect();
+    // All other numbers must hardly ever repeat.
+    let of_faults = |run: &&RepeatedRun| is_of_limit(run) || is_long(run);
+    let others = n - runs
+        .iter()
+        .filter(of_faults)
+        .map(|run| run.end - run.start)
+        .sum::<usize>();
+    let repeated: usize = runs
+        .iter()
+        .filter(|run| !of_faults(run))
+        .map(|run| run.end - run.start - 1)
+        .sum();
+    if (others as f64) < (1.0 - FROZEN_MOST_SHARE) * n as f64 || repeated as f64 >= FROZEN_MOST_REPEATS * others as f64
+    {
+        return ForceRepeats::default();
+    }
+    let rms = (force.iter().map(|f| f * f).sum::<f64>() / n as f64).sqrt();
+    ForceRepeats {
+        others_have_noise: white_noise(force) > FROZEN_LEAST_NOISE_SHARE * rms,
+        stuck: if stuck.len() > SILENCE_MOST_INTERVALS {
+            Vec::new()
+        } else {
+            stuck.into_iter().map(|run| (span(run), force[run.start])).collect()
+        },
+        limits: limits
+            .into_iter()
+            .map(|(level, runs)| (level, runs.into_iter().map(span).collect()))
+            .collect(),
+    }
+}
+
+/// The runs at an extreme value; `None` if the force meets it once or seldom.
+fn runs_at_limit<'a>(force: &[f64], runs: &'a [RepeatedRun], level: f64) -> Option<Vec<&'a RepeatedRun>> {
+    let is_there =
+        |run: &&RepeatedRun| run.end - run.start >= LIMIT_FEWEST_REPEATS && force[run.start].total_cmp(&level).is_eq();
+    let runs: Vec<&RepeatedRun> = runs.iter().filter(is_there).collect();
+    let count: usize = runs.iter().map(|run| run.end - run.start).sum();
+    let is_often = count >= LIMIT_FEWEST_SAMPLES && count as f64 >= LIMIT_LEAST_SHARE * force.len() as f64;
+    (runs.len() > 1 && is_often).then_some(runs)
+}
+
+/// All runs of at least two equal numbers.
+fn repeated_runs(force: &[f64]) -> Vec<RepeatedRun> {
+    let mut runs = Vec::new();
+    let mut start = 0;
+    for k in 1..=force.len() {
+        if k == force.len() || force[k].total_cmp(&force[start]).is_ne() {
+            if k - start > 1 {
+                runs.push(RepeatedRun { start, end: k });
+            }
+            start = k;
+        }
+    }
+    runs
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Times in s, and a smooth force with a small pseudorandom error.
+    fn noisy() -> (Vec<f64>, Vec<f64>) {
+        let time: Vec<f64> = (0..2000).map(|k| 0.005 * f64::from(k)).collect();
+        let mut state = 1_u64;
+        let force = time.iter().map(|t| {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (2.0 * t).sin() + 0.01 * ((state >> 33) as f64 / f64::from(1_u32 << 31) - 0.5)
+        });
+        let force = force.collect();
+        (time, force)
+    }
+
+    #[test]
+    fn a_number_that_repeats_for_a_time_is_stuck() {
+        let (time, mut force) = noisy();
+        assert!(find_repeats(&force, &time).stuck.is_empty());
+        let level = force[600];
+        force[600..800].fill(level);
+        let found = find_repeats(&force, &time);
+        assert!(found.others_have_noise && found.limits.is_empty());
+        assert_eq!(found.stuck, [([time[600], time[799]], level)]);
+    }
+
+    #[test]
+    fn a_value_that_is_never_exceeded_is_a_limit() {
+        let (time, force) = noisy();
+        let clipped: Vec<f64> = force.iter().map(|x| x.clamp(-0.8, 0.9)).collect();
+        let found = find_repeats(&clipped, &time);
+        assert!(found.stuck.is_empty());
+        let levels: Vec<f64> = found.limits.iter().map(|(level, _)| *level).collect();
+        assert_eq!(levels, [-0.8, 0.9]);
+    }
+
+    #[test]
+    fn commands_in_pieces_and_coarse_readings_are_no_faults() {
+        let (time, force) = noisy();
+        let in_pieces: Vec<f64> = (0..2000).map(|k| force[k / 100 * 100]).collect();
+        let coarse: Vec<f64> = force.iter().map(|x| (5.0 * x).round() / 5.0).collect();
+        for force in [in_pieces, coarse] {
+            let found = find_repeats(&force, &time);
+            assert!(found.stuck.is_empty() && found.limits.is_empty());
+        }
+    }
+}
