@@ -1,6 +1,10 @@
 //! Candidates for a wrong length or angle of the model: first and second derivatives of the base columns by
 //! each constant, by central differences. Fixed base parameters follow the constant, because their values are
 //! computed from it: their derivative is that of column times value.
+//!
+//! Decision: the forces are a polynomial of second degree in the error. A first search uses small steps; what it claims
+//! is searched again with the claimed error as step, so that the polynomial is exact there. What a polynomial of small
+//! steps leaves of a wrong length of 5 % looked like further wrong lengths (`lab/numpy-plant`).
 
 use std::ops::Range;
 
@@ -23,21 +27,31 @@ pub(super) const CONSTANT_ERROR: &str = "constant_error";
 /// Steps of the differences: this part of the machine's size, or of a radian.
 const STEP: f64 = 1e-3;
 
+/// The error of a constant that a search claims.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct ClaimedConstant {
+    /// Name of the constant, or of a zero.
+    pub(crate) name: String,
+    /// Its error, m or rad.
+    pub(crate) value: f64,
+}
+
 /// A candidate for the error of each length and angle, and of each named zero; `is_held` is true for base parameters that
-/// are fixed.
+/// are fixed. `claimed` are errors that an earlier search found: their steps make the polynomial exact there.
 pub(crate) fn constants(
     model: &Model,
     all: &SegmentList<'_>,
     named: Option<&NamedZeros>,
+    claimed: &[ClaimedConstant],
     is_held: &dyn Fn(usize) -> bool,
 ) -> Vec<CandidateEffect> {
     let positions: Vec<usize> = (0..model.base.len()).collect();
     let n_own = model.derivation.mechanism.constants.len();
-    let mut candidates = GeometryColumns::new(model, model, &positions, is_held).candidates(all, 0..n_own);
+    let mut candidates = GeometryColumns::new(model, model, &positions, is_held).candidates(all, claimed, 0..n_own);
     if let Some(named) = named {
         let n_all = named.model.derivation.mechanism.constants.len();
         let columns = GeometryColumns::new(model, &named.model, &named.positions, is_held);
-        candidates.extend(columns.candidates(all, n_own..n_all));
+        candidates.extend(columns.candidates(all, claimed, n_own..n_all));
     }
     candidates
 }
@@ -99,7 +113,12 @@ impl<'a> GeometryColumns<'a> {
     }
 
     /// A candidate for each of some constants.
-    fn candidates(&self, all: &SegmentList<'_>, wanted: Range<usize>) -> Vec<CandidateEffect> {
+    fn candidates(
+        &self,
+        all: &SegmentList<'_>,
+        claimed: &[ClaimedConstant],
+        wanted: Range<usize>,
+    ) -> Vec<CandidateEffect> {
         let mechanism = &self.evaluated.derivation.mechanism;
         // The columns at the nominal constants are the same for all of them.
         let mut middle = None;
@@ -113,7 +132,11 @@ impl<'a> GeometryColumns<'a> {
                 _ => continue,
             };
             // With another length the loops may not close along the recordings.
-            let (Some(back), Some(ahead)) = (self.columns(all, k, -step), self.columns(all, k, step)) else {
+            let sides = |step: f64| self.columns(all, k, -step).zip(self.columns(all, k, step));
+            let claim = claimed.iter().find(|claim| claim.name == constant.name);
+            let exact = claim.map(|claim| claim.value.abs()).filter(|value| *value > step);
+            let exact = exact.and_then(|value| Some((value, sides(value)?)));
+            let Some((step, (back, ahead))) = exact.or_else(|| Some((step, sides(step)?))) else {
                 continue;
             };
             if middle.is_none() {

@@ -22,17 +22,18 @@ use super::added_effects::{self, CompletedModelFile};
 use super::completion::ModelCompletion;
 use super::constants::CONSTANT_ERROR;
 use super::corrected::CorrectedRecordings;
+use super::effect_search::search_effects;
 use super::estimates::{EffectEstimate, effect_estimates};
 use super::faults;
 use super::geometry_alternatives::{GeometryAlternative, GeometryError, geometry_alternatives};
 use super::laws::{self, LawHypothesis};
 use super::long_recordings;
 use super::model_versions::ModelVersion;
-use super::named_zeros::{self, NamedZeros};
+use super::named_zeros::NamedZeros;
 use super::off_nominal::{OffNominalParameter, off_nominal_parameters, reversed_sign_note};
 use super::problem::{self, DiagnosisQuery, DiagnosisSolution, FixedParameters};
 use super::requested_effects::NamedEffect;
-use super::thresholds::{DIFFERENCE_LEAST_GAIN, EQUAL_ALTERNATIVE_LEAST_SHARE, MOST_VALIDATION_ERROR};
+use super::thresholds::{EQUAL_ALTERNATIVE_LEAST_SHARE, MOST_VALIDATION_ERROR};
 use super::words::{self, ValidationMethod};
 
 /// Fails if the fitted model predicts validation data worse than a model without any force: findings of the fit
@@ -434,6 +435,7 @@ fn nominal_diagnosis(findings: &DiagnosisFindings, between: &[RecordingDifferenc
         in_full: false,
         run_differences: between,
         is_clock_in_question: false,
+        claimed: &[],
         zeros: None,
     };
     let answer = problem::find_missing_effects(&version.model, &of(false), &of(true), query)?;
@@ -443,52 +445,6 @@ fn nominal_diagnosis(findings: &DiagnosisFindings, between: &[RecordingDifferenc
         missing: missing.collect(),
         diagnosis: answer.diagnosis,
     })
-}
-
-/// The search for missing effects, with differences `between` recordings, which are cleared if a search without them
-/// explains more. It is repeated with zeros of the model file as candidates where these may be wrong; these zeros are
-/// returned as well.
-///
-/// Fails as [`Model::diagnose`] does.
-fn search_effects(
-    model: &Model,
-    data: &[Vec<RecordingSegment>; 2],
-    held: FixedParameters,
-    is_clock_in_question: bool,
-    between: &mut Vec<RecordingDifference>,
-) -> Outcome<(DiagnosisSolution, Option<NamedZeros>)> {
-    let find = |between: &[RecordingDifference], zeros: Option<&NamedZeros>| {
-        let asked = DiagnosisQuery {
-            fixed: held,
-            in_full: true,
-            run_differences: between,
-            is_clock_in_question,
-            zeros,
-        };
-        problem::find_missing_effects(model, &data[0], &data[1], asked)
-    };
-    // The search with differences between recordings; it is repeated without them if there are any.
-    let mut answer = find(between, None)?;
-    if !between.is_empty() {
-        // A missing effect may look like a difference between recordings.
-        let without = find(&[], None)?;
-        if without.mean_square_residual() < DIFFERENCE_LEAST_GAIN * answer.mean_square_residual() {
-            answer = without;
-            between.clear();
-        }
-    }
-    // Zeros of the file may be wrong as well. They have no names, so they are tried only where something was found.
-    let is_explained = answer.diagnosis.verdict == DiagnosisVerdict::Adequate;
-    let named = if is_explained { None } else { NamedZeros::new(model)? };
-    if let Some(named) = &named
-        && named_zeros::needs_search(&answer)
-    {
-        let with_zeros = find(between, Some(named))?;
-        if named.is_better(&with_zeros, &answer) {
-            answer = with_zeros;
-        }
-    }
-    Ok((answer, named))
 }
 
 /// Errors of the geometry that explain as much as all effects found together.

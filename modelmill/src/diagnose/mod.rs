@@ -37,6 +37,7 @@ mod constants;
 mod contacts;
 mod corrected;
 mod disturbance_words;
+mod effect_search;
 mod encoders;
 mod estimates;
 mod faults;

@@ -21,7 +21,7 @@ use modelmill_identify::RecordingNote;
 use super::candidates::{DerivedCandidates, candidates};
 use super::clock::clock;
 use super::columns::{self, CandidateOrigin, load_dependent_columns, refined_columns};
-use super::constants::constants;
+use super::constants::{ClaimedConstant, constants};
 use super::contacts::{drop_doubtful_contacts, leave_out_late_contacts};
 use super::encoders::{self, encoders};
 use super::estimates::round_by_deviation;
@@ -95,6 +95,8 @@ pub(crate) struct DiagnosisQuery<'a> {
     pub run_differences: &'a [RecordingDifference],
     /// Whether the clock of the recordings may be wrong: a recorded rate would show that by itself.
     pub is_clock_in_question: bool,
+    /// Errors of constants that an earlier search claims.
+    pub claimed: &'a [ClaimedConstant],
     /// Zeros of the model file that are candidates as wrong constants.
     pub zeros: Option<&'a NamedZeros>,
 }
@@ -147,7 +149,9 @@ pub(crate) fn find_missing_effects(
     }
     further.extend(encoders(model, &all, &problem, &slopes));
     further.extend(gears(model, &all, &values, &slopes)?);
-    further.extend(constants(model, &all, query.zeros, &|k| is_fixed(model, held, k)));
+    further.extend(constants(model, &all, query.zeros, query.claimed, &|k| {
+        is_fixed(model, held, k)
+    }));
     further.extend(other_friction);
     if query.in_full {
         if held == FixedParameters::All || problem.base.is_empty() {

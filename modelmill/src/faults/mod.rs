@@ -58,7 +58,7 @@ pub enum RecordingFaultKind {
     /// A force stays at one value although the model predicts another.
     FrozenForce,
     /// A force is cut off at a value, although the model predicts larger ones.
-    ForceLimit,
+    Saturation,
     /// Brakes hold the joints, and the drives are off.
     Brakes,
 }
@@ -74,7 +74,7 @@ impl RecordingFaultKind {
         Self::Wrapped,
         Self::DeadChannel,
         Self::FrozenForce,
-        Self::ForceLimit,
+        Self::Saturation,
         Self::Brakes,
     ];
 
@@ -89,7 +89,7 @@ impl RecordingFaultKind {
             Self::Wrapped => "wrapped",
             Self::DeadChannel => "dead_channel",
             Self::FrozenForce => "frozen_force",
-            Self::ForceLimit => "force_limit",
+            Self::Saturation => "saturation",
             Self::Brakes => "brakes",
         }
     }

@@ -198,7 +198,7 @@ fn a_force_that_is_cut_off_is_left_out_at_its_limit() {
         .map(|fault| fault.kind.as_str())
         .collect();
     assert!(
-        !faults.is_empty() && faults.iter().all(|kind| *kind == "force_limit"),
+        !faults.is_empty() && faults.iter().all(|kind| *kind == "saturation"),
         "{faults:?}"
     );
     let run = &read.segments[0].run;

@@ -102,6 +102,10 @@ impl SilenceFit {
 
     /// Whether the level of a candidate is zero, except for noise and a small offset.
     pub(super) fn is_zero(&self, one: &SilenceCandidate) -> bool {
+        // A number that repeats is zero or it is not.
+        if one.evidence != SilenceEvidence::Flat {
+            return one.level == 0.0;
+        }
         one.level.abs() <= one.noise.max(0.01 * self.complete_rms[one.drive])
     }
 
@@ -144,7 +148,7 @@ impl SilenceFit {
                     0.0
                 }
             });
-            return (beyond > LIMIT_LEAST_SHARE_BEYOND).then_some((RecordingFaultKind::ForceLimit, size));
+            return (beyond > LIMIT_LEAST_SHARE_BEYOND).then_some((RecordingFaultKind::Saturation, size));
         }
         // A prediction beyond all forces is an extrapolation.
         if off <= SILENCE_LEAST_FORCE_SHARE * rms || size > 1.5 * largest {

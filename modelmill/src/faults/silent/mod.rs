@@ -66,7 +66,7 @@ impl SilentInterval {
                 "the {force} of {names} {reads} 0 {when}, where the model predicts {}: the channel is dead",
                 self.predicted
             ),
-            RecordingFaultKind::ForceLimit => format!(
+            RecordingFaultKind::Saturation => format!(
                 "the {force} of {names} {is} limited to {} {when}, where the model predicts {}",
                 self.level, self.predicted
             ),
@@ -93,7 +93,7 @@ impl SilentInterval {
     pub(crate) fn note(&self) -> RecordingNote {
         let advice = match self.kind {
             RecordingFaultKind::Brakes => "Nothing is to be done, unless the brakes were off",
-            RecordingFaultKind::ForceLimit => "Choose a larger range of the sensor, or look for the limit of the drive",
+            RecordingFaultKind::Saturation => "Choose a larger range of the sensor, or look for the limit of the drive",
             _ => "Check the sensor and its cable before the next recording",
         };
         RecordingNote::warning(message!(
@@ -183,7 +183,7 @@ fn find_intervals(model: &Model, raw: &SignalRecording, segments: &[RecordingSeg
         // The same interval of several drives is one fault; a limit is that of one drive.
         let is_same = |other: &&mut SilentInterval| {
             other.kind == kind
-                && kind != RecordingFaultKind::ForceLimit
+                && kind != RecordingFaultKind::Saturation
                 && (0..2).all(|k| (other.interval[k] - interval[k]).abs() < SAME_TIME_S)
         };
         let unit = model.force_unit(one.drive);
