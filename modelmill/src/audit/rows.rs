@@ -45,13 +45,13 @@ impl AuditRows {
 
     /// The regressor and the further columns at samples of several segments, the rows of one segment behind those of
     /// another; `None` as for [`Self::new`].
-    pub(crate) fn joined_regressor(
+    pub(crate) fn joined_regressor<'a>(
         model: &Model,
-        segments: &[RecordingSegment],
+        segments: impl Iterator<Item = &'a RecordingSegment>,
         samples: &[Vec<usize>],
     ) -> Option<ChannelRegressor> {
         let mut joined: Option<DMatrix<f64>> = None;
-        for (data, samples) in segments.iter().zip(samples) {
+        for (data, samples) in segments.zip(samples) {
             let rows = DriveStencil::new(model, data, samples)?.rows(model, data, samples)?;
             joined = Some(match joined {
                 None => rows,

@@ -83,12 +83,10 @@ impl PreparedRecording {
             return prepared;
         }
         // Forces that were not measured would spoil the choice of the preparation and every fit.
-        let silent: Vec<Vec<SilentInterval>> = (prepared.iter())
-            .map(|one| {
-                let one = one.as_ref().ok();
-                one.map_or_else(Vec::new, |one| silent_intervals(model, &one.raw, &one.segments))
-            })
+        let sources: Vec<_> = (prepared.iter())
+            .map(|one| one.as_ref().ok().map(|one| (&*one.raw, one.segments.as_slice())))
             .collect();
+        let silent: Vec<Vec<SilentInterval>> = silent_intervals(model, &sources);
         if silent.iter().any(|silent| !silent.is_empty()) {
             prepared = Self::prepare_group(model, recordings, Some(&silent), fitted);
         }

@@ -21,8 +21,8 @@ const LOOKED_AT: usize = 3000;
 
 /// A fit of the model to the samples without candidates.
 pub(super) struct SilenceFit {
-    /// Times of the samples, s.
-    time: Vec<f64>,
+    /// The recording and the time, s, of each sample.
+    samples: Vec<(usize, f64)>,
     /// The rows of all samples.
     regressor: ChannelRegressor,
     /// The fit.
@@ -40,26 +40,30 @@ pub(super) struct SilenceFit {
 }
 
 impl SilenceFit {
-    /// Fits the model; `None` if forces are missing, a pose has no solution or the fit fails.
-    pub(super) fn new(model: &Model, segments: &[RecordingSegment], candidates: &[SilenceCandidate]) -> Option<Self> {
+    /// Fits the model to recordings, each with its candidates; `None` if forces are missing, a pose has no solution or the
+    /// fit fails.
+    pub(super) fn new(model: &Model, recordings: &[(&[RecordingSegment], &[SilenceCandidate])]) -> Option<Self> {
         let n = model.derivation.mechanism.drives.len();
-        let all: usize = segments.iter().map(RecordingSegment::samples).sum();
+        let segments = || recordings.iter().flat_map(|(segments, _)| segments.iter());
+        let all: usize = segments().map(RecordingSegment::samples).sum();
         let every = (all / LOOKED_AT).max(1);
-        let samples: Vec<Vec<usize>> = segments
-            .iter()
+        let picked: Vec<Vec<usize>> = segments()
             .map(|data| (0..data.samples()).step_by(every).collect())
             .collect();
-        let regressor = AuditRows::joined_regressor(model, segments, &samples)?;
-        let (mut time, mut measured, mut counts) = (Vec::new(), Vec::new(), Vec::new());
-        for (data, samples) in segments.iter().zip(&samples) {
-            let forces = data.run.force.as_deref()?;
-            for k in samples {
-                let t = data.run.time[*k];
-                time.push(t);
-                for (d, force) in forces.iter().enumerate() {
-                    let is_candidate = candidates.iter().any(|one| one.drive == d && one.contains(t));
-                    measured.push(force[*k]);
-                    counts.push(data.run.is_force_measured(d, *k) && !is_candidate);
+        let regressor = AuditRows::joined_regressor(model, segments(), &picked)?;
+        let (mut samples, mut measured, mut counts) = (Vec::new(), Vec::new(), Vec::new());
+        let mut picked = picked.iter();
+        for (recording, (segments, candidates)) in recordings.iter().enumerate() {
+            for (data, picked) in segments.iter().zip(picked.by_ref()) {
+                let forces = data.run.force.as_deref()?;
+                for k in picked {
+                    let t = data.run.time[*k];
+                    samples.push((recording, t));
+                    for (d, force) in forces.iter().enumerate() {
+                        let is_candidate = candidates.iter().any(|one| one.drive == d && one.contains(t));
+                        measured.push(force[*k]);
+                        counts.push(data.run.is_force_measured(d, *k) && !is_candidate);
+                    }
                 }
             }
         }
@@ -86,10 +90,12 @@ impl SilenceFit {
             size[d][0] = (size[d][0] / used[d].max(1) as f64).sqrt();
         }
         let complete_rms = (0..n)
-            .map(|d| (measured.iter().skip(d).step_by(n).map(|f| f * f).sum::<f64>() / time.len().max(1) as f64).sqrt())
+            .map(|d| {
+                (measured.iter().skip(d).step_by(n).map(|f| f * f).sum::<f64>() / samples.len().max(1) as f64).sqrt()
+            })
             .collect();
         Some(Self {
-            time,
+            samples,
             regressor,
             fit,
             fitted,
@@ -109,15 +115,19 @@ impl SilenceFit {
         one.level.abs() <= one.noise.max(0.01 * self.complete_rms[one.drive])
     }
 
-    /// The kind of fault of a candidate with the predicted force, rms; `None` if the prediction does not contradict it.
+    /// The kind of fault of a candidate in a recording with its segments, and the predicted force, rms; `None` if the
+    /// prediction does not contradict it.
     pub(super) fn judge(
         &self,
         model: &Model,
-        segments: &[RecordingSegment],
+        (recording, segments): (usize, &[RecordingSegment]),
         one: &SilenceCandidate,
     ) -> Option<(RecordingFaultKind, f64)> {
         let (n, d) = (self.size.len(), one.drive);
-        let inside: Vec<usize> = (0..self.time.len()).filter(|i| one.contains(self.time[*i])).collect();
+        let is_inside = |(of, time): (usize, f64)| of == recording && one.contains(time);
+        let inside: Vec<usize> = (0..self.samples.len())
+            .filter(|i| is_inside(self.samples[*i]))
+            .collect();
         let predicted: Vec<f64> = inside.iter().map(|i| self.fitted[i * n + d]).collect();
         let mean =
             |of: &dyn Fn(f64) -> f64| predicted.iter().map(|x| of(*x)).sum::<f64>() / predicted.len().max(1) as f64;

@@ -154,28 +154,58 @@ impl SilenceCandidate {
     }
 }
 
-/// Intervals of a recording in which forces were not measured; none if forces are missing or a pose has no solution.
+/// Intervals of recordings of one machine in which forces were not measured; none if forces are missing or a pose has no
+/// solution.
 pub(crate) fn silent_intervals(
     model: &Model,
-    raw: &SignalRecording,
-    segments: &[RecordingSegment],
-) -> Vec<SilentInterval> {
-    find_intervals(model, raw, segments).unwrap_or_default()
+    recordings: &[Option<(&SignalRecording, &[RecordingSegment])>],
+) -> Vec<Vec<SilentInterval>> {
+    let drives = &model.derivation.mechanism.drives;
+    let driven = || (0..drives.len()).filter(|d| drives[*d].is_driven);
+    let candidates: Vec<Vec<SilenceCandidate>> = (recordings.iter())
+        .map(|one| {
+            let one = one.iter();
+            one.flat_map(|(raw, segments)| driven().flat_map(|d| find_candidates(d, model, raw, segments)))
+                .collect()
+        })
+        .collect();
+    if candidates.iter().all(Vec::is_empty) {
+        return vec![Vec::new(); recordings.len()];
+    }
+    let parts: Vec<(&[RecordingSegment], &[SilenceCandidate])> = (recordings.iter().zip(&candidates))
+        .map(|(one, candidates)| (one.map_or(&[][..], |(_, segments)| segments), candidates.as_slice()))
+        .collect();
+    // A recording that misses forces for most of its time is predicted by all others. A recording with another load is
+    // predicted by itself.
+    let of_all = SilenceFit::new(model, &parts);
+    let each = recordings.iter().zip(&candidates).enumerate();
+    each.map(|(k, (one, candidates))| {
+        let Some((raw, segments)) = one.filter(|_| !candidates.is_empty()) else {
+            return Vec::new();
+        };
+        let own = SilenceFit::new(model, &parts[k..=k]);
+        let judges = [own.as_ref().map(|fit| (fit, 0)), of_all.as_ref().map(|fit| (fit, k))];
+        let judges: Vec<(&SilenceFit, usize)> = judges.into_iter().flatten().collect();
+        judged_intervals(model, raw.file(), segments, candidates, &judges)
+    })
+    .collect()
 }
 
-/// The intervals; `None` if there is nothing to compare with.
-fn find_intervals(model: &Model, raw: &SignalRecording, segments: &[RecordingSegment]) -> Option<Vec<SilentInterval>> {
-    let file = raw.file();
+/// The candidates of a recording that count by one of the fits; each fit has the recording's index in it.
+fn judged_intervals(
+    model: &Model,
+    file: &str,
+    segments: &[RecordingSegment],
+    candidates: &[SilenceCandidate],
+    judges: &[(&SilenceFit, usize)],
+) -> Vec<SilentInterval> {
     let drives = &model.derivation.mechanism.drives;
-    let driven = (0..drives.len()).filter(|d| drives[*d].is_driven);
-    let candidates: Vec<SilenceCandidate> = driven.flat_map(|d| find_candidates(d, model, raw, segments)).collect();
-    if candidates.is_empty() {
-        return None;
-    }
-    let rest = SilenceFit::new(model, segments, &candidates)?;
     let mut found: Vec<SilentInterval> = Vec::new();
-    for one in &candidates {
-        let Some((kind, predicted)) = rest.judge(model, segments, one) else {
+    for one in candidates {
+        let mut verdicts = judges
+            .iter()
+            .filter_map(|(fit, k)| fit.judge(model, (*k, segments), one));
+        let Some((kind, predicted)) = verdicts.next() else {
             continue;
         };
         let interval = one.span();
@@ -203,7 +233,10 @@ fn find_intervals(model: &Model, raw: &SignalRecording, segments: &[RecordingSeg
     // With brakes on, drives without weight read zero as well.
     for brakes in found.iter_mut().filter(|one| one.kind == RecordingFaultKind::Brakes) {
         let [from, to] = brakes.interval;
-        for one in candidates.iter().filter(|one| rest.is_zero(one)) {
+        for one in candidates
+            .iter()
+            .filter(|one| judges.iter().any(|(fit, _)| fit.is_zero(one)))
+        {
             let [start, end] = one.span();
             let name = &drives[one.drive].name;
             if start < from + SAME_TIME_S && end > to - SAME_TIME_S && !brakes.drives.contains(name) {
@@ -211,7 +244,7 @@ fn find_intervals(model: &Model, raw: &SignalRecording, segments: &[RecordingSeg
             }
         }
     }
-    Some(found)
+    found
 }
 
 /// Candidates of a drive.
