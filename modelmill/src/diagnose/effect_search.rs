@@ -14,7 +14,7 @@ use super::problem::{self, DiagnosisQuery, DiagnosisSolution, FixedParameters};
 use super::thresholds::{CONSTANT_SETTLED_SHARE, DIFFERENCE_LEAST_GAIN};
 
 /// Most times a search is repeated with the errors of constants that it claims.
-const MOST_CONSTANT_ROUNDS: usize = 2;
+const MOST_CONSTANT_ROUNDS: usize = 3;
 
 /// The search for missing effects, with differences `between` recordings, which are cleared if a search without them
 /// explains more. It is repeated with zeros of the model file as candidates where these may be wrong; these zeros are

@@ -106,7 +106,7 @@ pub(super) const ALTERNATIVE_MOST_ERROR: f64 = 0.1;
 pub(super) const ALTERNATIVE_LEAST_GAIN: f64 = 0.1;
 
 /// A search is not repeated if the errors of constants that it claims changed by at most this share (1). By judgement.
-pub(super) const CONSTANT_SETTLED_SHARE: f64 = 0.05;
+pub(super) const CONSTANT_SETTLED_SHARE: f64 = 0.01;
 
 /// An error of the geometry that explains at least this part of what the effects found explain (1) cannot be
 /// distinguished from them. By judgement.
