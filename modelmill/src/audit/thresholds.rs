@@ -181,6 +181,10 @@ pub(super) const STEP_WINDOWS_S: [f64; 2] = [0.1, 0.25];
 /// Time after and before a motion in which no step is a push, s: friction changes its direction there.
 pub(super) const STANDSTILL_END_MARGIN_S: f64 = 0.15;
 
+/// Time at standstill from which the usual steps of a force are known, s: with less, no push at standstill is reported. By
+/// judgement.
+pub(super) const STANDSTILL_FEWEST_S: f64 = 0.8;
+
 /// A step at standstill exceeds the usual change of the force by this factor (1).
 pub(super) const STEP_LEAST_DEVIATIONS: f64 = 4.0;
 

@@ -8,7 +8,7 @@ use super::segments::DriveSegment;
 use super::smoothing::{dilate_mask, median_deviation, range_median, running_median, sample_quantile, true_ranges};
 use super::trace::ResidualTrace;
 use crate::audit::thresholds::{
-    STANDSTILL_END_MARGIN_S, STEP_LEAST_DEVIATIONS, STEP_LEAST_FORCE_SHARE, STEP_LEAST_RETURN, STEP_MOST_RATIO,
+    STANDSTILL_END_MARGIN_S, STANDSTILL_FEWEST_S, STEP_LEAST_DEVIATIONS, STEP_LEAST_FORCE_SHARE, STEP_LEAST_RETURN, STEP_MOST_RATIO,
     STEP_WINDOWS_S,
 };
 
@@ -62,7 +62,13 @@ fn pushes_of_window(
         .cloned()
         .collect();
     let differences = step_differences(&trace.residual[rest.drive], &standing, window, rise);
-    let of_standing: Vec<f64> = standing.iter().flat_map(|r| differences[r.clone()].to_vec()).collect();
+    // At the ends of a standstill there is no difference.
+    let apart = rise + window / 2;
+    let inner = |range: &std::ops::Range<usize>| range.start + apart..range.end - apart;
+    let of_standing: Vec<f64> = standing.iter().flat_map(|range| differences[inner(range)].to_vec()).collect();
+    if of_standing.len() < trace.sample_count(STANDSTILL_FEWEST_S, 1) {
+        return Vec::new();
+    }
     let middle = sample_quantile(of_standing.clone(), 0.5);
     let deviation = median_deviation(of_standing.iter().map(|x| x - middle)).max(ROUNDING * rest.force_rms);
     let bound = (STEP_LEAST_DEVIATIONS * deviation).max(STEP_LEAST_FORCE_SHARE * rest.force_rms);
