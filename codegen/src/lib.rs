@@ -28,7 +28,7 @@ mod tree;
 pub use derive::base::BaseParameterEntry;
 pub use derive::{BaseFormulas, Derivation, derive_columns};
 pub use error::DeriveError;
-pub use evaluate::{ModelEvaluator, MotionStates, PoseFault, PoseReason};
+pub use evaluate::{ModelEvaluator, MotionStates, PoseFault, PoseReason, SingleStateFunction};
 pub use lower::{OperationCount, PoseGuard, ProgramOp, ProgramStage, SINGULAR, StraightLineProgram, ValueId};
 pub use modelmill_algebra::field;
 pub use on_request::dynamics::DynamicsPrograms;

@@ -129,6 +129,8 @@ fn effect(added: &AddedEffect, log: &mut DiagnosticLog) -> EffectEntry {
             entries: added.at.iter().map(|place| name(place)).collect(),
             span: NOWHERE,
         }),
+        at_each: None,
+        without: None,
         parameters: Some(NamedEntries {
             entries: parameters.map(|(symbol, name)| (key(symbol), named(name))).collect(),
             faulty: Vec::new(),

@@ -12,6 +12,7 @@ use std::path::PathBuf;
 
 use modelmill_boundary::files::FileSource;
 
+use crate::build::effect_places::ALL_DRIVES;
 use crate::diagnostic::{DiagnosticLog, SourceFile, SourceSpan};
 use crate::document::{self, TomlNode, TomlValue, find_key, quote};
 use crate::exact::ExactExpression;
@@ -24,10 +25,16 @@ use crate::values::is_name;
 /// An effect to be written into a model file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct NewEffect {
+    /// Name of the entry, by which a variant can replace it; `None` for an entry without a name.
+    pub name: Option<String>,
     /// Name of the kind.
     pub kind: String,
     /// Names of the places on which it acts.
     pub at: Vec<String>,
+    /// Whether each place has parameters of its own; otherwise the places share them.
+    pub is_at_each: bool,
+    /// Symbols of parameters of the kind that it does not have.
+    pub without: Vec<String>,
     /// Names and nominal values of its parameters; all others have the defaults of the kind.
     pub parameters: Vec<NewParameter>,
     /// Values of its constants by their symbols, in SI units.
@@ -95,7 +102,10 @@ pub fn add_to_model(
     let before = load_with(path_name, text, libraries, files).map_err(model)?;
     let kind = kind_of(effect, &before.kinds)?;
     refuse_twin(effect, kind, &before.mechanism)?;
-    let effect = with_free_names(effect, kind, &before.mechanism);
+    let mut effect = with_free_names(effect, kind, &before.mechanism);
+    if effect.name.is_none() {
+        effect.name = Some(free_entry_name(&effect, &before));
+    }
     let edited = add_effect(text, &effect)?;
     let loaded = load_with(path_name, &edited, libraries, files)
         .map_err(|failure| model(relocate_failure(failure, text, &edited, &effect)))?;
@@ -447,11 +457,21 @@ fn remarks(effect: &NewEffect) -> impl Iterator<Item = String> {
 
 /// The fields of the effect as `key = value`; parameters and constants only if there are any.
 fn fields(effect: &NewEffect) -> Vec<String> {
-    let places: Vec<String> = effect.at.iter().map(|name| format!("\"{name}\"")).collect();
-    let mut fields = vec![
-        format!("kind = \"{}\"", effect.kind),
-        format!("at = [{}]", places.join(", ")),
-    ];
+    let list = |names: &[String]| {
+        let names: Vec<String> = names.iter().map(|name| format!("\"{name}\"")).collect();
+        format!("[{}]", names.join(", "))
+    };
+    let mut fields: Vec<String> = effect.name.iter().map(|name| format!("name = \"{name}\"")).collect();
+    fields.push(format!("kind = \"{}\"", effect.kind));
+    // A single word stands for all drives.
+    fields.push(match (effect.is_at_each, effect.at.as_slice()) {
+        (false, at) => format!("at = {}", list(at)),
+        (true, [one]) => format!("at_each = \"{one}\""),
+        (true, at) => format!("at_each = {}", list(at)),
+    });
+    if !effect.without.is_empty() {
+        fields.push(format!("without = {}", list(&effect.without)));
+    }
     // Parameters without a name and a value keep the defaults of the kind.
     let said = effect
         .parameters
@@ -481,7 +501,9 @@ fn fields(effect: &NewEffect) -> Vec<String> {
 fn check_writable(effect: &NewEffect) -> Result<(), EditFailure> {
     let parameters = effect.parameters.iter();
     let names = std::iter::once(&effect.kind)
+        .chain(&effect.name)
         .chain(&effect.at)
+        .chain(&effect.without)
         .chain(parameters.clone().map(|one| &one.symbol))
         .chain(parameters.clone().filter_map(|one| one.name.as_ref()))
         .chain(effect.constants.iter().map(|(symbol, _)| symbol));
@@ -518,9 +540,9 @@ fn kind_of<'a>(effect: &NewEffect, kinds: &'a [EffectKind]) -> Result<&'a Effect
     };
     let of = format!(" of `{}`", kind.name);
     let symbols: Vec<&str> = (kind.parameters.iter()).map(|one| one.symbol.as_str()).collect();
-    for one in &effect.parameters {
-        if !symbols.contains(&one.symbol.as_str()) {
-            return Err(unknown("parameter", &one.symbol, symbols, &of));
+    for symbol in effect.parameters.iter().map(|one| &one.symbol).chain(&effect.without) {
+        if !symbols.contains(&symbol.as_str()) {
+            return Err(unknown("parameter", symbol, symbols, &of));
         }
     }
     let symbols: Vec<&str> = (kind.constants.iter()).map(|one| one.symbol.as_str()).collect();
@@ -542,7 +564,8 @@ fn refuse_twin(effect: &NewEffect, kind: &EffectKind, mechanism: &Mechanism) -> 
             constant.value.as_ref()?.parse().ok()
         })
     };
-    let is_named = |place: &EffectPlace| effect.at.iter().any(|at| at == mechanism.place_name(*place));
+    let at = effect.places(mechanism);
+    let is_named = |place: &EffectPlace| at.iter().any(|at| at == mechanism.place_name(*place));
     let of_kind = || mechanism.effects.iter().filter(|e| e.kind == effect.kind);
     let meets = of_kind().flat_map(|e| &e.places).filter(|place| is_named(place));
     let meets: Vec<EffectPlace> = meets.copied().collect();
@@ -558,12 +581,12 @@ fn refuse_twin(effect: &NewEffect, kind: &EffectKind, mechanism: &Mechanism) -> 
         // Effects that couple two places are equal only if they couple the same ones.
         let places = known.places.iter().chain(&known.other);
         let names = places.map(|p| mechanism.place_name(*p));
-        if kind.places == Some(2) && !names.clone().all(|n| effect.at.iter().any(|at| at == n)) {
+        if kind.places == Some(2) && !names.clone().all(|n| at.iter().any(|at| at == n)) {
             continue;
         }
         // Tilt and delay are properties of the complete mechanism, whatever their constants are.
         let whole = matches!(known.places[..], [EffectPlace::Base | EffectPlace::Force]);
-        let place = names.into_iter().find(|name| effect.at.iter().any(|at| at == name));
+        let place = names.into_iter().find(|name| at.iter().any(|at| at == name));
         if let Some(place) = place.filter(|_| alike || whole) {
             return Err(EditFailure::Effect(format!(
                 "`{}` acts at `{place}` already; change that effect in the model file instead, or remove it there",
@@ -574,6 +597,37 @@ fn refuse_twin(effect: &NewEffect, kind: &EffectKind, mechanism: &Mechanism) -> 
     Ok(())
 }
 
+/// A name for the entry of an effect that no other effect of the file, or of files that it extends, has.
+fn free_entry_name(effect: &NewEffect, before: &LoadedModel) -> String {
+    /// Longest name with places; names have at most 60 letters.
+    const LONGEST: usize = 50;
+    let list = before.entries.model.effect.iter().flat_map(|list| &list.entries);
+    let taken: BTreeSet<&str> = list
+        .filter_map(|entry| Some(entry.name.as_ref()?.text.as_str()))
+        .collect();
+    let usual = format!("{}_{}", effect.kind, effect.at.join("_"));
+    let usual = if usual.len() > LONGEST {
+        effect.kind.clone()
+    } else {
+        usual
+    };
+    let numbered = (2..).map(|n| format!("{usual}_{n}"));
+    let mut names = std::iter::once(usual.clone()).chain(numbered);
+    names.find(|name| !taken.contains(name.as_str())).unwrap_or(usual)
+}
+
+impl NewEffect {
+    /// The names of its places; all drives if it acts at each of them.
+    fn places(&self, mechanism: &Mechanism) -> Vec<String> {
+        let is_all = self.is_at_each && self.at == [ALL_DRIVES];
+        if !is_all || mechanism.drives.iter().any(|drive| drive.name == ALL_DRIVES) {
+            return self.at.clone();
+        }
+        let driven = mechanism.drives.iter().filter(|drive| drive.is_driven);
+        driven.map(|drive| drive.name.clone()).collect()
+    }
+}
+
 /// The effect with new names for parameters whose default names are taken by other quantities.
 fn with_free_names(effect: &NewEffect, kind: &EffectKind, mechanism: &Mechanism) -> NewEffect {
     let parameters = mechanism.parameters.iter().map(|one| one.name.as_str());
@@ -581,6 +635,10 @@ fn with_free_names(effect: &NewEffect, kind: &EffectKind, mechanism: &Mechanism)
     let coordinates = mechanism.coordinates.iter().map(|one| one.name.as_str());
     let taken: BTreeSet<&str> = parameters.chain(constants).chain(coordinates).collect();
     let mut named = effect.clone();
+    // Parameters of several places have no names in the file.
+    if effect.is_at_each {
+        return named;
+    }
     for symbol in kind.parameters.iter().map(|one| &one.symbol) {
         let usual = format!("{symbol}_{}", effect.at.join("_"));
         let said = named.parameters.iter().position(|one| one.symbol == *symbol);

@@ -396,11 +396,16 @@ record! {
         /// Name of the kind.
         "kind" kind: required SpannedName,
         /// Where it acts: a drive, a coordinate, a point or a part, `base` or `force`, as its kind has it, or a list
-        /// whose members share the parameters.
-        "at" at: required OneOrMany<SpannedName>,
+        /// whose members share the parameters. Either this or `at_each` is required.
+        "at" at: optional OneOrMany<SpannedName>,
+        /// Where it acts with parameters of its own at each place: a list of drives, coordinates or points, or `drives`
+        /// for all drives. It stands for one effect at each of them.
+        "at_each" at_each: optional OneOrMany<SpannedName>,
         /// Names and nominal values of its parameters, by the kind's symbols. A parameter without a name here is
         /// called `symbol_place`.
         "parameters" parameters: optional NamedEntries<EffectParameterEntry>,
+        /// Parameters of the kind that this effect does not have, such as the damping `Fv` of a coil spring.
+        "without" without: optional OneOrMany<SpannedName>,
         /// Values of the kind's constants: numbers, or expressions over the constants of this file.
         "constants" constants: optional NamedEntries<SourceFormula>,
         /// Remark.

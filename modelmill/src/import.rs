@@ -50,7 +50,10 @@ impl Host {
             .map_err(|fault| Error::input(format!("{name}: {fault}")))?;
         let imported =
             modelmill_reduction::import(&text, options).map_err(|error| Error::input(format!("{name}: {error}")))?;
-        let notes: Vec<RecordingNote> = imported.remarks.into_iter().map(RecordingNote::warning).collect();
+        let facts = imported.facts.into_iter().map(RecordingNote::info);
+        let notes: Vec<RecordingNote> = (imported.remarks.into_iter().map(RecordingNote::warning))
+            .chain(facts)
+            .collect();
         for note in &notes {
             self.note(note);
         }

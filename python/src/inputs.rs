@@ -3,13 +3,16 @@
 use std::path::{Path, PathBuf};
 
 use modelmill::recording::{RecordingOptions, UnpreparedRecording};
-use modelmill::{Model, Outcome};
+use modelmill::text::style::TerminalStyle;
+use modelmill::{Host, Model, Outcome, print};
 use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
 
 use crate::errors::input_error;
+use crate::model::new_host;
 use crate::options::ReadingOptions;
-use crate::results::PythonRecording;
+use crate::results::{PythonRecording, PythonResult, RemarkList};
+use crate::work::{run_blocking, run_interruptible};
 
 /// The source of a recording: files of one run, or named columns.
 #[derive(FromPyObject)]
@@ -75,4 +78,30 @@ impl PassedRecording {
             Self::Read(recording) => Ok(recording),
         }
     }
+}
+
+/// Contents of a log, independent of a model.
+#[pyfunction]
+pub(crate) fn contents(py: Python<'_>, path: PathBuf) -> PyResult<PythonResult> {
+    let (host, listener) = new_host(Vec::new(), false);
+    let found = run_interruptible(py, &listener, None, || host.recordings(&path))?;
+    Ok(PythonResult::new(
+        &found.json(),
+        &found.text(TerminalStyle::PLAIN),
+        RemarkList::new(),
+    ))
+}
+
+/// Kinds of effects that a model may have: name and description.
+#[pyfunction]
+pub(crate) fn kinds(py: Python<'_>, libraries: Vec<PathBuf>) -> PyResult<String> {
+    let (host, _) = new_host(libraries, false);
+    let kinds = run_blocking(py, || host.kinds())?;
+    Ok(print::effects::json(&kinds).to_string())
+}
+
+/// The pairs of a file with the table `[recording.columns]`.
+#[pyfunction]
+pub(crate) fn column_mapping(py: Python<'_>, path: PathBuf) -> PyResult<Vec<(String, String)>> {
+    run_blocking(py, || Host::new().column_mapping(&path))
 }

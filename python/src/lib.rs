@@ -14,6 +14,7 @@ mod options;
 mod results;
 mod rigs;
 mod spelling;
+mod states;
 mod work;
 
 use pyo3::prelude::*;
@@ -24,11 +25,15 @@ mod _core {
     #[pymodule_export]
     use crate::fleet::{FleetGround, fleet_merge, fleet_plan};
     #[pymodule_export]
-    use crate::model::{CoreModel, contents, import_text, kinds, load, load_text};
+    use crate::inputs::{column_mapping, contents, kinds};
+    #[pymodule_export]
+    use crate::model::{CoreModel, import_text, load, load_text};
     #[pymodule_export]
     use crate::results::{PythonExcitation, PythonRecording, PythonResult};
     #[pymodule_export]
     use crate::rigs::{PythonSimulation, reduce, simulate};
     #[pymodule_export]
     use crate::spelling::advised_names;
+    #[pymodule_export]
+    use crate::states::{at_single, drive_units, forces_along, model_contents};
 }

@@ -16,7 +16,7 @@ use modelmill::runs::UnreadRun;
 use modelmill::states::{ModelFunction, ModelFunctions, StateSamples};
 use modelmill::text::style::TerminalStyle;
 use modelmill::variants::VariantComparison;
-use modelmill::{Error, FitFile, Host, Model, Outcome, export, import, print};
+use modelmill::{Error, FitFile, Host, Model, Outcome, export, import};
 use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
@@ -130,9 +130,13 @@ pub(crate) fn import_text(
 #[derive(Clone)]
 pub(crate) struct CoreModel {
     /// The derived model.
-    model: Model,
+    pub(crate) model: Model,
     /// Its functions at states, shared by all copies.
-    functions: Arc<ModelFunctions>,
+    pub(crate) functions: Arc<ModelFunctions>,
+    /// Number of active coordinates.
+    pub(crate) n_active: usize,
+    /// Number of drives.
+    pub(crate) n_drives: usize,
     /// Listener for the jobs of its host.
     listener: Arc<JobListener>,
 }
@@ -142,6 +146,8 @@ impl CoreModel {
     fn new(model: Model, listener: Arc<JobListener>) -> Self {
         Self {
             functions: Arc::new(model.functions()),
+            n_active: model.active_coordinates().len(),
+            n_drives: model.drives().len(),
             model,
             listener,
         }
@@ -177,7 +183,7 @@ impl CoreModel {
     }
 
     /// Runs work on this model in a separate thread, with progress and interrupts.
-    fn run_interruptible<T: Send>(
+    pub(crate) fn run_interruptible<T: Send>(
         &self,
         py: Python<'_>,
         progress: ProgressCallback<'_, '_>,
@@ -188,7 +194,7 @@ impl CoreModel {
 }
 
 /// A function by the name of its method.
-fn function_by_name(py: Python<'_>, function: &str) -> PyResult<ModelFunction> {
+pub(crate) fn function_by_name(py: Python<'_>, function: &str) -> PyResult<ModelFunction> {
     Ok(match function {
         "inverse_dynamics" => ModelFunction::InverseDynamics,
         "regressor" => ModelFunction::Regressor,
@@ -528,12 +534,16 @@ impl CoreModel {
         Ok(PythonExcitation { found })
     }
 
-    /// The model with an effect; settings are values, or names of parameters.
+    /// The model with an effect, which has parameters of its own at each place or shares them among the places; settings
+    /// are values, or names of parameters.
+    #[allow(clippy::too_many_arguments, reason = "each is a keyword of Python")]
     fn with_effect(
         &self,
         py: Python<'_>,
         kind: &str,
         at: Vec<String>,
+        is_at_each: bool,
+        without: Vec<String>,
         values: Vec<(String, f64)>,
         names: Vec<(String, String)>,
     ) -> PyResult<Self> {
@@ -548,7 +558,8 @@ impl CoreModel {
             .map(|(symbol, value)| EffectSetting { symbol, value })
             .collect();
         let model = self.run_interruptible(py, None, || {
-            let effect = new_effect(&self.model.loaded.kinds, kind, &at, &settings)?;
+            let mut effect = new_effect(&self.model.loaded.kinds, kind, &at, &settings)?;
+            (effect.is_at_each, effect.without) = (is_at_each, without);
             self.model.with_added_effects(&[effect])
         })?;
         Ok(self.with_same_host(model))
@@ -668,24 +679,4 @@ impl CoreModel {
         let files = self.run_interruptible(py, None, || self.model.generate(&code))?;
         Ok(files.into_iter().map(|file| (file.path, file.text)).collect())
     }
-}
-
-/// Contents of a log, independent of a model.
-#[pyfunction]
-pub(crate) fn contents(py: Python<'_>, path: PathBuf) -> PyResult<PythonResult> {
-    let (host, listener) = new_host(Vec::new(), false);
-    let found = run_interruptible(py, &listener, None, || host.recordings(&path))?;
-    Ok(PythonResult::new(
-        &found.json(),
-        &found.text(TerminalStyle::PLAIN),
-        RemarkList::new(),
-    ))
-}
-
-/// Kinds of effects that a model may have: name and description.
-#[pyfunction]
-pub(crate) fn kinds(py: Python<'_>, libraries: Vec<PathBuf>) -> PyResult<String> {
-    let (host, _) = new_host(libraries, false);
-    let kinds = run_blocking(py, || host.kinds())?;
-    Ok(print::effects::json(&kinds).to_string())
 }

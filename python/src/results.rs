@@ -68,6 +68,34 @@ impl PythonRecording {
             joined(&|run| &run.qdd),
         )
     }
+
+    /// Measured forces at the prepared samples, an array for each drive, with NaN where a force was not measured or was
+    /// found faulty; `None` if the recording has no forces.
+    fn forces<'py>(&self, py: Python<'py>) -> Option<ArrayColumns<'py>> {
+        let runs = || self.recording.segments.iter().map(|segment| &segment.run);
+        let n_drives = runs().next()?.force.as_ref()?.len();
+        let mut columns = vec![Vec::new(); n_drives];
+        for run in runs() {
+            for (k, (column, force)) in columns.iter_mut().zip(run.force.as_ref()?).enumerate() {
+                let out = run.left_out.get(k);
+                let is_out = |i: usize| out.is_some_and(|out| out.get(i).copied().unwrap_or(false));
+                let values = force.iter().enumerate();
+                column.extend(values.map(|(i, force)| if is_out(i) { f64::NAN } else { *force }));
+            }
+        }
+        Some(
+            columns
+                .into_iter()
+                .map(|column| PyArray1::from_vec(py, column))
+                .collect(),
+        )
+    }
+
+    /// Numbers of samples of the segments between gaps in time.
+    fn segment_lengths(&self) -> Vec<usize> {
+        let segments = self.recording.segments.iter();
+        segments.map(|segment| segment.run.time.len()).collect()
+    }
 }
 
 /// One array for each coordinate or drive.

@@ -19,6 +19,10 @@ def use() -> float:
     values: list[float] = [one.value for one in fit.parameters]
     diagnosis = m.diagnose(run, held=True, progress=lambda what, done, total: print(what))
     better = diagnosis.model or m.with_effect("coulomb_friction", at="motor", Fc=2.0)
+    better = better.with_effect("viscous_friction", at_each="drives", without=(), Fv=1.0)
+    measured = run.forces
+    residual = 0.0 if measured is None else float((measured - run.calculated(fit)).max())
+    m.plot(run, parameters=fit, drives=["motor"]).savefig("forces.png")
     better.report(run).save("page.html")
     motion = better.excite(limits={"q1": (-1, 1), "q1_d": 2.0})
     changed = m.runs(["a.csv", "b.csv"], per_run=["friction"])
@@ -31,4 +35,4 @@ def use() -> float:
     reduced.compare(made.columns)
     print(masses, cost, description)
     nrms = m.compare(run, parameters=fit).nrms or 0.0
-    return float(forces.sum() + mass.sum() + motion.q.max() + len(changed.changes) + len(values) + (first.value or 0.0)) + nrms
+    return residual + float(forces.sum() + mass.sum() + motion.q.max() + len(changed.changes) + len(values) + (first.value or 0.0)) + nrms

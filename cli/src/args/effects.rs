@@ -27,8 +27,22 @@ pub(crate) struct AddArgs {
     pub(crate) kind: String,
     /// Where the effect acts: drives, coordinates, points, a part, `base` or `force`, depending on the kind; several
     /// places share its parameters
-    #[arg(long, value_name = "PLACE,...", required = true, value_delimiter = ',')]
+    #[arg(
+        long,
+        value_name = "PLACE,...",
+        required_unless_present = "at_each",
+        value_delimiter = ','
+    )]
     pub(crate) at: Vec<String>,
+    /// Places with parameters of their own, instead of --at; `drives` stands for all drives
+    #[arg(long, value_name = "PLACE,...", value_delimiter = ',', conflicts_with = "at")]
+    pub(crate) at_each: Vec<String>,
+    /// Name of the new entry, by which a variant can replace it. Default: kind and places
+    #[arg(long, value_name = "NAME")]
+    pub(crate) name: Option<String>,
+    /// Parameters of the kind that the effect does not have, such as the damping `Fv` of a coil spring
+    #[arg(long, value_name = "SYMBOL,...", value_delimiter = ',')]
+    pub(crate) without: Vec<String>,
     /// Nominal value of a parameter (`Fc=25.9`) or its name (`Fc.name=Fc_left`), or the value of a constant
     /// (`vs=0.02`), in SI units; may be repeated
     #[arg(long, value_name = "NAME=VALUE", value_parser = parse_setting, allow_hyphen_values = true)]

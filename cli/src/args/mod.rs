@@ -100,6 +100,7 @@ pub(crate) enum ProgramCommand {
     #[command(after_help = "Examples (from the project's root):\n  \
         modelmill add model-spec/models/spidermill.toml coulomb_friction --at spindle_left --set Fc=25.9\n  \
         modelmill add model-spec/models/spidermill.toml rod_inertia --at spindle_left,spindle_right --out rods.toml\n  \
+        modelmill add model-spec/models/puma560.toml viscous_friction --at-each drives --out friction.toml\n  \
         modelmill add model-spec/models/spidermill-paper.toml lumped_mass_placement \\\n      \
         --at R3m,R3m_right --set m.name=m4\n\n\
         Places in one --at share the effect's parameters. Without --in-place or --out nothing is written.")]

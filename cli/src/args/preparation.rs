@@ -1,13 +1,15 @@
 //! Options for reading and preparing recordings, shared by all commands that read them.
 
 use std::fmt::Write as _;
+use std::path::Path;
 
 use clap::{Args, ValueEnum};
+use modelmill::Host;
 use modelmill::recording::{
     DerivativeSource, MAX_FILTER_ORDER, RecordingOptions, SmoothingMethod, StandstillRule, StatePreparation,
 };
 
-use crate::flags::quote_word;
+use crate::flags::{FlagSpelling, quote_word};
 
 /// Order of the low-pass without `--order`.
 const USUAL_ORDER: usize = 4;
@@ -21,6 +23,10 @@ pub(crate) struct PreparationArgs {
     /// coordinate, a coordinate with `_d` or `_dd`, a drive, and a drive with `_var` for the variance of its force
     #[arg(long, value_name = "OURS=THEIRS", value_parser = parse_map)]
     pub(crate) map: Vec<(String, String)>,
+    /// Columns of the recording from a file with the table `[recording.columns]`, which `modelmill recordings --model`
+    /// prints; `--map` has priority
+    #[arg(long, value_name = "FILE.toml", value_parser = read_mapping)]
+    pub(crate) mapping: Option<MappingFile>,
     /// Cut-off of the low-pass on positions, Hz. Default: chosen by cross-validation on the forces; without forces,
     /// from the positions
     #[arg(long, value_name = "HZ", value_parser = parse_cutoff, allow_negative_numbers = true)]
@@ -68,6 +74,15 @@ pub(crate) struct PreparationArgs {
     pub(crate) standstill: Option<f64>,
 }
 
+/// A mapping file that was read.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct MappingFile {
+    /// The argument.
+    path: String,
+    /// Names of the model with their columns.
+    columns: Vec<(String, String)>,
+}
+
 /// Where derivatives come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum DerivativesArg {
@@ -95,7 +110,7 @@ impl PreparationArgs {
     /// The same as options of the library.
     pub(crate) fn reading(&self) -> RecordingOptions {
         RecordingOptions {
-            columns: self.map.clone(),
+            columns: self.columns(),
             preparation: self.preparation(),
             skip_bad_samples: self.skip_bad_samples,
             leave_out_events: self.leave_out_events,
@@ -107,6 +122,13 @@ impl PreparationArgs {
                 Some(_) => StandstillRule::KeepAll,
             },
         }
+    }
+
+    /// Columns by `--map`, then those of the mapping file for other names.
+    fn columns(&self) -> Vec<(String, String)> {
+        let of_file = self.mapping.iter().flat_map(|file| &file.columns);
+        let is_free = |(ours, _): &&(String, String)| self.map.iter().all(|(mine, _)| mine != ours);
+        self.map.iter().chain(of_file.filter(is_free)).cloned().collect()
     }
 
     /// The options that differ from their defaults, as text for a command line, each with a space before it.
@@ -124,6 +146,7 @@ impl PreparationArgs {
         for (ours, theirs) in &self.map {
             option("map", Some(format!("{ours}={theirs}")));
         }
+        option("mapping", self.mapping.as_ref().map(|file| file.path.clone()));
         let number = |value: Option<f64>| value.map(|value| value.to_string());
         option("cutoff", number(self.cutoff));
         option("order", self.order.map(|order| order.to_string()));
@@ -175,6 +198,15 @@ impl PreparationArgs {
             ..StatePreparation::default()
         }
     }
+}
+
+/// Reads a mapping file.
+fn read_mapping(path: &str) -> Result<MappingFile, String> {
+    let columns = Host::new().column_mapping(Path::new(path));
+    Ok(MappingFile {
+        path: path.to_owned(),
+        columns: columns.map_err(|error| error.spell(&FlagSpelling))?,
+    })
 }
 
 /// Reads `OURS=THEIRS`: a name of the model and an expression of columns.

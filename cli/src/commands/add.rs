@@ -25,7 +25,11 @@ pub(crate) fn run(host: &Host, args: &AddArgs) -> CommandOutcome {
         .transpose()?;
     let old = before.sources.files.first();
     let old = old.map_or("", |file| &file.text);
-    let mut effect = new_effect(&before.kinds, &args.kind, &args.at, &args.set)?;
+    let places = if args.at.is_empty() { &args.at_each } else { &args.at };
+    let mut effect = new_effect(&before.kinds, &args.kind, places, &args.set)?;
+    effect.is_at_each = args.at.is_empty();
+    effect.name.clone_from(&args.name);
+    effect.without = args.without.iter().map(|symbol| symbol.trim().to_owned()).collect();
     effect.comment.clone_from(&args.comment);
     let path = args.model.display().to_string();
     let edited = host.edit(&path, old, &effect)?;

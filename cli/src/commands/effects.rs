@@ -1,5 +1,7 @@
 //! `effects`: the library of effects, as a list, or the description of one kind.
 
+use std::fmt::Write as _;
+
 use modelmill::Host;
 use modelmill::print::effects;
 
@@ -17,7 +19,11 @@ pub(crate) fn run(host: &Host, args: &EffectsArgs) -> CommandOutcome {
     if let Some(name) = &args.kind {
         let kind = effects::kind(&kinds, name)?.clone();
         if !args.json {
-            return terminal::print(&effects::kind_text(&kind, terminal::style()));
+            let mut text = effects::kind_text(&kind, terminal::style());
+            for other in effects::related_kinds(&kinds, name) {
+                let _ = write!(text, "\n\nsee also {}: {}", other.name, other.says);
+            }
+            return terminal::print(&text);
         }
         kinds = vec![kind];
     }

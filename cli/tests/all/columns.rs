@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use serde_json::Value;
+
 use crate::common::{json, model, printed, ran, refused, run, scratch};
 
 /// Samples of a bundled recording that are used, so that tests are quick.
@@ -254,4 +256,156 @@ fn two_names_share_a_column() {
         "{}",
         found.err
     );
+}
+
+/// An arm as `import` writes it: coordinates with the names of joints.
+const JOINTS: &str = r#"
+schema = 1
+name = "arm"
+gravity = [0, "-g", 0]
+constants = { g = { value = 9.81, unit = "m/s^2" }, l = { value = 0.4, unit = "m" } }
+coordinates = { shoulder_pan_joint = {}, joint_2 = {} }
+frame = [
+  { name = "upper", on = "base", modified_dh = { theta = "shoulder_pan_joint" } },
+  { name = "lower", on = "upper", modified_dh = { theta = "joint_2", a = "l" } },
+]
+part = [{ on = "upper", linear = { planar = "1" } }, { on = "lower", linear = { planar = "2" } }]
+drive = [
+  { name = "shoulder_pan_joint_drive", joint = "shoulder_pan_joint" },
+  { name = "joint_2_drive", joint = "joint_2" },
+]
+"#;
+
+/// A motion of that arm: time, positions, velocities, torques.
+fn rows() -> Vec<[f64; 7]> {
+    let row = |k: u32| {
+        let t = 0.01 * f64::from(k);
+        let q = [(2.0 * t).sin(), (3.1 * t).cos() - 1.0];
+        let v = [2.0 * (2.0 * t).cos(), -3.1 * (3.1 * t).sin()];
+        let a = [-4.0 * (2.0 * t).sin(), -9.61 * (3.1 * t).cos()];
+        let far = 0.3 * (a[0] + a[1]) + 2.0 * 9.81 * (q[0] + q[1]).cos();
+        [t, q[0], q[1], v[0], v[1], 0.8 * a[0] + far + 5.0 * q[0].cos(), far]
+    };
+    (0..500).map(row).collect()
+}
+
+/// The recording with given names of columns.
+fn table(header: &str, first: f64) -> String {
+    let mut text = format!("{header}\n");
+    for [t, more @ ..] in rows() {
+        let more: Vec<String> = more.iter().map(ToString::to_string).collect();
+        text += &format!("{},{}\n", first * t, more.join(","));
+    }
+    text
+}
+
+/// Values of a fit to a recording, and what the program says.
+fn fitted(name: &str, header: &str, first: f64, options: &[&str]) -> (Vec<f64>, String) {
+    let (model, data) = (scratch(&format!("{name}.toml")), scratch(&format!("{name}.csv")));
+    std::fs::write(&model, JOINTS).expect("written");
+    std::fs::write(&data, table(header, first)).expect("written");
+    let mut arguments = vec!["identify", &model, "--data", &data, "--json"];
+    arguments.extend(options);
+    let ran = ran(&arguments);
+    assert_eq!(ran.status, 0, "{header}: {}", ran.err);
+    let fit: Value = serde_json::from_str(&ran.out).expect("JSON");
+    let parameters = fit["parameters"].as_array().expect("a list").iter();
+    (
+        parameters.map(|one| one["value"].as_f64().expect("a number")).collect(),
+        ran.err,
+    )
+}
+
+/// Whether two fits are equal, but for rounding of the times.
+fn are_equal(one: &[f64], other: &[f64]) -> bool {
+    one.len() == other.len()
+        && one
+            .iter()
+            .zip(other)
+            .all(|(a, b)| (a - b).abs() < 1e-6 * (1.0 + a.abs()))
+}
+
+#[test]
+fn columns_that_name_joints_need_no_mapping() {
+    let plain = "t,shoulder_pan_joint,joint_2,shoulder_pan_joint_d,joint_2_d,shoulder_pan_joint_drive,joint_2_drive";
+    let (expected, _) = fitted("joints-plain", plain, 1.0, &[]);
+    for (k, (header, first)) in [
+        (
+            "t,joint_states.position.shoulder_pan_joint,joint_states.position.joint_2,joint_states.velocity.shoulder_pan_joint,\
+             joint_states.velocity.joint_2,joint_states.effort.shoulder_pan_joint,joint_states.effort.joint_2",
+            1.0,
+        ),
+        (
+            "time,shoulder_pan_joint.position,joint_2.position,shoulder_pan_joint.velocity,joint_2.velocity,\
+             shoulder_pan_joint.effort,joint_2.effort",
+            1.0,
+        ),
+        (
+            "time_ms,q_shoulder_pan_joint,q_joint_2,dq_shoulder_pan_joint,dq_joint_2,tau_shoulder_pan_joint,tau_joint_2",
+            1000.0,
+        ),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let (found, says) = fitted(&format!("joints-{k}"), header, first, &[]);
+        assert!(are_equal(&found, &expected), "{header}: {found:?} for {expected:?}");
+        assert!(says.contains("by the names of joints"), "{says}");
+    }
+}
+
+#[test]
+fn a_column_that_may_be_another_signal_is_not_taken() {
+    let model = scratch("joints-doubt.toml");
+    std::fs::write(&model, JOINTS).expect("written");
+    for (k, header) in [
+        // Two topics have the same joints.
+        "t,a.position.shoulder_pan_joint,b.position.shoulder_pan_joint,position.joint_2,x,y,z",
+        // Set points, motor positions and numbers without names are no positions of joints.
+        "t,desired.position.shoulder_pan_joint,motor_position.joint_2,position_2,x,y,z",
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let data = scratch(&format!("joints-doubt-{k}.csv"));
+        std::fs::write(&data, table(header, 1.0)).expect("written");
+        let refused = ran(&["identify", &model, "--data", &data]);
+        assert_ne!(refused.status, 0);
+        assert!(refused.err.contains("shoulder_pan_joint"), "{}", refused.err);
+    }
+}
+
+#[test]
+fn a_mapping_file_gives_what_its_lines_give_as_options() {
+    let header = "clock,a,b,c,d,e,f";
+    let pairs = [
+        ("t", "clock [ms]"),
+        ("shoulder_pan_joint", "a"),
+        ("joint_2", "b"),
+        ("shoulder_pan_joint_d", "c"),
+        ("joint_2_d", "d"),
+        ("shoulder_pan_joint_drive", "e"),
+        ("joint_2_drive", "f"),
+    ];
+    let maps: Vec<String> = pairs
+        .iter()
+        .map(|(ours, theirs)| format!("--map={ours}={theirs}"))
+        .collect();
+    let maps: Vec<&str> = maps.iter().map(String::as_str).collect();
+    let (expected, _) = fitted("mapped", header, 1000.0, &maps);
+    // The first line is wrong in the file, and right as an option.
+    let lines: Vec<String> = (pairs.iter().skip(1))
+        .map(|(ours, theirs)| format!("{ours} = \"{theirs}\"\n"))
+        .collect();
+    let file = scratch("mapping.toml");
+    std::fs::write(&file, format!("[recording.columns]\nt = \"clock\"\n{}", lines.concat())).expect("written");
+    let (found, _) = fitted("mapped-by-file", header, 1000.0, &["--mapping", &file, maps[0]]);
+    assert!(are_equal(&found, &expected), "{found:?} for {expected:?}");
+    std::fs::write(&file, lines.concat()).expect("written");
+    let (found, _) = fitted("mapped-without-header", header, 1000.0, &["--mapping", &file, maps[0]]);
+    assert!(are_equal(&found, &expected), "{found:?} for {expected:?}");
+    std::fs::write(&file, "joint_2 = 3\n").expect("written");
+    let refused = ran(&["identify", "arm.toml", "--data", "run.csv", "--mapping", &file]);
+    assert_eq!(refused.status, 2);
+    assert!(refused.err.contains("[recording.columns]"), "{}", refused.err);
 }

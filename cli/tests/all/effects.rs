@@ -1,6 +1,6 @@
 //! `effects` and `add`, libraries of one's own, and forces that are read late.
 
-use crate::common::{ran, run, scratch, workspace};
+use crate::common::{printed, ran, run, scratch, workspace};
 use serde_json::Value;
 
 fn model(name: &str) -> String {
@@ -208,4 +208,64 @@ fn rods_are_identified_from_a_recording_with_rods() {
     };
     let (without, with) = (error(&spidermill), error(&file));
     assert!(with < 1e-5 && without > 20.0 * with, "{without} {with}");
+}
+
+#[test]
+fn an_effect_at_each_drive_is_one_entry() {
+    let out = scratch("each.toml");
+    let (arm, kind) = (model("puma560.toml"), "stribeck_friction");
+    let added = ran(&[
+        "add",
+        &arm,
+        kind,
+        "--at-each",
+        "drives",
+        "--set",
+        "vs=0.1",
+        "--set",
+        "Fs=2",
+        "--out",
+        &out,
+    ]);
+    assert_eq!(added.status, 0, "{}", added.err);
+    let text = std::fs::read_to_string(&out).expect("a model");
+    assert_eq!(text.matches(kind).count(), 2, "the name and the kind: {text}");
+    assert!(text.contains("at_each = \"drives\""), "{text}");
+    // The same model as with an entry for each drive.
+    let mut single = arm.clone();
+    for k in 1..=6 {
+        let to = scratch(&format!("single-{k}.toml"));
+        let place = format!("joint{k}");
+        let added = ran(&[
+            "add", &single, kind, "--at", &place, "--set", "vs=0.1", "--set", "Fs=2", "--out", &to,
+        ]);
+        assert_eq!(added.status, 0, "{}", added.err);
+        single = to;
+    }
+    let told = json(&["diff", &single, &out, "--json"]);
+    for key in ["entries", "parameters", "base", "values"] {
+        assert_eq!(told[key], serde_json::json!([]), "{key}");
+    }
+    // It acts there now.
+    let again = ran(&["add", &out, kind, "--at", "joint2", "--set", "vs=0.1"]);
+    assert!(
+        again.status == 1 && again.err.contains("acts at `joint2` already"),
+        "{}",
+        again.err
+    );
+    let named = ran(&["add", &arm, "spring", "--at-each", "joint2,joint3", "--set", "k.name=k"]);
+    assert!(named.status == 1 && named.err.contains("one name"), "{}", named.err);
+}
+
+#[test]
+fn a_spring_between_points_is_found_under_spring() {
+    let spring = printed(&["effects", "spring"]);
+    assert!(spring.contains("see also two_point_element"), "{spring}");
+    let unknown = ran(&["effects", "strut"]);
+    assert_eq!(unknown.status, 1);
+    assert!(
+        unknown.err.contains("description of `two_point_element`"),
+        "{}",
+        unknown.err
+    );
 }

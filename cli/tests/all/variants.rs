@@ -131,3 +131,25 @@ fn what_cannot_be_held_beside_is_refused() {
     let says = refused(1, &["diff", &before, &before, "--data", "no-such-run.csv"]);
     assert!(says.contains("no-such-run.csv"), "{says}");
 }
+
+#[test]
+fn values_of_base_parameters_that_differ_are_listed() {
+    let before = model("spidermill.toml");
+    // Base parameters are linear in the mass of the platform.
+    let [one, two] = [("heavy-values.toml", "92.4560"), ("heavier-values.toml", "172.4560")].map(|(name, mass)| {
+        let told = json(&["diff", &before, &heavier(name, mass), "--json"]);
+        told["values"].as_array().expect("a list").clone()
+    });
+    assert!(!one.is_empty() && one.len() == two.len());
+    for (one, two) in one.iter().zip(&two) {
+        assert_eq!((&one["name"], &one["before"]), (&two["name"], &two["before"]));
+        let change = |told: &Value| number(told, "/after") - number(told, "/before");
+        close(change(two), 2.0 * change(one));
+    }
+    let printed = printed(&["diff", &before, &scratch("heavy-values.toml")]);
+    assert!(printed.contains("nominal values of p_min"), "{printed}");
+    assert_eq!(
+        json(&["diff", &before, &before, "--json"])["values"],
+        Value::Array(Vec::new())
+    );
+}

@@ -55,20 +55,20 @@ pub(super) struct RegisterMachine<'a> {
     /// Values of the fixed stage by operation.
     fixed: Vec<f64>,
     /// Fixed values that the state stage reads, with their slots.
-    kept: Vec<(usize, f64)>,
+    pub(super) kept: Vec<(usize, f64)>,
     /// Instructions for every block, in order.
-    steps: Vec<SlotInstruction>,
+    pub(super) steps: Vec<SlotInstruction>,
     /// Slot of each operation of the state stage, and of fixed values that it reads.
-    slots: Vec<usize>,
+    pub(super) slots: Vec<usize>,
     /// Slot of each output; outputs that are not wanted share a slot that stays zero.
-    outputs: Vec<usize>,
+    pub(super) outputs: Vec<usize>,
     /// Number of slots of the memory.
-    n_slots: usize,
+    pub(super) n_slots: usize,
 }
 
 /// One operation on slots; the target comes first and is never an operand.
 #[derive(Clone, Copy, Debug)]
-enum SlotInstruction {
+pub(super) enum SlotInstruction {
     /// Copies an input.
     Input(usize, Atom),
     /// `a + b`
@@ -390,7 +390,7 @@ fn sign(x: f64) -> f64 {
 }
 
 /// A function of one operand at one state.
-fn evaluate_unary(function: Unary, x: f64) -> f64 {
+pub(super) fn evaluate_unary(function: Unary, x: f64) -> f64 {
     match function {
         Unary::Sqrt => x.sqrt(),
         Unary::Sign => sign(x),

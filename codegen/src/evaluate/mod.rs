@@ -8,6 +8,7 @@
 
 pub(crate) mod lost_digits;
 mod machine;
+mod single;
 
 use std::fmt;
 
@@ -19,6 +20,8 @@ use crate::expr::Atom;
 use crate::lower::{ProgramOp, StraightLineProgram};
 use crate::programs::{LoopPrograms, PassivePosition};
 use crate::{Derivation, DynamicsPrograms, ModelPrograms, ReactionPrograms};
+
+pub use single::SingleStateFunction;
 
 use machine::{OutputBlock, RegisterMachine, SingleStateProgram};
 

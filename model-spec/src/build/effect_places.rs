@@ -10,7 +10,7 @@ use crate::kind_terms::symbols_without_unit;
 use crate::kinds::{ActsOn, OtherMotion, PlaceLoad, n_places};
 use crate::mechanism::{DriveIdx, DriveKind, EffectPlace, LumpedMass, ModelDrive, ModelPart, PartIdx};
 use crate::record::OneOrMany;
-use crate::schema::EffectKindEntry;
+use crate::schema::{EffectEntry, EffectKindEntry};
 use crate::suggest;
 use crate::values::SpannedName;
 
@@ -24,6 +24,74 @@ pub(crate) struct EffectTargets<'a> {
     pub(crate) parts: &'a [ModelPart],
     /// Lumped masses, without names that an effect could use.
     pub(crate) lumped_masses: &'a [LumpedMass],
+}
+
+/// The word for all drives in `at_each`.
+pub(crate) const ALL_DRIVES: &str = "drives";
+
+/// The effects that an entry stands for: one at each place of `at_each`, or the entry itself. Faults are reported.
+pub(super) fn single_effects(
+    entry: &EffectEntry,
+    scene: &EffectTargets<'_>,
+    log: &mut DiagnosticLog,
+) -> Vec<EffectEntry> {
+    let Some(each) = &entry.at_each else {
+        if entry.at.is_none() && !entry.faulty {
+            log.push(
+                Diagnostic::error(entry.span, "this effect has no place")
+                    .label("expected `at`, or `at_each` for parameters of its own at each place")
+                    .help("for example `at = [\"motor\"]`, or `at_each = \"drives\"`"),
+            );
+        }
+        return vec![entry.clone()];
+    };
+    if let Some(at) = &entry.at {
+        log.push(
+            Diagnostic::error(at.span, "an effect has both `at` and `at_each`")
+                .label("expected one of them")
+                .related(each.span, "the other one")
+                .help("`at` shares the parameters among its places; `at_each` gives each place its own"),
+        );
+        return Vec::new();
+    }
+    // A common name would make the parameters one.
+    let named = entry.parameters.iter().flat_map(|table| &table.entries);
+    let mut names = named.filter_map(|(_, parameter)| parameter.name.as_ref());
+    if let Some(name) = names.next() {
+        log.push(
+            Diagnostic::error(name.span, "a parameter at several places has one name")
+                .label("expected no name with `at_each`")
+                .help("delete the name, so that each place has its own parameter; or share one parameter with `at`"),
+        );
+        return Vec::new();
+    }
+    let is_all = each.entries.iter().all(|name| name.text == ALL_DRIVES)
+        && scene.drives.iter().all(|drive| drive.name != ALL_DRIVES);
+    let places: Vec<SpannedName> = if is_all {
+        let driven = scene.drives.iter().filter(|drive| drive.is_driven);
+        let named = |text: &String| SpannedName {
+            text: text.clone(),
+            span: each.span,
+        };
+        driven.map(|drive| named(&drive.name)).collect()
+    } else {
+        each.entries.clone()
+    };
+    if places.is_empty() {
+        log.push(
+            Diagnostic::error(each.span, "this effect acts nowhere")
+                .label("expected the names of drives, coordinates or points"),
+        );
+    }
+    let single = |place: SpannedName| EffectEntry {
+        at: Some(OneOrMany {
+            span: place.span,
+            entries: vec![place],
+        }),
+        at_each: None,
+        ..entry.clone()
+    };
+    places.into_iter().map(single).collect()
 }
 
 /// Finds a place by its name. If several things have that name, the kind of effect decides which one is used.

@@ -6,7 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::build::bodies::check_unique;
-use crate::build::effect_places::{EffectTargets, common_load, find_place};
+use crate::build::effect_places::{EffectTargets, common_load, find_place, single_effects};
 use crate::build::frames::duplicate_name;
 use crate::build::symbols::{ParameterLookup, SymbolTable};
 use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
@@ -35,8 +35,11 @@ pub(super) fn effects(
 ) -> Vec<ModelEffect> {
     // All kinds are checked once, before any effect uses them.
     let kinds = kinds(own_kinds, log);
-    let entries = model.effect.iter().flat_map(|list| &list.entries);
-    check_unique("effect", entries.clone().filter_map(|entry| entry.name.as_ref()), log);
+    let listed = model.effect.iter().flat_map(|list| &list.entries);
+    check_unique("effect", listed.clone().filter_map(|entry| entry.name.as_ref()), log);
+    // An entry for each of several places stands for one effect at each of them.
+    let single: Vec<EffectEntry> = listed.flat_map(|entry| single_effects(entry, scene, log)).collect();
+    let entries = single.iter();
     // Effects that couple two places may share one of them with another effect.
     // For kinds with exactly two places: whether they act on both. `None` for all other kinds.
     let couples = |entry: &EffectEntry| {
@@ -258,6 +261,7 @@ fn effect(
     };
     // Names of parameters are compared with the symbols of the kind.
     check_parameter_names(entry, kind, log);
+    check_without(entry, kind, log);
     let at = at?;
     if at.entries.is_empty() {
         log.push(
@@ -311,6 +315,9 @@ fn effect(
             && !those.contains(&key.name.as_str())
         {
             way.entry().refuse_parameter(entry, &key.name, those, log);
+            continue;
+        }
+        if lacks(entry, &key.name) {
             continue;
         }
         let unit = unit_at(parameter.unit.as_ref(), carries)?;
@@ -564,6 +571,55 @@ fn check_values(
             .label(label)
             .help(format!("the kind adds `{}`", expression.text)),
     );
+}
+
+/// Whether an effect does not have a parameter of its kind.
+fn lacks(entry: &EffectEntry, symbol: &str) -> bool {
+    let mut without = entry.without.iter().flat_map(|list| &list.entries);
+    without.any(|name| name.text == symbol)
+}
+
+/// Reports parameters that an effect lacks although its kind has no such parameter or needs all of them, or that it has
+/// at the same time.
+fn check_without(entry: &EffectEntry, kind: &EffectKindEntry, log: &mut DiagnosticLog) {
+    let Some(without) = &entry.without else { return };
+    let symbols = || (kind.parameters.iter().flat_map(|table| &table.entries)).map(|(key, _)| key.name.as_str());
+    if kind.mechanics.is_some_and(|way| !way.entry().may_lack_parameters()) {
+        log.push(
+            Diagnostic::error(without.span, "this kind of effect needs all of its parameters")
+                .label("expected no `without`")
+                .help("delete `without`; give a parameter that is zero the nominal value 0"),
+        );
+        return;
+    }
+    for name in &without.entries {
+        let mut named = entry.parameters.iter().flat_map(|table| &table.entries);
+        if !symbols().any(|symbol| symbol == name.text) {
+            let advice = suggest::advice(&name.text, "parameters", symbols());
+            log.push(
+                Diagnostic::error(name.span, format!("unknown parameter `{}`", name.text))
+                    .label("this kind of effect has no such parameter")
+                    .help(advice),
+            );
+        } else if let Some((key, _)) = named.find(|(key, _)| key.name == name.text) {
+            log.push(
+                Diagnostic::error(
+                    key.span,
+                    format!("`{}` stands in `without` and in `parameters`", name.text),
+                )
+                .label("this effect does not have it")
+                .related(name.span, "left out here")
+                .help("delete one of the two"),
+            );
+        }
+    }
+    if symbols().all(|symbol| lacks(entry, symbol)) {
+        log.push(
+            Diagnostic::error(without.span, "this effect has no parameter")
+                .label("all parameters of the kind are left out")
+                .help("delete the effect, or leave out less"),
+        );
+    }
 }
 
 /// Reports entries of `parameters` whose names the kind does not have.

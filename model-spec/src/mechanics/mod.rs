@@ -173,6 +173,11 @@ pub(crate) trait MechanicsEntry: Sync {
     /// Reports a parameter that an effect names but that does not exist at its place; `those` are the ones that do.
     fn refuse_parameter(&self, _entry: &EffectEntry, _symbol: &str, _those: &[&str], _log: &mut DiagnosticLog) {}
 
+    /// Whether an effect may have only some of its parameters.
+    fn may_lack_parameters(&self) -> bool {
+        false
+    }
+
     /// The values of an effect's constants, some of which become named constants of the model. `None` after a fault,
     /// which is reported.
     fn named_constants(

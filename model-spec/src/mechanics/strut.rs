@@ -15,7 +15,7 @@ pub(crate) struct StrutMechanics;
 
 impl MechanicsEntry for StrutMechanics {
     fn description(&self) -> &'static str {
-        "F0 + k*l + Fv*l' that pull the points together, l their distance"
+        "F0 + k*l + Fv*l' of a spring, strut or damper that pulls the points together, l their distance"
     }
 
     fn introduction(&self) -> &'static str {
@@ -37,6 +37,11 @@ impl MechanicsEntry for StrutMechanics {
 
     fn n_places(&self) -> Option<usize> {
         Some(2)
+    }
+
+    /// A coil spring has no damping, a damper no stiffness.
+    fn may_lack_parameters(&self) -> bool {
+        true
     }
 
     fn check_places(

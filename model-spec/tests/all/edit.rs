@@ -113,7 +113,10 @@ fn inline_lists_of_effects() {
         ),
     ] {
         let (text, loaded) = add(&with_effects(old), &friction).unwrap();
-        let new = new.replace("{ N }", "{ kind = \"coulomb_friction\", at = [\"motor\"] }");
+        let new = new.replace(
+            "{ N }",
+            "{ name = \"coulomb_friction_motor\", kind = \"coulomb_friction\", at = [\"motor\"] }",
+        );
         assert_eq!(text, with_effects(&new));
         assert_eq!(loaded.mechanism.effects.last().unwrap().kind, "coulomb_friction");
     }
@@ -394,4 +397,47 @@ fn a_place_that_shares_a_value_may_get_its_difference() {
     );
     let (_, loaded) = add(&shared, &effect("viscous_friction", &["joint2"])).unwrap();
     assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
+}
+
+#[test]
+fn an_effect_may_lack_parameters_and_has_a_name() {
+    let mut spring = effect("two_point_element", &["C", "D"]);
+    spring.without = vec!["Fv".to_owned()];
+    let text = format!(
+        "{ARM}{REST}\n[[point]]\nname = \"C\"\non = \"base\"\nat = [1, 0, 0]\n\n[[point]]\nname = \"D\"\non = \"link\"\nat = [1, 0, 0]\n"
+    );
+    let (text, loaded) = add(&text, &spring).unwrap();
+    assert!(text.contains("name = \"two_point_element_C_D\""), "{text}");
+    let symbols: Vec<&str> = loaded.mechanism.effects[0]
+        .terms
+        .iter()
+        .map(|term| term.symbol.as_str())
+        .collect();
+    assert_eq!(symbols, ["F0", "k"]);
+    // A second effect gets a name of its own.
+    let (text, _) = add(&text, &effect("two_point_element", &["C", "D"])).err().map_or_else(
+        || panic!("the same effect twice"),
+        |says| {
+            assert!(says.contains("acts at"), "{says}");
+            add(&text, &effect("spring", &["q"])).unwrap()
+        },
+    );
+    assert!(text.contains("name = \"spring_q\""));
+    for (without, says) in [
+        (&["c"][..], "unknown parameter"),
+        (&["F0", "k", "Fv"][..], "no parameter"),
+    ] {
+        let mut wrong = spring.clone();
+        wrong.without = without.iter().map(|&name| name.to_owned()).collect();
+        let fault = add(
+            &format!(
+                "{ARM}{REST}\n[[point]]\nname = \"C\"\non = \"base\"\nat = [1, 0, 0]\n\n[[point]]\nname = \"D\"\non = \"link\"\nat = [1, 0, 0]\n"
+            ),
+            &wrong,
+        );
+        assert!(
+            fault.clone().is_err_and(|fault| fault.contains(says)),
+            "{says}: {fault:?}"
+        );
+    }
 }

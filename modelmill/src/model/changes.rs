@@ -1,10 +1,11 @@
 //! `diff`: the differences of two models, for reviewers.
 
 use modelmill_codegen::review::ReducedEquations;
-use modelmill_codegen::{OperationCount, ProgramStage};
+use modelmill_codegen::{BaseParameterEntry, OperationCount, ProgramStage};
 
 use crate::model::Model;
 use crate::model::entries::entries;
+use crate::model::thresholds::EQUAL_VALUES;
 
 /// A named entry before and after a change.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -16,6 +17,40 @@ pub struct EntryChange {
     pub before: Option<String>,
     /// Its text after; `None` if it was removed.
     pub after: Option<String>,
+}
+
+/// The nominal value of a base parameter before and after a change, in SI units.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BaseValueChange {
+    /// The retained product, by which both models name the base parameter.
+    pub retained: String,
+    /// Its unit.
+    pub unit: String,
+    /// Its value before; `None` if that model has no such base parameter, or does not give all values in it.
+    pub before: Option<f64>,
+    /// Its value after, likewise.
+    pub after: Option<f64>,
+}
+
+/// Nominal values of base parameters that differ, in the order of the first model, then of the second.
+fn changed_values(before: &Model, after: &Model) -> Vec<BaseValueChange> {
+    let value = |model: &Model, retained: &str| {
+        let k = model.base.iter().position(|base| base.retained == retained)?;
+        model.has_nominal(k).then(|| model.nominal[k])
+    };
+    let is_new = |base: &&BaseParameterEntry| before.base.iter().all(|other| other.retained != base.retained);
+    (before.base.iter().chain(after.base.iter().filter(is_new)))
+        .map(|base| BaseValueChange {
+            retained: base.retained.clone(),
+            unit: base.unit.clone(),
+            before: value(before, &base.retained),
+            after: value(after, &base.retained),
+        })
+        .filter(|change| match (change.before, change.after) {
+            (Some(a), Some(b)) => (a - b).abs() > EQUAL_VALUES * a.abs().max(b.abs()),
+            (a, b) => a != b,
+        })
+        .collect()
 }
 
 /// Named entries that differ, in the order of the first list, then of the second.
@@ -83,6 +118,8 @@ pub struct ModelChanges {
     pub dependencies: Vec<EntryChange>,
     /// p_min, eq. (16), named by retained products.
     pub base: Vec<EntryChange>,
+    /// Nominal values of p_min that differ.
+    pub values: Vec<BaseValueChange>,
     /// Numbers of operations of a call, by the name of the function, before and after.
     pub operations: Vec<(&'static str, OperationCount, OperationCount)>,
 }
@@ -130,6 +167,7 @@ impl ModelChanges {
             products: changed_entries(&products(before), &products(after)),
             dependencies: changed_entries(&dependencies(before), &dependencies(after)),
             base: changed_entries(&base(before), &base(after)),
+            values: changed_values(before, after),
             operations: vec![
                 ("regressor", regressor.0, regressor.1),
                 ("inverse dynamics", dynamics.0, dynamics.1),

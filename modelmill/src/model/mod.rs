@@ -28,7 +28,7 @@ use crate::error::{Error, Outcome};
 use crate::host::Host;
 use gravity_variants::GravityVariants;
 
-pub use changes::{EntryChange, ModelChanges};
+pub use changes::{BaseValueChange, EntryChange, ModelChanges};
 pub use equations::EquationsText;
 pub use magnitudes::ModelMagnitudes;
 pub use modelmill_codegen::review::PageFormat;

@@ -11,3 +11,7 @@ pub(super) const SMALL_COMPONENT: f64 = 0.01;
 
 /// Number of random poses from which the size of a mechanism is taken. By judgement.
 pub(super) const SIZE_POSES: usize = 40;
+
+/// Relative difference of two nominal values of a base parameter below which they count as equal. Sums of some terms in
+/// another order differ by 1e-15 to 1e-13; values that users write have at most 10 digits.
+pub(super) const EQUAL_VALUES: f64 = 1e-12;

@@ -3,8 +3,9 @@
 use modelmill_codegen::review::NumericMethod;
 use serde_json::{Value, json};
 
-use crate::model::{EntryChange, Model, ModelChanges};
+use crate::model::{BaseValueChange, EntryChange, Model, ModelChanges};
 use crate::text::TerminalStyle;
+use crate::text::table;
 
 impl ModelChanges {
     /// All changes as one JSON object: base parameters of both models, changed entries, products (eq. (5)),
@@ -38,6 +39,10 @@ impl ModelChanges {
             }
             side
         };
+        let values = self.values.iter();
+        let values: Vec<Value> = values
+            .map(|c| json!({ "name": c.retained, "unit": c.unit, "before": c.before, "after": c.after }))
+            .collect();
         json!({
             "before": side(before),
             "after": side(after),
@@ -45,6 +50,7 @@ impl ModelChanges {
             "parameters": list(&self.products),
             "dependencies": list(&self.dependencies),
             "base": list(&self.base),
+            "values": values,
             "operations": operations,
         })
     }
@@ -95,6 +101,12 @@ impl ModelChanges {
             "no change",
             &self.base,
         );
+        // Models often have the same equations with other values.
+        if !self.values.is_empty() {
+            lines.push(String::new());
+            lines.push(style.bold("nominal values of p_min, by retained product"));
+            lines.extend(self.values.iter().map(value_text));
+        }
         lines.push(String::new());
         // Operations are printed even without a change.
         lines.push(style.bold("Operations per call"));
@@ -108,4 +120,27 @@ impl ModelChanges {
         }
         lines.join("\n")
     }
+}
+
+/// A line for a changed value, with the relative change if there is one.
+fn value_text(change: &BaseValueChange) -> String {
+    let text = |value: Option<f64>| value.map_or("not given".to_owned(), table::number);
+    let relative = match (change.before, change.after) {
+        (Some(before), Some(after)) if before != 0.0 => {
+            let percent = 100.0 * (after - before) / before.abs();
+            format!(
+                " ({}{} %)",
+                if percent > 0.0 { "+" } else { "" },
+                table::significant(percent, 3)
+            )
+        }
+        _ => String::new(),
+    };
+    format!(
+        "  {}: {} -> {} {}{relative}",
+        change.retained,
+        text(change.before),
+        text(change.after),
+        change.unit
+    )
 }

@@ -45,8 +45,11 @@ pub fn effect_json(effect: &NewEffect) -> Value {
     });
     let constants = effect.constants.iter();
     json!({
+        "name": effect.name,
         "kind": effect.kind,
         "at": effect.at,
+        "at_each": effect.is_at_each,
+        "without": effect.without,
         "parameters": parameters.collect::<serde_json::Map<String, Value>>(),
         "constants": constants.map(|(s, v)| (s.clone(), json!(v))).collect::<serde_json::Map<String, Value>>(),
     })

@@ -38,11 +38,39 @@ pub fn kind<'a>(kinds: &'a [EffectKind], name: &str) -> Outcome<&'a EffectKind> 
     found.ok_or_else(|| unknown_kind_error(name, kinds))
 }
 
+/// Other kinds whose first sentence has the name of a kind as a word: a spring may also be an element between points.
+pub fn related_kinds<'a>(kinds: &'a [EffectKind], name: &str) -> Vec<&'a EffectKind> {
+    let word = name.replace('_', " ");
+    let others = kinds.iter().filter(|kind| kind.name != name);
+    others.filter(|kind| has_word(&kind.says, &word)).collect()
+}
+
+/// Whether a text has a word, or words in sequence, also as a plural.
+fn has_word(text: &str, word: &str) -> bool {
+    let plain = |text: &str| {
+        let words = text.split(|c: char| !c.is_alphanumeric()).filter(|one| !one.is_empty());
+        words.map(|one| format!(" {}", one.to_lowercase())).collect::<String>() + " "
+    };
+    let (text, word) = (plain(text), plain(word));
+    text.contains(&word) || text.contains(&format!("{}s ", word.trim_end()))
+}
+
 /// The error for an unknown kind; it lists the known ones.
 fn unknown_kind_error(name: &str, kinds: &[EffectKind]) -> Error {
     let names: Vec<&str> = kinds.iter().map(|kind| kind.name.as_str()).collect();
+    // Users search for what they see on the machine, such as a strut.
+    let word = name.replace('_', " ");
+    let described = kinds
+        .iter()
+        .filter(|kind| has_word(&kind.says, &word) || has_word(&kind.explains, &word));
+    let described: Vec<String> = described.map(|kind| format!("`{}`", kind.name)).collect();
+    let described = if described.is_empty() {
+        String::new()
+    } else {
+        format!("; the word stands in the description of {}", described.join(", "))
+    };
     Error::input(format!(
-        "there is no kind of effect `{name}`; the known kinds are {}",
+        "there is no kind of effect `{name}`{described}; the known kinds are {}",
         names.join(", ")
     ))
 }

@@ -1,4 +1,5 @@
-//! Assigns columns of a recording to the names of the model: first by the user's options, then by the model file.
+//! Assigns columns of a recording to the names of the model: first by the user's options, then by the model file, then
+//! by names of joints in the names of columns.
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{Message, OptionName, Remedy};
@@ -6,6 +7,7 @@ use modelmill_identify::RecordingNote;
 use modelmill_identify::{ComputedColumn, NonFinitePolicy, ReadOptions};
 use modelmill_spec::{ColumnFault, ColumnQuantity, ColumnSum, read_column, split_header_unit, unit_factor};
 
+use super::joint_columns::{JointColumn, JointColumns};
 use super::options::RecordingOptions;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
@@ -100,7 +102,16 @@ pub(crate) fn read_options(
             mapping.add(ours, sum);
         }
     }
-    let notes = mapping.notes(&known, &mechanism.recording.torque, file);
+    let is_given = |ours: &str, mapping: &ColumnMapping| {
+        header.iter().any(|name| name == ours) || mapping.has(ours) || (ours == "t" && args.rate.is_some())
+    };
+    let by_joint = map_joint_columns(model, &known, header, &mut mapping, &is_given);
+    let mut notes = mapping.notes(&known, &mechanism.recording.torque, file);
+    notes.extend(
+        by_joint
+            .into_iter()
+            .map(|says| RecordingNote::info(message!("{file}: {}", says))),
+    );
     // Motor torques are scaled to the drive, their variances by the square.
     for (drive, factor) in &mechanism.recording.torque {
         mapping.scale(drive, *factor, header);
@@ -125,6 +136,59 @@ pub(crate) fn read_options(
         ..ReadOptions::default()
     };
     Ok((options, notes))
+}
+
+/// Most columns that a remark names.
+const MOST_NAMED: usize = 4;
+
+/// Assigns columns that name joints, such as `joint_states.position.elbow`, to names of the model that have no column.
+/// Returns remarks for the user.
+fn map_joint_columns(
+    model: &Model,
+    known: &[(String, ColumnQuantity)],
+    header: &[String],
+    mapping: &mut ColumnMapping,
+    is_given: &dyn Fn(&str, &ColumnMapping) -> bool,
+) -> Vec<Message> {
+    let joints = JointColumns::new(&model.derivation.mechanism, known, header);
+    let (mut pairs, mut remarks) = (Vec::new(), Vec::new());
+    for (ours, quantity) in known {
+        if is_given(ours, mapping) {
+            continue;
+        }
+        match joints.find(ours, *quantity) {
+            Some(JointColumn::Unique(text)) => {
+                if let Ok(sum) = parse_column_sum(model, &text, *quantity, header) {
+                    // A column that the user assigned to another name is that.
+                    if sum.terms.iter().any(|(theirs, _)| mapping.is_source(theirs)) {
+                        continue;
+                    }
+                    mapping.add(ours, sum);
+                    pairs.push(format!("`{ours}` from `{text}`"));
+                }
+            }
+            Some(JointColumn::Ambiguous(names)) => {
+                let more = names.len().saturating_sub(MOST_NAMED);
+                let more = if more > 0 {
+                    format!(" and {more} more")
+                } else {
+                    String::new()
+                };
+                let names: Vec<String> = names.iter().take(MOST_NAMED).map(|name| format!("`{name}`")).collect();
+                remarks.push(message!(
+                    "the columns {}{more} may all be `{ours}`, and none is used; map one with {}.",
+                    names.join(", "),
+                    map(ours, "THEIRS")
+                ));
+            }
+            None => {}
+        }
+    }
+    if !pairs.is_empty() {
+        let says = message!("columns are assigned by the names of joints: {}.", pairs.join(", "));
+        remarks.insert(0, says);
+    }
+    remarks
 }
 
 /// Forces with samples that may be missing. None if drives share rows, since their forces are added before samples are
@@ -185,6 +249,12 @@ impl ColumnMapping {
     /// Whether a column of the file already has another name.
     fn is_renamed(&self, theirs: &str) -> bool {
         self.renames.iter().any(|(_, other)| other == theirs)
+    }
+
+    /// Whether a column of the file is read for any name of the model.
+    fn is_source(&self, theirs: &str) -> bool {
+        let mut terms = self.computed.iter().flat_map(|one| &one.terms);
+        self.is_renamed(theirs) || terms.any(|(name, _)| name == theirs)
     }
 
     /// Whether a name of the model has a column.

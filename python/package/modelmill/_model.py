@@ -18,6 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from . import _core
 from ._compiled import Compiled
 from ._errors import ModelmillError, ModelmillWarning
+from ._figures import force_figure
+from ._keywords import with_reading_keywords
 from ._progress import Told, told
 from ._results import (
     AnswerT,
@@ -41,6 +43,7 @@ from ._tables import columns as columns_of
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
     from typing_extensions import Unpack
 
 Floats = NDArray[np.float64]
@@ -55,10 +58,11 @@ class ReadingOptions(TypedDict, total=False):
 
     Attributes
     ----------
-    columns : dict of str to str
+    columns : dict of str to str, or path
         Names that the model needs, each with the name of a column of the recording, or a sum of columns, with a unit if it is
         not SI: ``{"q6": "(pos6 - pos5)/32 - 90 [deg]"}``. The model needs ``t``, coordinates, and drives. Optional are a
-        coordinate with ``_d`` or ``_dd``, and a drive with ``_var`` for the variance of its force.
+        coordinate with ``_d`` or ``_dd``, and a drive with ``_var`` for the variance of its force. Or the path of a file with
+        the table ``[recording.columns]``.
     cutoff_hz : float
         Cut-off of the low-pass on positions, Hz; default: chosen by cross-validation on the forces.
     order : int
@@ -88,7 +92,7 @@ class ReadingOptions(TypedDict, total=False):
         where the forces show that the drive sticks.
     """
 
-    columns: Mapping[str, str]
+    columns: Mapping[str, str] | PathText
     cutoff_hz: float | None
     order: int | None
     trim: int | tuple[int, int] | None
@@ -127,7 +131,11 @@ def _reading(options: Mapping[str, Any]) -> dict[str, Any]:
     if unknown:
         raise TypeError(f"unknown keyword {', '.join(unknown)}; the keywords for reading a recording are {', '.join(_READING)}")
     whole = {**_READING, **options}
-    whole["columns"] = [(str(ours), str(theirs)) for ours, theirs in dict(whole["columns"] or {}).items()]
+    columns = whole["columns"] or {}
+    if isinstance(columns, (str, os.PathLike)):
+        whole["columns"] = _core.column_mapping(columns)
+    else:
+        whole["columns"] = [(str(ours), str(theirs)) for ours, theirs in dict(columns).items()]
     trim = whole["trim"]
     whole["trim"] = None if trim is None else trim if isinstance(trim, (tuple, list)) else (trim, trim)
     for names, expected, of in _TYPES:
@@ -182,6 +190,16 @@ def _are_the_same(some: Sequence[Sequence[Any]], others: Sequence[Sequence[Any]]
 def _sources(data: Any) -> list[Any]:
     """Returns the recordings of an argument: none, one, or a list."""
     return [] if data is None else data if isinstance(data, list) else [data]
+
+
+def _vector(given: ArrayLike | None) -> ArrayLike | None:
+    """Returns real numbers as a contiguous vector of floats, and everything else as it is."""
+    if given is None:
+        return None
+    array = np.asarray(given)
+    if array.ndim != 1 or array.dtype.kind not in "fiub":
+        return given
+    return np.ascontiguousarray(array, dtype=np.float64)
 
 
 def _wrong_shape(name: str, shape: tuple[int, ...], names: list[str]) -> str:
@@ -327,6 +345,9 @@ def _request(source: Any, options: Mapping[str, Any], name: str) -> _Request:
 class Recording:
     """A recording that was read and prepared for a model, once for several methods.
 
+    It can be pickled and copied. In another process it is prepared again, together with the recordings with which it was
+    prepared first: the files must still be there.
+
     Attributes
     ----------
     name : str
@@ -335,14 +356,20 @@ class Recording:
         Processing steps and warnings of the audit: severity and text.
     """
 
-    def __init__(self, model: Model, request: _Request, core: _core.Recording) -> None:
+    def __init__(self, model: Model, request: _Request, core: _core.Recording, group: _Group, place: tuple[int, int]) -> None:
         self._model, self._core = model, core
         self._source, self._options, self._given_name = request.source, dict(request.options), request.name
+        self._group, self._place = group, place
         self.name = core.file
         self.notes = core.notes
 
     def _motion(self) -> tuple[Floats, list[Floats], list[Floats], list[Floats]]:
         return self._core.prepared()
+
+    @property
+    def model(self) -> Model:
+        """The model for which the recording was prepared."""
+        return self._model
 
     @property
     def t(self) -> Floats:
@@ -364,9 +391,70 @@ class Recording:
         """Prepared accelerations, rad/s^2 or m/s^2; shape (n, dof)."""
         return np.stack(self._motion()[3], axis=1)
 
+    @property
+    def forces(self) -> Floats | None:
+        """Measured forces of the drives, N or N m; shape (n, drives). None if the recording has no forces.
+
+        NaN where a force was not measured, or was found to be a fault of its sensor.
+        """
+        measured = self._core.forces()
+        return None if measured is None else np.stack(measured, axis=1)
+
+    def calculated(self, parameters: Values = None) -> Floats:
+        """Computes the forces of the model at the prepared samples, N or N m; shape (n, drives).
+
+        Parameters
+        ----------
+        parameters : optional
+            Values of the base parameters, as for :meth:`Model.inverse_dynamics`; nominal ones if not given.
+        """
+        values, _ = self._model._values(parameters)
+        return np.stack(_core.forces_along(self._model._core, self._core, values), axis=1)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Recording):
+            return NotImplemented
+        if self is other:
+            return True
+        own, others = self._arrays(), other._arrays()
+        return (
+            (self.name, self._model) == (other.name, other._model)
+            and len(own) == len(others)
+            and all(np.array_equal(a, b, equal_nan=True) for a, b in zip(own, others))
+        )
+
+    def _arrays(self) -> list[Floats]:
+        time, q, qd, qdd = self._motion()
+        return [time, *q, *qd, *qdd, *(self._core.forces() or [])]
+
+    def __hash__(self) -> int:
+        return hash((self.name, self._model))
+
+    def __copy__(self) -> Recording:
+        return self
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Recording:
+        # Nothing of a recording changes.
+        return self
+
+    def __reduce__(self) -> tuple[Callable[..., Recording], tuple[Any, ...]]:
+        return _restored_recording, (self._model, self._group, self._place)
+
     def __repr__(self) -> str:
         remarks = "".join(f"\n  {severity}: {says}" for severity, says in self.notes)
         return f"recording {self.name}: {len(self.t)} samples{remarks}"
+
+
+#: Recordings that were prepared together: those of a fit, and its validation runs; each with source, options and name.
+_Group = tuple[tuple[tuple[Any, dict[str, Any], str], ...], ...]
+
+
+def _restored_recording(model: Model, group: _Group, place: tuple[int, int]) -> Recording:
+    """Prepares the recordings of a group again, once for all that are restored from it."""
+    if model._restored is None or model._restored[0] is not group:
+        requests = [[_request(source, options, name) for source, options, name in run] for run in group]
+        model._restored = (group, model._prepared(requests[0], requests[1], False))
+    return _successful(model._restored[1][place[0]][place[1]])
 
 
 #: One recording: a path, a tuple of paths of one run, a table, or the result of `Model.recording`.
@@ -380,15 +468,50 @@ class Model:
     order. Columns have the order of `coordinates`, those of forces the order of `drives`. Values of base parameters are the
     nominal ones of the file, unless ``parameters`` is given: an :class:`Identification`, the path of one, an array in the order
     of `p_min`, or a dict that replaces some of them by name.
+
+    A model can be pickled and copied: it is derived again from its text in another process. Models are equal if their text and
+    the values of their base parameters are.
     """
 
     def __init__(self, core: _core.Model) -> None:
         self._core = core
+        # What functions of single states need, read once.
+        self._nominal_notes: Remarks | None = None
+        self._sizes: dict[str, tuple[int, ...]] = {}
+        self._last_fit: tuple[Identification, Floats] | None = None
+        # Recordings that were last restored from a pickle.
+        self._restored: tuple[_Group, tuple[list[Recording | ModelmillError], list[Recording | ModelmillError]]] | None = None
         self._p_min: BaseParameters | None = None
         self._compiled: dict[str, Compiled] = {}
         # Recordings that were last prepared together: those that were given, and those that came out.
         self._together: tuple[tuple[Any, ...], ...] = ()
         self._together_prepared: tuple[list[Recording | ModelmillError], list[Recording | ModelmillError]] = ([], [])
+
+    # Copies.
+
+    def __reduce__(self) -> tuple[Callable[..., Model], tuple[Any, ...]]:
+        path, text, libraries, at_values = _core.model_contents(self._core)
+        # Other files are found from the folder of the model file, wherever the other process starts.
+        libraries = [os.path.abspath(one) for one in libraries]
+        if os.path.isfile(path):
+            path = os.path.abspath(path)
+        return _restored_model, (path, text, libraries, at_values, self._core.nominal)
+
+    def __copy__(self) -> Model:
+        return Model(self._core)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Model:
+        # The compiled part never changes.
+        return Model(self._core)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Model):
+            return NotImplemented
+        same = self.text == other.text and len(self.p_min) == len(other.p_min)
+        return same and bool(np.array_equal(self._core.nominal, other._core.nominal, equal_nan=True))
+
+    def __hash__(self) -> int:
+        return hash(self.text)
 
     # What the model is.
 
@@ -536,6 +659,53 @@ class Model:
             found.append(array)
         return found, first is not None and first[1] == ()
 
+    def _single(
+        self,
+        function: str,
+        q: ArrayLike | None,
+        qd: ArrayLike | None = None,
+        qdd: ArrayLike | None = None,
+        forces: ArrayLike | None = None,
+        parameters: Values = None,
+    ) -> Floats | None:
+        """Evaluates a function at one state given as vectors, as fast as possible; None for all other input and for faults."""
+        if getattr(q, "ndim", 1) != 1:
+            return None
+        values: Floats | None = None
+        if parameters is not None:
+            if isinstance(parameters, np.ndarray):
+                values = parameters
+            elif isinstance(parameters, Identification):
+                if self._last_fit is None or self._last_fit[0] is not parameters:
+                    self._last_fit = (parameters, self._values(parameters)[0])
+                values = self._last_fit[1]
+            else:
+                return None
+        shape = self._sizes.get(function)
+        if shape is None:
+            n, drives, n_base = self.dof, len(self.drives), len(self.p_min)
+            self._sizes = {
+                "inverse_dynamics": (drives,),
+                "regressor": (drives, n_base),
+                "mass_matrix": (n, n),
+                "bias": (n,),
+            }
+            shape = self._sizes[function]
+        size = shape[0] if len(shape) == 1 else shape[0] * shape[1]
+        found = _core.at_single(self._core, function, size, q, qd, qdd, forces, values)
+        if found is None:
+            # Lists and other types of numbers.
+            q, qd, qdd, forces = [_vector(one) for one in (q, qd, qdd, forces)]
+            found = _core.at_single(self._core, function, size, q, qd, qdd, forces, values)
+            if found is None:
+                return None
+        if parameters is None and function != "regressor":
+            if self._nominal_notes is None:
+                self._nominal_notes = self._core.nominal_notes
+            if self._nominal_notes:
+                _warn(self._nominal_notes, 4)
+        return found if len(shape) == 1 else found.reshape(shape)
+
     def _at(
         self,
         function: str,
@@ -582,7 +752,8 @@ class Model:
         numpy.ndarray, shape (drives,) or (n, drives)
             N or N m.
         """
-        return self._at("inverse_dynamics", q, qd, qdd, load, parameters)
+        found = self._single("inverse_dynamics", q, qd, qdd, load, parameters)
+        return self._at("inverse_dynamics", q, qd, qdd, load, parameters) if found is None else found
 
     def regressor(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, load: ArrayLike | None = None) -> Floats:
         """Computes H_min of eq. (4): forces are ``regressor @ p_min``.
@@ -596,7 +767,8 @@ class Model:
         -------
         numpy.ndarray, shape (drives, n_base) or (n, drives, n_base)
         """
-        return self._at("regressor", q, qd, qdd, load, self._core.nominal)
+        found = self._single("regressor", q, qd, qdd, load)
+        return self._at("regressor", q, qd, qdd, load, self._core.nominal) if found is None else found
 
     def mass_matrix(self, q: ArrayLike, *, parameters: Values = None) -> Floats:
         """Computes the mass matrix M of ``J' f = M q'' + b``.
@@ -612,7 +784,8 @@ class Model:
         -------
         numpy.ndarray, shape (dof, dof) or (n, dof, dof)
         """
-        return self._at("mass_matrix", q, parameters=parameters)
+        found = self._single("mass_matrix", q, parameters=parameters)
+        return self._at("mass_matrix", q, parameters=parameters) if found is None else found
 
     def bias(
         self, q: ArrayLike, qd: ArrayLike, *, parameters: Values = None, load: ArrayLike | None = None
@@ -629,7 +802,8 @@ class Model:
         numpy.ndarray, shape (dof,) or (n, dof)
             N or N m.
         """
-        return self._at("bias", q, qd, None, load, parameters)
+        found = self._single("bias", q, qd, None, load, parameters)
+        return self._at("bias", q, qd, None, load, parameters) if found is None else found
 
     def forward_dynamics(self, q: ArrayLike, qd: ArrayLike, forces: ArrayLike, *, parameters: Values = None) -> Floats:
         """Computes the accelerations of the coordinates for given forces of the drives.
@@ -686,6 +860,7 @@ class Model:
 
     # Recordings.
 
+    @with_reading_keywords(_READING, ReadingOptions)
     def recording(
         self, data: Source, *, name: str | None = None, progress: Progress = None, **reading: Unpack[ReadingOptions]
     ) -> Recording:
@@ -707,6 +882,7 @@ class Model:
         _warn(found.notes)
         return found
 
+    @with_reading_keywords(_READING, ReadingOptions)
     def prepare_recordings(
         self,
         data: Sequence[Source],
@@ -766,10 +942,11 @@ class Model:
         with told(progress) as hears:
             answers = self._core.prepare_together([[one.input for one in run] for run in (fit, check)], hears)
         found: list[list[Recording | ModelmillError]] = [[], []]
-        for requests, run, own in zip((fit, check), answers, found):
-            for request, (core, error) in zip(requests, run):
+        group: _Group = tuple(tuple((one.source, dict(one.options), one.name) for one in run) for run in (fit, check))
+        for place, (requests, run, own) in enumerate(zip((fit, check), answers, found)):
+            for k, (request, (core, error)) in enumerate(zip(requests, run)):
                 if core is not None:
-                    own.append(Recording(self, request, core))
+                    own.append(Recording(self, request, core, group, (place, k)))
                 elif isinstance(error, ModelmillError):
                     if request.left_out and hasattr(error, "add_note"):
                         error.add_note(f"Columns without numbers were left out: {', '.join(request.left_out)}")
@@ -810,6 +987,48 @@ class Model:
         first, second = self._all_recordings((data, what), (check, "check"), reading, progress, unprepared)
         return [one._core for one in first], [one._core for one in second]
 
+    @with_reading_keywords(_READING, ReadingOptions)
+    def plot(
+        self,
+        data: Source,
+        *,
+        parameters: Values = None,
+        drives: Sequence[str] | None = None,
+        progress: Progress = None,
+        **reading: Unpack[ReadingOptions],
+    ) -> Figure:
+        """Draws the measured force of each drive, that of the model, and the residual, over time; needs matplotlib.
+
+        Parameters
+        ----------
+        data
+            A recording as :meth:`recording` takes it.
+        parameters : optional
+            Values of the base parameters, such as the result of :meth:`identify`; nominal ones if not given.
+        drives : list of str, optional
+            Drives to draw; default: all.
+        progress, **reading
+            As for :meth:`compare`.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        if isinstance(data, list):
+            raise ModelmillError("plot() draws one recording: pass one of the list")
+        if isinstance(data, Recording) and data.model is self and not reading:
+            run = data
+        else:
+            [run], _ = self._all_recordings((data, "recording"), (None, "check"), reading, progress)
+        names = self.drives
+        chosen = names if drives is None else [drives] if isinstance(drives, str) else list(drives)
+        for name in chosen:
+            if name not in names:
+                raise ModelmillError(f"there is no drive `{name}`; there are {', '.join(names)}")
+        values, what = self._values(parameters)
+        return force_figure(run, self, [names.index(name) for name in chosen], values, what)
+
+    @with_reading_keywords(_READING, ReadingOptions)
     def compare(
         self, data: Source, *, parameters: Values = None, progress: Progress = None, **reading: Unpack[ReadingOptions]
     ) -> Comparison:
@@ -830,6 +1049,7 @@ class Model:
         read, _ = self._recordings(data, None, reading, progress)
         return Comparison(_answered(progress, lambda hears: self._core.compare(read, values, name, hears)))
 
+    @with_reading_keywords(_READING, ReadingOptions)
     def identify(
         self,
         data: Source,
@@ -883,6 +1103,7 @@ class Model:
         found = _answered(progress, lambda hears: self._core.identify(read, checked, options, recorded, instrument_period, hears))
         return Identification(found, self)
 
+    @with_reading_keywords(_READING, ReadingOptions)
     def diagnose(
         self,
         data: Source,
@@ -918,6 +1139,7 @@ class Model:
         """Returns the diagnosis as one page, inline in a notebook; arguments as for :meth:`diagnose`."""
         return self.diagnose(data, **options).report()
 
+    @with_reading_keywords(_READING, ReadingOptions)
     def runs(
         self,
         data: Sequence[Source],
@@ -974,7 +1196,7 @@ class Model:
         beside: Sequence[str] = (),
         noise: float | None = None,
         data: Source = None,
-        columns: Mapping[str, str] | None = None,
+        columns: Mapping[str, str] | PathText | None = None,
         progress: Progress = None,
     ) -> Excitation:
         """Plans the periodic motion that determines base parameters best, or distinguishes effects best.
@@ -1025,7 +1247,15 @@ class Model:
 
     # Other models of the same mechanism.
 
-    def with_effect(self, kind: str, at: str | Sequence[str], **settings: float | str) -> Model:
+    def with_effect(
+        self,
+        kind: str,
+        at: str | Sequence[str] | None = None,
+        *,
+        at_each: str | Sequence[str] | None = None,
+        without: str | Sequence[str] = (),
+        **settings: float | str,
+    ) -> Model:
         """Returns the model with an effect added to its file.
 
         Parameters
@@ -1033,14 +1263,22 @@ class Model:
         kind : str
             For example ``"coulomb_friction"``; :func:`kinds` lists all kinds.
         at : str or list of str
-            Where it acts: a drive, a coordinate, a point, ``"base"``.
+            Where it acts: a drive, a coordinate, a point, ``"base"``. Several places share the parameters.
+        at_each : str or list of str, optional
+            Places with parameters of their own, instead of ``at``; ``"drives"`` stands for all drives.
+        without : str or list of str
+            Parameters of the kind that the effect does not have, such as ``"Fv"`` of a coil spring.
         **settings
             Symbols of the kind, each with a value (SI), or with the name for its parameter.
         """
         values = [(name, float(one)) for name, one in settings.items() if not isinstance(one, str)]
         names = [(name, one) for name, one in settings.items() if isinstance(one, str)]
-        places = [at] if isinstance(at, str) else list(at)
-        return Model(self._core.with_effect(kind, places, values, names))
+        if (at is None) == (at_each is None):
+            raise ModelmillError("with_effect() needs the places of the effect: give either at or at_each")
+        given = at if at is not None else at_each
+        places = [given] if isinstance(given, str) else list(given or ())
+        lacking = [without] if isinstance(without, str) else list(without)
+        return Model(self._core.with_effect(kind, places, at is None, lacking, values, names))
 
     def with_fit(self, parameters: Values) -> Model:
         """Returns the model with other values of its base parameters, such as those of an :class:`Identification`."""
@@ -1077,6 +1315,7 @@ class Model:
         _warn(found.notes)
         return Interpretation(found)
 
+    @with_reading_keywords(_READING, ReadingOptions)
     def diff(
         self, variant: Model, data: Source = None, *, progress: Progress = None, **reading: Unpack[ReadingOptions]
     ) -> Difference:
@@ -1136,6 +1375,14 @@ class Picture:
 
     def _repr_html_(self) -> str:
         return self.svg
+
+
+def _restored_model(path: str, text: str, libraries: Sequence[str], at_values: bool, values: Floats) -> Model:
+    """Derives a model from the contents of another one."""
+    core = _core.load_text(path, text, libraries, at_values, None)
+    if not np.array_equal(core.nominal, values, equal_nan=True):
+        core = core.with_values(values)
+    return Model(core)
 
 
 def load(

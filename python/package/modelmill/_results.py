@@ -78,6 +78,14 @@ class Result:
         """Writes :meth:`to_dict` to a file (JSON)."""
         Path(path).write_text(json.dumps(self._object, indent=2) + "\n", encoding="utf-8")
 
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Result):
+            return NotImplemented
+        return type(self) is type(other) and self._object == other._object
+
+    def __hash__(self) -> int:
+        return hash((type(self), self._text))
+
     def __str__(self) -> str:
         return self._text
 
@@ -404,6 +412,12 @@ class Difference(Result):
     def base(self) -> list[dict[str, Any]]:
         """Base parameters that changed: ``name``, ``before``, ``after``."""
         changed: list[dict[str, Any]] = self._object["base"]
+        return changed
+
+    @property
+    def values(self) -> list[dict[str, Any]]:
+        """Nominal values of base parameters that changed: ``name``, ``unit``, ``before``, ``after``."""
+        changed: list[dict[str, Any]] = self._object["values"]
         return changed
 
     @property

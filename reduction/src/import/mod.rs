@@ -46,6 +46,8 @@ pub struct DescriptionImport {
     pub model: String,
     /// What was left out, rounded or assumed; one sentence each.
     pub remarks: Vec<Message>,
+    /// What has no effect on a model in any reading; one sentence each.
+    pub facts: Vec<Message>,
     /// Joints of the description, with the coordinates of the model that move them.
     pub joints: Vec<ImportedJoint>,
 }

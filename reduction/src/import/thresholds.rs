@@ -14,3 +14,7 @@ pub(super) const MOST_ATTRIBUTES: usize = 500;
 /// Largest difference (rad or m, and relative) between the value given for a joint and the one by its coupling. By
 /// judgement: typed values have few digits, and a difference that matters is larger.
 pub(super) const COUPLED_VALUES: f64 = 1e-4;
+
+/// Largest ratio of an entry of an inertia or a first moment to the largest one that counts as rounding of a rotation.
+/// Rounding of some rotations in sequence is below 1e-15; values that CAD exports have are above 1e-9.
+pub(super) const ROUNDING_OF_ROTATION: f64 = 1e-14;

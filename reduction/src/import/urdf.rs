@@ -79,8 +79,9 @@ pub(crate) fn read(document: &Document, closures: Option<&str>, is_floating: boo
         ));
     }
     // A tree needs unique names, one root, and one parent for each other link.
-    check_names(&links, &joints)?;
-    let root = root_link(&links, &joints)?;
+    let world = implied_world(&links, &joints);
+    check_names(&links, &joints, world)?;
+    let root = root_link(&links, &joints, world)?;
     // Names are looked up in tables, because a search per joint would take the square of their number.
     let by_name: BTreeMap<&str, Node> = links
         .iter()
@@ -91,19 +92,20 @@ pub(crate) fn read(document: &Document, closures: Option<&str>, is_floating: boo
         below.entry(joint.parent.as_str()).or_default().push(j);
     }
     let mut places: BTreeMap<String, usize> = BTreeMap::new();
-    let mut reached: BTreeSet<&str> = root.attribute("name").into_iter().collect();
+    let mut reached: BTreeSet<&str> = BTreeSet::from([root.as_str()]);
     // Breadth first from the root, so that parents stand before their children.
-    let mut order = vec![(root, None)];
+    let mut order = vec![(root.as_str(), None)];
     let mut k = 0;
     while k < order.len() {
-        let (node, between): (Node, Option<usize>) = order[k];
-        let name = required_attribute(&node, "name")?;
+        let (name, between): (&str, Option<usize>) = order[k];
+        // The world may have no element.
+        let node = by_name.get(name);
         let mut link = DescriptionLink {
-            name: name.clone(),
+            name: name.to_owned(),
             parent: None,
             at: DescriptionPose::identity(),
             joints: Vec::new(),
-            inertial: inertial(&node)?,
+            inertial: node.map(inertial).transpose()?.unwrap_or_default(),
         };
         // A link gets pose and joints of the joint through which it is reached.
         if let Some(j) = between {
@@ -111,9 +113,7 @@ pub(crate) fn read(document: &Document, closures: Option<&str>, is_floating: boo
             link.parent = places.get(&joint.parent).copied();
             link.at = joint.origin;
             link.joints.clone_from(&joint.joints);
-            if joint.joints.iter().any(|j| j.kind == DescriptionJointKind::Free)
-                && joint.parent != required_attribute(&root, "name")?
-            {
+            if joint.joints.iter().any(|j| j.kind == DescriptionJointKind::Free) && joint.parent != root {
                 return Err(format!(
                     "line {}: the joint `{}` is floating, but its parent link is not the root; only children of the root can be free bodies",
                     joint.line, joint.name
@@ -124,13 +124,13 @@ pub(crate) fn read(document: &Document, closures: Option<&str>, is_floating: boo
             link.joints.push(DescriptionJoint::new(
                 "root_joint".to_owned(),
                 DescriptionJointKind::Free,
-                line(&node),
+                line(node.unwrap_or(&robot)),
             ));
         }
-        places.insert(name.clone(), out.links.len());
+        places.insert(name.to_owned(), out.links.len());
         out.links.push(link);
         // Children of this link follow in the order of their joints.
-        for &j in below.get(name.as_str()).into_iter().flatten() {
+        for &j in below.get(name).into_iter().flatten() {
             let joint = &joints[j];
             if !reached.insert(&joint.child) {
                 return Err(format!(
@@ -138,9 +138,7 @@ pub(crate) fn read(document: &Document, closures: Option<&str>, is_floating: boo
                     joint.line, joint.child
                 ));
             }
-            if let Some(node) = by_name.get(joint.child.as_str()) {
-                order.push((*node, Some(j)));
-            }
+            order.push((&joint.child, Some(j)));
         }
         k += 1;
     }
@@ -223,9 +221,19 @@ fn resolve_fixed_couplings(out: &mut RobotDescription, joints: &[UrdfJoint]) {
     });
 }
 
+/// The name of the ground for readers that know it without an element, such as Drake and `MuJoCo`.
+const WORLD: &str = "world";
+
+/// The ground as the parent of a joint, if it has no `<link>`.
+fn implied_world(links: &[Node], joints: &[UrdfJoint]) -> Option<&'static str> {
+    let is_declared = links.iter().any(|node| node.attribute("name") == Some(WORLD));
+    let is_parent = joints.iter().any(|joint| joint.parent == WORLD);
+    (is_parent && !is_declared).then_some(WORLD)
+}
+
 /// Checks that names of links and joints are unique, and that joints connect links that exist.
-fn check_names(links: &[Node], joints: &[UrdfJoint]) -> Result<(), String> {
-    let mut names = BTreeSet::new();
+fn check_names(links: &[Node], joints: &[UrdfJoint], world: Option<&str>) -> Result<(), String> {
+    let mut names: BTreeSet<String> = world.into_iter().map(str::to_owned).collect();
     for node in links {
         let name = required_attribute(node, "name")?;
         if !names.insert(name.clone()) {
@@ -255,22 +263,23 @@ fn check_names(links: &[Node], joints: &[UrdfJoint]) -> Result<(), String> {
     Ok(())
 }
 
-/// The link that is no joint's child. Fails if there is none or more than one.
-fn root_link<'a, 'i>(links: &[Node<'a, 'i>], joints: &[UrdfJoint]) -> Result<Node<'a, 'i>, String> {
+/// The name of the link that is no joint's child. Fails if there is none or more than one.
+fn root_link(links: &[Node], joints: &[UrdfJoint], world: Option<&str>) -> Result<String, String> {
     // A link is a child if a joint names it as such.
     let children: BTreeSet<&str> = joints.iter().map(|joint| joint.child.as_str()).collect();
-    let is_child = |node: &&Node| node.attribute("name").is_some_and(|name| children.contains(name));
-    let mut roots = links.iter().filter(|node| !is_child(node));
+    let is_child = |name: &str| children.contains(name);
+    let named = links
+        .iter()
+        .map(|node| (node.attribute("name").unwrap_or_default(), Some(node)));
+    let all = world.into_iter().map(|name| (name, None)).chain(named);
+    let mut roots = all.filter(|(name, _)| !is_child(name));
     match (roots.next(), roots.next()) {
-        (Some(root), None) => Ok(*root),
-        (None, _) => Err("there is no root link: every link is the child of a joint".to_owned()),
-        (Some(one), Some(two)) => Err(located_message(
+        (Some((root, _)), None) => Ok(root.to_owned()),
+        (Some((one, _)), Some((_, Some(two)))) => Err(located_message(
             two,
-            &format!(
-                "this link and `{}` are both without a parent; connect them to one robot",
-                one.attribute("name").unwrap_or_default()
-            ),
+            &format!("this link and `{one}` are both without a parent; connect them to one robot"),
         )),
+        _ => Err("there is no root link: every link is the child of a joint".to_owned()),
     }
 }
 

@@ -100,17 +100,15 @@ fn tendons_that_bend_are_said() {
     assert!(error.contains("line") && error.contains("`tap`"), "{error}");
 }
 
-/// The nominal values of a body's part, as they stand in a model file.
-fn part<'a>(model: &'a str, body: &str) -> &'a str {
+/// The nominal values of a body's part that are not zero, as they stand in a model file.
+fn part(model: &str, body: &str) -> String {
     let from = model.find(&format!("name = \"{body}_body\"")).unwrap();
-    model[from..]
-        .split("nominal = {")
-        .nth(1)
-        .unwrap()
-        .split('}')
-        .next()
-        .unwrap()
-        .trim()
+    let values = model[from..].split("nominal = {").nth(1).unwrap();
+    let values = values.split('}').next().unwrap().trim().split(", ");
+    values
+        .filter(|value| !value.ends_with("= 0.0"))
+        .collect::<Vec<_>>()
+        .join(", ")
 }
 
 #[test]

@@ -269,3 +269,38 @@ fn right_angles_are_read_from_their_digits() {
     assert!(four.model.contains("value = 1.5708"), "{}", four.model);
     assert!(lines(&four.remarks).contains("is not rounded to pi/2"));
 }
+
+#[test]
+fn the_world_needs_no_link() {
+    let declared = import(ARM, &ImportOptions::default()).unwrap();
+    let implied = ARM.replace("  <link name=\"world\"/>\n", "");
+    assert_ne!(implied, ARM);
+    assert_eq!(
+        import(&implied, &ImportOptions::default()).unwrap().model,
+        declared.model
+    );
+    // Other links must exist, and the world is no child.
+    for text in [
+        implied.replace("<parent link=\"world\"/>", "<parent link=\"floor_plate\"/>"),
+        implied.replace("<child link=\"tool\"/>", "<child link=\"world\"/>"),
+    ] {
+        assert!(import(&text, &ImportOptions::default()).is_err());
+    }
+}
+
+#[test]
+fn all_values_of_a_body_are_written_and_zeros_are_exact() {
+    // A rotation by a quarter turn leaves rounding beside the zeros.
+    let turned = ARM.replace(
+        "<origin xyz=\"0 0 0.1\"/><mass",
+        "<origin xyz=\"0 0 0.1\" rpy=\"1.5707963267948966 0 3.141592653589793\"/><mass",
+    );
+    assert_ne!(turned, ARM);
+    let imported = import(&turned, &ImportOptions::default()).unwrap().model;
+    assert!(!imported.contains("e-1"), "{imported}");
+    let files = MemoryFiles::default();
+    let loaded = modelmill_spec::load("arm.toml", &imported, &files).unwrap();
+    let parameters = &loaded.mechanism.parameters;
+    assert!(parameters.iter().all(|parameter| parameter.has_nominal), "{imported}");
+    assert!(parameters.iter().filter(|parameter| parameter.nominal == 0.0).count() > 5);
+}

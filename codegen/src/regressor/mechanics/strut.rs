@@ -46,7 +46,10 @@ fn strut_line(
     }))
 }
 
-/// Generalised forces `[0][t][c]` for `F0`, `k` and `Fv` of one each, on every coordinate c.
+/// Symbols of the parameters.
+const SYMBOLS: [&str; 3] = ["F0", "k", "Fv"];
+
+/// Generalised forces `[0][t][c]` for each of `F0`, `k` and `Fv` that the effect has, of one, on every coordinate c.
 pub(super) fn generalised_forces(
     graph: &mut Graph,
     mechanism: &Mechanism,
@@ -68,7 +71,14 @@ pub(super) fn generalised_forces(
         forces[1].push(stretched);
         forces[2].push(graph.mul(stretched, per_rate));
     }
-    Ok(vec![forces])
+    // An effect may lack some of its parameters.
+    let has = |symbol: &str| effect.terms.iter().any(|term| term.symbol == symbol);
+    let all = SYMBOLS.into_iter().zip(forces);
+    Ok(vec![
+        all.filter(|(symbol, _)| has(symbol))
+            .map(|(_, forces)| forces)
+            .collect(),
+    ])
 }
 
 /// Forces at both ends that balance an element with given parameters, N.
@@ -82,7 +92,12 @@ pub(super) fn point_forces(
     let Some(line) = strut_line(graph, mechanism, tree, effect)? else {
         return Ok(Vec::new());
     };
-    let [constant, stiffness, damping] = [0, 1, 2].map(|k| values.get(k).copied().unwrap_or(Graph::ZERO));
+    let [constant, stiffness, damping] = SYMBOLS.map(|symbol| {
+        let mut terms = effect.terms.iter().zip(values);
+        terms
+            .find(|(term, _)| term.symbol == symbol)
+            .map_or(Graph::ZERO, |(_, value)| *value)
+    });
     let rate = distance_rate(graph, &line);
     let by_distance = graph.mul(stiffness, line.length);
     let by_rate = graph.mul(damping, rate);

@@ -7,7 +7,7 @@ mod fit;
 mod pairing;
 mod signals;
 mod thresholds;
-mod words;
+pub(super) mod words;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;

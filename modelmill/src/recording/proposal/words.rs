@@ -4,7 +4,7 @@ use modelmill_spec::split_header_unit;
 
 /// What a column of a recording measures, by its name or by its numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum SignalRole {
+pub(in crate::recording) enum SignalRole {
     Time,
     Position,
     Rate,
@@ -92,7 +92,7 @@ const WEAK_WORDS: &[(SignalRole, &[&str])] = &[
 ];
 
 /// Words of signals that a controller requests and a sensor does not measure.
-const COMMAND_WORDS: [&str; 14] = [
+pub(in crate::recording) const COMMAND_WORDS: [&str; 14] = [
     "des",
     "desired",
     "ref",
@@ -129,7 +129,7 @@ const IDLE_WORDS: [&str; 14] = [
 
 /// Units at the end of a name behind `_`, with the spelling of the tables of units. Those of one letter are units of
 /// forces.
-const UNIT_ENDINGS: [(&str, &str); 13] = [
+pub(in crate::recording) const UNIT_ENDINGS: [(&str, &str); 13] = [
     ("deg", "deg"),
     ("degree", "deg"),
     ("degrees", "deg"),
@@ -219,7 +219,7 @@ fn role_words(words: &[String]) -> Option<&'static (SignalRole, &'static [&'stat
 }
 
 /// The words of a name in lower case: parts between other characters, at capitals, and at numbers.
-fn split_words(name: &str) -> Vec<String> {
+pub(in crate::recording) fn split_words(name: &str) -> Vec<String> {
     let mut words: Vec<String> = Vec::new();
     let mut before = ' ';
     for c in name.chars() {

@@ -91,6 +91,8 @@ struct ModelTextBuilder<'a> {
     names: Vec<String>,
     /// Remarks so far.
     remarks: Vec<Message>,
+    /// Links that do not move, with their masses, kg.
+    fixed_links: Vec<(String, f64)>,
     /// Lines of `[constants]`.
     constants: String,
     /// Constants that are angles, with their values in rad.
@@ -134,6 +136,7 @@ pub(crate) fn model_text(mut description: RobotDescription, options: &Options) -
         options,
         names: vec!["base".to_owned(), "g".to_owned()],
         remarks: description.remarks.drain(..).map(Message::from).collect(),
+        fixed_links: Vec::new(),
         constants: String::new(),
         angles: Vec::new(),
         followers: String::new(),
@@ -274,6 +277,11 @@ impl ModelTextBuilder<'_> {
         if mass == 0.0 && matrix.amax() == 0.0 {
             return Ok(());
         }
+        // A link without a frame is fixed to the base.
+        let Some(frame) = frame else {
+            self.fixed_links.push((name.to_owned(), mass));
+            return Ok(());
+        };
         // Principal moments of a body are positive and satisfy the triangle inequality.
         let moments = matrix.symmetric_eigenvalues();
         if moments.min() < -1e-15 * moments.amax() || 2.0 * moments.amax() > moments.sum() * (1.0 + 1e-6) {
@@ -284,14 +292,6 @@ impl ModelTextBuilder<'_> {
                 significant_digits(moments[2], 4)
             ));
         }
-        // A link without a frame is fixed to the base.
-        let Some(frame) = frame else {
-            self.remarks.push(message!(
-                "`{name}` does not move; its {} kg have no effect and are left out",
-                significant_digits(mass, 4)
-            ));
-            return Ok(());
-        };
         // Rotate into the axes of the frame and shift to its origin (Steiner).
         let c = placed.p;
         let inertia = placed.r * matrix * placed.r.transpose()

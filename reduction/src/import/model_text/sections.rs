@@ -3,14 +3,16 @@
 use std::fmt::Write as _;
 
 use modelmill_boundary::message;
+use modelmill_boundary::text::Message;
 use nalgebra::Vector3;
 
 use super::super::DescriptionImport;
 use super::super::closing::LoopSolution;
 use super::super::description::RobotDescription;
+use super::super::thresholds::ROUNDING_OF_ROTATION;
 use super::lines::NamedDriveLine;
 use super::{ImportCoordinate, ModelTextBuilder, round_to_15_digits};
-use crate::write::{toml_float, toml_string};
+use crate::write::{significant_digits, toml_float, toml_string};
 
 impl ModelTextBuilder<'_> {
     /// Joins all sections to the text of the model file.
@@ -87,9 +89,32 @@ impl ModelTextBuilder<'_> {
         self.forces(&is_passive, lines, &mut text);
         DescriptionImport {
             model: text,
+            facts: self.facts(),
             remarks: self.remarks,
             joints: self.joints,
         }
+    }
+
+    /// What every reader of the description would leave out.
+    fn facts(&self) -> Vec<Message> {
+        /// Most links that are named.
+        const NAMED: usize = 4;
+        let all = &self.fixed_links;
+        if all.is_empty() {
+            return Vec::new();
+        }
+        let names: Vec<String> = all.iter().take(NAMED).map(|(name, _)| format!("`{name}`")).collect();
+        let more = match all.len().saturating_sub(NAMED) {
+            0 => String::new(),
+            n => format!(" and {n} more"),
+        };
+        let mass: f64 = all.iter().map(|(_, mass)| mass).sum();
+        vec![message!(
+            "{}{more} {}; {} kg have no effect on the drives and are left out",
+            names.join(", "),
+            if all.len() == 1 { "does not move" } else { "do not move" },
+            significant_digits(mass, 4)
+        )]
     }
 
     /// Writes the bodies with their ten linear parameters.
@@ -102,8 +127,14 @@ impl ModelTextBuilder<'_> {
             } else {
                 format!("_{}", k + 1)
             };
-            // The ten parameters about the origin of the frame.
-            let (i, c) = (&body.inertia, &body.moment);
+            // The ten parameters about the origin of the frame. Rotations leave rounding where an entry is zero.
+            let largest = |entries: &[f64]| entries.iter().fold(0.0_f64, |all, one| all.max(one.abs()));
+            let i = body
+                .inertia
+                .map(|one| zero_if_rounding(one, largest(body.inertia.as_slice())));
+            let c = body
+                .moment
+                .map(|one| zero_if_rounding(one, largest(body.moment.as_slice())));
             let values = [
                 ("XX", i[(0, 0)]),
                 ("XY", i[(0, 1)]),
@@ -116,10 +147,9 @@ impl ModelTextBuilder<'_> {
                 ("MZ", c.z),
                 ("M", body.mass),
             ];
-            // Zeros are the default and are not written.
+            // Zeros are written as well: a value that the file does not state counts as unknown.
             let nominal: Vec<String> = values
                 .iter()
-                .filter(|(_, v)| *v != 0.0)
                 .map(|(key, v)| format!("{key} = {}", toml_float(round_to_15_digits(*v))))
                 .collect();
             let _ = write!(
@@ -223,6 +253,15 @@ impl ModelTextBuilder<'_> {
                 let _ = write!(text, "\n[limits.{table}]\n{entries}");
             }
         }
+    }
+}
+
+/// Zero for an entry that is only rounding of entries of size `largest`.
+fn zero_if_rounding(entry: f64, largest: f64) -> f64 {
+    if entry.abs() <= ROUNDING_OF_ROTATION * largest {
+        0.0
+    } else {
+        entry
     }
 }
 
