@@ -32,8 +32,8 @@ const TOLERANCE: f64 = 1e-8;
 
 /// Finds loops that are solved by relations and stores the relations in them.
 ///
-/// A loop is examined as soon as it has as many unknown coordinates as equations, since it may be driven by a loop
-/// before it.
+/// A loop is examined as soon as it has at most as many unknown coordinates as equations, since it may be driven by a
+/// loop before it.
 pub(crate) fn find_relations(
     graph: &mut Graph,
     mechanism: &Mechanism,
@@ -52,10 +52,7 @@ pub(crate) fn find_relations(
         let coordinates = closure.coordinates.iter().copied();
         coordinates.filter(|c| !known.contains(c)).collect()
     };
-    while let Some(position) = todo.iter().position(|i| {
-        let closure = &closures[*i];
-        unknown_of(closure, &known).len() == closure.residual.len()
-    }) {
+    while let Some((position, is_exact)) = next_loop(closures, &todo, |closure| unknown_of(closure, &known).len()) {
         let index = todo.remove(position);
         let closure = &closures[index];
         let unknown = unknown_of(closure, &known);
@@ -63,27 +60,51 @@ pub(crate) fn find_relations(
         let turning: Vec<usize> = (known.iter().copied())
             .filter(|c| related.iter().all(|r| r.coordinate != *c))
             .collect();
-        known.extend(&unknown);
+        let mut is_solved = is_exact;
         if closure.explicit_coordinates().is_empty() {
             // Relations of other loops may be what makes this one a parallelogram.
             let residual = substitute_relations(graph, &related, &closure.residual);
-            let relations = relations_of(graph, mechanism, &residual, &unknown).or_else(|| {
+            let alone = if unknown.is_empty() {
+                is_loop_closed(graph, mechanism, &residual, &[]).then(Vec::new)
+            } else {
+                relations_of(graph, mechanism, &residual, &unknown)
+            };
+            let relations = alone.or_else(|| {
                 let before = solved.iter().map(|i| &closures[*i]);
                 let motion = PriorLoops::new(mechanism, before, divided)?;
                 relations_along(graph, mechanism, &motion, &turning, &residual, &unknown)
             });
-            // The relations replace the equations of the loop.
+            // The relations replace the equations of the loop; none are left if the other loops close it.
             if let Some(relations) = relations {
                 let closure = &mut closures[index];
                 closure.residual = relations.iter().map(|r| r.residual(graph)).collect();
                 closure.coordinates = coordinates_of(graph, &closure.residual);
                 closure.chain = None;
                 closure.relations = relations;
+                is_solved = true;
             }
         }
-        related.extend(closures[index].relations.iter().cloned());
-        solved.push(index);
+        // A loop with too many equations that no relations solve is left to the other methods.
+        if is_solved {
+            known.extend(&unknown);
+            related.extend(closures[index].relations.iter().cloned());
+            solved.push(index);
+        }
     }
+}
+
+/// The next loop to examine, by its position in `todo`, and whether it has as many equations as unknown coordinates.
+/// Loops with more equations come last, such as that of a third crank of a parallelogram with two equations for one
+/// angle.
+fn next_loop(
+    closures: &[LoopClosure],
+    todo: &[usize],
+    n_unknown: impl Fn(&LoopClosure) -> usize,
+) -> Option<(usize, bool)> {
+    let counts = |i: &usize| (n_unknown(&closures[*i]), closures[*i].residual.len());
+    let exact = todo.iter().position(|i| counts(i).0 == counts(i).1);
+    let redundant = || todo.iter().position(|i| counts(i).0 < counts(i).1);
+    exact.map(|at| (at, true)).or_else(|| redundant().map(|at| (at, false)))
 }
 
 /// Loops that were solved before, whose motion may drive others.

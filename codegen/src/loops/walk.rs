@@ -89,8 +89,9 @@ impl<'a> PoseWalk<'a> {
         let numeric = NumericLoops::for_unknowns(graph, mechanism, &residual, all.clone(), &[]);
         let nominal = numeric.declared_nominal_pose();
         let sizes = residual_loop_sizes(graph, mechanism, loops);
-        // The size of the largest loop; couplings have no length.
-        let of_lengths = loops.closures.iter().filter(|c| c.explicit_coordinates().is_empty());
+        // The size of the largest loop; couplings have no length, and loops that others close have no equations.
+        let of_lengths =
+            (loops.closures.iter()).filter(|c| c.explicit_coordinates().is_empty() && !c.residual.is_empty());
         let of_lengths = of_lengths.map(|c| magnitude::nominal_magnitude(graph, mechanism, &c.residual));
         let length = of_lengths.reduce(f64::max).unwrap_or(1.0);
         let mut walk = Self {

@@ -12,6 +12,7 @@
 //! constants that are equal in this file only). The numeric rank is printed as well, and a difference is reported.
 
 pub(crate) mod base;
+mod closing_constants;
 mod conditioned;
 mod constants;
 mod dependences;
@@ -35,6 +36,8 @@ use modelmill_spec::Mechanism;
 
 pub use rational_function::{FactorVariable, PowerProduct, RationalFunction, TrigonometricPolynomial};
 pub use reduction::{BaseReduction, ColumnDependency, ReductionMethod};
+#[cfg(any(test, feature = "review"))]
+pub(crate) use reduction::{constant_change_text, n_verified_digits};
 
 use crate::DeriveError;
 use crate::expr::independent::SEED;

@@ -40,7 +40,7 @@ struct ConstantPower {
     above: Vec<FactorVariable>,
     /// Constants in the denominator.
     below: Vec<FactorVariable>,
-    /// Exact value for the decimals of the file.
+    /// Exact value for the values of the constants.
     value: BigFloat,
     /// The same in double precision.
     rough: f64,
@@ -56,8 +56,9 @@ impl ConstantPower {
 }
 
 impl<'a> FileConstants<'a> {
-    /// Collects the products that may occur for numbers with a relative error of `rounding`.
-    pub(super) fn new(mechanism: &'a Mechanism, rounding: f64) -> Self {
+    /// Collects the products that may occur for numbers with a relative error of `rounding`. `value` returns the exact
+    /// value of a constant.
+    pub(super) fn new(mechanism: &'a Mechanism, value: &dyn Fn(usize) -> Option<BigFloat>, rounding: f64) -> Self {
         let one = ConstantPower {
             above: Vec::new(),
             below: Vec::new(),
@@ -66,22 +67,25 @@ impl<'a> FileConstants<'a> {
             metres: 0,
         };
         let mut powers = vec![one];
-        // Only lengths and pure numbers are used; angles occur in factors only through sines and cosines.
-        let lengths: Vec<(FactorVariable, BigFloat, i32)> = (mechanism.constants.iter().enumerate())
-            .filter(|(_, c)| !c.is_angle && c.value != 0.0)
-            .filter_map(|(i, c)| {
-                let metres = match c.unit.as_str() {
-                    "m" => 1,
-                    "1" => 0,
-                    _ => return None,
+        let mut lengths: Vec<(FactorVariable, BigFloat, i32)> = Vec::new();
+        for (i, constant) in mechanism.constants.iter().enumerate().filter(|(_, c)| c.value != 0.0) {
+            let Some(value) = value(i) else { continue };
+            // Angles occur in factors only through sines and cosines.
+            if constant.is_angle {
+                let Some((cosine, sine)) = value.cos_sin() else {
+                    continue;
                 };
-                Some((
-                    FactorVariable::Constant(i),
-                    BigFloat::from_shortest_decimal(c.value)?,
-                    metres,
-                ))
-            })
-            .collect();
+                let pair = [(FactorVariable::Cos(i), cosine), (FactorVariable::Sin(i), sine)];
+                let pair = pair.into_iter().filter(|(_, x)| x.to_f64().abs() > BigFloat::ROUNDING);
+                lengths.extend(pair.map(|(variable, x)| (variable, x, 0)));
+                continue;
+            }
+            match constant.unit.as_str() {
+                "m" => lengths.push((FactorVariable::Constant(i), value, 1)),
+                "1" => lengths.push((FactorVariable::Constant(i), value, 0)),
+                _ => {}
+            }
+        }
         let mut push = |above: &[usize], below: &[usize]| {
             let of = |chosen: &[usize]| -> Vec<FactorVariable> { chosen.iter().map(|i| lengths[*i].0).collect() };
             let product = |chosen: &[usize]| {

@@ -43,6 +43,9 @@ pub enum ReductionMethod {
         most_dropped: f64,
         /// Largest residual of a dependent column at further states, relative to its terms.
         residual: f64,
+        /// Largest change of a constant, in rad or relative to its size, with which loops close that have more equations
+        /// than needed; `None` without a change.
+        constant_change: Option<f64>,
         /// Why there is no exact reduction.
         because: Box<DeriveError>,
     },
@@ -58,12 +61,38 @@ impl ReductionMethod {
                  only"
                     .to_owned(),
             ),
-            Self::Numeric { because, residual, .. } => Some(format!(
+            Self::Numeric {
+                because,
+                residual,
+                most_dropped,
+                constant_change,
+                ..
+            } => Some(format!(
                 "the base parameters were computed numerically from the values of this file: {because}; factors are \
-                 rounded (residual {residual:.1e} of a column), and base and factors are valid for these values only"
+                 rounded (residual {residual:.1e} of a column), and base and factors are valid for these values only; \
+                 the dependences were verified to {} digits and not proved{}",
+                n_verified_digits(*most_dropped),
+                constant_change.map_or_else(String::new, |change| format!("; {}", constant_change_text(change)))
             )),
         }
     }
+}
+
+/// Number of digits to which dependences hold whose columns leave a residual of `most_dropped`.
+pub(crate) fn n_verified_digits(most_dropped: f64) -> i32 {
+    /// Digits of the numbers that are used.
+    const MOST: f64 = 130.0;
+    #[expect(clippy::cast_possible_truncation, reason = "at most 130")]
+    let n = -most_dropped.max(f64::MIN_POSITIVE).log10().clamp(-MOST, 0.0).ceil() as i32;
+    n
+}
+
+/// The statement that loops close only with changed constants, as a clause.
+pub(crate) fn constant_change_text(change: f64) -> String {
+    format!(
+        "the loops have more equations than needed, and these agree only with constants that differ from the file by up \
+         to {change:.0e} (rounding, relative or in rad), which were used"
+    )
 }
 
 /// One line of eq. (6): `h_j = sum of a_k h_k`.

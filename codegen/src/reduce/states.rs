@@ -3,9 +3,13 @@
 
 use modelmill_algebra::digits::BigFloat;
 use modelmill_algebra::field::RandomStream;
-use modelmill_spec::Mechanism;
+use modelmill_spec::{Mechanism, ModelConstant};
 use nalgebra::{DMatrix, DVector};
 
+use super::closing_constants::{
+    CLOSED_TO_ALL_DIGITS, ConstantSensitivity, NO_CONTRADICTION, PoseContradiction, SINGULAR, changed_value,
+    least_change, project_residuals,
+};
 use crate::DeriveError;
 use crate::expr::independent::SEED;
 use crate::expr::{Atom, BigFloatPoint, EvaluationTape, ExprId, Graph};
@@ -43,6 +47,12 @@ pub(super) struct WalkSampler<'a> {
     stream: RandomStream,
     /// Largest residual so far of equations that are not selected, relative to the size of the loops.
     off: f64,
+    /// Derivatives of all equations by the constants in them.
+    sensitivity: ConstantSensitivity,
+    /// Poses so far at which rows were evaluated.
+    poses: Vec<Vec<f64>>,
+    /// Largest change of a constant, in rad or relative to its size, with which all equations hold; `None` without one.
+    change: Option<f64>,
 }
 
 impl<'a> WalkSampler<'a> {
@@ -67,24 +77,25 @@ impl<'a> WalkSampler<'a> {
             |atom, value: Option<BigFloat>, is_angle| value.and_then(|value| constants.set(atom, value, is_angle));
         set(Atom::Pi, Some(BigFloat::pi()), false).ok_or(none.clone())?;
         for (i, constant) in mechanism.constants.iter().enumerate() {
-            let value = if constant.is_angle {
-                declared_angle(constant.value)
-            } else {
-                BigFloat::from_shortest_decimal(constant.value)
-            };
-            set(Atom::Constant(i), value, constant.is_angle).ok_or(none.clone())?;
+            set(Atom::Constant(i), stated_value(constant), constant.is_angle).ok_or(none.clone())?;
         }
         for (i, parameter) in mechanism.parameters.iter().enumerate() {
             let value = BigFloat::from_shortest_decimal(parameter.nominal);
             set(Atom::Parameter(i), value, false).ok_or(none.clone())?;
         }
+        let equations = all_residuals(loops);
+        // As many equations as unknowns agree with any constants.
+        let redundant = if equations.len() > loops.passive.len() { &equations[..] } else { &[] };
         Ok(Self {
+            sensitivity: ConstantSensitivity::new(graph, mechanism, redundant, &loops.passive),
+            poses: Vec::new(),
+            change: None,
             kept: NumericLoops::new(graph, mechanism, &loops.residual),
             active: loops.active.clone(),
             passive: loops.passive.clone(),
             n_columns: columns.len(),
             n_drives,
-            residual: EvaluationTape::new(graph, &[loops.residual.clone(), all_residuals(loops)].concat()),
+            residual: EvaluationTape::new(graph, &[loops.residual.clone(), equations].concat()),
             rates: EvaluationTape::new(graph, &projection.passive_rates),
             accelerations: EvaluationTape::new(graph, &projection.passive_accelerations),
             outputs: EvaluationTape::new(graph, &outputs),
@@ -126,6 +137,7 @@ impl<'a> WalkSampler<'a> {
                 continue;
             }
             n_found += 1;
+            self.poses.push(pose);
             #[expect(clippy::cast_possible_truncation, reason = "the exponent of a machine number")]
             // Scaling by a power of two is exact.
             let scale = -(largest.log2() as i64);
@@ -146,9 +158,98 @@ impl<'a> WalkSampler<'a> {
         self.off
     }
 
+    /// The value of a constant, as stated in the file or as changed by [`Self::close_by_constants`].
+    pub(super) fn constant_value(&self, constant: usize) -> Option<&BigFloat> {
+        self.constants.value(Atom::Constant(constant))
+    }
+
+    /// The largest change of a constant, in rad or relative to its size, if constants were changed.
+    pub(super) fn constant_change(&self) -> Option<f64> {
+        self.change
+    }
+
+    /// Changes constants so that all equations hold to all digits, and starts the record of closure errors again.
+    /// False, without a change, if all equations hold already or no small change achieves this.
+    pub(super) fn close_by_constants(&mut self) -> bool {
+        if self.off <= NO_CONTRADICTION {
+            return false;
+        }
+        let stated = self.constants.clone();
+        for selection in self.sensitivity.selections(self.mechanism, &is_part_of_turn) {
+            for singular in SINGULAR {
+                if let Some(change) = self.change_constants(&selection, singular) {
+                    (self.change, self.off) = (Some(change), 0.0);
+                    return true;
+                }
+                self.constants = stated.clone();
+            }
+        }
+        false
+    }
+
+    /// Takes back the changes of [`Self::close_by_constants`].
+    pub(super) fn restore_constants(&mut self) -> Option<()> {
+        for (i, constant) in self.mechanism.constants.iter().enumerate() {
+            let value = stated_value(constant)?;
+            self.constants.set(Atom::Constant(i), value, constant.is_angle)?;
+        }
+        self.change = None;
+        Some(())
+    }
+
+    /// Gauss-Newton steps on some constants until all loops close at many poses; returns the largest change. `None` if a
+    /// contradiction remains. Singular values below the share `singular` of the largest count as zero.
+    fn change_constants(&mut self, selection: &[usize], singular: f64) -> Option<f64> {
+        /// Number of poses at which all equations must hold. Each has at least one contradiction for the constants.
+        const POSES: usize = 24;
+        /// Largest number of steps. Each adds as many digits as derivatives in double precision have.
+        const ROUNDS: usize = 40;
+        /// Residuals must fall at least by this factor per step.
+        const FALL: f64 = 0.3;
+        let every = self.poses.len().div_ceil(POSES).max(1);
+        let poses: Vec<Vec<f64>> = self.poses.iter().step_by(every).cloned().collect();
+        let units: Vec<f64> = (self.passive.iter()).map(|p| self.walk.coordinate_unit(*p)).collect();
+        let sizes = self.walk.residual_sizes();
+        let at = |q: &Vec<f64>| {
+            let sensitivity = &self.sensitivity;
+            sensitivity.contradiction(self.mechanism, q, sizes, &units, selection)
+        };
+        let contradictions: Vec<PoseContradiction> = poses.iter().map(at).collect::<Option<_>>()?;
+        let inverse = least_change(&contradictions, singular)?;
+        let mut last = f64::INFINITY;
+        for _ in 0..ROUNDS {
+            let closed = poses.iter().map(|q| Some(self.close_loops(q)?.1));
+            let residuals: Vec<Vec<f64>> = closed.collect::<Option<_>>()?;
+            let most = residuals.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
+            if most <= CLOSED_TO_ALL_DIGITS || most > FALL * last {
+                return (most <= NO_CONTRADICTION).then(|| self.largest_change(selection))?;
+            }
+            last = most;
+            let step = &inverse * project_residuals(&contradictions, &residuals);
+            for (at, step) in selection.iter().zip(step.iter()) {
+                let (i, one) = self.sensitivity.constant(*at);
+                let constant = &self.mechanism.constants[i];
+                let value = changed_value(self.constant_value(i)?, constant.value, one, *step)?;
+                self.constants.set(Atom::Constant(i), value, constant.is_angle)?;
+            }
+        }
+        None
+    }
+
+    /// The largest change of selected constants from their stated values, in rad or relative to their size.
+    fn largest_change(&self, selection: &[usize]) -> Option<f64> {
+        let mut changes = selection.iter().map(|at| {
+            let (i, one) = self.sensitivity.constant(*at);
+            let change = self.constant_value(i)? - &stated_value(&self.mechanism.constants[i])?;
+            Some(change.to_f64().abs() / one)
+        });
+        changes.try_fold(0.0, |most: f64, change| Some(most.max(change?)))
+    }
+
     /// Values of the outputs at a pose, with random rates, accelerations and loads; `None` where they do not exist.
     fn evaluate_at(&mut self, q: &[f64]) -> Option<Vec<BigFloat>> {
-        let (mut point, off) = self.close_loops(q)?;
+        let (mut point, residuals) = self.close_loops(q)?;
+        let off = residuals.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
         for i in self.active.clone() {
             let unit = self.walk.coordinate_unit(i);
             let mut random = |most: f64| BigFloat::from_f64(most * unit * uniform_symmetric(&mut self.stream));
@@ -172,9 +273,9 @@ impl<'a> WalkSampler<'a> {
         Some(values)
     }
 
-    /// A pose with its passive coordinates to all digits, and the largest residual of equations that are not selected,
-    /// relative to the size of the loops. `None` if the loops do not close.
-    fn close_loops(&self, q: &[f64]) -> Option<(BigFloatPoint, f64)> {
+    /// A pose with its passive coordinates to all digits, and the residuals of all equations, relative to the size of the
+    /// loops. `None` if the loops do not close.
+    fn close_loops(&self, q: &[f64]) -> Option<(BigFloatPoint, Vec<f64>)> {
         /// Largest number of Newton steps. Each adds as many correct digits as the inverse has in double precision.
         const ROUNDS: usize = 40;
         let mut point = self.constants.clone();
@@ -186,7 +287,7 @@ impl<'a> WalkSampler<'a> {
             place(&mut point, i, BigFloat::from_f64(*value)?)?;
         }
         if self.passive.is_empty() {
-            return Some((point, 0.0));
+            return Some((point, Vec::new()));
         }
         let (_, mut jacobian) = self.kept.linearise(q)?;
         for (mut column, p) in jacobian.column_iter_mut().zip(&self.passive) {
@@ -202,9 +303,9 @@ impl<'a> WalkSampler<'a> {
             // Converged: the other equations must be satisfied as well.
             if step.amax() < BigFloat::ROUNDING {
                 let relative = all.iter().zip(self.walk.residual_sizes());
-                let relative = relative.map(|(x, size)| x.to_f64().abs() / size);
-                let off = relative.fold(0.0, f64::max);
-                return (off <= NEARLY_CLOSED).then_some((point, off));
+                let relative: Vec<f64> = relative.map(|(x, size)| x.to_f64() / size).collect();
+                let is_closed = relative.iter().all(|x| x.abs() <= NEARLY_CLOSED);
+                return is_closed.then_some((point, relative));
             }
             for (p, dx) in self.passive.iter().zip(step.iter()) {
                 let change = BigFloat::from_f64(dx * self.walk.coordinate_unit(*p))?;
@@ -216,16 +317,27 @@ impl<'a> WalkSampler<'a> {
     }
 }
 
-/// A constant angle with all digits: a multiple of a quarter of a degree if the value equals one up to rounding, else
-/// the decimal that was written.
-fn declared_angle(value: f64) -> Option<BigFloat> {
-    // Quarters of a degree in half a revolution.
-    const PER_HALF_TURN: f64 = 720.0;
-    let n = (value / std::f64::consts::PI * PER_HALF_TURN).round();
-    let is_near = (n * std::f64::consts::PI / PER_HALF_TURN - value).abs() <= 4.0 * f64::EPSILON * value.abs();
-    if is_near && n != 0.0 {
-        let part = &BigFloat::from_f64(n)? * &BigFloat::pi();
+/// A constant with all digits: the decimal that was written, or for an angle near a part of a turn that part.
+fn stated_value(constant: &ModelConstant) -> Option<BigFloat> {
+    let value = constant.value;
+    if constant.is_angle && is_part_of_turn(value) {
+        let part = &BigFloat::from_f64(quarter_degrees(value))? * &BigFloat::pi();
         return Some(part / BigFloat::from_f64(PER_HALF_TURN)?);
     }
     BigFloat::from_shortest_decimal(value)
+}
+
+/// Quarters of a degree in half a revolution.
+const PER_HALF_TURN: f64 = 720.0;
+
+/// An angle in quarters of a degree, rounded.
+fn quarter_degrees(angle: f64) -> f64 {
+    (angle / std::f64::consts::PI * PER_HALF_TURN).round()
+}
+
+/// Whether an angle other than 0 is a multiple of a quarter of a degree up to rounding.
+fn is_part_of_turn(angle: f64) -> bool {
+    let n = quarter_degrees(angle);
+    let off = (n * std::f64::consts::PI / PER_HALF_TURN - angle).abs();
+    n != 0.0 && off <= 4.0 * f64::EPSILON * angle.abs()
 }

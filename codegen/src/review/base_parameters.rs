@@ -14,7 +14,7 @@ use crate::reduce::base::{
     base_parameter_name as base_name, dependent_sums, expanded_formula, lumped_formulas, product_formula as product,
     product_unit,
 };
-use crate::reduce::{RationalFunction, ReductionMethod};
+use crate::reduce::{RationalFunction, ReductionMethod, constant_change_text, n_verified_digits};
 use crate::tree::expressions::ParameterMonomial;
 
 /// Base parameter `k` expanded term by term, without parentheses: the form that a script reads.
@@ -53,6 +53,11 @@ pub fn factored_base_expression(derivation: &Derivation, k: usize) -> PrintedFor
             number = -&number;
         }
         let inverse = number.recip();
+        // Rounded decimals have no content that is worth reading: each term keeps its own number.
+        if !members.iter().all(|(k, _)| is_small_multiple(&(k * &inverse))) {
+            terms.extend((members.into_iter()).map(|(k, what)| PrintedFormula::product(k, [factor.clone(), what])));
+            continue;
+        }
         for (k, _) in &mut members {
             *k = &*k * &inverse;
         }
@@ -62,6 +67,13 @@ pub fn factored_base_expression(derivation: &Derivation, k: usize) -> PrintedFor
         terms.push(term);
     }
     PrintedFormula::sum(terms)
+}
+
+/// Whether a number in parentheses is easier to read than its product with the number in front of them.
+fn is_small_multiple(number: &Rational) -> bool {
+    /// Largest such integer. By judgement.
+    const LARGEST: i64 = 10_000;
+    number.as_small().is_some_and(|(n, _)| n.abs() <= LARGEST)
 }
 
 /// The summand of base parameter `k` that belongs to the product of p_g at `product_idx`: `d1*m2`, with its factor of
@@ -178,13 +190,16 @@ pub(super) fn dependencies(page: &mut PageDocument, derivation: &Derivation) {
              They were found in exact arithmetic and confirmed at {confirmed_at} further states with other values of the constants."
         ),
         ReductionMethod::Unreduced => "Columns are not reduced.".to_owned(),
-        ReductionMethod::Numeric { least_kept, most_dropped, residual, because } => format!(
+        ReductionMethod::Numeric { least_kept, most_dropped, residual, constant_change, because } => format!(
             "The following columns are constant combinations of retained columns, eq. (6). \
              They were found numerically with the values of this file: {because}. \
              The factors are rounded; base and factors are valid for these values only. \
              In the span of the other columns, every retained column has a residual of at least {least_kept:.1e} of its size, \
              every dependent one of at most {most_dropped:.1e}. \
-             At further states the residual of eq. (6) is at most {residual:.1e} of a column."
+             At further states the residual of eq. (6) is at most {residual:.1e} of a column. \
+             So the dependences were verified to {} digits and not proved{}.",
+            n_verified_digits(*most_dropped),
+            constant_change.map_or_else(String::new, |change| format!("; {}", constant_change_text(change))),
         ),
     })]);
     // One equation per dependent column: factors times retained columns, or times dependent ones with lines of their

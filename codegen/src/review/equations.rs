@@ -89,6 +89,10 @@ pub struct NumericMethod {
     pub most_dropped: f64,
     /// Largest residual of eq. (6) for a dependent column at further states, relative to the size of its terms.
     pub residual: f64,
+    /// Largest change of a constant, in rad or relative to its size, with which loops close that have more equations
+    /// than needed.
+    #[cfg_attr(any(test, feature = "json"), serde(skip_serializing_if = "Option::is_none"))]
+    pub constant_change: Option<f64>,
 }
 
 impl NumericMethod {
@@ -98,6 +102,7 @@ impl NumericMethod {
             least_kept,
             most_dropped,
             residual,
+            constant_change,
             because,
         } = &reduction.method
         else {
@@ -110,6 +115,7 @@ impl NumericMethod {
             least_kept: *least_kept,
             most_dropped: *most_dropped,
             residual: *residual,
+            constant_change: *constant_change,
         })
     }
 }

@@ -52,6 +52,8 @@ pub(super) fn loops(page: &mut PageDocument, derivation: &Derivation) {
         // A chain of links exists for planar loops only.
         let plane = if closure.chain.is_some() {
             "; the loop is planar"
+        } else if closure.residual.is_empty() {
+            "; the other loops close it"
         } else {
             ""
         };

@@ -45,6 +45,19 @@ fn overconstrained_loops_may_be_moved_by_a_slide() {
     }
 }
 
+/// A Bennett linkage whose twist is rounded to 17 digits, and a rod on three equal cranks: the count is that of the
+/// linkage that moves, as the rank at random states is.
+#[test]
+fn equations_that_follow_from_others_add_no_base_parameter() {
+    for (name, base) in [("bennett", 7), ("locomotive", 3), ("weld2", 8)] {
+        let Some(text) = text(&format!("{name}.toml")) else {
+            continue;
+        };
+        let (retained, rank, warnings) = counts(&text);
+        assert_eq!((retained, rank), (base, base), "{name}: {warnings:?}");
+    }
+}
+
 /// A screw of 10 mm per turn moves the links behind it by degrees in many turns.
 #[test]
 fn numeric_ranks_are_sampled_along_the_travel_of_a_screw() {
