@@ -1,5 +1,5 @@
 //! The program: arguments become options of the library, its answers become text, JSON and files. Exit status 0 done, 1
-//! the input is at fault, 2 wrong usage.
+//! the input is at fault, 2 wrong usage, 3 the time limit was reached.
 
 mod args;
 mod commands;
@@ -13,12 +13,14 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::Parser;
+use modelmill::progress::ProgressListener;
 use modelmill::{Error, Host};
 
 use args::{CommandLine, ProgramCommand};
 use failure::{CommandFailure, CommandOutcome};
 use flags::FlagSpelling;
 use terminal::progress::TerminalProgress;
+use terminal::time_limit::TimeLimit;
 
 /// Reads the command line, runs the command, and turns a failure into a message and an exit status.
 fn main() -> ExitCode {
@@ -28,29 +30,50 @@ fn main() -> ExitCode {
             return print_help_or_usage(&error);
         }
     };
+    if let Err(failure) = check_time_limit(&cli) {
+        return report_failure(&failure);
+    }
+    let mut progress: Arc<dyn ProgressListener> = Arc::new(TerminalProgress::new());
+    if let Some(limit) = cli.time_limit {
+        progress = Arc::new(TimeLimit::start(limit, progress));
+    }
     // All files of the library are read through the disk of this run, which remembers them.
     let host = Host::new()
         .with_files(Arc::new(output::disk().clone()))
         .with_libraries(cli.library)
         .at_values(cli.at_values)
-        .with_progress(Arc::new(TerminalProgress::new()));
+        .with_progress(progress);
     match run(&host, &cli.command) {
         Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => {
-            // Faults of a model file are shown with the lines of the file; other errors are one message.
-            match &failure {
-                CommandFailure::Library(Error::Model(faults)) => {
-                    // Each fault has its line, what was expected, and a remedy.
-                    let in_colour = terminal::is_stderr_coloured();
-                    terminal::print_to_stderr(faults.render_spelled(in_colour, &FlagSpelling).trim_end());
-                }
-                CommandFailure::Library(error) => terminal::error(&error.spell(&FlagSpelling)),
-                CommandFailure::Input(says) | CommandFailure::Usage(says) => terminal::error(says),
-                CommandFailure::NotVerified | CommandFailure::ImpossibleValues | CommandFailure::BrokenPipe => {}
-            }
-            ExitCode::from(failure.status())
-        }
+        Err(failure) => report_failure(&failure),
     }
+}
+
+/// Refuses a time limit for the workbench, which runs until it is stopped.
+fn check_time_limit(cli: &CommandLine) -> CommandOutcome {
+    #[cfg(feature = "workbench")]
+    if cli.time_limit.is_some() && matches!(cli.command, ProgramCommand::Work(_)) {
+        let says = "--time-limit: the workbench runs until it is stopped; leave out the option";
+        return Err(CommandFailure::Usage(says.to_owned()));
+    }
+    let _ = cli;
+    Ok(())
+}
+
+/// Prints why a command ended early, and returns its exit status.
+fn report_failure(failure: &CommandFailure) -> ExitCode {
+    match failure {
+        // Faults of a model file are shown with the lines of the file; other errors are one message.
+        CommandFailure::Library(Error::Model(faults)) => {
+            // Each fault has its line, what was expected, and a remedy.
+            let in_colour = terminal::is_stderr_coloured();
+            terminal::print_to_stderr(faults.render_spelled(in_colour, &FlagSpelling).trim_end());
+        }
+        CommandFailure::Library(error) => terminal::error(&error.spell(&FlagSpelling)),
+        CommandFailure::Input(says) | CommandFailure::Usage(says) => terminal::error(says),
+        CommandFailure::NotVerified | CommandFailure::ImpossibleValues | CommandFailure::BrokenPipe => {}
+    }
+    ExitCode::from(failure.status())
 }
 
 /// Prints help, version or a wrong usage. Help and version have status 0, unless they cannot be written. A closed

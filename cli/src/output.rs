@@ -7,6 +7,7 @@ use std::sync::LazyLock;
 use modelmill_boundary::files::{DiskFiles, FileError, FileFault};
 
 use crate::failure::{CommandFailure, CommandOutcome};
+use crate::terminal::time_limit::begin_write;
 
 /// The disk of this run. It remembers which files were read, so that they are not written over.
 pub(crate) fn disk() -> &'static DiskFiles {
@@ -110,6 +111,7 @@ impl OutputSet {
     pub(crate) fn write(&self) -> CommandOutcome {
         let files = self.0.iter();
         let files: Vec<(&Path, &[u8])> = files.map(|(path, text)| (path.as_path(), text.as_bytes())).collect();
+        let _writing = begin_write();
         disk().write_together(&files).map_err(|error| write_failure(&error))
     }
 }
@@ -145,6 +147,7 @@ pub(crate) fn refuse_dash(flag: &str, path: &Path) -> CommandOutcome {
 
 /// Writes a file atomically, but not over one that was read. Fails with the reason and a remedy.
 pub(crate) fn write(path: &Path, text: &str) -> CommandOutcome {
+    let _writing = begin_write();
     disk()
         .write(path, text.as_bytes())
         .map_err(|error| write_failure(&error))
@@ -152,6 +155,7 @@ pub(crate) fn write(path: &Path, text: &str) -> CommandOutcome {
 
 /// Writes a file atomically over one that was read, as the user requested.
 pub(crate) fn replace(path: &Path, text: &str) -> CommandOutcome {
+    let _writing = begin_write();
     disk()
         .replace(path, text.as_bytes())
         .map_err(|error| write_failure(&error))

@@ -7,6 +7,7 @@ use modelmill_boundary::text::{OptionName, Remedy};
 use toml::de::{DeTable, DeValue};
 
 use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
+use crate::toml_budget::find_toml_excess;
 use crate::unclosed::first_unclosed_bracket;
 
 /// Largest file in bytes that is read.
@@ -86,9 +87,22 @@ pub(crate) fn quote(text: &str) -> String {
 
 /// Parses a file. Syntax errors go to the log, and the readable part is returned.
 pub(crate) fn parse_toml(text: &str, file: usize, log: &mut DiagnosticLog) -> TomlTable {
+    if let Some(excess) = find_toml_excess(text) {
+        log.syntax_broken = true;
+        let place = SourceSpan {
+            file,
+            start: excess.at,
+            end: excess.at,
+        };
+        log.push(
+            Diagnostic::error(place, excess.fault)
+                .label(excess.limit)
+                .help("a model file describes a mechanism; recordings belong in CSV files"),
+        );
+        return TomlTable::new();
+    }
     // The parser treats all text after an open bracket as its content, so only the text before it is parsed.
-    let open = first_unclosed_bracket(text)
-        .filter(|_| text.len() <= LARGEST_FILE && !DeTable::parse_recoverable(text).1.is_empty());
+    let open = first_unclosed_bracket(text).filter(|_| !DeTable::parse_recoverable(text).1.is_empty());
     let Some(open) = open else {
         return parse_closed(text, file, log);
     };
@@ -114,18 +128,9 @@ pub(crate) fn parse_toml(text: &str, file: usize, log: &mut DiagnosticLog) -> To
     table
 }
 
-/// Parses a text without open brackets; checks its size and reports syntax errors, one per line.
+/// Parses a text without open brackets; reports syntax errors, one per line.
 fn parse_closed(text: &str, file: usize, log: &mut DiagnosticLog) -> TomlTable {
     let whole = SourceSpan { file, start: 0, end: 0 };
-    if text.len() > LARGEST_FILE {
-        log.syntax_broken = true;
-        log.push(
-            Diagnostic::error(whole, "this file is too large")
-                .label(format!("a model file has at most {LARGEST_FILE} bytes"))
-                .help("a model file describes a mechanism; recordings belong in CSV files"),
-        );
-        return TomlTable::new();
-    }
     let (root, mut errors) = DeTable::parse_recoverable(text);
     errors.sort_by_key(|error| error.span().map_or(0, |range| range.start));
     let is_model = root.get_ref().contains_key("schema");

@@ -45,6 +45,7 @@ mod record;
 mod schema;
 mod scope;
 mod suggest;
+mod toml_budget;
 mod total_mass;
 mod unclosed;
 mod unit;
@@ -68,6 +69,7 @@ pub use mechanics::Mechanics;
 pub use mechanism::*;
 pub use motion::{CoordinateAxis, FramePlacement, Kinematics, MechanismPoses};
 pub use reading::{read_referenced, read_text};
+pub use toml_budget::{TomlExcess, find_toml_excess};
 pub use unit::unit_product;
 
 /// The JSON Schema of model files, by which editors complete and explain them; a test keeps it true.

@@ -8,6 +8,7 @@ use toml::de::DeTable;
 use crate::diagnostic::{Diagnostic, DiagnosticSeverity, SourceFile, SourceFiles, SourceSpan};
 use crate::document::LARGEST_FILE;
 use crate::load::LoadFailure;
+use crate::toml_budget::find_toml_excess;
 
 /// Reads the text of a file that a user names; `advice` is printed when the path leads to no file.
 ///
@@ -27,7 +28,9 @@ pub fn read_text(files: &dyn FileSource, path: &Path, advice: &str) -> Result<St
 pub fn read_referenced(files: &dyn FileSource, path: &Path, keys: &[&str]) -> Result<String, FileError> {
     let text = files.read_text(path, LARGEST_FILE as u64)?;
     // A file with syntax errors is accepted here; the reader of the file reports them.
-    let (table, _) = DeTable::parse_recoverable(&text);
+    // One beyond the limits is not parsed, so that its keys are unknown.
+    let is_readable = find_toml_excess(&text).is_none();
+    let (table, _) = DeTable::parse_recoverable(if is_readable { &text } else { "" });
     if keys.iter().any(|key| table.get_ref().contains_key(*key)) {
         return Ok(text);
     }

@@ -40,7 +40,7 @@ pub enum Error {
     Input(Message),
     /// Options contradict each other, or the method does not support them.
     Options(Message),
-    /// The caller stopped the job.
+    /// The caller stopped the job, or the time limit of its host is over.
     Cancelled,
 }
 
@@ -84,7 +84,7 @@ impl Error {
             Self::Figures(error) => error.to_string().into(),
             Self::Filter(error) => error.to_string().into(),
             Self::Input(says) | Self::Options(says) => says.clone(),
-            Self::Cancelled => "stopped on request before there was a result".into(),
+            Self::Cancelled => "stopped on request, or by a time limit, before there was a result".into(),
         }
     }
 }

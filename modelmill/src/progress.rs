@@ -3,6 +3,7 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::Instant;
 
 use modelmill_identify::RecordingNote;
 
@@ -37,6 +38,8 @@ pub struct JobHandle {
     /// Finished steps.
     done: AtomicU64,
     is_cancelled: AtomicBool,
+    /// When the job ends by itself.
+    deadline: Option<Instant>,
 }
 
 impl JobHandle {
@@ -50,9 +53,9 @@ impl JobHandle {
         self.is_cancelled.store(true, Ordering::Relaxed);
     }
 
-    /// Whether the job has been requested to stop.
+    /// Whether the job has been requested to stop, or its time is over.
     pub fn is_cancelled(&self) -> bool {
-        self.is_cancelled.load(Ordering::Relaxed)
+        self.is_cancelled.load(Ordering::Relaxed) || self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
     }
 
     /// Adds finished steps.
@@ -70,7 +73,7 @@ impl JobHandle {
 
     /// Adds finished steps.
     ///
-    /// Fails with [`Error::Cancelled`] once the job has been requested to stop.
+    /// Fails with [`Error::Cancelled`] once the job has been requested to stop, or its time is over.
     pub fn step(&self, steps: usize) -> Outcome {
         self.add(steps);
         if self.is_cancelled() {
@@ -89,16 +92,20 @@ impl Drop for JobGuard<'_> {
     }
 }
 
-/// Runs a job that `progress` observes.
+/// Runs a job that `progress` observes, until `deadline` if there is one.
 ///
-/// Fails with [`Error::Cancelled`] if the job was requested to stop, even if it has a result.
+/// Fails with [`Error::Cancelled`] if the job was requested to stop or its time is over, even if it has a result.
 pub(crate) fn run_job<T>(
     progress: &dyn ProgressListener,
+    deadline: Option<Instant>,
     what: &str,
     total: usize,
     work: impl FnOnce(&JobHandle) -> T,
 ) -> Outcome<T> {
-    let job = Arc::new(JobHandle::default());
+    let job = Arc::new(JobHandle {
+        deadline,
+        ..JobHandle::default()
+    });
     progress.on_job_start(what, total, &job);
     let ending = JobGuard(progress);
     // A listener may cancel the job as soon as it starts.
@@ -145,9 +152,20 @@ mod tests {
             stops: "long",
             ..Listener::default()
         };
-        assert!(matches!(run_job(&listener, "short", 2, JobHandle::done), Ok(0)));
-        let found = run_job(&listener, "long", 0, |_| unreachable!("it was cancelled"));
+        assert!(matches!(run_job(&listener, None, "short", 2, JobHandle::done), Ok(0)));
+        let found = run_job(&listener, None, "long", 0, |_| unreachable!("it was cancelled"));
         assert!(matches!(found, Err::<(), _>(Error::Cancelled)));
         assert_eq!(*listener.heard.lock().unwrap(), ["short 2", "end", "long 0", "end"]);
+    }
+
+    #[test]
+    fn a_job_ends_with_an_error_once_its_time_is_over() {
+        let listener = Listener::default();
+        let now = Some(Instant::now());
+        let found = run_job(&listener, now, "late", 0, |_| unreachable!("its time is over"));
+        assert!(matches!(found, Err::<(), _>(Error::Cancelled)));
+        let soon = Some(Instant::now() + std::time::Duration::from_millis(20));
+        let found = run_job(&listener, soon, "endless", 0, |job| while job.step(1).is_ok() {});
+        assert!(matches!(found, Err(Error::Cancelled)));
     }
 }

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use modelmill_boundary::files::{DiskFiles, FileSource, normalise_path};
 use modelmill_boundary::text::RemedySpelling;
 use modelmill_spec::{
-    Diagnostic, DiagnosticSeverity, LARGEST_FILE, LoadFailure, SourceFile, SourceFiles, SourceSpan, read_referenced,
-    read_text,
+    Diagnostic, DiagnosticSeverity, LoadFailure, SourceFile, SourceFiles, SourceSpan, find_toml_excess,
+    read_referenced, read_text,
 };
 
 use crate::assemble::assemble;
@@ -156,8 +156,13 @@ pub fn load(path_name: &str, text: &str, files: &dyn FileSource) -> Result<Loade
 ///
 /// Fails with the place of the first entry that does not have the expected form.
 pub fn parse<T: serde::de::DeserializeOwned>(text: &str, file: usize) -> Result<T, Box<Diagnostic>> {
-    if text.len() > LARGEST_FILE {
-        return Err(Box::new(plain_error(None, "this file is too large to be read")));
+    if let Some(excess) = find_toml_excess(text) {
+        let place = source_span(file, &(excess.at..excess.at));
+        let found = plain_error(Some(place), excess.fault);
+        return Err(Box::new(Diagnostic {
+            label: excess.limit.to_owned(),
+            ..found
+        }));
     }
     toml::from_str(text).map_err(|error| {
         let place = error.span().map(|range| source_span(file, &range));

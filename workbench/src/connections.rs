@@ -1,8 +1,8 @@
-//! Connections of the server, with a limit on those that have not sent a complete request header.
+//! Connections of the server, with a limit on those that have not sent a request with the token of the link.
 //!
-//! Any program of this machine can open connections and send nothing. Such a connection is closed after
-//! [`HEADER_TIMEOUT`], or as soon as more than [`MOST_WAITING`] of them wait: the oldest one first, so that a user's
-//! request, which is sent at once, is always accepted.
+//! Any program of this machine can open connections, and send nothing, a part of a header, or a header whose body never
+//! comes. Such a connection is closed after [`ADMISSION_TIMEOUT`], or as soon as more than [`MOST_WAITING`] of them
+//! wait: the oldest one first, so that a user's request, which is sent at once, is always accepted.
 
 use std::collections::VecDeque;
 use std::io;
@@ -13,15 +13,16 @@ use std::sync::{Arc, Mutex, PoisonError, Weak};
 use std::task::{Context, Poll, Waker};
 use std::time::Duration;
 
-use axum::serve::Listener;
+use axum::extract::connect_info::Connected;
+use axum::serve::{IncomingStream, Listener};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::{TcpListener, TcpStream};
 
-/// Longest time from the start of a connection to the end of its first request header. By judgement: a browser on the
-/// same machine needs milliseconds.
-const HEADER_TIMEOUT: Duration = Duration::from_secs(10);
+/// Longest time from the start of a connection to its first request with the token. By judgement: a browser on the same
+/// machine needs milliseconds.
+const ADMISSION_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// Most connections without a complete header. By judgement: a browser opens six, and some systems allow a program 256
+/// Most connections without such a request. By judgement: a browser opens six, and some systems allow a program 256
 /// open files.
 const MOST_WAITING: usize = 32;
 
@@ -32,8 +33,8 @@ const RETRY_PAUSE: Duration = Duration::from_millis(50);
 pub(crate) struct LimitedListener {
     /// The listener of the system.
     inner: TcpListener,
-    /// Connections without a complete header, in the order of their start.
-    waiting: VecDeque<Weak<HeaderWait>>,
+    /// Connections without a request with the token, in the order of their start.
+    waiting: VecDeque<Weak<ConnectionAdmission>>,
 }
 
 impl LimitedListener {
@@ -46,19 +47,19 @@ impl LimitedListener {
     }
 
     /// Registers a new connection, and closes the oldest waiting one if there are too many.
-    fn register(&mut self) -> Arc<HeaderWait> {
-        let still_waits = |one: &Weak<HeaderWait>| one.upgrade().is_some_and(|one| one.is_waiting());
+    fn register(&mut self) -> Arc<ConnectionAdmission> {
+        let still_waits = |one: &Weak<ConnectionAdmission>| one.upgrade().is_some_and(|one| one.is_waiting());
         self.waiting.retain(still_waits);
         if self.waiting.len() >= MOST_WAITING
             && let Some(oldest) = self.waiting.pop_front().and_then(|one| one.upgrade())
         {
             oldest.close();
         }
-        let new = Arc::new(HeaderWait::default());
+        let new = Arc::new(ConnectionAdmission::default());
         self.waiting.push_back(Arc::downgrade(&new));
         let timed = Arc::downgrade(&new);
         tokio::spawn(async move {
-            tokio::time::sleep(HEADER_TIMEOUT).await;
+            tokio::time::sleep(ADMISSION_TIMEOUT).await;
             if let Some(connection) = timed.upgrade() {
                 connection.close();
             }
@@ -74,14 +75,8 @@ impl Listener for LimitedListener {
     async fn accept(&mut self) -> (Self::Io, Self::Addr) {
         loop {
             if let Ok((inner, address)) = self.inner.accept().await {
-                let wait = self.register();
-                let stream = LimitedStream {
-                    inner,
-                    wait,
-                    has_begun: false,
-                    line_ends: 0,
-                };
-                return (stream, address);
+                let admission = self.register();
+                return (LimitedStream { inner, admission }, address);
             }
             // The oldest waiting connection gives its file back.
             if let Some(oldest) = self.waiting.pop_front().and_then(|one| one.upgrade()) {
@@ -96,24 +91,29 @@ impl Listener for LimitedListener {
     }
 }
 
-/// The state of a connection until its first header is complete.
+/// The state of a connection until its first request with the token.
 #[derive(Default)]
-struct HeaderWait {
-    /// Whether the header is complete.
-    is_complete: AtomicBool,
+pub(crate) struct ConnectionAdmission {
+    /// Whether a request had the token.
+    is_admitted: AtomicBool,
     /// Whether the connection was closed before that.
     is_closed: AtomicBool,
     /// The task that reads, to be woken when the connection is closed.
     reader: Mutex<Option<Waker>>,
 }
 
-impl HeaderWait {
-    /// Whether the header is still expected.
-    fn is_waiting(&self) -> bool {
-        !self.is_complete.load(Ordering::Relaxed) && !self.is_closed.load(Ordering::Relaxed)
+impl ConnectionAdmission {
+    /// Exempts the connection from the limit.
+    pub(crate) fn admit(&self) {
+        self.is_admitted.store(true, Ordering::Relaxed);
     }
 
-    /// Closes the connection, unless its header is complete.
+    /// Whether a request with the token is still expected.
+    fn is_waiting(&self) -> bool {
+        !self.is_admitted.load(Ordering::Relaxed) && !self.is_closed.load(Ordering::Relaxed)
+    }
+
+    /// Closes the connection, unless it is admitted.
     fn close(&self) {
         if self.is_waiting() {
             self.is_closed.store(true, Ordering::SeqCst);
@@ -134,30 +134,16 @@ pub(crate) struct LimitedStream {
     /// The connection of the system.
     inner: TcpStream,
     /// Its state.
-    wait: Arc<HeaderWait>,
-    /// Whether a byte that is no line end was read.
-    has_begun: bool,
-    /// Line ends at the end of what was read; two of them end a header.
-    line_ends: u8,
+    admission: Arc<ConnectionAdmission>,
 }
 
-impl LimitedStream {
-    /// Looks for the end of the header in new bytes.
-    fn inspect(&mut self, bytes: &[u8]) {
-        for byte in bytes {
-            match byte {
-                // Empty lines before a request are no header.
-                b'\n' if self.has_begun => self.line_ends += 1,
-                b'\n' | b'\r' => {}
-                _ => {
-                    self.has_begun = true;
-                    self.line_ends = 0;
-                }
-            }
-            if self.line_ends == 2 {
-                return self.wait.is_complete.store(true, Ordering::Relaxed);
-            }
-        }
+/// The connection of a request, for the check of its token.
+#[derive(Clone)]
+pub(crate) struct RequestConnection(pub(crate) Arc<ConnectionAdmission>);
+
+impl Connected<IncomingStream<'_, LimitedListener>> for RequestConnection {
+    fn connect_info(stream: IncomingStream<'_, LimitedListener>) -> Self {
+        Self(Arc::clone(&stream.io().admission))
     }
 }
 
@@ -167,19 +153,13 @@ impl AsyncRead for LimitedStream {
         context: &mut Context<'_>,
         buffer: &mut ReadBuf<'_>,
     ) -> Poll<io::Result<()>> {
-        if self.wait.is_complete.load(Ordering::Relaxed) {
-            return Pin::new(&mut self.inner).poll_read(context, buffer);
+        if !self.admission.is_admitted.load(Ordering::Relaxed) {
+            self.admission.remember(context.waker());
+            if self.admission.is_closed.load(Ordering::SeqCst) {
+                return Poll::Ready(Err(io::ErrorKind::TimedOut.into()));
+            }
         }
-        self.wait.remember(context.waker());
-        if self.wait.is_closed.load(Ordering::SeqCst) {
-            return Poll::Ready(Err(io::ErrorKind::TimedOut.into()));
-        }
-        let before = buffer.filled().len();
-        let read = Pin::new(&mut self.inner).poll_read(context, buffer);
-        if read.is_ready() {
-            self.inspect(&buffer.filled()[before..]);
-        }
-        read
+        Pin::new(&mut self.inner).poll_read(context, buffer)
     }
 }
 

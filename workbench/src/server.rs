@@ -14,7 +14,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use axum::body::Bytes;
-use axum::extract::{DefaultBodyLimit, Path, Query, Request, State};
+use axum::extract::{ConnectInfo, DefaultBodyLimit, Path, Query, Request, State};
 use axum::http::StatusCode;
 use axum::http::header::{
     CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, HOST, HeaderName, HeaderValue, ORIGIN, REFERRER_POLICY,
@@ -30,7 +30,7 @@ use serde_json::json;
 use tokio::net::TcpListener;
 
 use crate::answers::{PageResponse, RequestRefusal, answer_request};
-use crate::connections::LimitedListener;
+use crate::connections::{LimitedListener, RequestConnection};
 use crate::machine::{LocalMachine, STACK};
 use crate::page;
 use crate::session::{LONGEST, WorkbenchSession};
@@ -89,7 +89,8 @@ pub(crate) fn serve(
             port,
         });
         opened(&link);
-        axum::serve(LimitedListener::new(listener), router(app))
+        let service = router(app).into_make_service_with_connect_info::<RequestConnection>();
+        axum::serve(LimitedListener::new(listener), service)
             .await
             .map_err(|error| Error::input(format!("the server ended: {error}")))
     })
@@ -154,6 +155,10 @@ async fn guard(State(app): State<Arc<ServerState>>, request: Request, next: Next
     };
     if !given.is_some_and(|given| is_same_token(given, &app.token)) {
         return refused("The token is missing or wrong. Open the link that `modelmill work` printed.\n");
+    }
+    // Only connections of the page's user are exempt from the limit.
+    if let Some(ConnectInfo(connection)) = request.extensions().get::<ConnectInfo<RequestConnection>>() {
+        connection.0.admit();
     }
     let mut response = next.run(request).await;
     let own = [

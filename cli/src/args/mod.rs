@@ -17,6 +17,7 @@ mod verify;
 pub(crate) mod work;
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
 
@@ -26,6 +27,8 @@ use preparation::PreparationArgs;
 use runs::RunsArgs;
 #[cfg(feature = "workbench")]
 use work::WorkArgs;
+
+use crate::terminal::time_limit::parse_seconds;
 
 pub(crate) use code::{AtlasArgs, EquationsArgs, EquationsFormat, GenerateArgs};
 pub(crate) use data::{
@@ -47,7 +50,8 @@ pub(crate) use verify::VerifyArgs;
     after_help = "Start here:\n  \
         modelmill tour                              all main steps on bundled recordings\n  \
         modelmill help COMMAND                       options and examples of one command\n\n\
-        Exit status: 0 done, 1 the input is at fault (with the place and what to do) or the model fails `verify`, 2 wrong usage."
+        Exit status: 0 done, 1 the input is at fault (with the place and what to do) or the model fails `verify`, 2 wrong usage, \
+        3 the time limit was reached."
 )]
 pub(crate) struct CommandLine {
     /// The command to run.
@@ -60,6 +64,9 @@ pub(crate) struct CommandLine {
     /// lengths are zero or equal, and emitted code has no geometry to change
     #[arg(long, global = true)]
     pub(crate) at_values: bool,
+    /// End with an error and exit status 3 if the command takes longer. Files are complete or unchanged
+    #[arg(long, global = true, value_name = "SECONDS", value_parser = parse_seconds)]
+    pub(crate) time_limit: Option<Duration>,
 }
 
 /// The commands.

@@ -3,6 +3,7 @@
 
 pub(crate) mod plot;
 pub(crate) mod progress;
+pub(crate) mod time_limit;
 
 use std::borrow::Cow;
 use std::io::{self, ErrorKind, IsTerminal, Write};

@@ -46,6 +46,7 @@ mod runs;
 mod separate;
 mod simulate;
 mod sound;
+mod time_limit;
 mod try_page;
 mod tx40;
 mod usage;

@@ -1,5 +1,6 @@
 //! The result of an identification as a file: what `identify --json` prints and `--parameters FIT.json` reads.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use indexmap::IndexMap;
@@ -280,8 +281,9 @@ impl FitFile {
             file: file.to_owned(),
             fault,
         };
-        for (i, parameter) in self.parameters.iter().enumerate() {
-            if self.parameters[..i].iter().any(|other| other.name == parameter.name) {
+        let mut known = BTreeSet::new();
+        for parameter in &self.parameters {
+            if !known.insert(parameter.name.as_str()) {
                 return Err(fail(FitFault::DuplicateParameter {
                     name: parameter.name.clone(),
                 }));

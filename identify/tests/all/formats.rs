@@ -361,3 +361,44 @@ fn hdf5_chunks_beyond_the_end_of_the_file_are_refused() {
     let fault = SignalRecording::read_with(&path, &ReadOptions::default()).unwrap_err();
     assert!(fault.to_string().contains("it is damaged or incomplete"), "{fault}");
 }
+
+/// A soft link in a group of the older layout has no address, and the library cannot pass over it.
+#[test]
+fn hdf5_files_with_soft_links_of_the_older_layout_are_refused_by_their_cause() {
+    let fault = SignalRecording::read_with(fixture("soft-link.h5"), &ReadOptions::default()).unwrap_err();
+    let says = fault.to_string();
+    assert!(
+        says.contains("soft or external link") && !says.contains("complete"),
+        "{says}"
+    );
+}
+
+/// A column of text can be one byte, but takes some hundred in memory.
+#[test]
+fn text_with_very_many_columns_is_refused() {
+    let read = |n: usize| {
+        let names: Vec<String> = (0..n).map(|k| format!("c{k}")).collect();
+        let text = format!("{}\n{}\n", names.join(","), vec!["1"; n].join(","));
+        let options = ReadOptions {
+            wanted: Some(vec!["c7".to_owned()]),
+            ..ReadOptions::default()
+        };
+        SignalRecording::from_bytes(text.as_bytes(), "wide.csv", &options)
+    };
+    assert_eq!(read(20_000).unwrap().column("c7").unwrap(), [1.0]);
+    for text in [
+        ",".repeat(70_000),
+        ";".repeat(70_000),
+        "1,".repeat(70_000),
+        "a\n".to_owned() + &",".repeat(70_000),
+    ] {
+        let fault = SignalRecording::from_bytes(text.as_bytes(), "wide.csv", &ReadOptions::default()).unwrap_err();
+        assert!(fault.to_string().contains("more than 65536 columns"), "{fault}");
+    }
+    assert!(
+        read(70_000)
+            .unwrap_err()
+            .to_string()
+            .contains("more than 65536 columns")
+    );
+}

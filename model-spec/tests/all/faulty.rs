@@ -215,15 +215,25 @@ fn a_file_of_megabytes() {
     let huge = "x".repeat(5 << 20);
     assert!(failure(&huge).render(false).contains("too large"));
     let mut table = "schema = 1\nname = \"big\"\n[constants]\n".to_owned();
-    for i in 0..40_000 {
+    for i in 0..15_000 {
         let _ = writeln!(table, "c{i} = {{ value = 1, unit = \"m\" }}");
     }
     assert!(failure(&table).render(false).contains("at most 1000"));
     let mut frames = "schema = 1\nname = \"big\"\n".to_owned();
-    for i in 0..50_000 {
+    for i in 0..10_000 {
         let _ = writeln!(frames, "[[frame]]\nname = \"f{i}\"\non = \"f{}\"", i + 1);
     }
     assert!(failure(&frames).render(false).contains("at most 1000"));
+    // Marks of a byte each would take a hundred times their size in memory.
+    for mark in ["\n", ",", "[", "a.", "\"\"", "x=1\n"] {
+        let start = std::time::Instant::now();
+        let found = failure(&format!("schema = 1\n{}", mark.repeat((4 << 20) / mark.len() - 20)));
+        assert!(
+            found.render(false).contains("too many lines, brackets and entries"),
+            "{mark:?}"
+        );
+        assert!(start.elapsed().as_secs() < 5, "{mark:?}: {:?}", start.elapsed());
+    }
     let one_line = format!("schema = 1\nretain = [{}]\n", "\"a*b\", ".repeat(200_000));
     failure(&one_line);
     let keys = (0..150_000).fold(String::new(), |mut text, i| {

@@ -4,6 +4,7 @@ pub(crate) mod kinds_of_files;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use modelmill_boundary::files::{DiskFiles, FileSource};
 use modelmill_identify::{FitFile, RecordingNote};
@@ -28,6 +29,8 @@ pub struct Host {
     is_at_values: bool,
     /// Receives progress and notes.
     progress: Arc<dyn ProgressListener>,
+    /// When all jobs end.
+    deadline: Option<Instant>,
 }
 
 impl Default for Host {
@@ -37,6 +40,7 @@ impl Default for Host {
             libraries: Vec::new(),
             is_at_values: false,
             progress: Arc::new(SilentProgress),
+            deadline: None,
         }
     }
 }
@@ -103,6 +107,23 @@ impl Host {
         self
     }
 
+    /// The host with a time limit, counted from this call: all jobs fail with [`Error::Cancelled`] once it is over. Jobs
+    /// that count their steps end at the next step, others at their end.
+    ///
+    /// ```
+    /// use std::time::Duration;
+    /// use modelmill::{Error, Host};
+    ///
+    /// let host = Host::new().with_time_limit(Duration::ZERO);
+    /// let found = host.model("../model-spec/models/two_link.toml");
+    /// assert!(matches!(found, Err(Error::Cancelled)));
+    /// ```
+    #[must_use]
+    pub fn with_time_limit(mut self, limit: Duration) -> Self {
+        self.deadline = Instant::now().checked_add(limit);
+        self
+    }
+
     /// Sets whether constants are replaced by their numeric values before the derivation
     /// ([`modelmill_spec::Mechanism::with_numeric_constants`]).
     ///
@@ -141,9 +162,13 @@ impl Host {
     ///
     /// Fails with all errors and warnings of the files, each with its line and column.
     pub fn load(&self, path: &Path) -> Outcome<LoadedModel> {
-        run_job(&*self.progress, &format!("reading {}", path.display()), 0, |_| {
-            modelmill_spec::load_file_with(path, &self.libraries, self.files())
-        })?
+        run_job(
+            &*self.progress,
+            self.deadline,
+            &format!("reading {}", path.display()),
+            0,
+            |_| modelmill_spec::load_file_with(path, &self.libraries, self.files()),
+        )?
         // A valid file of another kind gets a message that names the kind.
         .map_err(|failure| match kinds_of_files::file_kind(self, path) {
             Some(kind) => Error::input(format!(
@@ -181,9 +206,9 @@ impl Host {
     /// Runs a job. The listener receives its progress and can cancel it. `what` is the name of the job, and `total` its
     /// number of steps, 0 if unknown.
     ///
-    /// Fails with [`Error::Cancelled`] if the job was cancelled.
+    /// Fails with [`Error::Cancelled`] if the job was cancelled, or the host's time limit is over.
     pub fn run_job<T>(&self, what: &str, total: usize, work: impl FnOnce(&JobHandle) -> T) -> Outcome<T> {
-        run_job(&*self.progress, what, total, work)
+        run_job(&*self.progress, self.deadline, what, total, work)
     }
 
     /// Reads a fit file: the JSON that `identify` writes.

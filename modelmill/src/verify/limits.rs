@@ -70,6 +70,9 @@ impl VerificationLimits {
     /// ```
     pub fn parse(model: &Model, text: &str, file: &str) -> Outcome<Self> {
         let place = LimitsText { text, file };
+        if let Some(excess) = modelmill_spec::find_toml_excess(text) {
+            return Err(place.error(excess.at, &format!("{}: {}", excess.fault, excess.limit)));
+        }
         let table = DeTable::parse(text).map_err(|error| {
             let at = error.span().map_or(0, |span| span.start);
             place.error(at, &format!("this is not valid TOML: {}", error.message()))

@@ -144,6 +144,10 @@ impl FrameChain {
     pub(crate) fn close_pairs(&self, pairs: &[CoincidentPair], values: &mut [f64]) -> f64 {
         /// Largest step of a variable, rad or m.
         const LONGEST_STEP: f64 = 0.2;
+        // Without a condition there is nothing to solve, and no matrix to decompose.
+        if pairs.is_empty() {
+            return 0.0;
+        }
         let mut left = f64::INFINITY;
         for _ in 0..300 {
             let (gaps, rows, size) = self.gaps(pairs, values);

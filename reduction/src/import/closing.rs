@@ -229,6 +229,10 @@ fn passive_conditioning(rows: &DMatrix<f64>, passive: &[bool]) -> f64 {
         .filter(|k| passive[*k])
         .map(|k| rows.column(k).into_owned())
         .collect();
+    // Closures without a condition have no passive variable.
+    if columns.is_empty() {
+        return 1.0;
+    }
     match rank(&DMatrix::from_columns(&columns), ZERO_SHARE) {
         (n, share) if n == columns.len() => share,
         _ => 0.0,

@@ -2,6 +2,7 @@
 //!
 //! Source of names and defaults: MuJoCo's XML reference (mujoco.readthedocs.io/en/stable/XMLreference.html).
 
+use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 use nalgebra::{Matrix3, Vector3};
@@ -38,15 +39,17 @@ struct MjcfCompiler {
 }
 
 /// The state of the reader: settings, defaults, and the description so far.
-pub(super) struct MjcfReader<'a, 'i> {
+pub(super) struct MjcfReader<'a> {
     /// Settings of the file.
     compiler: MjcfCompiler,
     /// Default classes.
-    defaults: MjcfDefaults<'a, 'i>,
+    defaults: MjcfDefaults<'a>,
     /// The description.
     pub(super) out: RobotDescription,
     /// Poses of the bodies in the world, at the pose of the file.
     pub(super) world: Vec<DescriptionPose>,
+    /// The bodies by their names, for elements that refer to them.
+    pub(super) link_of_name: BTreeMap<String, usize>,
     /// Sites: name, link (none is the world) and pose in it.
     pub(super) sites: Vec<(String, Option<usize>, DescriptionPose)>,
 }
@@ -73,6 +76,7 @@ pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
             ..RobotDescription::default()
         },
         world: Vec::new(),
+        link_of_name: BTreeMap::new(),
         sites: Vec::new(),
     };
     // Options: gravity, and forces that the model does not have.
@@ -196,7 +200,7 @@ fn compiler(root: &Node) -> Result<MjcfCompiler, String> {
     Ok(out)
 }
 
-impl<'a, 'i> MjcfReader<'a, 'i> {
+impl<'a> MjcfReader<'a> {
     /// An angle of the file in rad.
     fn angle(&self, value: f64) -> f64 {
         if self.compiler.is_degree {
@@ -207,14 +211,14 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
     }
 
     /// An attribute of an element, its own or that of its default class.
-    pub(super) fn text(&self, node: &Node<'a, 'i>, class: Option<&str>, key: &str) -> Result<Option<&'a str>, String> {
+    pub(super) fn text(&self, node: &Node<'a, '_>, class: Option<&str>, key: &str) -> Result<Option<&'a str>, String> {
         self.defaults.attribute(node, class, key)
     }
 
     /// An attribute of exactly `N` numbers, its own or that of its default class.
     pub(super) fn numbers<const N: usize>(
         &self,
-        node: &Node<'a, 'i>,
+        node: &Node<'a, '_>,
         class: Option<&str>,
         key: &str,
     ) -> Result<Option<[f64; N]>, String> {
@@ -223,7 +227,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
     }
 
     /// The first number of an attribute, zero without it. Nonzero further ones are reported.
-    pub(super) fn first(&mut self, node: &Node<'a, 'i>, class: Option<&str>, key: &str) -> Result<f64, String> {
+    pub(super) fn first(&mut self, node: &Node<'a, '_>, class: Option<&str>, key: &str) -> Result<f64, String> {
         let Some(text) = self.text(node, class, key)? else {
             return Ok(0.0);
         };
@@ -238,7 +242,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
     }
 
     /// Position and orientation of an element, from any of the ways in which MJCF specifies an orientation.
-    fn read_placement(&self, node: &Node<'a, 'i>, class: Option<&str>) -> Result<DescriptionPose, String> {
+    fn read_placement(&self, node: &Node<'a, '_>, class: Option<&str>) -> Result<DescriptionPose, String> {
         // The position; then whichever orientation is given.
         let mut out = DescriptionPose::identity();
         if let Some(pos) = self.numbers(node, class, "pos")? {
@@ -298,7 +302,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
     /// Reads the elements inside a body, which are given in a frame at `place` in the body.
     fn read_children(
         &mut self,
-        node: &Node<'a, 'i>,
+        node: &Node<'a, '_>,
         inside: MjcfContext<'a>,
         place: DescriptionPose,
     ) -> Result<(), String> {
@@ -332,7 +336,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
     /// Reads a body with its joints, its inertia and its child bodies.
     fn read_body(
         &mut self,
-        node: &Node<'a, 'i>,
+        node: &Node<'a, '_>,
         around: MjcfContext<'a>,
         place: DescriptionPose,
     ) -> Result<(), String> {
@@ -343,7 +347,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         let name = node
             .attribute("name")
             .map_or_else(|| format!("body{}", own + 1), str::to_owned);
-        if self.out.links.iter().any(|link| link.name == name) {
+        if self.link_of_name.insert(name.clone(), own).is_some() {
             return Err(located_message(
                 node,
                 &format!("two bodies have the name `{name}`; rename one"),
@@ -382,7 +386,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
     }
 
     /// Mass and inertia of a body: its `<inertial>`, or its shapes, with the bounds of the file.
-    fn inertial(&mut self, node: &Node<'a, 'i>, class: Option<&'a str>) -> Result<DescriptionInertia, String> {
+    fn inertial(&mut self, node: &Node<'a, '_>, class: Option<&'a str>) -> Result<DescriptionInertia, String> {
         let given = node.children().find(|child| child.tag_name().name() == "inertial");
         // The given inertia counts, unless the file demands that of the shapes.
         let mut found = match (given, self.compiler.from_geoms) {
@@ -457,7 +461,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
     /// Mass and inertia of the shapes of a body, including those in its `<frame>` elements.
     fn inertia_from_geoms(
         &mut self,
-        node: &Node<'a, 'i>,
+        node: &Node<'a, '_>,
         class: Option<&'a str>,
     ) -> Result<DescriptionInertia, String> {
         // All shapes of the body itself, but not those of its child bodies.
@@ -481,7 +485,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
     /// Mass and inertia of one shape; none if it has no mass or is outside of the groups.
     fn geom_inertia(
         &mut self,
-        node: &Node<'a, 'i>,
+        node: &Node<'a, '_>,
         class: Option<&'a str>,
         place: DescriptionPose,
     ) -> Result<Option<DescriptionInertia>, String> {
@@ -533,7 +537,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
     }
 
     /// Reads a free joint, which only a body of the world may have.
-    fn read_free_joint(&mut self, node: &Node<'a, 'i>, inside: MjcfContext<'a>) -> Result<(), String> {
+    fn read_free_joint(&mut self, node: &Node<'a, '_>, inside: MjcfContext<'a>) -> Result<(), String> {
         let name = node.attribute("name").unwrap_or("root").to_owned();
         let Some(link) = inside.link else {
             return Ok(());
@@ -553,7 +557,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
     /// Reads a joint with its zero, limits and losses. It gets a drive only from an actuator.
     fn read_joint(
         &mut self,
-        node: &Node<'a, 'i>,
+        node: &Node<'a, '_>,
         inside: MjcfContext<'a>,
         place: DescriptionPose,
     ) -> Result<(), String> {

@@ -8,10 +8,10 @@ use super::description::{DescriptionJointKind, StraightDrive};
 use super::mjcf::MjcfReader;
 use super::xml::{children, located_message, numbers, required_attribute};
 
-impl<'a, 'i> MjcfReader<'a, 'i> {
+impl<'a> MjcfReader<'a> {
     /// Reads all actuators: marks driven joints, adds straight drives, and reports properties of tendons that are left
     /// out.
-    pub(super) fn read_actuators(&mut self, root: &Node<'a, 'i>) -> Result<(), String> {
+    pub(super) fn read_actuators(&mut self, root: &Node<'a, '_>) -> Result<(), String> {
         let mut n = 0;
         for node in children(root, "actuator")
             .flat_map(|section| section.children().filter(Node::is_element).collect::<Vec<_>>())
@@ -102,7 +102,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
     }
 
     /// Adds a straight drive for an actuator on a spatial tendon, if the tendon is a straight line between two sites.
-    fn add_tendon_drive(&mut self, node: &Node<'a, 'i>, tendon: &Node<'a, 'i>, gear: f64) -> Result<(), String> {
+    fn add_tendon_drive(&mut self, node: &Node<'a, '_>, tendon: &Node<'a, '_>, gear: f64) -> Result<(), String> {
         let parts: Vec<Node> = tendon.children().filter(Node::is_element).collect();
         // Pulleys and wrapped tendons have more elements, and their direction is not that of a line.
         let (&[one, other], true) = (
@@ -156,7 +156,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
     }
 
     /// The force limits of an actuator before its gear, N or N m; none if it has no limits.
-    fn force_range(&self, node: &Node<'a, 'i>) -> Result<Option<[f64; 2]>, String> {
+    fn force_range(&self, node: &Node<'a, '_>) -> Result<Option<[f64; 2]>, String> {
         if let Some([low, high]) = self.numbers(node, None, "forcerange")?
             && low < high
             && self.text(node, None, "forcelimited")? != Some("false")
@@ -174,7 +174,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
     }
 
     /// Marks a joint as driven by an actuator `node`, with force limits and reflected rotor inertia.
-    fn add_joint_drive(&mut self, node: &Node<'a, 'i>, name: &str, gear: f64) -> Result<(), String> {
+    fn add_joint_drive(&mut self, node: &Node<'a, '_>, name: &str, gear: f64) -> Result<(), String> {
         let range = self.force_range(node)?;
         let armature = self.first(node, None, "armature")?;
         let damping = self.first(node, None, "damping")?;
@@ -209,7 +209,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
     }
 
     /// Reads the first keyframe with positions, as the pose from which loops are closed.
-    pub(super) fn read_keyframe(&mut self, root: &Node<'a, 'i>) -> Result<(), String> {
+    pub(super) fn read_keyframe(&mut self, root: &Node<'a, '_>) -> Result<(), String> {
         let mut keys = children(root, "keyframe").flat_map(|section| section.children().collect::<Vec<_>>());
         let Some((key, text)) = keys.find_map(|key| key.attribute("qpos").map(|text| (key, text))) else {
             return Ok(());

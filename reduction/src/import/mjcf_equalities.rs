@@ -11,13 +11,13 @@ use super::xml::{
     children, exact_numbers, line, located_message, number_attribute, numbers, required_attribute, vector,
 };
 
-impl<'a, 'i> MjcfReader<'a, 'i> {
+impl<'a> MjcfReader<'a> {
     /// The index of a body by name; none is the world.
     fn link(&self, node: &Node, name: &str) -> Result<Option<usize>, String> {
         if name == "world" {
             return Ok(None);
         }
-        let found = self.out.links.iter().position(|link| link.name == name);
+        let found = self.link_of_name.get(name).copied();
         found
             .map(Some)
             .ok_or_else(|| located_message(node, &format!("there is no body `{name}`")))
@@ -32,7 +32,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
     }
 
     /// Reads one equality; inactive ones are left out with a remark.
-    pub(super) fn read_equality(&mut self, node: &Node<'a, 'i>) -> Result<(), String> {
+    pub(super) fn read_equality(&mut self, node: &Node<'a, '_>) -> Result<(), String> {
         if self.text(node, None, "active")? == Some("false") {
             self.out
                 .remarks
@@ -78,7 +78,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
     }
 
     /// The two ends of a closure between bodies; the second end is determined by the pose of the file.
-    fn body_ends(&self, node: &Node<'a, 'i>, tag: &str) -> Result<[(Option<usize>, DescriptionPose); 2], String> {
+    fn body_ends(&self, node: &Node<'a, '_>, tag: &str) -> Result<[(Option<usize>, DescriptionPose); 2], String> {
         let one = self.link(node, &required_attribute(node, "body1")?)?;
         let other = self.link(node, node.attribute("body2").unwrap_or("world"))?;
         // Poses of both bodies, as the file gives them, determine the second end.
@@ -121,7 +121,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
 
     /// Reads an equality of two joints, or of one joint that is fixed. `polycoef` refers to deviations from the pose of
     /// the file.
-    fn read_joint_equality(&mut self, node: &Node<'a, 'i>) -> Result<(), String> {
+    fn read_joint_equality(&mut self, node: &Node<'a, '_>) -> Result<(), String> {
         let joint = required_attribute(node, "joint1")?;
         let of = node.attribute("joint2").map(str::to_owned);
         let given = match self.text(node, None, "polycoef")? {
@@ -162,7 +162,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
 
     /// Reads a fixed tendon of constant length, or two tendons that follow each other, as a coupling. At most two
     /// joints may be involved.
-    fn read_tendon_equality(&mut self, node: &Node<'a, 'i>) -> Result<(), String> {
+    fn read_tendon_equality(&mut self, node: &Node<'a, '_>) -> Result<(), String> {
         let given = match self.text(node, None, "polycoef")? {
             Some(text) => numbers(node, "polycoef", text)?,
             None => vec![0.0, 1.0],

@@ -8,6 +8,7 @@
 mod chain;
 mod closing;
 mod closures_file;
+mod counts;
 mod couplings;
 mod description;
 mod geoms;
@@ -175,6 +176,7 @@ fn read_description(text: &str, options: &Options) -> Result<RobotDescription, I
     })?;
     // Lines in messages are looked up in a table while this value exists.
     let _lines = xml::LineTable::install(&document);
+    counts::check_elements(&document).map_err(ImportError)?;
     let read = match document.root_element().tag_name().name() {
         "robot" => urdf::read(&document, options.closures, options.floating),
         "mujoco" => mjcf::read(&document),
@@ -185,6 +187,7 @@ fn read_description(text: &str, options: &Options) -> Result<RobotDescription, I
         )),
     };
     let mut description = read.map_err(ImportError)?;
+    counts::check_description(&description).map_err(ImportError)?;
     description.remarks.extend(unread::unread_remarks(&document));
     // Values of the options replace those of the description, such as a keyframe of MJCF.
     for (name, value) in options.pose {

@@ -2,14 +2,19 @@
 //!
 //! Source of names, defaults and frames: the specification (sdformat.org/spec) and its tutorial "Pose Frame Semantics".
 
+use std::cell::RefCell;
+use std::collections::{BTreeMap, BTreeSet};
+
 use nalgebra::{Matrix3, Vector3};
 use roxmltree::{Document, Node};
 
+use super::counts::too_many_joints;
 use super::description::{
     ClosureConstraint, DescriptionClosure, DescriptionCoupling, DescriptionInertia, DescriptionJoint,
     DescriptionJointKind, DescriptionLink, RobotDescription,
 };
 use super::placed::{DescriptionPose, rotation, rotation_between_axes, rotation_from_quaternion};
+use super::thresholds::MOST_MOVING_JOINTS;
 use super::urdf_extensions::ball_constraint;
 use super::xml::{
     child, children, exact_numbers, line, located_message, required_attribute, required_child, symmetric, vector,
@@ -22,12 +27,31 @@ const LONGEST_CHAIN: usize = 1000;
 
 /// A frame that poses may refer to.
 struct SdfFrame<'a, 'i> {
-    /// Name of the link, joint or frame.
-    name: String,
     /// Its element.
     node: Node<'a, 'i>,
     /// Name of the frame to which the pose is relative by default.
     usually: String,
+}
+
+/// All frames of a model, in tables: a search per element would take the square of their number.
+struct SdfFrames<'a, 'i> {
+    /// In the order of the file.
+    frames: Vec<SdfFrame<'a, 'i>>,
+    /// The first frame of each name.
+    by_name: BTreeMap<String, usize>,
+    /// Names of links and joints that occur a second time, with another kind of element.
+    ambiguous: BTreeSet<String>,
+    /// The links by their names.
+    links: BTreeMap<String, usize>,
+    /// Poses in the model that are known already, by index of the frame.
+    poses: RefCell<Vec<Option<DescriptionPose>>>,
+}
+
+impl<'a, 'i> SdfFrames<'a, 'i> {
+    /// The first frame of a name, with its index.
+    fn find(&self, name: &str) -> Option<(usize, &SdfFrame<'a, 'i>)> {
+        self.by_name.get(name).map(|k| (*k, &self.frames[*k]))
+    }
 }
 
 /// A joint between two links.
@@ -99,14 +123,13 @@ pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
     }
     let mut joints = Vec::new();
     for node in children(&model, "joint") {
-        joints.push(joint(&node, &links, &frames, version, &mut out)?);
+        joints.push(joint(&node, &frames, version, &mut out)?);
     }
     // Pose of the model in the world.
     let own = match child(&model, "pose") {
         Some(pose) => pose_of(&pose)?,
         None => DescriptionPose::identity(),
     };
-    // The canonical link, by default the first one.
     let base = model
         .attribute("canonical_link")
         .and_then(|name| links.iter().position(|node| node.attribute("name") == Some(name)))
@@ -121,10 +144,11 @@ fn read_constraints(
     out: &mut RobotDescription,
     model: &Node,
     links: &[Node],
-    frames: &[SdfFrame],
+    frames: &SdfFrames,
 ) -> Result<(), String> {
     let known: Vec<String> = out.links.iter().map(|link| link.name.clone()).collect();
-    let index = |name: &str| known.iter().position(|link| link == name);
+    let known: BTreeMap<&str, usize> = known.iter().enumerate().map(|(k, name)| (name.as_str(), k)).collect();
+    let index = |name: &str| known.get(name).copied();
     for node in children(model, "ball_constraint") {
         out.closures.push(ball_constraint(&node, |name| match index(name) {
             None if name == "world" => Ok(None),
@@ -138,7 +162,7 @@ fn read_constraints(
             let inner = required_child(&node, tag)?;
             let name = inner.text().unwrap_or("").trim();
             let place = pose_in_model(frames, name, &inner, 0)?;
-            let Some(link) = attached_link(name, &inner, links, frames)? else {
+            let Some(link) = attached_link(name, &inner, frames)? else {
                 return Ok((None, place));
             };
             let link = required_attribute(&links[link], "name")?;
@@ -156,21 +180,20 @@ fn read_constraints(
 }
 
 /// The link to which a frame is attached, directly or through other frames; none is the world.
-fn attached_link(name: &str, from: &Node, links: &[Node], frames: &[SdfFrame]) -> Result<Option<usize>, String> {
+fn attached_link(name: &str, from: &Node, frames: &SdfFrames) -> Result<Option<usize>, String> {
     let mut name = name.to_owned();
     for _ in 0..LONGEST_CHAIN {
         if name == "world" {
             return Ok(None);
         }
-        if let Some(k) = links.iter().position(|link| link.attribute("name") == Some(&name)) {
-            return Ok(Some(k));
+        if let Some(k) = frames.links.get(&name) {
+            return Ok(Some(*k));
         }
-        let frame = frames
-            .iter()
-            .find(|frame| frame.name == name)
+        let (_, frame) = frames
+            .find(&name)
             .ok_or_else(|| located_message(from, &format!("there is no link `{name}`")))?;
         if frame.usually == "__model__" {
-            return Ok(links.first().map(|_| 0));
+            return Ok((!frames.links.is_empty()).then_some(0));
         }
         name.clone_from(&frame.usually);
     }
@@ -194,8 +217,15 @@ fn number_of(node: &Node, tag: &str) -> Result<Option<f64>, String> {
 }
 
 /// All frames of a model: links, joints and explicit frames.
-fn model_frames<'a, 'i>(model: &Node<'a, 'i>) -> Result<Vec<SdfFrame<'a, 'i>>, String> {
-    let mut out: Vec<SdfFrame> = Vec::new();
+fn model_frames<'a, 'i>(model: &Node<'a, 'i>) -> Result<SdfFrames<'a, 'i>, String> {
+    let mut out = SdfFrames {
+        frames: Vec::new(),
+        by_name: BTreeMap::new(),
+        ambiguous: BTreeSet::new(),
+        links: BTreeMap::new(),
+        poses: RefCell::default(),
+    };
+    let mut known: BTreeSet<(String, &str)> = BTreeSet::new();
     for node in model.children().filter(Node::is_element) {
         // Frame for poses without `relative_to`: the child link for joints, else the model or the attached frame.
         let usually = match node.tag_name().name() {
@@ -206,19 +236,26 @@ fn model_frames<'a, 'i>(model: &Node<'a, 'i>) -> Result<Vec<SdfFrame<'a, 'i>>, S
         };
         let name = required_attribute(&node, "name")?;
         // Old files use the same name for a link and a joint, so only elements of the same kind are compared.
-        if out
-            .iter()
-            .any(|frame| frame.name == name && frame.node.tag_name() == node.tag_name())
-        {
+        let tag = node.tag_name().name();
+        if !known.insert((name.clone(), tag)) {
             return Err(located_message(&node, "this name occurs twice; rename one"));
         }
-        out.push(SdfFrame { name, node, usually });
+        if tag == "link" {
+            out.links.insert(name.clone(), out.links.len());
+        }
+        if out.by_name.contains_key(&name) {
+            out.ambiguous.insert(name);
+        } else {
+            out.by_name.insert(name, out.frames.len());
+        }
+        out.frames.push(SdfFrame { node, usually });
     }
+    out.poses = RefCell::new(vec![None; out.frames.len()]);
     Ok(out)
 }
 
 /// The pose of a frame in the model, through all frames to which it is relative. `from` is the element for messages.
-fn pose_in_model(frames: &[SdfFrame], name: &str, from: &Node, depth: usize) -> Result<DescriptionPose, String> {
+fn pose_in_model(frames: &SdfFrames, name: &str, from: &Node, depth: usize) -> Result<DescriptionPose, String> {
     // The recursion ends at the frame of the model.
     if name == "__model__" || name.is_empty() || name == "world" {
         return Ok(DescriptionPose::identity());
@@ -229,10 +266,12 @@ fn pose_in_model(frames: &[SdfFrame], name: &str, from: &Node, depth: usize) -> 
             "its pose is relative to itself through other frames",
         ));
     }
-    let frame = frames
-        .iter()
-        .find(|frame| frame.name == name)
+    let (k, frame) = frames
+        .find(name)
         .ok_or_else(|| located_message(from, &format!("there is no frame `{name}`")))?;
+    if let Some(known) = frames.poses.borrow()[k] {
+        return Ok(known);
+    }
     // `frame` is the older name of the attribute `relative_to`.
     let pose = child(&frame.node, "pose");
     let relative = pose
@@ -240,7 +279,9 @@ fn pose_in_model(frames: &[SdfFrame], name: &str, from: &Node, depth: usize) -> 
         .filter(|name| !name.is_empty())
         .unwrap_or(&frame.usually);
     let placed = pose.map_or(Ok(DescriptionPose::identity()), |pose| pose_of(&pose))?;
-    Ok(pose_in_model(frames, relative, &frame.node, depth + 1)?.compose(&placed))
+    let pose = pose_in_model(frames, relative, &frame.node, depth + 1)?.compose(&placed);
+    frames.poses.borrow_mut()[k] = Some(pose);
+    Ok(pose)
 }
 
 /// The pose in a `<pose>` element, with roll, pitch and yaw or a quaternion.
@@ -307,18 +348,12 @@ fn inertial(node: &Node) -> Result<DescriptionInertia, String> {
 
 /// Reads a `<joint>`: its links, its pose in the model, and its one or two axes. Screws become a rotation and a coupled
 /// translation.
-fn joint(
-    node: &Node,
-    links: &[Node],
-    frames: &[SdfFrame],
-    version: f64,
-    out: &mut RobotDescription,
-) -> Result<SdfJoint, String> {
+fn joint(node: &Node, frames: &SdfFrames, version: f64, out: &mut RobotDescription) -> Result<SdfJoint, String> {
     let name = required_attribute(node, "name")?;
     let end = |tag: &str| -> Result<Option<usize>, String> {
         let inner = required_child(node, tag)?;
         // A frame as parent or child means the link to which it is attached.
-        attached_link(inner.text().unwrap_or("").trim(), &inner, links, frames)
+        attached_link(inner.text().unwrap_or("").trim(), &inner, frames)
     };
     // Each degree of freedom becomes a joint, with the element that describes its axis.
     let kind = required_attribute(node, "type")?;
@@ -346,8 +381,20 @@ fn joint(
         }
     };
     // Pose of the joint at zero, and the links at both ends.
-    let place = pose_in_model(frames, &name_in(frames, node, &name)?, node, 0)?;
+    if frames.ambiguous.contains(&name) {
+        return Err(located_message(
+            node,
+            "a joint and a link or frame have the same name, so poses that refer to it are ambiguous; rename one",
+        ));
+    }
+    let place = pose_in_model(frames, &name, node, 0)?;
     let (parent, child_link) = (end("parent")?, end("child")?);
+    if parent == child_link {
+        return Err(located_message(
+            node,
+            "its parent and its child are the same link; correct one of them",
+        ));
+    }
     let mut joints = Vec::new();
     for (k, (tag, kind)) in wanted.iter().enumerate() {
         // The second joint of a pair needs another name.
@@ -407,22 +454,11 @@ fn screw_coupling(
     })
 }
 
-/// The name of a joint's frame. Fails if a link or frame has the same name, which old files permit.
-fn name_in(frames: &[SdfFrame], node: &Node, name: &str) -> Result<String, String> {
-    if frames.iter().filter(|frame| frame.name == name).count() > 1 {
-        return Err(located_message(
-            node,
-            "a joint and a link or frame have the same name, so poses that refer to it are ambiguous; rename one",
-        ));
-    }
-    Ok(name.to_owned())
-}
-
 /// Reads the axis (in the axes of the model), limits, losses and `<mimic>` of one degree of freedom.
 fn read_axis(
     joint: &mut DescriptionJoint,
     node: &Node,
-    frames: &[SdfFrame],
+    frames: &SdfFrames,
     version: f64,
     place: &DescriptionPose,
     out: &mut RobotDescription,
@@ -494,6 +530,19 @@ fn read_axis(
     Ok(())
 }
 
+/// The part that stands for the group of a part. Parts on the way are made to lead there at once.
+fn last_of_group(leads: &mut [usize], part: usize) -> usize {
+    let mut last = part;
+    while leads[last] != last {
+        last = leads[last];
+    }
+    let mut here = part;
+    while leads[here] != last {
+        here = std::mem::replace(&mut leads[here], last);
+    }
+    last
+}
+
 /// Builds a tree from links and joints. Joints that close a loop become closures, preferably ball joints.
 #[allow(
     clippy::too_many_lines,
@@ -511,25 +560,29 @@ fn tree(
     // they are cut.
     let n = nodes.len();
     let part = |link: Option<usize>| link.unwrap_or(n);
-    let mut group: Vec<usize> = (0..=n).collect();
     let mut order: Vec<usize> = (0..joints.len()).collect();
     order.sort_by_key(|k| joints[*k].kind == "ball");
+    // Each part leads to another one of its group; the last one stands for the group.
+    let mut leads: Vec<usize> = (0..=n).collect();
     let mut in_tree = vec![false; joints.len()];
     for k in order {
-        let [one, other] = [part(joints[k].parent), part(joints[k].child)].map(|p| group[p]);
+        let [one, other] = [part(joints[k].parent), part(joints[k].child)].map(|p| last_of_group(&mut leads, p));
         // A joint between two groups connects them; a joint inside of a group would close a loop.
         if one != other {
             in_tree[k] = true;
-            for member in &mut group {
-                if *member == other {
-                    *member = one;
-                }
-            }
+            leads[other] = one;
         }
+    }
+    // The joints of the tree at each part, in the order of the file.
+    let mut at: Vec<Vec<usize>> = vec![Vec::new(); n + 1];
+    for k in (0..joints.len()).filter(|k| in_tree[*k]) {
+        at[part(joints[k].parent)].push(k);
+        at[part(joints[k].child)].push(k);
     }
     // Links in the order in which they are reached: from the world, then from the base link, then from the remaining
     // links. The last two get a free joint.
     let mut index: Vec<Option<usize>> = vec![None; n];
+    let mut n_free = 0;
     let starts = [None, Some(base)].into_iter().chain((0..n).map(Some));
     for start in starts {
         if let Some(link) = start {
@@ -542,6 +595,10 @@ fn tree(
                 format!("_{}", nodes[link].attribute("name").unwrap_or_default())
             };
             // A link that no joint connects to the world is a free body.
+            n_free += 1;
+            if n_free > MOST_MOVING_JOINTS {
+                return Err(located_message(&nodes[link], &too_many_joints()));
+            }
             index[link] = Some(out.links.len());
             out.links.push(DescriptionLink {
                 name: required_attribute(&nodes[link], "name")?,
@@ -558,13 +615,10 @@ fn tree(
         // Follow the joints of the tree from this link.
         let mut waiting = vec![start];
         while let Some(here) = waiting.pop() {
-            for (between, _) in joints.iter().zip(&in_tree).filter(|(_, is)| **is) {
+            for between in at[part(here)].iter().map(|k| &joints[*k]) {
                 // The tree can pass a joint in either direction.
                 let is_forward = between.parent == here;
                 let there = if is_forward { between.child } else { between.parent };
-                if !(is_forward || between.child == here) {
-                    continue;
-                }
                 let Some(link) = there.filter(|link| index[*link].is_none()) else {
                     continue;
                 };

@@ -11,6 +11,17 @@ pub(super) const DEEPEST_ELEMENT: usize = 200;
 /// the square of their number.
 pub(super) const MOST_ATTRIBUTES: usize = 500;
 
+/// Most joints that move. By judgement: models have at most 100 coordinates, and each joint becomes entries of the model
+/// file, of which a table has at most 1000.
+pub(super) const MOST_MOVING_JOINTS: usize = 1000;
+
+/// Most elements of one kind whose names are searched for each other, such as sites, tendons or default classes. The
+/// search takes the square of their number: about a second for this one. Published robots have some hundreds.
+pub(super) const MOST_NAMED_ELEMENTS: usize = 5000;
+
+/// Most loop closures. Each is a condition of one dense system of equations. Published robots have less than 20.
+pub(super) const MOST_CLOSURES: usize = 200;
+
 /// Largest difference (rad or m, and relative) between the value given for a joint and the one by its coupling. By
 /// judgement: typed values have few digits, and a difference that matters is larger.
 pub(super) const COUPLED_VALUES: f64 = 1e-4;

@@ -255,16 +255,20 @@ fn apply_cut(description: &mut RobotDescription, closure: usize, end: usize, cut
 
 /// Sorts links so that parents stand before their children, with as few changes of the order as possible.
 fn sort_links(description: &mut RobotDescription) {
+    let n = description.links.len();
     let mut order: Vec<usize> = Vec::new();
-    while order.len() < description.links.len() {
+    let mut places: Vec<Option<usize>> = vec![None; n];
+    // One pass is enough unless welds were cut; each cut may need another one.
+    while order.len() < n {
         for (k, link) in description.links.iter().enumerate() {
-            if !order.contains(&k) && link.parent.is_none_or(|parent| order.contains(&parent)) {
+            if places[k].is_none() && link.parent.is_none_or(|parent| places[parent].is_some()) {
+                places[k] = Some(order.len());
                 order.push(k);
             }
         }
     }
     // Replace all indices of links by the new ones.
-    let place = |link: usize| order.iter().position(|k| *k == link).unwrap_or(link);
+    let place = |link: usize| places[link].unwrap_or(link);
     for closure in &mut description.closures {
         for (link, _) in &mut closure.ends {
             *link = link.map(place);

@@ -554,6 +554,13 @@ fn format_fault(says: impl Into<String>) -> RecordingFault {
 
 /// The fault of a file that cannot be read.
 fn unreadable_fault(error: &Error) -> RecordingFault {
+    // In groups of the older layout, the library takes the undefined address of a soft link for that of an object.
+    if error.to_string().contains(&u64::MAX.to_string()) {
+        return format_fault(
+            "one of its groups has a soft or external link, which cannot be followed in the older layout of groups; copy the \
+             file without links, or with the newer layout (`libver=\"latest\"` of h5py)",
+        );
+    }
     format_fault(format!(
         "it cannot be read: {error}; is it complete, and was it closed by the program that wrote it?"
     ))

@@ -20,7 +20,7 @@ use crate::recording::error::RecordingFault;
 use crate::recording::formats::lerobot::{DataSetFiles, EPISODE, ElementNames, EpisodeClock};
 use crate::recording::formats::packing::CompressionMethod;
 use crate::recording::formats::parquet_columns::{ParquetColumns, ParquetLeaf};
-use crate::recording::formats::parquet_pages::{self, PageGrowth, UnpackedPages};
+use crate::recording::formats::parquet_pages::{self, OrderedPages, PageGrowth, UnpackedPages};
 use crate::recording::formats::parquet_values::{BatchPlace, ParquetValueKind, read_batch};
 use crate::recording::formats::{RecordingFormat, RecordingInput, TableInfo, read_all};
 use crate::recording::intake::{IntakeFlow, SampleIntake};
@@ -329,7 +329,10 @@ pub(super) fn column_reader<R: ChunkReader + 'static>(
     let packing = match chunk.compression() {
         Compression::ZSTD(_) => CompressionMethod::Zstd,
         Compression::BROTLI(_) => CompressionMethod::Brotli,
-        _ => return group.get_column_reader(i).map_err(parquet_fault),
+        _ => {
+            let pages = OrderedPages::new(group.get_column_page_reader(i).map_err(parquet_fault)?);
+            return Ok(get_column_reader(column.clone(), Box::new(pages)));
+        }
     };
     // The copy of the metadata declares the pages as uncompressed.
     let as_stored = chunk
@@ -340,7 +343,7 @@ pub(super) fn column_reader<R: ChunkReader + 'static>(
         .map_err(parquet_fault)?;
     let rows = usize::try_from(group.metadata().num_rows()).unwrap_or(0);
     let pages = SerializedPageReader::new(bytes.clone(), &as_stored, rows, None).map_err(parquet_fault)?;
-    let pages = UnpackedPages { pages, packing };
+    let pages = OrderedPages::new(Box::new(UnpackedPages { pages, packing }));
     Ok(get_column_reader(column.clone(), Box::new(pages)))
 }
 

@@ -8,6 +8,7 @@
 use std::io::{self, BufReader, Read};
 
 use flate2::read::MultiGzDecoder;
+use parquet::basic::Encoding;
 use parquet::column::page::{Page, PageMetadata, PageReader};
 use parquet::errors::{ParquetError, Result};
 
@@ -163,6 +164,58 @@ impl<P: PageReader> PageReader for UnpackedPages<P> {
     fn get_next_page(&mut self) -> Result<Option<Page>> {
         let page = self.pages.get_next_page()?;
         page.map(|page| self.decompress_page(page)).transpose()
+    }
+
+    fn peek_next_page(&mut self) -> Result<Option<PageMetadata>> {
+        self.pages.peek_next_page()
+    }
+
+    fn skip_next_page(&mut self) -> Result<()> {
+        self.pages.skip_next_page()
+    }
+}
+
+/// The pages of a column, whose values may refer to a dictionary only behind one. The library takes that for granted, and
+/// ends the program otherwise.
+pub(super) struct OrderedPages {
+    /// The pages.
+    pages: Box<dyn PageReader>,
+    /// Whether a dictionary was passed on.
+    has_dictionary: bool,
+}
+
+impl OrderedPages {
+    /// Checks the order of these pages.
+    pub(super) fn new(pages: Box<dyn PageReader>) -> Self {
+        Self {
+            pages,
+            has_dictionary: false,
+        }
+    }
+}
+
+impl Iterator for OrderedPages {
+    type Item = Result<Page>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.get_next_page().transpose()
+    }
+}
+
+impl PageReader for OrderedPages {
+    fn get_next_page(&mut self) -> Result<Option<Page>> {
+        let page = self.pages.get_next_page()?;
+        if let Some(page) = &page {
+            let needs_dictionary = matches!(page.encoding(), Encoding::PLAIN_DICTIONARY | Encoding::RLE_DICTIONARY);
+            if page.is_dictionary_page() {
+                self.has_dictionary = true;
+            } else if needs_dictionary && !self.has_dictionary {
+                return Err(ParquetError::General(
+                    "a page refers to a dictionary that its column does not have".to_owned(),
+                ));
+            }
+        }
+        Ok(page)
     }
 
     fn peek_next_page(&mut self) -> Result<Option<PageMetadata>> {

@@ -13,6 +13,9 @@ use crate::recording::formats::text_fields::{is_number_text, is_sample_text};
 
 /// Most bytes up to the first sample; a file with more is not a recording.
 const LONGEST_HEAD: u64 = 1 << 20;
+/// Most columns of a text file. Names and messages take some hundred bytes for each, while a column of a hostile file
+/// takes one byte.
+const MOST_COLUMNS: usize = 1 << 16;
 /// Lines with contents that decide the layout: header, units and a sample.
 const DECIDING_LINES: usize = 3;
 
@@ -102,6 +105,12 @@ impl TextLayout {
                 None => RecordingFault::Empty,
             });
         };
+        let widest = lines.iter().map(|line| count_separators(&line.text)).max();
+        if widest.is_some_and(|n| n >= MOST_COLUMNS) {
+            return Err(RecordingFault::NotCsv {
+                looks_like: "a file with more than 65536 columns",
+            });
+        }
         let separator = find_separator(first, others)?;
         let fields = separator.split(&first.text);
         // A line end in a name means that a quote was not closed.
@@ -231,6 +240,17 @@ fn foreign_format(bytes: &[u8]) -> Option<&'static str> {
         _ if bytes.contains(&0) => Some("binary data"),
         _ => None,
     }
+}
+
+/// The number of bytes in a line that can separate fields, of the most frequent kind.
+fn count_separators(line: &str) -> usize {
+    let mut counts = [0; 4];
+    for byte in line.bytes() {
+        if let Some(k) = b",;\t ".iter().position(|separator| *separator == byte) {
+            counts[k] += 1;
+        }
+    }
+    counts.into_iter().max().unwrap_or(0)
 }
 
 /// The separator of the lines; fails when it is not clear.

@@ -8,6 +8,7 @@ mod lines;
 mod loops;
 mod sections;
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use modelmill_boundary::message;
@@ -88,7 +89,7 @@ struct ModelTextBuilder<'a> {
     /// Joints as functions of variables.
     couplings: ImportCouplings,
     /// Names that are used already.
-    names: Vec<String>,
+    names: BTreeSet<String>,
     /// Remarks so far.
     remarks: Vec<Message>,
     /// Links that do not move, with their masses, kg.
@@ -134,7 +135,7 @@ pub(crate) fn model_text(mut description: RobotDescription, options: &Options) -
     let n = couplings.variables.len();
     let mut build = ModelTextBuilder {
         options,
-        names: vec!["base".to_owned(), "g".to_owned()],
+        names: ["base", "g"].map(str::to_owned).into(),
         remarks: description.remarks.drain(..).map(Message::from).collect(),
         fixed_links: Vec::new(),
         constants: String::new(),
@@ -330,7 +331,7 @@ impl ModelTextBuilder<'_> {
             n += 1;
             name = format!("{stem}_{n}");
         }
-        self.names.push(name.clone());
+        self.names.insert(name.clone());
         name
     }
 

@@ -7,6 +7,8 @@ mod mjcf;
 mod sdf;
 mod urdf;
 
+use std::collections::BTreeMap;
+
 use roxmltree::{Document, Node};
 
 use super::xml::line;
@@ -32,6 +34,29 @@ struct UnreadItem {
     n_places: usize,
 }
 
+/// All of them in the order of the file, with their places by text.
+#[derive(Default)]
+struct UnreadItems {
+    items: Vec<UnreadItem>,
+    by_text: BTreeMap<String, usize>,
+}
+
+impl UnreadItems {
+    /// Counts an item; the first of its text is added.
+    fn add(&mut self, text: String, line: u32) {
+        if let Some(k) = self.by_text.get(&text) {
+            self.items[*k].n_places += 1;
+            return;
+        }
+        self.by_text.insert(text.clone(), self.items.len());
+        self.items.push(UnreadItem {
+            text,
+            line,
+            n_places: 1,
+        });
+    }
+}
+
 /// One remark for each kind of element and attribute that is not read. The root element determines the format.
 pub(super) fn unread_remarks(document: &Document) -> Vec<String> {
     let root = document.root_element();
@@ -40,9 +65,9 @@ pub(super) fn unread_remarks(document: &Document) -> Vec<String> {
         "mujoco" => &mjcf::RULES,
         _ => &sdf::RULES,
     };
-    let mut found = Vec::new();
+    let mut found = UnreadItems::default();
     collect_unread(&root, rules, &mut found);
-    let remarks = found.iter().map(|item| {
+    let remarks = found.items.iter().map(|item| {
         let places = match item.n_places {
             1 => String::new(),
             n => format!(" ({n} places)"),
@@ -56,20 +81,12 @@ pub(super) fn unread_remarks(document: &Document) -> Vec<String> {
 }
 
 /// Collects what is not read of an element and of those inside it.
-fn collect_unread(node: &Node, rules: &[ElementRule], found: &mut Vec<UnreadItem>) {
+fn collect_unread(node: &Node, rules: &[ElementRule], found: &mut UnreadItems) {
     let tag = node.tag_name().name();
     let rule = rule_of(node, rules);
-    let mut add = |text: String, line: u32| match found.iter_mut().find(|item| item.text == text) {
-        Some(item) => item.n_places += 1,
-        None => found.push(UnreadItem {
-            text,
-            line,
-            n_places: 1,
-        }),
-    };
     for attribute in node.attributes() {
         if !rule.is_some_and(|rule| has_word(rule.attributes, attribute.name(), attribute.value())) {
-            add(format!("`{}` of <{tag}>", attribute.name()), line(node));
+            found.add(format!("`{}` of <{tag}>", attribute.name()), line(node));
         }
     }
     let mut inside = Vec::new();
@@ -79,7 +96,7 @@ fn collect_unread(node: &Node, rules: &[ElementRule], found: &mut Vec<UnreadItem
         if is_in(|rule| rule.inner) {
             inside.push(child);
         } else if !is_in(|rule| rule.ignored) {
-            add(format!("<{name}> in <{tag}>"), line(&child));
+            found.add(format!("<{name}> in <{tag}>"), line(&child));
         }
     }
     for child in inside {
