@@ -141,6 +141,7 @@ impl PreparedRecording {
         note_idle_options(&mut segments, &reading);
         if let Some(first) = segments.first_mut() {
             first.run.notes.extend(choice.notes);
+            first.faults.extend(source.faults.iter().cloned());
         }
         Ok(Self {
             segments,

@@ -5,6 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use modelmill_boundary::files::MemoryFiles;
+use modelmill_identify::diagnose::Disturbance;
 use modelmill_identify::{RecordingFiles, SignalRecording as Raw};
 
 use super::columns::read_options;
@@ -23,6 +24,8 @@ pub struct UnpreparedRecording {
     pub(super) raw: Arc<Raw>,
     /// The options as they were requested.
     pub(super) reading: RecordingOptions,
+    /// Faults that were found before the preparation.
+    pub(super) faults: Vec<Disturbance>,
 }
 
 impl UnpreparedRecording {
@@ -31,7 +34,36 @@ impl UnpreparedRecording {
         Self {
             raw: Arc::new(raw),
             reading: reading.clone(),
+            faults: Vec::new(),
         }
+    }
+
+    /// The signals of the recording.
+    pub(crate) fn raw(&self) -> &Raw {
+        &self.raw
+    }
+
+    /// The options as they were requested.
+    pub(crate) fn options(&self) -> &RecordingOptions {
+        &self.reading
+    }
+
+    /// The same recording with other signals and further faults.
+    pub(crate) fn with_signals(&self, raw: Raw, faults: Vec<Disturbance>) -> Self {
+        Self {
+            faults: [self.faults.clone(), faults].concat(),
+            ..Self::new(raw, &self.reading)
+        }
+    }
+
+    /// The same recording for another model with the same columns, such as one with servo equations.
+    ///
+    /// Fails when a quaternion is far from unit length, or when a twist is incomplete.
+    pub(crate) fn for_model(&self, model: &Model, reading: &RecordingOptions) -> Outcome<Self> {
+        let mut raw = (*self.raw).clone();
+        free::complete(model, &mut raw)?;
+        raw.unwrap_angles(&model.active_coordinate_types());
+        Ok(Self::new(raw, reading))
     }
 
     /// Whether it may have its preparation in common with another recording: both are prepared with the same options.

@@ -8,9 +8,12 @@
 
 mod delay;
 mod estimate;
+mod forces;
+mod gains;
 mod instruments;
 mod rows;
 mod scale;
+mod suspects;
 mod thresholds;
 
 use modelmill_spec::ModelActuator;

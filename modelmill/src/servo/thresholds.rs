@@ -37,3 +37,22 @@ pub(super) const IMPOSSIBLE_SIGMAS: f64 = 3.0;
 pub(super) const LARGE_BALANCE_ERROR: f64 = 0.1;
 /// Most samples of the estimate; more are thinned evenly. By judgement.
 pub(super) const MOST_SAMPLES: usize = 40_000;
+/// Values that are tried for a saturation or a dead band of a servo, at quantiles of its force or error. By judgement.
+pub(super) const LIMIT_GRID: usize = 24;
+/// Samples beyond a limit (1) below which it is not judged. By judgement.
+pub(super) const FEWEST_LIMITED: usize = 20;
+/// A limit of a servo explains this share of the squared residual of its drive at least (1). By judgement.
+pub(super) const LIMIT_REDUCTION: f64 = 0.3;
+/// The factor of a limit, which is 1 if the limit is the cause, has this many standard deviations at least. By judgement.
+pub(super) const LIMIT_T: f64 = 6.0;
+/// Largest error of this factor (1) in the fit. By judgement.
+pub(super) const LIMIT_FACTOR_ERROR: f64 = 0.2;
+/// As [`LIMIT_REDUCTION`], for validation runs, which may reach the limit less often. By judgement.
+pub(super) const CHECKED_REDUCTION: f64 = 0.1;
+/// As [`LIMIT_FACTOR_ERROR`], for validation runs. By judgement.
+pub(super) const CHECKED_FACTOR_ERROR: f64 = 0.3;
+/// Samples at which a servo requests this share of its saturation (1) are left out: the filter spreads the corner. By
+/// judgement.
+pub(super) const SATURATION_SHARE: f64 = 0.9;
+/// Passes of the estimate with a saturation. By judgement.
+pub(super) const SATURATION_PASSES: usize = 3;
