@@ -2,12 +2,15 @@
 """How often `modelmill diagnose` names what a servo arm has and its model file has not, from logs without forces.
 
     python3 lab/servo-plant/hidden.py --program target/release/modelmill [--count 24] [--seed 1] [--keep DIR]
+        [--kinds none,spring,...] [--servo position_servo|velocity_servo|current]
 
 The plant is a vertical arm with two links and position servos: encoders of 12 bits, 200 Hz, commands that act 12 ms
-late, viscous and dry friction. It shares no code with modelmill. The model file has the arm, both kinds of friction and
-the servos with their gains, but not the delay. Each case hides one item of HIDDEN, or nothing. It needs numpy. Marks:
+late, viscous and dry friction. With `--servo velocity_servo` the commands are rates, and with `current` the log has the
+forces as noisy currents. It shares no code with modelmill. The model file has the arm, both kinds of friction and the
+servos with their gains, but not the delay. Each case hides one item of HIDDEN, or nothing. It needs numpy. Marks:
 
 right    what is hidden is claimed, and nothing else; or nothing is hidden and nothing is claimed
+honest   as right, but what is hidden is named as an alternative of a claim that explains the log equally well
 silent   something is hidden, and nothing is claimed
 partly   what is hidden is claimed, with something else
 false    something is claimed that is not hidden, and what is hidden is not claimed
@@ -31,7 +34,16 @@ VISCOUS, COULOMB = np.array([0.15, 0.08]), np.array([0.5, 0.25])
 DELAY = 0.012
 RATE, STEP, TIME = 200, 2e-4, 25.0
 ENCODER = 2 * np.pi / 4096
-HIDDEN = ["none", "quadratic_friction", "spring", "force_offset", "dead_band", "saturation", "coulomb_friction", "stribeck_friction"]
+HIDDEN = ["none", "quadratic_friction", "spring", "force_offset", "dead_band", "saturation", "coulomb_friction", "stribeck_friction", "wrong_gain", "wrong_delay", "payload"]
+# The claims that are right for items whose names differ from those of the program.
+NAMES = {
+    "dead_band": {"servo_dead_band"},
+    "saturation": {"servo_saturation"},
+    "wrong_gain": {"drive_gain"},
+    "wrong_delay": {"signal_delay"},
+}
+DRIVES = ["shoulder", "elbow"]
+VELOCITY_GAIN = np.array([12.0, 4.0])
 MODEL = """schema = 1
 name = "servo_arm"
 gravity = ["0", "-g", "0"]
@@ -54,7 +66,7 @@ joint = { revolute = "q1", axis = "z" }
 [[frame]]
 name = "lower"
 on = "upper"
-at = ["L", "0", "0"]
+transform = { xyz = ["L", 0, 0] }
 joint = { revolute = "q2", axis = "z" }
 [[part]]
 on = "upper"
@@ -75,20 +87,16 @@ at = "shoulder"
 kind = "viscous_friction"
 at = "elbow"
 %s
-[[actuator]]
-drive = "shoulder"
-kind = "position_servo"
-kp = "80"
-kd = "1.5"
-[[actuator]]
-drive = "elbow"
-kind = "position_servo"
-kp = "40"
-kd = "0.5"
-"""
+%s"""
 DRY = """[[effect]]
 kind = "coulomb_friction"
 at = "%s"
+"""
+
+
+ACTUATOR = """[[actuator]]
+drive = "%s"
+kind = "%s"
 """
 
 
@@ -106,41 +114,60 @@ class Commands:
         return self.centre + (self.amplitude * np.sin(2 * np.pi * self.frequency * t + self.phase)).sum(0)
 
 
-def simulate(random, cases):
-    """Logs of all cases at once, [sample, drive, case]: commands and positions."""
+def simulate(random, cases, servo):
+    """Logs of all cases at once, [sample, drive, case]: signals and positions."""
     n = len(cases)
     commands = Commands(random, n)
     size = {kind: np.array([[case["size"] if (case["hidden"], case["drive"]) == (kind, d) else 0.0 for case in cases] for d in (0, 1)]) for kind in HIDDEN}
     limit = np.where(size["saturation"] > 0, size["saturation"], np.inf)
+    load = size["payload"].sum(0)
     (m1, c1, i1), (m2, c2, i2) = LINKS
+    # The load is a point at the tip of the second link.
+    i2, mc2, m2 = i2 + m2 * c2**2 + load * LENGTH**2, m2 * c2 + load * LENGTH, m2 + load
     q, v = commands.at(0.0), np.zeros((2, n))
     every = round(1 / RATE / STEP)
-    log_command, log_position = [], []
+    late = round(DELAY / STEP)
+    log_signal, log_position, rates = [], [], []
+    wanted = commands.at(-DELAY)
     for k in range(int(TIME / STEP)):
         t = k * STEP
+        if servo == "velocity_servo":
+            # An outer loop of the user, at the rate of the log: its commands are held between samples.
+            if k % every == 0:
+                now = commands.at(t)
+                rates.append((now - wanted) * RATE + 6.0 * (now - np.round(q / ENCODER) * ENCODER))
+                wanted = now
+            signal = rates[-1]
+            error = rates[max(0, (k - late) // every)] - v
+            force = VELOCITY_GAIN[:, None] * error
+        else:
+            signal = commands.at(t)
+            error = commands.at(t - DELAY) - q
+            error = np.sign(error) * np.maximum(np.abs(error) - size["dead_band"], 0)
+            force = KP[:, None] * error - KD[:, None] * v
+        force = np.clip(force, -limit, limit)
+        if servo == "current":
+            signal = force + random.normal(0, 0.02, force.shape)
         if k % every == 0:
-            log_command.append(commands.at(t))
+            log_signal.append(signal)
             log_position.append(np.round(q / ENCODER) * ENCODER)
-        error = commands.at(t - DELAY) - q
-        error = np.sign(error) * np.maximum(np.abs(error) - size["dead_band"], 0)
-        force = np.clip(KP[:, None] * error - KD[:, None] * v, -limit, limit)
         direction = np.tanh(v / 0.006)
         friction = VISCOUS[:, None] * v + COULOMB[:, None] * direction
         friction += size["quadratic_friction"] * v * np.abs(v) + size["spring"] * q + size["force_offset"]
         friction += size["stribeck_friction"] * direction * np.exp(-((v / 0.15) ** 2))
         cos, sin = np.cos(q[1]), np.sin(q[1])
-        a = i1 + m1 * c1**2 + m2 * LENGTH**2 + i2 + m2 * c2**2 + 2 * m2 * LENGTH * c2 * cos
-        b = i2 + m2 * c2**2 + m2 * LENGTH * c2 * cos
-        d = i2 + m2 * c2**2
-        lower = m2 * GRAVITY * c2 * np.cos(q[0] + q[1])
+        a = i1 + m1 * c1**2 + m2 * LENGTH**2 + i2 + 2 * mc2 * LENGTH * cos
+        b = i2 + mc2 * LENGTH * cos
+        d = i2
+        lower = mc2 * GRAVITY * np.cos(q[0] + q[1])
         gravity = np.array([(m1 * c1 + m2 * LENGTH) * GRAVITY * np.cos(q[0]) + lower, lower])
-        h = m2 * LENGTH * c2 * sin
+        h = mc2 * LENGTH * sin
         coriolis = np.array([-h * (2 * v[0] * v[1] + v[1] ** 2), h * v[0] ** 2])
         x, y = force - friction - gravity - coriolis
         determinant = a * d - b * b
         v = v + STEP * np.array([(d * x - b * y) / determinant, (a * y - b * x) / determinant])
         q = q + STEP * v
-    return np.array(log_command), np.array(log_position)
+    return np.array(log_signal), np.array(log_position)
 
 
 def draw_case(random, hidden):
@@ -156,38 +183,81 @@ def draw_case(random, hidden):
         "saturation": [(11.0, 14.0), (3.5, 4.2)][drive],
         "coulomb_friction": (0, 0),
         "stribeck_friction": (0.15, 0.4),
+        "wrong_gain": (0.75, 0.9),
+        "wrong_delay": (0, 0),
+        "payload": (0.2, 0.5),
     }
     return {"hidden": hidden, "drive": drive, "size": random.uniform(*ranges[hidden])}
 
 
-def write_case(folder, case, fit, check, column):
+def actuators(case, servo):
+    """The entries of both servos; a wrong gain is `size` times the true one, and a wrong delay is zero."""
+    text = ""
+    for d, name in enumerate(DRIVES):
+        hides = case["drive"] == d and case["hidden"]
+        gains = {
+            "position_servo": {"kp": KP[d], "kd": KD[d]},
+            "velocity_servo": {"kv": VELOCITY_GAIN[d]},
+            "current": {"torque_constant": 1.0},
+        }[servo]
+        if hides == "wrong_gain":
+            gains = {key: value * case["size"] for key, value in gains.items()}
+        text += ACTUATOR % (name, servo)
+        text += "".join(f'{key} = "{value:.6g}"\n' for key, value in gains.items())
+        if case["hidden"] == "wrong_delay":
+            text += "delay = 0.0\n"
+    return text
+
+
+def write_case(folder, case, fit, check, column, servo):
     """The model file and both logs of a case."""
     lacks = case["drive"] if case["hidden"] == "coulomb_friction" else None
-    dry = "".join(DRY % name for k, name in enumerate(["shoulder", "elbow"]) if k != lacks)
-    (folder / "arm.toml").write_text(MODEL % dry)
+    dry = "".join(DRY % name for k, name in enumerate(DRIVES) if k != lacks)
+    model = MODEL % (dry, actuators(case, servo))
+    if case["hidden"] == "payload":
+        model = with_nominal_values(model)
+    (folder / "arm.toml").write_text(model)
+    signal = {"current": "current"}.get(servo, "command")
     for name, (command, position) in [("fit", fit), ("check", check)]:
         t = np.arange(len(command)) / RATE
         table = np.column_stack([t, position[:, :, column], command[:, :, column]])
-        np.savetxt(folder / f"{name}.csv", table, delimiter=",", header="t,q1,q2,shoulder_command,elbow_command", comments="", fmt="%.9g")
+        header = f"t,q1,q2,shoulder_{signal},elbow_{signal}"
+        np.savetxt(folder / f"{name}.csv", table, delimiter=",", header=header, comments="", fmt="%.9g")
+
+
+def with_nominal_values(model):
+    """The model with the true values of its bodies and friction: without them a load is a part of the estimates."""
+    (m1, c1, i1), (m2, c2, i2) = LINKS
+    values = {"XX1": i1 + m1 * c1**2, "mc1": m1 * c1, "m2": m2, "mc2": m2 * c2, "I2": i2 + m2 * c2**2}
+    for name, value in values.items():
+        model = model.replace(f"{name} = {{ unit", f"{name} = {{ nominal = {value:.9g}, unit")
+    for d, name in enumerate(DRIVES):
+        for kind, key, size in [("viscous_friction", "Fv", VISCOUS), ("coulomb_friction", "Fc", COULOMB)]:
+            entry = f'kind = "{kind}"\nat = "{name}"\n'
+            model = model.replace(entry, entry + f"parameters = {{ {key} = {{ nominal = {size[d]} }} }}\n")
+    return model
 
 
 def claims(answer):
-    """What a diagnosis claims: kinds with their places."""
-    found = {(one["kind"], *one["at"]) for one in answer["effects"]}
-    return found | {(one["kind"], *one["at"]) for one in answer["disturbances"] if one["kind"].startswith("servo_")}
+    """What a diagnosis claims: kinds with their places, each with the claims that it calls indistinguishable."""
+    alike = lambda one: tuple((other["kind"], *other["at"]) for other in one["indistinguishable_from"])
+    found = {(one["kind"], *one["at"]): alike(one) for one in answer["effects"]}
+    of_servos = ("servo_dead_band", "servo_saturation", "signal_delay")
+    return found | {(one["kind"], *one["at"]): () for one in answer["disturbances"] if one["kind"] in of_servos}
 
 
 def mark(case, found):
-    name = ["shoulder", "elbow"][case["drive"]]
-    kind = case["hidden"]
-    wanted = {"dead_band": "servo_dead_band", "saturation": "servo_saturation"}.get(kind, kind)
+    name, kind = DRIVES[case["drive"]], case["hidden"]
     if kind == "none":
         return "false" if found else "right"
     if not found:
         return "silent"
-    if (wanted, name) in found:
-        return "right" if len(found) == 1 else "partly"
-    return "false"
+    # The delays of both servos are wrong, a load is on a body, and only the ratio of both gains can be known.
+    has_place = kind not in ("wrong_delay", "payload", "wrong_gain")
+    is_it = lambda one: one[0] in NAMES.get(kind, {kind}) and (name in one or not has_place)
+    is_right = [is_it(one) for one in found]
+    is_honest = [is_it(one) or any(is_it(other) for other in found[one]) for one in found]
+    return "right" if all(is_right) else "honest" if all(is_honest) else "partly" if any(is_honest) else "false"
 
 
 def main():
@@ -195,18 +265,23 @@ def main():
     parser.add_argument("--program", required=True)
     parser.add_argument("--count", type=int, default=24)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--kinds", default=",".join(HIDDEN))
+    parser.add_argument("--servo", default="position_servo", choices=["position_servo", "velocity_servo", "current"])
     parser.add_argument("--keep")
     given = parser.parse_args()
     random = np.random.default_rng(given.seed)
-    cases = [draw_case(random, HIDDEN[k % len(HIDDEN)]) for k in range(given.count)]
-    runs = [simulate(random, cases) for _ in range(2)]
+    kinds = given.kinds.split(",")
+    cases = [draw_case(random, kinds[k % len(kinds)]) for k in range(given.count)]
+    runs = [simulate(random, cases, given.servo) for _ in range(2)]
     counts = collections.Counter()
     with tempfile.TemporaryDirectory() as temporary:
         for k, case in enumerate(cases):
             folder = pathlib.Path(given.keep or temporary) / f"case{k}"
             folder.mkdir(parents=True, exist_ok=True)
-            write_case(folder, case, *runs, k)
+            write_case(folder, case, *runs, k, given.servo)
             command = [given.program, "diagnose", "arm.toml", "--data", "fit.csv", "--check", "check.csv", "--json"]
+            if case["hidden"] == "payload":
+                command.append("--held")
             answer = subprocess.run(command, cwd=folder, capture_output=True, text=True)
             if answer.returncode != 0:
                 verdict, found = "refused", answer.stderr.strip().splitlines()[-1:]
@@ -215,8 +290,7 @@ def main():
                 verdict = mark(case, found)
                 (folder / "answer.json").write_text(answer.stdout)
             counts[verdict] += 1
-            name = ["shoulder", "elbow"][case["drive"]]
-            print(f"{k:3} {verdict:8} {case['hidden']} of {name}, {case['size']:.3g}: {sorted(found)}", flush=True)
+            print(f"{k:3} {verdict:8} {case['hidden']} of {DRIVES[case['drive']]}, {case['size']:.3g}: {sorted(found)}", flush=True)
     print(", ".join(f"{n} {verdict}" for verdict, n in sorted(counts.items())))
 
 

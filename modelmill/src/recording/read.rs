@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use modelmill_boundary::files::MemoryFiles;
 use modelmill_identify::diagnose::Disturbance;
-use modelmill_identify::{RecordingFiles, SignalRecording as Raw};
+use modelmill_identify::{RecordingFiles, SignalRecording as Raw, StatePreparation};
 
 use super::columns::read_options;
 use super::free;
@@ -15,6 +15,7 @@ use super::options::RecordingOptions;
 use crate::error::{Error, Outcome};
 use crate::host::kinds_of_files;
 use crate::model::Model;
+use crate::segment::computed_forces::ComputedForces;
 
 /// A recording that was read for a model, with the options for its preparation.
 /// [`Model::prepare_together`](crate::Model::prepare_together) prepares it with others.
@@ -26,6 +27,8 @@ pub struct UnpreparedRecording {
     pub(super) reading: RecordingOptions,
     /// Faults that were found before the preparation.
     pub(super) faults: Vec<Disturbance>,
+    /// What the forces depend on if they were computed from signals.
+    pub(super) computed: Option<Arc<ComputedForces>>,
 }
 
 impl UnpreparedRecording {
@@ -35,6 +38,7 @@ impl UnpreparedRecording {
             raw: Arc::new(raw),
             reading: reading.clone(),
             faults: Vec::new(),
+            computed: None,
         }
     }
 
@@ -48,10 +52,18 @@ impl UnpreparedRecording {
         &self.reading
     }
 
-    /// The same recording with other signals and further faults.
-    pub(crate) fn with_signals(&self, raw: Raw, faults: Vec<Disturbance>) -> Self {
+    /// The same recording with another preparation.
+    pub(crate) fn with_preparation(&self, preparation: StatePreparation) -> Self {
+        let mut other = self.clone();
+        other.reading.preparation = preparation;
+        other
+    }
+
+    /// The same recording with forces that were computed from its signals, and with further faults.
+    pub(crate) fn with_computed_forces(&self, raw: Raw, computed: ComputedForces, faults: Vec<Disturbance>) -> Self {
         Self {
             faults: [self.faults.clone(), faults].concat(),
+            computed: Some(Arc::new(computed)),
             ..Self::new(raw, &self.reading)
         }
     }

@@ -174,6 +174,7 @@ pub(super) fn prepare(
             load: None,
             maps_from_degrees: maps_from_degrees.clone(),
             faults: faults.clone(),
+            computed: None,
         })
     });
     with_variance.collect()

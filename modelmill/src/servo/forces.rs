@@ -10,19 +10,25 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use modelmill_identify::{RecordingNote, SignalRecording as Raw};
+use modelmill_boundary::message;
+use modelmill_boundary::text::{OptionName, Remedy};
+use modelmill_identify::{DECIMATION_PASSBAND, RecordingNote, SignalRecording as Raw};
 use modelmill_spec::{DriveKind, ModelActuator, ModelSymbol, PlaceQuantity};
 
 use super::ServoModel;
 use super::delay::{DelayQuery, ServoDelay, delays};
 use super::gains::{GainValues, delay_phrase};
+use super::refine::refine_delays;
 use super::suspects::{ServoLimit, servo_limits};
+use super::thresholds::{DELAY_STEP, FEWEST_DECIMATED};
 use crate::along;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 use crate::progress::SilentProgress;
-use crate::recording::{PreparedRecording, RecordingOptions, UnpreparedRecording};
+use crate::recording::{PreparedRecording, RecordingOptions, SmoothingMethod, StatePreparation, UnpreparedRecording};
 use crate::segment::RecordingSegment;
+use crate::segment::computed_forces::{ComputedForces, DelaySensitivity};
+use crate::text::table::significant;
 
 /// Recordings of a fit, and those of its validation, each with its own result.
 type ReadRuns = [Vec<Outcome<UnpreparedRecording>>; 2];
@@ -47,17 +53,14 @@ impl Model {
     /// A recording with all forces, or without the signals of an actuator, is passed on unchanged. If values are unknown
     /// and cannot be estimated, recordings without forces become errors that state the reason.
     pub fn add_actuator_forces(&self, runs: ReadRuns) -> ReadRuns {
-        let is_affected = |one: &Outcome<UnpreparedRecording>| {
-            one.as_ref()
-                .is_ok_and(|one| !self.drives_to_compute(one.raw()).is_empty())
-        };
+        let is_affected = |one: &Outcome<UnpreparedRecording>| self.lacks_computable_forces(one);
         let affected = || runs.iter().map(|run| run.iter().filter(|one| is_affected(one)).count());
         if affected().sum::<usize>() == 0 {
             return runs;
         }
-        match ActuatorForces::new(self, &runs, is_affected) {
+        match ActuatorForces::new(self, &runs) {
             Ok(forces) => {
-                let mut prepared = forces.prepared.iter();
+                let mut prepared = forces.motion.iter().flatten();
                 runs.map(|run| {
                     let complete = |one: Outcome<UnpreparedRecording>| {
                         if !is_affected(&one) {
@@ -84,6 +87,12 @@ impl Model {
                 })
             }
         }
+    }
+
+    /// Whether a recording lacks forces that follow from its signals.
+    fn lacks_computable_forces(&self, one: &Outcome<UnpreparedRecording>) -> bool {
+        one.as_ref()
+            .is_ok_and(|one| !self.drives_to_compute(one.raw()).is_empty())
     }
 
     /// The drives whose force is not in a recording, and whose actuators have all their signals there.
@@ -127,8 +136,9 @@ struct ActuatorForces<'a> {
     model: &'a Model,
     /// The equations with the signals as coordinates.
     servo: ServoModel,
-    /// The recordings without forces, prepared for the servo equations, in their order.
-    prepared: Vec<Outcome<PreparedRecording>>,
+    /// The recordings without forces, prepared for the servo equations, in their order: those of the fit and those of the
+    /// validation.
+    motion: [Vec<Outcome<PreparedRecording>>; 2],
     /// Values of the gains.
     gains: GainValues,
     /// Delays of the actuators.
@@ -137,52 +147,104 @@ struct ActuatorForces<'a> {
     actuators: Vec<ModelActuator>,
     /// These limits.
     limits: Vec<ServoLimit>,
+    /// The preparation that was chosen by the forces; `None` if the user gave one.
+    preparation: Option<StatePreparation>,
+    /// The cut-off of this preparation, Hz.
+    cutoff_hz: Option<f64>,
 }
 
 impl<'a> ActuatorForces<'a> {
     /// Prepares the motion of all affected recordings, and estimates the values that the file does not give.
-    fn new(
-        model: &'a Model,
-        runs: &ReadRuns,
-        is_affected: impl Fn(&Outcome<UnpreparedRecording>) -> bool,
-    ) -> Outcome<Self> {
+    fn new(model: &'a Model, runs: &ReadRuns) -> Outcome<Self> {
         let silent = model.host().clone().with_progress(Arc::new(SilentProgress));
         let mut servo = model.clone().with_host(&silent).servo_model_for_forces()?;
         servo.equations = servo.equations.with_host(&silent);
-        let affected = runs.each_ref().map(|run| {
-            let all = run.iter().filter(|one| is_affected(one)).flatten();
-            all.map(|one| one.for_model(&servo.equations, &ServoModel::reading(one.options())))
-                .collect::<Vec<_>>()
-        });
-        let [fit, check] = servo.equations.prepare_together(affected);
-        let of_fit = if fit.is_empty() { &check } else { &fit };
-        let fitted: Vec<&PreparedRecording> = of_fit.iter().flatten().collect();
-        let segments = |all: &mut dyn Iterator<Item = &PreparedRecording>| -> Vec<RecordingSegment> {
-            all.flat_map(|one| one.segments.clone()).collect()
-        };
-        let fit_segments = segments(&mut of_fit.iter().flatten());
-        let check_segments = if fit.is_empty() {
-            Vec::new()
-        } else {
-            segments(&mut check.iter().flatten())
-        };
-        let delays = delays(&servo, &fit_segments, DelayQuery::WithFriction)?;
+        let motion = prepare_motion(model, &servo, runs, None);
+        let fitted: Vec<&PreparedRecording> = fitted(&motion).iter().flatten().collect();
+        let segments: Vec<RecordingSegment> = fitted.iter().flat_map(|one| one.segments.clone()).collect();
+        let delays = delays(&servo, &segments, DelayQuery::WithFriction)?;
         let gains = GainValues::new(model, &servo, &fitted)?;
-        let seconds: Vec<f64> = delays.iter().map(|delay| delay.value).collect();
-        let limits = servo_limits(model, &servo, [&fit_segments, &check_segments], &seconds, &gains)?;
-        let mut actuators = model.actuators().to_vec();
-        for limit in &limits {
-            actuators[limit.actuator] = limit.limited.clone();
-        }
-        Ok(Self {
-            actuators,
-            limits,
+        let mut all = Self {
+            actuators: model.actuators().to_vec(),
+            limits: Vec::new(),
             model,
             servo,
-            prepared: fit.into_iter().chain(check).collect(),
+            motion,
             gains,
             delays,
-        })
+            preparation: None,
+            cutoff_hz: None,
+        };
+        let cutoff = all.choose_preparation(runs);
+        all.motion = prepare_motion(model, &all.servo, runs, cutoff);
+        all.refine(runs)?;
+        all.find_limits()?;
+        if !all.limits.is_empty() {
+            all.refine(runs)?;
+        }
+        Ok(all)
+    }
+
+    /// Lets the forces choose the preparation, as they do for measured forces, and returns its cut-off, Hz. The cut-off
+    /// that was chosen from positions alone passes more noise.
+    fn choose_preparation(&mut self, runs: &ReadRuns) -> Option<f64> {
+        let chosen = self.prepare_fitted(runs);
+        let first = chosen.first()?;
+        let preparation = first.preparation();
+        let cutoff = first.segments.first().and_then(|one| one.run.prepared.cutoff_hz);
+        if preparation.chosen {
+            self.preparation = Some(preparation.clone());
+            self.cutoff_hz = cutoff;
+        }
+        cutoff
+    }
+
+    /// Estimates the delays once more, from the forces behind the filter of the preparation.
+    ///
+    /// Fails when a pose has no solution.
+    fn refine(&mut self, runs: &ReadRuns) -> Outcome {
+        if self.delays.iter().any(|delay| delay.interval.is_some()) {
+            let prepared = self.prepare_fitted(runs);
+            let segments: Vec<RecordingSegment> = prepared.into_iter().flat_map(|one| one.segments).collect();
+            self.delays = refine_delays(self.model, &segments, &self.delays)?;
+        }
+        Ok(())
+    }
+
+    /// The recordings that decide, with their forces; those of the validation if there are no others.
+    fn prepare_fitted(&self, runs: &ReadRuns) -> Vec<PreparedRecording> {
+        let k = usize::from(self.motion[0].is_empty());
+        let affected = runs[k]
+            .iter()
+            .filter(|one| self.model.lacks_computable_forces(one))
+            .flatten();
+        let completed = affected
+            .zip(&self.motion[k])
+            .map(|(one, motion)| self.complete(one, Some(motion)));
+        let quiet = self.model.clone().with_host(self.servo.equations.host());
+        let [prepared, _] = quiet.prepare_together([completed.collect(), Vec::new()]);
+        prepared.into_iter().flatten().collect()
+    }
+
+    /// Searches limits of servos that the file lacks.
+    ///
+    /// Fails when a pose has no solution.
+    fn find_limits(&mut self) -> Outcome {
+        let segments = |all: &[Outcome<PreparedRecording>]| -> Vec<RecordingSegment> {
+            all.iter().flatten().flat_map(|one| one.segments.clone()).collect()
+        };
+        let check = if self.motion[0].is_empty() {
+            Vec::new()
+        } else {
+            segments(&self.motion[1])
+        };
+        let seconds: Vec<f64> = self.delays.iter().map(|delay| delay.value).collect();
+        let all = [&*segments(fitted(&self.motion)), &check];
+        self.limits = servo_limits(self.model, &self.servo, all, &seconds, &self.gains)?;
+        for limit in &self.limits {
+            self.actuators[limit.actuator] = limit.limited.clone();
+        }
+        Ok(())
     }
 
     /// A recording with the forces of its actuators.
@@ -201,6 +263,10 @@ impl<'a> ActuatorForces<'a> {
         let time = raw.column("t")?.to_vec();
         let motion = SmoothMotion::new(&self.servo, prepared)?;
         let mut phrases = Vec::new();
+        let mut computed = ComputedForces {
+            time: time.clone(),
+            delays: Vec::new(),
+        };
         for drive in self.model.drives_to_compute(&raw) {
             let position = match mechanism.drives[drive].kind {
                 DriveKind::Joint(i) => raw.column(&mechanism.coordinates[i.0].name).ok().map(<[f64]>::to_vec),
@@ -209,28 +275,87 @@ impl<'a> ActuatorForces<'a> {
             let position = position.unwrap_or_else(|| motion.interpolate_at(&motion.positions[drive], &time, 0.0));
             let mut force = vec![0.0; time.len()];
             let own = self.actuators.iter().zip(&self.delays).enumerate();
+            let rate = motion.interpolate_at(&motion.rates[drive], &time, 0.0);
             for (k, (actuator, delay)) in own.filter(|(_, (actuator, _))| actuator.drive.0 == drive) {
                 let signal = raw.column(&actuator.signal)?;
-                let states = ActuatorStates {
-                    signal: interpolate(&time, signal, &time, delay.value),
-                    signal_rate: motion.interpolate_at(&motion.signal_rates[k], &time, delay.value),
-                    rate: motion.interpolate_at(&motion.rates[drive], &time, 0.0),
-                    position: position.clone(),
+                let forces_at = |delay: f64| {
+                    let states = ActuatorStates {
+                        signal: interpolate(&time, signal, &time, delay),
+                        signal_rate: motion.interpolate_at(&motion.signal_rates[k], &time, delay),
+                        rate: rate.clone(),
+                        position: position.clone(),
+                    };
+                    states.forces(self.model, actuator, &self.gains)
                 };
-                for (sum, force) in force.iter_mut().zip(states.forces(self.model, actuator, &self.gains)) {
+                for (sum, force) in force.iter_mut().zip(forces_at(delay.value)) {
                     *sum += force;
                 }
+                let [early, late] = [-DELAY_STEP, DELAY_STEP].map(|step| forces_at(delay.value + step));
+                let slopes = early.iter().zip(&late).map(|(a, b)| (b - a) / (2.0 * DELAY_STEP));
+                computed.delays.push(DelaySensitivity {
+                    drive,
+                    actuator: k,
+                    is_estimated: delay.interval.is_some(),
+                    is_commanded: actuator.kind.is_commanded(),
+                    values: slopes.collect(),
+                });
                 phrases.push(self.phrase(actuator, delay));
             }
             raw.set_column(&mechanism.drives[drive].name, force);
         }
         raw.add_note(RecordingNote::info(self.note(raw.file(), &phrases)));
+        let preparation = self.preparation_of(&time);
+        if let Some((chosen, passed)) = &preparation {
+            raw.add_note(RecordingNote::info(message!(
+                "{}: forces and regressor pass a low-pass at {} Hz and are decimated by {}. The positions are smoothed by one at \
+                 {} Hz, which the forces chose; above it the forces contain friction and the noise of the encoder, and the smoothed \
+                 motion does not. Set it yourself with {} and {}.",
+                raw.file(),
+                significant(*passed, 3),
+                chosen.decimate,
+                significant(self.cutoff_hz.unwrap_or(0.0), 3),
+                Remedy::option(OptionName::CutoffHz),
+                Remedy::option(OptionName::Decimate),
+            )));
+        }
         for limit in &self.limits {
             let says = limit.disturbance.description.clone().unwrap_or_default();
             raw.add_note(RecordingNote::warning(format!("{}: {says}.", raw.file())));
         }
         let limits = self.limits.iter().map(|limit| limit.disturbance.clone());
-        Ok(recording.with_signals(raw, limits.collect()))
+        let completed = recording.with_computed_forces(raw, computed, limits.collect());
+        Ok(match preparation {
+            Some((preparation, _)) => completed.with_preparation(preparation),
+            None => completed,
+        })
+    }
+
+    /// The preparation of a recording with forces of commands, and the highest frequency that its decimation passes, Hz;
+    /// `None` if the usual choice is made.
+    ///
+    /// Forces of commands contain what the positions were smoothed by. The decimation passes no frequency above the
+    /// cut-off, so that forces and regressor have passed equal filters.
+    fn preparation_of(&self, time: &[f64]) -> Option<(StatePreparation, f64)> {
+        let (chosen, cutoff) = (self.preparation.as_ref()?, self.cutoff_hz?);
+        if !self
+            .model
+            .actuators()
+            .iter()
+            .any(|actuator| actuator.kind.is_commanded())
+        {
+            return None;
+        }
+        let rate = mean_rate(time);
+        let most = time.len() / FEWEST_DECIMATED;
+        let factor = (1..most).find(|factor| DECIMATION_PASSBAND * rate <= cutoff * *factor as f64);
+        let factor = factor.unwrap_or(most).max(chosen.decimate).max(1);
+        let mut own = chosen.clone();
+        own.decimate = factor;
+        // Each recording has a period of its own.
+        if let SmoothingMethod::Fourier { period } = &mut own.smoothing {
+            *period = None;
+        }
+        Some((own, DECIMATION_PASSBAND * rate / factor as f64))
     }
 
     /// How the force of an actuator is computed.
@@ -281,6 +406,38 @@ impl<'a> ActuatorForces<'a> {
     }
 }
 
+/// The recordings that lack computable forces, prepared for the servo equations, with a cut-off in Hz if one is given.
+fn prepare_motion(
+    model: &Model,
+    servo: &ServoModel,
+    runs: &ReadRuns,
+    cutoff: Option<f64>,
+) -> [Vec<Outcome<PreparedRecording>>; 2] {
+    let affected = runs.each_ref().map(|run| {
+        let all = run.iter().filter(|one| model.lacks_computable_forces(one)).flatten();
+        all.map(|one| {
+            let mut reading = ServoModel::reading(one.options());
+            reading.preparation.cutoff_hz = reading.preparation.cutoff_hz.or(cutoff);
+            one.for_model(&servo.equations, &reading)
+        })
+        .collect::<Vec<_>>()
+    });
+    servo.equations.prepare_together(affected)
+}
+
+/// Samples per second.
+fn mean_rate(time: &[f64]) -> f64 {
+    match time {
+        [first, .., last] if last > first => (time.len() - 1) as f64 / (last - first),
+        _ => 0.0,
+    }
+}
+
+/// The recordings of the fit; those of the validation if there are no others.
+fn fitted(motion: &[Vec<Outcome<PreparedRecording>>; 2]) -> &[Outcome<PreparedRecording>] {
+    if motion[0].is_empty() { &motion[1] } else { &motion[0] }
+}
+
 /// The motion of drives and signals after the filter.
 struct SmoothMotion {
     /// Times, s.
@@ -325,7 +482,8 @@ impl SmoothMotion {
     }
 }
 
-/// A column at some times less a delay, linear between its samples and constant beyond its ends.
+/// A column at some times less a delay: between its samples the cubic polynomial through the four nearest, and constant
+/// beyond its ends. A line would cut the curves of a command: at 200 Hz and 4 Hz by more than the noise of an encoder.
 fn interpolate(time: &[f64], column: &[f64], times: &[f64], delay: f64) -> Vec<f64> {
     let last = time.len().saturating_sub(1);
     times
@@ -339,11 +497,20 @@ fn interpolate(time: &[f64], column: &[f64], times: &[f64], delay: f64) -> Vec<f
                 return column[last];
             }
             let b = time.partition_point(|x| *x < t).clamp(1, last);
-            let width = time[b] - time[b - 1];
-            let share = if width > 0.0 { (t - time[b - 1]) / width } else { 1.0 };
-            column[b - 1] + share * (column[b] - column[b - 1])
+            let nearest = b.saturating_sub(2)..(b + 2).min(last + 1);
+            lagrange(&time[nearest.clone()], &column[nearest], t)
         })
         .collect()
+}
+
+/// The polynomial through some points at a time. Points with equal times are no polynomial: the first value counts.
+fn lagrange(time: &[f64], values: &[f64], t: f64) -> f64 {
+    let basis = |k: usize| -> f64 {
+        let others = time.iter().enumerate().filter(|(j, _)| *j != k);
+        others.map(|(_, other)| (t - other) / (time[k] - other)).product()
+    };
+    let sum: f64 = values.iter().enumerate().map(|(k, value)| value * basis(k)).sum();
+    if sum.is_finite() { sum } else { values[0] }
 }
 
 /// What the force of one actuator depends on, by sample.

@@ -7,12 +7,16 @@ pub(super) const NULL_SHARE: f64 = 1e-9;
 pub(super) const NULL_ENTRY: f64 = 1e-6;
 /// Equations for each unknown in the search for directions without effect. By judgement.
 pub(super) const SCALE_ROWS_PER_COLUMN: usize = 6;
+/// Samples that a decimation of computed forces keeps at least. By judgement.
+pub(super) const FEWEST_DECIMATED: usize = 400;
 /// Step of the search for a delay, s; the minimum is interpolated by a parabola. By judgement.
 pub(super) const DELAY_STEP: f64 = 0.001;
 /// Steps of the search.
 pub(super) const DELAY_STEPS: usize = 100;
 /// Largest delay of a servo that is searched, s: field buses and controllers of machines need less. By judgement.
 pub(super) const LARGEST_DELAY: f64 = DELAY_STEPS as f64 * DELAY_STEP;
+/// Largest correction of a delay by forces, s: beyond it a Gauss-Newton step is not accurate. By judgement.
+pub(super) const LARGEST_DELAY_STEP: f64 = 0.02;
 /// Most samples for the search of a delay. By judgement.
 pub(super) const DELAY_SAMPLES: usize = 4000;
 /// Fall of the log likelihood, times two, at the ends of an interval of 95 % of one parameter.

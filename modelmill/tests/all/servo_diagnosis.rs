@@ -45,9 +45,21 @@ fn diagnose(text: &str, planted: &Planted, limits: PlantedLimits) -> DiagnosisFi
 fn claims(findings: &DiagnosisFindings) -> Vec<String> {
     let effects = findings.missing.iter().map(|one| one.effect.kind.clone());
     let limits = findings.diagnosis.disturbances.iter().map(|one| one.kind.clone());
+    let of_servos = ["servo_saturation", "servo_dead_band", "signal_delay"];
     effects
-        .chain(limits.filter(|kind| kind.starts_with("servo_")))
+        .chain(limits.filter(|kind| of_servos.contains(&kind.as_str())))
         .collect()
+}
+
+/// A log whose position is that of an encoder of 12 bits.
+fn by_encoder(mut log: Columns) -> Columns {
+    let step = std::f64::consts::TAU / 4096.0;
+    for (_, values) in log.iter_mut().filter(|(name, _)| name == "q") {
+        for value in values {
+            *value = step * (*value / step).round();
+        }
+    }
+    log
 }
 
 /// The values of the base parameters of the pendulum, by their expressions.
@@ -115,6 +127,29 @@ fn limits_of_a_servo_are_found_with_their_size_and_respected_from_the_file() {
         let with_limit = text.replace("kd = \"0.4\"", &format!("kd = \"0.4\"\n{entry}"));
         assert_eq!(claims(&diagnose(&with_limit, &PLANTED, limits)), Vec::<String>::new());
     }
+}
+
+/// The noise of a coarse encoder, and jumps of the friction above the cut-off of the positions, are no effects.
+#[test]
+fn clean_logs_of_coarse_encoders_give_no_claims() {
+    let model = model(&pendulum(&KNOWN));
+    for seed in 11..15 {
+        let run = prepare(&model, by_encoder(simulate_limited(&PLANTED, NONE, seed, 5000))).unwrap();
+        let findings = model.diagnose(&[&run], &[], &DiagnosisOptions::default()).unwrap();
+        assert_eq!(claims(&findings), Vec::<String>::new(), "seed {seed}");
+    }
+}
+
+/// A delay that the file gives is not estimated, so that a wrong one is reported with its size.
+#[test]
+fn a_wrong_delay_of_the_file_is_reported() {
+    let text = pendulum(&KNOWN).replace("kd = \"0.4\"", "kd = \"0.4\"\ndelay = 0.003");
+    let found = diagnose(&text, &PLANTED, NONE);
+    assert_eq!(claims(&found), ["signal_delay"]);
+    let disturbances = &found.diagnosis.disturbances;
+    let delay = disturbances.iter().find(|one| one.kind == "signal_delay").unwrap();
+    let shift = delay.estimates[0].value;
+    assert!((shift - 0.005).abs() < 0.0005, "{shift}");
 }
 
 #[test]
