@@ -143,6 +143,8 @@ struct ActuatorForces<'a> {
     gains: GainValues,
     /// Delays of the actuators.
     delays: Vec<ServoDelay>,
+    /// What the forces would add to the delays that the file gives, s, by actuator.
+    shifts: Vec<f64>,
     /// The actuators, with limits that the file lacks and the recordings show.
     actuators: Vec<ModelActuator>,
     /// These limits.
@@ -160,7 +162,7 @@ impl<'a> ActuatorForces<'a> {
         let mut servo = model.clone().with_host(&silent).servo_model_for_forces()?;
         servo.equations = servo.equations.with_host(&silent);
         let motion = prepare_motion(model, &servo, runs, None);
-        let fitted: Vec<&PreparedRecording> = fitted(&motion).iter().flatten().collect();
+        let fitted: Vec<&PreparedRecording> = deciding_recordings(&motion).iter().flatten().collect();
         let segments: Vec<RecordingSegment> = fitted.iter().flat_map(|one| one.segments.clone()).collect();
         let delays = delays(&servo, &segments, DelayQuery::WithFriction)?;
         let gains = GainValues::new(model, &servo, &fitted)?;
@@ -174,6 +176,7 @@ impl<'a> ActuatorForces<'a> {
             delays,
             preparation: None,
             cutoff_hz: None,
+            shifts: vec![0.0; model.actuators().len()],
         };
         let cutoff = all.choose_preparation(runs);
         all.motion = prepare_motion(model, &all.servo, runs, cutoff);
@@ -188,7 +191,7 @@ impl<'a> ActuatorForces<'a> {
     /// Lets the forces choose the preparation, as they do for measured forces, and returns its cut-off, Hz. The cut-off
     /// that was chosen from positions alone passes more noise.
     fn choose_preparation(&mut self, runs: &ReadRuns) -> Option<f64> {
-        let chosen = self.prepare_fitted(runs);
+        let chosen = self.prepare_deciding_recordings(runs);
         let first = chosen.first()?;
         let preparation = first.preparation();
         let cutoff = first.segments.first().and_then(|one| one.run.prepared.cutoff_hz);
@@ -203,16 +206,14 @@ impl<'a> ActuatorForces<'a> {
     ///
     /// Fails when a pose has no solution.
     fn refine(&mut self, runs: &ReadRuns) -> Outcome {
-        if self.delays.iter().any(|delay| delay.interval.is_some()) {
-            let prepared = self.prepare_fitted(runs);
-            let segments: Vec<RecordingSegment> = prepared.into_iter().flat_map(|one| one.segments).collect();
-            self.delays = refine_delays(self.model, &segments, &self.delays)?;
-        }
+        let prepared = self.prepare_deciding_recordings(runs);
+        let segments: Vec<RecordingSegment> = prepared.into_iter().flat_map(|one| one.segments).collect();
+        (self.delays, self.shifts) = refine_delays(self.model, &segments, &self.delays)?;
         Ok(())
     }
 
     /// The recordings that decide, with their forces; those of the validation if there are no others.
-    fn prepare_fitted(&self, runs: &ReadRuns) -> Vec<PreparedRecording> {
+    fn prepare_deciding_recordings(&self, runs: &ReadRuns) -> Vec<PreparedRecording> {
         let k = usize::from(self.motion[0].is_empty());
         let affected = runs[k]
             .iter()
@@ -239,7 +240,7 @@ impl<'a> ActuatorForces<'a> {
             segments(&self.motion[1])
         };
         let seconds: Vec<f64> = self.delays.iter().map(|delay| delay.value).collect();
-        let all = [&*segments(fitted(&self.motion)), &check];
+        let all = [&*segments(deciding_recordings(&self.motion)), &check];
         self.limits = servo_limits(self.model, &self.servo, all, &seconds, &self.gains)?;
         for limit in &self.limits {
             self.actuators[limit.actuator] = limit.limited.clone();
@@ -290,8 +291,13 @@ impl<'a> ActuatorForces<'a> {
                 for (sum, force) in force.iter_mut().zip(forces_at(delay.value)) {
                     *sum += force;
                 }
-                let [early, late] = [-DELAY_STEP, DELAY_STEP].map(|step| forces_at(delay.value + step));
-                let slopes = early.iter().zip(&late).map(|(a, b)| (b - a) / (2.0 * DELAY_STEP));
+                // A delay of the file may be far from the true one: a secant has the force of the difference exactly.
+                let [from, to] = match self.shifts[k] {
+                    shift if shift.abs() > DELAY_STEP => [0.0, shift],
+                    _ => [-DELAY_STEP, DELAY_STEP],
+                };
+                let [before, after] = [from, to].map(|step| forces_at(delay.value + step));
+                let slopes = before.iter().zip(&after).map(|(a, b)| (b - a) / (to - from));
                 computed.delays.push(DelaySensitivity {
                     drive,
                     actuator: k,
@@ -308,8 +314,8 @@ impl<'a> ActuatorForces<'a> {
         if let Some((chosen, passed)) = &preparation {
             raw.add_note(RecordingNote::info(message!(
                 "{}: forces and regressor pass a low-pass at {} Hz and are decimated by {}. The positions are smoothed by one at \
-                 {} Hz, which the forces chose; above it the forces contain friction and the noise of the encoder, and the smoothed \
-                 motion does not. Set it yourself with {} and {}.",
+                 {} Hz, which the forces chose; above it the forces contain jumps of friction and \
+                 noise, and the smoothed motion does not. Set it yourself with {} and {}.",
                 raw.file(),
                 significant(*passed, 3),
                 chosen.decimate,
@@ -330,21 +336,13 @@ impl<'a> ActuatorForces<'a> {
         })
     }
 
-    /// The preparation of a recording with forces of commands, and the highest frequency that its decimation passes, Hz;
+    /// The preparation of a recording with computed forces, and the highest frequency that its decimation passes, Hz;
     /// `None` if the usual choice is made.
     ///
-    /// Forces of commands contain what the positions were smoothed by. The decimation passes no frequency above the
+    /// Positions are smoothed, and signals are not. The decimation passes no frequency above the
     /// cut-off, so that forces and regressor have passed equal filters.
     fn preparation_of(&self, time: &[f64]) -> Option<(StatePreparation, f64)> {
         let (chosen, cutoff) = (self.preparation.as_ref()?, self.cutoff_hz?);
-        if !self
-            .model
-            .actuators()
-            .iter()
-            .any(|actuator| actuator.kind.is_commanded())
-        {
-            return None;
-        }
         let rate = mean_rate(time);
         let most = time.len() / FEWEST_DECIMATED;
         let factor = (1..most).find(|factor| DECIMATION_PASSBAND * rate <= cutoff * *factor as f64);
@@ -434,7 +432,7 @@ fn mean_rate(time: &[f64]) -> f64 {
 }
 
 /// The recordings of the fit; those of the validation if there are no others.
-fn fitted(motion: &[Vec<Outcome<PreparedRecording>>; 2]) -> &[Outcome<PreparedRecording>] {
+fn deciding_recordings(motion: &[Vec<Outcome<PreparedRecording>>; 2]) -> &[Outcome<PreparedRecording>] {
     if motion[0].is_empty() { &motion[1] } else { &motion[0] }
 }
 

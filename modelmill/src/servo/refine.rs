@@ -22,30 +22,35 @@ use crate::segment::RecordingSegment;
 /// Half an interval of 95 % in standard deviations.
 const HALF_INTERVAL: f64 = 1.96;
 
-/// Delays that fit the forces of some segments best. Those that the file gives, and those of which the equations determine
-/// nothing, stay as they are.
+/// Delays that fit the forces of some segments best, and what the forces would add to those that the file gives, s. The
+/// latter, and those of which the equations determine nothing, stay as they are.
 ///
 /// Fails when a pose has no solution.
 pub(super) fn refine_delays(
     model: &Model,
     segments: &[RecordingSegment],
     delays: &[ServoDelay],
-) -> Outcome<Vec<ServoDelay>> {
+) -> Outcome<(Vec<ServoDelay>, Vec<f64>)> {
     let mut refined = delays.to_vec();
+    let mut shifts = vec![0.0; delays.len()];
     let Some(equations) = DelayEquations::new(model, segments)? else {
-        return Ok(refined);
+        return Ok((refined, shifts));
     };
     for (actuator, step, std) in equations.steps(model)? {
         let one = &mut refined[actuator];
         // A step beyond the range of the search means that the equations determine nothing.
-        if one.interval.is_none() || !std.is_finite() || step.abs() > LARGEST_DELAY_STEP {
+        if !std.is_finite() || step.abs() > LARGEST_DELAY_STEP {
+            continue;
+        }
+        if one.interval.is_none() {
+            shifts[actuator] = step;
             continue;
         }
         one.value = (one.value + step).clamp(0.0, LARGEST_DELAY);
         one.std = std;
         one.interval = Some([-1.0, 1.0].map(|sign: f64| (one.value + sign * HALF_INTERVAL * std).max(0.0)));
     }
-    Ok(refined)
+    Ok((refined, shifts))
 }
 
 /// The equations of all drives at the samples that count.
@@ -59,14 +64,13 @@ struct DelayEquations {
 }
 
 impl DelayEquations {
-    /// `None` without forces that were computed with an estimated delay.
+    /// `None` without computed forces.
     fn new(model: &Model, segments: &[RecordingSegment]) -> Outcome<Option<Self>> {
         let n_drives = model.drives().len();
         // The same actuators in all segments: recordings may lack some of the signals.
         let mut places: BTreeMap<usize, usize> = BTreeMap::new();
         for one in segments.iter().filter_map(|one| one.computed.as_ref()) {
-            let estimated = one.delays.iter().filter(|delay| delay.is_estimated);
-            places.extend(estimated.map(|delay| (delay.actuator, delay.drive)));
+            places.extend(one.delays.iter().map(|delay| (delay.actuator, delay.drive)));
         }
         let has_forces = segments.iter().all(|one| one.run.force.is_some());
         if places.is_empty() || !has_forces {
