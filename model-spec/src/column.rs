@@ -124,7 +124,8 @@ pub(crate) fn units(quantity: ColumnQuantity) -> &'static [(&'static str, f64)] 
 
 impl Mechanism {
     /// The names that columns of recordings have in this model, with their quantities: `t`, every active coordinate
-    /// with its two derivatives (`_d`, `_dd`), and every drive with the variance of its force (`_var`).
+    /// with its two derivatives (`_d`, `_dd`), every drive with the variance of its force (`_var`), and the signal of
+    /// every actuator.
     pub fn columns(&self) -> Vec<(String, ColumnQuantity)> {
         let mut columns = vec![("t".to_owned(), ColumnQuantity::Time)];
         for coordinate in self.coordinates.iter().filter(|c| !c.passive) {
@@ -147,6 +148,14 @@ impl Mechanism {
             };
             columns.push((drive.name.clone(), force));
             columns.push((format!("{}_var", drive.name), variance));
+        }
+        // In the equations of servos, signals are coordinates already.
+        for actuator in self.actuators.iter().filter(|_| self.servo_forces.is_empty()) {
+            let quantity = match actuator.motion {
+                CoordinateMotion::Revolute => ColumnQuantity::Angle(0),
+                _ => ColumnQuantity::Length(0),
+            };
+            columns.push((actuator.signal.clone(), quantity));
         }
         columns
     }

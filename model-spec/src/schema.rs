@@ -383,6 +383,11 @@ record! {
         "supply" supply: optional SourceFormula,
         /// Delay from the recorded signal to the force, s; estimated if omitted.
         "delay" delay: optional SpannedNumber,
+        /// Largest absolute force of the actuator, N m or N; none if omitted.
+        "saturation" saturation: optional SpannedNumber,
+        /// Largest absolute error of position at which a `position_servo` makes no force, rad or m; the force follows the
+        /// error beyond it. 0 if omitted.
+        "dead_band" dead_band: optional SpannedNumber,
         /// Remark.
         "note" note: optional SpannedText,
     }

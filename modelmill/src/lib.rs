@@ -60,6 +60,7 @@
 //! | [`Model::functions`] | forces, regressor, mass matrix and other functions at given states |
 //! | [`Model::identify`] | base parameters from recordings by least squares, eq. (12) |
 //! | [`servo::ServoModel::identify`] | base parameters and gains from commands or currents, without forces |
+//! | [`Model::add_actuator_forces`] | recordings with the forces of actuators, computed from their signals |
 //! | [`Model::compare`] | error metrics (such as the NRMS), and the ranges of coordinates, rates, loads and time in which errors are large |
 //! | [`Model::simulate_motion`], [`Model::compare_forward`] | the motion under recorded forces, and its position errors over horizons |
 //! | [`Model::diagnose`] | the physical effects that are missing |

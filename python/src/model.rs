@@ -162,7 +162,8 @@ impl CoreModel {
         }
     }
 
-    /// Reads recordings and prepares them together.
+    /// Reads recordings and prepares them together. Forces that a recording lacks are computed from the signals of the
+    /// actuators if the model has some.
     fn prepare_inputs(
         &self,
         py: Python<'_>,
@@ -172,7 +173,7 @@ impl CoreModel {
         let model = &self.model;
         let prepared = self.run_interruptible(py, progress, || {
             let read = runs.map(|run| run.into_iter().map(|one| one.read(model)).collect());
-            Ok(model.prepare_together(read))
+            Ok(model.prepare_together(model.add_actuator_forces(read)))
         })?;
         Ok(prepared.map(|run| run.into_iter().map(|one| one.map(Arc::new)).collect()))
     }

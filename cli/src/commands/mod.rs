@@ -126,7 +126,10 @@ pub(crate) fn recordings(
     let files = [fit, check].map(|paths| paths.iter().map(|path| files_of(path)).collect::<Vec<_>>());
     let [fit, check] = [&files[0], &files[1]].map(|files| runs_of(files));
     let mut read = [Vec::new(), Vec::new()];
-    for (read, all) in read.iter_mut().zip(model.prepare_recordings([&fit, &check], reading)) {
+    for (read, all) in read
+        .iter_mut()
+        .zip(model.prepare_recordings_with_signals([&fit, &check], reading))
+    {
         for recording in all {
             read.push(recording?);
         }

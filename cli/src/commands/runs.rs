@@ -43,7 +43,7 @@ pub(crate) fn run(host: &Host, args: &RunsArgs) -> CommandOutcome {
     let reading = args.preparation.reading();
     // A run that cannot be read is passed on with its error; the library decides whether the others are sufficient.
     let files: Vec<Vec<PathBuf>> = data.iter().map(|path| commands::files_of(path)).collect();
-    let [read, _] = model.prepare_recordings([&commands::runs_of(&files), &[]], &reading);
+    let [read, _] = model.prepare_recordings_with_signals([&commands::runs_of(&files), &[]], &reading);
     let recordings = data.iter().zip(read).map(|(path, read)| {
         read.map_err(|error| UnreadRun {
             file: path.display().to_string(),

@@ -35,6 +35,7 @@ pub(crate) fn remove_lines(problem: &mut DiagnosisProblem, rest: &[Vec<f64>]) ->
     while frequencies.len() <= MOST_LINES {
         // The most prominent line of all channels.
         let Some(frequency) = (0..channels)
+            .filter(|d| has_sensor(problem, *d))
             .filter_map(|d| most_prominent_line(problem, &left[d], lowest))
             .max_by(|a, b| a.0.total_cmp(&b.0))
             .map(|(_, frequency)| frequency)
@@ -44,7 +45,7 @@ pub(crate) fn remove_lines(problem: &mut DiagnosisProblem, rest: &[Vec<f64>]) ->
         let frequency = refine_frequency(problem, &left, &unfit, frequency);
         // Subtract it from the residual of every channel.
         let mut without = left.clone();
-        for (d, left) in without.iter_mut().enumerate() {
+        for (d, left) in without.iter_mut().enumerate().filter(|(d, _)| has_sensor(problem, *d)) {
             // Samples that were not measured stay as they are.
             let lost = problem.layout.left_out.get(d).map_or(&[][..], Vec::as_slice);
             subtract_sinusoid(problem, left, &unfit[d], lost, frequency);
@@ -54,6 +55,10 @@ pub(crate) fn remove_lines(problem: &mut DiagnosisProblem, rest: &[Vec<f64>]) ->
             |(before, after): (&Vec<f64>, &Vec<f64>)| dot(after, after) < (1.0 - LINE_MAIN_SHARE) * dot(before, before);
         // A line at a low frequency that is not most of a residual comes from the motion; look above that range only.
         if frequency < LINE_LOW_HZ && !left.iter().zip(&without).any(is_most) {
+            // The least squares fit may move a line from above this bound to below it: it would be found forever.
+            if lowest >= LINE_LOW_HZ {
+                break;
+            }
             lowest = LINE_LOW_HZ;
             continue;
         }
@@ -73,6 +78,11 @@ pub(crate) fn remove_lines(problem: &mut DiagnosisProblem, rest: &[Vec<f64>]) ->
         }
     }
     found
+}
+
+/// Whether the force of a channel was measured.
+fn has_sensor(problem: &DiagnosisProblem, channel: usize) -> bool {
+    problem.without_sensor.get(channel) != Some(&true)
 }
 
 /// A slow spectral line in one channel.
@@ -107,7 +117,7 @@ pub(crate) fn slow_lines(
         // Squares that are not a function of the state.
         let by_no_state = dot(own, own) * (1.0 - again[channel]);
         // White noise contains no line.
-        if is_white(problem, channel, by_no_state / own.len().max(1) as f64) {
+        if !has_sensor(problem, channel) || is_white(problem, channel, by_no_state / own.len().max(1) as f64) {
             continue;
         }
         let Some(frequency) = strongest_frequency(problem, own) else {
@@ -539,6 +549,30 @@ mod tests {
             }
             assert!(taken <= 1, "damping {damping}: {taken} of 50");
         }
+    }
+
+    /// The spectrum shows a line at the frequency of its next step, which may lie above the bound that the line itself is
+    /// below. It is then neither subtracted nor searched forever.
+    #[test]
+    fn a_line_just_below_the_bound_ends_the_search() {
+        let mut skipped = 0;
+        for k in 0..60 {
+            let mut noise = TestNoise::new(k);
+            let rate = 43.0 + 0.03 * k as f64;
+            let rest: Vec<f64> = (0..1200)
+                .map(|i| (TAU * (LINE_LOW_HZ - 0.01) / rate * f64::from(i)).sin() + noise.normal())
+                .collect();
+            let mut problem = problem(&rest);
+            for segment in &mut problem.layout.segments {
+                segment.step = 1.0 / rate;
+            }
+            problem.removed = vec![0.0];
+            let above = most_prominent_line(&problem, &rest, LINE_LOW_HZ);
+            skipped += usize::from(above.is_some());
+            let found = remove_lines(&mut problem, &[rest]);
+            assert!(found.len() <= 1, "{found:?}");
+        }
+        assert!(skipped > 0, "no line was shown above the bound");
     }
 
     /// A third of a segment was not measured, and a column of the base has nearly the frequency of the hum.

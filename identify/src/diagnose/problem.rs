@@ -268,6 +268,8 @@ pub struct DiagnosisProblem {
     pub noise: Vec<f64>,
     /// Channels without a force signal, since nothing drives there; empty if all have one.
     pub idle: Vec<bool>,
+    /// Channels whose forces were computed from commands: no sensor adds a hum there. Empty if all were measured.
+    pub without_sensor: Vec<bool>,
     /// Mean squares of the terms that cancel in each idle channel, `[channel]`, 0 for the others. The diagnosis estimates
     /// them.
     pub idle_squares: Vec<f64>,

@@ -98,6 +98,11 @@ impl SignalRecording {
         &self.notes
     }
 
+    /// Adds a note on the recording.
+    pub fn add_note(&mut self, note: RecordingNote) {
+        self.notes.push(note);
+    }
+
     /// The numbers of a column, one per sample. Fails when the column does not exist, or has fields that are not
     /// finite numbers.
     pub fn column(&self, name: &str) -> Result<&[f64], RecordingError> {

@@ -5,8 +5,8 @@
 //! out. [`Mechanism::with_servo_equations`](crate::Mechanism::with_servo_equations) makes equations of motion of it.
 //!
 //! Decision: the force of an actuator is linear in products of gains, so that gains are parameters as masses are, and
-//! the exact reduction finds what can be known of both together. Saturation and dead bands are not linear; recordings
-//! that reach them must be left out.
+//! the exact reduction finds what can be known of both together. Saturation and dead bands are not linear: they are known
+//! numbers that change forces and signals before the equations are formed.
 
 mod current;
 mod duty;
@@ -267,6 +267,44 @@ pub struct ModelActuator {
     pub terms: Vec<ActuatorTerm>,
     /// Known delay of the signal, s; `None` if it is unknown.
     pub delay: Option<f64>,
+    /// Largest absolute force, N m or N; `None` without a limit.
+    pub saturation: Option<f64>,
+    /// Largest absolute error of position without a force, rad or m; `None` without a dead band.
+    pub dead_band: Option<f64>,
+}
+
+impl ModelActuator {
+    /// The signal that has the same effect on a servo without a dead band: the position inside the band, and the error
+    /// beyond it outside. The command of an angle is taken in the turn that is next to the position.
+    pub fn effective_signal(&self, signal: f64, position: f64) -> f64 {
+        if !self.kind.entry().is_position() {
+            return signal;
+        }
+        let mut error = signal - position;
+        if self.motion.is_angle() {
+            error -= std::f64::consts::TAU * (error / std::f64::consts::TAU).round();
+        }
+        match self.dead_band {
+            Some(band) => position + error.signum() * (error.abs() - band).max(0.0),
+            None => position + error,
+        }
+    }
+
+    /// Whether its force depends on the error of a position.
+    pub fn has_position_error(&self) -> bool {
+        self.kind.entry().is_position()
+    }
+
+    /// A force after the saturation of the actuator.
+    pub fn limited_force(&self, force: f64) -> f64 {
+        self.saturation
+            .map_or(force, |limit| force.clamp(-limit.abs(), limit.abs()))
+    }
+
+    /// Unit of its positions: `rad` or `m`.
+    pub fn position_unit(&self) -> &'static str {
+        if self.motion.is_angle() { "rad" } else { "m" }
+    }
 }
 
 /// The force of an actuator in the equations of motion of a mechanism.

@@ -136,6 +136,7 @@ fn actuator(
     if let Some(number) = entry.delay.as_ref().filter(|number| number.value < 0.0) {
         log.push(Diagnostic::error(number.span, "this delay is negative").label("expected seconds, 0 or more"));
     }
+    let [saturation, dead_band] = limits(entry, kind, log);
     let motion = match row.kind {
         DriveKind::Joint(i) if kind.entry().is_position() => symbols.coordinates[i.0].motion,
         _ => CoordinateMotion::Prismatic,
@@ -148,7 +149,28 @@ fn actuator(
         motion,
         terms: kind.entry().terms(&|key| gains.get(key).cloned()),
         delay,
+        saturation,
+        dead_band,
     })
+}
+
+/// The saturation and the dead band of an actuator; faults are reported.
+fn limits(entry: &ActuatorEntry, kind: ActuatorKind, log: &mut DiagnosticLog) -> [Option<f64>; 2] {
+    if let Some(number) = entry.saturation.as_ref().filter(|number| number.value <= 0.0) {
+        log.push(Diagnostic::error(number.span, "this saturation is not positive").label("expected a force above 0"));
+    }
+    if let Some(number) = &entry.dead_band {
+        if !kind.entry().is_position() {
+            log.push(
+                Diagnostic::error(number.span, format!("`{}` has no `dead_band`", kind.name()))
+                    .label("a dead band belongs to the error of a position")
+                    .help("delete it"),
+            );
+        } else if number.value < 0.0 {
+            log.push(Diagnostic::error(number.span, "this dead band is negative").label("expected 0 or more"));
+        }
+    }
+    [&entry.saturation, &entry.dead_band].map(|number| number.as_ref().map(|number| number.value))
 }
 
 /// Reports signals with the name of another column, which would be read from the same place of a recording.

@@ -129,6 +129,10 @@ pub fn disturbance(one: &Disturbance) -> String {
         "encoder_zero" => {
             format!("the encoder of {at} has a constant offset, since its zero differs from that of the model: {all}")
         }
+        "signal_delay" => format!(
+            "the signal of {at} has another delay than the model file gives: the force acts later by {all}. Correct `delay` in \
+             its [[actuator]]"
+        ),
         "contact_event" => {
             let [from, to] = one.interval.unwrap_or_default();
             format!(

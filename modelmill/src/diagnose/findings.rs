@@ -307,7 +307,8 @@ impl Model {
             findings.off_nominal = off_nominal_parameters(findings.final_version());
         }
         let turned = reversed_sign_note(findings.final_version(), &findings.off_nominal);
-        for note in [turned, findings.answer.unsearched_changes_note()]
+        let computed = findings.answer.computed_forces_note.clone();
+        for note in [turned, findings.answer.unsearched_changes_note(), computed]
             .into_iter()
             .flatten()
         {

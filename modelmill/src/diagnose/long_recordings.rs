@@ -126,6 +126,7 @@ pub(crate) fn thin_out(model: &Model, stretch: &RecordingSegment) -> Outcome<Rec
         load: stretch.load.as_deref().map(&filtered).transpose()?,
         maps_from_degrees: stretch.maps_from_degrees.clone(),
         faults: stretch.faults.clone(),
+        computed: stretch.computed.clone(),
         ..RecordingSegment::from(modelmill_identify::PreparedRun {
             file: run.file.clone(),
             time: decimate_time(time, factor),

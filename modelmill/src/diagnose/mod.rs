@@ -12,8 +12,8 @@
 //! 4. `columns`, `numbers`: evaluate the forces of these effects along the recordings.
 //! 5. `faults`, `contacts`: find faults of recordings and contacts before the search, and subtract their forces or
 //!    exclude their samples. After the search, contacts are searched once more, in its residual.
-//! 6. `encoders`, `gears`, `memory`, `payloads`, `constants`, `tilt`, `held_friction`: add candidates that a model file
-//!    cannot contain.
+//! 6. `encoders`, `gears`, `memory`, `payloads`, `constants`, `tilt`, `held_friction`, `signal_delays`: add candidates that
+//!    a model file cannot contain.
 //! 7. `problem`: formulates the search with all of these, and solves it.
 //! 8. `estimates`, `added_effects`: give each effect found one value per parameter, and add the effects to the model file, in
 //!    memory.
@@ -57,6 +57,7 @@ mod payloads;
 mod places;
 mod problem;
 mod requested_effects;
+mod signal_delays;
 mod thresholds;
 mod tilt;
 pub mod words;

@@ -35,6 +35,7 @@ use super::named_zeros::NamedZeros;
 use super::numbers::{layout, stack, variables};
 use super::payloads::{frame_loads, load_changes, payloads, reach};
 use super::places::sharing_places;
+use super::signal_delays::SignalDelays;
 use super::thresholds::FEWEST_SAMPLES;
 use super::words;
 use crate::regressors::{SegmentList, regressor};
@@ -54,6 +55,8 @@ pub(crate) struct DiagnosisSolution {
     pub problem: DiagnosisProblem,
     /// Whether changes within recordings were searched.
     pub are_changes_searched: bool,
+    /// What was not searched in forces that were computed from signals; `None` if all were measured.
+    pub computed_forces_note: Option<RecordingNote>,
     /// Its solution.
     pub diagnosis: ModelDiagnosis,
     /// Candidates that `add` could add, with their derivation.
@@ -161,9 +164,19 @@ pub(crate) fn find_missing_effects(
         problem.change_shapes = load_changes(model, &all)?;
         problem.change_shapes.extend(signal_changes(&problem, &units));
     }
+    let delays = SignalDelays::new(model, &all)?;
+    further.extend(delays.candidates.iter().cloned());
     problem.candidates.extend(further);
     // None of these can be an entry of a model file.
     origins.resize(problem.candidates.len(), None);
+    let mut is_kept = problem.candidates.iter().map(|one| !delays.excludes(one));
+    origins.retain(|_| is_kept.next().unwrap_or(true));
+    drop(is_kept);
+    problem.candidates.retain(|one| !delays.excludes(one));
+    // Estimated delays are estimated anew with each set of effects.
+    problem.base.extend(delays.estimated.iter().cloned());
+    problem.base_is_part_of_load.resize(problem.base.len(), false);
+    problem.without_sensor = delays.is_commanded(model);
     // Stage 4: the search, which requests further columns while it runs.
     let supply = ColumnSupply {
         candidates: &candidates,
@@ -214,6 +227,7 @@ pub(crate) fn find_missing_effects(
     Ok(DiagnosisSolution {
         problem: problem.without_columns(),
         are_changes_searched,
+        computed_forces_note: delays.note(model),
         diagnosis,
         candidates,
     })

@@ -477,6 +477,7 @@ fn recording(plant: &ModelPlant<'_>, motion: &ExcitationMotion) -> Option<Record
         },
         variance: None,
         weights: None,
+        computed: None,
         maps_from_degrees: Vec::new(),
         faults: Vec::new(),
         load: None,

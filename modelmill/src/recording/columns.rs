@@ -80,7 +80,8 @@ pub(crate) fn read_options(
         match parse_column_sum(model, text, quantity, header) {
             Ok(sum) => mapping.add(ours, sum),
             // A recording may use the names of the model, or lack optional columns.
-            Err(ColumnFault::Missing { .. }) if header.contains(ours) || is_optional(ours, quantity) => {}
+            Err(ColumnFault::Missing { .. })
+                if header.contains(ours) || is_optional(ours, quantity) || is_signal(model, ours) => {}
             Err(fault) => {
                 faults.push(Error::input(message!(
                     "{file}: the model file takes `{ours}` from `{text}`, but {fault} {} \
@@ -356,6 +357,13 @@ fn is_optional(ours: &str, quantity: ColumnQuantity) -> bool {
         ColumnQuantity::Angle(order) | ColumnQuantity::Length(order) => order > 0 && ours.contains("_d"),
         _ => true,
     }
+}
+
+/// Whether a column is the signal of an actuator, which a recording with forces may lack.
+fn is_signal(model: &Model, ours: &str) -> bool {
+    let mechanism = &model.derivation.mechanism;
+    let mut actuators = mechanism.actuators.iter();
+    mechanism.servo_forces.is_empty() && actuators.any(|actuator| actuator.signal == ours)
 }
 
 /// The error of a name that is no column of the model.

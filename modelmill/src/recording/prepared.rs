@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use modelmill_identify::{DerivativeSource, RecordingNote, SignalRecording as Raw};
+use modelmill_identify::{DerivativeSource, RecordingNote, SignalRecording as Raw, StatePreparation};
 
 use super::common::{self, RecordingChoices, RecordingSticks};
 use super::options::RecordingOptions;
@@ -137,8 +137,12 @@ impl PreparedRecording {
         let delay = model.derivation.mechanism.force_delay;
         let mut segments = prepare(model, &raw, &reading, delay)?;
         note_idle_options(&mut segments, &reading);
+        for one in &mut segments {
+            one.computed.clone_from(&source.computed);
+        }
         if let Some(first) = segments.first_mut() {
             first.run.notes.extend(choice.notes);
+            first.faults.extend(source.faults.iter().cloned());
         }
         Ok(Self {
             segments,
@@ -270,6 +274,11 @@ impl PreparedRecording {
         self.raw.column(name).ok()
     }
 
+    /// The preparation, including automatic choices.
+    pub(crate) fn preparation(&self) -> &StatePreparation {
+        &self.reading.preparation
+    }
+
     /// Where its rates and accelerations were taken from.
     pub(crate) fn derivative_source(&self) -> DerivativeSource {
         self.reading.preparation.source
@@ -292,6 +301,7 @@ impl PreparedRecording {
             if faulty.samples() == repaired.samples() {
                 faulty.weights.clone_from(&repaired.weights);
             }
+            faulty.computed.clone_from(&repaired.computed);
         }
         Some(stretches)
     }
@@ -301,6 +311,9 @@ impl PreparedRecording {
     pub(crate) fn prepare_for(&self, model: &Model) -> Outcome<Vec<RecordingSegment>> {
         let mut stretches = prepare_segments(model, &self.raw, &self.reading)?;
         self.sticks.all.mark(self.sticks.index, &mut stretches);
+        for one in &mut stretches {
+            one.computed.clone_from(&self.source.computed);
+        }
         Ok(stretches)
     }
 }

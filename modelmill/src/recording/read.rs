@@ -5,7 +5,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use modelmill_boundary::files::MemoryFiles;
-use modelmill_identify::{RecordingFiles, SignalRecording as Raw};
+use modelmill_identify::diagnose::Disturbance;
+use modelmill_identify::{RecordingFiles, SignalRecording as Raw, StatePreparation};
 
 use super::columns::read_options;
 use super::free;
@@ -14,6 +15,7 @@ use super::options::RecordingOptions;
 use crate::error::{Error, Outcome};
 use crate::host::kinds_of_files;
 use crate::model::Model;
+use crate::segment::computed_forces::ComputedForces;
 
 /// A recording that was read for a model, with the options for its preparation.
 /// [`Model::prepare_together`](crate::Model::prepare_together) prepares it with others.
@@ -23,6 +25,10 @@ pub struct UnpreparedRecording {
     pub(super) raw: Arc<Raw>,
     /// The options as they were requested.
     pub(super) reading: RecordingOptions,
+    /// Faults that were found before the preparation.
+    pub(super) faults: Vec<Disturbance>,
+    /// What the forces depend on if they were computed from signals.
+    pub(super) computed: Option<Arc<ComputedForces>>,
 }
 
 impl UnpreparedRecording {
@@ -31,7 +37,45 @@ impl UnpreparedRecording {
         Self {
             raw: Arc::new(raw),
             reading: reading.clone(),
+            faults: Vec::new(),
+            computed: None,
         }
+    }
+
+    /// The signals of the recording.
+    pub(crate) fn raw(&self) -> &Raw {
+        &self.raw
+    }
+
+    /// The options as they were requested.
+    pub(crate) fn options(&self) -> &RecordingOptions {
+        &self.reading
+    }
+
+    /// The same recording with another preparation.
+    pub(crate) fn with_preparation(&self, preparation: StatePreparation) -> Self {
+        let mut other = self.clone();
+        other.reading.preparation = preparation;
+        other
+    }
+
+    /// The same recording with forces that were computed from its signals, and with further faults.
+    pub(crate) fn with_computed_forces(&self, raw: Raw, computed: ComputedForces, faults: Vec<Disturbance>) -> Self {
+        Self {
+            faults: [self.faults.clone(), faults].concat(),
+            computed: Some(Arc::new(computed)),
+            ..Self::new(raw, &self.reading)
+        }
+    }
+
+    /// The same recording for another model with the same columns, such as one with servo equations.
+    ///
+    /// Fails when a quaternion is far from unit length, or when a twist is incomplete.
+    pub(crate) fn for_model(&self, model: &Model, reading: &RecordingOptions) -> Outcome<Self> {
+        let mut raw = (*self.raw).clone();
+        free::complete(model, &mut raw)?;
+        raw.unwrap_angles(&model.active_coordinate_types());
+        Ok(Self::new(raw, reading))
     }
 
     /// Whether it may have its preparation in common with another recording: both are prepared with the same options.

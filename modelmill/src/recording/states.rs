@@ -133,9 +133,10 @@ pub(super) fn prepare(
         .filter(|run| has_unused_actuators && run.force.is_none())
     {
         first.notes.push(RecordingNote::warning(message!(
-            "{} has no forces; {} uses the actuators of the model in their place, but comparisons with measured forces are not \
-             possible.",
+            "{} has no forces of {}, and they cannot be computed: it lacks the signals of their actuators, or the values of \
+             these are unknown. Comparisons with forces are not possible; {} estimates values from signals.",
             first.file,
+            first.missing_force.join(", "),
             Remedy::command(CommandName::Identify)
         )));
     }
@@ -173,6 +174,7 @@ pub(super) fn prepare(
             load: None,
             maps_from_degrees: maps_from_degrees.clone(),
             faults: faults.clone(),
+            computed: None,
         })
     });
     with_variance.collect()

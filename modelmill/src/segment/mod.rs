@@ -1,8 +1,11 @@
 //! A segment of a recording without gaps in time, prepared for a model. States are visited block by block, and faults
 //! name the time and the line of the recording.
 
+pub(crate) mod computed_forces;
 pub(crate) mod picked_states;
 pub mod variances;
+
+use std::sync::Arc;
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, OptionSetting, Remedy};
@@ -13,6 +16,8 @@ use modelmill_identify::{PreparedRun, RecordingNote, sample_place_word};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
+
+use computed_forces::ComputedForces;
 
 /// States that are evaluated at once: progress is reported after each block, and memory stays small.
 pub const BLOCK: usize = 4096;
@@ -34,6 +39,8 @@ pub struct RecordingSegment {
     pub maps_from_degrees: Vec<OptionSetting>,
     /// Disturbances that were found in the recording.
     pub faults: Vec<Disturbance>,
+    /// What the forces depend on if they were computed from signals.
+    pub(crate) computed: Option<Arc<ComputedForces>>,
 }
 
 impl From<PreparedRun> for RecordingSegment {
@@ -46,6 +53,7 @@ impl From<PreparedRun> for RecordingSegment {
             load: None,
             maps_from_degrees: Vec::new(),
             faults: Vec::new(),
+            computed: None,
         }
     }
 }
@@ -95,6 +103,7 @@ impl RecordingSegment {
                 load: self.load.as_deref().map(cut),
                 maps_from_degrees: self.maps_from_degrees.clone(),
                 faults: Vec::new(),
+                computed: self.computed.clone(),
             }
         };
         (0..n).map(piece).collect()

@@ -10,6 +10,7 @@ use modelmill_identify::estimate::LeastSquares;
 use super::ServoModel;
 use super::rows::UsedSamples;
 use super::thresholds::{DELAY_SAMPLES, DELAY_STEP, DELAY_STEPS, INTERVAL_FALL};
+use crate::along;
 use crate::error::{Error, Outcome};
 use crate::segment::RecordingSegment;
 
@@ -28,10 +29,20 @@ pub struct ServoDelay {
     pub is_open: bool,
 }
 
+/// The equations with which delays are estimated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum DelayQuery {
+    /// Those of the model.
+    OfModel,
+    /// Those of the model with viscous friction, dry friction and an offset of the drive: if the model lacks them, the
+    /// delay would explain them. A servo that is late by `T` has nearly the force of a damping `kp*T`.
+    WithFriction,
+}
+
 /// The delays of all actuators.
 ///
 /// Fails when a pose has no solution.
-pub(super) fn delays(servo: &ServoModel, segments: &[RecordingSegment]) -> Outcome<Vec<ServoDelay>> {
+pub(super) fn delays(servo: &ServoModel, segments: &[RecordingSegment], query: DelayQuery) -> Outcome<Vec<ServoDelay>> {
     let samples: Vec<UsedSamples> = segments
         .iter()
         .map(|one| UsedSamples::new(servo, one, DELAY_SAMPLES))
@@ -41,7 +52,7 @@ pub(super) fn delays(servo: &ServoModel, segments: &[RecordingSegment]) -> Outco
     if actuators.iter().any(|actuator| actuator.delay.is_none()) {
         for step in 0..=DELAY_STEPS {
             let delay = step as f64 * DELAY_STEP;
-            let rows = residuals(servo, &samples, delay)?;
+            let rows = residuals(servo, &samples, delay, query)?;
             for (profile, level) in profiles.iter_mut().zip(rows) {
                 profile.push(level);
             }
@@ -76,7 +87,12 @@ struct ResidualLevel {
 }
 
 /// The residual of each actuator's equation if all signals have one delay.
-fn residuals(servo: &ServoModel, samples: &[UsedSamples], delay: f64) -> Outcome<Vec<ResidualLevel>> {
+fn residuals(
+    servo: &ServoModel,
+    samples: &[UsedSamples],
+    delay: f64,
+    query: DelayQuery,
+) -> Outcome<Vec<ResidualLevel>> {
     let actuators = servo.actuators();
     let all = vec![delay; actuators.len()];
     let model = &servo.equations;
@@ -86,17 +102,31 @@ fn residuals(servo: &ServoModel, samples: &[UsedSamples], delay: f64) -> Outcome
         .iter()
         .map(|one| one.equations(servo, &one.delayed(servo, &all)))
         .collect::<Outcome<Vec<_>>>()?;
+    let rates = samples
+        .iter()
+        .map(|one| match query {
+            DelayQuery::OfModel => Ok(Vec::new()),
+            DelayQuery::WithFriction => along::drive_rates(model, &one.segment),
+        })
+        .collect::<Outcome<Vec<_>>>()?;
     actuators
         .iter()
         .map(|actuator| {
             let place = body_rows.iter().position(|d| *d == actuator.drive.0).unwrap_or(0);
             let response = response_column(servo, actuator.drive.0);
-            let mut table: Vec<&[f64]> = Vec::new();
-            for one in &equations {
+            let mut table: Vec<Vec<f64>> = Vec::new();
+            for (one, rates) in equations.iter().zip(&rates) {
                 let rows = one.regressor.chunks_exact(n).skip(place).step_by(body_rows.len());
-                table.extend(rows.filter(|row| row.iter().any(|x| *x != 0.0)));
+                for (sample, row) in rows.enumerate().filter(|(_, row)| row.iter().any(|x| *x != 0.0)) {
+                    let friction = rates.get(actuator.drive.0).map(|rates| {
+                        let rate = rates[sample];
+                        [rate, if rate == 0.0 { 0.0 } else { rate.signum() }, 1.0]
+                    });
+                    table.push(row.iter().copied().chain(friction.into_iter().flatten()).collect());
+                }
             }
-            let used: Vec<usize> = (0..n)
+            let width = table.first().map_or(n, Vec::len);
+            let used: Vec<usize> = (0..width)
                 .filter(|k| *k != response && table.iter().any(|row| row[*k] != 0.0))
                 .collect();
             let mut regression = LeastSquares::new(used.len().max(1));

@@ -11,11 +11,14 @@ use modelmill_identify::{LeastSquaresError, ParameterUncertainty, RecordingNote,
 use modelmill_spec::Sign;
 
 use super::ServoModel;
-use super::delay::{ServoDelay, delays};
+use super::delay::{DelayQuery, ServoDelay, delays};
+use super::gains::GainValues;
 use super::instruments::commanded_segment;
 use super::rows::{EquationRows, UsedSamples};
 use super::scale::ServoScale;
-use super::thresholds::{IMPOSSIBLE_SIGMAS, INSTRUMENT_CORRELATION, LARGE_BALANCE_ERROR, MOST_SAMPLES};
+use super::thresholds::{
+    IMPOSSIBLE_SIGMAS, INSTRUMENT_CORRELATION, LARGE_BALANCE_ERROR, MOST_SAMPLES, SATURATION_PASSES,
+};
 use crate::error::{Error, Outcome};
 use crate::recording::PreparedRecording;
 use crate::segment::RecordingSegment;
@@ -119,16 +122,24 @@ impl ServoModel {
         };
         let (fit, check) = (segments(fit), segments(check));
         self.check_length(&fit)?;
-        let delays = delays(self, &fit)?;
+        let delays = delays(self, &fit, DelayQuery::OfModel)?;
         let values: Vec<f64> = delays.iter().map(|delay| delay.value).collect();
-        let system = ServoSystem::new(self, &fit)?;
-        let solved = system.solve(&values)?;
+        let mut system = ServoSystem::new(self, &fit)?;
+        let mut solved = system.solve(&values)?;
+        if self.actuators().iter().any(|actuator| actuator.saturation.is_some()) {
+            // The forces at a saturation are known only with the gains, which are better with each pass.
+            for _ in 0..SATURATION_PASSES {
+                system.leave_out_saturated(&values, &solved)?;
+                solved = system.solve(&values)?;
+            }
+        }
         let spread = system.delay_spread(&delays, &solved)?;
         let base = system.base_values(&solved);
         let checked = if check.is_empty() {
             Vec::new()
         } else {
-            let system = ServoSystem::new(self, &check)?;
+            let mut system = ServoSystem::new(self, &check)?;
+            system.leave_out_saturated(&values, &solved)?;
             system.row_errors(&system.equations(&values)?.0, &base)
         };
         let fitted = system.row_errors(&solved.equations, &base);
@@ -232,6 +243,28 @@ impl<'a> ServoSystem<'a> {
             });
         }
         Ok((own, instruments))
+    }
+
+    /// Leaves out samples at which the actuators reach their saturation, with the gains of a solution.
+    ///
+    /// Fails when only ratios of gains can be known.
+    fn leave_out_saturated(&mut self, delays: &[f64], solved: &ServoSolution) -> Outcome {
+        let base = self.base_values(solved);
+        let gains = GainValues::from_base_values(self.servo, &base);
+        for actuator in self.servo.actuators().iter().filter(|one| one.saturation.is_some()) {
+            if actuator.terms.iter().any(|term| self.servo.is_ratio(term)) {
+                return Err(Error::input(format!(
+                    "{}: the saturation of the servo of {} is a force, but only ratios of forces can be known; give a gain or \
+                     another number that fixes the scale, or delete `saturation`",
+                    self.servo.equations.path,
+                    self.servo.drive_name(actuator)
+                )));
+            }
+        }
+        for one in &mut self.samples {
+            one.leave_out_saturated(self.servo, delays, &gains);
+        }
+        Ok(())
     }
 
     /// Number of rows of a sample.

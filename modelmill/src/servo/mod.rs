@@ -8,9 +8,13 @@
 
 mod delay;
 mod estimate;
+mod forces;
+mod gains;
 mod instruments;
+mod refine;
 mod rows;
 mod scale;
+mod suspects;
 mod thresholds;
 
 use modelmill_spec::ModelActuator;

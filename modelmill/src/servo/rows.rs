@@ -1,10 +1,12 @@
 //! Equations of a servo log: rows of the regressor along a segment with delayed signals, and the samples that count.
 
 use modelmill_codegen::ModelEvaluator;
-use modelmill_spec::{ExactExpression, ExactFunction};
+use modelmill_spec::{ExactExpression, ExactFunction, ModelActuator};
 
 use super::ServoModel;
-use super::thresholds::{LARGEST_DELAY, MOST_SAMPLES, REVERSAL_PERIODS, STANDSTILL_SHARE};
+use super::forces::ActuatorStates;
+use super::gains::GainValues;
+use super::thresholds::{LARGEST_DELAY, MOST_SAMPLES, REVERSAL_PERIODS, SATURATION_SHARE, STANDSTILL_SHARE};
 use crate::along;
 use crate::error::Outcome;
 use crate::segment::RecordingSegment;
@@ -26,6 +28,8 @@ pub(super) struct UsedSamples {
     pub(super) counts: Vec<Vec<bool>>,
     /// The complete segment, from which delayed signals are taken.
     complete: RecordingSegment,
+    /// Positions of the drives, `[drive][sample]`.
+    positions: Vec<Vec<f64>>,
 }
 
 impl UsedSamples {
@@ -40,14 +44,17 @@ impl UsedSamples {
         let places: Vec<usize> = (first..time.len()).step_by(every).collect();
         let segment = pick(complete, &places);
         let counts = counting_samples(servo, &segment)?;
+        let [positions, _] = along::drive_motion(&servo.equations, &segment)?;
         Ok(Self {
             segment,
             counts,
+            positions,
             complete: complete.clone(),
         })
     }
 
-    /// The used samples with signals delayed, `delays` in s by actuator.
+    /// The used samples with signals delayed, `delays` in s by actuator. Commands are those that have the same effect on a
+    /// servo without a dead band.
     pub(super) fn delayed(&self, servo: &ServoModel, delays: &[f64]) -> RecordingSegment {
         let mut segment = self.segment.clone();
         let from = &self.complete.run;
@@ -56,12 +63,43 @@ impl UsedSamples {
             let (q, qd, qdd) = (&from.q[i], &from.qd[i], &from.qdd[i]);
             for (sample, t) in self.segment.run.time.iter().enumerate() {
                 let [value, rate, acceleration] = interpolate(&from.time, [q, qd, qdd], t - delay);
-                segment.run.q[i][sample] = value;
+                segment.run.q[i][sample] = actuator.effective_signal(value, self.positions[actuator.drive.0][sample]);
                 segment.run.qd[i][sample] = rate;
                 segment.run.qdd[i][sample] = acceleration;
             }
         }
         segment
+    }
+
+    /// Leaves out the samples at which an actuator requests nearly as much as its saturation, or more: its force is not
+    /// that of its formula there.
+    pub(super) fn leave_out_saturated(&mut self, servo: &ServoModel, delays: &[f64], gains: &GainValues) {
+        let delayed = self.delayed(servo, delays);
+        let Ok([_, rates]) = along::drive_motion(&servo.equations, &delayed) else {
+            return;
+        };
+        for actuator in servo.actuators() {
+            let (drive, i) = (actuator.drive.0, servo.signal_position(actuator));
+            let Some(limit) = actuator.saturation else {
+                continue;
+            };
+            let states = ActuatorStates {
+                signal: delayed.run.q[i].clone(),
+                signal_rate: delayed.run.qd[i].clone(),
+                position: self.positions[drive].clone(),
+                rate: rates[drive].clone(),
+            };
+            let unlimited = ModelActuator {
+                saturation: None,
+                dead_band: None,
+                ..actuator.clone()
+            };
+            let row = servo.body_rows().iter().position(|d| *d == drive).unwrap_or(0);
+            let forces = states.forces(&servo.equations, &unlimited, gains);
+            for (counts, force) in self.counts[row].iter_mut().zip(forces) {
+                *counts &= force.abs() < SATURATION_SHARE * limit;
+            }
+        }
     }
 
     /// The equations along a segment with the same samples.

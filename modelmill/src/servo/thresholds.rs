@@ -7,12 +7,16 @@ pub(super) const NULL_SHARE: f64 = 1e-9;
 pub(super) const NULL_ENTRY: f64 = 1e-6;
 /// Equations for each unknown in the search for directions without effect. By judgement.
 pub(super) const SCALE_ROWS_PER_COLUMN: usize = 6;
+/// Samples that a decimation of computed forces keeps at least. By judgement.
+pub(super) const FEWEST_DECIMATED: usize = 400;
 /// Step of the search for a delay, s; the minimum is interpolated by a parabola. By judgement.
 pub(super) const DELAY_STEP: f64 = 0.001;
 /// Steps of the search.
 pub(super) const DELAY_STEPS: usize = 100;
 /// Largest delay of a servo that is searched, s: field buses and controllers of machines need less. By judgement.
 pub(super) const LARGEST_DELAY: f64 = DELAY_STEPS as f64 * DELAY_STEP;
+/// Largest correction of a delay by forces, s: beyond it a Gauss-Newton step is not accurate. By judgement.
+pub(super) const LARGEST_DELAY_STEP: f64 = 0.02;
 /// Most samples for the search of a delay. By judgement.
 pub(super) const DELAY_SAMPLES: usize = 4000;
 /// Fall of the log likelihood, times two, at the ends of an interval of 95 % of one parameter.
@@ -37,3 +41,22 @@ pub(super) const IMPOSSIBLE_SIGMAS: f64 = 3.0;
 pub(super) const LARGE_BALANCE_ERROR: f64 = 0.1;
 /// Most samples of the estimate; more are thinned evenly. By judgement.
 pub(super) const MOST_SAMPLES: usize = 40_000;
+/// Values that are tried for a saturation or a dead band of a servo, at quantiles of its force or error. By judgement.
+pub(super) const LIMIT_GRID: usize = 24;
+/// Samples beyond a limit (1) below which it is not judged. By judgement.
+pub(super) const FEWEST_LIMITED: usize = 20;
+/// A limit of a servo explains this share of the squared residual of its drive at least (1). By judgement.
+pub(super) const LIMIT_REDUCTION: f64 = 0.3;
+/// The factor of a limit, which is 1 if the limit is the cause, has this many standard deviations at least. By judgement.
+pub(super) const LIMIT_T: f64 = 6.0;
+/// Largest error of this factor (1) in the fit. By judgement.
+pub(super) const LIMIT_FACTOR_ERROR: f64 = 0.2;
+/// As [`LIMIT_REDUCTION`], for validation runs, which may reach the limit less often. By judgement.
+pub(super) const CHECKED_REDUCTION: f64 = 0.1;
+/// As [`LIMIT_FACTOR_ERROR`], for validation runs. By judgement.
+pub(super) const CHECKED_FACTOR_ERROR: f64 = 0.3;
+/// Samples at which a servo requests this share of its saturation (1) are left out: the filter spreads the corner. By
+/// judgement.
+pub(super) const SATURATION_SHARE: f64 = 0.9;
+/// Passes of the estimate with a saturation. By judgement.
+pub(super) const SATURATION_PASSES: usize = 3;

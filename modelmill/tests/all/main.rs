@@ -13,6 +13,7 @@ mod run_plans;
 mod runs;
 mod runs_verdict;
 mod servo;
+mod servo_diagnosis;
 mod spoilt;
 mod stick;
 mod together;

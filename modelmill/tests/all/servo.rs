@@ -8,7 +8,7 @@ use modelmill::{Model, RecordingNote};
 use crate::draws::Draws;
 
 /// A pendulum on a position servo. `{kp}`, `{mass}` and so on are replaced by numbers or names of parameters.
-const PENDULUM: &str = r#"
+pub(crate) const PENDULUM: &str = r#"
 schema = 1
 name = "servo_pendulum"
 gravity = ["0", "-g", "0"]
@@ -45,7 +45,7 @@ kd = "{kd}"
 "#;
 
 /// The text of the pendulum with some entries replaced by numbers.
-fn pendulum(known: &[(&str, f64)]) -> String {
+pub(crate) fn pendulum(known: &[(&str, f64)]) -> String {
     let mut text = PENDULUM.to_owned();
     for name in ["J", "ml", "kp", "kd"] {
         let value = known.iter().find(|(one, _)| *one == name);
@@ -63,15 +63,30 @@ fn pendulum(known: &[(&str, f64)]) -> String {
 
 /// Planted values of the pendulum.
 #[derive(Clone, Copy)]
-struct Planted {
-    j: f64,
-    ml: f64,
-    kp: f64,
-    kd: f64,
-    viscous: f64,
-    coulomb: f64,
-    delay: f64,
+pub(crate) struct Planted {
+    pub(crate) j: f64,
+    pub(crate) ml: f64,
+    pub(crate) kp: f64,
+    pub(crate) kd: f64,
+    pub(crate) viscous: f64,
+    pub(crate) coulomb: f64,
+    pub(crate) delay: f64,
 }
+
+/// Limits of the servo.
+#[derive(Clone, Copy)]
+pub(crate) struct PlantedLimits {
+    /// Largest torque, N m.
+    pub(crate) saturation: f64,
+    /// Largest error without a torque, rad.
+    pub(crate) dead_band: f64,
+}
+
+/// A servo without limits.
+const UNLIMITED: PlantedLimits = PlantedLimits {
+    saturation: f64::INFINITY,
+    dead_band: 0.0,
+};
 
 /// A sum of sines.
 fn command(t: f64, phases: &[f64]) -> f64 {
@@ -84,10 +99,15 @@ fn command(t: f64, phases: &[f64]) -> f64 {
 }
 
 /// Columns of a log by name.
-type Columns = Vec<(String, Vec<f64>)>;
+pub(crate) type Columns = Vec<(String, Vec<f64>)>;
 
 /// A log of a servo at 200 Hz: command and noisy position, simulated by small steps of the closed-form equation.
 fn simulate(planted: &Planted, seed: u64, samples: usize) -> Columns {
+    simulate_limited(planted, UNLIMITED, seed, samples)
+}
+
+/// As [`simulate`], of a servo with limits.
+pub(crate) fn simulate_limited(planted: &Planted, limits: PlantedLimits, seed: u64, samples: usize) -> Columns {
     let mut draws = Draws::new(seed);
     let phases: Vec<f64> = (0..4).map(|_| std::f64::consts::TAU * draws.uniform()).collect();
     let (mut q, mut v) = (0.0, 0.0);
@@ -102,7 +122,9 @@ fn simulate(planted: &Planted, seed: u64, samples: usize) -> Columns {
         for i in 0..inner {
             let now = t + f64::from(i) * h;
             let reference = command(now - planted.delay, &phases);
-            let torque = planted.kp * (reference - q) - planted.kd * v;
+            let error = reference - q;
+            let error = error.signum() * (error.abs() - limits.dead_band).max(0.0);
+            let torque = (planted.kp * error - planted.kd * v).clamp(-limits.saturation, limits.saturation);
             let load = planted.ml * 9.81 * q.sin() + planted.viscous * v;
             // Stiction holds the pendulum where the torque is below the Coulomb friction.
             let free = torque - load;

@@ -683,7 +683,11 @@ fn model_columns(mechanism: &Mechanism) -> Vec<ModelColumn> {
             .iter()
             .any(|drive| drive.name == *name && !drive.is_driven)
     };
-    columns.filter(|one| !undriven(&one.name)).collect()
+    // Signals of actuators have no relation to motion and force by which they could be recognised.
+    let is_signal = |name: &String| mechanism.actuators.iter().any(|actuator| actuator.signal == *name);
+    columns
+        .filter(|one| !undriven(&one.name) && !is_signal(&one.name))
+        .collect()
 }
 
 #[cfg(test)]
