@@ -7,9 +7,9 @@
 use std::ops::Range;
 
 use modelmill_boundary::message;
-use modelmill_identify::RecordingNote;
 use modelmill_identify::diagnose::{Disturbance, white_noise};
 use modelmill_identify::robust_fit;
+use modelmill_identify::{RecordingNote, float_to_count};
 use modelmill_spec::DriveKind;
 use nalgebra::DVector;
 
@@ -284,13 +284,8 @@ fn mark_frozen(intervals: &mut [FlatInterval], force: &[f64], shortest: usize) {
 }
 
 /// A count that was computed, rounded down; at most a million.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a float becomes the nearest count there is"
-)]
 fn count(value: f64) -> usize {
-    value.clamp(0.0, 1e6) as usize
+    float_to_count(value.clamp(0.0, 1e6))
 }
 
 impl FlatInterval {
