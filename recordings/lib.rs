@@ -1,6 +1,6 @@
 //! Recordings that ship with modelmill, as texts of CSV files, for programs that carry them.
 //!
-//! SI units, 500 Hz; `README.md` beside this file says where they come from and what the columns are.
+//! SI units, 500 Hz; `README.md` in this folder states where they come from and what the columns are.
 
 /// A recorded pair of runs of one machine: one to identify from, one to check on.
 #[derive(Debug)]

@@ -32,7 +32,7 @@ impl std::fmt::Display for BuildError {
 
 impl std::error::Error for BuildError {}
 
-/// What is generated besides regressor and inverse dynamics.
+/// What is generated in addition to regressor and inverse dynamics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Options {
@@ -76,7 +76,7 @@ pub fn generate(pattern: &str) {
     generate_with(pattern, Options::default());
 }
 
-/// Generates like [`generate`], with what `options` ask for.
+/// Generates like [`generate`], with `options`.
 pub fn generate_with(pattern: &str, options: Options) {
     println!("cargo::rerun-if-changed=build.rs");
     let out = std::env::var_os("OUT_DIR").map(PathBuf::from);
@@ -102,7 +102,7 @@ pub fn try_generate(pattern: &str, out: &Path) -> Result<(), BuildError> {
     try_generate_with(pattern, Options::default(), out)
 }
 
-/// Generates like [`try_generate`], with what `options` ask for.
+/// Generates like [`try_generate`], with `options`.
 ///
 /// # Errors
 /// Diagnostics of all faulty model files together.

@@ -98,7 +98,7 @@ pub fn new_effect(kinds: &[EffectKind], kind: &str, at: &[String], settings: &[E
             (_, false) => {
                 let known: Vec<&str> = parameters.iter().chain(&constants).copied().collect();
                 return Err(Error::input(format!(
-                    "{symbol}: `{}` has no `{symbol}`; known are {}",
+                    "{symbol}: `{}` has no `{symbol}`; it has {}",
                     kind.name,
                     known.join(", ")
                 )));

@@ -139,8 +139,8 @@ fn comparison(model: &Model) -> ErrorAccumulator {
     ErrorAccumulator::new(drives.clone()).with_units(units)
 }
 
-/// Errors below this fraction of the measured force are rounding of the numbers in the recording; their location does
-/// not depend on the mechanism.
+/// Errors below this fraction of the measured force are rounding of the numbers in the recording, so they are not
+/// located.
 pub const ROUNDING: f64 = 1e-6;
 
 /// Ranges of variables in which the error of a model is large, and how it depends on the rates of the drives.

@@ -45,14 +45,14 @@ pub enum Error {
 }
 
 impl Error {
-    /// An error of an input; `says` is its text or message.
-    pub fn input(says: impl Into<Message>) -> Self {
-        Self::Input(says.into())
+    /// An error of an input.
+    pub fn input(message: impl Into<Message>) -> Self {
+        Self::Input(message.into())
     }
 
     /// Options that contradict each other.
-    pub(crate) fn options(says: impl Into<Message>) -> Self {
-        Self::Options(says.into())
+    pub(crate) fn options(message: impl Into<Message>) -> Self {
+        Self::Options(message.into())
     }
 
     /// A mechanism that cannot be derived; `model` is the name of its file in messages.

@@ -8,9 +8,9 @@
 //! A physical effect adds forces to those of the bodies, such as friction of a drive or inertia of a rod. A library of
 //! effects defines kinds of effects; one is built in.
 //!
-//! Results are values; [`mod@print`] and [`report`] convert them to text, JSON and pages. A diagnosis recommends next
-//! steps, such as adding an effect to the model file. A [`print::StepSpelling`] formats these steps: as a command, as a
-//! Python call, or in words for a caller of the Rust library.
+//! Results are values; [`mod@print`] and [`report`] convert them to text, JSON and pages. A [`print::StepSpelling`]
+//! formats the recommended next steps, such as adding an effect to the model file: as a command, as a Python call, or
+//! in words for a caller of the Rust library.
 //!
 //! All quantities are in SI units (m, rad, kg, s, N, N m). A recording or a model file may declare other units for its
 //! own values.
@@ -181,11 +181,11 @@
 //!
 //! # Modules
 //!
-//! The modules are listed in the order of the data flow. Each module uses only modules before it.
+//! In the order of the data flow; each module uses only modules before it:
 //!
-//! [`text`], [`error`], [`progress`], [`host`], [`model`], [`picture`], [`atlas`], [`segment`], [`along`], [`audit`],
+//! [`files`], [`text`], [`error`], [`progress`], [`host`], [`model`], [`picture`], [`atlas`], [`segment`], [`along`], [`audit`],
 //! [`faults`], [`recording`], [`compare`], [`evaluate`], [`states`], [`forward`], [`identify`], [`servo`], [`runs`], [`diagnose`],
-//! [`verify`], [`add`], [`adopt`], [`interpret`], [`excite`], [`variants`], [`generate`], [`simulate`], [`reduce`], [`mod@import`], [`mod@export`],
+//! [`verify`], [`add`], [`adopt`], [`interpret`], [`excite`], [`variants`], [`generate`], [`simulate`], [`rig_check`], [`reduce`], [`mod@import`], [`mod@export`],
 //! [`mod@print`], [`report`].
 
 pub mod add;

@@ -1,12 +1,12 @@
 //! Pictures of a model: its mechanism at a pose, as SVG, optionally over a second model.
 
-use modelmill_codegen::{ModelEvaluator, MotionStates};
+use modelmill_codegen::ModelEvaluator;
 use modelmill_draw::{MechanismScene, ViewDirection, loaded_svg};
 
 pub use modelmill_draw::{DrawingStyle, DriveArrow, ERROR_SHADES};
 
 use crate::error::{Error, Outcome};
-use crate::model::Model;
+use crate::model::{Model, state_at_standstill};
 
 /// Options of a picture.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -51,16 +51,8 @@ impl Model {
             all.filter(move |(_, c)| c.passive == passive).map(|(i, _)| i)
         };
         let active: Vec<f64> = places(false).map(|i| pose[i]).collect();
-        let zero = [0.0];
-        let still: Vec<&[f64]> = active.iter().map(|_| &zero[..]).collect();
-        let states = MotionStates {
-            q: active.iter().map(std::slice::from_ref).collect(),
-            qd: still.clone(),
-            qdd: still,
-            load: Vec::new(),
-        };
         if places(true).next().is_some() {
-            let passive = ModelEvaluator::new(&self.derivation).passive_motion(&states);
+            let passive = ModelEvaluator::new(&self.derivation).passive_motion(&state_at_standstill(&active));
             let passive =
                 passive.map_err(|_| Error::options(format!("the loops of {} cannot close at that pose", self.name)))?;
             for (i, column) in places(true).zip(passive) {

@@ -25,7 +25,7 @@ pub(crate) struct LocalMachine {
 }
 
 impl LocalMachine {
-    /// Files are read under the policy `fence`.
+    /// Files are read as `file_access` permits.
     pub(crate) fn new(file_access: Arc<FileAccessPolicy>) -> Self {
         Self {
             file_access,

@@ -81,7 +81,7 @@ fn languages_in_folders() -> Vec<(&'static str, &'static str)> {
 /// `atlas`.
 #[derive(Debug, Args)]
 pub(crate) struct AtlasArgs {
-    /// Model files, and robot descriptions (URDF, MJCF, SDF). A robot description gets a line and a picture, but no
+    /// Model files, and robot descriptions (URDF, MJCF, SDF). A robot description gets a row and a picture, but no
     /// page
     #[arg(required = true)]
     pub(crate) models: Vec<PathBuf>,

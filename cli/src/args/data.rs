@@ -189,12 +189,14 @@ pub(crate) struct DiagnosisArgs {
     /// into blocks (cross-validation)
     #[arg(long, value_name = "RUN", num_args = 1..)]
     pub(crate) check: Vec<PathBuf>,
-    /// Do not estimate parameters: fix them at nominal values, so that wrong nominal values show up as well
+    /// Fix the base parameters at their nominal values, to find out why nominal values are wrong. Default: they are
+    /// estimated
     #[arg(long)]
     pub(crate) held: bool,
-    /// Fix the base parameters at these values instead of the nominal ones: a file that `identify` wrote, for example
-    /// from a run without a load
-    #[arg(long, value_name = "nominal|FIT.json", default_value = "nominal", value_parser = ParameterSource::parse)]
+    /// Base parameters of an earlier fit (a file that `identify` wrote), for example of a run without load. They are
+    /// fixed, or may change within their uncertainty if the fit contains a covariance
+    #[arg(long, value_name = "nominal|FIT.json", default_value = "nominal", hide_default_value = true,
+        value_parser = ParameterSource::parse)]
     pub(crate) parameters: ParameterSource,
     #[command(flatten)]
     pub(crate) preparation: PreparationArgs,

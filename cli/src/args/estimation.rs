@@ -9,9 +9,7 @@ use super::preparation::parse_map;
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Estimation")]
 pub(crate) struct EstimatorArgs {
-    /// How equations are weighted: `channels` divides the equations of each drive by the standard deviation of its
-    /// residuals (iterated), `variance` divides each sample by the standard deviation from the recording's columns
-    /// `DRIVE_var`
+    /// How equations are weighted
     #[arg(long, value_enum, default_value = "auto")]
     pub(crate) weights: WeightsArg,
     /// Huber's robust estimate: residuals beyond BOUND standard deviations (estimated from their median) get a lower
@@ -22,12 +20,12 @@ pub(crate) struct EstimatorArgs {
     /// Nominal values as soft constraints, with this relative standard deviation of each product of parameters
     #[arg(long, value_name = "SIGMA", allow_negative_numbers = true, value_parser = parse_positive)]
     pub(crate) prior: Option<f64>,
-    /// Allow only physically possible parameters (positive definite pseudo-inertias), nearest to the nominal ones; also
-    /// returns every physical parameter
+    /// Allow only physically possible parameters (positive definite pseudo-inertias); what the recordings do not
+    /// determine is as near to the nominal values as possible. Also returns every physical parameter
     #[arg(long, conflicts_with_all = ["prior", "essential"])]
     pub(crate) physical: bool,
-    /// Leave out base parameters that the recordings do not support, one by one, until leaving them out would be
-    /// statistically significant (Wald test)
+    /// Remove base parameters that the recordings do not support, one by one, as long as the residual does not rise
+    /// significantly (Wald test)
     #[arg(long, conflicts_with = "prior")]
     pub(crate) essential: bool,
     /// Instrumental variables, against the bias from noise that is fed back through the controller: recordings of the
@@ -37,7 +35,7 @@ pub(crate) struct EstimatorArgs {
         conflicts_with_all = ["robust", "prior", "physical", "essential"])]
     pub(crate) instruments: Vec<String>,
     /// The same as --map for the recordings of --instruments; they may be those of --data with other columns
-    #[arg(long, value_name = "OURS=THEIRS", value_parser = parse_map, requires = "instruments")]
+    #[arg(long, value_name = "NAME=COLUMN", value_parser = parse_map, requires = "instruments")]
     pub(crate) instrument_map: Vec<(String, String)>,
 }
 
@@ -49,9 +47,9 @@ pub(crate) enum WeightsArg {
     Auto,
     /// Equal weights
     None,
-    /// By the standard deviation of each drive's residuals
+    /// Equations of each drive divided by the standard deviation of its residuals, iterated
     Channels,
-    /// By the variances in the recording's columns `DRIVE_var`
+    /// Each equation divided by the standard deviation of its force, from the columns `DRIVE_var`
     Variance,
 }
 

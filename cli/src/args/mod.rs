@@ -106,25 +106,26 @@ pub(crate) enum ProgramCommand {
     /// Add an effect to a model file, keeping its comments and layout, and print the difference
     #[command(after_help = "Examples (from the project's root):\n  \
         modelmill add model-spec/models/spidermill.toml coulomb_friction --at spindle_left --set Fc=25.9\n  \
-        modelmill add model-spec/models/spidermill.toml rod_inertia --at spindle_left,spindle_right --out rods.toml\n  \
+        modelmill add model-spec/models/spidermill.toml rod_inertia \\\n      \
+        --at spindle_left,spindle_right --out rods.toml\n  \
         modelmill add model-spec/models/puma560.toml viscous_friction --at-each drives --out friction.toml\n  \
         modelmill add model-spec/models/spidermill-paper.toml lumped_mass_placement \\\n      \
         --at R3m,R3m_right --set m.name=m4\n\n\
-        Places in one --at share the effect's parameters. Without --in-place or --out nothing is written.")]
+        Without --in-place or --out nothing is written.")]
     Add(AddArgs),
     /// Replace the nominal values of a model file by those of a fit, and print the difference
     #[command(after_help = "Examples:\n  \
         modelmill identify arm.toml --data run.csv --physical --out fit.json\n  \
         modelmill adopt arm.toml fit.json --in-place\n\n\
-        A fit of --physical gives values of parameters, physically possible for each body. Any other fit gives values of base \
-        parameters, which do not determine single bodies. Without --in-place or --out nothing is written.")]
+        A fit of --physical gives the parameters of each body. Any other fit gives base parameters, which do not determine \
+        single bodies. Without --in-place or --out nothing is written.")]
     Adopt(AdoptArgs),
     /// Print the reduced model as equations: p_g, dependencies, p_min, intermediate variables, counts
     #[command(
         after_help = "Examples (from the project's root):\n  modelmill equations model-spec/models/spidermill-paper.toml\n  \
         modelmill equations model-spec/models/panda.toml --format html --out panda.html\n  \
         modelmill equations model-spec/models/panda.toml --format json | jq .rank\n  \
-        modelmill equations model-spec/models/spidermill-paper.toml --balances crank_left     one part, cut free"
+        modelmill equations model-spec/models/spidermill-paper.toml --balances crank_left"
     )]
     Equations(EquationsArgs),
     /// Write the model as Rust source, the same that `cargo build` generates, or as a crate for C or Python
@@ -151,12 +152,13 @@ pub(crate) enum ProgramCommand {
         modelmill identify model-spec/models/emps.toml --data emps_train.csv \\\n      \
         --order 4 --cutoff 100 --trim 49 --decimate 10\n  \
         modelmill identify arm.toml --data a.csv --data b.csv --map t=time_s --map q1=pos_1\n\n\
-        Estimation (see the options below --weights):\n  \
+        Estimation:\n  \
         modelmill identify arm.toml --data run.csv --weights channels --robust\n  \
-        modelmill identify arm.toml --data mean.csv --weights variance --map shoulder_var=var_tau1 --map elbow_var=var_tau2\n  \
-        modelmill identify arm.toml --data run.csv --prior 0.2        nominal values as priors, 20 % standard deviation each\n  \
-        modelmill identify arm.toml --data run.csv --physical         only physically possible parameters\n  \
-        modelmill identify arm.toml --data run.csv --essential        only parameters that the recording supports\n  \
+        modelmill identify arm.toml --data mean.csv --weights variance \\\n      \
+        --map shoulder_var=var_tau1 --map elbow_var=var_tau2\n  \
+        modelmill identify arm.toml --data run.csv --prior 0.2\n  \
+        modelmill identify arm.toml --data run.csv --physical\n  \
+        modelmill identify arm.toml --data run.csv --essential\n  \
         modelmill identify arm.toml --data run.csv --instruments run.csv --instrument-map q1=q1_reference\n  \
         modelmill identify arm.toml --data run.csv --instruments period=7.29")]
     Identify(IdentifyArgs),
@@ -209,14 +211,13 @@ pub(crate) enum ProgramCommand {
         --trajectory recordings/spidermill-mbs/plain-fit.csv --out run.csv\n  \
         modelmill simulate rig.toml --trajectory traj.csv --out run.csv --seed 7\n  \
         modelmill simulate model-spec/models/spidermill.toml \\\n      \
-        --data recordings/spidermill-mbs/plain-check.csv --out motion.csv     the motion that the model makes"
+        --data recordings/spidermill-mbs/plain-check.csv --out motion.csv"
     )]
     Simulate(SimulateArgs),
     /// Reduce a full-body rig to a planar model file, and report the size of every approximation
     #[command(
         after_help = "The plan (TOML) names the plane, the bodies that become one part, those that become point \
-        masses, and the symbols that parts share; without a plan every body becomes a separate part. Every approximation is \
-        measured along sampled motions of the rig, and the model's forces are compared with the rig's.\n\n\
+        masses, and the symbols that parts share. Every approximation is measured along sampled motions of the rig, and the model's forces are compared with the rig's.\n\n\
         Examples (from the project's root):\n  \
         modelmill reduce model-spec/rigs/spidermill-full.toml \\\n      \
         --plan model-spec/rigs/spidermill-plan.toml --out reduced.toml\n  \
@@ -237,8 +238,7 @@ pub(crate) enum ProgramCommand {
     Import(ImportArgs),
     /// Write a model as a URDF or MJCF, for simulators
     #[command(
-        after_help = "Bodies have the nominal values of the file, or with --parameters the physical ones of a fit made by `identify --physical`. \
-        What the format cannot express is reported: loops and drives between two points need MJCF.\n\n\
+        after_help = "What the format cannot express is reported: loops and drives between two points need MJCF.\n\n\
         Examples (from the project's root):\n  \
         modelmill export model-spec/models/panda.toml --out panda.urdf\n  \
         modelmill export model-spec/models/five_bar.toml --out five_bar.xml"
@@ -264,10 +264,10 @@ pub(crate) enum ProgramCommand {
         modelmill excite model-spec/models/spidermill.toml --out trajectory.csv\n  \
         modelmill excite model-spec/models/two_link.toml --harmonics 5 --period 10 \\\n      \
         --limits q1=-1:1 --limits q1_d=2 --limits q2=-1.5:1.5 --limits q2_d=3 --out trajectory.csv\n  \
-        modelmill excite model-spec/models/spidermill.toml --separate coulomb_friction@spindle_left:Fc=12 \\\n      \
-        --from load_friction@spindle_left --noise 1 --out separate.csv   motion that distinguishes two effects\n\n\
-        Limits are read from `[limits]` of the model file; --limits adds to them or replaces them. For effects that its \
-        recordings cannot distinguish, `diagnose` prints the command for a motion that does.")]
+        modelmill excite model-spec/models/spidermill.toml \\\n      \
+        --separate coulomb_friction@spindle_left:Fc=12 --from load_friction@spindle_left \\\n      \
+        --noise 1 --out separate.csv\n\n\
+        For effects that recordings do not distinguish, `diagnose` prints the command for a motion that does.")]
     Excite(ExciteArgs),
     /// Reproduce the experiment of the paper on the bundled rig, and explain its errors, as one page
     #[cfg(feature = "experiment")]
@@ -285,8 +285,7 @@ pub(crate) enum ProgramCommand {
         modelmill completions fish > ~/.config/fish/completions/modelmill.fish")]
     Completions(CompletionsArgs),
     /// Show all main steps on bundled recordings: derive, compare, find the missing effect, add it, identify again
-    #[command(after_help = "Examples:\n  modelmill tour\n  modelmill tour --out tour\n\n\
-        Models, recordings and pages are written into the folder, so that each command of the tour can be repeated.")]
+    #[command(after_help = "Examples:\n  modelmill tour\n  modelmill tour --out tour")]
     Tour(TourArgs),
 }
 
@@ -295,11 +294,11 @@ pub(crate) enum ProgramCommand {
 pub(crate) struct CheckArgs {
     /// Model file or rig file (TOML)
     pub(crate) model: PathBuf,
-    #[command(flatten)]
-    pub(crate) drawing: DrawingArgs,
     /// Print one JSON object on standard output
     #[arg(long)]
     pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) drawing: DrawingArgs,
 }
 
 /// `diff`.

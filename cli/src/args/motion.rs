@@ -30,7 +30,7 @@ pub(crate) struct SimulateArgs {
     #[arg(long, value_name = "N")]
     pub(crate) seed: Option<u64>,
     /// Column of the trajectory or recording for a name of the rig or model, e.g. `--map theta1=pos_left`; may be repeated
-    #[arg(long, value_name = "OURS=THEIRS", value_parser = preparation::parse_map)]
+    #[arg(long, value_name = "NAME=COLUMN", value_parser = preparation::parse_map)]
     pub(crate) map: Vec<(String, String)>,
     /// Print one JSON object on standard output
     #[arg(long)]

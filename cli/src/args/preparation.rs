@@ -21,7 +21,7 @@ pub(crate) struct PreparationArgs {
     /// Column of the recording for a name of the model, e.g. `--map theta1=pos_left`, or a sum of columns with a unit
     /// if it is not SI: `--map "q6=(pos6 - pos5)/32 - 90 [deg]"`; may be repeated. Names of the model are `t`, a
     /// coordinate, a coordinate with `_d` or `_dd`, a drive, and a drive with `_var` for the variance of its force
-    #[arg(long, value_name = "OURS=THEIRS", value_parser = parse_map)]
+    #[arg(long, value_name = "NAME=COLUMN", value_parser = parse_map)]
     pub(crate) map: Vec<(String, String)>,
     /// Columns of the recording from a file with the table `[recording.columns]`, which `modelmill recordings --model`
     /// prints; `--map` has priority
@@ -38,10 +38,9 @@ pub(crate) struct PreparationArgs {
     /// ends
     #[arg(long, value_name = "N[,N]", value_parser = parse_trim, allow_hyphen_values = true)]
     pub(crate) trim: Option<(usize, usize)>,
-    /// Keep every n-th sample, after the same low-pass on forces and regressor. Chosen together with the cut-off if
-    /// neither
-    /// --cutoff nor --smoothing nor --decimate is given
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = parse_decimate, allow_negative_numbers = true)]
+    /// Keep every n-th sample, after an anti-aliasing low-pass on forces and regressor. Default: chosen together with
+    /// the cut-off; 1 if --cutoff or --smoothing is given
+    #[arg(long, value_name = "N", default_value_t = 1, hide_default_value = true, value_parser = parse_decimate, allow_negative_numbers = true)]
     pub(crate) decimate: usize,
     /// Source of rates and accelerations
     #[arg(long, value_enum, default_value = "recorded")]
@@ -209,13 +208,13 @@ fn read_mapping(path: &str) -> Result<MappingFile, String> {
     })
 }
 
-/// Reads `OURS=THEIRS`: a name of the model and an expression of columns.
+/// Reads `NAME=COLUMN`: a name of the model and an expression of columns.
 pub(crate) fn parse_map(text: &str) -> Result<(String, String), String> {
     match text.split_once('=') {
         Some((ours, theirs)) if !ours.trim().is_empty() && !theirs.trim().is_empty() => {
             Ok((ours.trim().to_owned(), theirs.trim().to_owned()))
         }
-        _ => Err("expected OURS=THEIRS, such as theta1=pos_left".to_owned()),
+        _ => Err("expected NAME=COLUMN, such as theta1=pos_left".to_owned()),
     }
 }
 

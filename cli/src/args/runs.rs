@@ -8,18 +8,19 @@ use modelmill::runs::{KnownLoad, PerRunSelection, RunsOptions};
 use crate::args::preparation::PreparationArgs;
 
 /// Text of the help below the options.
-pub(crate) const HELP: &str = "The first run is the reference; every other run is compared with it. Runs may have different motions. \
+pub(crate) const HELP: &str = "Every other run is compared with the first one. Runs may have different motions. \
     With four or more runs the command also reports when base parameters changed permanently. Runs that cannot be read are listed \
     and left out; the first run must be readable.\n\n\
     Examples:\n  \
     modelmill runs arm.toml --data monday.csv --data tuesday.csv\n  \
-    modelmill runs arm.toml --data runs/ --out page                  a folder, in the order of its names\n  \
+    modelmill runs arm.toml --data runs/ --out page\n  \
     modelmill runs arm.toml --data 'runs/2026-*.csv' --json\n  \
     modelmill runs model-spec/models/spidermill.toml \\\n      \
-    --data recordings/spidermill-mbs/plain-fit.csv recordings/spidermill-mbs/with-rods-fit.csv --json\n\n\
+    --data recordings/spidermill-mbs/plain-fit.csv recordings/spidermill-mbs/with-rods-fit.csv \\\n      \
+    --json\n\n\
     One fit of all runs, with shared base parameters; what --per-run names is estimated separately for each run:\n  \
     modelmill runs arm.toml --data a.csv b.csv c.csv --per-run payload@flange,friction --out fit.json\n  \
-    modelmill runs arm.toml --data bare.csv loaded.csv --load loaded.csv=2.8@flange    scales of all forces by a known load\n\n\
+    modelmill runs arm.toml --data bare.csv loaded.csv --load loaded.csv=2.8@flange\n\n\
     --per-run accepts: payload@BODY, friction[@DRIVE], offset[@DRIVE], gain[@DRIVE], clock, zero[@COORDINATE], \
     or the name of a base parameter.";
 
@@ -28,8 +29,8 @@ pub(crate) const HELP: &str = "The first run is the reference; every other run i
 pub(crate) struct RunsArgs {
     /// Model file (TOML)
     pub(crate) model: PathBuf,
-    /// Recordings, folders of them, or patterns with * and ? (CSV, Parquet, MATLAB, HDF5, MCAP, ROS bags), two or more;
-    /// the first is the reference
+    /// Recordings, folders of them (in the order of the names), or patterns with * and ? (CSV, Parquet, MATLAB, HDF5,
+    /// MCAP, ROS bags), two or more; the first is the reference
     #[arg(long, value_name = "RUN", required = true, num_args = 1..)]
     pub(crate) data: Vec<PathBuf>,
     /// Fit all runs at once and estimate these separately for each run, separated by commas, e.g.

@@ -9,7 +9,7 @@ use crate::args::preparation::PreparationArgs;
 
 /// Help after the options.
 pub(super) const HELP: &str = "The states of a check are pass, fail and not evaluated. The exit status is 0 if the model passes, and 1 if a \
-    check fails, if no drive could be evaluated, or if a limit of the file could not be. The cause of a failure comes from \
+    check fails, if no drive was evaluated, or if a limit of the file was not evaluated. The cause of a failure comes from \
     the diagnosis of all recordings together.\n\n\
     A file of limits (TOML):\n\n  \
     [all_drives]                      # drives without a table of their own\n  \
@@ -25,7 +25,8 @@ pub(super) const HELP: &str = "The states of a check are pass, fail and not eval
     modelmill verify model-spec/models/spidermill.toml \\\n      \
     --data recordings/spidermill-mbs/plain-check.csv\n  \
     modelmill verify model-spec/models/spidermill.toml \\\n      \
-    --data recordings/spidermill-mbs/plain-check.csv --limits verify.toml --junit verify.xml --json";
+    --data recordings/spidermill-mbs/plain-check.csv --limits verify.toml \\\n      \
+    --junit verify.xml --json";
 
 /// `verify`.
 #[derive(Debug, Args)]

@@ -88,7 +88,7 @@ fn adding_what_cannot_be_is_refused() {
         (
             &["spring", "--at", "spindle_left", "--set", "c=1"][..],
             1,
-            "has no `c`; known are k, rest",
+            "has no `c`; it has k, rest",
         ),
         (
             &["spring", "--at", "spindle_left", "--set", "k=stiff"][..],

@@ -232,7 +232,7 @@ impl FleetModel {
                 "name": info.name,
                 "expression": info.expression,
                 "value": fitted.value,
-                "std": fitted.deviation,
+                "std": fitted.std,
                 "unit": info.unit,
             })
         });

@@ -65,7 +65,7 @@ pub fn outliers(ground: &FleetModel, robots: &[RobotSummary]) -> Result<FleetOut
             robust_centre(
                 fits.iter()
                     .flatten()
-                    .filter_map(|fit| value_and_deviation(fit[k]))
+                    .filter_map(|fit| value_and_std(fit[k]))
                     .map(|(x, _)| x)
                     .collect(),
             )
@@ -75,9 +75,9 @@ pub fn outliers(ground: &FleetModel, robots: &[RobotSummary]) -> Result<FleetOut
         .iter()
         .map(|fit| {
             let of = |k: usize| {
-                let (value, deviation) = value_and_deviation(fit.as_ref()?[k])?;
+                let (value, std) = value_and_std(fit.as_ref()?[k])?;
                 let usual = usual[k]?;
-                let spread = usual.deviation?.hypot(deviation);
+                let spread = usual.std?.hypot(std);
                 (spread > 0.0).then(|| (value - usual.value) / spread)
             };
             (0..n).map(of).collect()
@@ -109,7 +109,7 @@ pub fn outliers(ground: &FleetModel, robots: &[RobotSummary]) -> Result<FleetOut
         let bounds: Vec<(f64, f64)> = (0..possible)
             .map(|g| {
                 let of_all = robust_centre(roots.iter().map(|roots| roots[g]).collect());
-                let (median, spread) = of_all.map_or((0.0, 0.0), |all| (all.value, all.deviation.unwrap_or(0.0)));
+                let (median, spread) = of_all.map_or((0.0, 0.0), |all| (all.value, all.std.unwrap_or(0.0)));
                 (median, (spread / 1.4826).max(1.0))
             })
             .collect();
@@ -146,8 +146,8 @@ pub fn outliers(ground: &FleetModel, robots: &[RobotSummary]) -> Result<FleetOut
 }
 
 /// Value and standard deviation; none for a value that is not determined.
-fn value_and_deviation(fitted: FittedValue) -> Option<(f64, f64)> {
-    Some((fitted.value, fitted.deviation?))
+fn value_and_std(fitted: FittedValue) -> Option<(f64, f64)> {
+    Some((fitted.value, fitted.std?))
 }
 
 /// Median, and robust standard deviation (1.4826 times the median absolute deviation).
@@ -164,7 +164,7 @@ fn robust_centre(mut values: Vec<f64>) -> Option<FittedValue> {
     let mut distances: Vec<f64> = values.iter().map(|x| (x - value).abs()).collect();
     Some(FittedValue {
         value,
-        deviation: Some(1.4826 * median(&mut distances)),
+        std: Some(1.4826 * median(&mut distances)),
     })
 }
 
@@ -177,7 +177,7 @@ impl FleetOutliers {
                 "name": info.name,
                 "expression": info.expression,
                 "median": usual.map(|usual| usual.value),
-                "spread": usual.and_then(|usual| usual.deviation),
+                "spread": usual.and_then(|usual| usual.std),
                 "unit": info.unit,
             })
         });

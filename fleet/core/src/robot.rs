@@ -152,7 +152,7 @@ fn clearest_change(ground: &FleetModel, runs: &[DayRun], within: f64) -> Option<
     let series = |k: usize| -> Vec<Option<UncertainValue>> {
         let told = runs.iter().map(|run| {
             let fitted = run.0[k];
-            Some((fitted.value, fitted.deviation.filter(|d| *d > 0.0)?))
+            Some((fitted.value, fitted.std.filter(|d| *d > 0.0)?))
         });
         told.collect()
     };
@@ -172,11 +172,8 @@ fn clearest_change(ground: &FleetModel, runs: &[DayRun], within: f64) -> Option<
         .filter_map(|parameter| {
             let told = series(parameter);
             let [before, now] = [&told[..found.day], &told[found.day..]].map(|some| {
-                let (value, deviation) = weighted_mean(some)?;
-                Some(FittedValue {
-                    value,
-                    deviation: Some(deviation),
-                })
+                let (value, std) = weighted_mean(some)?;
+                Some(FittedValue { value, std: Some(std) })
             });
             let step = ParameterStep {
                 parameter,
@@ -197,7 +194,7 @@ fn clearest_change(ground: &FleetModel, runs: &[DayRun], within: f64) -> Option<
 
 /// The size of a step in standard deviations of the difference.
 fn step_significance(step: &ParameterStep) -> f64 {
-    (step.now.value - step.before.value).abs() / step.before.difference_deviation(step.now)
+    (step.now.value - step.before.value).abs() / step.before.difference_std(step.now)
 }
 
 /// Dead sensors, each with its first day and the number of days.
@@ -240,7 +237,7 @@ impl RobotHistory {
                 "day": day.name,
                 "recordings": day.fit.as_ref().map_or(0, |fit| fit.recordings),
                 "values": day.fit.as_ref().map(|fit| fit.parameters.iter().map(|one| one.value).collect::<Vec<_>>()),
-                "std": day.fit.as_ref().map(|fit| fit.parameters.iter().map(|one| one.deviation).collect::<Vec<_>>()),
+                "std": day.fit.as_ref().map(|fit| fit.parameters.iter().map(|one| one.std).collect::<Vec<_>>()),
                 "left": day.fit.as_ref().map(|fit| fit.residual_shares.clone()),
                 "bad": day.bad.iter().map(|one| json!({ "recording": one.recording, "says": one.says })).collect::<Vec<_>>(),
             })
@@ -251,7 +248,7 @@ impl RobotHistory {
                     "parameter": infos[step.parameter].name,
                     "before": step.before.value,
                     "now": step.now.value,
-                    "std": step.before.difference_deviation(step.now),
+                    "std": step.before.difference_std(step.now),
                     "unit": infos[step.parameter].unit,
                 })
             });
@@ -285,9 +282,9 @@ impl RobotHistory {
 /// A physical change as JSON, with the names of the command `runs`.
 pub(crate) fn change_json(change: &RunChange) -> Value {
     let (kind, at, values) = change.change.parts(change.unit);
-    let values = values.into_iter().map(|(name, estimate, unit)| {
-        json!({ "name": name, "value": estimate.value, "std": estimate.deviation, "unit": unit })
-    });
+    let values = values.into_iter().map(
+        |(name, estimate, unit)| json!({ "name": name, "value": estimate.value, "std": estimate.std, "unit": unit }),
+    );
     json!({
         "kind": kind,
         "at": at,

@@ -64,7 +64,7 @@ fn of_files(ground: &FleetModel, files: &BTreeMap<String, Vec<FleetFile>>) -> An
                 sum.merge(&ground.summarise_file(&file.name, &file.path)).unwrap();
             }
             let fit = ground.solve(&sum).unwrap();
-            let values = fit.parameters.iter().flat_map(|one| [Some(one.value), one.deviation]);
+            let values = fit.parameters.iter().flat_map(|one| [Some(one.value), one.std]);
             let counts = [sum.recordings as f64, sum.bad.len() as f64].map(Some);
             expected.insert(
                 (robot.clone(), day[0].day.clone()),

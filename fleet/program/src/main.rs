@@ -74,7 +74,7 @@ struct MakeArgs {
 #[derive(clap::Args, Clone)]
 struct ReadingArgs {
     /// Column of the recordings for a name of the model, such as `q1=pos_left`; may be repeated.
-    #[arg(long = "map", value_name = "OURS=THEIRS")]
+    #[arg(long = "map", value_name = "NAME=COLUMN")]
     map: Vec<String>,
     /// Cut-off of the low-pass on positions, Hz. Default: chosen from the first reference recording.
     #[arg(long)]

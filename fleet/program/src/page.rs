@@ -70,7 +70,7 @@ fn change_clarity(robot: &RobotHistory) -> f64 {
     // Steps without standard deviations give no finite ratio and do not count.
     let steps = robot.changes.iter().flat_map(|since| &since.steps);
     steps
-        .map(|step| (step.now.value - step.before.value).abs() / step.before.difference_deviation(step.now))
+        .map(|step| (step.now.value - step.before.value).abs() / step.before.difference_std(step.now))
         .filter(|x| x.is_finite())
         .fold(0.0, f64::max)
 }
@@ -118,7 +118,7 @@ fn changed_robots(found: &FleetResults) -> String {
         let known: Vec<(usize, [f64; 2])> = (robot.days.iter().enumerate())
             .filter_map(|(at, day)| {
                 let fitted = day.fit.as_ref()?.parameters[k];
-                Some((at, [fitted.value, fitted.deviation?]))
+                Some((at, [fitted.value, fitted.std?]))
             })
             .collect();
         // Its mean values before and since each change.
@@ -211,7 +211,7 @@ fn usual_values_table(found: &FleetResults) -> String {
         .filter_map(|(info, usual)| {
             // Parameters without a usual value or spread are left out.
             let usual = (*usual)?;
-            let spread = usual.deviation?;
+            let spread = usual.std?;
             Some(vec![
                 TableCell::text(&info.name),
                 TableCell::number(&significant(usual.value, 5), usual.value),

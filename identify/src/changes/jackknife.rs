@@ -16,7 +16,7 @@ pub struct BlockFit {
     /// One value per column; 0 for a column that is a combination of those before it.
     pub values: DVector<f64>,
     /// Standard deviations; `None` where the run does not determine a value individually.
-    pub deviations: Vec<Option<f64>>,
+    pub std: Vec<Option<f64>>,
 }
 
 /// Fits all columns to the blocks of a run.
@@ -46,7 +46,7 @@ pub fn fit_blocks(blocks: &[NormalEquations]) -> BlockFit {
         solved.determined[i].then(|| variance.max(0.0).sqrt())
     };
     BlockFit {
-        deviations: (0..variances.len()).map(deviation).collect(),
+        std: (0..variances.len()).map(deviation).collect(),
         values: solved.values,
     }
 }
@@ -110,7 +110,7 @@ mod tests {
         for drift in [0.0, 0.3] {
             let squares = (0..400).map(|seed| {
                 let fit = fit_blocks(&blocks(seed, drift));
-                ((fit.values[0] - 2.0) / fit.deviations[0].expect("a deviation")).powi(2)
+                ((fit.values[0] - 2.0) / fit.std[0].expect("a deviation")).powi(2)
             });
             let ratio = (squares.sum::<f64>() / 400.0).sqrt();
             assert!((0.5..1.4).contains(&ratio), "{drift}: {ratio}");
@@ -125,6 +125,6 @@ mod tests {
         let solved = total.solve();
         let noise = (solved.residual_squares / 399.0).max(1.0);
         let expected = (noise * solved.covariance[(0, 0)]).sqrt();
-        assert!((fit.deviations[0].expect("a deviation") - expected).abs() < 1e-12);
+        assert!((fit.std[0].expect("a deviation") - expected).abs() < 1e-12);
     }
 }

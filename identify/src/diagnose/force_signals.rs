@@ -8,6 +8,7 @@ use super::problem::{
     LocatedEffect, ReadingFaultKind, SignConstraint,
 };
 use super::thresholds::MIN_DISTINCTION;
+use crate::signal::float_to_count;
 
 /// Below this delay, in samples, a derivative is accurate enough.
 const SLIGHT: f64 = 0.1;
@@ -227,12 +228,7 @@ fn interpolate_cubic(values: &[f64], share: f64) -> f64 {
 fn interpolate_force(values: &[f64], rates: Option<&[f64]>, at: f64) -> f64 {
     let last = values.len() - 1;
     let at = at.clamp(0.0, last as f64);
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "clamped to the places of samples"
-    )]
-    let k = at.floor() as usize;
+    let k = float_to_count(at.floor());
     let share = at - at.floor();
     // The rate changes its sign between two samples.
     let turns_within = |rates: &[f64], i: usize| rates[i] * rates[i + 1] < 0.0;

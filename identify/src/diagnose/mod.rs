@@ -74,7 +74,9 @@ pub use disturbance::{Disturbance, EstimatedQuantity, ResidualBudget};
 pub use drifts::drift_candidates;
 pub use evidence::SelectionEvidence;
 pub use force_signals::reading_fault_candidates;
-pub use in_time::{ChangeForce, ChangeInterval, ChangeShape, ResidualCharacter, TimeResidual, signal_changes};
+pub use in_time::{
+    ChangeForce, ChangeInterval, ChangeShape, ResidualCharacter, TimeResidual, signal_changes, top_speed,
+};
 pub use laws::{LawFactor, LawProduct, LawProposal, LawShape, LawSite, LawTerm, LawVariable, SiteLaw};
 pub use noise::{effective_samples, white_noise};
 pub use problem::{

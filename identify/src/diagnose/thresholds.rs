@@ -362,7 +362,7 @@ pub(super) const TIME_RESIDUAL_LEAST_NOISE_RATIO: f64 = 4.0;
 /// Below this share of its top speed a drive is near standstill (1). By judgement.
 pub(super) const STANDSTILL_RATE_SHARE: f64 = 0.02;
 
-/// The top speed of a drive is this quantile of its speeds (1), as in a comparison of runs. By judgement.
+/// The top speed of a drive is this quantile of its speeds (1), also in a comparison of runs. By judgement.
 pub(super) const TOP_SPEED_QUANTILE: f64 = 0.98;
 
 /// Standstill from this time on, s, is left out of the diagnosis. By judgement: reversals of a motion are shorter.

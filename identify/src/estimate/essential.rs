@@ -13,9 +13,9 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::estimate::deviations::ParameterUncertainty;
 use crate::estimate::error::LeastSquaresError;
+use crate::estimate::r_factor::RFactor;
 use crate::estimate::solution::RegressionSolution;
 use crate::estimate::thresholds::{ESSENTIAL_SIGNIFICANCE, ESSENTIAL_WELL_DETERMINED};
-use crate::estimate::triangle::RFactor;
 
 /// Limits for essential parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -69,16 +69,16 @@ pub struct EssentialParameters {
 
 /// Leaves out parameters until all remaining ones are needed.
 ///
-/// `solution` and `deviations` belong to `triangle`; `held` are the values at which omitted parameters are fixed:
+/// `solution` and `deviations` belong to `r_factor`; `held` are the values at which omitted parameters are fixed:
 /// nominal values, or 0 without one. Fails only if a reduced problem cannot be solved.
 pub fn select_essential(
-    triangle: &RFactor,
+    r_factor: &RFactor,
     solution: &RegressionSolution,
     deviations: &ParameterUncertainty,
     held: &[f64],
     options: &EssentialOptions,
 ) -> Result<EssentialParameters, LeastSquaresError> {
-    let n = triangle.n_parameters();
+    let n = r_factor.n_parameters();
     let mut dropped = Vec::new();
     // Each undetermined direction starts with a parameter that no other direction contains: it can be left out without
     // loss.
@@ -92,11 +92,11 @@ pub fn select_essential(
             probability: 1.0,
         });
     }
-    let r = triangle.r();
+    let r = r_factor.r();
     let information = r.transpose() * &r;
     // The covariance of the gradients depends on the residuals only; each choice of columns uses its part.
     let scores = &information * &deviations.covariance * &information;
-    let full = ReducedRegression::fit(triangle, &scores, held, kept)?;
+    let full = ReducedRegression::fit(r_factor, &scores, held, kept)?;
     let mut effective: Vec<f64> = deviations
         .effective_samples
         .iter()
@@ -133,7 +133,7 @@ pub fn select_essential(
         });
         let mut columns = choice.columns.clone();
         columns.remove(worst);
-        choice = ReducedRegression::fit(triangle, &scores, held, columns)?;
+        choice = ReducedRegression::fit(r_factor, &scores, held, columns)?;
     }
     let mut found = EssentialParameters {
         kept: choice.columns.clone(),
@@ -170,12 +170,12 @@ struct ReducedRegression {
 impl ReducedRegression {
     /// Solves for some columns with the others fixed.
     fn fit(
-        triangle: &RFactor,
+        r_factor: &RFactor,
         scores: &DMatrix<f64>,
         held: &[f64],
         columns: Vec<usize>,
     ) -> Result<Self, LeastSquaresError> {
-        let solution = triangle
+        let solution = r_factor
             .relative_to(held)
             .select_columns(&columns)?
             .solve_near(&vec![0.0; columns.len()])?;
@@ -319,9 +319,9 @@ mod tests {
             let solution = regression.solve().unwrap();
             let deviations: Result<_, LeastSquaresError> =
                 uncertainty_with_autocorrelation(&solution, 1, |visit| visit(&w, &y));
-            let triangle = RFactor::new(&regression);
+            let r_factor = RFactor::new(&regression);
             let found = select_essential(
-                &triangle,
+                &r_factor,
                 &solution,
                 &deviations.unwrap(),
                 &[0.0; 7],
@@ -360,17 +360,17 @@ mod tests {
         let deviations: Result<_, LeastSquaresError> =
             uncertainty_with_autocorrelation(&solution, 1, |visit| visit(&w, &y));
         let deviations = deviations.unwrap();
-        let triangle = RFactor::new(&regression);
+        let r_factor = RFactor::new(&regression);
         let options = EssentialOptions::default();
         let held = [0.0, 8.0, 0.0];
-        let found = select_essential(&triangle, &solution, &deviations, &held, &options).unwrap();
+        let found = select_essential(&r_factor, &solution, &deviations, &held, &options).unwrap();
         assert_eq!(found.kept, [0, 2]);
         assert_eq!(found.values[1].to_bits(), 8.0_f64.to_bits());
         for j in [0, 2] {
             assert!((found.values[j] - truth[j]).abs() < 5.0 * found.std[j]);
         }
         // A well determined parameter moves away from its fixed value.
-        let found = select_essential(&triangle, &solution, &deviations, &[1.0, 8.0, 5.0], &options).unwrap();
+        let found = select_essential(&r_factor, &solution, &deviations, &[1.0, 8.0, 5.0], &options).unwrap();
         assert_eq!(found.kept, [0, 2]);
     }
 }

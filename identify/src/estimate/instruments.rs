@@ -106,14 +106,14 @@ struct InstrumentalSolution {
 /// Solves for `n` parameters; fails if the instruments are too weak.
 fn solve_instrumental(regression: &LeastSquares, n: usize) -> Result<InstrumentalSolution, LeastSquaresError> {
     let width = 2 * n + 1;
-    let triangle = regression.augmented_factor();
-    let entry = |i: usize, j: usize| triangle[i * width + j];
+    let r_factor = regression.augmented_factor();
+    let entry = |i: usize, j: usize| r_factor[i * width + j];
     let r_z = DMatrix::from_fn(n, n, &entry);
     let b = DMatrix::from_fn(n, n, |i, j| entry(i, n + j));
     let right = DVector::from_fn(n, |i, _| entry(i, 2 * n));
     // Rows of W and y alone, for ordinary least squares.
     let mut plain = LeastSquares::new(n);
-    for row in triangle.chunks_exact(width) {
+    for row in r_factor.chunks_exact(width) {
         plain.add_rows(&row[n..2 * n], &row[2 * n..])?;
     }
     let mut least_squares = crate::RFactor::new(&plain);

@@ -25,12 +25,12 @@ mod magnitudes;
 mod numeric_rank;
 mod physical;
 mod prior;
+mod r_factor;
 mod reflections;
 mod reweighted;
 mod rows;
 mod solution;
 mod thresholds;
-mod triangle;
 mod undetermined;
 mod weighted_rows;
 
@@ -46,11 +46,11 @@ pub use numeric_rank::{
 };
 pub use physical::{NOMINAL_WEIGHT, PhysicalParameters, physical_parameters};
 pub use prior::{ParameterPrior, solve_with_prior};
+pub use r_factor::RFactor;
 pub use reweighted::{EstimateOptions, WeightedEstimate, estimate};
 pub use rows::RowVisitor;
 pub use solution::RegressionSolution;
 pub use thresholds::{FEWEST_ROWS, HUBER_BOUND, RANK_TOLERANCE};
-pub use triangle::RFactor;
 pub use undetermined::NullDirection;
 pub use weighted_rows::RowWeighting;
 

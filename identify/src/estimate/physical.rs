@@ -28,9 +28,9 @@ use crate::estimate::deviations::ParameterUncertainty;
 use crate::estimate::divergence::{BaseMap, MisfitFunction, step_scales};
 use crate::estimate::error::PhysicalError;
 use crate::estimate::prior::variance_inflation;
+use crate::estimate::r_factor::RFactor;
 use crate::estimate::solution::RegressionSolution;
 use crate::estimate::thresholds::{INDIVIDUAL_MOST_OUTSIDE, PHYSICAL_SPAN_TOLERANCE};
-use crate::estimate::triangle::RFactor;
 
 /// Final weight `g` of the nominal values.
 pub const NOMINAL_WEIGHT: f64 = 0.01;
@@ -62,10 +62,10 @@ pub struct PhysicalParameters {
     pub iterations: usize,
 }
 
-/// Finds possible physical parameters that fit the rows of `triangle` and are nearest to `nominal`, at which every body
-/// must be possible. `solution` and `deviations` belong to `triangle`.
+/// Finds possible physical parameters that fit the rows of `r_factor` and are nearest to `nominal`, at which every body
+/// must be possible. `solution` and `deviations` belong to `r_factor`.
 pub fn physical_parameters(
-    triangle: &RFactor,
+    r_factor: &RFactor,
     solution: &RegressionSolution,
     deviations: &ParameterUncertainty,
     nominal: &[f64],
@@ -85,8 +85,8 @@ pub fn physical_parameters(
         .map(|body| NominalBodyMatrix::new(body, nominal))
         .collect::<Result<Vec<_>, _>>()?;
     let problem = MisfitFunction {
-        r: triangle.r() / noise,
-        right: triangle.right_side() / noise,
+        r: r_factor.r() / noise,
+        right: r_factor.right_side() / noise,
         base,
         bodies,
         references,
@@ -106,7 +106,7 @@ pub fn physical_parameters(
     let before = pseudo_inverse(&point.prior);
     let (p, slopes) = base(x.as_slice());
     let spread = &slopes * &inverse * slopes.transpose();
-    let misfit = triangle.right_side() - triangle.r() * &p;
+    let misfit = r_factor.right_side() - r_factor.r() * &p;
     let n = nominal.len();
     Ok(PhysicalParameters {
         std: (0..n).map(|i| inverse[(i, i)].max(0.0).sqrt()).collect(),
@@ -120,7 +120,7 @@ pub fn physical_parameters(
             })
             .collect(),
         individually_determined: individually_determined(&(&problem.r * &slopes)),
-        residual_norm: misfit.norm().hypot(triangle.residual_norm()),
+        residual_norm: misfit.norm().hypot(r_factor.residual_norm()),
         base: p.iter().copied().collect(),
         base_std: spread.diagonal().iter().map(|v| v.max(0.0).sqrt()).collect(),
         margins: problem
@@ -268,9 +268,9 @@ mod tests {
     }
 
     fn find(case: &Case) -> PhysicalParameters {
-        let (triangle, solution, deviations) = solved(case);
+        let (r_factor, solution, deviations) = solved(case);
         let base = |x: &[f64]| (&case.map * DVector::from_column_slice(x), case.map.clone());
-        physical_parameters(&triangle, &solution, &deviations, &case.nominal, &base, &bodies()).unwrap()
+        physical_parameters(&r_factor, &solution, &deviations, &case.nominal, &base, &bodies()).unwrap()
     }
 
     #[test]
@@ -297,7 +297,7 @@ mod tests {
     #[test]
     fn under_heavy_noise_no_possible_neighbour_is_better() {
         let case = case(40, 3.0);
-        let (triangle, solution, deviations) = solved(&case);
+        let (r_factor, solution, deviations) = solved(&case);
         let found = find(&case);
         let noise = (solution.residual_variance() * variance_inflation(&solution, &deviations)).sqrt();
         let references: Vec<NominalBodyMatrix> = bodies()
@@ -305,7 +305,7 @@ mod tests {
             .map(|body| NominalBodyMatrix::new(body, &case.nominal).unwrap())
             .collect();
         let objective = |x: &[f64]| -> f64 {
-            let misfit = (triangle.r() * (&case.map * DVector::from_column_slice(x)) - triangle.right_side()) / noise;
+            let misfit = (r_factor.r() * (&case.map * DVector::from_column_slice(x)) - r_factor.right_side()) / noise;
             let prior: f64 = (0..2)
                 .map(|k| {
                     let relative = references[k].relative(&matrix_of(&x[10 * k..10 * k + 10]));

@@ -10,8 +10,8 @@ use nalgebra::DMatrix;
 
 use crate::estimate::deviations::ParameterUncertainty;
 use crate::estimate::error::LeastSquaresError;
+use crate::estimate::r_factor::RFactor;
 use crate::estimate::solution::RegressionSolution;
-use crate::estimate::triangle::RFactor;
 
 /// Prior knowledge of one parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,17 +26,17 @@ pub struct ParameterPrior {
 
 /// The solution and its uncertainty with `beliefs` as additional measurements.
 ///
-/// `solution` and `deviations` belong to `triangle` alone. Parameters without a prior that the rows do not determine
+/// `solution` and `deviations` belong to `r_factor` alone. Parameters without a prior that the rows do not determine
 /// stay at `nominal`. The residual norm and the condition numbers remain those of the measured rows.
 /// Fails if a list has the wrong length or a number is not finite.
 pub fn solve_with_prior(
-    triangle: &RFactor,
+    r_factor: &RFactor,
     solution: &RegressionSolution,
     deviations: &ParameterUncertainty,
     nominal: &[f64],
     beliefs: &[ParameterPrior],
 ) -> Result<(RegressionSolution, ParameterUncertainty), LeastSquaresError> {
-    let n = triangle.n_parameters();
+    let n = r_factor.n_parameters();
     let noise = (solution.residual_variance() * variance_inflation(solution, deviations)).sqrt();
     // Without residuals the recording counts up to its rounding error.
     let least = 1e-9 * solution.measured_norm / (solution.rows.max(1) as f64).sqrt();
@@ -53,10 +53,10 @@ pub fn solve_with_prior(
         rows.extend(row);
         right.push(factor * belief.value);
     }
-    let both = triangle.with_rows(&rows, &right)?;
+    let both = r_factor.with_rows(&rows, &right)?;
     let mut found = both.solve_near(nominal)?;
     let inverse = found.unit_covariance();
-    let r = triangle.r();
+    let r = r_factor.r();
     let information = r.transpose() * &r;
     let scores = &information * &deviations.covariance * &information;
     let mut prior = DMatrix::zeros(n, n);
@@ -76,8 +76,8 @@ pub fn solve_with_prior(
         })
         .collect();
     after.covariance = covariance;
-    let misfit = triangle.right_side() - &r * nalgebra::DVector::from_column_slice(&found.values);
-    found.residual_norm = misfit.norm().hypot(triangle.residual_norm());
+    let misfit = r_factor.right_side() - &r * nalgebra::DVector::from_column_slice(&found.values);
+    found.residual_norm = misfit.norm().hypot(r_factor.residual_norm());
     found.measured_norm = solution.measured_norm;
     found.condition_number = solution.condition_number;
     found.scaled_condition_number = solution.scaled_condition_number;

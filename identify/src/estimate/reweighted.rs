@@ -12,9 +12,9 @@
 use crate::estimate::deviations::{ParameterUncertainty, uncertainty_with_autocorrelation};
 use crate::estimate::error::LeastSquaresError;
 use crate::estimate::least_squares::LeastSquares;
+use crate::estimate::r_factor::RFactor;
 use crate::estimate::rows::RowVisitor;
 use crate::estimate::solution::RegressionSolution;
-use crate::estimate::triangle::RFactor;
 use crate::estimate::weighted_rows::{
     RowWeighting, WeightedRows, outlier_share, residual_scales, reweight_rows, show_weighted,
 };
@@ -109,7 +109,7 @@ pub fn estimate<E: From<LeastSquaresError>>(
         }
     }
     // Robust estimates use the second derivatives of Huber's function in the covariance.
-    let triangle = RFactor::new(&regression);
+    let r_factor = RFactor::new(&regression);
     if weighting.huber.is_some() {
         let curvature = reweight_rows(
             &solution.values,
@@ -129,7 +129,7 @@ pub fn estimate<E: From<LeastSquaresError>>(
         solution,
         uncertainty: deviations,
         weighting,
-        r_factor: triangle,
+        r_factor,
     })
 }
 

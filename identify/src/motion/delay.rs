@@ -72,25 +72,20 @@ fn cubic_stencil(time: &[f64], at: f64) -> (usize, [f64; 4]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motion::prepared_as::PreparationRecord;
 
     /// Uneven samples of cubics, with the time itself as the force.
     fn run(n: u32) -> PreparedRun {
         let time: Vec<f64> = (0..n).map(|i| 0.01 * f64::from(i) + 0.003 * f64::from(i % 3)).collect();
         let column = |of: fn(f64) -> f64| vec![time.iter().map(|t| of(*t)).collect()];
+        let states = [
+            column(|t| t * t * t - t),
+            column(|t| 3.0 * t * t - 1.0),
+            column(|t| 6.0 * t),
+        ];
+        let force = Some(vec![time.clone()]);
         PreparedRun {
-            file: "run.csv".to_owned(),
-            q: column(|t| t * t * t - t),
-            qd: column(|t| 3.0 * t * t - 1.0),
-            qdd: column(|t| 6.0 * t),
-            force: Some(vec![time.clone()]),
-            missing_force: Vec::new(),
-            left_out: Vec::new(),
             lines: (2..u64::from(n) + 2).collect(),
-            repeatability: None,
-            prepared: PreparationRecord::default(),
-            notes: Vec::new(),
-            time,
+            ..PreparedRun::from_states("run.csv".to_owned(), time, states, force)
         }
     }
 

@@ -20,8 +20,8 @@ pub struct PreparationRecord {
     /// Samples dropped at the start and at the end.
     pub trimmed: (usize, usize),
     /// Whether the caller requested them, instead of the filter.
-    #[serde(default)]
-    pub trim_asked_for: bool,
+    #[serde(default, rename = "trim_asked_for")]
+    pub trim_requested: bool,
     /// Decimation that the regression applies to the columns of the regressor and to the forces
     /// ([`crate::decimate_table`]). The columns here are not decimated.
     pub decimate: usize,

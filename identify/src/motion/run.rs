@@ -228,7 +228,7 @@ impl SignalRecording {
             .or_else(|| band::motion_band(time, columns.iter().map(|c| c.q)));
         prepared.decimate_chosen = preparation.chosen;
         prepared.trimmed = preparation.trim.unwrap_or(prepared.trimmed);
-        prepared.trim_asked_for = preparation.trim.is_some();
+        prepared.trim_requested = preparation.trim.is_some();
         // The run with all samples; it is trimmed at the end.
         let mut run = PreparedRun {
             file: self.file().to_owned(),
@@ -354,7 +354,7 @@ impl SignalRecording {
             return Err(self.fault(RecordingFault::TooFewSamples {
                 have,
                 need: start.saturating_add(end).saturating_add(1),
-                purpose: if run.prepared.trim_asked_for {
+                purpose: if run.prepared.trim_requested {
                     message!("dropping as many at both ends as {} requests", trim)
                 } else {
                     "dropping the filter's transients at both ends".into()
@@ -383,7 +383,7 @@ impl SignalRecording {
         run.notes.push(RecordingNote::info(message!(
             "The first {start} and the last {end} of {have} samples of {} are dropped ({}).",
             self.file(),
-            if run.prepared.trim_asked_for {
+            if run.prepared.trim_requested {
                 message!("as requested by {}", trim)
             } else {
                 "transients of the filter".into()
@@ -394,6 +394,29 @@ impl SignalRecording {
 }
 
 impl PreparedRun {
+    /// A run with known states `[q, qd, qdd]`, which need no preparation.
+    pub fn from_states(
+        file: String,
+        time: Vec<f64>,
+        [q, qd, qdd]: [Vec<Vec<f64>>; 3],
+        force: Option<Vec<Vec<f64>>>,
+    ) -> Self {
+        Self {
+            file,
+            q,
+            qd,
+            qdd,
+            force,
+            missing_force: Vec::new(),
+            left_out: Vec::new(),
+            lines: (0..time.len() as u64).collect(),
+            time,
+            repeatability: None,
+            prepared: PreparationRecord::default(),
+            notes: Vec::new(),
+        }
+    }
+
     /// Number of samples.
     pub fn samples(&self) -> usize {
         self.time.len()

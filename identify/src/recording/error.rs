@@ -108,7 +108,7 @@ pub enum RecordingFault {
         name: String,
         /// Positions of the first two that have it, from 1.
         places: [usize; 2],
-        /// Whether a renaming caused this.
+        /// Whether a mapping caused this.
         by_renaming: bool,
     },
     /// Two renamings have the same name.
@@ -133,7 +133,7 @@ pub enum RecordingFault {
         nearest: Option<String>,
         /// All names that exist.
         present: Vec<String>,
-        /// Whether the name comes from a renaming of the user.
+        /// Whether the name comes from a mapping of the user.
         by_renaming: bool,
     },
     /// Several needed columns do not exist.
@@ -336,9 +336,9 @@ impl RecordingFault {
                 places: [a, b],
                 by_renaming,
             } => {
-                // The advice depends on whether the file or a renaming has the duplicate.
+                // The advice depends on whether the file or a mapping has the duplicate.
                 let what = if *by_renaming {
-                    "a renaming causes this: remove it, or rename the other column too"
+                    "a mapping causes this: remove it, or map the other column too"
                 } else {
                     "give every column a name of its own"
                 };
@@ -360,7 +360,7 @@ impl RecordingFault {
             } => {
                 // First what is missing, then the nearest name, all names, and how to map one.
                 let missing = if *by_renaming {
-                    format!("a renaming refers to the column `{name}`, which is not there")
+                    format!("a mapping names the column `{name}`, which does not exist")
                 } else {
                     format!("there is no column `{name}`")
                 };
@@ -369,10 +369,10 @@ impl RecordingFault {
                     None => ".".to_owned(),
                 };
                 let how = if *by_renaming {
-                    message!("Renamings read {}.", Remedy::options([map("ours", "theirs")]))
+                    message!("A mapping has the form {}.", Remedy::options([map("NAME", "COLUMN")]))
                 } else {
-                    let theirs = nearest.as_deref().unwrap_or("THEIRS");
-                    message!("Map one onto it with {}.", Remedy::options([map(name, theirs)]))
+                    let theirs = nearest.as_deref().unwrap_or("COLUMN");
+                    message!("Assign one of them with {}.", Remedy::options([map(name, theirs)]))
                 };
                 // A recording without times may still have a rate.
                 let rate = if name == "t" && nearest.is_none() && !by_renaming {
@@ -395,9 +395,9 @@ impl RecordingFault {
                     .collect();
                 let maps = missing
                     .iter()
-                    .map(|(name, nearest)| map(name, nearest.as_deref().unwrap_or("THEIRS")));
+                    .map(|(name, nearest)| map(name, nearest.as_deref().unwrap_or("COLUMN")));
                 message!(
-                    "there are no columns {}.{} Map one onto each of them with {}.",
+                    "there are no columns {}.{} Assign a column to each name with {}.",
                     all.join(", "),
                     columns_there(present),
                     Remedy::options(maps)
@@ -441,9 +441,9 @@ impl RecordingFault {
             }
             Self::MissingForce { drives } => message!(
                 "the measured force of {} is needed, but there is no such column; \
-                 map one onto it with {}",
+                 assign a column with {}",
                 backquoted_list(drives),
-                Remedy::options([map(drives.first().map_or("DRIVE", String::as_str), "THEIRS")])
+                Remedy::options([map(drives.first().map_or("DRIVE", String::as_str), "COLUMN")])
             ),
             Self::TimeNotIncreasing { previous, here, .. } => message!(
                 "time goes from {previous} s to {here} s, but must increase from sample to sample; \

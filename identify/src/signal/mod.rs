@@ -6,5 +6,4 @@ mod statistics;
 
 pub use filters::{FilterError, LowPass, MAX_FILTER_ORDER};
 pub(crate) use spectrum::hann_power;
-pub use statistics::white_noise;
-pub(crate) use statistics::{float_to_count, median};
+pub use statistics::{float_to_count, median, white_noise};

@@ -1,7 +1,7 @@
 //! Statistics of plain numbers.
 
 /// Median of numbers, the upper one of two; zero for none.
-pub(crate) fn median(mut values: Vec<f64>) -> f64 {
+pub fn median(mut values: Vec<f64>) -> f64 {
     if values.is_empty() {
         return 0.0;
     }
@@ -34,6 +34,6 @@ pub fn white_noise(values: &[f64]) -> f64 {
     clippy::cast_sign_loss,
     reason = "a float becomes the nearest count there is"
 )]
-pub(crate) fn float_to_count(value: f64) -> usize {
+pub fn float_to_count(value: f64) -> usize {
     value as usize
 }

@@ -195,18 +195,18 @@ fn renamings_and_missing_columns() {
     assert_eq!(
         read(&[]).unwrap().column("t").unwrap_err().to_string(),
         "run.csv: there is no column `t`; did you mean `t_s`? The columns are: `t_s`, `theta1`, `F_left`. \
-         Map one onto it with option `columns` = `t=t_s`."
+         Assign one of them with option `columns` = `t=t_s`."
     );
     assert_eq!(
         read(&[("spindle_left", "F_lefd")]).unwrap_err().to_string(),
-        "run.csv: a renaming refers to the column `F_lefd`, which is not there; did you mean `F_left`? \
-         The columns are: `t_s`, `theta1`, `F_left`. Renamings read option `columns` = `ours=theirs`."
+        "run.csv: a mapping names the column `F_lefd`, which does not exist; did you mean `F_left`? \
+         The columns are: `t_s`, `theta1`, `F_left`. A mapping has the form option `columns` = `NAME=COLUMN`."
     );
     assert!(
         read(&[("theta1", "F_left")])
             .unwrap_err()
             .to_string()
-            .contains("a renaming causes this")
+            .contains("a mapping causes this")
     );
     assert!(matches!(
         read(&[("a", "t_s"), ("a", "F_left")]).unwrap_err().fault,
@@ -253,7 +253,7 @@ fn a_force_may_be_missing_until_it_is_needed() {
     assert_eq!(
         run.measured_forces().unwrap_err().to_string(),
         "run.csv: the measured force of `right` is needed, but there is no such column; \
-         map one onto it with option `columns` = `right=THEIRS`"
+         assign a column with option `columns` = `right=COLUMN`"
     );
 }
 

@@ -3,8 +3,8 @@
 //!
 //! The consistent treatment represents the rig here, since both agree up to rounding.
 
+use modelmill_identify::PreparedRun;
 use modelmill_identify::excite::{ExcitationMotion, FourierSeries};
-use modelmill_identify::{PreparationRecord, PreparedRun};
 
 use crate::bundled;
 use crate::study::{DriveErrors, TreatmentRun};
@@ -53,20 +53,9 @@ fn errors_at(host: &Host, series: &[FourierSeries], distance: f64) -> Outcome<Di
     let motion = ExcitationMotion::sample(series, SAMPLES);
     let period = series.first().map_or(0.0, FourierSeries::period);
     let time: Vec<f64> = (0..SAMPLES).map(|i| i as f64 * period / SAMPLES as f64).collect();
-    let data = RecordingSegment::from(PreparedRun {
-        file: format!("the test motion for b = {distance} m"),
-        q: motion.q,
-        qd: motion.qd,
-        qdd: motion.qdd,
-        force: None,
-        missing_force: Vec::new(),
-        left_out: Vec::new(),
-        lines: (0..time.len() as u64).collect(),
-        time,
-        repeatability: None,
-        prepared: PreparationRecord::default(),
-        notes: Vec::new(),
-    });
+    let name = format!("the test motion for b = {distance} m");
+    let states = [motion.q, motion.qd, motion.qdd];
+    let data = RecordingSegment::from(PreparedRun::from_states(name, time, states, None));
     let (paper, consistent) = (variant("spidermill-paper.toml")?, variant("spidermill.toml")?);
     let forces = [
         along::forces(&paper, &data, &paper.nominal)?,

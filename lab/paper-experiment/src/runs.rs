@@ -2,11 +2,11 @@
 
 use std::f64::consts::PI;
 
+use modelmill_identify::PreparedRun;
 use modelmill_identify::excite::{
     ExcitationLimits, ExcitationMotion, ExcitationPlant, FourierSeries, Options, condition_number, excite,
     max_progress_steps,
 };
-use modelmill_identify::{PreparationRecord, PreparedRun};
 use modelmill_rig::{Rig, RigState, Trajectory};
 
 use modelmill::Model;
@@ -194,18 +194,12 @@ pub(crate) fn run(rig: &Rig, model: &Model, periodic: &PeriodicTrajectory, rate:
         coordinates.iter().map(column).collect()
     };
     let force = |k: &usize| instants.iter().map(|i| i.forces[*k]).collect();
-    Ok(RecordingSegment::from(PreparedRun {
-        file: rig.name.clone(),
-        q: state(|s| &s.q),
-        qd: state(|s| &s.qd),
-        qdd: state(|s| &s.qdd),
-        force: Some(drives.iter().map(force).collect()),
-        missing_force: Vec::new(),
-        left_out: Vec::new(),
-        lines: (0..time.len() as u64).collect(),
+    let states = [state(|s| &s.q), state(|s| &s.qd), state(|s| &s.qdd)];
+    let forces = Some(drives.iter().map(force).collect());
+    Ok(RecordingSegment::from(PreparedRun::from_states(
+        rig.name.clone(),
         time,
-        repeatability: None,
-        prepared: PreparationRecord::default(),
-        notes: Vec::new(),
-    }))
+        states,
+        forces,
+    )))
 }

@@ -2,7 +2,7 @@
 //! offset. If a model lacks these, their force would be attributed to something else.
 
 use modelmill_codegen::{ModelEvaluator, MotionStates};
-use modelmill_identify::ChannelRegressor;
+use modelmill_identify::{ChannelRegressor, float_to_count};
 use nalgebra::DMatrix;
 
 use crate::model::Model;
@@ -191,8 +191,7 @@ fn reach(data: &RecordingSegment) -> usize {
     let time = &data.run.time;
     let rate = (time.len() - 1) as f64 / (time[time.len() - 1] - time[0]);
     let band = data.run.prepared.band_hz.unwrap_or(rate);
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few samples")]
-    let reach = (REACH * rate / band) as usize;
+    let reach = float_to_count(REACH * rate / band);
     reach.clamp(1, time.len().max(2) / 2)
 }
 

@@ -5,6 +5,7 @@
 //! leaves standstill out. An identification that ignores them gives biased values.
 
 use modelmill_identify::diagnose::IdentifiedEffect;
+use modelmill_identify::float_to_count;
 
 use super::problem::DiagnosisSolution;
 use super::thresholds::{ESTIMATE_FEWEST_DIGITS, ESTIMATE_MOST_DIGITS};
@@ -73,13 +74,7 @@ pub(crate) fn round_by_deviation(value: f64, std: Option<f64>) -> f64 {
         std.filter(|std| *std > 0.0 && std.is_finite() && value != 0.0)
             .map_or(ESTIMATE_FEWEST_DIGITS, |std| {
                 let digits = value.abs().log10().floor() - std.log10().floor() + 2.0;
-                #[expect(
-                    clippy::cast_possible_truncation,
-                    clippy::cast_sign_loss,
-                    reason = "clamped to a few digits"
-                )]
-                let digits = digits.clamp(ESTIMATE_FEWEST_DIGITS as f64, ESTIMATE_MOST_DIGITS as f64) as usize;
-                digits
+                float_to_count(digits.clamp(ESTIMATE_FEWEST_DIGITS as f64, ESTIMATE_MOST_DIGITS as f64))
             });
     round_significant(value, digits)
 }

@@ -93,7 +93,7 @@ fn difference(one: &RecordingDifference) -> Disturbance {
     let estimates = values.into_iter().map(|(name, value, unit)| EstimatedQuantity {
         name: name.to_owned(),
         value: value.value,
-        standard_deviation: Some(value.deviation),
+        standard_deviation: Some(value.std),
         unit: unit.to_owned(),
     });
     Disturbance {

@@ -55,7 +55,7 @@ pub struct GeometryError {
 pub struct GeometryAlternative {
     /// The errors, one or two.
     pub errors: Vec<GeometryError>,
-    /// What they explain of the squared residual that the effects found explain, 1 for all of it.
+    /// The squared residual that they explain, divided by that which the effects found explain.
     pub share: f64,
 }
 

@@ -166,23 +166,16 @@ mod tests {
     fn long(samples: usize, band_hz: f64) -> RecordingSegment {
         let time: Vec<f64> = (0..samples).map(|i| 1e-3 * i as f64).collect();
         let of = |f: &dyn Fn(f64) -> f64| vec![time.iter().map(|t| f(*t)).collect::<Vec<f64>>()];
+        let states = [of(&f64::sin), of(&f64::cos), of(&|t| -t.sin())];
+        let force = Some(of(&|t| 5.0 * t.sin()));
         RecordingSegment::from(PreparedRun {
-            file: "long.csv".to_owned(),
-            q: of(&f64::sin),
-            qd: of(&f64::cos),
-            qdd: of(&|t| -t.sin()),
-            force: Some(of(&|t| 5.0 * t.sin())),
-            missing_force: Vec::new(),
             left_out: vec![vec![false; samples]],
-            lines: (0..samples as u64).collect(),
-            repeatability: None,
             prepared: PreparationRecord {
                 band_hz: Some(band_hz),
                 decimate: 10,
                 ..PreparationRecord::default()
             },
-            notes: Vec::new(),
-            time,
+            ..PreparedRun::from_states("long.csv".to_owned(), time, states, force)
         })
     }
 

@@ -521,38 +521,29 @@ fn first_checks(diagnosis: &ModelDiagnosis) -> Option<String> {
 
 /// The faults that were corrected hypothetically, as sentences; the verdict on the corrected recordings follows.
 pub(crate) fn corrected_text(corrected: &[SuspectedFault]) -> String {
-    let sentences: Vec<String> = (corrected.iter())
-        .map(|fault| {
-            format!(
-                "In {} {}.",
-                joined_by_and(&fault.recordings),
-                fault.clause.replace('`', "")
-            )
-        })
-        .collect();
     let with = if corrected.len() == 1 {
         "With it corrected"
     } else {
         "With these corrected"
     };
-    format!("{} {with}, ", sentences.join(" "))
+    format!("{} {with}, ", fault_sentences(corrected))
 }
 
 /// The verdict if faults remain that cannot be corrected.
 pub(crate) fn unresolved_text(unresolved: &[SuspectedFault]) -> String {
-    let sentences: Vec<String> = (unresolved.iter())
-        .map(|fault| {
-            format!(
-                "In {} {}.",
-                joined_by_and(&fault.recordings),
-                fault.clause.replace('`', "")
-            )
-        })
-        .collect();
     format!(
         "Check the recording and the model first. {} Until this is clear, nothing can be stated about the model.",
-        sentences.join(" ")
+        fault_sentences(unresolved)
     )
+}
+
+/// Faults of recordings as sentences.
+fn fault_sentences(faults: &[SuspectedFault]) -> String {
+    let sentence = |fault: &SuspectedFault| {
+        let clause = fault.clause.replace('`', "");
+        format!("In {} {clause}.", joined_by_and(&fault.recordings))
+    };
+    faults.iter().map(sentence).collect::<Vec<_>>().join(" ")
 }
 
 /// Whether the recording or the model is in doubt. Until that is checked, no effect is worth adding.

@@ -8,11 +8,11 @@ mod separated;
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
-use modelmill_identify::RecordingNote;
 use modelmill_identify::excite::{
     ExcitationLimits, ExcitationMotion, ExcitationPlant, ExcitationTrajectory, FourierSeries, excite,
     max_progress_steps, scaled_condition_number,
 };
+use modelmill_identify::{RecordingNote, float_to_count};
 
 use crate::diagnose::NamedEffect;
 use crate::error::{Error, Outcome};
@@ -305,12 +305,7 @@ fn too_slow(model: &Model, rate: f64) -> Error {
 
 /// Number of samples of one period, at least 1.
 fn samples_per_period(rate: f64, period: f64) -> usize {
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a float that is too large or negative becomes the nearest number of samples"
-    )]
-    let samples = (rate * period).round() as usize;
+    let samples = float_to_count((rate * period).round());
     samples.max(1)
 }
 

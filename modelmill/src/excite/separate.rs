@@ -457,29 +457,15 @@ impl ExcitationPlant for SeparatingPlant<'_> {
 /// A motion as a segment with the forces of the nominal model.
 fn recording(plant: &ModelPlant<'_>, motion: &ExcitationMotion) -> Option<RecordingSegment> {
     let samples = motion.q.first().map_or(0, Vec::len);
-    Some(RecordingSegment {
-        run: PreparedRun {
-            file: "the trajectory".to_owned(),
-            time: (0..samples).map(|i| i as f64).collect(),
-            q: motion.q.clone(),
-            qd: motion.qd.clone(),
-            qdd: motion.qdd.clone(),
-            force: Some(plant.forces(motion)?),
-            missing_force: Vec::new(),
-            left_out: Vec::new(),
-            lines: Vec::new(),
-            repeatability: None,
-            prepared: PreparationRecord {
-                decimate: 1,
-                ..PreparationRecord::default()
-            },
-            notes: Vec::new(),
+    let time = (0..samples).map(|i| i as f64).collect();
+    let states = [motion.q.clone(), motion.qd.clone(), motion.qdd.clone()];
+    let forces = Some(plant.forces(motion)?);
+    Some(RecordingSegment::from(PreparedRun {
+        lines: Vec::new(),
+        prepared: PreparationRecord {
+            decimate: 1,
+            ..PreparationRecord::default()
         },
-        variance: None,
-        weights: None,
-        computed: None,
-        maps_from_degrees: Vec::new(),
-        faults: Vec::new(),
-        load: None,
-    })
+        ..PreparedRun::from_states("the trajectory".to_owned(), time, states, forces)
+    }))
 }

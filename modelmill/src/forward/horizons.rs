@@ -4,6 +4,7 @@
 //! Decision: the growth of a small disturbance of the first state bounds the horizons. Beyond this bound, errors come
 //! from the encoder and the first state, whatever the model.
 
+use modelmill_identify::float_to_count;
 use rayon::prelude::*;
 
 use crate::error::Outcome;
@@ -160,12 +161,7 @@ fn windows(segment: &RecordingSegment, seconds: f64) -> Vec<[usize; 2]> {
         start = end;
     }
     // Many windows are thinned out evenly.
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a small positive number"
-    )]
-    let most = (MOST_SIMULATED_S / seconds).ceil().max(1.0) as usize;
+    let most = float_to_count((MOST_SIMULATED_S / seconds).ceil().max(1.0));
     let every = all.len().div_ceil(most).max(1);
     all.into_iter().step_by(every).collect()
 }

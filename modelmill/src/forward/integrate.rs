@@ -6,6 +6,7 @@
 //! none of them has. The rest is one page.
 
 use modelmill_codegen::PoseFault;
+use modelmill_identify::float_to_count;
 
 use super::plant::MotionPlant;
 use super::thresholds::{LONGEST_STEP_S, MOST_EVENTS, STOPPED_PART};
@@ -60,12 +61,7 @@ pub(super) fn advance(
     duration: f64,
     forces: &ForceInterval<'_>,
 ) -> Result<(), PoseFault> {
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a small positive number"
-    )]
-    let steps = (duration / LONGEST_STEP_S - 1e-6).ceil().max(1.0) as usize;
+    let steps = float_to_count((duration / LONGEST_STEP_S - 1e-6).ceil().max(1.0));
     for k in 0..steps {
         let [start, end] = [k, k + 1].map(|k| k as f64 / steps as f64);
         advance_step(plant, state, duration, [start, end], forces)?;

@@ -45,7 +45,7 @@ pub(super) fn fault_influence(
     // The change of each parameter is measured in its standard deviations.
     let pairs = found.solution.values.iter().zip(&faulty.solution.values);
     let moved = pairs
-        .zip(&found.deviations.std)
+        .zip(&found.uncertainty.std)
         .zip(&found.unknown)
         .filter(|((_, std), _)| std.is_finite() && **std > 0.0);
     // Only parameters with a finite standard deviation can be compared.

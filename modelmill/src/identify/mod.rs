@@ -167,7 +167,7 @@ pub fn identify(
     let infos = model.parameter_infos();
     let unknown: Vec<ParameterInfo> = found.unknown.iter().map(|k| infos[*k].clone()).collect();
     // Values, standard deviations and status of the estimated parameters.
-    let mut parameters = fit_parameters(&unknown, solution, &found.deviations);
+    let mut parameters = fit_parameters(&unknown, solution, &found.uncertainty);
     for one in found.refined.removed_parameters() {
         parameters[one].status = ParameterStatus::NotEssential;
     }
@@ -234,10 +234,10 @@ fn covariance(found: &RegressionEstimate, n: usize) -> Option<Vec<Vec<f64>>> {
     let mut rows = vec![vec![0.0; n]; n];
     for (a, i) in found.unknown.iter().enumerate() {
         for (b, j) in found.unknown.iter().enumerate() {
-            rows[*i][*j] = found.deviations.covariance[(a, b)];
+            rows[*i][*j] = found.uncertainty.covariance[(a, b)];
         }
     }
-    let is_known = found.deviations.std.iter().all(|s| s.is_finite()) && rows.iter().flatten().all(|c| c.is_finite());
+    let is_known = found.uncertainty.std.iter().all(|s| s.is_finite()) && rows.iter().flatten().all(|c| c.is_finite());
     is_known.then_some(rows)
 }
 
@@ -316,7 +316,7 @@ fn remarks(model: &Model, found: &RegressionEstimate, parameters: &[FitParameter
                 n => format!("are {n} equations"),
             }
         )));
-    } else if found.deviations.few_samples {
+    } else if found.uncertainty.few_samples {
         notes.push(RecordingNote::warning(format!(
             "There are only {} equations for {}: standard deviations assume independent residuals and are too small \
              if they are not, and the error of the fit is not reliable; use a longer recording (at least {FEWEST_ROWS} \

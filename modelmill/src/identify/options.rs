@@ -13,9 +13,9 @@ pub struct EstimatorOptions {
     pub robust: Option<f64>,
     /// Refinement of the least-squares solution.
     pub refinement: EstimateRefinement,
-    /// Bound of standstill, as a fraction of the maximum rate of the drive over all recordings of the fit. Below this
-    /// bound, the equations of the drive are excluded, because static friction is not determined by the state. A usual
-    /// bound is 0.01; `None` excludes no equation.
+    /// Bound of standstill, as a fraction of the maximum rate of the drive over all recordings of the fit; 0.01 is usual.
+    /// Equations of the drive below this bound are excluded from the fit, in addition to those that the recordings leave
+    /// out ([`StandstillRule`](crate::recording::StandstillRule)). `None` excludes no equation.
     pub standstill: Option<f64>,
 }
 

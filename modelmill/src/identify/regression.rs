@@ -30,8 +30,8 @@ pub struct RegressionEstimate {
     /// The solution.
     pub solution: RegressionSolution,
     /// Standard deviations, covariance and effective numbers of samples.
-    pub deviations: ParameterUncertainty,
-    /// Indices of the base parameters that solution and deviations refer to.
+    pub uncertainty: ParameterUncertainty,
+    /// Indices of the base parameters that solution and uncertainty refer to.
     pub unknown: Vec<usize>,
     /// Weights of the rows, if any were used.
     pub weighting: Option<RowWeighting>,
@@ -86,7 +86,7 @@ pub fn identify(
         .collect::<Outcome<Vec<RegressionRows<'_>>>>()?;
     check_equation_count(data, &runs, unknown.len(), model)?;
     check_forces_nonzero(data, &runs)?;
-    // Plain least squares: one pass for the solution, two for the deviations. The number of passes with reweighting
+    // Plain least squares: one pass for the solution, two for the uncertainty. The number of passes with reweighting
     // is unknown.
     let by_channel = args.weights == EquationWeights::Channels;
     let reweighted = by_channel || args.robust.is_some();
@@ -106,7 +106,7 @@ pub fn identify(
             let found = estimate_with_instruments(unknown.len(), channels, show)?;
             return Ok(RegressionEstimate {
                 solution: found.solution,
-                deviations: found.uncertainty,
+                uncertainty: found.uncertainty,
                 unknown: unknown.clone(),
                 weighting: None,
                 refined: RefinementResult::Nothing,
@@ -129,7 +129,7 @@ pub fn identify(
         let is_weighted = weighting.by_channel || weighting.huber.is_some();
         Ok(RegressionEstimate {
             solution: found.solution,
-            deviations: found.uncertainty,
+            uncertainty: found.uncertainty,
             unknown: unknown.clone(),
             weighting: is_weighted.then_some(weighting),
             refined,

@@ -1,4 +1,4 @@
-//! A model with other vectors of gravity. Each is derived once, since every recording of a machine may ask for the same ones.
+//! A model with other vectors of gravity. Each is derived once, since recordings of one machine may need the same ones.
 
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};

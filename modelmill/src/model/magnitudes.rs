@@ -140,6 +140,17 @@ fn extent(model: &Model) -> (Option<[[f64; 2]; 3]>, usize) {
     (Some(sides), poses.len())
 }
 
+/// One state at standstill at these values of the active coordinates.
+pub(crate) fn state_at_standstill(active: &[f64]) -> MotionStates<'_> {
+    let zeros = vec![&[0.0][..]; active.len()];
+    MotionStates {
+        q: active.iter().map(std::slice::from_ref).collect(),
+        qd: zeros.clone(),
+        qdd: zeros,
+        load: Vec::new(),
+    }
+}
+
 /// All coordinates at random poses that the mechanism can reach, rad or m. Poses whose loops do not close are left out.
 fn sampled_poses(model: &Model) -> Vec<Vec<f64>> {
     let Ok([positions, ..]) = reachable_states(model, SIZE_POSES) else {
@@ -148,20 +159,12 @@ fn sampled_poses(model: &Model) -> Vec<Vec<f64>> {
     let coordinates = &model.derivation.mechanism.coordinates;
     let has_passive = coordinates.iter().any(|c| c.passive);
     let evaluator = ModelEvaluator::new(&model.derivation);
-    let zero = [0.0];
     let n = positions.first().map_or(0, Vec::len);
     (0..n)
         .filter_map(|sample| {
             let active: Vec<f64> = positions.iter().map(|column| column[sample]).collect();
-            let still: Vec<&[f64]> = active.iter().map(|_| &zero[..]).collect();
-            let states = MotionStates {
-                q: active.iter().map(std::slice::from_ref).collect(),
-                qd: still.clone(),
-                qdd: still,
-                load: Vec::new(),
-            };
             let passive = if has_passive {
-                evaluator.passive_motion(&states).ok()?
+                evaluator.passive_motion(&state_at_standstill(&active)).ok()?
             } else {
                 Vec::new()
             };

@@ -31,6 +31,7 @@ use gravity_variants::GravityVariants;
 pub use changes::{BaseValueChange, EntryChange, ModelChanges};
 pub use equations::EquationsText;
 pub use magnitudes::ModelMagnitudes;
+pub(crate) use magnitudes::state_at_standstill;
 pub use modelmill_codegen::review::PageFormat;
 pub use modelmill_spec::LoadedModel;
 pub use sampled_rank::SampledRank;

@@ -1,4 +1,4 @@
-//! Properties of an estimate besides its values, as JSON and as text for people: independent samples, weights,
+//! Properties of an estimate in addition to its values, as JSON and as text for people: independent samples, weights,
 //! parameters that are not essential, physical parameters, and the bias that instruments remove.
 
 use modelmill_identify::ParameterInfo;
@@ -14,7 +14,7 @@ use crate::text::table::{ColumnAlignment, count, number, percent, significant, t
 fn effective_samples(found: &RegressionEstimate) -> Option<f64> {
     // Parameters without a finite number, such as known ones, are left out.
     let mut all: Vec<f64> = found
-        .deviations
+        .uncertainty
         .effective_samples
         .iter()
         .copied()
@@ -46,8 +46,8 @@ pub(crate) fn json(model: &Model, found: &RegressionEstimate, args: &EstimatorOp
     let mut value = json!({
         "weights": args.weights.name(),
         "effective_samples": effective_samples(found),
-        "residual_correlation": by_drive(&found.deviations.residual_lag1),
-        "bandwidth": found.deviations.bandwidth,
+        "residual_correlation": by_drive(&found.uncertainty.residual_lag1),
+        "bandwidth": found.uncertainty.bandwidth,
     });
     // Optional parts are added only if the estimator computed them.
     let mut put = |name: &str, what: Value| value[name] = what;
@@ -121,16 +121,16 @@ pub(crate) fn json(model: &Model, found: &RegressionEstimate, args: &EstimatorOp
 /// The same as lines of text.
 pub(crate) fn text(model: &Model, found: &RegressionEstimate, infos: &[ParameterInfo]) -> Vec<String> {
     let mut lines = Vec::new();
-    let deviations = &found.deviations;
+    let uncertainty = &found.uncertainty;
     // Independent samples, since they explain the size of the standard deviations.
     if let Some(effective) = effective_samples(found) {
         // One correlation for each drive.
-        let correlations: Vec<String> = deviations.residual_lag1.iter().map(|c| significant(*c, 2)).collect();
+        let correlations: Vec<String> = uncertainty.residual_lag1.iter().map(|c| significant(*c, 2)).collect();
         lines.push(format!(
             "The residuals are correlated in time (at lag 1, per drive: {}), so these {} samples are worth about {} \
              independent ones.",
             correlations.join(", "),
-            deviations.samples,
+            uncertainty.samples,
             significant(effective, 2)
         ));
         lines.push("The standard deviations above allow for that.".to_owned());
@@ -197,7 +197,7 @@ pub(crate) fn text(model: &Model, found: &RegressionEstimate, infos: &[Parameter
         // The difference of both estimates in standard deviations shows the bias.
         let rows: Vec<Vec<String>> = (0..found.unknown.len())
             .map(|i| {
-                let (value, std) = (found.solution.values[i], deviations.std[i]);
+                let (value, std) = (found.solution.values[i], uncertainty.std[i]);
                 vec![
                     name(i),
                     number(value),

@@ -32,7 +32,7 @@ impl DiagnosisFindings {
     ///   value the model uses there too (`shared_with`): the estimates are then the difference from that value
     /// - `geometry_alternatives`: errors of the geometry that explain as much as the effects found (`share`, 1 for as
     ///   much): each a constant, or a coordinate of a point that the file writes as zero
-    /// - `possible`: the same for effects with a probability below 0.5, which the model is not said to lack
+    /// - `possible`: the same for effects with a probability below 0.5
     /// - `candidates`: all effects that were tried, with the share of the squared error that each explains
     ///   alone and the reason of its rejection
     /// - `untold`: effects that the recordings can neither show nor exclude

@@ -32,7 +32,7 @@ impl ForwardComparison {
         })
     }
 
-    /// The errors as text, with the horizon up to which they say something about the model.
+    /// The errors as text, with the longest horizon over which they depend on the model.
     pub fn text(&self, style: TerminalStyle) -> String {
         let mut lines = vec![style.bold("Position error when the model is simulated under the recorded forces")];
         let mut rows = Vec::new();

@@ -223,7 +223,7 @@ impl Identification {
             // The fit itself cannot be worse than the nominal values.
             nominal: self.nominal_check.as_ref().filter(|_| self.has_nominal),
             by_rate: &self.by_rate,
-            correlations: &self.found.deviations.residual_lag1,
+            correlations: &self.found.uncertainty.residual_lag1,
             suspect: self.suspect.as_ref(),
         };
         if let Some(step) = look.correction_step().or_else(|| look.diagnosis_step()) {

@@ -11,7 +11,7 @@ use crate::runs::{
     UndecidedDrive, UndecidedReason,
 };
 use crate::text::TerminalStyle;
-use crate::text::table::{ColumnAlignment, count, percent, table, with_deviation};
+use crate::text::table::{ColumnAlignment, count, percent, table, with_std};
 
 impl RunsComparison {
     /// All differences as one JSON object; values in SI units.
@@ -64,7 +64,7 @@ impl RunsComparison {
                 "parameter": self.parameters[step.parameter].name,
                 "before": step.before.value,
                 "now": step.now.value,
-                "std": step.before.difference_deviation(step.now),
+                "std": step.before.difference_std(step.now),
                 "unit": self.parameters[step.parameter].unit,
             })
         });
@@ -84,13 +84,13 @@ impl RunsComparison {
         // Base parameters that are separate for each run are not in the shared list.
         let shared = shared.filter_map(|(info, value)| {
             let value = (*value)?;
-            Some(json!({ "name": info.name, "expression": info.expression, "value": value.value, "std": value.deviation, "unit": info.unit }))
+            Some(json!({ "name": info.name, "expression": info.expression, "value": value.value, "std": value.std, "unit": info.unit }))
         });
         // Factors of force signals, which need a known load.
         let gains = fit
             .gains
             .iter()
-            .map(|(drive, gain)| json!({ "drive": drive, "gain": gain.value, "std": gain.deviation }));
+            .map(|(drive, gain)| json!({ "drive": drive, "gain": gain.value, "std": gain.std }));
         // Values of each run, absolute or relative to the first run.
         let runs = fit.runs.iter().map(|(file, values)| {
             let values = values.iter().map(|one| {
@@ -98,7 +98,7 @@ impl RunsComparison {
                     "of": one.quantity,
                     "name": one.name,
                     "value": one.value.value,
-                    "std": one.value.deviation,
+                    "std": one.value.std,
                     "unit": one.unit,
                     "against_first": one.is_against_first,
                 })
@@ -121,7 +121,7 @@ impl RunsComparison {
                 "name": info.name,
                 "expression": info.expression,
                 "value": fitted.value,
-                "std": fitted.deviation,
+                "std": fitted.std,
                 "unit": info.unit,
             })
         };
@@ -132,13 +132,13 @@ impl RunsComparison {
     fn moved_parameter_json(&self, run: usize, k: usize) -> Value {
         // Both values are from separate fits, so their errors are independent.
         let (before, now) = (self.runs[0].alone[k], self.runs[run].alone[k]);
-        let deviation = self.runs[run].difference_deviation(&self.runs[0], k);
+        let std = self.runs[run].difference_std(&self.runs[0], k);
         json!({
             "parameter": self.parameters[k].name,
-            "sigmas": (now.value - before.value).abs() / deviation,
+            "sigmas": (now.value - before.value).abs() / std,
             "before": before.value,
             "now": now.value,
-            "std": deviation,
+            "std": std,
             "unit": self.parameters[k].unit,
             "between": [0, run],
         })
@@ -258,13 +258,13 @@ impl RunsComparison {
     fn moved_parameter_row(&self, first: &RunReport, run: &RunReport, k: usize) -> Vec<String> {
         let (before, now) = (first.alone[k], run.alone[k]);
         let info = &self.parameters[k];
-        let difference = run.difference_deviation(first, k);
-        let [value, deviation] = with_deviation(now.value, difference);
+        let difference = run.difference_std(first, k);
+        let [value, std] = with_std(now.value, difference);
         vec![
             info.name.clone(),
-            with_deviation(before.value, difference)[0].clone(),
+            with_std(before.value, difference)[0].clone(),
             value,
-            deviation,
+            std,
             info.unit.clone(),
             info.expression.clone(),
         ]
@@ -274,16 +274,16 @@ impl RunsComparison {
 /// Up to this number of later runs each run is listed with its base parameters; beyond, only changes are listed.
 const MOST_DETAILED_RUNS: usize = 12;
 
-/// The sentences on a run besides those on its changes: that nothing changed, that the cause is unknown, or that the
-/// runs cannot show it. Empty if changes say all.
+/// The sentences on a run in addition to those on its changes: that nothing changed, that the cause is unknown, or that
+/// the runs cannot show it. Empty if the changes are all that there is.
 pub(crate) fn verdict_text(run: &RunReport) -> Message {
     let other = if run.changes.is_empty() { "" } else { "other " };
     let unknown = undecided_text(&run.undecided);
     match run.verdict() {
-        // Changes on some drives say nothing of drives without knowledge.
+        // Changes of some drives do not show what the undecided drives did.
         RunVerdict::Changed if run.undecided.is_empty() => Message::default(),
         RunVerdict::Changed => message!("For some drives the runs cannot show a change. {}", unknown),
-        RunVerdict::CannotTell => message!("Cannot tell whether anything changed. {}", unknown),
+        RunVerdict::CannotTell => message!("The runs cannot show whether anything changed. {}", unknown),
         RunVerdict::DifferentWithoutCause => message!(
             "The runs differ, but no {other}single change explains how: the base parameters below differ by more than noise and \
              model error. The model may lack an effect that depends on the motion. Find it with {}, then compare the runs again.{}",
@@ -404,9 +404,9 @@ fn write_many_runs(later: &[RunReport], lines: &mut Vec<String>, style: Terminal
 fn change_json(between: [usize; 2], change: &RunChange) -> Value {
     let (kind, at, estimates) = change.change.parts(change.unit);
     // Sizes of the change with standard deviations.
-    let estimates = estimates.iter().map(|(name, estimate, unit)| {
-        json!({ "name": name, "value": estimate.value, "std": estimate.deviation, "unit": unit })
-    });
+    let estimates = estimates.iter().map(
+        |(name, estimate, unit)| json!({ "name": name, "value": estimate.value, "std": estimate.std, "unit": unit }),
+    );
     // Only contacts have a time.
     let interval = match &change.change {
         PhysicalChange::ContactEvent { interval, .. } => Some(interval),
@@ -434,8 +434,8 @@ fn write_shared_fit(fit: &SharedFit, lines: &mut Vec<String>, style: TerminalSty
         count(n, "base parameter", "base parameters")
     )));
     // A value without standard deviation was not determined.
-    let text = |value: FittedValue| match value.deviation {
-        Some(deviation) => with_deviation(value.value, deviation),
+    let text = |value: FittedValue| match value.std {
+        Some(std) => with_std(value.value, std),
         None => ["not identifiable".to_owned(), String::new()],
     };
     if !fit.gains.is_empty() {
@@ -456,18 +456,18 @@ fn write_shared_fit(fit: &SharedFit, lines: &mut Vec<String>, style: TerminalSty
         lines.push(format!("  {file}"));
         // A change relative to the first run is marked as such.
         let row = |one: &RunValue| {
-            let [value, deviation] = text(one.value);
+            let [value, std] = text(one.value);
             let against = if one.is_against_first {
                 "relative to the first run"
             } else {
                 ""
             };
-            [one.quantity.as_str(), &one.name, &value, &deviation, &one.unit, against]
+            [one.quantity.as_str(), &one.name, &value, &std, &one.unit, against]
                 .map(str::to_owned)
                 .to_vec()
         };
         // Values that a run does not determine are listed below the table.
-        let known = values.iter().filter(|one| one.value.deviation.is_some());
+        let known = values.iter().filter(|one| one.value.std.is_some());
         let rows: Vec<Vec<String>> = known.map(row).collect();
         let columns = [
             ("of", ColumnAlignment::Left),
@@ -478,7 +478,7 @@ fn write_shared_fit(fit: &SharedFit, lines: &mut Vec<String>, style: TerminalSty
             ("", ColumnAlignment::Left),
         ];
         lines.extend(table(4, &columns, &rows));
-        let unknown = values.iter().filter(|one| one.value.deviation.is_none());
+        let unknown = values.iter().filter(|one| one.value.std.is_none());
         let unknown: Vec<String> = unknown.map(|one| format!("{} of {}", one.name, one.quantity)).collect();
         if !unknown.is_empty() {
             lines.push(format!("    not identifiable: {}", unknown.join(", ")));
@@ -517,10 +517,7 @@ mod tests {
         let offset = RunChange {
             change: PhysicalChange::Offset {
                 drive: "joint0".to_owned(),
-                force: ChangeEstimate {
-                    value: 2.0,
-                    deviation: 0.1,
-                },
+                force: ChangeEstimate { value: 2.0, std: 0.1 },
             },
             gain: 400.0,
             unit: "N m",
@@ -537,7 +534,7 @@ mod tests {
                     let denies = says.contains("No change found") || says.contains("No other change found");
                     assert_eq!(denies, !is_changed && moved == 0 && undecided < 2, "{says}");
                     let is_unknown = !is_changed && undecided == 2;
-                    assert_eq!(says.contains("Cannot tell"), is_unknown, "{says}");
+                    assert_eq!(says.contains("cannot show whether"), is_unknown, "{says}");
                     assert_eq!(says.contains("94.0 %"), undecided > 0, "{says}");
                 }
             }

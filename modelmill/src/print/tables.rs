@@ -49,7 +49,7 @@ pub fn parameters(parameters: &[FitParameter]) -> Vec<String> {
             ("nominal", ColumnAlignment::Right),
             ("identified", ColumnAlignment::Right),
             ("std", ColumnAlignment::Right),
-            ("std", ColumnAlignment::Right),
+            ("std, %", ColumnAlignment::Right),
             ("unit", ColumnAlignment::Left),
         ],
         &rows,

@@ -19,6 +19,7 @@ use modelmill_boundary::text::{Message, OptionName, Remedy};
 use modelmill_identify::diagnose::white_noise;
 use modelmill_identify::{
     DECIMATION_PASSBAND, LowPass, PreparationChoices, PreparedRun, RecordingNote, SignalRecording as Raw,
+    float_to_count,
 };
 use nalgebra::DMatrix;
 
@@ -29,7 +30,7 @@ use super::held_out::{
 };
 use super::options::RecordingOptions;
 use super::raised_cutoff::{ComparedBand, RaisedWindow, is_harmless};
-use super::smoother::{SmootherCandidate, floor_to_count, series_up_to};
+use super::smoother::{SmootherCandidate, series_up_to};
 use super::stick::StickPhases;
 use super::thresholds::{
     DECIMATION_FEWEST_KEPT, SAME_RATE_TOLERANCE, SAME_RESIDUAL_TOLERANCE, SMOOTHING_LEAST_GAIN,
@@ -344,7 +345,7 @@ impl<'a> SmootherSearch<'a> {
         let most = all.map(|one| one.raw.samples() / DECIMATION_FEWEST_KEPT).min()?;
         // Passbands increase, so that the strongest decimation is tested first.
         for part in PARALLEL {
-            let factor = floor_to_count(DECIMATION_PASSBAND * self.open.rate_hz / (part * self.open.band_hz));
+            let factor = float_to_count(DECIMATION_PASSBAND * self.open.rate_hz / (part * self.open.band_hz));
             let factor = factor.min(most).max(1);
             let passed = if factor == 1 {
                 f64::INFINITY
@@ -441,7 +442,7 @@ impl<'a> SmootherSearch<'a> {
 
     /// Number of samples per sample at which the model is evaluated.
     fn evaluation_step(&self) -> usize {
-        floor_to_count(self.open.rate_hz / self.evaluation_rate()).max(1)
+        float_to_count(self.open.rate_hz / self.evaluation_rate()).max(1)
     }
 
     /// The runs of each recording prepared with a smoother; `None` if that fails.
@@ -566,7 +567,7 @@ impl<'a> SmootherSearch<'a> {
             let n = one.forces.nrows();
             let filtered = one.low_passed(passed, rate)?;
             let margin = margin(n, rate, band);
-            let thin = floor_to_count(rate / (4.0 * passed.min(self.open.band_hz * 4.0))).max(1);
+            let thin = float_to_count(rate / (4.0 * passed.min(self.open.band_hz * 4.0))).max(1);
             if folds.is_empty() {
                 folds = vec![FoldSums::new(one.forces.ncols(), one.regressor.ncols()); FOLDS];
             }

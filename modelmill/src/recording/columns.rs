@@ -85,9 +85,9 @@ pub(crate) fn read_options(
             Err(fault) => {
                 faults.push(Error::input(message!(
                     "{file}: the model file takes `{ours}` from `{text}`, but {fault} {} \
-                     Map one onto it with {}",
+                     Assign one of them with {}",
                     column_list_text(header),
-                    map(ours, "THEIRS")
+                    map(ours, "COLUMN")
                 )));
             }
         }

@@ -1,11 +1,10 @@
 //! The residual of forces on held-out parts of a run: the pieces of its computation. Rows of windows go in; normal
 //! equations of each fold, the values that fit the other folds, and the power of the residual by octaves come out.
 
-use modelmill_identify::LowPass;
+use modelmill_identify::{LowPass, float_to_count};
 use nalgebra::{DMatrix, DVector};
 
 use super::friction_rows::{solve_scaled, symmetric};
-use super::smoother::floor_to_count;
 use super::thresholds::SMOOTHING_ROWS_PER_COLUMN;
 
 /// Number of parts of the time, each of which is held out once.
@@ -109,7 +108,7 @@ impl OctavePower {
 
 /// Number of samples at both ends of `n` that a low-pass at `band`, Hz, distorts.
 pub(super) fn margin(n: usize, rate: f64, band: f64) -> usize {
-    floor_to_count((DROPPED.0 * rate / band).min(DROPPED.1 * n as f64))
+    float_to_count((DROPPED.0 * rate / band).min(DROPPED.1 * n as f64))
 }
 
 /// Sums over the rows of one fold, drive by drive.

@@ -26,11 +26,13 @@ pub struct RecordingOptions {
     pub standstill: StandstillRule,
 }
 
-/// Which forces are left out of fits and error figures because a drive sticks or reverses. Dry friction may have any
-/// value there, between zero and its value in motion.
+/// Which forces a prepared recording leaves out of all fits and error figures, because a drive sticks or reverses: dry
+/// friction may have any value there, between zero and its value in motion.
+///
+/// [`EstimatorOptions::standstill`](crate::identify::EstimatorOptions::standstill) leaves out equations of one fit only.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum StandstillRule {
-    /// Forces in phases in which the recording shows that the drive sticks.
+    /// Forces of stick phases, which are detected from rates and forces.
     #[default]
     Automatic,
     /// Forces at rates below this fraction of the largest rate of the drive.

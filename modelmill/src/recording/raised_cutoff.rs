@@ -6,8 +6,9 @@
 //! that the residual falls by this change; noise of the positions is not, and must be small relative to the noise of
 //! the forces.
 
+use modelmill_identify::float_to_count;
+
 use super::held_out::{FOLDS, FoldSums, WindowSamples, fit_folds, margin};
-use super::smoother::floor_to_count;
 use super::thresholds::{RAISED_LEAST_MOTION_SHARE, RAISED_MOST_NOISE_RATIO, RAISED_MOTION_SIGMAS};
 
 /// Rows of one window at both cut-offs.
@@ -65,7 +66,7 @@ pub(super) fn is_harmless(
     let drives = first.forces.ncols();
     // One fit to all rows: the values of a model that is fitted without any of the folds.
     let mut folds = vec![FoldSums::new(drives, first.regressor.ncols()); FOLDS];
-    let thin = floor_to_count(band.rate / (4.0 * band.passed)).max(1);
+    let thin = float_to_count(band.rate / (4.0 * band.passed)).max(1);
     let mut counted = 0;
     for one in &passed {
         let edge = margin(one.lower.forces.nrows(), band.rate, band.passed);

@@ -1,6 +1,6 @@
 //! Candidates for the smoothing of positions: low-pass filters, and Fourier series if a motion is periodic.
 
-use modelmill_identify::{SmoothingMethod, StatePreparation};
+use modelmill_identify::{SmoothingMethod, StatePreparation, float_to_count};
 
 use crate::text::table::significant;
 
@@ -35,7 +35,7 @@ impl SmootherCandidate {
 
     /// Number of harmonics; `None` for a low-pass.
     pub(super) fn harmonics(self) -> Option<usize> {
-        Some(floor_to_count(self.cutoff * self.period?))
+        Some(float_to_count(self.cutoff * self.period?))
     }
 
     /// Sets the candidate in the options of a preparation of a motion with the given period, s.
@@ -79,21 +79,11 @@ impl SmootherCandidate {
 
 /// Fourier series up to a frequency, Hz, with decreasing numbers of harmonics.
 pub(super) fn series_up_to(highest: f64, period: f64) -> Vec<SmootherCandidate> {
-    let mut harmonics = floor_to_count(highest * period).clamp(1, MOST_HARMONICS);
+    let mut harmonics = float_to_count(highest * period).clamp(1, MOST_HARMONICS);
     let mut ladder = Vec::new();
     while harmonics > 0 {
         ladder.push(SmootherCandidate::series(period, harmonics));
-        harmonics = floor_to_count(harmonics as f64 / FEWER);
+        harmonics = float_to_count(harmonics as f64 / FEWER);
     }
     ladder
-}
-
-/// A count that was computed, rounded down.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a float becomes the nearest count there is"
-)]
-pub(super) fn floor_to_count(value: f64) -> usize {
-    value as usize
 }

@@ -3,6 +3,8 @@
 
 use std::fmt::Write as _;
 
+use modelmill_identify::float_to_count;
+
 use crate::text::svg::{escape, thin_out};
 
 /// Width of a picture in its own units.
@@ -107,8 +109,7 @@ impl PlotAxis {
         let steps: &[f64] = if decades <= 2.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
         #[expect(clippy::cast_possible_truncation, reason = "exponents of ten")]
         let (low, high) = (self.from.log10().floor() as i32, self.to.log10().ceil() as i32);
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few decades")]
-        let every = ((decades / most.max(1) as f64).ceil() as usize).max(1);
+        let every = float_to_count((decades / most.max(1) as f64).ceil()).max(1);
         for exponent in (low..=high).step_by(every) {
             for step in steps {
                 let value = step * 10_f64.powi(exponent);
@@ -142,8 +143,7 @@ fn label(value: f64, step: f64) -> String {
         let text = format!("{value:.1e}");
         return text.replace(".0e", "e");
     }
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few decimals")]
-    let decimals = (-(step.abs() * 1.001).log10().floor()).max(0.0) as usize;
+    let decimals = float_to_count((-(step.abs() * 1.001).log10().floor()).max(0.0));
     format!("{value:.decimals$}").replace('-', "−")
 }
 

@@ -3,6 +3,8 @@
 
 use std::fmt::Write as _;
 
+use modelmill_identify::float_to_count;
+
 use super::draw::{PlotAxis, SvgPicture, range};
 use super::units::{force_unit, variable_unit};
 use crate::diagnose::ModelVersion;
@@ -41,12 +43,7 @@ impl ErrorGrid {
         }
         // The largest value belongs to the last cell.
         let cell = |v: f64, [low, high]: [f64; 2], n: usize| -> usize {
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "a cell between 0 and n"
-            )]
-            let k = ((v - low) / (high - low) * n as f64) as usize;
+            let k = float_to_count((v - low) / (high - low) * n as f64);
             k.min(n - 1)
         };
         let pairs = x.iter().zip(y);
@@ -189,8 +186,7 @@ fn picture(maps: &[(&str, Vec<Option<f64>>)], grid: &ErrorGrid, names: &[String;
         // Cells of one shade are one path, so that the file stays small.
         for (cell, size) in map.iter().enumerate() {
             let Some(size) = size else { continue };
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a shade")]
-            let shade = (size / largest.max(f64::MIN_POSITIVE) * SHADES as f64) as usize;
+            let shade = float_to_count(size / largest.max(f64::MIN_POSITIVE) * SHADES as f64);
             let (column, row) = (cell % COLUMNS, cell / COLUMNS);
             let _ = write!(
                 shades[shade.min(SHADES - 1)],

@@ -134,7 +134,8 @@ fn steps_section(findings: &DiagnosisFindings) -> String {
          <p>All errors are nrms: rms of measured minus calculated force, divided by rms of the measured force. Each step was \
          tested {}. <i>t value of the decrease</i>: the mean decrease of the squared error over blocks of time, divided by its \
          standard error. <i>effective samples</i>: the number of independent samples that are worth as much as the correlated \
-         residuals.</p>\n{}",
+         residuals. <i>noise of the force, at most</i>: estimated from the differences of successive samples; the standard \
+         deviations of missing effects assume at least this noise.</p>\n{}",
         findings.validation.phrase(),
         steps::picture(findings),
         tables::steps(findings),
@@ -264,7 +265,8 @@ fn location(findings: &DiagnosisFindings) -> String {
     if !findings.places.regions.is_empty() {
         let _ = writeln!(
             html,
-            "<p>Each picture shows mean and standard deviation of the error over one variable. The range named in its caption is shaded. The same samples may be in the ranges of several variables, so the percentages do not add up to 100 %. {}</p>",
+            "<p>Mean and standard deviation of the error over one variable. The range named in the caption is shaded. The same \
+             samples may be in the ranges of several variables. {}</p>",
             legend(after.is_some())
         );
         html.push_str(&regions::figures(
@@ -349,7 +351,7 @@ fn parameters(findings: &DiagnosisFindings) -> String {
     let mut html = String::new();
     match findings.after.version() {
         Some(after) => {
-            html.push_str("<p>Base parameters of the model with the effects, fitted by weighted least squares: the equations of each drive are divided by the standard deviation of its residual. The standard deviations below take into account that residuals are correlated in time.</p>\n");
+            html.push_str("<p>Base parameters of the model with the effects, fitted by weighted least squares: the equations of each drive are divided by the standard deviation of its residual. The standard deviations allow for residuals that are correlated in time.</p>\n");
             html.push_str(&tables::parameters(after));
             let _ = writeln!(
                 html,
@@ -358,7 +360,7 @@ fn parameters(findings: &DiagnosisFindings) -> String {
             );
         }
         None => {
-            html.push_str("<p>Base parameters, fitted by weighted least squares: the equations of each drive are divided by the standard deviation of its residual. The standard deviations below take into account that residuals are correlated in time.</p>\n");
+            html.push_str("<p>Base parameters, fitted by weighted least squares: the equations of each drive are divided by the standard deviation of its residual. The standard deviations allow for residuals that are correlated in time.</p>\n");
             html.push_str(&tables::parameters(&findings.before));
         }
     }

@@ -4,7 +4,7 @@
 use std::cmp::Ordering;
 use std::fmt::Write as _;
 
-use modelmill_identify::{ErrorRegion, TIME_COLUMN};
+use modelmill_identify::{ErrorRegion, TIME_COLUMN, float_to_count};
 
 use super::draw::{PlotAxis, SvgPicture, range, with_room};
 use super::maps::MapVariable;
@@ -165,8 +165,7 @@ fn bin_errors(over: &[f64], error: &[f64]) -> Vec<ErrorBin> {
     // Number, sum and sum of squares of the error in each segment.
     let mut sums = vec![(0.0, 0.0, 0.0); BINS];
     for (v, e) in over.iter().zip(error).filter(|(v, e)| v.is_finite() && e.is_finite()) {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a bin")]
-        let k = ((v - low) / (high - low) * BINS as f64) as usize;
+        let k = float_to_count((v - low) / (high - low) * BINS as f64);
         let sum = &mut sums[k.min(BINS - 1)];
         *sum = (sum.0 + 1.0, sum.1 + e, sum.2 + e * e);
     }

@@ -139,13 +139,9 @@ fn points(compared: &RunsComparison) -> String {
 fn value(fitted: Option<FittedValue>) -> TableCell {
     // A value without standard deviation was not determined.
     match fitted {
-        Some(FittedValue {
-            value,
-            deviation: Some(deviation),
-        }) => TableCell::number(
-            &format!("{} ± {}", significant(value, 5), significant(deviation, 2)),
-            value,
-        ),
+        Some(FittedValue { value, std: Some(std) }) => {
+            TableCell::number(&format!("{} ± {}", significant(value, 5), significant(std, 2)), value)
+        }
         _ => TableCell::text("not identifiable"),
     }
 }
@@ -252,7 +248,7 @@ fn parameters(compared: &RunsComparison) -> String {
 
 /// A value and its standard deviation, if the run determines it.
 fn determined(fitted: FittedValue) -> Option<[f64; 2]> {
-    Some([fitted.value, fitted.deviation.filter(|d| *d > 0.0)?])
+    Some([fitted.value, fitted.std.filter(|d| *d > 0.0)?])
 }
 
 /// One base parameter over the runs.
@@ -291,9 +287,9 @@ pub fn parameter_history(
     let mut picture = SvgPicture::new(WIDTH, HEIGHT);
     picture.frame(&x, &y, what, [n.min(12), 4]);
     // One bar and one dot for each run that determines the parameter.
-    for (at, [value, deviation]) in known {
+    for (at, [value, std]) in known {
         let across = x.position(*at as f64 + 1.0);
-        let [low, high] = [-BARS, BARS].map(|b| y.position(value + b * deviation));
+        let [low, high] = [-BARS, BARS].map(|b| y.position(value + b * std));
         picture.path("curve c-fit", &format!("M{across:.1} {low:.1}V{high:.1}"));
         picture.dot("dot c-before", [across, y.position(*value)], 2.4);
     }

@@ -3,6 +3,8 @@
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 
+use modelmill_identify::float_to_count;
+
 use super::draw::{LEFT, PlotAxis, RIGHT, SvgPicture, WIDTH, range};
 use super::units::force_unit;
 use crate::diagnose::ModelVersion;
@@ -44,12 +46,7 @@ pub(crate) fn density(signal: &[f64], rate: f64) -> Vec<(f64, f64)> {
     let mut bins: Vec<usize> = (0..FREQUENCIES)
         .map(|k| {
             let share = k as f64 / (FREQUENCIES - 1) as f64;
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "between 1 and half a segment"
-            )]
-            let bin = (n as f64 / 2.0).powf(share).round() as usize;
+            let bin = float_to_count((n as f64 / 2.0).powf(share).round());
             bin.clamp(1, n / 2)
         })
         .collect();

@@ -145,7 +145,7 @@ pub(crate) fn drives(findings: &DiagnosisFindings) -> String {
     if findings.after.version().is_some() {
         head.push("#error with the effects");
     }
-    head.push("#noise of the force");
+    head.push("#noise of the force, at most");
     table("", &head, &rows)
 }
 
@@ -296,7 +296,7 @@ fn percent_cell(value: f64) -> TableCell {
     } else if percents.abs() < 10.0 {
         format!("{percents:.1} %")
     } else {
-        format!("{percents:.0} %")
+        percent(Some(value))
     };
     TableCell::number(&text.replace('-', "−"), value)
 }

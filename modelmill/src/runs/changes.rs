@@ -13,7 +13,7 @@ use crate::model::Model;
 use crate::runs::layout::RunColumnLayout;
 use crate::runs::payload::{PayloadColumns, TEN};
 use crate::runs::thresholds::{KNOWN_VALUE_SIGMAS, SCALE_CHANGE_RARITY};
-use crate::text::table::{significant, with_deviation};
+use crate::text::table::{significant, with_std};
 
 /// An estimated value with its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,19 +21,19 @@ pub struct ChangeEstimate {
     /// The value, in the unit of the quantity.
     pub value: f64,
     /// Its standard deviation, in the same unit.
-    pub deviation: f64,
+    pub std: f64,
 }
 
 impl ChangeEstimate {
     /// The value with its standard deviation and unit.
     fn text(self, unit: &str) -> String {
-        let [value, deviation] = with_deviation(self.value, self.deviation);
-        format!("{value} +- {deviation} {unit}").trim_end().to_owned()
+        let [value, std] = with_std(self.value, self.std);
+        format!("{value} +- {std} {unit}").trim_end().to_owned()
     }
 
     /// Whether its standard deviation is below a third of its size.
     fn is_known(self) -> bool {
-        KNOWN_VALUE_SIGMAS * self.deviation < self.value.abs()
+        KNOWN_VALUE_SIGMAS * self.std < self.value.abs()
     }
 }
 
@@ -106,7 +106,7 @@ impl PhysicalChange {
             Self::ContactEvent { drives, interval } => {
                 let names = drives.iter().map(|(name, _)| name.as_str()).collect();
                 // The times of an event are those of samples, so that they have no standard deviation.
-                let [from, to] = interval.map(|value| ChangeEstimate { value, deviation: 0.0 });
+                let [from, to] = interval.map(|value| ChangeEstimate { value, std: 0.0 });
                 let times = vec![("from", from, "s"), ("to", to, "s")];
                 return ("contact_event", names, times);
             }
@@ -147,7 +147,7 @@ pub struct RunChange {
     pub unit: &'static str,
     /// Names of other changes that explain the difference between the runs nearly as well.
     pub rivals: Vec<String>,
-    /// Weight of each drive in what determines a load; empty for other changes. The sum is 1.
+    /// Weight of each drive in the estimate of a load, with the sum 1; empty for other changes.
     pub drive_weights: Vec<f64>,
     /// The change as text.
     pub says: String,
@@ -245,7 +245,7 @@ pub(crate) fn clock_change(factor: ChangeEstimate) -> RunChange {
     RunChange {
         says: clock_text(factor),
         change: PhysicalChange::Clock { factor },
-        gain: ((factor.value - 1.0) / factor.deviation).powi(2),
+        gain: ((factor.value - 1.0) / factor.std).powi(2),
         unit: "1",
         rivals: Vec::new(),
         drive_weights: Vec::new(),
@@ -282,7 +282,7 @@ pub(crate) fn event(model: &Model, event: &ContactEvent) -> RunChange {
 fn physical_change(model: &Model, kind: &ChangeKind, found: &SelectedChange, values: &DVector<f64>) -> PhysicalChange {
     let estimate = |i: usize| ChangeEstimate {
         value: found.values[i],
-        deviation: found.covariance[(i, i)].max(0.0).sqrt(),
+        std: found.covariance[(i, i)].max(0.0).sqrt(),
     };
     let drive = |d: &usize| model.drives()[*d].clone();
     match kind {
@@ -383,7 +383,7 @@ fn column_of(model: &Model, drive: usize, kind: &str) -> Option<usize> {
 pub(crate) fn centre(found: &JointValues) -> [Option<ChangeEstimate>; 3] {
     let estimate = |i: usize| ChangeEstimate {
         value: found.values[i],
-        deviation: found.covariance[(i, i)].max(0.0).sqrt(),
+        std: found.covariance[(i, i)].max(0.0).sqrt(),
     };
     [1, 2, 3].map(|i| {
         let mass = found.determined[0].then(|| estimate(0));
@@ -394,7 +394,7 @@ pub(crate) fn centre(found: &JointValues) -> [Option<ChangeEstimate>; 3] {
         let variance = c(i, i) - 2.0 * value * c(0, i) + value * value * c(0, 0);
         found.determined[i].then(|| ChangeEstimate {
             value,
-            deviation: variance.max(0.0).sqrt() / mass.value.abs(),
+            std: variance.max(0.0).sqrt() / mass.value.abs(),
         })
     })
 }

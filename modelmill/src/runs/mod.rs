@@ -63,13 +63,13 @@ pub struct FittedValue {
     /// The value, in the unit of the parameter.
     pub value: f64,
     /// Its standard deviation, in the same unit; `None` if the run does not determine the parameter.
-    pub deviation: Option<f64>,
+    pub std: Option<f64>,
 }
 
 impl FittedValue {
     /// The standard deviation of its difference from another value. An unknown standard deviation counts as 0.
-    pub fn difference_deviation(self, other: Self) -> f64 {
-        let [a, b] = [self, other].map(|one| one.deviation.unwrap_or(0.0));
+    pub fn difference_std(self, other: Self) -> f64 {
+        let [a, b] = [self, other].map(|one| one.std.unwrap_or(0.0));
         a.hypot(b)
     }
 }
@@ -84,7 +84,7 @@ pub struct RunReport {
     /// Base parameters fitted to this run alone, with standard deviations that include the scatter between its parts.
     pub alone: Vec<FittedValue>,
     /// Indices of base parameters that differ from those of the first run by more than six standard deviations of
-    /// [`RunReport::difference_deviation`].
+    /// [`RunReport::difference_std`].
     pub moved: Vec<usize>,
     /// Number of drives.
     pub drives: usize,
@@ -99,8 +99,8 @@ pub struct RunReport {
 
 impl RunReport {
     /// The standard deviation of the difference of a base parameter from that of the first run.
-    pub fn difference_deviation(&self, first: &Self, parameter: usize) -> f64 {
-        self.difference_factor * first.alone[parameter].difference_deviation(self.alone[parameter])
+    pub fn difference_std(&self, first: &Self, parameter: usize) -> f64 {
+        self.difference_factor * first.alone[parameter].difference_std(self.alone[parameter])
     }
 }
 
@@ -475,7 +475,7 @@ impl<'a> RunAnalyser<'a> {
             samples: run.samples,
             alone: merge_known(self.model, |i| FittedValue {
                 value: fit.values[i],
-                deviation: fit.deviations[i],
+                std: fit.std[i],
             }),
             moved: Vec::new(),
             drives: self.layout.drives,
@@ -515,8 +515,8 @@ impl<'a> RunAnalyser<'a> {
             // Only parameters that both runs determine can be compared.
             let differs = |k: &usize| {
                 let (a, b) = (&report.alone[*k], &first.alone[*k]);
-                let is_known = a.deviation.is_some() && b.deviation.is_some();
-                is_known && (a.value - b.value).abs() > PARAMETER_CHANGE_SIGMAS * report.difference_deviation(first, *k)
+                let is_known = a.std.is_some() && b.std.is_some();
+                is_known && (a.value - b.value).abs() > PARAMETER_CHANGE_SIGMAS * report.difference_std(first, *k)
             };
             report.moved = (0..report.alone.len()).filter(differs).collect();
         }
@@ -625,7 +625,7 @@ fn fit_parameters(model: &Model, moments: &NormalEquations) -> Vec<FittedValue> 
     let noise = (solved.residual_squares / (moments.rows as f64 - solved.rank as f64).max(1.0)).max(1.0);
     merge_known(model, |i| FittedValue {
         value: solved.values[i],
-        deviation: solved.determined[i].then(|| (noise * solved.covariance[(i, i)]).sqrt()),
+        std: solved.determined[i].then(|| (noise * solved.covariance[(i, i)]).sqrt()),
     })
 }
 
@@ -637,7 +637,7 @@ fn merge_known(model: &Model, unknown: impl Fn(usize) -> FittedValue) -> Vec<Fit
         if model.is_known(k) {
             return FittedValue {
                 value: model.nominal[k],
-                deviation: Some(0.0),
+                std: Some(0.0),
             };
         }
         let i = next;

@@ -101,17 +101,14 @@ pub(crate) fn apply_gains(load: &mut PhysicalChange, weights: &[f64], gains: &[(
         return;
     };
     // Errors of the factors are due to the same known load, so that they add up.
-    let mut factor = ChangeEstimate {
-        value: 0.0,
-        deviation: 0.0,
-    };
+    let mut factor = ChangeEstimate { value: 0.0, std: 0.0 };
     for (weight, (_, gain)) in weights.iter().zip(gains).filter(|(weight, _)| **weight > 0.0) {
-        let Some(deviation) = gain.deviation else { return };
+        let Some(std) = gain.std else { return };
         factor.value += weight * gain.value;
-        factor.deviation += weight * deviation;
+        factor.std += weight * std;
     }
     if factor.value > 0.0 {
-        mass.deviation = (mass.deviation * factor.value).hypot(mass.value * factor.deviation);
+        mass.std = (mass.std * factor.value).hypot(mass.value * factor.std);
         mass.value *= factor.value;
     }
 }
@@ -134,23 +131,20 @@ mod tests {
 
     #[test]
     fn a_load_takes_over_the_uncertainty_of_the_factors() {
-        let estimate = |value: f64, deviation: f64| ChangeEstimate { value, deviation };
+        let estimate = |value: f64, std: f64| ChangeEstimate { value, std };
         let mut load = PhysicalChange::Payload {
             frame: "flange".to_owned(),
             mass: Some(estimate(3.0, 0.027)),
             centre: [None; 3],
         };
-        let gain = |value: f64| FittedValue {
-            value,
-            deviation: Some(0.08),
-        };
+        let gain = |value: f64| FittedValue { value, std: Some(0.08) };
         let gains = [("a".to_owned(), gain(1.1)), ("b".to_owned(), gain(1.1))];
         apply_gains(&mut load, &[0.5, 0.5], &gains);
         let PhysicalChange::Payload { mass: Some(mass), .. } = load else {
             panic!("{load:?}");
         };
         assert!(
-            (mass.value - 3.3).abs() < 1e-12 && (mass.deviation - 0.2418).abs() < 1e-3,
+            (mass.value - 3.3).abs() < 1e-12 && (mass.std - 0.2418).abs() < 1e-3,
             "{mass:?}"
         );
     }

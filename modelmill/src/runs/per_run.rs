@@ -380,7 +380,7 @@ impl<'a> SharedFitBuilder<'a> {
         let of_base = |k: usize| match unknown.iter().position(|one| *one == k) {
             None => Some(FittedValue {
                 value: self.model.nominal[k],
-                deviation: Some(0.0),
+                std: Some(0.0),
             }),
             Some(column) => {
                 let at = shared.iter().position(|one| *one == column)?;
@@ -391,8 +391,8 @@ impl<'a> SharedFitBuilder<'a> {
         let gain = |(d, drive): (usize, String)| {
             let scale = fitted_value(&found.shared, shared.len() + d);
             let value = scale.value.recip();
-            let deviation = scale.deviation.map(|one| one * value * value);
-            (drive, FittedValue { value, deviation })
+            let std = scale.std.map(|one| one * value * value);
+            (drive, FittedValue { value, std })
         };
         let drives = self.model.drives().into_iter().enumerate();
         let runs = self.runs.iter().zip(parts).zip(owns).zip(&found.own);
@@ -441,9 +441,9 @@ impl<'a> SharedFitBuilder<'a> {
             };
             let axes = ["x", "y", "z"].into_iter().zip(centre(&four));
             run_values.extend(axes.filter_map(|(axis, at)| {
-                let ChangeEstimate { value, deviation } = at?;
-                let deviation = Some(deviation);
-                Some(valued(axis, "m", FittedValue { value, deviation }))
+                let ChangeEstimate { value, std } = at?;
+                let std = Some(std);
+                Some(valued(axis, "m", FittedValue { value, std }))
             }));
         }
         run_values
@@ -455,7 +455,7 @@ fn fitted_value(values: &JointValues, at: usize) -> FittedValue {
     let variance = values.covariance[(at, at)].max(0.0);
     FittedValue {
         value: values.values[at],
-        deviation: values.determined[at].then(|| variance.sqrt()),
+        std: values.determined[at].then(|| variance.sqrt()),
     }
 }
 

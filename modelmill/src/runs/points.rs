@@ -1,6 +1,7 @@
 //! Permanent changes of parameters over the order of the runs, and their physical meaning.
 
 use modelmill_identify::changes::{NormalEquations, RunPair, UncertainValue, change_points, weighted_mean};
+use modelmill_identify::median;
 
 use crate::runs::thresholds::{CHANGE_POINT_RUNS, MOST_UNEXPLAINED_SHARE};
 use crate::runs::{FittedValue, PhysicalChange, RunAnalyser, RunChange, RunStatistics};
@@ -18,8 +19,8 @@ pub struct ParameterStep {
 
 impl ParameterStep {
     /// The size of the step in its standard deviations.
-    fn deviations(&self) -> f64 {
-        (self.now.value - self.before.value).abs() / self.before.difference_deviation(self.now)
+    fn sigmas(&self) -> f64 {
+        (self.now.value - self.before.value).abs() / self.before.difference_std(self.now)
     }
 }
 
@@ -88,9 +89,9 @@ pub(crate) fn find_change_points(
         bounds.push(runs.len());
         for three in bounds.windows(3) {
             let [before, now] = [three[0]..three[1], three[1]..three[2]].map(|some| {
-                let (value, deviation) = weighted_mean(&known[some])?;
-                let deviation = Some(deviation);
-                Some(FittedValue { value, deviation })
+                let (value, std) = weighted_mean(&known[some])?;
+                let std = Some(std);
+                Some(FittedValue { value, std })
             });
             if let (Some(before), Some(now)) = (before, now) {
                 let parameter = *parameter;
@@ -106,11 +107,11 @@ pub(crate) fn find_change_points(
         let (start, at, end) = (three[0], three[1], three[2]);
         let own = steps.iter().filter(|(run, _)| run.abs_diff(at) <= CHANGE_POINT_RUNS);
         let mut own: Vec<ParameterStep> = own.map(|(_, step)| *step).collect();
-        own.sort_by(|a, b| b.deviations().total_cmp(&a.deviations()));
+        own.sort_by(|a, b| b.sigmas().total_cmp(&a.sigmas()));
         let both = RunPair {
             reference: wholes[start..at].to_vec(),
             later: wholes[at..end].to_vec(),
-            within_run_spread: median(&within[start..end]),
+            within_run_spread: median(within[start..end].to_vec()),
         };
         let mut found = bench.significant_changes(&both, &before.sizes, &doubts.believed);
         bench.drop_unknown_friction(&mut found, |drive| doubts.stands[drive]);
@@ -146,7 +147,7 @@ pub(crate) fn adopt_drive_weights(points: &mut [ChangePoint], runs: &[&[RunChang
 
 /// The value with its standard deviation, if the run determines it.
 fn known_value(fitted: FittedValue) -> Option<UncertainValue> {
-    Some((fitted.value, fitted.deviation.filter(|d| *d > 0.0)?))
+    Some((fitted.value, fitted.std.filter(|d| *d > 0.0)?))
 }
 
 /// Indices of runs at which steps begin. Of neighbouring runs the one with the clearest steps is taken, since a
@@ -154,7 +155,7 @@ fn known_value(fitted: FittedValue) -> Option<UncertainValue> {
 fn step_runs(steps: &[(usize, ParameterStep)]) -> Vec<usize> {
     let mut weights: Vec<(usize, f64)> = Vec::new();
     for (run, step) in steps {
-        let weight = step.deviations().powi(2);
+        let weight = step.sigmas().powi(2);
         match weights.iter_mut().find(|(at, _)| at == run) {
             Some((_, sum)) => *sum += weight,
             None => weights.push((*run, weight)),
@@ -169,13 +170,6 @@ fn step_runs(steps: &[(usize, ParameterStep)]) -> Vec<usize> {
     }
     kept.sort_unstable();
     kept
-}
-
-/// The median of some values; 0 without values.
-fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
 }
 
 #[cfg(test)]

@@ -348,9 +348,9 @@ fn weighted_least_squares(sums: &[NormalEquations]) -> Outcome<DVector<f64>> {
     // Weights start from the forces and are then computed from the residuals.
     for _ in 0..=ROUNDS {
         let mut all = NormalEquations::new(sums.first().map_or(0, |one| one.rhs.len()));
-        for (one, deviation) in sums.iter().zip(&deviations) {
-            if *deviation > 0.0 {
-                all.merge(&one.scale_weight(deviation.powi(-2)));
+        for (one, std) in sums.iter().zip(&deviations) {
+            if *std > 0.0 {
+                all.merge(&one.scale_weight(std.powi(-2)));
             }
         }
         values = all.solve().values;

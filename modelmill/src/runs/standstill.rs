@@ -2,12 +2,14 @@
 //! and smoothing of positions has moved the time at which the rate changes its sign. Two runs of one machine would then
 //! differ in dry and viscous friction only because they reverse at different speeds.
 
+use modelmill_identify::diagnose::top_speed;
+
 use crate::along::drive_rates;
 use crate::error::Outcome;
 use crate::model::Model;
 use crate::runs::thresholds::{
     NOISE_REVERSALS_PER_CUTOFF, RECORDED_CUTOFF_SHARE, ROUNDING_RATE, RUN_STANDSTILL_SHARE,
-    STANDING_FEWEST_MOVING_SHARE, TOP_SPEED_QUANTILE,
+    STANDING_FEWEST_MOVING_SHARE,
 };
 use crate::segment::RecordingSegment;
 
@@ -23,7 +25,7 @@ pub(crate) fn exclude_uncertain_friction(model: &Model, segments: &mut [Recordin
     let mut stands = vec![false; drives];
     for (drive, stands) in stands.iter_mut().enumerate() {
         let own: Vec<&[f64]> = rates.iter().map(|run| run[drive].as_slice()).collect();
-        let bound = RUN_STANDSTILL_SHARE * top_speed(&own);
+        let bound = RUN_STANDSTILL_SHARE * top_speed(own.iter().copied().flatten());
         let moving: Vec<Vec<bool>> = (segments.iter().zip(&own))
             .map(|(segment, rate)| moving_rows(rate, segment.decimation(), bound))
             .collect();
@@ -67,23 +69,6 @@ fn is_rate_noise(segment: &RecordingSegment, rate: &[f64], bound: f64) -> bool {
     is_zero || !is_series && reversals as f64 > NOISE_REVERSALS_PER_CUTOFF * cutoff * duration
 }
 
-/// The usual largest speed: single wrong samples do not raise it.
-fn top_speed(rates: &[&[f64]]) -> f64 {
-    let mut speeds: Vec<f64> = rates.iter().flat_map(|run| run.iter().map(|rate| rate.abs())).collect();
-    if speeds.is_empty() {
-        return 0.0;
-    }
-    speeds.sort_by(f64::total_cmp);
-    let last = speeds.len() - 1;
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "the index lies between 0 and the last one"
-    )]
-    let at = (TOP_SPEED_QUANTILE * last as f64) as usize;
-    speeds[at.min(last)]
-}
-
 /// Whether a drive moves in each decimated row. The low-pass before decimation also uses the samples around a row.
 fn moving_rows(rate: &[f64], every: usize, bound: f64) -> Vec<bool> {
     let moves = |row: usize| {
@@ -106,6 +91,6 @@ mod tests {
         let rows = moving_rows(&rate, 4, 0.05);
         let standing: Vec<usize> = (0..rows.len()).filter(|k| !rows[*k]).collect();
         assert_eq!(standing, [5]);
-        assert!((top_speed(&[&rate]) - 1.9).abs() < 1e-9);
+        assert!((top_speed(&rate) - 1.9).abs() < 1e-9);
     }
 }

@@ -182,7 +182,7 @@ impl ReferenceFit {
         let covariance = solved.unit_covariance();
         Ok(merge_known(&self.model, |i| FittedValue {
             value: solved.values[i],
-            deviation: solved.determined[i].then(|| (noise * covariance[(i, i)]).sqrt()),
+            std: solved.determined[i].then(|| (noise * covariance[(i, i)]).sqrt()),
         }))
     }
 

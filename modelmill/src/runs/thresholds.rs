@@ -26,9 +26,6 @@ pub(super) const ROWS_PER_PARAMETER: f64 = 2.0;
 /// samples is identified exactly with it.
 pub(super) const RUN_STANDSTILL_SHARE: f64 = 0.03;
 
-/// The usual largest speed is this quantile of the speeds (1). By judgement.
-pub(super) const TOP_SPEED_QUANTILE: f64 = 0.98;
-
 /// A drive that moves in less than this share of the equations (1) stands, and keeps all of them. By judgement.
 pub(super) const STANDING_FEWEST_MOVING_SHARE: f64 = 0.1;
 

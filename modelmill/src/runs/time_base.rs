@@ -81,16 +81,16 @@ impl TimeBase {
             let (Some((a, da)), Some((b, db))) = (mean_slope(first), mean_slope(later)) else {
                 continue;
             };
-            let deviation = (a / b).abs() * (da / a).hypot(db / b);
-            ratios.push((a / b, deviation.max(f64::EPSILON).powi(-2)));
+            let std = (a / b).abs() * (da / a).hypot(db / b);
+            ratios.push((a / b, std.max(f64::EPSILON).powi(-2)));
         }
         let weight: f64 = ratios.iter().map(|(_, w)| w).sum();
         let value = ratios.iter().map(|(x, w)| x * w).sum::<f64>() / weight;
         // Coordinates that disagree make the ratio uncertain: a clock is the same for all.
         let scatter: f64 = ratios.iter().map(|(x, w)| w * (x - value).powi(2)).sum();
         let scatter = scatter / (ratios.len() as f64 - 1.0).max(1.0);
-        let deviation = (scatter.max(1.0) / weight).sqrt();
-        (value.is_finite() && deviation.is_finite()).then_some(ChangeEstimate { value, deviation })
+        let std = (scatter.max(1.0) / weight).sqrt();
+        (value.is_finite() && std.is_finite()).then_some(ChangeEstimate { value, std })
     }
 
     /// The changed clock of a later run; `None` if the clock is unknown or did not change. The first result states
@@ -99,9 +99,9 @@ impl TimeBase {
         let ratio = self.ratio(later);
         let is_changed = |one: &ChangeEstimate| {
             let error = (one.value - 1.0).abs();
-            error > TIME_BASE_LEAST_ERROR && error > TIME_BASE_SIGMAS * one.deviation
+            error > TIME_BASE_LEAST_ERROR && error > TIME_BASE_SIGMAS * one.std
         };
-        let is_known = |one: &ChangeEstimate| TIME_BASE_SIGMAS * one.deviation < TIME_BASE_LEAST_ERROR;
+        let is_known = |one: &ChangeEstimate| TIME_BASE_SIGMAS * one.std < TIME_BASE_LEAST_ERROR;
         (
             ratio.as_ref().is_some_and(|one| is_known(one) || is_changed(one)),
             ratio.filter(is_changed),
@@ -213,10 +213,10 @@ fn mean_slope(slopes: &[WindowSlope]) -> Option<(f64, f64)> {
     let weight: f64 = slopes.iter().map(|one| one.weight).sum();
     let mean = slopes.iter().map(|one| one.weight * one.slope).sum::<f64>() / weight;
     let squares = slopes.iter().map(|one| one.weight.powi(2) * (one.slope - mean).powi(2));
-    let deviation = (n / (n - 1.0) * squares.sum::<f64>()).sqrt() / weight;
+    let std = (n / (n - 1.0) * squares.sum::<f64>()).sqrt() / weight;
     // Windows cannot agree better than their own noise allows.
-    let deviation = deviation.max(weight.sqrt().recip());
-    (mean.is_finite() && deviation.is_finite() && mean.abs() > 0.0).then_some((mean, deviation))
+    let std = std.max(weight.sqrt().recip());
+    (mean.is_finite() && std.is_finite() && mean.abs() > 0.0).then_some((mean, std))
 }
 
 #[cfg(test)]
@@ -242,10 +242,7 @@ mod tests {
             let (is_known, found) = signals(1.0, 3.0).changed_clock(&later);
             let found = found.expect("a change");
             let off = (found.value - speed).abs();
-            assert!(
-                is_known && off < 5e-4 && off < 5.0 * found.deviation,
-                "{speed}: {found:?}"
-            );
+            assert!(is_known && off < 5e-4 && off < 5.0 * found.std, "{speed}: {found:?}");
         }
         assert_eq!(signals(1.0, 3.0).changed_clock(&signals(1.0, 5.0)), (true, None));
         assert_eq!(signals(1.0, 3.0).changed_clock(&TimeBase::default()), (false, None));

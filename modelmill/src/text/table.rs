@@ -73,15 +73,15 @@ pub fn all_digits(value: f64) -> String {
 /// A value and its standard deviation, both rounded to the second digit of the standard deviation.
 ///
 /// ```
-/// assert_eq!(modelmill::text::table::with_deviation(1.23456, 0.012), ["1.235", "0.012"]);
+/// assert_eq!(modelmill::text::table::with_std(1.23456, 0.012), ["1.235", "0.012"]);
 /// ```
-pub fn with_deviation(value: f64, deviation: f64) -> [String; 2] {
+pub fn with_std(value: f64, std: f64) -> [String; 2] {
     // Position of the first digit of the standard deviation.
-    let exponent = deviation.abs().log10().floor();
+    let exponent = std.abs().log10().floor();
     let decimals = 1.0 - exponent;
     // Very large and very small standard deviations use significant digits instead.
     if !(value.is_finite() && (0.0..=12.0).contains(&decimals)) {
-        return [number(value), number(deviation)];
+        return [number(value), number(std)];
     }
     #[expect(
         clippy::cast_possible_truncation,
@@ -89,7 +89,7 @@ pub fn with_deviation(value: f64, deviation: f64) -> [String; 2] {
         reason = "a whole number from 0 to 12"
     )]
     let decimals = decimals as usize;
-    [value, deviation].map(|x| format!("{x:.decimals$}"))
+    [value, std].map(|x| format!("{x:.decimals$}"))
 }
 
 /// A number with some significant digits; very large and very small ones with an exponent.

@@ -87,7 +87,7 @@ impl VerificationLimits {
                 "effects" => limits.read_effects(&place, value.get_ref(), at)?,
                 other => {
                     let says = format!(
-                        "there is no entry `{other}`; the tables are [all_drives], [drives.NAME], [parameters] and [effects]"
+                        "unknown entry `{other}`; the tables are [all_drives], [drives.NAME], [parameters] and [effects]"
                     );
                     return Err(place.error(key.span().start, &says));
                 }
@@ -181,8 +181,7 @@ impl VerificationLimits {
                 }
                 ("accepted", _) => return Err(place.error(at, ACCEPTED)),
                 (other, _) => {
-                    let says =
-                        format!("there is no entry `{other}` in [effects]; use `most_probability` or `accepted`");
+                    let says = format!("unknown entry `{other}` in [effects]; use `most_probability` or `accepted`");
                     return Err(place.error(key.span().start, &says));
                 }
             }

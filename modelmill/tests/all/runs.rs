@@ -37,7 +37,7 @@ fn held(model: &Model, recordings: &[&PreparedRecording], asked: &RunsOptions) -
 fn is_near(found: &ChangeEstimate, truth: f64, part: f64) {
     let off = (found.value - truth).abs();
     assert!(
-        off < part * truth.abs() && off < 6.0 * found.deviation,
+        off < part * truth.abs() && off < 6.0 * found.std,
         "{found:?} is not {truth}"
     );
 }
@@ -257,28 +257,25 @@ fn what_is_each_runs_own_is_told_in_one_fit() {
     let own = |run: usize, name: &str| {
         let mut values = fit.runs[run].1.iter();
         let value = values.find(|one| one.name == name).expect("a value").value;
-        let deviation = value.deviation.expect("a deviation");
+        let std = value.std.expect("a standard deviation");
         ChangeEstimate {
             value: value.value,
-            deviation,
+            std,
         }
     };
     for run in [1, 2] {
         is_near(&own(run, "mass"), 2.8, 0.05);
         for (axis, truth) in [("x", 0.03), ("y", -0.02), ("z", 0.08)] {
             let at = own(run, axis);
-            assert!(
-                (at.value - truth).abs() < (6.0 * at.deviation).min(0.01),
-                "{axis}: {at:?}"
-            );
+            assert!((at.value - truth).abs() < (6.0 * at.std).min(0.01), "{axis}: {at:?}");
         }
     }
     let more = |name: &str| {
         let [before, now] = [own(1, name), own(2, name)];
-        let deviation = before.deviation.hypot(now.deviation);
+        let std = before.std.hypot(now.std);
         ChangeEstimate {
             value: now.value - before.value,
-            deviation,
+            std,
         }
     };
     is_near(&more("Fc"), 0.9, 0.2);
@@ -313,12 +310,9 @@ fn a_known_load_tells_the_scales_of_all_forces() {
     let found = held(&model, &[&bare, &loaded], &load("runs-puma560-1401.csv=2.8@link6"));
     let fit = found.shared.expect("a fit");
     for ((drive, gain), scale) in fit.gains.iter().zip(scales) {
-        let deviation = gain.deviation.expect("a deviation");
+        let std = gain.std.expect("a standard deviation");
         let off = (gain.value - 1.0 / scale).abs();
-        assert!(
-            off < 5.0 * deviation && off < 0.05,
-            "{drive}: {gain:?} is not 1/{scale}"
-        );
+        assert!(off < 5.0 * std && off < 0.05, "{drive}: {gain:?} is not 1/{scale}");
     }
     let error = model.runs([Ok(&bare), Ok(&loaded)], &load("other.csv=2.8@link6"));
     let error = error.err().expect("a refusal").to_string();

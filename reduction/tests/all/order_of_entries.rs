@@ -4,10 +4,11 @@
 use std::path::Path;
 
 use modelmill_boundary::files::{DiskFiles, MemoryFiles};
-use modelmill_codegen::{Derivation, ModelEvaluator, MotionStates};
+use modelmill_codegen::{ModelEvaluator, MotionStates};
 use modelmill_reduction::{default_plan, reduce, sampled_forces};
 use modelmill_rig::Rig;
-use modelmill_runtime::RandomBits;
+
+use crate::{derived, shuffled};
 
 fn bundled() -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../model-spec/rigs/spidermill-full.toml");
@@ -15,22 +16,8 @@ fn bundled() -> String {
 }
 
 /// The rig with its entries in a random order.
-fn shuffled(text: &str, seed: u64) -> Rig {
-    let (head, rest) = text.split_once("\n[[").expect("entries");
-    let mut entries: Vec<&str> = rest.split("\n[[").collect();
-    let mut draws = RandomBits::new(seed);
-    for k in (1..entries.len()).rev() {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "below the number of entries"
-        )]
-        entries.swap(k, (draws.below_one() * (k + 1) as f64) as usize);
-    }
-    let text = entries
-        .iter()
-        .fold(head.to_owned(), |text, entry| text + "\n[[" + entry + "\n");
-    let loaded = modelmill_rig::load("shuffled.toml", &text, &DiskFiles::default());
+fn shuffled_rig(text: &str, seed: u64) -> Rig {
+    let loaded = modelmill_rig::load("shuffled.toml", &shuffled(text, seed), &DiskFiles::default());
     loaded.unwrap_or_else(|failure| panic!("{failure}")).rig
 }
 
@@ -41,17 +28,12 @@ fn model(rig: &Rig) -> String {
         .model
 }
 
-fn derived(text: &str) -> Derivation {
-    let loaded = modelmill_spec::load("model.toml", text, &MemoryFiles::default()).expect("a model");
-    modelmill_codegen::derive(&loaded.mechanism).expect("a derivation")
-}
-
 /// Seven of the eleven groups rotate as another one or not at all; two loops of five equations less remain.
 #[test]
 fn parts_that_move_alike_need_no_coordinate() {
     let text = bundled();
     for seed in 0..20 {
-        let rig = shuffled(&text, seed);
+        let rig = shuffled_rig(&text, seed);
         let model = model(&rig);
         let loaded = modelmill_spec::load("model.toml", &model, &MemoryFiles::default()).expect("a model");
         let mechanism = &loaded.mechanism;
@@ -73,7 +55,7 @@ fn parts_that_move_alike_need_no_coordinate() {
 fn base_parameters_and_forces_are_those_of_any_other_order() {
     let text = bundled();
     for seed in [3, 11] {
-        let rig = shuffled(&text, seed);
+        let rig = shuffled_rig(&text, seed);
         let derivation = derived(&model(&rig));
         assert_eq!(derivation.base_parameters().len(), 9, "seed {seed}");
         let sampled = sampled_forces(&rig, 20, 0.2).expect("forces");

@@ -4,10 +4,10 @@
 use std::path::Path;
 
 use modelmill_boundary::files::{DiskFiles, MemoryFiles};
-use modelmill_codegen::Derivation;
 use modelmill_reduction::{plan, propose_plan, reduce};
 use modelmill_rig::Rig;
-use modelmill_runtime::RandomBits;
+
+use crate::{derived, shuffled};
 
 fn rigs(name: &str) -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -20,35 +20,12 @@ fn load(path: &Path, text: &str) -> Rig {
     loaded.unwrap_or_else(|failure| panic!("{failure}")).rig
 }
 
-fn derived(text: &str) -> Derivation {
-    let loaded = modelmill_spec::load("model.toml", text, &MemoryFiles::default()).expect("a model");
-    modelmill_codegen::derive(&loaded.mechanism).expect("a derivation")
-}
-
 /// The model of the proposed plan.
 fn proposed_model(rig: &Rig) -> (String, String) {
     let proposal = propose_plan(rig).unwrap_or_else(|says| panic!("{says}"));
     let made = plan("proposed.toml", &proposal.text).unwrap_or_else(|failure| panic!("{failure}\n{}", proposal.text));
     let reduced = reduce(rig, &made).unwrap_or_else(|failure| panic!("{failure}\n{}", proposal.text));
     (reduced.model, proposal.text)
-}
-
-/// The text with its joints, points and bodies in a random order.
-fn shuffled(text: &str, seed: u64) -> String {
-    let (head, rest) = text.split_once("\n[[").expect("entries");
-    let mut entries: Vec<&str> = rest.split("\n[[").collect();
-    let mut draws = RandomBits::new(seed);
-    for k in (1..entries.len()).rev() {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "below the number of entries"
-        )]
-        entries.swap(k, (draws.below_one() * (k + 1) as f64) as usize);
-    }
-    entries
-        .iter()
-        .fold(head.to_owned(), |text, entry| text + "\n[[" + entry + "\n")
 }
 
 /// Numbers of parts, lumped masses, coordinates and loops.

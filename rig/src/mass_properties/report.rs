@@ -260,14 +260,8 @@ impl<'a> ReportReader<'a> {
                     let Some(k) = ["x", "y", "z"].iter().position(|axis| *axis == key) else {
                         continue;
                     };
-                    let factor = pick_factor(
-                        factor,
-                        &unit,
-                        self.units.length.as_deref(),
-                        length_factor,
-                        "centre of mass",
-                        span,
-                    )?;
+                    let default = self.units.length.as_deref();
+                    let factor = pick_factor(factor, &unit, default, length_factor, "centre of mass", span)?;
                     state_value(&mut self.centre[k], values[0].value * factor, "centre of mass", span)?;
                 }
                 Ok(())
@@ -277,14 +271,7 @@ impl<'a> ReportReader<'a> {
                     let Some((letter, row, column)) = entry_of(&key) else {
                         continue;
                     };
-                    let factor = pick_factor(
-                        factor,
-                        &unit,
-                        self.units.inertia.as_deref(),
-                        inertia_factor,
-                        "inertia",
-                        span,
-                    )?;
+                    let factor = self.inertia_factor(factor, &unit, span)?;
                     // L is about the centre in SolidWorks and Onshape.
                     let by_letter = (letter == 'l').then_some(InertiaPoint::Centre);
                     let Some(about) = point.or(by_letter).or(self.stated.point) else {
@@ -316,25 +303,24 @@ impl<'a> ReportReader<'a> {
                         self.axes[k] = Some([x.value, y.value, z.value]);
                     } else if let (Some(k), [value]) = (of(["px", "py", "pz"]).or(of(["i1", "i2", "i3"])), &values[..])
                     {
-                        let factor = pick_factor(
-                            factor,
-                            &unit,
-                            self.units.inertia.as_deref(),
-                            inertia_factor,
-                            "inertia",
-                            span,
-                        )?;
-                        state_value(
-                            &mut self.principal[k],
-                            value.value * factor,
-                            &format!("entry `{key}`"),
-                            span,
-                        )?;
+                        let value = value.value * self.inertia_factor(factor, &unit, span)?;
+                        state_value(&mut self.principal[k], value, &format!("entry `{key}`"), span)?;
                     }
                 }
                 Ok(())
             }
         }
+    }
+
+    /// The factor of the unit of an inertia.
+    fn inertia_factor(
+        &self,
+        heading: Option<f64>,
+        after: &str,
+        span: &std::ops::Range<usize>,
+    ) -> Result<f64, CadFault> {
+        let default = self.units.inertia.as_deref();
+        pick_factor(heading, after, default, inertia_factor, "inertia", span)
     }
 
     /// The body of the report.

@@ -92,10 +92,10 @@ impl TourText {
     pub(super) fn compare(&mut self, place: &TourFolder, model: &Model, seen: &TourComparison) {
         self.heading("2  Compare: where is the error large?");
         self.paragraph(&format!(
-            "This recording is simulated: a third-party multibody program computed the motion and the forces of the complete robot. \
-             Its robot has one effect that the model file lacks. With the nominal parameters of the model file the error \
-             is {} of the force (nrms: rms of the error divided by rms of the measured force). The upper curve is the force of \
-             one ball screw, the lower curve is its error. Each curve has its own scale:",
+            "The recording is simulated: a third-party multibody program computed the motion and the forces of a complete robot, \
+             which has one effect that the model file lacks. With the nominal parameters, the error of the model is {} of the \
+             force (nrms: rms of the error divided by rms of the measured force). The upper curve is the force of one ball \
+             screw, the lower curve its error. Each curve has its own scale:",
             percent(seen.compared.figures.nrms)
         ));
         // The curves of the first drive are an example; the table below lists where all errors are largest.
@@ -121,7 +121,7 @@ impl TourText {
         self.line("Where the error is largest:");
         self.lines(&tables::places(&seen.compared.places));
         self.line("");
-        self.paragraph("This shows where the error is large, not its cause. The next step finds the cause.");
+        self.paragraph("This shows where the error is large, not its cause.");
         self.command(&format!(
             "compare {} --data {}",
             place.name("spidermill.toml"),
@@ -135,11 +135,11 @@ impl TourText {
         let all = &findings.diagnosis.candidates;
         self.paragraph(&format!(
             "modelmill tries every effect of its library at every place of this mechanism, {} in all: friction of many kinds, \
-             springs, inertias, offsets, delays, rods. It fits different sets of them, each together with the base parameters, to one \
-             recording. It accepts an effect only if the error also falls on a second recording that the fit does not use (the \
-             validation run). The base parameters are estimated here. Therefore the error without the \
-             effect is smaller than in step 2, where they had their nominal values.",
-            count(all.len(), "candidate", "candidates")
+             springs, inertias, offsets, delays, rods. It fits sets of candidates, together with the base parameters, to one \
+             recording. It accepts an effect only if the error also falls on a second recording that is not fitted (the \
+             validation run). The base parameters are estimated, which alone reduces the error of step 2 to {}.",
+            count(all.len(), "candidate", "candidates"),
+            percent(findings.diagnosis.steps.first().map(|step| step.check))
         ));
         self.paragraph(&verdict(findings));
         // Effects that were found come first, then the best of the rejected ones.
@@ -151,7 +151,7 @@ impl TourText {
             .map(|c| {
                 vec![
                     words::effect(&c.effect),
-                    format!("{:.0} %", 100.0 * c.explained),
+                    percent(Some(c.explained)),
                     c.rejection_reason
                         .map_or("found", |why| words::refusal(why, has_findings))
                         .to_owned(),
@@ -277,14 +277,12 @@ impl TourText {
     pub(super) fn paper(&mut self, place: &TourFolder, findings: &DiagnosisFindings) {
         self.heading("6  Diagnose a published model");
         self.paragraph(
-            "The paper that describes this robot reports an error of its model. It names two causes: mainly the positions of the \
-             point masses that replace the coupling elements and the platform, and to a lesser extent the contact points of the \
-             screws on the cranks. The page docs/experiment.html examines both causes. The first one has no effect: these bodies only translate, so \
-             the positions of their centres do not change the forces. The second one leaves an error similar to that of the \
-             paper after its identification. There is a third cause, in the equations of the paper. They give half of the \
-             platform's mass m4 to each coupler. In the force balance this mass is at the joint between the couplers, but in \
-             the moment balance it is at the coupler's centre. The recording below is from a simulation of \
-             the same robot. Here the base parameters are fixed at their nominal values (`--held`), as in step 2:",
+            "The paper that describes this robot reports an error of its model. It names two causes: the positions of the point \
+             masses that replace the coupling elements and the platform, and the contact points of the screws on the cranks. \
+             modelmill finds another one, in the equations of the paper. They give half of the platform's mass m4 to each \
+             coupler. In the force balance this mass is at the joint between the couplers, but in the moment balance it is at \
+             the coupler's centre. The page docs/experiment.html examines all three causes. The recording is a simulation of the \
+             same robot without rods. The base parameters are fixed at their nominal values (`--held`), as in step 2:",
         );
         self.paragraph(&verdict(findings));
         let diagnosis = &findings.diagnosis;

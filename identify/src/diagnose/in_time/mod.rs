@@ -22,7 +22,7 @@ use super::problem::{
 use super::thresholds::{CHANGE_LEAST_ADVANTAGE, CHANGE_LEAST_SHARE, INTERVAL_LEAST_ADVANTAGE, SIMPLER_CHANGE_SHARE};
 use products::BlockProducts;
 use profile::{TimeProfile, slow_profiles};
-pub use residual::{ResidualCharacter, TimeResidual};
+pub use residual::{ResidualCharacter, TimeResidual, top_speed};
 pub(crate) use residual::{standstill_samples, time_residual};
 
 /// The force of a possible change, from the time on at which it begins.

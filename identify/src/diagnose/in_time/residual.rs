@@ -107,9 +107,10 @@ pub(crate) fn standstill_samples(problem: &DiagnosisProblem, channel: usize) -> 
     rates.iter().map(|v| v.abs() < bound).collect()
 }
 
-/// The rate that a drive exceeds in few samples only: a single spike of a rate would make slow motion a standstill.
-fn top_speed(rates: &[f64]) -> f64 {
-    let mut speeds: Vec<f64> = rates.iter().map(|v| v.abs()).collect();
+/// The magnitude of a rate that a drive exceeds in few samples only; 0 without samples. A single spike of a rate would
+/// make slow motion a standstill.
+pub fn top_speed<'a>(rates: impl IntoIterator<Item = &'a f64>) -> f64 {
+    let mut speeds: Vec<f64> = rates.into_iter().map(|v| v.abs()).collect();
     if speeds.is_empty() {
         return 0.0;
     }
@@ -139,12 +140,7 @@ fn loud_intervals(problem: &DiagnosisProblem, rest: &[f64]) -> Option<(Vec<Chang
     let wanted = (INDEPENDENT * rest.len() as f64 / worth.max(1.0)).max(WINDOW_FEWEST_SAMPLES);
     let windows = segment_values(problem, rest).flat_map(|(start, part)| {
         let count = (part.len() as f64 / wanted).floor().max(1.0);
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a count of windows"
-        )]
-        let count = count as usize;
+        let count = float_to_count(count);
         let place = move |k: usize| start + k * part.len() / count;
         (0..count).map(move |k| place(k)..place(k + 1))
     });

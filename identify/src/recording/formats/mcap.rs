@@ -13,10 +13,9 @@ use std::collections::BTreeMap;
 use std::io::{self, BufReader, Read};
 
 use crate::recording::error::RecordingFault;
-use crate::recording::formats::bag::{self, BagCollector, BagEncoding};
+use crate::recording::formats::RecordingInput;
+use crate::recording::formats::bag::{BagCollector, BagEncoding, MessageLogFormat};
 use crate::recording::formats::packing::{CompressionMethod, check_growth};
-use crate::recording::formats::{RecordingFormat, RecordingInput, TableInfo};
-use crate::recording::{ReadOptions, SignalRecording};
 
 /// First bytes of a file.
 const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
@@ -26,44 +25,21 @@ const LARGEST: u64 = 128 << 20;
 /// The format of ROS 2 and Foxglove.
 pub(crate) struct McapFormat;
 
-impl RecordingFormat for McapFormat {
-    fn suffix(&self) -> &'static str {
+impl MessageLogFormat for McapFormat {
+    fn log_suffix(&self) -> &'static str {
         " (MCAP)"
     }
 
-    fn extensions(&self) -> &'static [&'static str] {
+    fn log_extensions(&self) -> &'static [&'static str] {
         &["mcap"]
     }
 
-    fn has_signature(&self, first: &[u8]) -> bool {
+    fn has_log_signature(&self, first: &[u8]) -> bool {
         first.starts_with(&MAGIC)
     }
 
-    // The three readers differ only in what the collector keeps.
-    fn read(
-        &self,
-        input: RecordingInput<'_>,
-        file: &str,
-        options: &ReadOptions,
-    ) -> Result<SignalRecording, RecordingFault> {
-        bag::read(&mut replay_once(input), file, options)
-    }
-
-    fn names(&self, input: RecordingInput<'_>) -> Result<Vec<String>, RecordingFault> {
-        bag::names(&mut replay_once(input))
-    }
-
-    fn tables(&self, input: RecordingInput<'_>) -> Result<Vec<TableInfo>, RecordingFault> {
-        bag::tables(&mut replay_once(input))
-    }
-}
-
-/// A function that passes the messages of a file to a collector; a stream can be read only once.
-fn replay_once(input: RecordingInput<'_>) -> impl FnMut(&mut BagCollector<'_>) -> Result<(), RecordingFault> + use<'_> {
-    let mut stream = Some(input.stream());
-    move |bag| match stream.take() {
-        Some(stream) => replay_messages(stream, bag),
-        None => Ok(()),
+    fn pass_messages(&self, input: RecordingInput<'_>, bag: &mut BagCollector<'_>) -> Result<(), RecordingFault> {
+        replay_messages(input.stream(), bag)
     }
 }
 

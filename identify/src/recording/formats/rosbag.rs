@@ -6,11 +6,10 @@ use std::collections::BTreeMap;
 use std::io;
 
 use crate::recording::error::RecordingFault;
-use crate::recording::formats::bag::{self, BagCollector, BagEncoding};
+use crate::recording::formats::bag::{BagCollector, BagEncoding, MessageLogFormat};
 use crate::recording::formats::packing::CompressionMethod;
 use crate::recording::formats::sqlite::{self, SqliteDatabase, SqliteValue};
-use crate::recording::formats::{ReadSeek, RecordingFormat, RecordingInput, TableInfo};
-use crate::recording::{ReadOptions, SignalRecording};
+use crate::recording::formats::{ReadSeek, RecordingInput};
 
 /// Largest message that was compressed by itself, in bytes after decompression.
 const LONGEST_MESSAGE: u64 = 64 << 20;
@@ -20,39 +19,23 @@ const ZSTD: [u8; 4] = [0x28, 0xB5, 0x2F, 0xFD];
 /// The format of rosbag2 in SQLite.
 pub(crate) struct Rosbag2Format;
 
-impl RecordingFormat for Rosbag2Format {
-    fn suffix(&self) -> &'static str {
+impl MessageLogFormat for Rosbag2Format {
+    fn log_suffix(&self) -> &'static str {
         " (rosbag2)"
     }
 
-    fn extensions(&self) -> &'static [&'static str] {
+    fn log_extensions(&self) -> &'static [&'static str] {
         &["db3"]
     }
 
     // The signature of SQLite; whether it is a log is known only from its tables.
-    fn has_signature(&self, first: &[u8]) -> bool {
+    fn has_log_signature(&self, first: &[u8]) -> bool {
         first.starts_with(sqlite::MAGIC)
     }
 
-    fn read(
-        &self,
-        input: RecordingInput<'_>,
-        file: &str,
-        options: &ReadOptions,
-    ) -> Result<SignalRecording, RecordingFault> {
-        let mut stream = input.seekable()?;
-        // Rows are read page by page, so a file need not be in memory.
-        bag::read(&mut |bag| replay_messages(&mut stream, bag), file, options)
-    }
-
-    fn names(&self, input: RecordingInput<'_>) -> Result<Vec<String>, RecordingFault> {
-        let mut stream = input.seekable()?;
-        bag::names(&mut |bag| replay_messages(&mut stream, bag))
-    }
-
-    fn tables(&self, input: RecordingInput<'_>) -> Result<Vec<TableInfo>, RecordingFault> {
-        let mut stream = input.seekable()?;
-        bag::tables(&mut |bag| replay_messages(&mut stream, bag))
+    // Rows are read page by page, so a file need not be in memory.
+    fn pass_messages(&self, input: RecordingInput<'_>, bag: &mut BagCollector<'_>) -> Result<(), RecordingFault> {
+        replay_messages(&mut input.seekable()?, bag)
     }
 }
 

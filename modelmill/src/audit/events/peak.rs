@@ -1,9 +1,11 @@
 //! The largest force of an event: the peak of its residual. Noise raises the largest sample, and an average over the time
 //! of a short hit lowers its peak, so that a parabola is fitted about each sample.
 
+use modelmill_identify::float_to_count;
+
 use super::levels::SearchedResidual;
 use super::segments::DriveSegment;
-use super::smoothing::{floor_to_count, range_median};
+use super::smoothing::range_median;
 
 /// Half of the time over which a parabola is fitted, s.
 const PARABOLA_HALF_S: f64 = 0.02;
@@ -14,7 +16,7 @@ const LEVEL_S: f64 = 0.1;
 
 /// The largest force of a drive in a segment, N or N m. `step` is the time between samples, s.
 pub(super) fn largest_force(rest: &SearchedResidual, segment: &DriveSegment, step: f64) -> f64 {
-    let count = |seconds: f64, fewest: usize| floor_to_count(seconds / step + 1e-6).max(fewest);
+    let count = |seconds: f64, fewest: usize| float_to_count(seconds / step + 1e-6).max(fewest);
     let half = count(PARABOLA_HALF_S, 1);
     let sign = segment.force.signum();
     // At standstill dry friction gives the residual any level.

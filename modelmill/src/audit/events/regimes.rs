@@ -4,6 +4,8 @@
 //! At standstill friction takes any value up to its limit. A reading in a dead band follows no force. Such samples
 //! neither start nor end an event.
 
+use modelmill_identify::float_to_count;
+
 use super::smoothing::{dilate_mask, running_mean, true_ranges, true_share};
 use super::trace::ResidualTrace;
 use crate::audit::thresholds::{
@@ -33,7 +35,7 @@ pub(super) struct DriveRegimes {
 
 /// The samples at which something stands still for some time. `slowest` is a rate that is standstill in any case.
 pub(super) fn standing_mask(rates: &[f64], samples_per_second: f64, slowest: f64) -> Vec<bool> {
-    let count = |seconds: f64| super::smoothing::floor_to_count(seconds * samples_per_second).max(1);
+    let count = |seconds: f64| float_to_count(seconds * samples_per_second).max(1);
     let magnitudes: Vec<f64> = running_mean(rates, count(RATE_MEAN_S))
         .iter()
         .map(|v| v.abs())

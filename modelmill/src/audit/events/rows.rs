@@ -2,12 +2,12 @@
 //! every drive added, and the motion of the drives.
 
 use modelmill_codegen::ModelEvaluator;
-use modelmill_identify::{ChannelRegressor, PreparedRun};
+use modelmill_identify::{ChannelRegressor, PreparedRun, float_to_count};
 use nalgebra::DMatrix;
 
 use super::fit::fit_without_events;
 use super::regimes::standing_mask;
-use super::smoothing::{floor_to_count, sample_quantile};
+use super::smoothing::sample_quantile;
 use super::trace::ResidualTrace;
 use crate::audit::thresholds::{EVENT_FEWEST_SAMPLES, LONGEST_SMEAR_S, SLOWEST_ANGULAR_RATE, SLOWEST_LINEAR_RATE};
 use crate::model::Model;
@@ -60,8 +60,8 @@ fn evaluated_samples(time: &[f64]) -> Option<Vec<usize>> {
     if time.len() < EVENT_FEWEST_SAMPLES || duration <= 0.0 {
         return None;
     }
-    let usual = floor_to_count(FINE_PER_S * duration).clamp(SAMPLES[0], SAMPLES[1]);
-    let wanted = usual.max(floor_to_count(COARSE_PER_S * duration));
+    let usual = float_to_count(FINE_PER_S * duration).clamp(SAMPLES[0], SAMPLES[1]);
+    let wanted = usual.max(float_to_count(COARSE_PER_S * duration));
     Some((0..time.len()).step_by((time.len() / wanted).max(1)).collect())
 }
 

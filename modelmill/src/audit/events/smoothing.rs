@@ -1,5 +1,7 @@
 //! Smoothing and masks of sampled signals, as the search for events needs them.
 
+use modelmill_identify::float_to_count;
+
 use std::ops::Range;
 
 /// The ranges in which a mask is true, in order.
@@ -90,7 +92,7 @@ pub(super) fn sample_quantile(mut values: Vec<f64>, part: f64) -> f64 {
     if values.is_empty() {
         return 0.0;
     }
-    let at = floor_to_count(part * (values.len() - 1) as f64);
+    let at = float_to_count(part * (values.len() - 1) as f64);
     *values.select_nth_unstable_by(at, f64::total_cmp).1
 }
 
@@ -104,14 +106,4 @@ pub(super) fn range_median(values: &[f64], from: isize, to: isize) -> Option<f64
 /// Standard deviation of a normal distribution with the median magnitude of some values.
 pub(super) fn median_deviation(values: impl Iterator<Item = f64>) -> f64 {
     1.4826 * sample_quantile(values.map(f64::abs).collect(), 0.5)
-}
-
-/// A count that was computed, rounded down.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a float becomes the nearest count there is"
-)]
-pub(super) fn floor_to_count(value: f64) -> usize {
-    value as usize
 }

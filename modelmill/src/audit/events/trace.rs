@@ -1,6 +1,6 @@
 //! The residual of a fit along one run, with the motion of its drives: what events are found in.
 
-use super::smoothing::floor_to_count;
+use modelmill_identify::float_to_count;
 
 /// The residual of a fit along one run, with the motion of its drives.
 #[derive(Clone, Debug)]
@@ -41,7 +41,7 @@ impl ResidualTrace {
 
     /// The number of samples in a time, at least `fewest`.
     pub(super) fn sample_count(&self, seconds: f64, fewest: usize) -> usize {
-        floor_to_count(seconds * self.sample_rate()).max(fewest)
+        float_to_count(seconds * self.sample_rate()).max(fewest)
     }
 
     /// Root mean square of the measured force of a drive, N or N m.

@@ -1,6 +1,7 @@
 //! Intervals in which a force is constant except for white noise.
 
 use modelmill_identify::diagnose::white_noise;
+use modelmill_identify::float_to_count;
 
 use super::super::thresholds::{SILENCE_FEWEST_SAMPLES, SILENCE_NOISE_SIGMAS, SILENCE_SHORTEST_S};
 use super::{SilenceCandidate, SilenceEvidence};
@@ -73,11 +74,6 @@ pub(super) fn flat_intervals(drive: usize, data: &RecordingSegment) -> Vec<Silen
 }
 
 /// A count that was computed, rounded down; at most a million.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a float becomes the nearest count there is"
-)]
 fn count(value: f64) -> usize {
-    value.clamp(0.0, 1e6) as usize
+    float_to_count(value.clamp(0.0, 1e6))
 }

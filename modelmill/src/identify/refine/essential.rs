@@ -10,22 +10,22 @@ use crate::error::Outcome;
 pub(super) fn refine(found: &mut WeightedEstimate, nominal: &[f64]) -> Outcome<RefinementResult> {
     let WeightedEstimate {
         solution,
-        uncertainty: deviations,
-        r_factor: triangle,
+        uncertainty,
+        r_factor,
         ..
     } = found;
-    let kept = select_essential(triangle, solution, deviations, nominal, &EssentialOptions::default())?;
+    let kept = select_essential(r_factor, solution, uncertainty, nominal, &EssentialOptions::default())?;
     solution.values = kept.values;
     solution.classical_std = kept.classical_std;
     solution.condition_number = kept.condition_number;
     solution.scaled_condition_number = kept.scaled_condition_number;
     // Removed parameters are listed in the result, so that no direction is undetermined.
     solution.undetermined.clear();
-    solution.determined = deviations.std.iter().map(|_| true).collect();
+    solution.determined = uncertainty.std.iter().map(|_| true).collect();
     // Effective samples follow from the ratio of the two standard deviations.
-    deviations.effective_samples = (kept.std.iter().zip(&solution.classical_std))
-        .map(|(std, classical)| deviations.samples as f64 * (classical / std).powi(2))
+    uncertainty.effective_samples = (kept.std.iter().zip(&solution.classical_std))
+        .map(|(std, classical)| uncertainty.samples as f64 * (classical / std).powi(2))
         .collect();
-    deviations.std = kept.std;
+    uncertainty.std = kept.std;
     Ok(RefinementResult::Essential(kept.dropped, kept.residual_rise))
 }

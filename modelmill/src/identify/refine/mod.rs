@@ -31,7 +31,7 @@ pub enum EstimateRefinement {
     Essential,
 }
 
-/// The result of a refinement in addition to solution and deviations.
+/// The result of a refinement in addition to solution and uncertainty.
 #[derive(Debug, Clone, PartialEq)]
 pub enum RefinementResult {
     /// No refinement.

@@ -19,16 +19,16 @@ use crate::model::Model;
 pub(super) fn refine(model: &Model, found: &mut WeightedEstimate, unknown: &[usize]) -> Outcome<RefinementResult> {
     let WeightedEstimate {
         solution,
-        uncertainty: deviations,
-        r_factor: triangle,
+        uncertainty,
+        r_factor,
         ..
     } = found;
     // The residual without constraints is kept for comparison.
     let before = solution.residual_norm;
-    let (physical, bodies) = solve_physical(model, triangle, solution, deviations, unknown)?;
+    let (physical, bodies) = solve_physical(model, r_factor, solution, uncertainty, unknown)?;
     solution.values.clone_from(&physical.base);
     solution.residual_norm = physical.residual_norm;
-    deviations.std.clone_from(&physical.base_std);
+    uncertainty.std.clone_from(&physical.base_std);
     // Directions that the recordings do not determine are fixed by nominal values.
     solution.undetermined.clear();
     solution.determined = physical.base.iter().map(|_| true).collect();
@@ -40,13 +40,13 @@ pub(super) fn refine(model: &Model, found: &mut WeightedEstimate, unknown: &[usi
 /// Fails when no consistent parameters are found.
 fn solve_physical(
     model: &Model,
-    triangle: &RFactor,
+    r_factor: &RFactor,
     solution: &RegressionSolution,
-    deviations: &ParameterUncertainty,
+    uncertainty: &ParameterUncertainty,
     unknown: &[usize],
 ) -> Outcome<(PhysicalParameters, Vec<String>)> {
     let mechanism = &model.derivation.mechanism;
-    let start = start_values(model, solution, deviations, unknown);
+    let start = start_values(model, solution, uncertainty, unknown);
     // Bodies are constrained as matrices, effect parameters as matrices of one entry.
     let mut bodies = bodies(mechanism);
     for p in model.positive_effects() {
@@ -62,7 +62,7 @@ fn solve_physical(
     // Base parameters are polynomials of the physical ones.
     let base = |x: &[f64]| base_map(model, unknown, x);
     let base: &BaseMap<'_> = &base;
-    let found = physical_parameters(triangle, solution, deviations, &start, base, &bodies)
+    let found = physical_parameters(r_factor, solution, uncertainty, &start, base, &bodies)
         .map_err(|error| Error::input(format!("{}: {error}", model.path)))?;
     Ok((found, bodies.into_iter().map(|body| body.name).collect()))
 }
@@ -71,7 +71,7 @@ fn solve_physical(
 fn start_values(
     model: &Model,
     solution: &RegressionSolution,
-    deviations: &ParameterUncertainty,
+    uncertainty: &ParameterUncertainty,
     unknown: &[usize],
 ) -> Vec<f64> {
     // All parameters of bodies have nominal values, those of effects often have none.
@@ -87,8 +87,8 @@ fn start_values(
                 && product.0 == [(p, 1)]
             {
                 // The start is at least one standard deviation above zero.
-                let deviation = if deviations.std[i].is_finite() {
-                    deviations.std[i]
+                let deviation = if uncertainty.std[i].is_finite() {
+                    uncertainty.std[i]
                 } else {
                     0.0
                 };

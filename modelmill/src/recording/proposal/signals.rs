@@ -1,5 +1,7 @@
 //! Columns of a recording as signals: their numbers, which of them is the time, and which one is the rate of another.
 
+use modelmill_identify::float_to_count;
+
 use super::thresholds::{LONGEST_LIKELY_STEP, RATE_LEAST_CORRELATION, STENCIL_SPAN, TIME_LEAST_SHARE};
 use super::words::{NameParts, SignalRole};
 
@@ -84,8 +86,7 @@ pub(super) fn find_rate_link(time: &[f64], signal: &[f64], rate: &[f64]) -> Opti
     }
     // Differences over several samples suppress the steps of an encoder.
     let step = (time[n - 1] - time[0]) / (n - 1) as f64;
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few samples")]
-    let reach = ((STENCIL_SPAN / step) as usize).clamp(1, n / 4);
+    let reach = float_to_count(STENCIL_SPAN / step).clamp(1, n / 4);
     let mut sums = [0.0; 5];
     let mut count = 0.0;
     for k in reach..n - reach {

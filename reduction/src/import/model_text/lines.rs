@@ -8,7 +8,7 @@ use modelmill_boundary::message;
 use super::super::chain::FrameChain;
 use super::super::closing::LoopSolution;
 use super::super::description::StraightDrive;
-use super::{ImportCoordinate, ModelTextBuilder, round_to_15_digits};
+use super::{ImportCoordinate, ModelTextBuilder};
 use crate::write::toml_float;
 
 /// A straight drive with its names in the model.
@@ -141,22 +141,7 @@ impl ModelTextBuilder<'_> {
                     }
                     None => (None, *at),
                 };
-                let on = frame.map_or("base", |frame| self.frame_names[frame].as_str());
-                let at: Vec<String> = place
-                    .iter()
-                    .map(|x| {
-                        if x.abs() < 1e-12 {
-                            "0".to_owned()
-                        } else {
-                            toml_float(round_to_15_digits(*x))
-                        }
-                    })
-                    .collect();
-                let _ = write!(
-                    text,
-                    "\n[[point]]\nname = \"{point}\"\non = \"{on}\"\nat = [{}]\n",
-                    at.join(", ")
-                );
+                self.write_point(text, point, frame, &place);
             }
         }
     }

@@ -8,8 +8,8 @@ use nalgebra::Vector3;
 use super::super::chain::CoincidentPair;
 use super::super::closing::{self, LoopSolution, RANGE_TOLERANCE};
 use super::super::description::{ClosureConstraint, DescriptionClosure, RobotDescription};
-use super::{ModelTextBuilder, ORIENTATION_ARM, round_to_15_digits};
-use crate::write::{significant_digits, toml_float};
+use super::{ModelTextBuilder, ORIENTATION_ARM};
+use crate::write::significant_digits;
 
 impl ModelTextBuilder<'_> {
     /// Closes the loops and sets the nominal values; none without loops.
@@ -138,23 +138,7 @@ impl ModelTextBuilder<'_> {
             let mut points = Vec::new();
             for ((frame, at), letter) in pair.ends.iter().zip(["a", "b"]) {
                 let point = self.unique_name(&format!("{name}_{letter}"));
-                // The point in the frame that carries it.
-                let on = frame.map_or("base", |frame| self.frame_names[frame].as_str());
-                let at: Vec<String> = at
-                    .iter()
-                    .map(|x| {
-                        if x.abs() < 1e-12 {
-                            "0".to_owned()
-                        } else {
-                            toml_float(round_to_15_digits(*x))
-                        }
-                    })
-                    .collect();
-                let _ = write!(
-                    text,
-                    "\n[[point]]\nname = \"{point}\"\non = \"{on}\"\nat = [{}]\n",
-                    at.join(", ")
-                );
+                self.write_point(text, &point, *frame, at);
                 points.push(format!("\"{point}\""));
             }
             let _ = write!(

@@ -407,6 +407,18 @@ impl ModelTextBuilder<'_> {
         self.angles.push((name.clone(), round_to_15_digits(value)));
         format!("\"{name}\"")
     }
+
+    /// Writes a point at a place in the frame that carries it; `None` is the base.
+    fn write_point(&self, text: &mut String, name: &str, frame: Option<usize>, place: &Vector3<f64>) {
+        let on = frame.map_or("base", |frame| self.frame_names[frame].as_str());
+        let number = |x: &f64| match *x {
+            x if x.abs() < 1e-12 => "0".to_owned(),
+            x => toml_float(round_to_15_digits(x)),
+        };
+        let at: Vec<String> = place.iter().map(number).collect();
+        let at = at.join(", ");
+        let _ = write!(text, "\n[[point]]\nname = \"{name}\"\non = \"{on}\"\nat = [{at}]\n");
+    }
 }
 
 /// A value rounded to fifteen significant digits; further digits are rounding errors of sums.

@@ -26,6 +26,14 @@ struct ElementRule {
     ignored: &'static str,
 }
 
+/// The extension of Drake in URDF and SDF. Both kinds of names of a body are checked by the reader of closures.
+const BALL_CONSTRAINT: ElementRule = ElementRule {
+    element: "ball_constraint",
+    attributes: "name",
+    inner: "",
+    ignored: "ball_constraint_body_A ball_constraint_body_B ball_constraint_p_AP ball_constraint_p_BQ",
+};
+
 /// An element or attribute that is not read, with the first place and the number of places.
 struct UnreadItem {
     /// The words of the remark after the line.

@@ -1,6 +1,6 @@
 //! The elements of SDF 1.12, and the extensions of Drake that are read.
 
-use super::ElementRule;
+use super::{BALL_CONSTRAINT, ElementRule};
 
 /// The table of SDF. Entries of a matrix and similar elements have only text, and need no rule.
 pub(super) const RULES: [ElementRule; 19] = [
@@ -110,13 +110,7 @@ pub(super) const RULES: [ElementRule; 19] = [
         inner: "multiplier offset reference",
         ignored: "",
     },
-    // Both kinds of names are checked by the reader of closures.
-    ElementRule {
-        element: "ball_constraint",
-        attributes: "name",
-        inner: "",
-        ignored: "ball_constraint_body_A ball_constraint_body_B ball_constraint_p_AP ball_constraint_p_BQ",
-    },
+    BALL_CONSTRAINT,
     ElementRule {
         element: "weld_constraint",
         attributes: "name",

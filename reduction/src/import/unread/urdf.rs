@@ -1,6 +1,6 @@
 //! The elements of URDF 1.2, and the extensions of Drake and Gazebo that have an effect.
 
-use super::ElementRule;
+use super::{BALL_CONSTRAINT, ElementRule};
 
 /// The table of URDF.
 pub(super) const RULES: [ElementRule; 27] = [
@@ -155,13 +155,7 @@ pub(super) const RULES: [ElementRule; 27] = [
         inner: "",
         ignored: "",
     },
-    // Both kinds of names are checked by the reader of closures.
-    ElementRule {
-        element: "ball_constraint",
-        attributes: "name",
-        inner: "",
-        ignored: "ball_constraint_body_A ball_constraint_body_B ball_constraint_p_AP ball_constraint_p_BQ",
-    },
+    BALL_CONSTRAINT,
     // Settings of Gazebo for pictures, contacts and sensors have no effect.
     ElementRule {
         element: "gazebo",

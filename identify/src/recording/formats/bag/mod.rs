@@ -13,6 +13,7 @@ use indexmap::IndexMap;
 
 use crate::recording::column::SampleField;
 use crate::recording::error::RecordingFault;
+use crate::recording::formats::{RecordingFormat, RecordingInput};
 use crate::recording::intake::{IntakeFlow, SampleIntake};
 use crate::recording::join::{JoinPart, join_parts};
 use crate::recording::notes::RecordingNote;
@@ -35,7 +36,7 @@ const ARRIVAL: usize = 8;
 const EXACT: i64 = 1 << 53;
 
 /// Collects the columns of a log while its messages are read.
-pub(super) struct BagCollector<'a> {
+pub(crate) struct BagCollector<'a> {
     /// Topics in the order of registration.
     topics: Vec<BagTopic>,
     /// Whether the numbers of a column are kept, by its name.
@@ -357,15 +358,64 @@ impl BagTopic {
     }
 }
 
-/// A function that passes all messages of a log to a collector.
-pub(super) type BagReplay<'a> = &'a mut dyn FnMut(&mut BagCollector<'_>) -> Result<(), RecordingFault>;
+/// A format of robot logs; every one is a format of recordings.
+pub(crate) trait MessageLogFormat: Sync {
+    /// See [`RecordingFormat::suffix`].
+    fn log_suffix(&self) -> &'static str;
+    /// See [`RecordingFormat::extensions`].
+    fn log_extensions(&self) -> &'static [&'static str];
+    /// See [`RecordingFormat::has_signature`].
+    fn has_log_signature(&self, first: &[u8]) -> bool;
+    /// Passes all messages of a log to a collector.
+    fn pass_messages(&self, input: RecordingInput<'_>, bag: &mut BagCollector<'_>) -> Result<(), RecordingFault>;
+}
+
+impl<T: MessageLogFormat> RecordingFormat for T {
+    fn suffix(&self) -> &'static str {
+        self.log_suffix()
+    }
+
+    fn extensions(&self) -> &'static [&'static str] {
+        self.log_extensions()
+    }
+
+    fn has_signature(&self, first: &[u8]) -> bool {
+        self.has_log_signature(first)
+    }
+
+    fn read(
+        &self,
+        input: RecordingInput<'_>,
+        file: &str,
+        options: &ReadOptions,
+    ) -> Result<SignalRecording, RecordingFault> {
+        read(self, input, file, options)
+    }
+
+    fn names(&self, input: RecordingInput<'_>) -> Result<Vec<String>, RecordingFault> {
+        let mut bag = BagCollector::new(&|_| false, usize::MAX);
+        self.pass_messages(input, &mut bag)?;
+        Ok(names_of(&bag.tables()))
+    }
+
+    fn tables(&self, input: RecordingInput<'_>) -> Result<Vec<TableInfo>, RecordingFault> {
+        let mut bag = BagCollector::new(&|_| false, usize::MAX);
+        self.pass_messages(input, &mut bag)?;
+        Ok(tables(bag))
+    }
+}
 
 /// Reads a log: the needed columns, joined on time.
-pub(super) fn read(show: BagReplay<'_>, file: &str, options: &ReadOptions) -> Result<SignalRecording, RecordingFault> {
+fn read(
+    format: &dyn MessageLogFormat,
+    input: RecordingInput<'_>,
+    file: &str,
+    options: &ReadOptions,
+) -> Result<SignalRecording, RecordingFault> {
     // Numbers of needed columns are kept while the messages are read.
     let is_kept = |name: &str| options.is_column_needed(name);
     let mut bag = BagCollector::new(&is_kept, options.max_numbers);
-    show(&mut bag)?;
+    format.pass_messages(input, &mut bag)?;
     let tables = bag.tables();
     // The first column is the time; then the columns of all topics follow.
     let mut intake = SampleIntake::new(names_of(&tables), options)?;
@@ -425,17 +475,8 @@ pub(super) fn read(show: BagReplay<'_>, file: &str, options: &ReadOptions) -> Re
     intake.finish(file)
 }
 
-/// Names of the columns of a log, the time first.
-pub(super) fn names(show: BagReplay<'_>) -> Result<Vec<String>, RecordingFault> {
-    let mut bag = BagCollector::new(&|_| false, usize::MAX);
-    show(&mut bag)?;
-    Ok(names_of(&bag.tables()))
-}
-
 /// The topics of a log; no numbers are kept.
-pub(super) fn tables(show: BagReplay<'_>) -> Result<Vec<TableInfo>, RecordingFault> {
-    let mut bag = BagCollector::new(&|_| false, usize::MAX);
-    show(&mut bag)?;
+fn tables(bag: BagCollector<'_>) -> Vec<TableInfo> {
     let mut found = Vec::new();
     for topic in bag.topics {
         // The part of the description that is the same for all cases.
@@ -490,7 +531,7 @@ pub(super) fn tables(show: BagReplay<'_>) -> Result<Vec<TableInfo>, RecordingFau
             });
         }
     }
-    Ok(found)
+    found
 }
 
 /// Names of the columns of all tables, the time first.

@@ -181,8 +181,8 @@ mod tests {
         let of = |from: usize, to: usize| {
             let mut regression = LeastSquares::new(n);
             regression.add_rows(&w[from * n..to * n], &y[from..to]).unwrap();
-            let triangle = RFactor::new(&regression);
-            RFactor::from_entries(n, triangle.rows(), &triangle.entries()).unwrap()
+            let r_factor = RFactor::new(&regression);
+            RFactor::from_entries(n, r_factor.rows(), &r_factor.entries()).unwrap()
         };
         let [a, b, c] = [of(0, 20), of(20, 50), of(50, rows)];
         let all = of(0, rows).solve_near(&[0.0; 4]).unwrap();
