@@ -3,9 +3,9 @@
 
 use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
-    CandidateOutcome, ColumnChoice, ColumnProvider, ColumnSource, DiagnosisProblem, Disturbance, FORCE_ROUNDING,
-    ForceColumn, LawSite, LoadDependentQuery, ModelDiagnosis, RejectionReason, diagnose, drift_candidates,
-    reading_fault_candidates, signal_changes, white_noise,
+    CandidateEffect, CandidateOutcome, ColumnChoice, ColumnProvider, ColumnSource, DiagnosisProblem, Disturbance,
+    FORCE_ROUNDING, ForceColumn, LawSite, LoadDependentQuery, ModelDiagnosis, RejectionReason, diagnose,
+    drift_candidates, reading_fault_candidates, signal_changes, white_noise,
 };
 
 use crate::along::drive_rates;
@@ -144,17 +144,7 @@ pub(crate) fn find_missing_effects(
     further.extend(drift_candidates(&problem, &units));
     further.extend(dahl_candidates(model, &all)?);
     // Stage 3: candidates that need the derivatives of the forces by the motion.
-    let values = encoders::values(model, &problem, held);
-    let slopes = encoders::sensitivities(model, &all, &values);
-    further.extend(encoders::zeros(model, &slopes));
-    if query.is_clock_in_question {
-        further.extend(clock(model, &all, &slopes));
-    }
-    further.extend(encoders(model, &all, &problem, &slopes));
-    further.extend(gears(model, &all, &values, &slopes)?);
-    further.extend(constants(model, &all, query.zeros, query.claimed, &|k| {
-        is_fixed(model, held, k)
-    }));
+    further.extend(motion_candidates(model, &all, &problem, query)?);
     further.extend(other_friction);
     if query.in_full {
         if held == FixedParameters::All || problem.base.is_empty() {
@@ -251,6 +241,31 @@ fn describe_disturbance(one: &mut Disturbance, model: &Model) {
     if one.description.is_none() {
         one.description = Some(words::disturbance(one));
     }
+}
+
+/// Candidates that follow from the derivatives of the forces by the motion: errors of encoders, of the clock, of gears, of
+/// lengths and angles.
+///
+/// Fails when a pose has no solution.
+fn motion_candidates(
+    model: &Model,
+    all: &SegmentList<'_>,
+    problem: &DiagnosisProblem,
+    query: DiagnosisQuery<'_>,
+) -> Outcome<Vec<CandidateEffect>> {
+    let held = query.fixed;
+    let values = encoders::values(model, problem, held);
+    let slopes = encoders::sensitivities(model, all, &values);
+    let mut candidates = encoders::zeros(model, &slopes);
+    if query.is_clock_in_question {
+        candidates.extend(clock(model, all, &slopes));
+    }
+    candidates.extend(encoders(model, all, problem, &slopes));
+    candidates.extend(gears(model, all, &values, &slopes)?);
+    candidates.extend(constants(model, all, query.zeros, query.claimed, &|k| {
+        is_fixed(model, held, k)
+    }));
+    Ok(candidates)
 }
 
 /// Computes columns that the search requests while it runs.

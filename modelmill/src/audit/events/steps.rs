@@ -8,8 +8,8 @@ use super::segments::DriveSegment;
 use super::smoothing::{dilate_mask, median_deviation, range_median, running_median, sample_quantile, true_ranges};
 use super::trace::ResidualTrace;
 use crate::audit::thresholds::{
-    STANDSTILL_END_MARGIN_S, STANDSTILL_FEWEST_S, STEP_LEAST_DEVIATIONS, STEP_LEAST_FORCE_SHARE, STEP_LEAST_RETURN, STEP_MOST_RATIO,
-    STEP_WINDOWS_S,
+    STANDSTILL_END_MARGIN_S, STANDSTILL_FEWEST_S, STEP_LEAST_DEVIATIONS, STEP_LEAST_FORCE_SHARE, STEP_LEAST_RETURN,
+    STEP_MOST_RATIO, STEP_WINDOWS_S,
 };
 
 /// Time on either side of a step that is not used, s: the step itself.
@@ -65,7 +65,10 @@ fn pushes_of_window(
     // At the ends of a standstill there is no difference.
     let apart = rise + window / 2;
     let inner = |range: &std::ops::Range<usize>| range.start + apart..range.end - apart;
-    let of_standing: Vec<f64> = standing.iter().flat_map(|range| differences[inner(range)].to_vec()).collect();
+    let of_standing: Vec<f64> = standing
+        .iter()
+        .flat_map(|range| differences[inner(range)].to_vec())
+        .collect();
     if of_standing.len() < trace.sample_count(STANDSTILL_FEWEST_S, 1) {
         return Vec::new();
     }
