@@ -44,6 +44,7 @@ mod reading;
 mod record;
 mod schema;
 mod scope;
+mod sharing;
 mod suggest;
 mod total_mass;
 mod unclosed;
