@@ -303,6 +303,7 @@ mod tests {
             }],
             constants: vec![("q0".to_owned(), 0.5)],
             comment: None,
+            ..NewEffect::default()
         };
         assert_eq!(
             add_command("my arm.toml", &effect),

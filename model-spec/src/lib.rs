@@ -44,6 +44,7 @@ mod reading;
 mod record;
 mod schema;
 mod scope;
+mod sharing;
 mod suggest;
 mod toml_budget;
 mod total_mass;

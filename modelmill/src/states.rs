@@ -273,10 +273,13 @@ impl ModelFunctions {
                 known.len() - 1
             }
         };
-        Ok(known[place]
-            .program
-            .as_mut()
-            .is_some_and(|program| program.run(state, out)))
+        let PreparedSingle { program, zeros, .. } = &mut known[place];
+        // Programs have inputs for all of the motion; those that the function does not depend on are zero.
+        let [has_rates, has_accelerations, _] = function.required_inputs();
+        let [q, qd, qdd, forces] = state;
+        let qd = if has_rates { qd } else { zeros.as_slice() };
+        let qdd = if has_accelerations { qdd } else { zeros.as_slice() };
+        Ok((program.as_mut()).is_some_and(|program| program.run([q, qd, qdd, forces], out)))
     }
 
     /// The program of a function for single states, if it has one.

@@ -39,11 +39,11 @@ pub(crate) fn at_single<'py>(
     let Some(values) = vector(values, model.model.base.len()) else {
         return Ok(None);
     };
-    let arrays = [&q, &qd, &qdd, &forces].map(numbers);
+    let arrays = [q.as_ref(), qd.as_ref(), qdd.as_ref(), forces.as_ref()].map(numbers);
     let [Some(q), Some(qd), Some(qdd), Some(forces)] = arrays else {
         return Ok(None);
     };
-    let values = match &values {
+    let values = match values.as_ref() {
         None => Some(model.model.nominal.as_slice()),
         given => numbers(given),
     };
@@ -57,6 +57,7 @@ pub(crate) fn at_single<'py>(
 }
 
 /// A vector of 64-bit numbers of a length; `None` within if there is none, and `None` if it is something else.
+#[allow(clippy::option_option, reason = "an argument may be absent, or of another type")]
 fn vector<'py>(given: StateArgument<'_, 'py>, width: usize) -> Option<Option<PyReadonlyArray1<'py, f64>>> {
     let Some(given) = given else { return Some(None) };
     let array = given.cast::<PyArray1<f64>>().ok()?.try_readonly().ok()?;
@@ -64,7 +65,7 @@ fn vector<'py>(given: StateArgument<'_, 'py>, width: usize) -> Option<Option<PyR
 }
 
 /// The numbers of a vector, none without one; `None` if they are not contiguous.
-fn numbers<'a>(array: &'a Option<PyReadonlyArray1<'_, f64>>) -> Option<&'a [f64]> {
+fn numbers<'a>(array: Option<&'a PyReadonlyArray1<'_, f64>>) -> Option<&'a [f64]> {
     match array {
         None => Some(&[]),
         Some(array) => array.as_slice().ok(),

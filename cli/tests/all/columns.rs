@@ -294,7 +294,7 @@ fn table(header: &str, first: f64) -> String {
     let mut text = format!("{header}\n");
     for [t, more @ ..] in rows() {
         let more: Vec<String> = more.iter().map(ToString::to_string).collect();
-        text += &format!("{},{}\n", first * t, more.join(","));
+        writeln!(text, "{},{}", first * t, more.join(",")).expect("a text grows");
     }
     text
 }

@@ -49,7 +49,7 @@ pub fn related_kinds<'a>(kinds: &'a [EffectKind], name: &str) -> Vec<&'a EffectK
 fn has_word(text: &str, word: &str) -> bool {
     let plain = |text: &str| {
         let words = text.split(|c: char| !c.is_alphanumeric()).filter(|one| !one.is_empty());
-        words.map(|one| format!(" {}", one.to_lowercase())).collect::<String>() + " "
+        format!(" {} ", words.map(str::to_lowercase).collect::<Vec<_>>().join(" "))
     };
     let (text, word) = (plain(text), plain(word));
     text.contains(&word) || text.contains(&format!("{}s ", word.trim_end()))

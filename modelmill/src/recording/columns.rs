@@ -92,20 +92,10 @@ pub(crate) fn read_options(
             }
         }
     }
-    // A column `q1 [deg]` has the name `q1` of the model and a unit.
-    for (ours, quantity) in &known {
-        let is_named = header.contains(ours) || mapping.has(ours) || (ours == "t" && args.rate.is_some());
-        let is_unit_only = |name: &String| split_header_unit(name).is_some_and(|(base, _)| base == ours);
-        if is_named || header.iter().filter(|name| is_unit_only(name)).count() != 1 {
-            continue;
-        }
-        if let Ok(sum) = parse_column_sum(model, ours, *quantity, header) {
-            mapping.add(ours, sum);
-        }
-    }
     let is_given = |ours: &str, mapping: &ColumnMapping| {
         header.iter().any(|name| name == ours) || mapping.has(ours) || (ours == "t" && args.rate.is_some())
     };
+    map_header_units(model, &known, header, &mut mapping, &is_given);
     let by_joint = map_joint_columns(model, &known, header, &mut mapping, &is_given);
     let mut notes = mapping.notes(&known, &mechanism.recording.torque, file);
     notes.extend(
@@ -139,6 +129,28 @@ pub(crate) fn read_options(
     Ok((options, notes))
 }
 
+/// Whether a name of the model has a column without further assignments.
+type IsGiven<'a> = dyn Fn(&str, &ColumnMapping) -> bool + 'a;
+
+/// Assigns columns with the name of the model and a unit, such as `q1 [deg]`.
+fn map_header_units(
+    model: &Model,
+    known: &[(String, ColumnQuantity)],
+    header: &[String],
+    mapping: &mut ColumnMapping,
+    is_given: &IsGiven<'_>,
+) {
+    for (ours, quantity) in known {
+        let is_unit_only = |name: &String| split_header_unit(name).is_some_and(|(base, _)| base == ours);
+        if is_given(ours, mapping) || header.iter().filter(|name| is_unit_only(name)).count() != 1 {
+            continue;
+        }
+        if let Ok(sum) = parse_column_sum(model, ours, *quantity, header) {
+            mapping.add(ours, sum);
+        }
+    }
+}
+
 /// Most columns that a remark names.
 const MOST_NAMED: usize = 4;
 
@@ -149,7 +161,7 @@ fn map_joint_columns(
     known: &[(String, ColumnQuantity)],
     header: &[String],
     mapping: &mut ColumnMapping,
-    is_given: &dyn Fn(&str, &ColumnMapping) -> bool,
+    is_given: &IsGiven<'_>,
 ) -> Vec<Message> {
     let joints = JointColumns::new(&model.derivation.mechanism, known, header);
     let (mut pairs, mut remarks) = (Vec::new(), Vec::new());

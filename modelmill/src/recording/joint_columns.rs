@@ -29,6 +29,9 @@ const ROLE_WORDS: &[(SignalRole, &[&str])] = &[
 /// Words that do not identify a joint.
 const IDLE_WORDS: [&str; 6] = ["joint", "joints", "measured", "meas", "actual", "act"];
 
+/// Words that state a measurement.
+const MEASURED_WORDS: [&str; 4] = ["measured", "meas", "actual", "act"];
+
 /// Words of signals that are no measurements at the joint, in addition to those of commands.
 const FOREIGN_WORDS: [&str; 18] = [
     "trajectory",
@@ -184,7 +187,12 @@ fn stated_signal(name: &str) -> Option<StatedSignal> {
     }
     // The parts of a column of a log are topic, field and joint; the topic identifies no joint.
     let parts: Vec<&str> = base.split('.').collect();
-    let role_of_part = |part: &str| role_of(&split_words(part)).filter(|_| split_words(part).len() == 1);
+    let split = |text: &str| {
+        let mut words = split_words(text);
+        words.retain(|word| !MEASURED_WORDS.contains(&word.as_str()));
+        words
+    };
+    let role_of_part = |part: &str| role_of(&split(part));
     let field = parts.iter().rposition(|part| role_of_part(part).is_some());
     let (topic, own) = match field {
         // `topic.position.elbow`, or `elbow.position` without anything behind it.
@@ -193,7 +201,7 @@ fn stated_signal(name: &str) -> Option<StatedSignal> {
         _ => (String::new(), base.to_owned()),
     };
     let topic = split_words(&topic);
-    let mut words = split_words(&own);
+    let mut words = split(&own);
     // A unit behind `_`.
     let unit = UNIT_ENDINGS
         .iter()
