@@ -15,6 +15,7 @@ use crate::samples::{MotionPlane, MotionSamples};
 use crate::write::{model_file, significant_digits};
 use modelmill_boundary::files::MemoryFiles;
 use modelmill_rig::{LoadFailure, Rig, RigLog, plain_error};
+use modelmill_spec::Diagnostic;
 
 /// The result of a reduction.
 #[derive(Clone, Debug, PartialEq)]
@@ -89,10 +90,11 @@ fn run(rig: &Rig, plan: &ReductionPlan, log: &mut RigLog) -> Option<(PlanarDraft
             return None;
         }
         Err(error) => {
-            log.0.push(plain_error(
-                None,
-                format!("the rig cannot be assembled in its nominal configuration: {error}"),
-            ));
+            let says = format!("the rig cannot be assembled in its nominal configuration: {error}");
+            log.0.push(Diagnostic {
+                help: open_joints(rig).into_iter().map(Into::into).collect(),
+                ..plain_error(None, says)
+            });
             return None;
         }
     };
@@ -140,6 +142,27 @@ fn run(rig: &Rig, plan: &ReductionPlan, log: &mut RigLog) -> Option<(PlanarDraft
         symbols.report_ties(&mut report);
     }
     Some((draft, report))
+}
+
+/// The largest gaps of joints in the poses that the file states, as a sentence; `None` if all are closed. The residual
+/// of the assembly is smaller than these, because it is shared by all joints of a loop.
+fn open_joints(rig: &Rig) -> Option<String> {
+    /// Largest number of joints that are named.
+    const NAMED: usize = 3;
+    let mut gaps = rig.nominal_gaps();
+    gaps.retain(|gap| gap.distance > TOLERANCE);
+    gaps.sort_by(|a, b| b.distance.total_cmp(&a.distance));
+    let named = gaps.iter().take(NAMED).map(|gap| {
+        let millimetres = significant_digits(1e3 * gap.distance, 3);
+        format!("`{}` by {millimetres} mm", gap.joint)
+    });
+    let named: Vec<String> = named.collect();
+    (!named.is_empty()).then(|| {
+        format!(
+            "with the poses of the file, joints are open: {}; correct their points, or lengths in the same loop",
+            named.join(", ")
+        )
+    })
 }
 
 /// The state of a reduction between its steps.
