@@ -85,7 +85,11 @@ impl<'a> WalkSampler<'a> {
         }
         let equations = all_residuals(loops);
         // As many equations as unknowns agree with any constants.
-        let redundant = if equations.len() > loops.passive.len() { &equations[..] } else { &[] };
+        let redundant = if equations.len() > loops.passive.len() {
+            &equations[..]
+        } else {
+            &[]
+        };
         Ok(Self {
             sensitivity: ConstantSensitivity::new(graph, mechanism, redundant, &loops.passive),
             poses: Vec::new(),

@@ -41,8 +41,13 @@ fn a_plan_that_cannot_be_read() {
 #[test]
 fn a_joint_that_is_open_is_named_with_its_gap() {
     let text = std::fs::read_to_string(here("../model-spec/rigs/spidermill-full.toml")).expect("a rig");
-    let (before, after) = text.split_once("name = \"R2_G1\"").expect("the elbow of the parallel crank");
-    let text = format!("{before}name = \"R2_G1\"{}", after.replacen("at = [1.13,", "at = [1.132,", 1));
+    let (before, after) = text
+        .split_once("name = \"R2_G1\"")
+        .expect("the elbow of the parallel crank");
+    let text = format!(
+        "{before}name = \"R2_G1\"{}",
+        after.replacen("at = [1.13,", "at = [1.132,", 1)
+    );
     let files = modelmill_boundary::files::DiskFiles::default();
     let rig = modelmill_rig::load("gap.toml", &text, &files).expect("a rig").rig;
     let plan = plan_file(&here("../model-spec/rigs/spidermill-plan.toml")).expect("a plan");
