@@ -66,7 +66,7 @@ class ReadingOptions(TypedDict, total=False):
     trim : int or (int, int)
         Samples dropped at the start and at the end.
     decimate : int
-        Keep every n-th sample, after the same low-pass on forces and regressor.
+        Keep every n-th sample, after an anti-aliasing low-pass on forces and regressor.
     source : {"recorded", "positions"}
         Whether recorded rates and accelerations are used, or all are computed from positions.
     smoothing : {"auto", "butterworth", "savitzky_golay", "fourier"}
