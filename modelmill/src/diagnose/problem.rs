@@ -159,14 +159,7 @@ pub(crate) fn find_missing_effects(
     problem.candidates.extend(further);
     // None of these can be an entry of a model file.
     origins.resize(problem.candidates.len(), None);
-    let mut is_kept = problem.candidates.iter().map(|one| !delays.excludes(one));
-    origins.retain(|_| is_kept.next().unwrap_or(true));
-    drop(is_kept);
-    problem.candidates.retain(|one| !delays.excludes(one));
-    // Estimated delays are estimated anew with each set of effects.
-    problem.base.extend(delays.estimated.iter().cloned());
-    problem.base_is_part_of_load.resize(problem.base.len(), false);
-    problem.without_sensor = delays.is_commanded(model);
+    drop_excluded_candidates(&mut problem, &mut origins, model, &delays);
     // Stage 4: the search, which requests further columns while it runs.
     let supply = ColumnSupply {
         candidates: &candidates,
@@ -221,6 +214,26 @@ pub(crate) fn find_missing_effects(
         diagnosis,
         candidates,
     })
+}
+
+/// Removes the candidates that computed forces exclude, with their origins, and adds the delays of their signals to the
+/// base: estimated delays are estimated anew with each set of effects.
+fn drop_excluded_candidates(
+    problem: &mut DiagnosisProblem,
+    origins: &mut Vec<CandidateOrigin>,
+    model: &Model,
+    delays: &SignalDelays,
+) {
+    let is_kept: Vec<bool> = (problem.candidates.iter())
+        .map(|one| !delays.excludes(model, one))
+        .collect();
+    let mut of_origins = is_kept.iter();
+    origins.retain(|_| *of_origins.next().unwrap_or(&true));
+    let mut of_candidates = is_kept.iter();
+    problem.candidates.retain(|_| *of_candidates.next().unwrap_or(&true));
+    problem.base.extend(delays.estimated.iter().cloned());
+    problem.base_is_part_of_load.resize(problem.base.len(), false);
+    problem.without_sensor = delays.is_commanded(model);
 }
 
 /// Completes a disturbance: the units of its place, and a sentence.

@@ -21,6 +21,9 @@ use super::numbers::stack;
 /// The kind of a wrong delay of a signal.
 const SIGNAL_DELAY: &str = "signal_delay";
 
+/// Kinds of effects of a gear.
+const GEAR_KINDS: [&str; 2] = ["drive_compliance", "backlash"];
+
 /// Delays of the signals of computed forces.
 pub(super) struct SignalDelays {
     /// Forces per second of each delay that was estimated.
@@ -79,8 +82,16 @@ impl SignalDelays {
     }
 
     /// Whether a candidate is a fault of a force sensor that a computed force cannot have. A delay of the force is a delay
-    /// of the signal there, and its lag is one only if the signal is measured.
-    pub(super) fn excludes(&self, candidate: &CandidateEffect) -> bool {
+    /// of the signal there, and its lag is one only if the signal is measured. Compliance and backlash of a gear move the
+    /// load by the force and its derivatives. If the force contains the position of the same encoder, they cannot be
+    /// distinguished from its noise and from jumps of friction.
+    pub(super) fn excludes(&self, model: &Model, candidate: &CandidateEffect) -> bool {
+        let is_of_command = |(drive, is_commanded): &(usize, bool)| {
+            *is_commanded && candidate.effect.at.contains(&model.drives()[*drive])
+        };
+        if GEAR_KINDS.contains(&candidate.effect.kind.as_str()) {
+            return self.computed.iter().any(is_of_command);
+        }
         let ColumnSource::ReadingFault(ForceReadingFault { kind, channel }) = candidate.source else {
             return false;
         };
@@ -117,7 +128,8 @@ impl SignalDelays {
             String::new()
         } else {
             format!(
-                " A lag and a hum of the force of {} were not searched: commands have no sensor.",
+                " A lag and a hum of the force of {} were not searched, since commands have no sensor. Compliance and backlash of \
+                 these drives were not searched, since the force contains the noise of the same encoder: record a current for them.",
                 joined_by_and(&commanded)
             )
         };
