@@ -21,8 +21,9 @@ use super::numbers::stack;
 /// The kind of a wrong delay of a signal.
 const SIGNAL_DELAY: &str = "signal_delay";
 
-/// Kinds of effects of a gear.
-const GEAR_KINDS: [&str; 2] = ["drive_compliance", "backlash"];
+/// Kinds of effects that act by the derivatives of a force, or within the distance that the filter of the positions blurs
+/// at a reversal.
+const BLURRED_KINDS: [&str; 3] = ["drive_compliance", "backlash", "dahl_friction"];
 
 /// Delays of the signals of computed forces.
 pub(super) struct SignalDelays {
@@ -89,7 +90,7 @@ impl SignalDelays {
         let is_of_command = |(drive, is_commanded): &(usize, bool)| {
             *is_commanded && candidate.effect.at.contains(&model.drives()[*drive])
         };
-        if GEAR_KINDS.contains(&candidate.effect.kind.as_str()) {
+        if BLURRED_KINDS.contains(&candidate.effect.kind.as_str()) {
             return self.computed.iter().any(is_of_command);
         }
         let ColumnSource::ReadingFault(ForceReadingFault { kind, channel }) = candidate.source else {
@@ -128,8 +129,8 @@ impl SignalDelays {
             String::new()
         } else {
             format!(
-                " A lag and a hum of the force of {} were not searched, since commands have no sensor. Compliance and backlash of \
-                 these drives were not searched, since the force contains the noise of the same encoder: record a current for them.",
+                " A lag and a hum of the force of {} were not searched, since commands have no sensor. Compliance, backlash and \
+                 Dahl friction of these drives were not searched: the force contains the noise of the same encoder. Record a current.",
                 joined_by_and(&commanded)
             )
         };
