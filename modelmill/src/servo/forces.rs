@@ -179,12 +179,11 @@ impl<'a> ActuatorForces<'a> {
             shifts: vec![0.0; model.actuators().len()],
         };
         let cutoff = all.choose_preparation(runs);
+        all.refine(runs)?;
+        // A low cut-off rounds the corners at which a limit shows.
+        all.find_limits()?;
         all.motion = prepare_motion(model, &all.servo, runs, cutoff);
         all.refine(runs)?;
-        all.find_limits()?;
-        if !all.limits.is_empty() {
-            all.refine(runs)?;
-        }
         Ok(all)
     }
 
