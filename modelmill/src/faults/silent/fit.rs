@@ -133,13 +133,19 @@ impl SilenceFit {
             |of: &dyn Fn(f64) -> f64| predicted.iter().map(|x| of(*x)).sum::<f64>() / predicted.len().max(1) as f64;
         let size = mean(&|x| x * x).sqrt();
         let is_zero = self.is_zero(one);
-        let others_have_noise = SilenceEvidence::Repeated {
-            others_have_noise: true,
+        // No motion gives one number again and again where all others have noise.
+        let kind_by_itself = match one.evidence {
+            SilenceEvidence::Repeated {
+                others_have_noise: true,
+            } if !is_zero => Some(RecordingFaultKind::FrozenForce),
+            SilenceEvidence::Limit {
+                others_have_noise: true,
+            } => Some(RecordingFaultKind::Saturation),
+            _ => None,
         };
-        if one.evidence == others_have_noise && !is_zero {
-            // No motion gives one number again and again where all others have noise.
+        if kind_by_itself.is_some() {
             let moves = travel_shares(segments, one).any(|share| share > SILENCE_STANDSTILL_SHARE);
-            return moves.then_some((RecordingFaultKind::FrozenForce, size));
+            return kind_by_itself.filter(|_| moves).map(|kind| (kind, size));
         }
         let off = mean(&|x| (x - one.level).powi(2)).sqrt();
         let [rms, largest] = self.size[d];
@@ -150,7 +156,7 @@ impl SilenceFit {
         if off <= SILENCE_RESIDUAL_FACTOR * uncertain.max(one.noise) {
             return None;
         }
-        if one.evidence == SilenceEvidence::Limit {
+        if matches!(one.evidence, SilenceEvidence::Limit { .. }) {
             let beyond = mean(&|x| {
                 if x * one.level.signum() > one.level.abs() {
                     1.0

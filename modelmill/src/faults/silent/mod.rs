@@ -66,10 +66,9 @@ impl SilentInterval {
                 "the {force} of {names} {reads} 0 {when}, where the model predicts {}: the channel is dead",
                 self.predicted
             ),
-            RecordingFaultKind::Saturation => format!(
-                "the {force} of {names} {is} limited to {} {when}, where the model predicts {}",
-                self.level, self.predicted
-            ),
+            RecordingFaultKind::Saturation => {
+                format!("the {force} of {names} {is} cut off at {}, at times {when}", self.level)
+            }
             _ => format!(
                 "the {force} of {names} {is} stuck at {} {when} while the joints move",
                 self.level
@@ -135,7 +134,10 @@ enum SilenceEvidence {
         others_have_noise: bool,
     },
     /// One number repeats, and no reading is beyond.
-    Limit,
+    Limit {
+        /// Whether all other readings have noise.
+        others_have_noise: bool,
+    },
 }
 
 impl SilenceCandidate {
@@ -277,7 +279,7 @@ fn find_candidates(
         intervals,
         level,
         noise,
-        evidence: SilenceEvidence::Limit,
+        evidence: SilenceEvidence::Limit { others_have_noise },
     });
     let mut candidates: Vec<SilenceCandidate> = stuck.chain(limits).collect();
     // A force that is often constant has a dead band, a limit, or coarse steps.

@@ -46,7 +46,7 @@ pub(super) fn find_repeats(force: &[f64], time: &[f64]) -> ForceRepeats {
         run.end - run.start >= SILENCE_FEWEST_SAMPLES && span(run)[1] - span(run)[0] >= SILENCE_SHORTEST_S
     };
     // A channel that is stuck once at its largest value is no limit: a limit is met again and again.
-    let limits: Vec<(f64, Vec<&RepeatedRun>)> = [low, high]
+    let limits: Vec<(f64, Vec<RepeatedRun>)> = [low, high]
         .into_iter()
         .filter_map(|level| Some((level, runs_at_limit(force, &runs, level)?)))
         .collect();
@@ -82,19 +82,30 @@ pub(super) fn find_repeats(force: &[f64], time: &[f64]) -> ForceRepeats {
         },
         limits: limits
             .into_iter()
-            .map(|(level, runs)| (level, runs.into_iter().map(span).collect()))
+            .map(|(level, runs)| (level, runs.iter().map(span).collect()))
             .collect(),
     }
 }
 
-/// The runs at an extreme value; `None` if the force meets it once or seldom.
-fn runs_at_limit<'a>(force: &[f64], runs: &'a [RepeatedRun], level: f64) -> Option<Vec<&'a RepeatedRun>> {
-    let is_there =
-        |run: &&RepeatedRun| run.end - run.start >= LIMIT_FEWEST_REPEATS && force[run.start].total_cmp(&level).is_eq();
-    let runs: Vec<&RepeatedRun> = runs.iter().filter(is_there).collect();
-    let count: usize = runs.iter().map(|run| run.end - run.start).sum();
-    let is_often = count >= LIMIT_FEWEST_SAMPLES && count as f64 >= LIMIT_LEAST_SHARE * force.len() as f64;
-    (runs.len() > 1 && is_often).then_some(runs)
+/// The samples at an extreme value, in runs; `None` if the force meets it once or seldom.
+fn runs_at_limit(force: &[f64], runs: &[RepeatedRun], level: f64) -> Option<Vec<RepeatedRun>> {
+    let is_there = |k: usize| force[k].total_cmp(&level).is_eq();
+    let long = runs
+        .iter()
+        .filter(|run| run.end - run.start >= LIMIT_FEWEST_REPEATS && is_there(run.start));
+    let (times, count) = long.fold((0, 0), |(times, count), run| (times + 1, count + run.end - run.start));
+    if times < 2 || count < LIMIT_FEWEST_SAMPLES || (count as f64) < LIMIT_LEAST_SHARE * force.len() as f64 {
+        return None;
+    }
+    // Single samples are at the limit as well.
+    let mut all: Vec<RepeatedRun> = Vec::new();
+    for k in (0..force.len()).filter(|k| is_there(*k)) {
+        match all.last_mut() {
+            Some(run) if run.end == k => run.end = k + 1,
+            _ => all.push(RepeatedRun { start: k, end: k + 1 }),
+        }
+    }
+    Some(all)
 }
 
 /// All runs of at least two equal numbers.
