@@ -257,9 +257,16 @@ impl ModelFunctions {
         let Ok(mut known) = self.single.try_lock() else {
             return Ok(false);
         };
-        let is_it = |one: &PreparedSingle| one.function == function && one.values == values;
+        let is_it = |one: &PreparedSingle| {
+            let is_independent = function == ModelFunction::Regressor;
+            one.function == function && (is_independent || one.values == values)
+        };
         let place = match known.iter().rposition(is_it) {
-            Some(place) => place,
+            Some(place) => {
+                // The function that was not used for longest is dropped first.
+                known[place..].rotate_left(1);
+                known.len() - 1
+            }
             None => {
                 if known.len() >= MOST_SINGLE {
                     known.remove(0);

@@ -146,7 +146,7 @@ fn values_of_base_parameters_that_differ_are_listed() {
         let change = |told: &Value| number(told, "/after") - number(told, "/before");
         close(change(two), 2.0 * change(one));
     }
-    let printed = printed(&["diff", &before, &scratch("heavy-values.toml")]);
+    let printed = printed(&["diff", &before, &heavier("heavy-values.toml", "92.4560")]);
     assert!(printed.contains("nominal values of p_min"), "{printed}");
     assert_eq!(
         json(&["diff", &before, &before, "--json"])["values"],

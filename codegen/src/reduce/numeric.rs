@@ -71,11 +71,13 @@ pub(super) fn reduce(
     let mut rows = states.next_rows(n_rows)?;
     // Equations that contradict each other in the last digits would look like independent columns.
     if states.close_by_constants() {
-        rows = states.next_rows(n_rows)?;
-        if states.closure_error() > FURTHER * NO_CONTRADICTION {
-            states.restore_constants();
-            rows = states.next_rows(n_rows)?;
-        }
+        rows = match states.next_rows(n_rows) {
+            Ok(closed) if states.closure_error() <= FURTHER * NO_CONTRADICTION => closed,
+            _ => {
+                states.restore_constants();
+                states.next_rows(n_rows)?
+            }
+        };
     }
     for _ in 0..ROUNDS {
         let w = ObservationColumns::new(&rows, columns.len());

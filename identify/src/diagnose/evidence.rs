@@ -213,11 +213,11 @@ impl EffectSelector<'_> {
         !is_exact || less > MIN_SHARE_OF_FORCE * channels.iter().map(squares).sum::<f64>()
     }
 
-    /// Whether a decrease of the squares is larger than the error that subtracting disturbances may leave.
+    /// Whether a decrease of the squares is larger than the error that subtracting differences between recordings may leave.
     fn is_above_removed_error(&self, less: f64, channels: &[usize]) -> bool {
         let removed = |d: &usize| {
             let samples = self.problem.measured_force(*d).len() as f64;
-            self.weights[*d] * samples * self.problem.removed.get(*d).copied().unwrap_or(0.0)
+            self.weights[*d] * samples * self.problem.removed_differences.get(*d).copied().unwrap_or(0.0)
         };
         less > MIN_SHARE_OF_REMOVED * channels.iter().map(removed).sum::<f64>()
     }

@@ -280,6 +280,8 @@ pub struct DiagnosisProblem {
     pub jumps: Vec<Vec<bool>>,
     /// Mean square of the forces that were removed from each channel, since they are not a function of the state.
     pub removed: Vec<f64>,
+    /// The part of [`Self::removed`] that differences between recordings explain, whose sizes are estimates.
+    pub removed_differences: Vec<f64>,
     /// Possible changes of the machine or of its signals within a recording.
     pub change_shapes: Vec<ChangeShape>,
     /// When the changes act that were added to the candidates, by kind and place.

@@ -50,8 +50,8 @@ pub(super) const WHITE_MOST_NOISE_RATIO: f64 = 1.5;
 /// By judgement.
 pub(super) const MIN_SHARE_OF_OTHERS: f64 = 1e-4;
 
-/// A gain below this part of the squares of subtracted disturbances (1) may be what they leave: their sizes and times are
-/// estimates. By judgement: a payload that differs by 1.5 kg left a Dahl friction of 0.8 % of its force.
+/// A gain below this part of the squares of subtracted differences between recordings (1) may be what they leave: their
+/// sizes are estimates. By judgement: a payload that differs by 1.5 kg left a Dahl friction of 0.8 % of its force.
 pub(super) const MIN_SHARE_OF_REMOVED: f64 = 3e-4;
 
 /// A gain below this part of a force's squares (1) may come from the smoothing of the positions. By judgement.

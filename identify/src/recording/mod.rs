@@ -83,7 +83,7 @@ impl SignalRecording {
 
     /// Samples of a column with interpolated values, because none was measured or a sensor failed; `None` if there
     /// are none.
-    pub(crate) fn lost_samples(&self, name: &str) -> Option<&[bool]> {
+    pub fn lost_samples(&self, name: &str) -> Option<&[bool]> {
         let lost = &self.columns.get(name)?.interpolated;
         lost.contains(&true).then_some(lost.as_slice())
     }

@@ -65,7 +65,8 @@ pub(super) fn single_effects(
         );
         return Vec::new();
     }
-    let is_all = each.entries.iter().all(|name| name.text == ALL_DRIVES)
+    let is_all = !each.entries.is_empty()
+        && each.entries.iter().all(|name| name.text == ALL_DRIVES)
         && scene.drives.iter().all(|drive| drive.name != ALL_DRIVES);
     let places: Vec<SpannedName> = if is_all {
         let driven = scene.drives.iter().filter(|drive| drive.is_driven);

@@ -11,7 +11,7 @@ use crate::segment::RecordingSegment;
 use super::constants::{CONSTANT_ERROR, ClaimedConstant};
 use super::named_zeros::{self, NamedZeros};
 use super::problem::{self, DiagnosisQuery, DiagnosisSolution, FixedParameters};
-use super::thresholds::{CONSTANT_SETTLED_SHARE, DIFFERENCE_LEAST_GAIN};
+use super::thresholds::{CONSTANT_MOST_RESIDUAL, CONSTANT_SETTLED_SHARE, DIFFERENCE_LEAST_GAIN};
 
 /// Most times a search is repeated with the errors of constants that it claims.
 const MOST_CONSTANT_ROUNDS: usize = 3;
@@ -48,6 +48,10 @@ pub(super) fn search_effects(
                 break;
             }
             let again = find_once(between, zeros, &claimed)?;
+            // Far from its value a constant may have no polynomial.
+            if again.mean_square_residual() > CONSTANT_MOST_RESIDUAL * answer.mean_square_residual() {
+                break;
+            }
             let found = claimed_constants(&again);
             let is_settled = have_settled(&claimed, &found);
             // The constants of an earlier round stay exact where they are no longer claimed.

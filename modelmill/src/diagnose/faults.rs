@@ -36,6 +36,7 @@ pub(crate) fn subtract_known(
     between: &[RecordingDifference],
 ) -> Outcome<()> {
     problem.removed.resize(model.drives().len(), 0.0);
+    problem.removed_differences.resize(model.drives().len(), 0.0);
     // Powers are means over all samples.
     let samples = problem.layout.samples().max(1) as f64;
     // Differences between recordings are subtracted, and their power is counted as removed.
@@ -51,7 +52,9 @@ pub(crate) fn subtract_known(
             for (y, f) in measured.iter_mut().zip(force) {
                 *y -= f;
             }
-            problem.removed[d] += force.iter().map(|f| f * f).sum::<f64>() / samples;
+            let power = force.iter().map(|f| f * f).sum::<f64>() / samples;
+            problem.removed[d] += power;
+            problem.removed_differences[d] += power;
         }
         problem.disturbances.push(difference(one));
     }

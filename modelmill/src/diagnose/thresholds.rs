@@ -105,6 +105,10 @@ pub(super) const ALTERNATIVE_MOST_ERROR: f64 = 0.1;
 /// less, any error would seem to explain as much. By judgement.
 pub(super) const ALTERNATIVE_LEAST_GAIN: f64 = 0.1;
 
+/// The answer of a repeated search replaces the one before if its mean square residual is at most this many times as large
+/// (1): fewer effects leave a little more. By judgement.
+pub(super) const CONSTANT_MOST_RESIDUAL: f64 = 1.1;
+
 /// A search is not repeated if the errors of constants that it claims changed by at most this share (1). By judgement.
 pub(super) const CONSTANT_SETTLED_SHARE: f64 = 0.01;
 

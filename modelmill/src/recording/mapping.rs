@@ -13,7 +13,7 @@ const LARGEST_MAPPING: u64 = 1 << 20;
 
 impl Host {
     /// Reads the columns of a mapping file, for [`RecordingOptions::columns`](super::RecordingOptions::columns). It has
-    /// the table `[recording.columns]`, as `recordings --model` prints it.
+    /// the lines of the table `[recording.columns]`, as `recordings --model` prints them, with or without its header.
     ///
     /// Fails when the file cannot be read, is no TOML, or has other content.
     ///
@@ -85,7 +85,7 @@ mod tests {
             ("[recording.columns]\nq1 = 3", "`q1` is no column"),
             ("schema = 1", "`schema` is no column"),
             ("[recording.columns\n", "no valid TOML"),
-            ("", "a mapping file has the table"),
+            ("", "a mapping file has lines such as"),
         ] {
             let fault = columns_of_text(text).unwrap_err();
             assert!(fault.contains(says), "{text}: {fault}");

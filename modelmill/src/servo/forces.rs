@@ -179,8 +179,7 @@ impl<'a> ActuatorForces<'a> {
             shifts: vec![0.0; model.actuators().len()],
         };
         let cutoff = all.choose_preparation(runs);
-        all.refine(runs)?;
-        // A low cut-off rounds the corners at which a limit shows.
+        // A low cut-off rounds the corners at which a limit shows, and the limit would bias delays.
         all.find_limits()?;
         all.motion = prepare_motion(model, &all.servo, runs, cutoff);
         all.refine(runs)?;
@@ -306,7 +305,18 @@ impl<'a> ActuatorForces<'a> {
                 });
                 phrases.push(self.phrase(actuator, delay));
             }
-            raw.set_column(&mechanism.drives[drive].name, force);
+            let name = &mechanism.drives[drive].name;
+            raw.set_column(name, force);
+            // Before the first command arrives, the force is not known.
+            let latest = self
+                .delays
+                .iter()
+                .zip(&self.actuators)
+                .filter(|(_, one)| one.drive.0 == drive);
+            let latest = latest.map(|(delay, _)| delay.value).fold(0.0, f64::max);
+            if latest > 0.0 {
+                raw.leave_out_samples(name, &|t| t < time[0] + latest);
+            }
         }
         raw.add_note(RecordingNote::info(self.note(raw.file(), &phrases)));
         let preparation = self.preparation_of(&time);

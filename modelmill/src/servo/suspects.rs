@@ -25,6 +25,11 @@ use crate::model::Model;
 use crate::segment::RecordingSegment;
 use crate::text::table::{percent, significant};
 
+/// Steps by which a limit of the grid is refined, as shares of it.
+const LIMIT_STEPS: [f64; 5] = [0.04, 0.02, 0.01, 0.005, 0.002];
+/// Most steps of one size.
+const MOST_LIMIT_STEPS: usize = 4;
+
 /// A limit of a servo that the model file lacks.
 #[derive(Clone, Debug)]
 pub(super) struct ServoLimit {
@@ -69,7 +74,11 @@ pub(super) fn servo_limits(
                 best = Some((one, limited));
             }
         }
-        let Some((fitted, limited)) = best.filter(|(one, _)| one.is_accepted()) else {
+        let best = best.filter(|(one, _)| one.is_accepted());
+        let best = best
+            .map(|best| own.refine_limit(model, actuator, gains, best))
+            .transpose()?;
+        let Some((fitted, limited)) = best else {
             continue;
         };
         let is_confirmed = validation.force_rows.is_empty()
@@ -176,7 +185,11 @@ impl DriveEquations {
         };
         let mut all = Vec::new();
         if actuator.saturation.is_none() {
-            let forces = self.states.forces(model, actuator, gains);
+            let without_band = ModelActuator {
+                dead_band: None,
+                ..actuator.clone()
+            };
+            let forces = self.states.forces(model, &without_band, gains);
             let limits = quantiles(forces.iter().map(|force| force.abs()).collect(), [300, 995]);
             all.extend(limits.into_iter().map(|limit| ModelActuator {
                 saturation: Some(limit),
@@ -195,6 +208,40 @@ impl DriveEquations {
         all
     }
 
+    /// The limit that explains most, near one of the grid.
+    ///
+    /// Fails when a regression fails.
+    fn refine_limit(
+        &self,
+        model: &Model,
+        actuator: &ModelActuator,
+        gains: &GainValues,
+        (mut fitted, mut limited): (LimitFit, ModelActuator),
+    ) -> Outcome<(LimitFit, ModelActuator)> {
+        let scaled = |one: &ModelActuator, factor: f64| {
+            let scale = |new: Option<f64>, old: Option<f64>| if old.is_none() { new.map(|x| factor * x) } else { new };
+            ModelActuator {
+                saturation: scale(one.saturation, actuator.saturation),
+                dead_band: scale(one.dead_band, actuator.dead_band),
+                ..one.clone()
+            }
+        };
+        for step in LIMIT_STEPS {
+            // In the direction in which it explains more, as long as it does.
+            for factor in [1.0 + step, 1.0 - step] {
+                for _ in 0..MOST_LIMIT_STEPS {
+                    let next = scaled(&limited, factor);
+                    let fit = self.fit_limit(model, [actuator, &next], gains)?;
+                    match fit.filter(|fit| fit.is_accepted() && fit.reduction > fitted.reduction) {
+                        Some(fit) => (fitted, limited) = (fit, next),
+                        None => break,
+                    }
+                }
+            }
+        }
+        Ok((fitted, limited))
+    }
+
     /// How well the difference between two versions of an actuator explains the residual; `None` if too few samples
     /// differ.
     fn fit_limit(
@@ -203,8 +250,16 @@ impl DriveEquations {
         [plain, limited]: [&ModelActuator; 2],
         gains: &GainValues,
     ) -> Outcome<Option<LimitFit>> {
-        let force = self.states.forces(model, plain, gains);
-        let limited = self.states.forces(model, limited, gains);
+        // The signal contains the effect of a dead band of the file already.
+        let is_applied = plain.dead_band.is_some();
+        let forces = |one: &ModelActuator| {
+            let without_band = ModelActuator {
+                dead_band: one.dead_band.filter(|_| !is_applied),
+                ..one.clone()
+            };
+            self.states.forces(model, &without_band, gains)
+        };
+        let (force, limited) = (forces(plain), forces(limited));
         let excess: Vec<f64> = force.iter().zip(&limited).map(|(all, made)| all - made).collect();
         if excess.iter().filter(|x| **x != 0.0).count() < FEWEST_LIMITED {
             return Ok(None);

@@ -193,7 +193,8 @@ fn an_imported_arm_has_the_forces_of_its_rig() {
         says.contains("1.5708 rad, is rounded to pi/2 (difference 0.0000037 rad)") || says.contains("3.7e-6"),
         "{says}"
     );
-    assert!(says.contains("`foot` does not move"), "{says}");
+    let facts = lines(&imported.facts);
+    assert!(facts.contains("`foot` does not move"), "{facts}");
     assert!(
         imported.model.contains("quill = { nominal = 0.2 }"),
         "the middle of its range"

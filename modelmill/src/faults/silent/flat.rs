@@ -28,16 +28,18 @@ pub(super) fn flat_intervals(drive: usize, data: &RecordingSegment) -> Vec<Silen
     let tolerance = SILENCE_NOISE_SIGMAS * noise / (block as f64).sqrt();
     let near = |sample: usize, level: f64| (force[sample] - level).abs() <= SILENCE_NOISE_SIGMAS * noise;
     let mean = |range: std::ops::Range<usize>| force[range.clone()].iter().sum::<f64>() / range.len() as f64;
-    let mut found = Vec::new();
-    let mut start = 0;
+    let mut found: Vec<SilenceCandidate> = Vec::new();
+    let (mut start, mut last_from, mut last_end) = (0, 0, 0);
     while start + block <= n {
-        let level = mean(start..start + block);
+        let mut level = mean(start..start + block);
         let mut end = start;
-        // Blocks follow as long as their mean is that of the first, and all samples are noise about it.
+        // Blocks follow as long as their mean is that of those before, and all samples are noise about it.
         while end + block <= n
             && (mean(end..end + block) - level).abs() <= tolerance
             && (end..end + block).all(|k| near(k, level))
         {
+            let share = block as f64 / (end + block - start) as f64;
+            level += share * (mean(end..end + block) - level);
             end += block;
         }
         if end - start < shortest {
@@ -60,6 +62,20 @@ pub(super) fn flat_intervals(drive: usize, data: &RecordingSegment) -> Vec<Silen
             interval[0] - dropped(from == 0, run.prepared.trimmed.0),
             interval[1] + dropped(end == n, run.prepared.trimmed.1),
         ];
+        // One sample of large noise does not divide an interval.
+        if let Some(last) = found.last_mut()
+            && from <= last_end + block
+            && (level - last.level).abs() <= tolerance
+        {
+            let weight = (last_end - last_from) as f64 / (end - last_from) as f64;
+            last.level += (1.0 - weight) * (level - last.level);
+            last.intervals[0][1] = interval[1];
+            last.reach[0][1] = reach[1];
+            last_end = end;
+            start = end;
+            continue;
+        }
+        (last_from, last_end) = (from, end);
         found.push(SilenceCandidate {
             drive,
             intervals: vec![interval],

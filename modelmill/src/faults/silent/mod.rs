@@ -21,7 +21,7 @@ use crate::text::table::significant;
 
 use fit::SilenceFit;
 use flat::flat_intervals;
-use repeats::find_repeats;
+use repeats::{IntactReadings, find_repeats};
 
 /// Times of two intervals that differ by less are equal, s.
 const SAME_TIME_S: f64 = 0.1;
@@ -67,7 +67,10 @@ impl SilentInterval {
                 self.predicted
             ),
             RecordingFaultKind::Saturation => {
-                format!("the {force} of {names} {is} cut off at {}, at times {when}", self.level)
+                format!(
+                    "the {force} of {names} {is} cut off at {}, again and again {when}",
+                    self.level
+                )
             }
             _ => format!(
                 "the {force} of {names} {is} stuck at {} {when} while the joints move",
@@ -212,11 +215,10 @@ fn judged_intervals(
         };
         let interval = one.span();
         let name = drives[one.drive].name.clone();
-        // The same interval of several drives is one fault; a limit is that of one drive.
+        // The same interval of several drives is one fault, unless each drive has a value of its own.
+        let has_level = matches!(kind, RecordingFaultKind::Saturation | RecordingFaultKind::FrozenForce);
         let is_same = |other: &&mut SilentInterval| {
-            other.kind == kind
-                && kind != RecordingFaultKind::Saturation
-                && (0..2).all(|k| (other.interval[k] - interval[k]).abs() < SAME_TIME_S)
+            other.kind == kind && !has_level && (0..2).all(|k| (other.interval[k] - interval[k]).abs() < SAME_TIME_S)
         };
         let unit = model.force_unit(one.drive);
         match found.iter_mut().find(is_same) {
@@ -257,9 +259,16 @@ fn find_candidates(
     segments: &[RecordingSegment],
 ) -> Vec<SilenceCandidate> {
     let name = &model.derivation.mechanism.drives[drive].name;
+    // Forces that follow from commands have no sensor, and may be at a limit or zero exactly.
+    let is_computed = |data: &RecordingSegment| {
+        (data.computed.iter()).any(|computed| computed.delays.iter().any(|delay| delay.drive == drive))
+    };
+    if segments.iter().any(is_computed) {
+        return Vec::new();
+    }
     // Filters change numbers: repetitions are searched in the recording as it was read.
     let repeats = match (raw.column(name), raw.column("t")) {
-        (Ok(force), Ok(time)) => find_repeats(force, time),
+        (Ok(force), Ok(time)) => find_repeats(&IntactReadings::new(force, time, raw.lost_samples(name))),
         _ => return Vec::new(),
     };
     let flat: Vec<SilenceCandidate> = segments.iter().flat_map(|data| flat_intervals(drive, data)).collect();

@@ -27,10 +27,31 @@ pub(super) struct ForceRepeats {
     pub(super) others_have_noise: bool,
 }
 
-/// Finds the exact repetitions of forces at times in s. Nothing is found where numbers repeat often, as those of coarse
+/// Readings of one drive that were measured, with their times.
+pub(super) struct IntactReadings {
+    /// Forces, N or N m.
+    force: Vec<f64>,
+    /// Times, s.
+    time: Vec<f64>,
+}
+
+impl IntactReadings {
+    /// The readings without those that are lost and were interpolated.
+    pub(super) fn new(force: &[f64], time: &[f64], lost: Option<&[bool]>) -> Self {
+        let is_lost = |k: usize| lost.is_some_and(|lost| lost.get(k) == Some(&true));
+        let intact = || (0..force.len().min(time.len())).filter(|k| !is_lost(*k));
+        Self {
+            force: intact().map(|k| force[k]).collect(),
+            time: intact().map(|k| time[k]).collect(),
+        }
+    }
+}
+
+/// Finds the exact repetitions of forces. Nothing is found where numbers repeat often, as those of coarse
 /// steps and of commands that are constant in pieces do.
-pub(super) fn find_repeats(force: &[f64], time: &[f64]) -> ForceRepeats {
-    let n = force.len().min(time.len());
+pub(super) fn find_repeats(readings: &IntactReadings) -> ForceRepeats {
+    let IntactReadings { force, time } = readings;
+    let n = force.len();
     let (Some(first), Some(last)) = (time.first(), time.last()) else {
         return ForceRepeats::default();
     };
@@ -38,7 +59,7 @@ pub(super) fn find_repeats(force: &[f64], time: &[f64]) -> ForceRepeats {
     if n < SILENCE_FEWEST_SAMPLES || step.is_nan() || step <= 0.0 || force.iter().any(|x| !x.is_finite()) {
         return ForceRepeats::default();
     }
-    let runs = repeated_runs(&force[..n]);
+    let runs = repeated_runs(force);
     let span = |run: &RepeatedRun| [time[run.start], time[run.end - 1]];
     let low = force.iter().copied().fold(f64::INFINITY, f64::min);
     let high = force.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -68,14 +89,14 @@ pub(super) fn find_repeats(force: &[f64], time: &[f64]) -> ForceRepeats {
         .filter(|run| !of_faults(run))
         .map(|run| run.end - run.start - 1)
         .sum();
-    if (others as f64) < (1.0 - FROZEN_MOST_SHARE) * n as f64 || repeated as f64 >= FROZEN_MOST_REPEATS * others as f64
-    {
+    if others < SILENCE_FEWEST_SAMPLES || repeated as f64 >= FROZEN_MOST_REPEATS * others as f64 {
         return ForceRepeats::default();
     }
+    let are_others_most = others as f64 >= (1.0 - FROZEN_MOST_SHARE) * n as f64;
     let rms = (force.iter().map(|f| f * f).sum::<f64>() / n as f64).sqrt();
     ForceRepeats {
-        others_have_noise: white_noise(force) > FROZEN_LEAST_NOISE_SHARE * rms,
-        stuck: if stuck.len() > SILENCE_MOST_INTERVALS {
+        others_have_noise: are_others_most && white_noise(force) > FROZEN_LEAST_NOISE_SHARE * rms,
+        stuck: if !are_others_most || stuck.len() > SILENCE_MOST_INTERVALS {
             Vec::new()
         } else {
             stuck.into_iter().map(|run| (span(run), force[run.start])).collect()
@@ -94,7 +115,12 @@ fn runs_at_limit(force: &[f64], runs: &[RepeatedRun], level: f64) -> Option<Vec<
         .iter()
         .filter(|run| run.end - run.start >= LIMIT_FEWEST_REPEATS && is_there(run.start));
     let (times, count) = long.fold((0, 0), |(times, count), run| (times + 1, count + run.end - run.start));
-    if times < 2 || count < LIMIT_FEWEST_SAMPLES || (count as f64) < LIMIT_LEAST_SHARE * force.len() as f64 {
+    // Zero is the reading of a dead channel.
+    if level == 0.0
+        || times < 2
+        || count < LIMIT_FEWEST_SAMPLES
+        || (count as f64) < LIMIT_LEAST_SHARE * force.len() as f64
+    {
         return None;
     }
     // Single samples are at the limit as well.
@@ -144,10 +170,10 @@ mod tests {
     #[test]
     fn a_number_that_repeats_for_a_time_is_stuck() {
         let (time, mut force) = noisy();
-        assert!(find_repeats(&force, &time).stuck.is_empty());
+        assert!(find_repeats(&IntactReadings::new(&force, &time, None)).stuck.is_empty());
         let level = force[600];
         force[600..800].fill(level);
-        let found = find_repeats(&force, &time);
+        let found = find_repeats(&IntactReadings::new(&force, &time, None));
         assert!(found.others_have_noise && found.limits.is_empty());
         assert_eq!(found.stuck, [([time[600], time[799]], level)]);
     }
@@ -156,10 +182,33 @@ mod tests {
     fn a_value_that_is_never_exceeded_is_a_limit() {
         let (time, force) = noisy();
         let clipped: Vec<f64> = force.iter().map(|x| x.clamp(-0.8, 0.9)).collect();
-        let found = find_repeats(&clipped, &time);
+        let found = find_repeats(&IntactReadings::new(&clipped, &time, None));
         assert!(found.stuck.is_empty());
         let levels: Vec<f64> = found.limits.iter().map(|(level, _)| *level).collect();
         assert_eq!(levels, [-0.8, 0.9]);
+    }
+
+    /// Values in place of lost samples repeat, and a channel that drops to zero has no limit there.
+    #[test]
+    fn lost_samples_and_zeros_are_neither_stuck_nor_a_limit() {
+        let (time, mut force) = noisy();
+        let last = force[1500];
+        force[1500..].fill(last);
+        let lost: Vec<bool> = (0..force.len()).map(|k| k >= 1500).collect();
+        assert!(
+            find_repeats(&IntactReadings::new(&force, &time, Some(&lost)))
+                .stuck
+                .is_empty()
+        );
+        let (time, force) = noisy();
+        let mut positive: Vec<f64> = force.iter().map(|x| x + 5.0).collect();
+        positive[300..340].fill(0.0);
+        positive[900..940].fill(0.0);
+        assert!(
+            find_repeats(&IntactReadings::new(&positive, &time, None))
+                .limits
+                .is_empty()
+        );
     }
 
     #[test]
@@ -168,7 +217,7 @@ mod tests {
         let in_pieces: Vec<f64> = (0..2000).map(|k| force[k / 100 * 100]).collect();
         let coarse: Vec<f64> = force.iter().map(|x| (5.0 * x).round() / 5.0).collect();
         for force in [in_pieces, coarse] {
-            let found = find_repeats(&force, &time);
+            let found = find_repeats(&IntactReadings::new(&force, &time, None));
             assert!(found.stuck.is_empty() && found.limits.is_empty());
         }
     }
