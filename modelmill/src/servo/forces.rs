@@ -20,7 +20,7 @@ use super::delay::{DelayQuery, ServoDelay, delays};
 use super::gains::{GainValues, delay_phrase};
 use super::refine::refine_delays;
 use super::suspects::{ServoLimit, servo_limits};
-use super::thresholds::{DELAY_STEP, FEWEST_DECIMATED};
+use super::thresholds::{CERTAIN_LIMIT_SHARE, DELAY_STEP, FEWEST_DECIMATED};
 use crate::along;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
@@ -29,6 +29,9 @@ use crate::recording::{PreparedRecording, RecordingOptions, SmoothingMethod, Sta
 use crate::segment::RecordingSegment;
 use crate::segment::computed_forces::{ComputedForces, DelaySensitivity};
 use crate::text::table::significant;
+
+/// Rounds in which limits and delays of servos are estimated in turn.
+const LIMIT_ROUNDS: usize = 4;
 
 /// Recordings of a fit, and those of its validation, each with its own result.
 type ReadRuns = [Vec<Outcome<UnpreparedRecording>>; 2];
@@ -179,8 +182,15 @@ impl<'a> ActuatorForces<'a> {
             shifts: vec![0.0; model.actuators().len()],
         };
         let cutoff = all.choose_preparation(runs);
-        // A low cut-off rounds the corners at which a limit shows, and the limit would bias delays.
-        all.find_limits()?;
+        // A low cut-off rounds the corners at which a limit shows. A limit and the delays bias each other until both are
+        // known.
+        for _ in 0..LIMIT_ROUNDS {
+            all.find_limits()?;
+            if all.limits.is_empty() {
+                break;
+            }
+            all.refine(runs)?;
+        }
         all.motion = prepare_motion(model, &all.servo, runs, cutoff);
         all.refine(runs)?;
         Ok(all)
@@ -240,8 +250,13 @@ impl<'a> ActuatorForces<'a> {
         let seconds: Vec<f64> = self.delays.iter().map(|delay| delay.value).collect();
         let all = [&*segments(deciding_recordings(&self.motion)), &check];
         self.limits = servo_limits(self.model, &self.servo, all, &seconds, &self.gains)?;
+        self.actuators = self.model.actuators().to_vec();
         for limit in &self.limits {
-            self.actuators[limit.actuator] = limit.limited.clone();
+            // A saturation is known roughly: forces about it are left out, and none is cut off.
+            self.actuators[limit.actuator] = ModelActuator {
+                saturation: self.model.actuators()[limit.actuator].saturation,
+                ..limit.limited.clone()
+            };
         }
         Ok(())
     }
@@ -316,6 +331,20 @@ impl<'a> ActuatorForces<'a> {
             let latest = latest.map(|(delay, _)| delay.value).fold(0.0, f64::max);
             if latest > 0.0 {
                 raw.leave_out_samples(name, &|t| t < time[0] + latest);
+            }
+            let found = self
+                .limits
+                .iter()
+                .filter(|limit| self.actuators[limit.actuator].drive.0 == drive);
+            let found = found.filter_map(|limit| limit.limited.saturation.filter(|_| limit.is_saturation));
+            if let Some(limit) = found.reduce(f64::min) {
+                let force = raw.column(name)?.to_vec();
+                let at = |t: f64| time.partition_point(|x| *x < t);
+                raw.leave_out_samples(name, &|t| {
+                    force
+                        .get(at(t))
+                        .is_some_and(|force| force.abs() > CERTAIN_LIMIT_SHARE * limit)
+                });
             }
         }
         raw.add_note(RecordingNote::info(self.note(raw.file(), &phrases)));

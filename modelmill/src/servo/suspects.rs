@@ -16,8 +16,8 @@ use super::forces::ActuatorStates;
 use super::gains::GainValues;
 use super::rows::UsedSamples;
 use super::thresholds::{
-    CHECKED_FACTOR_ERROR, CHECKED_REDUCTION, DELAY_SAMPLES, FEWEST_LIMITED, LIMIT_FACTOR_ERROR, LIMIT_GRID,
-    LIMIT_REDUCTION, LIMIT_T,
+    CERTAIN_LIMIT_SHARE, CHECKED_FACTOR_ERROR, CHECKED_REDUCTION, DELAY_SAMPLES, FEWEST_LIMITED, LIMIT_FACTOR_ERROR,
+    LIMIT_GRID, LIMIT_REDUCTION, LIMIT_T,
 };
 use crate::along;
 use crate::error::{Error, Outcome};
@@ -37,6 +37,8 @@ pub(super) struct ServoLimit {
     pub(super) actuator: usize,
     /// The actuator with the limit.
     pub(super) limited: ModelActuator,
+    /// Whether it is a saturation; otherwise a dead band.
+    pub(super) is_saturation: bool,
     /// The same as a disturbance for the diagnosis.
     pub(super) disturbance: Disturbance,
 }
@@ -70,7 +72,10 @@ pub(super) fn servo_limits(
             let Some(one) = own.fit_limit(model, [actuator, &limited], gains)? else {
                 continue;
             };
-            if best.as_ref().is_none_or(|(known, _)| one.reduction > known.reduction) {
+            if best
+                .as_ref()
+                .is_none_or(|(known, _)| one.reduction_as_is > known.reduction_as_is)
+            {
                 best = Some((one, limited));
             }
         }
@@ -88,6 +93,7 @@ pub(super) fn servo_limits(
         if is_confirmed {
             found.push(ServoLimit {
                 actuator: k,
+                is_saturation: limited.saturation.is_some() && actuator.saturation.is_none(),
                 disturbance: disturbance(model, actuator, &limited, &fitted),
                 limited,
             });
@@ -102,6 +108,8 @@ struct LimitFit {
     factor: f64,
     /// Share of the squared residual that it explains.
     reduction: f64,
+    /// The same with a factor of 1, by which limits are compared: a free factor makes up for a wrong limit.
+    reduction_as_is: f64,
     /// The factor in standard deviations.
     t: f64,
 }
@@ -232,7 +240,7 @@ impl DriveEquations {
                 for _ in 0..MOST_LIMIT_STEPS {
                     let next = scaled(&limited, factor);
                     let fit = self.fit_limit(model, [actuator, &next], gains)?;
-                    match fit.filter(|fit| fit.is_accepted() && fit.reduction > fitted.reduction) {
+                    match fit.filter(|fit| fit.is_accepted() && fit.reduction_as_is > fitted.reduction_as_is) {
                         Some(fit) => (fitted, limited) = (fit, next),
                         None => break,
                     }
@@ -279,6 +287,7 @@ impl DriveEquations {
         Ok(Some(LimitFit {
             factor,
             reduction: (before - after) / before,
+            reduction_as_is: (2.0 * dot(&excess, &force) - size) / before,
             t: (independent * (before - after).max(0.0) / after).sqrt(),
         }))
     }
@@ -334,9 +343,11 @@ fn disturbance(model: &Model, plain: &ModelActuator, limited: &ModelActuator, fi
         Some(limit) => {
             let unit = model.force_unit(drive);
             let says = format!(
-                "the servo of {name} reaches a limit: where its command requests more than {} {unit}, the motion shows no more; \
-                 this explains {share} of the squared residual. Give `saturation` in its [[actuator]]",
-                significant(limit, 3)
+                "the servo of {name} reaches a limit: where its command requests more than about {} {unit}, the motion shows no \
+                 more; this explains {share} of the squared residual. The limit is known roughly, so forces above {} {unit} are \
+                 left out. Give `saturation` in its [[actuator]]",
+                significant(limit, 2),
+                significant(CERTAIN_LIMIT_SHARE * limit, 2)
             );
             ("servo_saturation", EstimatedQuantity::new("limit", limit, unit), says)
         }

@@ -60,3 +60,7 @@ pub(super) const CHECKED_FACTOR_ERROR: f64 = 0.3;
 pub(super) const SATURATION_SHARE: f64 = 0.9;
 /// Passes of the estimate with a saturation. By judgement.
 pub(super) const SATURATION_PASSES: usize = 3;
+
+/// A saturation that was found is certainly above this share of its estimate (1). By judgement: planted ones of 1.6 N m were
+/// estimated as 1.3 to 2.1 N m, since the smoothed motion rounds the corners of the force.
+pub(super) const CERTAIN_LIMIT_SHARE: f64 = 0.6;
