@@ -261,6 +261,39 @@ impl<'a> ActuatorForces<'a> {
         Ok(())
     }
 
+    /// Leaves out the forces of a drive that do not follow from its signals: those before the first command arrives, and
+    /// those near a saturation that the file lacks.
+    ///
+    /// Fails when the recording has no such column.
+    fn leave_out_unknown(&self, raw: &mut Raw, drive: usize, time: &[f64]) -> Outcome {
+        let name = &self.model.derivation.mechanism.drives[drive].name;
+        // Before the first command arrives, the force is not known.
+        let latest = self
+            .delays
+            .iter()
+            .zip(&self.actuators)
+            .filter(|(_, one)| one.drive.0 == drive);
+        let latest = latest.map(|(delay, _)| delay.value).fold(0.0, f64::max);
+        if latest > 0.0 {
+            raw.leave_out_samples(name, &|t| t < time[0] + latest);
+        }
+        let found = self
+            .limits
+            .iter()
+            .filter(|limit| self.actuators[limit.actuator].drive.0 == drive);
+        let found = found.filter_map(|limit| limit.limited.saturation.filter(|_| limit.is_saturation));
+        if let Some(limit) = found.reduce(f64::min) {
+            let force = raw.column(name)?.to_vec();
+            let at = |t: f64| time.partition_point(|x| *x < t);
+            raw.leave_out_samples(name, &|t| {
+                force
+                    .get(at(t))
+                    .is_some_and(|force| force.abs() > CERTAIN_LIMIT_SHARE * limit)
+            });
+        }
+        Ok(())
+    }
+
     /// A recording with the forces of its actuators.
     fn complete(
         &self,
@@ -322,30 +355,7 @@ impl<'a> ActuatorForces<'a> {
             }
             let name = &mechanism.drives[drive].name;
             raw.set_column(name, force);
-            // Before the first command arrives, the force is not known.
-            let latest = self
-                .delays
-                .iter()
-                .zip(&self.actuators)
-                .filter(|(_, one)| one.drive.0 == drive);
-            let latest = latest.map(|(delay, _)| delay.value).fold(0.0, f64::max);
-            if latest > 0.0 {
-                raw.leave_out_samples(name, &|t| t < time[0] + latest);
-            }
-            let found = self
-                .limits
-                .iter()
-                .filter(|limit| self.actuators[limit.actuator].drive.0 == drive);
-            let found = found.filter_map(|limit| limit.limited.saturation.filter(|_| limit.is_saturation));
-            if let Some(limit) = found.reduce(f64::min) {
-                let force = raw.column(name)?.to_vec();
-                let at = |t: f64| time.partition_point(|x| *x < t);
-                raw.leave_out_samples(name, &|t| {
-                    force
-                        .get(at(t))
-                        .is_some_and(|force| force.abs() > CERTAIN_LIMIT_SHARE * limit)
-                });
-            }
+            self.leave_out_unknown(&mut raw, drive, &time)?;
         }
         raw.add_note(RecordingNote::info(self.note(raw.file(), &phrases)));
         let preparation = self.preparation_of(&time);
