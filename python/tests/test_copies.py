@@ -11,7 +11,7 @@ import modelmill
 import numpy as np
 import pytest
 
-from conftest import MODELS, RECORDINGS
+from .conftest import MODELS, RECORDINGS
 
 RUN = RECORDINGS / "spidermill-mbs" / "plain-check.csv"
 

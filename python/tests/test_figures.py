@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from modelmill import ModelmillError
 
-from conftest import MODELS, RECORDINGS
+from .conftest import MODELS, RECORDINGS
 
 RUN = RECORDINGS / "spidermill-mbs" / "plain-check.csv"
 

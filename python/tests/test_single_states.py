@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from modelmill import ModelmillError
 
-from conftest import MODELS
+from .conftest import MODELS
 
 
 def loaded(name: str) -> modelmill.Model:
