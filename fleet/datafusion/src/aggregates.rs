@@ -247,9 +247,7 @@ impl Accumulator for SummaryAccumulator {
                     // Value and standard deviation; both are null if not determined.
                     let fitted = fit.as_ref().map(|fit| fit.parameters[k]);
                     columns.push(Arc::new(Float64Array::from(vec![fitted.map(|fitted| fitted.value)])));
-                    columns.push(Arc::new(Float64Array::from(vec![
-                        fitted.and_then(|fitted| fitted.std),
-                    ])));
+                    columns.push(Arc::new(Float64Array::from(vec![fitted.and_then(|fitted| fitted.std)])));
                 }
                 let answer = StructArray::try_new(self.fleet.fields(), columns, None)?;
                 Ok(ScalarValue::Struct(Arc::new(answer)))
