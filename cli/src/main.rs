@@ -30,7 +30,8 @@ fn main() -> ExitCode {
             return print_help_or_usage(&error);
         }
     };
-    if let Err(failure) = check_time_limit(&cli) {
+    #[cfg(feature = "workbench")]
+    if let Some(failure) = find_time_limit_fault(&cli) {
         return report_failure(&failure);
     }
     let mut progress: Arc<dyn ProgressListener> = Arc::new(TerminalProgress::new());
@@ -49,15 +50,12 @@ fn main() -> ExitCode {
     }
 }
 
-/// Refuses a time limit for the workbench, which runs until it is stopped.
-fn check_time_limit(cli: &CommandLine) -> CommandOutcome {
-    #[cfg(feature = "workbench")]
-    if cli.time_limit.is_some() && matches!(cli.command, ProgramCommand::Work(_)) {
-        let says = "--time-limit: the workbench runs until it is stopped; leave out the option";
-        return Err(CommandFailure::Usage(says.to_owned()));
-    }
-    let _ = cli;
-    Ok(())
+/// The fault of a time limit for the workbench, which runs until it is stopped.
+#[cfg(feature = "workbench")]
+fn find_time_limit_fault(cli: &CommandLine) -> Option<CommandFailure> {
+    let is_limited = cli.time_limit.is_some() && matches!(cli.command, ProgramCommand::Work(_));
+    let says = "--time-limit: the workbench runs until it is stopped; leave out the option";
+    is_limited.then(|| CommandFailure::Usage(says.to_owned()))
 }
 
 /// Prints why a command ended early, and returns its exit status.
