@@ -122,8 +122,10 @@ pub fn disturbance(one: &Disturbance) -> String {
             let is = if percent > 0.0 { "longer" } else { "shorter" };
             format!(
                 "recorded times are {}{deviation} % {is} than true ones, as with a clock or a sampling rate that is not the \
-                 stated one",
-                significant(percent.abs(), 3)
+                 stated one. The recordings cannot distinguish this from lengths of the model that are all {} % too {}",
+                significant(percent.abs(), 3),
+                significant(2.0 * percent.abs(), 2),
+                if percent > 0.0 { "short" } else { "long" }
             )
         }
         "encoder_zero" => {

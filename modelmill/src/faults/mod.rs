@@ -55,9 +55,9 @@ pub enum RecordingFaultKind {
     Wrapped,
     /// A force reads zero although the model predicts one.
     DeadChannel,
-    /// A force stays at one value although the model predicts another.
+    /// A force stays at one value while the machine moves: all other readings have noise, or the model predicts another.
     FrozenForce,
-    /// A force is cut off at a value, although the model predicts larger ones.
+    /// The largest or smallest readings of a force repeat one value: it is cut off there.
     Saturation,
     /// Brakes hold the joints, and the drives are off.
     Brakes,

@@ -206,6 +206,75 @@ fn a_force_that_is_cut_off_is_left_out_at_its_limit() {
     assert!(lost as f64 > 0.1 * run.samples() as f64, "{lost}");
 }
 
+/// A clock that runs slow or fast shows in the forces if no rate is recorded. With a single length in the model it cannot be
+/// distinguished from an error of that length by twice the share, so that each names the other. A sound clock is not named.
+#[test]
+fn a_wrong_clock_is_named_with_its_size() {
+    let model = Model::open(bundled("two_link")).expect("a model");
+    for factor in [1.0, 1.03, 0.97] {
+        let mut table = Table::made("two_link", 5);
+        let kept: Vec<usize> = (0..table.names.len())
+            .filter(|k| !table.names[*k].contains("_d"))
+            .collect();
+        table.names = kept.iter().map(|k| table.names[*k].clone()).collect();
+        for row in &mut table.rows {
+            *row = kept.iter().map(|k| row[*k]).collect();
+        }
+        let read = table.scaled("t", factor).read(&model);
+        let found = model
+            .diagnose(&[&read], &[], &DiagnosisOptions::default())
+            .expect("a diagnosis");
+        let share = factor - 1.0_f64;
+        if share.abs() < 1e-6 {
+            assert!(found.missing.is_empty());
+            assert!(found.diagnosis.disturbances.iter().all(|one| one.kind != "time_base"));
+            continue;
+        }
+        let clock = found.diagnosis.disturbances.iter().find(|one| one.kind == "time_base");
+        if let Some(clock) = clock {
+            assert!(found.missing.is_empty());
+            assert!((clock.estimates[0].value - share).abs() < 0.005, "{factor}: {clock:?}");
+            let says = clock.description.as_deref().unwrap_or_default();
+            assert!(says.contains("lengths of the model that are all"), "{says}");
+            continue;
+        }
+        let [length] = found.missing.as_slice() else {
+            panic!(
+                "{factor}: neither a clock nor one length: {:?}",
+                found.diagnosis.effects
+            );
+        };
+        let effect = &length.effect;
+        assert_eq!(
+            (effect.kind.as_str(), effect.at.join(" ").as_str()),
+            ("constant_error", "L")
+        );
+        let value = length.estimates[0].value;
+        let expected = 0.5 * (factor * factor - 1.0);
+        assert!(
+            (value - expected).abs() < 0.1 * expected.abs(),
+            "{factor}: {value} for {expected}"
+        );
+        assert!(length.indistinguishable_from.iter().any(|one| one.kind == "time_base"));
+    }
+}
+
+/// Recordings with gaps are diagnosed with the segments that are long enough.
+#[test]
+fn short_segments_between_gaps_are_left_out_of_a_diagnosis() {
+    let model = Model::open(bundled("two_link")).expect("a model");
+    let mut table = Table::made("two_link", 5);
+    // The segment between both gaps has 40 samples.
+    let middle = SAMPLES / 3;
+    table.rows.drain(middle + 70..middle + 100);
+    table.rows.drain(middle..middle + 30);
+    let read = table.read(&model);
+    let found = model
+        .diagnose(&[&read], &[], &DiagnosisOptions::default())
+        .expect("a diagnosis");
+    assert!(found.missing.is_empty(), "{:?}", found.missing.len());
+}
+
 /// The verdict names the fault, the rest holds for the corrected recording, and two faults are both found.
 #[test]
 fn a_diagnosis_runs_on_the_corrected_recordings() {

@@ -29,14 +29,14 @@ const SAME_TIME_S: f64 = 0.1;
 /// An interval in which forces were not measured.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct SilentInterval {
-    /// Dead channel, frozen force, or brakes.
+    /// Dead channel, frozen force, saturation, or brakes.
     pub(crate) kind: RecordingFaultKind,
     /// Names of the drives.
     pub(crate) drives: Vec<String>,
     /// Start and end, s.
     pub(crate) interval: [f64; 2],
-    /// Starts and ends of what is left out, s: with samples that were dropped at the ends of the recording, and only
-    /// the samples at a limit.
+    /// Starts and ends of the times that fits do not use, s. They include samples that were dropped at the ends of the
+    /// recording. For a limit they are the samples at it.
     pub(crate) reach: Vec<[f64; 2]>,
     /// The recording.
     pub(crate) file: String,
@@ -116,7 +116,7 @@ struct SilenceCandidate {
     drive: usize,
     /// Starts and ends, s.
     intervals: Vec<[f64; 2]>,
-    /// What is left out if it counts, s.
+    /// Times that fits do not use if the fault is confirmed, s.
     reach: Vec<[f64; 2]>,
     /// The mean force.
     level: f64,
