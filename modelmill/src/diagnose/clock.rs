@@ -2,7 +2,6 @@
 //! and times: if the recorded time is too long by a share e, true rates are larger by e and true accelerations by 2 e.
 //! A mechanism whose lengths are all larger by 2 e has the same forces, so that the recordings cannot distinguish the two.
 
-use modelmill_identify::PreparedRun;
 use modelmill_identify::diagnose::{
     CandidateEffect, CandidateNature, ColumnChoice, ColumnSource, EffectParameter, ForceColumn, LocatedEffect,
     SignConstraint,
@@ -22,12 +21,11 @@ pub(crate) fn clock(
     let mut column = ForceColumn(vec![None; model.drives().len()]);
     for (i, slopes) in slopes.iter().enumerate() {
         let [_, by_rate, by_acceleration] = slopes.as_ref()?;
-        let rates = |run: &PreparedRun| run.qd[i].clone();
-        let accelerations = |run: &PreparedRun| run.qdd[i].clone();
-        let parts: [(f64, &ForceColumn, &dyn Fn(&PreparedRun) -> Vec<f64>); 2] =
-            [(1.0, by_rate, &rates), (2.0, by_acceleration, &accelerations)];
-        for (order, slope, values) in parts {
-            let motion = (all.iter()).flat_map(|(one, _)| values(&one.run).into_iter().step_by(one.decimation()));
+        for (factor, slope, is_rate) in [(1.0, by_rate, true), (2.0, by_acceleration, false)] {
+            let motion = all.iter().flat_map(|(one, _)| {
+                let values = if is_rate { &one.run.qd[i] } else { &one.run.qdd[i] };
+                values.iter().copied().step_by(one.decimation())
+            });
             let motion: Vec<f64> = motion.collect();
             let mut part = slope.clone();
             for values in part.0.iter_mut().flatten() {
@@ -35,7 +33,7 @@ pub(crate) fn clock(
                     *value *= motion;
                 }
             }
-            column.add(order, &part);
+            column.add(factor, &part);
         }
     }
     (!column.is_zero()).then(|| CandidateEffect {
