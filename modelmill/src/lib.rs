@@ -168,7 +168,8 @@
 //! let host = Host::new();
 //! let rig = Path::new("../model-spec/rigs/spidermill-full.toml");
 //! let plan = Path::new("../model-spec/rigs/spidermill-plan.toml");
-//! let reduced = host.reduce(rig, Some(plan))?;
+//! let options = modelmill::reduce::RigReductionOptions { plan: Some(plan), ..Default::default() };
+//! let reduced = host.reduce(rig, &options)?;
 //! assert!(reduced.forces.iter().all(|force| force.nrms < 1e-6));
 //! # Ok::<(), modelmill::Error>(())
 //! ```

@@ -19,6 +19,16 @@ const POSES: (usize, f64) = (100, 0.2);
 /// Endings of robot descriptions.
 const DESCRIPTION_ENDINGS: [&str; 4] = ["urdf", "xml", "mjcf", "sdf"];
 
+/// What a reduction may use.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct RigReductionOptions<'a> {
+    /// The path of a plan file, which states the plane and the bodies that are merged to one part. Without a plan,
+    /// every body becomes a separate part.
+    pub plan: Option<&'a Path>,
+    /// Largest gap that joints may have, m or rad; 0 for joints that close.
+    pub gap_tolerance: f64,
+}
+
 /// The planar model of a rig.
 pub struct RigReduction {
     /// The rig's name.
@@ -44,14 +54,17 @@ pub struct ProposedReduction {
 }
 
 impl Host {
-    /// Reduces a rig with spatial bodies to a planar model file, and measures the error of every approximation. `plan`
-    /// is the path of a plan file, which states the plane and the bodies that are merged to one part. Without a plan,
-    /// every body becomes a separate part.
+    /// Reduces a rig with spatial bodies to a planar model file, and measures the error of every approximation.
+    /// With a tolerance for gaps, the joints of the rig are closed as well as possible (least squares), and its forces
+    /// are those of this motion; a planned loop is closed exactly by the model, so that the difference of forces is what
+    /// the gaps cost.
     ///
     /// Fails with all errors and warnings of rig and plan, each with its place, and when the reduction does not support
     /// the mechanism.
-    pub fn reduce(&self, path: &Path, plan: Option<&Path>) -> Outcome<RigReduction> {
-        let loaded = self.noted_rig(path)?;
+    pub fn reduce(&self, path: &Path, options: &RigReductionOptions<'_>) -> Outcome<RigReduction> {
+        let plan = options.plan;
+        let mut loaded = self.noted_rig(path)?;
+        loaded.rig.gap_tolerance = options.gap_tolerance;
         // The plan names parts and their bodies; the default plan has one part for each body.
         let made = match plan {
             Some(plan) => modelmill_reduction::plan_file_with(plan, self.files())?,
@@ -85,13 +98,14 @@ impl Host {
     /// use std::path::Path;
     ///
     /// let rig = Path::new("model-spec/rigs/spidermill-seventeen.toml");
-    /// let proposed = modelmill::Host::new().propose_plan(rig)?;
+    /// let proposed = modelmill::Host::new().propose_plan(rig, &modelmill::reduce::RigReductionOptions::default())?;
     /// std::fs::write("plan.toml", &proposed.plan).unwrap();
     /// assert!(proposed.reduced.forces.iter().all(|force| force.nrms < 1e-6));
     /// # Ok::<(), modelmill::Error>(())
     /// ```
-    pub fn propose_plan(&self, path: &Path) -> Outcome<ProposedReduction> {
-        let loaded = self.noted_rig(path)?;
+    pub fn propose_plan(&self, path: &Path, options: &RigReductionOptions<'_>) -> Outcome<ProposedReduction> {
+        let mut loaded = self.noted_rig(path)?;
+        loaded.rig.gap_tolerance = options.gap_tolerance;
         let rig = &loaded.rig;
         let refuse = |says: String| Error::input(format!("{}: {says}", path.display()));
         let proposal = self

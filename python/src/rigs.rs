@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use modelmill::reduce::RigReductionOptions;
 use modelmill::text::table::count;
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -90,10 +91,17 @@ pub(crate) fn reduce(
     py: Python<'_>,
     rig: PathBuf,
     plan: Option<PathBuf>,
+    tolerance: f64,
     progress: Option<Bound<'_, PyAny>>,
 ) -> PyResult<(PythonResult, String)> {
     let (host, listener) = new_host(Vec::new(), false);
-    let reduced = run_interruptible(py, &listener, progress.as_ref(), || host.reduce(&rig, plan.as_deref()))?;
+    let reduced = run_interruptible(py, &listener, progress.as_ref(), || {
+        let options = RigReductionOptions {
+            plan: plan.as_deref(),
+            gap_tolerance: tolerance,
+        };
+        host.reduce(&rig, &options)
+    })?;
     let mut object = reduced.json("");
     if let Some(object) = object.as_object_mut() {
         object.shift_remove("out");

@@ -17,7 +17,8 @@ use nalgebra::{Complex, Vector2};
 
 use crate::drive::ContactPlace;
 use crate::part::{SubstitutionPart, rotation, wrap_angle};
-use crate::reduce::{ReductionState, TOLERANCE};
+use crate::reduce::ReductionState;
+use crate::tolerance::{angle_tolerance, distance_tolerance};
 
 /// A sum of coordinates with integer factors: the rotation of a part since the nominal configuration.
 #[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -88,6 +89,7 @@ impl ReductionState<'_> {
             return None;
         }
         let (plane, samples) = (&self.plane, &self.samples);
+        let tolerance = angle_tolerance(self.names.rig, part.bodies[0]);
         let differs = |other: RotationReference| {
             let most = samples.largest(|moment| {
                 let other = match other {
@@ -97,7 +99,7 @@ impl ReductionState<'_> {
                 let difference = part.rotation_angle(moment, plane, samples) - other;
                 difference.sin().atan2(difference.cos())
             });
-            most.is_nan() || most > TOLERANCE
+            most.is_nan() || most > tolerance
         };
         let earlier = (0..self.rotations.len()).map(RotationReference::Part);
         std::iter::once(RotationReference::Base)
@@ -176,7 +178,7 @@ impl ReductionState<'_> {
             }
         }
         let size = gap.values().map(Complex::norm_sqr).sum::<f64>().sqrt();
-        if size <= TOLERANCE {
+        if size <= distance_tolerance(self.names.rig) {
             return true;
         }
         self.loop_directions

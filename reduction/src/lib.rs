@@ -28,6 +28,7 @@ mod reduce_drives;
 mod reduce_parts;
 mod report;
 mod samples;
+mod tolerance;
 mod write;
 
 pub use export::{DescriptionExport, DescriptionFormat as ExportFormat, ExportError, export};

@@ -12,9 +12,12 @@ use crate::planar::{PlanarBody, check_group, out_of_plane_rate};
 use crate::planar_draft::PlanarDraft;
 use crate::report::{AssumptionSize, ReductionReport};
 use crate::samples::{MotionPlane, MotionSamples};
+use crate::tolerance::{TOLERANCE, rate_tolerance};
 use crate::write::{model_file, significant_digits};
 use modelmill_boundary::files::MemoryFiles;
-use modelmill_rig::{LoadFailure, Rig, RigLog, plain_error};
+use modelmill_boundary::message;
+use modelmill_boundary::text::{Message, OptionName, Remedy};
+use modelmill_rig::{LoadFailure, Rig, RigLog, RigPoseError, plain_error};
 use modelmill_spec::Diagnostic;
 
 /// The result of a reduction.
@@ -26,8 +29,6 @@ pub struct PlanarReduction {
     pub report: ReductionReport,
 }
 
-/// Rates out of the plane, gaps of joints and changes of shifts above this are faults, not rounding.
-pub(crate) const TOLERANCE: f64 = 1e-6;
 /// Lengths (m), angles (rad) and accelerations (m/s^2) below this count as zero.
 pub(crate) const ZERO: f64 = 1e-12;
 
@@ -91,8 +92,19 @@ fn run(rig: &Rig, plan: &ReductionPlan, log: &mut RigLog) -> Option<(PlanarDraft
         }
         Err(error) => {
             let says = format!("the rig cannot be assembled in its nominal configuration: {error}");
+            let may_have_gaps = match &error {
+                RigPoseError::OutOfReach { .. } => true,
+                RigPoseError::TooManyCoordinates { enough_with_gaps, .. } => *enough_with_gaps,
+                _ => false,
+            };
+            let accept = may_have_gaps.then(|| {
+                message!(
+                    "to accept gaps of joints, and to measure what they change, use {}",
+                    Remedy::option(OptionName::Tolerance)
+                )
+            });
             log.0.push(Diagnostic {
-                help: open_joints(rig).into_iter().map(Into::into).collect(),
+                help: open_joints(rig).into_iter().chain(accept).collect(),
                 ..plain_error(None, says)
             });
             return None;
@@ -118,6 +130,7 @@ fn run(rig: &Rig, plan: &ReductionPlan, log: &mut RigLog) -> Option<(PlanarDraft
         nominal: BTreeMap::new(),
         loop_directions: Vec::new(),
     };
+    work.report_gaps();
     // The next steps make no sense if the motion is not planar, or if parts are missing.
     work.planar_reduction(log);
     if !log.0.is_empty() {
@@ -144,9 +157,9 @@ fn run(rig: &Rig, plan: &ReductionPlan, log: &mut RigLog) -> Option<(PlanarDraft
     Some((draft, report))
 }
 
-/// The largest gaps of joints in the poses that the file states, as a sentence; `None` if all are closed. The residual
-/// of the assembly is smaller than these, because it is shared by all joints of a loop.
-fn open_joints(rig: &Rig) -> Option<String> {
+/// The largest gaps of joints in the poses that the file states, with what can be done; `None` if all are closed. The
+/// residual of the assembly is smaller than these, because it is shared by all joints of a loop.
+fn open_joints(rig: &Rig) -> Option<Message> {
     /// Largest number of joints that are named.
     const NAMED: usize = 3;
     let mut gaps = rig.nominal_gaps();
@@ -158,7 +171,7 @@ fn open_joints(rig: &Rig) -> Option<String> {
     });
     let named: Vec<String> = named.collect();
     (!named.is_empty()).then(|| {
-        format!(
+        message!(
             "with the poses of the file, joints are open: {}; correct their points, or lengths in the same loop",
             named.join(", ")
         )
@@ -194,12 +207,27 @@ pub(crate) struct ReductionState<'a> {
 }
 
 impl ReductionState<'_> {
+    /// Reports the largest gap along the samples if the rig may have gaps.
+    fn report_gaps(&mut self) {
+        let allowed = self.names.rig.gap_tolerance;
+        if allowed > 0.0 {
+            let (joint, gap) = &self.samples.largest_gap;
+            let says = format!(
+                "do not close exactly; gaps up to {} mm are accepted, and all joints of a loop share them; the largest is at \
+                 `{joint}`",
+                significant_digits(1e3 * allowed, 3)
+            );
+            let sizes = vec![AssumptionSize::new("largest gap", *gap, "m or rad")];
+            self.report.add(1, "joints", says, sizes);
+        }
+    }
+
     /// Step 1: checks that motion is planar, and writes gravity in the plane.
     fn planar_reduction(&mut self, log: &mut RigLog) {
         let rig = self.names.rig;
         // No body may leave the plane.
         let out = out_of_plane_rate(&self.plane, &self.samples);
-        if out.is_nan() || out > TOLERANCE {
+        if out.is_nan() || out > rate_tolerance(rig) {
             log.0.push(plain_error(
                 None,
                 format!(

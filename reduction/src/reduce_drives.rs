@@ -6,8 +6,9 @@ use modelmill_rig::{RigLog, source_span};
 use crate::drive::check_linear;
 use crate::plan::PlanName;
 use crate::planar_draft::DraftEffect;
-use crate::reduce::{ReductionState, TOLERANCE};
+use crate::reduce::ReductionState;
 use crate::report::AssumptionSize;
+use crate::tolerance::distance_tolerance;
 use crate::write::significant_digits;
 
 impl ReductionState<'_> {
@@ -39,7 +40,7 @@ impl ReductionState<'_> {
                 (p - r).norm()
             });
             // Points that do not coincide in the samples are no loop.
-            if gap > TOLERANCE || gap.is_nan() {
+            if gap > distance_tolerance(self.names.rig) || gap.is_nan() {
                 log.error(
                     source_span(0, &two.span()),
                     format!(

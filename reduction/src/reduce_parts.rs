@@ -10,8 +10,9 @@ use crate::part::{SubstitutionPart, lump_mass, part_residuals, substitute};
 use crate::plan::{PlanName, PlanPartEntry};
 use crate::planar::PlanarBody;
 use crate::planar_draft::{DraftCoordinate, DraftFrame, DraftPart, DraftPoint, round_to_12_digits};
-use crate::reduce::{ReductionState, TOLERANCE, ZERO};
+use crate::reduce::{ReductionState, ZERO};
 use crate::samples::MotionSample;
+use crate::tolerance::{angle_tolerance, distance_tolerance};
 use crate::write::significant_digits;
 
 impl ReductionState<'_> {
@@ -116,7 +117,7 @@ impl ReductionState<'_> {
         part.shift = gap(&self.samples.nominal);
         // The gap changes along the samples if the points are no joint.
         let strays = self.samples.largest(|moment| (gap(moment) - part.shift).norm());
-        if strays > TOLERANCE || strays.is_nan() {
+        if strays > distance_tolerance(self.names.rig) || strays.is_nan() {
             log.error(
                 source_span(0, &entry.from.span()),
                 format!(
@@ -177,7 +178,7 @@ impl ReductionState<'_> {
             };
             // The coordinate may count in either direction.
             let [ahead, back] = [1.0, -1.0].map(strays);
-            if ahead.min(back) > TOLERANCE {
+            if ahead.min(back) > angle_tolerance(self.names.rig, part.bodies[0]) {
                 log.error(
                     source_span(0, &entry.coordinate.span()),
                     format!("`{coordinate}` of the rig is not the angle of `{}`", part.name),

@@ -87,6 +87,8 @@ pub(crate) struct MotionSamples {
     pub(crate) moments: Vec<MotionSample>,
     /// Number of states that could not be reached.
     pub(crate) n_out_of_reach: usize,
+    /// The joint with the largest gap of all poses, and this gap in m or rad. Above rounding only with a tolerance.
+    pub(crate) largest_gap: (String, f64),
 }
 
 impl MotionSamples {
@@ -109,11 +111,18 @@ impl MotionSamples {
         };
         let mut moments = Vec::new();
         let mut n_out_of_reach = 0;
+        let mut largest_gap = tracker.largest_gap();
         for state in sampled_states(&q0, number, range) {
             // Each pose is solved from the nominal configuration, so that all have the same assembly mode.
             let mut from_nominal = tracker.clone();
             match from_nominal.follow(&state) {
-                Ok(motion) => moments.push(MotionSample { state, motion }),
+                Ok(motion) => {
+                    let gap = from_nominal.largest_gap();
+                    if gap.1 > largest_gap.1 {
+                        largest_gap = gap;
+                    }
+                    moments.push(MotionSample { state, motion });
+                }
                 Err(_) => n_out_of_reach += 1,
             }
         }
@@ -121,6 +130,7 @@ impl MotionSamples {
             nominal,
             moments,
             n_out_of_reach,
+            largest_gap: (largest_gap.0.to_owned(), largest_gap.1),
         })
     }
 

@@ -63,6 +63,7 @@ fn build(merged: &MergedRig, log: &mut RigLog) -> Rig {
         effects: Vec::new(),
         sensors: RigSensors::default(),
         seed: merged.seed.unwrap_or(0),
+        gap_tolerance: 0.0,
     };
     for point in &merged.points {
         // A point on an unknown body is attached to the base, so that its name still exists.

@@ -31,6 +31,8 @@ const REFINED: f64 = 1e-13;
 const LARGEST_GAP: f64 = 1e-9;
 /// A pivot below this share of the largest means that a body can move by itself.
 const RANK_TOLERANCE: f64 = 1e-8;
+/// The same if lengths contradict each other by a few percent.
+const CONTRADICTION: f64 = 0.03;
 /// Coordinates move at most this far, m or rad, between two poses of a continuation.
 const CONTINUATION_STEP: f64 = 0.04;
 
@@ -66,6 +68,9 @@ pub enum RigPoseError {
         freedoms: usize,
         /// Number of coordinates.
         coordinates: usize,
+        /// Whether there would be enough degrees of freedom if small gaps of joints were accepted, as where parallel
+        /// bodies differ slightly in length.
+        enough_with_gaps: bool,
     },
     /// The drives cannot balance a load at this pose.
     DrivesDeadlocked,
@@ -84,10 +89,22 @@ impl fmt::Display for RigPoseError {
                 "joints and coordinates do not determine the motion: `{body}` is free to move; avoid singular poses, \
                  or fix it with a joint"
             ),
-            Self::TooManyCoordinates { freedoms, coordinates } => write!(
+            Self::TooManyCoordinates {
+                freedoms,
+                coordinates,
+                enough_with_gaps: false,
+            } => write!(
                 f,
                 "the joints leave fewer degrees of freedom ({freedoms}) than there are coordinates ({coordinates}); give as \
                  many coordinates and drives as there are degrees of freedom"
+            ),
+            Self::TooManyCoordinates {
+                freedoms, coordinates, ..
+            } => write!(
+                f,
+                "the joints leave fewer degrees of freedom ({freedoms}) than there are coordinates ({coordinates}), because \
+                 lengths contradict each other slightly; make bodies that move alike, such as parallel cranks, equally \
+                 long, or accept gaps of joints"
             ),
             Self::DrivesDeadlocked => write!(f, "the drives cannot balance a load at this pose; avoid this pose"),
         }
@@ -125,6 +142,8 @@ pub struct RigTracker<'r> {
     slopes: Option<DMatrix<f64>>,
     /// Inverse of the gradient at a pose nearby.
     inverse: Option<GradientInverse>,
+    /// The joint, or the coordinate, with the largest residual at the last pose, and this residual in m or rad.
+    gap: (&'r str, f64),
 }
 
 impl<'r> RigTracker<'r> {
@@ -157,10 +176,14 @@ impl<'r> RigTracker<'r> {
             last,
             slopes: None,
             inverse: None,
+            gap: ("", 0.0),
         };
         let q = tracker.last.clone();
         tracker.close_joints(&q)?;
-        tracker.check_freedoms()?;
+        // Lengths that contradict each other take degrees of freedom away; with gaps, the residual of each pose decides.
+        if rig.gap_tolerance == 0.0 {
+            tracker.check_freedoms()?;
+        }
         Ok(tracker)
     }
 
@@ -178,10 +201,17 @@ impl<'r> RigTracker<'r> {
             derived.scatter(pair, |column, value| jacobian[(i, column)] += value);
         }
         let r: DMatrix<f64> = ColPivQR::new(jacobian).r();
-        let held = (0..n).filter(|i| r[(*i, *i)].abs() > RANK_TOLERANCE * r[(0, 0)].abs());
-        let freedoms = n - held.count();
+        let freedoms_at = |tolerance: f64| {
+            let held = (0..n).filter(|i| r[(*i, *i)].abs() > tolerance * r[(0, 0)].abs());
+            n - held.count()
+        };
+        let freedoms = freedoms_at(RANK_TOLERANCE);
         if coordinates > freedoms {
-            return Err(RigPoseError::TooManyCoordinates { freedoms, coordinates });
+            return Err(RigPoseError::TooManyCoordinates {
+                freedoms,
+                coordinates,
+                enough_with_gaps: freedoms_at(CONTRADICTION) >= coordinates,
+            });
         }
         Ok(())
     }
@@ -197,6 +227,12 @@ impl<'r> RigTracker<'r> {
     /// Values of the coordinates at the last pose.
     pub fn coordinates(&self) -> &[f64] {
         &self.last
+    }
+
+    /// The joint, or the coordinate, with the largest residual at the last pose, and this residual in m or rad. It is
+    /// above rounding only if the rig has a tolerance.
+    pub fn largest_gap(&self) -> (&'r str, f64) {
+        self.gap
     }
 
     /// The motion of all bodies for a state near the last one, or for any state that can be reached from there
@@ -274,15 +310,18 @@ impl<'r> RigTracker<'r> {
             }
             if length < SMALLEST_STEP {
                 if outcome.1 > LARGEST_GAP {
-                    // An old inverse may not see this residual.
-                    if is_fresh {
+                    // An old inverse may not see this residual, and has another least-squares solution.
+                    if !is_fresh {
+                        self.inverse = None;
+                        continue;
+                    }
+                    if outcome.1 > self.rig.gap_tolerance {
                         break;
                     }
-                    self.inverse = None;
-                    continue;
                 }
                 displace(&mut poses, &step);
                 self.poses = poses;
+                self.gap = outcome;
                 q.clone_into(&mut self.last);
                 return Ok(());
             }

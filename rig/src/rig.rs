@@ -34,6 +34,9 @@ pub struct Rig {
     pub sensors: RigSensors,
     /// Seed of the noise, if the user requests none.
     pub seed: u64,
+    /// Largest gap that joints may have after they are closed as far as possible, m or rad. 0, the value of every rig
+    /// that is read: joints must close up to rounding.
+    pub gap_tolerance: f64,
 }
 
 impl Rig {

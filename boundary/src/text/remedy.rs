@@ -88,6 +88,8 @@ names! {
         Source => "source",
         /// Leaves out equations of drives at standstill.
         Standstill => "standstill",
+        /// Largest gap that joints may have.
+        Tolerance => "tolerance",
         /// Numbers of samples removed at the start and at the end.
         Trim => "trim",
         /// Physical parameters that are computed from base parameters.

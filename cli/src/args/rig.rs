@@ -19,6 +19,10 @@ pub(crate) struct ReduceArgs {
     /// file, to be edited
     #[arg(long, value_name = "PLAN.toml", conflicts_with = "plan")]
     pub(crate) propose: Option<PathBuf>,
+    /// Accept joints that do not close exactly, with gaps up to this length in m, such as 0.002. The loop is then closed
+    /// as well as possible, and the report says how much this changes the forces
+    #[arg(long, value_name = "METRES", default_value_t = 0.0, hide_default_value = true, value_parser = parse_length)]
+    pub(crate) tolerance: f64,
     /// Write the model to this file
     #[arg(long, value_name = "MODEL.toml", required_unless_present = "propose")]
     pub(crate) out: Option<PathBuf>,
@@ -72,6 +76,18 @@ pub(crate) struct ExportArgs {
     /// Write the description to this file
     #[arg(long, value_name = "FILE.urdf|FILE.xml")]
     pub(crate) out: PathBuf,
+}
+
+/// Reads a length in m that is not negative.
+fn parse_length(text: &str) -> Result<f64, String> {
+    let value: f64 = text
+        .parse()
+        .map_err(|_| "expected a length in m, such as 0.002".to_owned())?;
+    if value.is_finite() && value >= 0.0 {
+        Ok(value)
+    } else {
+        Err("expected a length in m that is not negative".to_owned())
+    }
 }
 
 /// Reads the name of a format of robot descriptions.

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use modelmill::Host;
+use modelmill::reduce::RigReductionOptions;
 
 use crate::args::ReduceArgs;
 use crate::failure::{CommandFailure, CommandOutcome};
@@ -12,6 +13,10 @@ use crate::{commands, terminal};
 /// Writes the model file and prints the report; or proposes a plan.
 pub(crate) fn run(host: &Host, args: &ReduceArgs) -> CommandOutcome {
     let loaded = host.rig_or_description(&args.rig)?;
+    let options = RigReductionOptions {
+        plan: args.plan.as_deref(),
+        gap_tolerance: args.tolerance,
+    };
     commands::print_remarks(&loaded);
     let mut inputs: Vec<&Path> = loaded.sources.paths().collect();
     inputs.extend(args.plan.as_deref());
@@ -25,12 +30,12 @@ pub(crate) fn run(host: &Host, args: &ReduceArgs) -> CommandOutcome {
         if let Some(target) = &target {
             OutputFile::refuse_equal([("--propose", &plan), ("--out", target)])?;
         }
-        return write_proposal(host, args, &plan, target.as_ref());
+        return write_proposal(host, args, &options, &plan, target.as_ref());
     }
     let Some(target) = target else {
         return Err(CommandFailure::Usage("--out or --propose is needed".to_owned()));
     };
-    let reduced = host.reduce(&args.rig, args.plan.as_deref())?;
+    let reduced = host.reduce(&args.rig, &options)?;
     // The model is written before the report, so that it exists even if standard output is closed.
     target.write(&reduced.reduction.model)?;
     if args.json {
@@ -42,8 +47,14 @@ pub(crate) fn run(host: &Host, args: &ReduceArgs) -> CommandOutcome {
 }
 
 /// Writes a proposed plan, and its model if requested.
-fn write_proposal(host: &Host, args: &ReduceArgs, plan: &OutputFile, target: Option<&OutputFile>) -> CommandOutcome {
-    let proposed = host.propose_plan(&args.rig)?;
+fn write_proposal(
+    host: &Host,
+    args: &ReduceArgs,
+    options: &RigReductionOptions<'_>,
+    plan: &OutputFile,
+    target: Option<&OutputFile>,
+) -> CommandOutcome {
+    let proposed = host.propose_plan(&args.rig, options)?;
     // A plan beside the model of another one would mislead, so both are replaced or none.
     let mut outputs = OutputSet::default();
     outputs.add(plan, proposed.plan.as_str());

@@ -119,7 +119,9 @@ def _write(table: Any, path: str) -> None:
     np.savetxt(path, np.stack([values for _, values in found], axis=1), fmt="%.17g", delimiter=",", header=head, comments="")
 
 
-def reduce(rig: PathText, plan: PathText | None = None, *, progress: Progress = None) -> Reduction:
+def reduce(
+    rig: PathText, plan: PathText | None = None, *, tolerance: float = 0.0, progress: Progress = None
+) -> Reduction:
     """Reduces a rig to a planar model, and reports the size of every approximation.
 
     Parameters
@@ -128,9 +130,12 @@ def reduce(rig: PathText, plan: PathText | None = None, *, progress: Progress = 
         A rig file (TOML).
     plan : path, optional
         A file that defines which bodies become which parts; default: every body becomes a separate part.
+    tolerance : float, optional
+        Accept joints that do not close exactly, with gaps up to this length in m. The loops are then closed as well as
+        possible, and the report says how much this changes the forces.
     progress : callable or bool, optional
         As for :func:`simulate`.
     """
     with told(progress) as hears:
-        found, text = _core.reduce(rig, plan, hears)
+        found, text = _core.reduce(rig, plan, tolerance, hears)
     return Reduction(found, text)

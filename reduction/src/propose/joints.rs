@@ -8,7 +8,7 @@ use modelmill_rig::{BodyAnchor, Rig};
 use nalgebra::Vector2;
 
 use super::motion::{BodyMotionKind, ClassifiedMotion};
-use super::thresholds::SAME_MOTION;
+use crate::tolerance::distance_tolerance;
 
 /// A place of a revolute joint on one of its bodies.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -112,7 +112,7 @@ fn moving_joints(rig: &Rig, motion: &ClassifiedMotion) -> Vec<MovingJoint> {
             let path = motion.path(&anchor);
             let is_same = |other: &MovingJoint| {
                 let pairs = other.path.iter().zip(&path);
-                pairs.map(|(a, b)| (a - b).norm()).fold(0.0, f64::max) <= SAME_MOTION
+                pairs.map(|(a, b)| (a - b).norm()).fold(0.0, f64::max) <= distance_tolerance(rig)
             };
             let place = HingePlace { joint, anchor };
             match joints.iter_mut().find(|other| is_same(other)) {

@@ -3,9 +3,10 @@
 use modelmill_rig::{BodyAnchor, Rig};
 use nalgebra::{Matrix3, Vector2, Vector3};
 
-use super::thresholds::{RANGES, REACHED_SHARE, SAME_MOTION, SAMPLES};
+use super::thresholds::{RANGES, REACHED_SHARE, SAMPLES};
 use crate::part::{SubstitutionPart, body_rotation, fit_carried_point};
 use crate::samples::{MotionPlane, MotionSamples};
+use crate::tolerance::{angle_tolerance, distance_tolerance, rate_tolerance};
 
 /// The kind of a body's motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,12 +62,12 @@ impl ClassifiedMotion {
     fn kind_of(&self, rig: &Rig, body: usize) -> BodyMotionKind {
         let (plane, samples) = (&self.plane, &self.samples);
         let rotation = samples.largest(|moment| body_rotation(body, moment, plane, samples));
-        if rotation <= SAME_MOTION {
+        if rotation <= angle_tolerance(rig, body) {
             let centre = BodyAnchor {
                 body: Some(body),
                 at: rig.bodies[body].centre,
             };
-            let moves = self.path(&centre).iter().any(|d| d.norm() > SAME_MOTION);
+            let moves = self.path(&centre).iter().any(|d| d.norm() > distance_tolerance(rig));
             return if moves {
                 BodyMotionKind::Translating
             } else {
@@ -87,7 +88,7 @@ impl ClassifiedMotion {
             let d = body_rotation(body, moment, plane, samples) - body_rotation(lead, moment, plane, samples);
             d.sin().atan2(d.cos())
         });
-        if twist.is_nan() || twist > SAME_MOTION {
+        if twist.is_nan() || twist > angle_tolerance(rig, body) {
             return false;
         }
         let anchor = |body: usize, at: Vector3<f64>| BodyAnchor { body: Some(body), at };
@@ -100,7 +101,7 @@ impl ClassifiedMotion {
             shift: Vector2::zeros(),
         };
         let (_, _, strays) = fit_carried_point(&carrier, &anchor(body, rig.bodies[body].centre), plane, samples);
-        strays <= SAME_MOTION
+        strays <= distance_tolerance(rig)
     }
 
     /// Displacements of an anchor in the plane since the nominal configuration, m, one per sample.
@@ -144,7 +145,7 @@ pub(super) fn find_plane(rig: &Rig, samples: &MotionSamples) -> Result<MotionPla
     let k = normal.iamax();
     normal *= normal[k].signum();
     let axis = |k: usize| Vector3::from_fn(|i, _| f64::from(u8::from(i == k)));
-    if (normal - axis(k)).norm() < SAME_MOTION {
+    if (normal - axis(k)).norm() < rate_tolerance(rig) {
         normal = axis(k);
     }
     // x for a normal along y or z; y for a normal along x.
@@ -158,7 +159,7 @@ pub(super) fn find_plane(rig: &Rig, samples: &MotionSamples) -> Result<MotionPla
     let at = on_base.map_or_else(Vector3::zeros, |anchor| anchor.at);
     let plane = MotionPlane::new(at.into(), normal.into(), x.into());
     let out = crate::planar::out_of_plane_rate(&plane, samples);
-    if out.is_nan() || out > SAME_MOTION {
+    if out.is_nan() || out > rate_tolerance(rig) {
         return Err("its bodies do not move in one plane".to_owned());
     }
     Ok(plane)

@@ -1,8 +1,8 @@
 //! Thresholds of a proposed plan. Each states what it bounds, its unit, and how it was chosen.
 
-/// Rotations (rad) and positions (m) along the samples that differ by less are equal. The same bound makes an assumption
-/// of a plan a fault.
-pub(super) const SAME_MOTION: f64 = crate::reduce::TOLERANCE;
+/// Lengths that differ by less are equal, m. The same bound makes an assumption of a plan a fault. Motions are compared
+/// within the tolerance of the rig's joints.
+pub(super) const SAME_MOTION: f64 = crate::tolerance::TOLERANCE;
 
 /// Values that differ by less than this share are equal and share a symbol (1). CAD programs print 6 to 12 digits, and
 /// lengths between joints are differences of such values. By judgement.

@@ -7,6 +7,7 @@ mod descriptions;
 mod export;
 mod extensions;
 mod faulty;
+mod gaps;
 mod locks;
 mod mjcf;
 mod order_of_entries;
