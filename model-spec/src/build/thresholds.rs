@@ -12,3 +12,20 @@ pub(super) const LARGEST_ANGLE_LIMIT: f64 = 4.0 * TAU;
 
 /// Limits above this value stand for no limit at all and are not judged, rad. By judgement.
 pub(super) const NO_LIMIT: f64 = 1000.0;
+
+/// A periodic table ends at least this far before the argument at which it repeats, rad: a last point closer to it is the
+/// first point once more. Well above the rounding of 2 pi to a few digits. By judgement.
+pub(super) const TABLE_CLOSURE: f64 = 1e-3;
+
+/// Largest distance between neighbouring points of a periodic table, as a multiple of the mean distance (1). Trigonometric
+/// polynomials through points with larger gaps swing far out of the table. By judgement.
+pub(super) const LARGEST_TABLE_GAP: f64 = 1.5;
+
+/// A nominal pose whose distance from a fold is below this is reported, rad, or as a share of the size of the mechanism for
+/// lengths (1). At one hundredth of a radian, passive rates are some ten times those in the middle of the motion. By
+/// judgement.
+pub(super) const FOLD_DISTANCE: f64 = 0.01;
+
+/// Step of the differences that measure the distance from a fold, rad, or as a share of the size of the mechanism for lengths
+/// (1). Small against [`FOLD_DISTANCE`], large against rounding. By judgement.
+pub(super) const FOLD_STEP: f64 = 1e-5;
