@@ -14,7 +14,7 @@ use super::description::{
     DescriptionJointKind, DescriptionLink, RobotDescription,
 };
 use super::placed::{DescriptionPose, rotation, rotation_between_axes, rotation_from_quaternion};
-use super::sdf_gearbox::gearbox_coupling;
+use super::sdf_couplings::{gearbox_coupling, screw_coupling};
 use super::thresholds::MOST_MOVING_JOINTS;
 use super::urdf_extensions::ball_constraint;
 use super::xml::{
@@ -439,32 +439,6 @@ fn joint(node: &Node, frames: &SdfFrames, version: f64, out: &mut RobotDescripti
 pub(super) fn joint_end(node: &Node, tag: &str, frames: &SdfFrames) -> Result<Option<usize>, String> {
     let inner = required_child(node, tag)?;
     attached_link(inner.text().unwrap_or("").trim(), &inner, frames)
-}
-
-/// The coupling of a screw: the translation follows the rotation, which keeps the limits and losses.
-fn screw_coupling(
-    node: &Node,
-    turn: &DescriptionJoint,
-    slide: &mut DescriptionJoint,
-) -> Result<DescriptionCoupling, String> {
-    let pitch = number_of(node, "screw_thread_pitch")?.ok_or_else(|| {
-        located_message(
-            node,
-            "it needs <screw_thread_pitch>, in metres per revolution; the older <thread_pitch> is ambiguous",
-        )
-    })?;
-    // The translation keeps only axis and anchor; limits and losses are not counted twice.
-    let mut bare = DescriptionJoint::new(slide.name.clone(), DescriptionJointKind::Prismatic, slide.line);
-    (bare.axis, bare.anchor) = (slide.axis, slide.anchor);
-    bare.is_driven = false;
-    *slide = bare;
-    Ok(DescriptionCoupling {
-        line: line(node),
-        joint: slide.name.clone(),
-        leader: Some(turn.name.clone()),
-        ratio: pitch / std::f64::consts::TAU,
-        offset: 0.0,
-    })
 }
 
 /// The direction of an `<axis>` of a joint at `place`, in the axes of the model.

@@ -1,7 +1,7 @@
-//! Gearboxes of SDF: a `<joint type="gearbox">` couples the angles of two other joints and has no motion of its own.
+//! Couplings of SDF: gearboxes, which couple the angles of two other joints and have no motion of their own, and screws.
 //!
-//! Let theta_1 be the angle from the reference body to the parent about `<axis>`, and theta_2 that from the reference body to
-//! the child about `<axis2>`. Then theta_2 = -ratio theta_1 (sdformat.org/spec, `gearbox_reference_body`).
+//! For a gearbox, let theta_1 be the angle from the reference body to the parent about `<axis>`, and theta_2 that from the
+//! reference body to the child about `<axis2>`. Then theta_2 = -ratio theta_1 (sdformat.org/spec, `gearbox_reference_body`).
 
 use roxmltree::Node;
 
@@ -80,4 +80,30 @@ fn hinge_between(joint: &SdfJoint, [body, link]: [Option<usize>; 2]) -> Option<(
     let ends = [joint.parent, joint.child];
     let is_forward = ends == [body, link];
     (is_forward || ends == [link, body]).then_some((hinge, is_forward))
+}
+
+/// The coupling of a screw: the translation follows the rotation, which keeps the limits and losses.
+pub(super) fn screw_coupling(
+    node: &Node,
+    turn: &DescriptionJoint,
+    slide: &mut DescriptionJoint,
+) -> Result<DescriptionCoupling, String> {
+    let pitch = number_of(node, "screw_thread_pitch")?.ok_or_else(|| {
+        located_message(
+            node,
+            "it needs <screw_thread_pitch>, in metres per revolution; the older <thread_pitch> is ambiguous",
+        )
+    })?;
+    // The translation keeps only axis and anchor; limits and losses are not counted twice.
+    let mut bare = DescriptionJoint::new(slide.name.clone(), DescriptionJointKind::Prismatic, slide.line);
+    (bare.axis, bare.anchor) = (slide.axis, slide.anchor);
+    bare.is_driven = false;
+    *slide = bare;
+    Ok(DescriptionCoupling {
+        line: line(node),
+        joint: slide.name.clone(),
+        leader: Some(turn.name.clone()),
+        ratio: pitch / std::f64::consts::TAU,
+        offset: 0.0,
+    })
 }
