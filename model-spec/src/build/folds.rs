@@ -5,7 +5,7 @@
 //! coordinate from the fold, so that `1/|d ln D/dq|` is this distance near one, and of the order of the mechanism elsewhere.
 
 use crate::build::MechanismSpans;
-use crate::build::thresholds::{FOLD_DISTANCE, FOLD_STEP};
+use crate::build::thresholds::{FOLD_DISTANCE, FOLD_LENGTH_SHARE, FOLD_STEP};
 use crate::diagnostic::{Diagnostic, DiagnosticLog};
 use crate::mechanism::Mechanism;
 use crate::numeric::{DenseRows, least_squares};
@@ -19,19 +19,34 @@ pub(super) fn warn_of_folds(mechanism: &Mechanism, places: &MechanismSpans, log:
     let passive: Vec<usize> = (0..mechanism.coordinates.len())
         .filter(|i| mechanism.coordinates[*i].passive)
         .collect();
-    let size = loop_gaps(mechanism).size.max(1e-6);
+    let closed = loop_gaps(mechanism);
+    let size = closed.size.max(1e-6);
+    // Columns of angles and of lengths differ in size by far; fixed scales change no difference of logarithms.
+    let scales: Vec<f64> = passive
+        .iter()
+        .map(|i| closed.rows.iter().map(|row| row[*i] * row[*i]).sum::<f64>().sqrt())
+        .collect();
     for (i, coordinate) in mechanism.coordinates.iter().enumerate() {
         if coordinate.passive || coordinate.motion.is_quaternion() {
             continue;
         }
-        let unit = if coordinate.motion.is_angle() { 1.0 } else { size };
-        let logarithm = |by: f64| log_determinant(mechanism, &passive, i, by * FOLD_STEP * unit);
-        let (Some(after), Some(before)) = (logarithm(1.0), logarithm(-1.0)) else {
+        let unit = if coordinate.motion.is_angle() {
+            1.0
+        } else {
+            FOLD_LENGTH_SHARE * size
+        };
+        let logarithm = |by: f64| log_determinant(mechanism, &passive, &scales, (i, by * unit));
+        // Positive if the fold lies above; both steps must agree, since rounding does not.
+        let slope = |step: f64| Some((logarithm(-step)? - logarithm(step)?) / (2.0 * step));
+        let (Some(near), Some(far)) = (slope(FOLD_STEP), slope(3.0 * FOLD_STEP)) else {
             continue;
         };
-        let distance = 2.0 * FOLD_STEP / (after - before).abs();
+        if (near - far).abs() > 0.2 * near.abs() {
+            continue;
+        }
+        let distance = near.abs().recip();
         if distance < FOLD_DISTANCE {
-            let direction = if after < before { "above" } else { "below" };
+            let direction = if near > 0.0 { "above" } else { "below" };
             log.push(
                 Diagnostic::warning(
                     places.coordinates[i],
@@ -48,12 +63,16 @@ pub(super) fn warn_of_folds(mechanism: &Mechanism, places: &MechanismSpans, log:
     }
 }
 
-/// `ln det(J'J)` with one coordinate moved and the loops closed again; `None` if they do not close.
-fn log_determinant(mechanism: &Mechanism, passive: &[usize], moved: usize, by: f64) -> Option<f64> {
+/// `ln det(J'J)` with one coordinate moved by a distance and the loops closed again; `None` if they do not close. Columns of J
+/// are divided by `scales`.
+fn log_determinant(mechanism: &Mechanism, passive: &[usize], scales: &[f64], (moved, by): (usize, f64)) -> Option<f64> {
     let mut at = mechanism.clone();
     at.coordinates[moved].nominal += by;
     for _ in 0..6 {
         let gaps = loop_gaps(&at);
+        if gaps.values.iter().all(|x| x.abs() < 1e-14 * gaps.size) {
+            break;
+        }
         let step = least_squares(&passive_columns(&gaps.rows, passive), &gaps.values, 0.0)?;
         for (i, change) in passive.iter().zip(step) {
             at.coordinates[*i].nominal -= change;
@@ -64,7 +83,12 @@ fn log_determinant(mechanism: &Mechanism, passive: &[usize], moved: usize, by: f
     if error.is_nan() || error > 1e-9 * gaps.size {
         return None;
     }
-    let rows = passive_columns(&gaps.rows, passive);
+    let mut rows = passive_columns(&gaps.rows, passive);
+    for row in &mut rows {
+        for (entry, scale) in row.iter_mut().zip(scales) {
+            *entry /= scale;
+        }
+    }
     let n = passive.len();
     // Elimination of the positive definite matrix J'J; the pivots multiply to its determinant.
     let mut matrix: DenseRows = (0..n)

@@ -21,11 +21,15 @@ pub(super) const TABLE_CLOSURE: f64 = 1e-3;
 /// polynomials through points with larger gaps swing far out of the table. By judgement.
 pub(super) const LARGEST_TABLE_GAP: f64 = 1.5;
 
-/// A nominal pose whose distance from a fold is below this is reported, rad, or as a share of the size of the mechanism for
-/// lengths (1). At one hundredth of a radian, passive rates are some ten times those in the middle of the motion. By
-/// judgement.
+/// A nominal pose whose distance from a fold is below this is reported, rad; for lengths it is multiplied by
+/// [`FOLD_LENGTH_SHARE`] and the size of the mechanism. At one hundredth of a radian, passive rates are some ten times those in
+/// the middle of the motion. By judgement.
 pub(super) const FOLD_DISTANCE: f64 = 0.01;
 
-/// Step of the differences that measure the distance from a fold, rad, or as a share of the size of the mechanism for lengths
-/// (1). Small against [`FOLD_DISTANCE`], large against rounding. By judgement.
+/// The length that counts as much as a radian at a fold, as a share of the size of the mechanism (1). The moving part of a
+/// mechanism is often smaller than the distance of its frames from the base. By judgement.
+pub(super) const FOLD_LENGTH_SHARE: f64 = 0.1;
+
+/// Step of the differences that measure the distance from a fold, rad; for lengths as [`FOLD_DISTANCE`]. Small against that,
+/// and large against rounding. By judgement.
 pub(super) const FOLD_STEP: f64 = 1e-5;
