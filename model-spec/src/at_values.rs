@@ -53,6 +53,12 @@ impl Mechanism {
                 *factor = stands.exact(factor);
             }
             coupling.offset = stands.exact(&coupling.offset);
+            if let Some(function) = &mut coupling.function {
+                function.value = stands.exact(&function.value);
+                if let Some(table) = &mut function.table {
+                    table.argument = stands.exact(&table.argument);
+                }
+            }
         }
         stands.bodies(&mut at.parts, &mut at.lumped_masses);
         let actuators = at.actuators.iter_mut().flat_map(|actuator| &mut actuator.terms);
@@ -215,7 +221,7 @@ impl ConstantSubstitutes {
 /// The decimal of 15 digits for a floating-point number, as an exact rational.
 ///
 /// Panics if the number is not finite.
-fn exact_decimal(value: f64) -> BigRational {
+pub(crate) fn exact_decimal(value: f64) -> BigRational {
     let digits = DIGITS - 1;
     // The printed mantissa and exponent are read back as integers.
     let written = format!("{value:.digits$e}");

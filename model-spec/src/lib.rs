@@ -45,6 +45,7 @@ mod record;
 mod schema;
 mod scope;
 mod sharing;
+mod slope;
 mod suggest;
 mod toml_budget;
 mod total_mass;

@@ -291,7 +291,8 @@ pub struct KinematicLoop {
     pub joins: [PointIdx; 2],
 }
 
-/// A coordinate that follows others, as by gears, a belt or a screw: `coordinate = sum of factor * other + offset`.
+/// A coordinate that follows others, as by gears, a belt, a screw or a cam: `coordinate = sum of factor * other + offset +
+/// function`.
 #[derive(Clone, Debug)]
 pub struct CoordinateCoupling {
     /// The coordinate that follows.
@@ -301,14 +302,56 @@ pub struct CoordinateCoupling {
     pub terms: Vec<(CoordinateIdx, ExactExpression)>,
     /// The constant term, an expression over constants, rad or m.
     pub offset: ExactExpression,
+    /// A function of other coordinates that is not affine, as of a cam; its coordinates are none of `terms`.
+    pub function: Option<CouplingFunction>,
+}
+
+/// A coupling that is not affine, as by a cam or by gears that are not round.
+#[derive(Clone, Debug)]
+pub struct CouplingFunction {
+    /// The function, over constants and coordinates, rad or m.
+    pub value: ExactExpression,
+    /// The coordinates in it, sorted.
+    pub leaders: Vec<CoordinateIdx>,
+    /// The interval of the table that it comes from, if it has one.
+    pub table: Option<TableInterval>,
+}
+
+/// The interval that a table covers; beyond its ends the function is a straight line.
+#[derive(Clone, Debug)]
+pub struct TableInterval {
+    /// The argument of the table, over constants and coordinates, rad or m.
+    pub argument: ExactExpression,
+    /// First and last argument.
+    pub ends: [f64; 2],
 }
 
 impl CoordinateCoupling {
+    /// The coordinates that it follows.
+    pub fn leaders(&self) -> Vec<CoordinateIdx> {
+        let of_function = self.function.iter().flat_map(|function| &function.leaders);
+        self.terms.iter().map(|(i, _)| i).chain(of_function).copied().collect()
+    }
+
     /// The value of the coordinate that follows, rad or m; `value` gives those of symbols.
     pub fn value(&self, value: &dyn Fn(ModelSymbol) -> f64) -> f64 {
         let terms = self.terms.iter();
         let moved = terms.map(|(i, factor)| factor.evaluate(value) * value(ModelSymbol::Coordinate(*i)));
-        self.offset.evaluate(value) + moved.sum::<f64>()
+        let function = self
+            .function
+            .as_ref()
+            .map_or(0.0, |function| function.value.evaluate(value));
+        self.offset.evaluate(value) + moved.sum::<f64>() + function
+    }
+
+    /// Its derivatives by the coordinates that it follows; `value` gives the values of symbols.
+    pub fn slopes(&self, value: &dyn Fn(ModelSymbol) -> f64) -> Vec<(CoordinateIdx, f64)> {
+        let terms = self.terms.iter().map(|(i, factor)| (*i, factor.evaluate(value)));
+        let of_function = self.function.iter().flat_map(|function| {
+            let leaders = function.leaders.iter();
+            leaders.map(|i| (*i, function.value.slope(*i, value)))
+        });
+        terms.chain(of_function).collect()
     }
 }
 

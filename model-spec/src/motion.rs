@@ -3,7 +3,7 @@
 
 use crate::exact::{CoordinateIdx, ModelSymbol};
 use crate::kinematics::{Vec3, rotation_from_quaternion};
-use crate::mechanism::{DriveKind, FrameAxis, FrameStep, FreeBody, Mechanism, PointIdx};
+use crate::mechanism::{CoordinateCoupling, DriveKind, FrameAxis, FrameStep, FreeBody, Mechanism, PointIdx};
 
 /// The geometry of a mechanism at the constants of its file.
 #[derive(Clone, Debug)]
@@ -17,18 +17,16 @@ pub struct Kinematics {
     /// Pairs of points that coincide.
     loops: Vec<[usize; 2]>,
     /// Coordinates that follow others.
-    couplings: Vec<FollowerCoordinate>,
+    couplings: Vec<CoordinateCoupling>,
+    /// Values of the constants and parameters in functions of couplings.
+    fixed: FixedValues,
 }
 
-/// A coordinate that follows others: `offset + sum of factor * other`.
+/// Values of the symbols that do not move.
 #[derive(Clone, Debug)]
-struct FollowerCoordinate {
-    /// Index of the coordinate.
-    coordinate: usize,
-    /// Indices of the others with their factors.
-    terms: Vec<(usize, f64)>,
-    /// The constant term, rad or m.
-    offset: f64,
+struct FixedValues {
+    /// Those of the constants, in the order of the file.
+    constants: Vec<f64>,
 }
 
 /// One step from a parent frame to its child.
@@ -58,6 +56,8 @@ struct ElementaryMotion {
 pub struct MechanismPoses {
     /// In the order of the mechanism.
     frames: Vec<FramePlacement>,
+    /// The coordinates, rad and m.
+    coordinates: Vec<f64>,
 }
 
 /// A frame at given coordinates, all in the axes of the base frame.
@@ -92,6 +92,17 @@ impl MechanismPoses {
     /// The frames in the order of the file, the base first.
     pub fn frames(&self) -> &[FramePlacement] {
         &self.frames
+    }
+}
+
+impl FixedValues {
+    /// The value of a symbol at given coordinates; couplings contain no parameters.
+    fn value(&self, symbol: ModelSymbol, coordinates: &[f64]) -> f64 {
+        match symbol {
+            ModelSymbol::Constant(i) => self.constants[i.0],
+            ModelSymbol::Coordinate(i) => coordinates[i.0],
+            ModelSymbol::Parameter(_) | ModelSymbol::Place(_) => f64::NAN,
+        }
     }
 }
 
@@ -147,19 +158,10 @@ impl Kinematics {
                 .map(|p| (p.frame.0, [0, 1, 2].map(|k| p.at[k].evaluate(&value))))
                 .collect(),
             loops: mechanism.loops.iter().map(|l| [l.joins[0].0, l.joins[1].0]).collect(),
-            couplings: mechanism
-                .couplings
-                .iter()
-                .map(|coupling| FollowerCoordinate {
-                    coordinate: coupling.coordinate.0,
-                    terms: coupling
-                        .terms
-                        .iter()
-                        .map(|(i, factor)| (i.0, factor.evaluate(&value)))
-                        .collect(),
-                    offset: coupling.offset.evaluate(&value),
-                })
-                .collect(),
+            couplings: mechanism.couplings.clone(),
+            fixed: FixedValues {
+                constants: mechanism.constants.iter().map(|one| one.value).collect(),
+            },
         }
     }
 
@@ -217,7 +219,10 @@ impl Kinematics {
             }
             frames.push(pose);
         }
-        MechanismPoses { frames }
+        MechanismPoses {
+            frames,
+            coordinates: coordinates.to_vec(),
+        }
     }
 
     /// A point's position in the base frame, m.
@@ -242,9 +247,7 @@ impl Kinematics {
             [0, 1, 2].map(|k| a[k] - b[k])
         });
         let of_couplings = self.couplings.iter().map(|follower| {
-            let terms = follower.terms.iter();
-            let followed: f64 = terms.map(|(i, factor)| factor * coordinates[*i]).sum();
-            coordinates[follower.coordinate] - followed - follower.offset
+            coordinates[follower.coordinate.0] - follower.value(&|symbol| self.fixed.value(symbol, coordinates))
         });
         of_loops.chain(of_couplings).collect()
     }
@@ -264,9 +267,9 @@ impl Kinematics {
         }
         for follower in &self.couplings {
             let mut row = vec![0.0; self.n_coordinates];
-            row[follower.coordinate] = 1.0;
-            for (i, factor) in &follower.terms {
-                row[*i] -= factor;
+            row[follower.coordinate.0] = 1.0;
+            for (i, slope) in follower.slopes(&|symbol| self.fixed.value(symbol, &poses.coordinates)) {
+                row[i.0] -= slope;
             }
             rows.push(row);
         }
@@ -300,7 +303,7 @@ impl Kinematics {
 
     /// Derivative of a drive's angle or length by all coordinates: one row of the drives' Jacobian.
     ///
-    /// All coordinates count as independent, so the mechanism must have no loops.
+    /// All coordinates count as independent: loops and couplings are not considered.
     pub fn drive_slopes(&self, poses: &MechanismPoses, kind: DriveKind) -> Vec<f64> {
         let mut row = vec![0.0; self.n_coordinates];
         match kind {

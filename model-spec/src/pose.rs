@@ -86,10 +86,10 @@ fn coupling_rows(mechanism: &Mechanism) -> DenseRows {
     let value = |symbol: ModelSymbol| mechanism.symbol_nominal(symbol);
     let row = |coupling: &CoordinateCoupling| {
         let mut row = vec![0.0; mechanism.coordinates.len()];
-        // The derivative of `coordinate - sum of factor * other`.
+        // The derivative of the coordinate minus its value.
         row[coupling.coordinate.0] = 1.0;
-        for (i, factor) in &coupling.terms {
-            row[i.0] -= factor.evaluate(&value);
+        for (i, slope) in coupling.slopes(&value) {
+            row[i.0] -= slope;
         }
         row
     };

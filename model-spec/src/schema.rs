@@ -9,7 +9,7 @@ use crate::record::{EntryList, NamedEntries, OneOrMany, record};
 use crate::unit::ModelUnit;
 use crate::values::{
     AxisName, BooleanFlag, FormulaVector, LumpedMassPlace, NameSuffix, QuaternionOrder, SchemaVersion, SearchEntry,
-    SpannedName, SpannedNumber, SpannedText, TwistName, UnitByPlace,
+    SpannedName, SpannedNumber, SpannedText, TableRow, TwistName, UnitByPlace,
 };
 
 record! {
@@ -101,9 +101,14 @@ record! {
         /// False if nothing drives the coordinate: its row of the equation of motion, with a force of zero, takes part in
         /// identification.
         "driven" driven: optional BooleanFlag,
-        /// What the coordinate follows, by gears, a belt or a screw: a sum of other coordinates, each times constants, and of
-        /// constants, such as `"n*q1 + q0"`.
+        /// What the coordinate follows, by gears, a belt, a screw or a cam: an expression over other coordinates and constants,
+        /// such as `"n*q1 + q0"` or `"e*(1 - cos(q1))"`.
         "follows" follows: optional SourceFormula,
+        /// Points of a function of `follows`: pairs of its value and that of this coordinate, in rad or m. The function is a
+        /// spline with continuous second derivatives.
+        "table" table: optional EntryList<TableRow>,
+        /// True if the table covers one turn of `follows` and repeats after it.
+        "periodic" periodic: optional BooleanFlag,
         /// Remark.
         "note" note: optional SpannedText,
     }
@@ -322,8 +327,10 @@ record! {
     LoopEntry = "a loop" {
         /// Name, by which a variant can override it.
         "name" name: optional SpannedName,
-        /// The two points.
-        "joins" joins: required EntryList<SpannedName>,
+        /// The two points that coincide.
+        "joins" joins: optional EntryList<SpannedName>,
+        /// Two frames that coincide with all their axes, in place of `joins`.
+        "welds" welds: optional EntryList<SpannedName>,
     }
 }
 

@@ -223,6 +223,50 @@ impl JsonSchema for SpannedNumber {
     }
 }
 
+/// A point of a table: an argument and the value there.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TableRow {
+    /// Argument and value, in SI units.
+    pub(crate) values: [f64; 2],
+    /// Where the point stands.
+    pub(crate) span: SourceSpan,
+}
+
+impl SchemaValue for TableRow {
+    const EXPECTED: &'static str = "a pair of numbers, the argument first";
+    const EXAMPLE: &'static str = "[0.5, 0.012]";
+
+    fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
+        let TomlValue::Array(entries) = &node.value else {
+            return wrong_type::<Self>(node, log);
+        };
+        let [argument, value] = entries.as_slice() else {
+            return wrong_type::<Self>(node, log);
+        };
+        // Both are read before either fault ends the reading.
+        let (argument, value) = (SpannedNumber::read(argument, log), SpannedNumber::read(value, log));
+        Some(Self {
+            values: [argument?.value, value?.value],
+            span: node.span,
+        })
+    }
+}
+
+#[cfg(any(test, feature = "schema"))]
+impl JsonSchema for TableRow {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "TableRow".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2 })
+    }
+}
+
 /// A boolean.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BooleanFlag(pub(crate) bool);

@@ -5,7 +5,7 @@
 //! Taylor series of poses, inertia from pseudo-inertias, and no equation is projected.
 
 use modelmill_codegen::{ModelEvaluator, ReactionPrograms};
-use modelmill_spec::{DriveKind, FrameIdx, Mechanism, PointIdx};
+use modelmill_spec::{DriveKind, FrameIdx, Mechanism, ModelSymbol, PointIdx};
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix4, Vector3};
 
 use crate::base_parameters::{base, nominal};
@@ -152,13 +152,16 @@ fn joints_give_way(
 }
 
 /// A coupling supplies what follows with a force, and takes it, times the factor, from what is followed.
-fn couplings_carry(mechanism: &Mechanism, first: usize, matrix: &mut DMatrix<f64>) {
-    let value = |symbol| mechanism.symbol_nominal(symbol);
+fn couplings_carry(mechanism: &Mechanism, motion: &[Jet], first: usize, matrix: &mut DMatrix<f64>) {
+    let value = |symbol| match symbol {
+        ModelSymbol::Coordinate(i) => motion[i.0].0[0],
+        other => mechanism.symbol_nominal(other),
+    };
     let joints = 6 * (mechanism.frames.len() - 1);
     for (column, coupling) in (first..).zip(&mechanism.couplings) {
         matrix[(joints + coupling.coordinate.0, column)] -= 1.0;
-        for (i, factor) in &coupling.terms {
-            matrix[(joints + i.0, column)] += factor.evaluate(&value);
+        for (i, slope) in coupling.slopes(&value) {
+            matrix[(joints + i.0, column)] += slope;
         }
     }
 }
@@ -247,7 +250,7 @@ impl Balances {
                 column += 1;
             }
         }
-        couplings_carry(mechanism, couplings, &mut matrix);
+        couplings_carry(mechanism, motion, couplings, &mut matrix);
         let effects = numbers.effects_on_joints(motion);
         joints_give_way(mechanism, &twists, &effects, drives, &mut matrix, &mut needed);
         Self {

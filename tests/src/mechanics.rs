@@ -234,6 +234,44 @@ impl<'a> Numbers<'a> {
         }
     }
 
+    /// An expression over coordinates, with its derivatives.
+    fn jet(&self, exact: &ExactExpression, coordinates: &[Jet]) -> Jet {
+        let jet = |exact: &ExactExpression| self.jet(exact, coordinates);
+        match exact {
+            ExactExpression::Symbol(ModelSymbol::Coordinate(i)) => coordinates[i.0],
+            ExactExpression::Rational(_) | ExactExpression::Pi | ExactExpression::Symbol(_) => {
+                Jet::constant(exact.evaluate(&|symbol| self.mechanism.symbol_nominal(symbol)))
+            }
+            ExactExpression::Sum(operands) => operands.iter().fold(Jet::constant(0.0), |sum, one| sum + jet(one)),
+            ExactExpression::Product(operands) => operands.iter().fold(Jet::constant(1.0), |all, one| all * jet(one)),
+            ExactExpression::Quotient(a, b) => jet(a) * jet(b).recip(),
+            ExactExpression::Negative(a) => -jet(a),
+            ExactExpression::Power(a, n) => {
+                let power = (0..n.unsigned_abs()).fold(Jet::constant(1.0), |all, _| all * jet(a));
+                if *n < 0 { power.recip() } else { power }
+            }
+            ExactExpression::Apply(function, a) => {
+                let a = jet(a);
+                match function {
+                    ExactFunction::Sin => a.sin(),
+                    ExactFunction::Cos => a.cos(),
+                    ExactFunction::Sqrt => a.sqrt(),
+                    ExactFunction::Abs if a.0[0] < 0.0 => -a,
+                    ExactFunction::Abs => a,
+                    ExactFunction::Sign => Jet::constant(a.0[0].signum()),
+                    ExactFunction::Tanh => {
+                        let (f, slope) = (a.0[0].tanh(), 1.0 - a.0[0].tanh().powi(2));
+                        a.function(f, slope, -2.0 * f * slope)
+                    }
+                    ExactFunction::Exp => {
+                        let f = a.0[0].exp();
+                        a.function(f, f, f)
+                    }
+                }
+            }
+        }
+    }
+
     fn vector(&self, exact: &[ExactExpression; 3]) -> [f64; 3] {
         std::array::from_fn(|i| self.value(&exact[i]))
     }
@@ -425,9 +463,11 @@ impl<'a> Numbers<'a> {
         let value = |exact: &ExactExpression| exact.evaluate(&|symbol| self.mechanism.symbol_nominal(symbol));
         let of_couplings = self.mechanism.couplings.iter().map(|coupling| {
             let own = coordinates[coupling.coordinate.0] - Jet::constant(value(&coupling.offset));
-            coupling.terms.iter().fold(own, |off, (i, factor)| {
+            let off = coupling.terms.iter().fold(own, |off, (i, factor)| {
                 off - Jet::constant(value(factor)) * coordinates[i.0]
-            })
+            });
+            let function = coupling.function.iter();
+            function.fold(off, |off, function| off - self.jet(&function.value, coordinates))
         });
         of_loops.chain(of_couplings).collect()
     }

@@ -1,4 +1,4 @@
-//! Coordinates that are determined by others through gears, belts or screws: each is a closure of its own, given by its
+//! Coordinates that are determined by others through gears, belts, screws or cams: each is a closure of its own, given by its
 //! value.
 //!
 //! In the field, an angle that is a fraction of another one is composed of parts that both have in common: with `q2 =
@@ -45,7 +45,7 @@ pub(crate) struct CouplingClosures {
 /// A [`DeriveError`] of an expression of the file that cannot be written into the graph.
 pub(crate) fn couplings(graph: &mut Graph, mechanism: &Mechanism) -> Result<CouplingClosures, DeriveError> {
     let is_angle = |i: usize| mechanism.coordinates[i].motion.is_angle();
-    // The value of every coupled coordinate: an offset plus factors times other coordinates.
+    // The value of every coupled coordinate: an offset, factors times other coordinates, and a function that is not affine.
     let mut values = Vec::new();
     for coupling in &mechanism.couplings {
         let mut terms = vec![expression(graph, &coupling.offset)?];
@@ -53,6 +53,9 @@ pub(crate) fn couplings(graph: &mut Graph, mechanism: &Mechanism) -> Result<Coup
             let factor = expression(graph, factor)?;
             let followed = graph.atom(Atom::Coordinate(i.0));
             terms.push(graph.mul(factor, followed));
+        }
+        if let Some(function) = &coupling.function {
+            terms.push(expression(graph, &function.value)?);
         }
         values.push((coupling.coordinate.0, graph.add_all(&terms)));
     }

@@ -17,6 +17,7 @@ use crate::build::bodies::check_unique;
 use crate::build::frames::{FrameTree, PointTable, duplicate_name};
 use crate::build::free;
 use crate::build::symbols::SymbolTable;
+use crate::build::welds::weld_loops;
 use crate::column;
 use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
 use crate::exact::{CoordinateIdx, ExactExpression, ModelSymbol};
@@ -29,12 +30,14 @@ use crate::values::SpannedName;
 /// Most loops of a mechanism.
 const MOST_LOOPS: usize = 60;
 
-/// Reads the loops: pairs of points on different frames that coincide.
+/// Reads the loops: pairs of points on different frames that coincide, and pairs of frames that are welded.
 ///
-/// Their places are appended to `places.loops`. A faulty loop is reported and left out.
+/// Points of welds are appended to `points`, and their places to `places.points`. The places of loops are appended to
+/// `places.loops`. A faulty loop is reported and left out.
 pub(super) fn loops(
     model: &ModelEntry,
-    points: &PointTable,
+    tree: &FrameTree,
+    points: &mut PointTable,
     places: &mut MechanismSpans,
     log: &mut DiagnosticLog,
 ) -> Vec<KinematicLoop> {
@@ -47,7 +50,22 @@ pub(super) fn loops(
     // Loops beyond the limit are not looked at.
     let mut loops = Vec::new();
     for entry in entries.iter().take(MOST_LOOPS) {
-        let Some(joins) = &entry.joins else { continue };
+        let joins = match (&entry.joins, &entry.welds) {
+            (Some(joins), None) => joins,
+            (None, Some(welds)) => {
+                loops.extend(weld_loops(entry.name.as_ref(), welds, tree, points, places, log));
+                continue;
+            }
+            _ if log.syntax_broken || entry.faulty => continue,
+            _ => {
+                log.push(
+                    Diagnostic::error(entry.span, "this loop does not specify what it joins")
+                        .label("expected either `joins` or `welds`")
+                        .help("for example `joins = [\"A\", \"B\"]` for two points, or `welds = [\"f\", \"g\"]` for two frames"),
+                );
+                continue;
+            }
+        };
         let [first, second] = joins.entries.as_slice() else {
             log.push(
                 Diagnostic::error(
@@ -88,12 +106,11 @@ pub(super) fn loops(
 pub(super) struct DriveRows {
     /// One row per degree of freedom, with the drive that acts on it.
     pub(super) rows: Vec<ModelDrive>,
-    /// Drives without rows of their own; empty unless a tree has more drives than degrees of freedom.
+    /// Drives without rows of their own; empty unless there are more drives than degrees of freedom.
     pub(super) shared: Vec<ModelDrive>,
 }
 
-/// Reads the drives. There must be one per driven degree of freedom, or, in a tree, more than there are degrees of
-/// freedom.
+/// Reads the drives. There must be one per driven degree of freedom, or more than there are degrees of freedom.
 ///
 /// Each degree of freedom without a drive has a row of its own, named after its coordinate. Rows of free bodies come
 /// first,
@@ -172,8 +189,8 @@ pub(super) fn drives(
             is_driven: true,
         });
     }
-    // A tree with more drives than degrees of freedom: the drives share rows, which are added below.
-    let shared = free::split_shared_drives(model, symbols, &mut drives);
+    // With more drives than degrees of freedom the drives share rows, which are added below.
+    let shared = free::split_shared_drives(symbols, &mut drives);
     free::check_linear_drives(tree, &shared, points, &places.drives, log);
     // The places of drives now belong to the rows.
     if !shared.is_empty() {
@@ -261,7 +278,7 @@ fn check_drive_count(
             format!("{} for {}", count(drives.len()), degrees(n_active)),
         )
         .label(if drives.len() > n_active {
-            "this drive is one too many"
+            "nothing is independent that this drive could move"
         } else {
             "there is no drive for this coordinate"
         })
@@ -269,8 +286,6 @@ fn check_drive_count(
         .help(if n_active == 0 {
             "every coordinate is `passive`, so that nothing is driven: remove `passive = true` from the one that the drive moves; if \
              the loops then constrain too many coordinates, a joint is missing or there is a loop too many"
-        } else if drives.len() > n_active {
-            "delete a drive, or make another coordinate active; more drives than degrees of freedom are possible without loops only"
         } else {
             "add a `[[drive]]`; if the loops determine this coordinate, mark it `passive = true`, and if it moves freely, `driven = false`"
         }),

@@ -1,17 +1,21 @@
-//! Coordinates that follow others: gears, belts, screws, differentials.
+//! Coordinates that follow others: gears, belts, screws, differentials, cams.
 //!
-//! The entry `follows` of a coordinate goes in; an affine function of other coordinates comes out.
+//! The entries `follows` and `table` of a coordinate go in; a function of other coordinates comes out. Affine functions are
+//! split into factors and offset, because later stages solve them without derivatives.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::build::MechanismSpans;
 use crate::build::symbols::SymbolTable;
+use crate::build::tables::table_function;
 use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
-use crate::exact::{CoordinateIdx, ExactExpression, ModelSymbol};
+use crate::exact::{CoordinateIdx, ExactExpression, ExactFunction, ModelSymbol};
 use crate::formula::SourceFormula;
-use crate::mechanism::CoordinateCoupling;
+use crate::joint_motion::CoordinateMotion;
+use crate::mechanism::{CoordinateCoupling, CouplingFunction, TableInterval};
 use crate::schema::{CoordinateEntry, ModelEntry};
 use crate::scope::{FormulaRequirement, SymbolSort};
+use crate::unit::UnitDimension;
 
 /// Reads the couplings and sets the nominal value of each coordinate that follows others.
 pub(super) fn couplings(
@@ -24,6 +28,7 @@ pub(super) fn couplings(
     // Coordinates that could not be declared are reported already.
     for (key, entry) in model.coordinates.iter().flat_map(|table| &table.entries) {
         let Some(follows) = &entry.follows else {
+            reject_table_alone(entry, key.span, log);
             continue;
         };
         let Some(i) = symbols.coordinates.iter().position(|c| c.name == key.name) else {
@@ -31,7 +36,7 @@ pub(super) fn couplings(
         };
         // The value and the drive of such a coordinate cannot be chosen.
         reject_unused_fields(entry, key.span, log);
-        if let Some(coupling) = coupling(follows, CoordinateIdx(i), symbols, log) {
+        if let Some(coupling) = coupling(entry, follows, CoordinateIdx(i), symbols, log) {
             found.push((coupling, follows.ast.span));
         }
     }
@@ -62,34 +67,45 @@ fn reject_unused_fields(entry: &CoordinateEntry, span: SourceSpan, log: &mut Dia
     }
 }
 
-/// The coupling of one coordinate; reports an expression that is not affine in others or contains a quaternion.
-/// The dimension of the expression must be that of the coordinate: an angle or a length.
+/// Reports a table of a coordinate that follows nothing.
+fn reject_table_alone(entry: &CoordinateEntry, span: SourceSpan, log: &mut DiagnosticLog) {
+    if entry.table.is_some() || entry.periodic.is_some() {
+        log.push(
+            Diagnostic::error(span, "a table needs `follows`, the argument of the table")
+                .label("expected `follows` here")
+                .help("for example `lift = { follows = \"cam\", table = [[0, 0], [1, 0.01], [2, 0.02], [3, 0.01]] }`"),
+        );
+    }
+}
+
+/// The coupling of one coordinate; reports an expression that is not smooth or contains a quaternion.
+/// The dimension of the expression must be that of the coordinate, an angle or a length, unless it is the argument of a
+/// table.
 fn coupling(
+    entry: &CoordinateEntry,
     follows: &SourceFormula,
     coordinate: CoordinateIdx,
     symbols: &SymbolTable,
     log: &mut DiagnosticLog,
 ) -> Option<CoordinateCoupling> {
     let own = &symbols.coordinates[coordinate.0];
+    // The argument of a table may be an angle or a length, as that of its joint is.
+    let is_table = entry.table.is_some();
+    let dimension = match (is_table, table_argument_dimension(follows, symbols)) {
+        (true, Some(dimension)) => dimension,
+        _ => own.motion.dimension(),
+    };
     let wanted = FormulaRequirement {
         sorts: &[SymbolSort::Constant, SymbolSort::Coordinate],
-        dimension: own.motion.dimension(),
+        dimension,
         what: "what this coordinate follows",
     };
     // The scope reports unknown names and wrong units; the shape is checked below.
     let exact = symbols.scope.resolve(follows, wanted, log)?;
     let span = follows.ast.span;
-    let Some(CoordinateSum { terms, offset }) = coordinate_sum(&exact) else {
-        log.push(
-            Diagnostic::error(span, "a coordinate can only be an affine function of others")
-                .label("expected a sum of coordinates, each times constants, and of constants")
-                .help("for example `\"n*q1\"`, `\"h*q1 + s0\"` or `\"(q1 + q2)/2\"`"),
-        );
-        return None;
-    };
-    let terms: Vec<(CoordinateIdx, ExactExpression)> = terms.into_iter().collect();
+    let leaders = coordinates_in(&exact);
     // An expression without coordinates would fix the coordinate.
-    if terms.is_empty() {
+    if leaders.is_empty() {
         log.push(
             Diagnostic::error(span, "this follows no coordinate")
                 .label("expected the name of a coordinate in it")
@@ -98,11 +114,8 @@ fn coupling(
         return None;
     }
     // Components of a unit quaternion are not independent of each other.
-    let all = terms.iter().map(|(i, _)| *i).chain([coordinate]);
-    if let Some(i) = all
-        .into_iter()
-        .find(|i| symbols.coordinates[i.0].motion.is_quaternion())
-    {
+    let mut all = leaders.iter().copied().chain([coordinate]);
+    if let Some(i) = all.find(|i| symbols.coordinates[i.0].motion.is_quaternion()) {
         let name = &symbols.coordinates[i.0].name;
         log.push(
             Diagnostic::error(span, format!("`{name}` is a component of a quaternion"))
@@ -110,11 +123,94 @@ fn coupling(
         );
         return None;
     }
+    if let Some(table) = &entry.table {
+        let is_periodic = entry.periodic.is_some_and(|flag| flag.0);
+        if is_periodic && dimension != CoordinateMotion::Revolute.dimension() {
+            log.push(
+                Diagnostic::error(
+                    span,
+                    "a periodic table repeats after one turn, so its argument is an angle",
+                )
+                .label("this is a length")
+                .help("delete `periodic`"),
+            );
+            return None;
+        }
+        let value = table_function(table, &exact, is_periodic, log)?;
+        let ends = [table.entries.first()?.values[0], table.entries.last()?.values[0]];
+        let interval = TableInterval { argument: exact, ends };
+        return Some(CoordinateCoupling {
+            coordinate,
+            terms: Vec::new(),
+            offset: ExactExpression::zero(),
+            function: Some(CouplingFunction {
+                value,
+                leaders,
+                table: (!is_periodic).then_some(interval),
+            }),
+        });
+    }
+    if let Some(CoordinateSum { terms, offset }) = coordinate_sum(&exact) {
+        return Some(CoordinateCoupling {
+            coordinate,
+            terms: terms.into_iter().collect(),
+            offset,
+            function: None,
+        });
+    }
+    if has_kink(&exact) {
+        log.push(
+            Diagnostic::error(span, "this function has jumps or kinks")
+                .label("at a kink the velocity jumps, and no finite force does that")
+                .help("use a smooth function, or points of it: `table = [[x1, y1], [x2, y2], ...]`"),
+        );
+        return None;
+    }
     Some(CoordinateCoupling {
         coordinate,
-        terms,
-        offset,
+        terms: Vec::new(),
+        offset: ExactExpression::zero(),
+        function: Some(CouplingFunction {
+            value: exact,
+            leaders,
+            table: None,
+        }),
     })
+}
+
+/// The dimension of the argument of a table: that of the first coordinate of an expression that is no pure number.
+fn table_argument_dimension(follows: &SourceFormula, symbols: &SymbolTable) -> Option<UnitDimension> {
+    // Faults are reported where the expression is resolved.
+    let mut unseen = DiagnosticLog::default();
+    let sorts = [SymbolSort::Constant, SymbolSort::Coordinate];
+    let (_, dimension) = symbols.scope.resolve_ast(&follows.ast, &sorts, &mut unseen)?;
+    let possible = [CoordinateMotion::Revolute, CoordinateMotion::Prismatic].map(CoordinateMotion::dimension);
+    dimension.filter(|one| possible.contains(one))
+}
+
+/// The coordinates of an expression, sorted.
+fn coordinates_in(exact: &ExactExpression) -> Vec<CoordinateIdx> {
+    let mut found = BTreeSet::new();
+    exact.for_each_symbol(&mut |symbol| {
+        if let ModelSymbol::Coordinate(i) = symbol {
+            found.insert(i);
+        }
+    });
+    found.into_iter().collect()
+}
+
+/// Whether an expression contains the sign or the absolute value of an expression with coordinates.
+fn has_kink(exact: &ExactExpression) -> bool {
+    match exact {
+        ExactExpression::Rational(_) | ExactExpression::Pi | ExactExpression::Symbol(_) => false,
+        ExactExpression::Sum(inner) | ExactExpression::Product(inner) => inner.iter().any(has_kink),
+        ExactExpression::Quotient(above, below) => has_kink(above) || has_kink(below),
+        ExactExpression::Negative(inner) | ExactExpression::Power(inner, _) => has_kink(inner),
+        ExactExpression::Apply(ExactFunction::Abs | ExactFunction::Sign, inner) => {
+            inner.mentions(&|symbol| matches!(symbol, ModelSymbol::Coordinate(_)))
+        }
+        ExactExpression::Apply(_, inner) => has_kink(inner),
+    }
 }
 
 /// Computes nominal values in the order of dependence; a coordinate that follows itself is reported.
@@ -130,8 +226,8 @@ fn set_nominal(
     while !left.is_empty() {
         // A coupling waits while one of its coordinates has no value yet.
         let waits = |coupling: &CoordinateCoupling| {
-            let mut terms = coupling.terms.iter();
-            terms.any(|(i, _)| left.iter().any(|(other, _)| other.coordinate == *i))
+            let mut leaders = coupling.leaders().into_iter();
+            leaders.any(|i| left.iter().any(|(other, _)| other.coordinate == i))
         };
         let Some(next) = left.iter().position(|(coupling, _)| !waits(coupling)) else {
             let (coupling, span) = left[0];

@@ -25,20 +25,14 @@ fn free_bodies(tree: &FrameTree) -> impl Iterator<Item = (usize, &FreeBody)> {
     })
 }
 
-/// Removes the drives from a tree that has more of them than degrees of freedom. They are returned and share its
-/// rows.
-pub(super) fn split_shared_drives(
-    model: &ModelEntry,
-    symbols: &SymbolTable,
-    drives: &mut Vec<ModelDrive>,
-) -> Vec<ModelDrive> {
+/// Removes the drives from a mechanism that has more of them than degrees of freedom. They are returned and share its
+/// rows: their forces are not unique, only those on the independent coordinates are.
+pub(super) fn split_shared_drives(symbols: &SymbolTable, drives: &mut Vec<ModelDrive>) -> Vec<ModelDrive> {
     // Degrees of freedom: active coordinates with a rate.
     let coordinates = symbols.coordinates.iter();
     let freedoms = coordinates.filter(|c| !c.passive && c.motion.has_rate()).count();
-    let has_loops = model.loops.as_ref().is_some_and(|list| !list.entries.is_empty());
-    // With loops or passive coordinates a surplus drive is an error instead.
-    let has_passive = symbols.coordinates.iter().any(|c| c.passive);
-    if drives.len() <= freedoms || freedoms == 0 || has_loops || has_passive {
+    // Without a degree of freedom there is no row to share.
+    if drives.len() <= freedoms || freedoms == 0 {
         return Vec::new();
     }
     std::mem::take(drives)
@@ -66,13 +60,16 @@ pub(super) fn add_rows(
         of_bodies.extend(body.position);
         of_bodies.extend([qx, qy, qz]);
     }
-    // Undriven joints, or all joints if drives share the rows.
+    // Undriven joints, or all independent ones if drives share the rows.
     let mut undriven = undriven_coordinates(model, symbols, places, drives, log);
-    // Shared drives act on all joints, so every joint gets a row without a drive.
+    // Shared drives act on all joints, so every independent coordinate gets a row without a drive.
     if !shared.is_empty() {
         let all = (0..symbols.coordinates.len()).map(CoordinateIdx);
         undriven = all
-            .filter(|i| symbols.coordinates[i.0].motion.has_rate() && !of_bodies.contains(i))
+            .filter(|i| {
+                let coordinate = &symbols.coordinates[i.0];
+                !coordinate.passive && coordinate.motion.has_rate() && !of_bodies.contains(i)
+            })
             .collect();
     }
     // A row is not needed where a drive acts directly on the coordinate.

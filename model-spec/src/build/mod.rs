@@ -10,6 +10,7 @@ mod couplings;
 mod degrees;
 pub(crate) mod effect_places;
 mod effects;
+mod folds;
 mod frames;
 mod free;
 mod identified;
@@ -17,7 +18,9 @@ mod joints;
 mod limits;
 mod retain;
 pub(crate) mod symbols;
+mod tables;
 mod thresholds;
+mod welds;
 
 use crate::build::effect_places::EffectTargets;
 use crate::diagnostic::{DiagnosticLog, SourceSpan};
@@ -67,11 +70,11 @@ pub(crate) fn build(
     if log.n_errors() == n_errors {
         symbols::check_coordinates_move(model, &symbols, &places, log);
     }
-    let points = frames::points(model, &symbols.scope, &tree, &mut places, log);
+    let mut points = frames::points(model, &symbols.scope, &tree, &mut places, log);
     let parts = bodies::parts(model, &symbols, &tree, log);
     let lumped_masses = bodies::lumped_masses(model, &symbols, &tree, &points, log);
     let couplings = couplings::couplings(model, &mut symbols, &places, log);
-    let loops = actuation::loops(model, &points, &mut places, log);
+    let loops = actuation::loops(model, &tree, &mut points, &mut places, log);
     free::check_loops(&tree, &loops, &points, &places, log);
     let drives = actuation::drives(model, &symbols, &tree, &points, &mut places, log);
     let actuators = actuators::actuators(model, &symbols, &drives, log);
@@ -134,5 +137,8 @@ pub(crate) fn build(
     bodies::warn_of_negative(model, &mechanism, log);
     degrees::warn_of_degrees(model, &mechanism, log);
     pose::check_pose(&mut mechanism, &places, log);
+    if log.n_errors() == 0 {
+        folds::warn_of_folds(&mechanism, &places, log);
+    }
     ((log.n_errors() == 0).then_some(mechanism), kinds)
 }

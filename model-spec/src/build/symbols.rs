@@ -10,7 +10,7 @@ use crate::exact::{ConstantIdx, CoordinateIdx, ExactExpression, ModelSymbol, Par
 use crate::formula::{FormulaAst, FormulaAstKind, SourceFormula};
 use crate::joint_motion::CoordinateMotion;
 use crate::mechanism::{DynamicParameter, JointCoordinate, ModelConstant};
-use crate::schema::{LinearEntry, LinearNominalEntry, ModelEntry};
+use crate::schema::{CoordinateEntry, LinearEntry, LinearNominalEntry, ModelEntry};
 use crate::scope::{FormulaRequirement, FormulaScope, SymbolMeaning, SymbolSort, symbol_meaning};
 use crate::unit::UnitDimension;
 use crate::values::FormulaVector;
@@ -395,8 +395,18 @@ fn declare_coordinates(
                 .help("fix joints that the recordings do not move, such as those of fingers: a frame without a joint is fixed"),
         );
     }
-    // Coordinates beyond the limit are declared too, so that their uses cause no further findings.
-    for (key, entry) in entries.iter().take(DECLARED_AT_MOST) {
+    // Coordinates beyond the limit are declared too, so that their uses cause no further findings. Those that move no frame
+    // and follow others, such as the length of a tendon, come last: what they follow decides between angle and length.
+    let moves_frame = |name: &str| {
+        let of_quaternions = quaternions.iter().map(|(ast, _)| *ast);
+        let mut all = angles.iter().chain(&lengths).copied().chain(of_quaternions);
+        all.any(|ast| find_name(ast, name).is_some())
+    };
+    let (in_frames, beside): (Vec<_>, Vec<_>) = entries
+        .iter()
+        .take(DECLARED_AT_MOST)
+        .partition(|(key, entry)| entry.follows.is_none() || moves_frame(&key.name) || !is_place(model, &key.name));
+    for (key, entry) in in_frames.into_iter().chain(beside) {
         // The first use as an angle, as a length, and in a quaternion.
         let turns = angles.iter().find_map(|ast| find_name(ast, &key.name));
         let slides = lengths.iter().find_map(|ast| find_name(ast, &key.name));
@@ -427,6 +437,9 @@ fn declare_coordinates(
             (None, None) if of_quaternion.is_some() => of_quaternion,
             (None, Some(_)) => Some(CoordinateMotion::Prismatic),
             (Some(_), None) => Some(CoordinateMotion::Revolute),
+            (None, None) if entry.follows.is_some() && is_place(model, &key.name) => {
+                followed_motion(entry, &symbols.scope)
+            }
             (None, None) => {
                 let next = CoordinateIdx(symbols.coordinates.len());
                 symbols.still.push(next);
@@ -455,6 +468,31 @@ fn declare_coordinates(
             symbols.still.retain(|idx| idx.0 < n_coordinates);
         }
     }
+}
+
+/// Whether a drive or an effect acts on something of this name.
+fn is_place(model: &ModelEntry, name: &str) -> bool {
+    let drives = model.drive.iter().flat_map(|list| &list.entries);
+    let effects = model.effect.iter().flat_map(|list| &list.entries);
+    drives.flat_map(|drive| &drive.joint).any(|joint| joint.text == name)
+        || effects
+            .flat_map(|effect| effect.at.iter().chain(&effect.at_each))
+            .any(|places| places.entries.iter().any(|place| place.text == name))
+}
+
+/// The motion of a coordinate that moves no frame: that of what it follows, without a table. `None` if that is unknown.
+fn followed_motion(entry: &CoordinateEntry, scope: &FormulaScope) -> Option<CoordinateMotion> {
+    let follows = entry.follows.as_ref()?;
+    // Faults are reported where the expression is resolved.
+    let mut unseen = DiagnosticLog::default();
+    let sorts = [SymbolSort::Constant, SymbolSort::Coordinate];
+    let (_, dimension) = scope.resolve_ast(&follows.ast, &sorts, &mut unseen)?;
+    let is_length = dimension == Some(CoordinateMotion::Prismatic.dimension()) && entry.table.is_none();
+    Some(if is_length {
+        CoordinateMotion::Prismatic
+    } else {
+        CoordinateMotion::Revolute
+    })
 }
 
 /// The expressions of all frames, by the quantity that they describe.

@@ -127,7 +127,8 @@ fn actuation(m: &Mechanism, entries: &mut ModelEntries) {
         let terms = c.terms.iter();
         let terms = terms.map(|(i, factor)| format!("({})*{}", text(m, factor), m.coordinates[i.0].name));
         let offset = (!c.offset.is_zero()).then(|| text(m, &c.offset));
-        let all: Vec<String> = terms.chain(offset).collect();
+        let function = c.function.iter().map(|function| text(m, &function.value));
+        let all: Vec<String> = terms.chain(offset).chain(function).collect();
         let name = &m.coordinates[c.coordinate.0].name;
         entries.add("coupling of", name, format!("follows {}", all.join(" + ")));
     }

@@ -226,8 +226,20 @@ impl ModelSummary {
         line("joints", format!("{}{}", joints.len(), list(&joints)));
         line("loops", format!("{}{}", self.loops.len(), list(&self.loops)));
         line("actuators", format!("{}{}", self.drives.len(), list(&drives(m, true))));
-        // Rows of the equations without a drive have force zero.
-        if !self.undriven.is_empty() {
+        // Forces of redundant drives are not unique; their projections on the independent coordinates are.
+        if !m.shared_drives.is_empty() {
+            let rows: Vec<&str> = m.drives.iter().map(|row| row.name.as_str()).collect();
+            line(
+                "redundant drives",
+                format!(
+                    "{} drives for {}: the force of each drive is not unique. The equations, regressors and base \
+                     parameters are those of their joint force J' f along the independent coordinates: {}",
+                    m.shared_drives.len(),
+                    count(m.drives.len(), "degree of freedom", "degrees of freedom"),
+                    rows.join(", ")
+                ),
+            );
+        } else if !self.undriven.is_empty() {
             line(
                 "undriven",
                 format!("{}{}", self.undriven.len(), list(&drives(m, false))),

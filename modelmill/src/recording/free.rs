@@ -4,8 +4,10 @@
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_identify::{PreparedRun, RecordingNote, SignalRecording as Raw, StatePreparation};
-use modelmill_spec::{DriveKind, FrameStep, FreeBody, Kinematics, Mechanism, TwistAxes};
+use modelmill_spec::{FrameStep, FreeBody, Mechanism, TwistAxes};
 
+use super::shared_drives;
+use super::table_range;
 use super::thresholds::QUATERNION_LENGTH_TOLERANCE;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
@@ -35,7 +37,8 @@ pub(super) fn complete(model: &Model, raw: &mut Raw) -> Outcome<Vec<RecordingNot
         check_twist(mechanism, body, raw)?;
         fill_scalar_part(mechanism, body, raw);
     }
-    add_shared_drive_forces(mechanism, raw)?;
+    let mut notes: Vec<RecordingNote> = shared_drives::add_projected_forces(model, raw)?.into_iter().collect();
+    notes.extend(table_range::note_beyond_tables(mechanism, raw));
     // A row without drive needs a force, which is zero.
     let mut zero = Vec::new();
     for (row, drive) in mechanism
@@ -53,58 +56,14 @@ pub(super) fn complete(model: &Model, raw: &mut Raw) -> Outcome<Vec<RecordingNot
         }
     }
     // The note states the assumption of zero forces.
-    if zero.is_empty() {
-        return Ok(Vec::new());
+    if !zero.is_empty() {
+        notes.push(RecordingNote::info(format!(
+            "{} has no column {}: no drive acts there, and no other force, such as a contact force, is assumed.",
+            raw.file(),
+            zero.join(", ")
+        )));
     }
-    Ok(vec![RecordingNote::info(format!(
-        "{} has no column {}: no drive acts there, and no other force, such as a contact force, is assumed.",
-        raw.file(),
-        zero.join(", ")
-    ))])
-}
-
-/// Adds the forces of drives that share rows, `J' f`, to the forces that were recorded on these rows.
-fn add_shared_drive_forces(mechanism: &Mechanism, raw: &mut Raw) -> Outcome {
-    let shared = &mechanism.shared_drives;
-    let has = |name: &str| raw.has_column(name);
-    if !shared.iter().any(|drive| has(&drive.name)) || !mechanism.coordinates.iter().all(|c| has(&c.name)) {
-        // No forces were measured, or poses are missing, which is reported when states are prepared.
-        return Ok(());
-    }
-    // The pose of every sample determines the Jacobian of the drives.
-    let column = |name: &str| raw.column(name).map(<[f64]>::to_vec);
-    let forces: Vec<Vec<f64>> = shared.iter().map(|d| column(&d.name)).collect::<Result<_, _>>()?;
-    let q: Vec<Vec<f64>> = mechanism
-        .coordinates
-        .iter()
-        .map(|c| column(&c.name))
-        .collect::<Result<_, _>>()?;
-    let kinematics = Kinematics::new(mechanism);
-    let mut rows: Vec<Vec<f64>> = Vec::new();
-    for row in &mechanism.drives {
-        rows.push(if has(&row.name) {
-            column(&row.name)?
-        } else {
-            vec![0.0; raw.samples()]
-        });
-    }
-    // The Jacobian of the drives is evaluated at the pose of each sample.
-    for sample in 0..raw.samples() {
-        let here: Vec<f64> = q.iter().map(|q| q[sample]).collect();
-        let poses = kinematics.poses(&here);
-        for (drive, force) in shared.iter().zip(&forces) {
-            let slopes = kinematics.drive_slopes(&poses, drive.kind);
-            for (row, total) in mechanism.drives.iter().zip(&mut rows) {
-                if let DriveKind::Joint(i) = row.kind {
-                    total[sample] += slopes[i.0] * force[sample];
-                }
-            }
-        }
-    }
-    for (row, total) in mechanism.drives.iter().zip(rows) {
-        raw.set_column(&row.name, total);
-    }
-    Ok(())
+    Ok(notes)
 }
 
 /// Scales quaternions to unit length, and changes the sign of those opposite to the one before.

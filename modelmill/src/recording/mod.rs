@@ -22,9 +22,11 @@ mod proposal;
 mod raised_cutoff;
 mod read;
 mod sensor_faults;
+mod shared_drives;
 mod smoother;
 mod states;
 mod stick;
+mod table_range;
 mod thresholds;
 
 use std::path::Path;

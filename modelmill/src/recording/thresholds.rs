@@ -6,6 +6,10 @@
 /// column. By judgement.
 pub(super) const QUATERNION_LENGTH_TOLERANCE: f64 = 0.02;
 
+/// Smallest over largest singular value of the closure equations in the passive rates (1). Below it, forces of redundant
+/// drives are not projected, since rounding of a pose would be amplified by its inverse. By judgement.
+pub(super) const PROJECTION_CONDITION: f64 = 1e-9;
+
 /// The mechanism itself causes a force peak, which is no outlier, where a drive needs more than this many times the
 /// force that it needs at the samples around (1). By judgement.
 pub(super) const LEVERAGE_PEAK_RATIO: f64 = 3.0;

@@ -9,6 +9,7 @@ mod made;
 mod mechanisms;
 mod missing;
 mod permuted_entries;
+mod redundant_drives;
 mod run_plans;
 mod runs;
 mod runs_verdict;

@@ -124,7 +124,12 @@ fn followed_coordinates(mechanism: &Mechanism, remarks: &mut Vec<Message>) -> Ve
     let mut found = Vec::new();
     for coupling in &mechanism.couplings {
         // Both formats know couplings to one joint only.
-        if let [(of, factor)] = &coupling.terms[..] {
+        if coupling.function.is_some() {
+            remarks.push(message!(
+                "`{}` follows others by a function, which the format cannot express; it is independent in the description",
+                mechanism.coordinates[coupling.coordinate.0].name
+            ));
+        } else if let [(of, factor)] = &coupling.terms[..] {
             found.push(FollowedCoordinate {
                 coordinate: coupling.coordinate.0,
                 leader: of.0,

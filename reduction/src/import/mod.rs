@@ -22,6 +22,7 @@ mod model_text;
 mod placed;
 mod rig_text;
 mod sdf;
+mod sdf_couplings;
 mod thresholds;
 mod unread;
 mod urdf;

@@ -14,6 +14,7 @@ use super::description::{
     DescriptionJointKind, DescriptionLink, RobotDescription,
 };
 use super::placed::{DescriptionPose, rotation, rotation_between_axes, rotation_from_quaternion};
+use super::sdf_couplings::{gearbox_coupling, screw_coupling};
 use super::thresholds::MOST_MOVING_JOINTS;
 use super::urdf_extensions::ball_constraint;
 use super::xml::{
@@ -34,7 +35,7 @@ struct SdfFrame<'a, 'i> {
 }
 
 /// All frames of a model, in tables: a search per element would take the square of their number.
-struct SdfFrames<'a, 'i> {
+pub(super) struct SdfFrames<'a, 'i> {
     /// In the order of the file.
     frames: Vec<SdfFrame<'a, 'i>>,
     /// The first frame of each name.
@@ -55,13 +56,13 @@ impl<'a, 'i> SdfFrames<'a, 'i> {
 }
 
 /// A joint between two links.
-struct SdfJoint {
+pub(super) struct SdfJoint {
     /// Index of the parent link; none is the world.
-    parent: Option<usize>,
+    pub(super) parent: Option<usize>,
     /// Index of the child link; none is the world.
-    child: Option<usize>,
+    pub(super) child: Option<usize>,
     /// Joints in sequence; empty for a fixed joint.
-    joints: Vec<DescriptionJoint>,
+    pub(super) joints: Vec<DescriptionJoint>,
     /// Pose of the joint in the model.
     place: DescriptionPose,
     /// Name of the joint.
@@ -122,8 +123,14 @@ pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
         places.push(pose_in_model(&frames, &required_attribute(node, "name")?, node, 0)?);
     }
     let mut joints = Vec::new();
-    for node in children(&model, "joint") {
+    // Gearboxes couple other joints, which are read first.
+    let (gearboxes, moving): (Vec<Node>, Vec<Node>) =
+        children(&model, "joint").partition(|node| node.attribute("type") == Some("gearbox"));
+    for node in moving {
         joints.push(joint(&node, &frames, version, &mut out)?);
+    }
+    for node in gearboxes {
+        out.couplings.push(gearbox_coupling(&node, &frames, version, &joints)?);
     }
     // Pose of the model in the world.
     let own = match child(&model, "pose") {
@@ -209,7 +216,7 @@ fn text_of<'a>(node: &Node<'a, '_>, tag: &str) -> Option<&'a str> {
 }
 
 /// The number in a child element; none without that element.
-fn number_of(node: &Node, tag: &str) -> Result<Option<f64>, String> {
+pub(super) fn number_of(node: &Node, tag: &str) -> Result<Option<f64>, String> {
     let Some(inner) = child(node, tag) else {
         return Ok(None);
     };
@@ -255,7 +262,12 @@ fn model_frames<'a, 'i>(model: &Node<'a, 'i>) -> Result<SdfFrames<'a, 'i>, Strin
 }
 
 /// The pose of a frame in the model, through all frames to which it is relative. `from` is the element for messages.
-fn pose_in_model(frames: &SdfFrames, name: &str, from: &Node, depth: usize) -> Result<DescriptionPose, String> {
+pub(super) fn pose_in_model(
+    frames: &SdfFrames,
+    name: &str,
+    from: &Node,
+    depth: usize,
+) -> Result<DescriptionPose, String> {
     // The recursion ends at the frame of the model.
     if name == "__model__" || name.is_empty() || name == "world" {
         return Ok(DescriptionPose::identity());
@@ -350,11 +362,6 @@ fn inertial(node: &Node) -> Result<DescriptionInertia, String> {
 /// translation.
 fn joint(node: &Node, frames: &SdfFrames, version: f64, out: &mut RobotDescription) -> Result<SdfJoint, String> {
     let name = required_attribute(node, "name")?;
-    let end = |tag: &str| -> Result<Option<usize>, String> {
-        let inner = required_child(node, tag)?;
-        // A frame as parent or child means the link to which it is attached.
-        attached_link(inner.text().unwrap_or("").trim(), &inner, frames)
-    };
     // Each degree of freedom becomes a joint, with the element that describes its axis.
     let kind = required_attribute(node, "type")?;
     let wanted: &[(&str, DescriptionJointKind)] = match kind.as_str() {
@@ -374,8 +381,8 @@ fn joint(node: &Node, frames: &SdfFrames, version: f64, out: &mut RobotDescripti
             return Err(located_message(
                 node,
                 &format!(
-                    "the joint type {other} is not supported; write it as several joints of the types revolute, prismatic, screw, ball \
-                     or fixed"
+                    "the joint type {other} is not supported; write it as several joints of the types revolute, prismatic, screw, ball, \
+                     gearbox or fixed"
                 ),
             ));
         }
@@ -388,7 +395,7 @@ fn joint(node: &Node, frames: &SdfFrames, version: f64, out: &mut RobotDescripti
         ));
     }
     let place = pose_in_model(frames, &name, node, 0)?;
-    let (parent, child_link) = (end("parent")?, end("child")?);
+    let (parent, child_link) = (joint_end(node, "parent", frames)?, joint_end(node, "child", frames)?);
     if parent == child_link {
         return Err(located_message(
             node,
@@ -428,41 +435,19 @@ fn joint(node: &Node, frames: &SdfFrames, version: f64, out: &mut RobotDescripti
     })
 }
 
-/// The coupling of a screw: the translation follows the rotation, which keeps the limits and losses.
-fn screw_coupling(
-    node: &Node,
-    turn: &DescriptionJoint,
-    slide: &mut DescriptionJoint,
-) -> Result<DescriptionCoupling, String> {
-    let pitch = number_of(node, "screw_thread_pitch")?.ok_or_else(|| {
-        located_message(
-            node,
-            "it needs <screw_thread_pitch>, in metres per revolution; the older <thread_pitch> is ambiguous",
-        )
-    })?;
-    // The translation keeps only axis and anchor; limits and losses are not counted twice.
-    let mut bare = DescriptionJoint::new(slide.name.clone(), DescriptionJointKind::Prismatic, slide.line);
-    (bare.axis, bare.anchor) = (slide.axis, slide.anchor);
-    bare.is_driven = false;
-    *slide = bare;
-    Ok(DescriptionCoupling {
-        line: line(node),
-        joint: slide.name.clone(),
-        leader: Some(turn.name.clone()),
-        ratio: pitch / std::f64::consts::TAU,
-        offset: 0.0,
-    })
+/// The link that a child element of a joint names; none is the world. A frame means the link to which it is attached.
+pub(super) fn joint_end(node: &Node, tag: &str, frames: &SdfFrames) -> Result<Option<usize>, String> {
+    let inner = required_child(node, tag)?;
+    attached_link(inner.text().unwrap_or("").trim(), &inner, frames)
 }
 
-/// Reads the axis (in the axes of the model), limits, losses and `<mimic>` of one degree of freedom.
-fn read_axis(
-    joint: &mut DescriptionJoint,
+/// The direction of an `<axis>` of a joint at `place`, in the axes of the model.
+pub(super) fn axis_in_model(
     node: &Node,
     frames: &SdfFrames,
     version: f64,
     place: &DescriptionPose,
-    out: &mut RobotDescription,
-) -> Result<(), String> {
+) -> Result<Vector3<f64>, String> {
     let (xyz, turned) = match child(node, "xyz") {
         Some(xyz) => {
             // The axis is given in the axes of the joint, or of a named frame.
@@ -480,10 +465,23 @@ fn read_axis(
         Some(text) => ["1", "true"].contains(&text),
         None => version < 1.45,
     };
-    joint.axis = if in_model_frame { xyz } else { turned * xyz };
-    if joint.axis.norm() == 0.0 {
+    let axis = if in_model_frame { xyz } else { turned * xyz };
+    if axis.norm() == 0.0 {
         return Err(located_message(node, "the axis has no direction"));
     }
+    Ok(axis)
+}
+
+/// Reads the axis (in the axes of the model), limits, losses and `<mimic>` of one degree of freedom.
+fn read_axis(
+    joint: &mut DescriptionJoint,
+    node: &Node,
+    frames: &SdfFrames,
+    version: f64,
+    place: &DescriptionPose,
+    out: &mut RobotDescription,
+) -> Result<(), String> {
+    joint.axis = axis_in_model(node, frames, version, place)?;
     if let Some(limit) = child(node, "limit") {
         // Limits; very large numbers mean that there is none.
         let low = number_of(&limit, "lower")?.filter(|x| *x > -NO_LIMIT);

@@ -64,3 +64,35 @@ fn a_screw_of_sdf_turns_and_slides() {
     let refused = import(&sdf(""), &ImportOptions::default()).expect_err("no pitch");
     assert!(refused.to_string().contains("screw_thread_pitch"), "{refused}");
 }
+
+/// A gearbox couples the angles of parent and child against its reference body: theta_2 = -ratio theta_1. The tree has the
+/// hinge of the second wheel from wheel to housing, and its axis points the other way.
+#[test]
+fn a_gearbox_of_sdf_couples_two_hinges() {
+    let body = "<inertial><mass>2</mass></inertial>";
+    let sdf = |axis2: &str, reference: &str| {
+        format!(
+            "<sdf version='1.10'><model name='gears'><link name='housing'/><link name='one'>{body}</link><link name='two'>{body}</link>\
+             <joint name='fixed' type='fixed'><parent>world</parent><child>housing</child></joint>\
+             <joint name='first' type='revolute'><parent>housing</parent><child>one</child><axis><xyz>0 0 1</xyz></axis></joint>\
+             <joint name='second' type='revolute'><parent>two</parent><child>housing</child><axis><xyz>0 0 -1</xyz>\
+             <limit><effort>0</effort></limit></axis></joint>\
+             <joint name='box' type='gearbox'><parent>one</parent><child>two</child><axis><xyz>0 0 1</xyz></axis>\
+             <axis2><xyz>{axis2}</xyz></axis2><gearbox_ratio>2.5</gearbox_ratio>\
+             <gearbox_reference_body>{reference}</gearbox_reference_body></joint></model></sdf>"
+        )
+    };
+    // The second hinge turns by the angle of the housing against the wheel about -z, which is that of the wheel about z.
+    let (text, mechanism) = imported(&sdf("0 0 1", "housing"));
+    check(&mechanism, "second", "first", -2.5, 0.0);
+    assert_eq!(mechanism.drives.len(), 1, "{text}");
+    let (_, mechanism) = imported(&sdf("0 0 -1", "housing"));
+    check(&mechanism, "second", "first", 2.5, 0.0);
+    for (axis, reference, reason) in [
+        ("0 1 0", "housing", "not that of the joint"),
+        ("0 0 1", "two", "has no revolute joint"),
+    ] {
+        let refused = import(&sdf(axis, reference), &ImportOptions::default()).expect_err(reason);
+        assert!(refused.to_string().contains(reason), "{refused}");
+    }
+}

@@ -166,3 +166,25 @@ fn forces_are_those_of_the_bodies() {
         }
     }
 }
+
+/// A platform on four driven legs has three freedoms: the forces along its pose are those of d'Alembert's principle, whatever
+/// the drives share among them, and the base is that of these three rows.
+#[test]
+fn four_driven_legs_leave_three_rows() {
+    let file = fixtures().join("redundant").join("four_rrr.toml");
+    let mechanism = modelmill_spec::load_file(&file).expect("a valid model").mechanism;
+    let rows: Vec<&str> = mechanism.drives.iter().map(|row| row.name.as_str()).collect();
+    assert_eq!(rows, ["on_x", "on_y", "on_phi"]);
+    assert_eq!(mechanism.shared_drives.len(), 4);
+    let case = Case::near_nominal(&mechanism, 160, 0.1).unwrap();
+    for law in [
+        case.reduction_keeps_the_forces(),
+        case.forces_satisfy_dalembert(40),
+        case.mass_matrix_is_symmetric_and_positive_definite(),
+        case.power_is_the_rate_of_energy(),
+        case.loops_stay_closed(),
+        case.exact_rank_is_numeric_rank(),
+    ] {
+        law.unwrap();
+    }
+}

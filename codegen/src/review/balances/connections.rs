@@ -113,7 +113,7 @@ impl BalanceEquations<'_> {
         };
         let is_coupled = mechanism.couplings.iter().any(|coupling| {
             let is_one_of = |c: &CoordinateIdx| c.0 == *coordinate;
-            is_one_of(&coupling.coordinate) || coupling.terms.iter().any(|(c, _)| is_one_of(c))
+            is_one_of(&coupling.coordinate) || coupling.leaders().iter().any(is_one_of)
         });
         (0..links.len()).filter(moves).count() == 1
             && !is_coupled

@@ -69,9 +69,10 @@ pub(super) const RULES: [ElementRule; 19] = [
     ElementRule {
         element: "joint",
         attributes: "name type",
-        inner: "parent child pose axis axis2 screw_thread_pitch rotor_inertia gear_ratio",
+        inner: "parent child pose axis axis2 screw_thread_pitch rotor_inertia gear_ratio \
+                gearbox_ratio gearbox_reference_body",
         // The pitch of other kinds of joints has no meaning; sensors and physics have a remark of their own.
-        ignored: "thread_pitch sensor physics gearbox_ratio gearbox_reference_body controller_gains",
+        ignored: "thread_pitch sensor physics controller_gains",
     },
     ElementRule {
         element: "axis",
