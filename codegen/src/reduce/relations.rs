@@ -6,8 +6,8 @@
 //! Khalil 1990). Its factors on the retained columns depend on all joints down to the base. So relations between
 //! neighbours are reconstructed, and the factors are sums of their products.
 //!
-//! Decision: products of relations are multiplied out up to 5000 terms; beyond that, base parameters are given by
-//! named sums, link by link. Polynomials over powers of lengths have one normal form, so this gives the same result
+//! Decision: products of relations are multiplied out up to 150 terms of one base parameter; beyond that, base
+//! parameters are given by named sums, link by link, if these are shorter. Polynomials over powers of lengths have one normal form, so this gives the same result
 //! as a direct reconstruction. Other quotients are reconstructed again from the combined relation, which needs no
 //! further points of motion.
 

@@ -74,14 +74,14 @@ pub(super) enum JuliaExit {
     Throw(JuliaValue),
 }
 
-type Outcome<T> = Result<T, JuliaExit>;
+type JuliaOutcome<T> = Result<T, JuliaExit>;
 
-fn fault<T>(says: impl Into<String>) -> Outcome<T> {
+fn fault<T>(says: impl Into<String>) -> JuliaOutcome<T> {
     Err(JuliaExit::Throw(V::Text(says.into())))
 }
 
 #[derive(Clone, Debug, PartialEq)]
-enum Token {
+enum JuliaToken {
     Number(V),
     Text(String),
     Name(String),
@@ -96,7 +96,7 @@ const MARKS: [&str; 38] = [
     ",", ";", "=", "<", ">", "+", "-", "*", "/", ":", "?", "!", ".", "@", "%", "^", "|", "&",
 ];
 
-fn tokens(text: &str) -> Vec<Token> {
+fn tokens(text: &str) -> Vec<JuliaToken> {
     let mut found = Vec::new();
     let mut open = 0;
     let mut rest = text;
@@ -107,7 +107,7 @@ fn tokens(text: &str) -> Vec<Token> {
             n = rest.find('\n').unwrap_or(rest.len());
         } else if c == '\n' {
             if open == 0 {
-                found.push(Token::Line);
+                found.push(JuliaToken::Line);
             }
         } else if c == '"' {
             let quote = if rest.starts_with("\"\"\"") { "\"\"\"" } else { "\"" };
@@ -121,7 +121,7 @@ fn tokens(text: &str) -> Vec<Token> {
             }
             let inner = &rest[quote.len()..at];
             assert!(!inner.replace("\\$", "").contains('$'), "an interpolation: {inner}");
-            found.push(Token::Text(inner.to_owned()));
+            found.push(JuliaToken::Text(inner.to_owned()));
             n = at + quote.len();
         } else if c.is_ascii_digit() {
             n = len(|c| c.is_ascii_digit());
@@ -141,7 +141,7 @@ fn tokens(text: &str) -> Vec<Token> {
                         .unwrap_or(rest.len() - from);
             }
             let number = &rest[..n];
-            found.push(Token::Number(if is_float {
+            found.push(JuliaToken::Number(if is_float {
                 V::Float(number.parse().expect("a number"))
             } else {
                 V::Int(number.parse().expect("an integer"))
@@ -155,7 +155,7 @@ fn tokens(text: &str) -> Vec<Token> {
             n = len(|c| c.is_alphanumeric() || c == '_');
             // Names of functions that change their arguments end with an exclamation mark.
             n += usize::from(rest[n..].starts_with("!("));
-            found.push(Token::Name(rest[..n].to_owned()));
+            found.push(JuliaToken::Name(rest[..n].to_owned()));
         } else if !c.is_whitespace() {
             let mark = MARKS.iter().find(|mark| rest.starts_with(**mark));
             let mark = mark.unwrap_or_else(|| panic!("unknown character {c:?}"));
@@ -164,73 +164,73 @@ fn tokens(text: &str) -> Vec<Token> {
                 ")" | "]" | "}" => open -= 1,
                 _ => {}
             }
-            found.push(Token::Mark(mark));
+            found.push(JuliaToken::Mark(mark));
             n = mark.len();
         }
         rest = &rest[n..];
     }
-    found.push(Token::End);
+    found.push(JuliaToken::End);
     found
 }
 
 #[derive(Clone, Debug)]
-enum Term {
+enum JuliaTerm {
     Value(V),
     Name(String),
-    Unary(&'static str, Box<Term>),
-    Binary(&'static str, Box<Term>, Box<Term>),
-    Choice(Box<[Term; 3]>),
-    Range(Box<Term>, Option<Box<Term>>, Box<Term>),
-    Call(String, Vec<Term>, Vec<(String, Term)>),
-    Index(Box<Term>, Vec<Term>),
-    Field(Box<Term>, String),
-    List(Vec<Term>),
-    Tuple(Vec<Term>),
-    Named(Vec<(String, Term)>),
-    Return(Box<Term>),
+    Unary(&'static str, Box<JuliaTerm>),
+    Binary(&'static str, Box<JuliaTerm>, Box<JuliaTerm>),
+    Choice(Box<[JuliaTerm; 3]>),
+    Range(Box<JuliaTerm>, Option<Box<JuliaTerm>>, Box<JuliaTerm>),
+    Call(String, Vec<JuliaTerm>, Vec<(String, JuliaTerm)>),
+    Index(Box<JuliaTerm>, Vec<JuliaTerm>),
+    Field(Box<JuliaTerm>, String),
+    List(Vec<JuliaTerm>),
+    Tuple(Vec<JuliaTerm>),
+    Named(Vec<(String, JuliaTerm)>),
+    Return(Box<JuliaTerm>),
 }
 
 #[derive(Clone, Debug)]
-enum Statement {
-    Term(Term),
+enum JuliaStatement {
+    Evaluate(JuliaTerm),
     /// Targets, the operator before the equals sign, and the value.
-    Assign(Vec<Term>, Option<&'static str>, Term),
-    If(Vec<(Option<Term>, Vec<Statement>)>),
-    For(String, Term, Vec<Statement>),
+    Assign(Vec<JuliaTerm>, Option<&'static str>, JuliaTerm),
+    If(Vec<(Option<JuliaTerm>, Vec<JuliaStatement>)>),
+    For(String, JuliaTerm, Vec<JuliaStatement>),
 }
 
 #[derive(Clone, Debug)]
-struct Function {
-    parameters: Vec<(String, Option<Term>)>,
-    body: Vec<Statement>,
+struct JuliaFunction {
+    parameters: Vec<(String, Option<JuliaTerm>)>,
+    body: Vec<JuliaStatement>,
 }
 
 /// A module that was read.
 #[derive(Default)]
 pub(super) struct JuliaProgram {
-    functions: HashMap<String, Function>,
+    functions: HashMap<String, JuliaFunction>,
     /// Fields of the types with their default values.
-    records: HashMap<String, Vec<(String, Option<Term>)>>,
+    records: HashMap<String, Vec<(String, Option<JuliaTerm>)>>,
     globals: HashMap<String, V>,
 }
 
-struct Parser {
-    tokens: Vec<Token>,
+struct JuliaParser {
+    tokens: Vec<JuliaToken>,
     at: usize,
 }
 
-impl Parser {
-    fn peek(&self) -> &Token {
+impl JuliaParser {
+    fn peek(&self) -> &JuliaToken {
         &self.tokens[self.at]
     }
 
-    fn next(&mut self) -> Token {
+    fn take_next(&mut self) -> JuliaToken {
         self.at += 1;
         self.tokens[self.at - 1].clone()
     }
 
     fn takes(&mut self, mark: &str) -> bool {
-        let is_next = matches!(self.peek(), Token::Mark(m) if *m == mark);
+        let is_next = matches!(self.peek(), JuliaToken::Mark(m) if *m == mark);
         self.at += usize::from(is_next);
         is_next
     }
@@ -245,21 +245,21 @@ impl Parser {
     }
 
     fn takes_word(&mut self, word: &str) -> bool {
-        let is_next = matches!(self.peek(), Token::Name(name) if name == word);
+        let is_next = matches!(self.peek(), JuliaToken::Name(name) if name == word);
         self.at += usize::from(is_next);
         is_next
     }
 
     fn name(&mut self) -> String {
-        match self.next() {
-            Token::Name(name) => name,
+        match self.take_next() {
+            JuliaToken::Name(name) => name,
             other => panic!("a name expected, found {other:?}"),
         }
     }
 
     fn lines(&mut self) {
-        while matches!(self.peek(), Token::Line) || self.takes(";") {
-            self.at += usize::from(matches!(self.peek(), Token::Line));
+        while matches!(self.peek(), JuliaToken::Line) || self.takes(";") {
+            self.at += usize::from(matches!(self.peek(), JuliaToken::Line));
         }
     }
 
@@ -274,7 +274,7 @@ impl Parser {
     fn skip_braces(&mut self) {
         if self.takes("{") {
             while !self.takes("}") {
-                self.next();
+                self.take_next();
             }
         }
     }
@@ -302,7 +302,9 @@ impl Parser {
                 }
                 let body = self.block();
                 assert!(self.takes_word("end"), "a function has no end");
-                let known = program.functions.insert(name.clone(), Function { parameters, body });
+                let known = program
+                    .functions
+                    .insert(name.clone(), JuliaFunction { parameters, body });
                 assert!(known.is_none(), "two functions {name}");
             } else if self.takes_word("Base") {
                 self.expect(".");
@@ -323,14 +325,14 @@ impl Parser {
                 );
             } else {
                 assert!(
-                    matches!(self.next(), Token::Text(_)),
+                    matches!(self.take_next(), JuliaToken::Text(_)),
                     "{:?} between functions",
                     self.tokens[self.at - 1]
                 );
             }
         }
         self.lines();
-        assert_eq!(*self.peek(), Token::End);
+        assert_eq!(*self.peek(), JuliaToken::End);
     }
 
     fn record(&mut self, program: &mut JuliaProgram) {
@@ -351,15 +353,15 @@ impl Parser {
     }
 
     /// Statements up to `end`, `else` or `elseif`.
-    fn block(&mut self) -> Vec<Statement> {
+    fn block(&mut self) -> Vec<JuliaStatement> {
         let mut statements = Vec::new();
         loop {
             self.lines();
             match self.peek() {
-                Token::Name(word) if ["end", "else", "elseif"].contains(&word.as_str()) => return statements,
+                JuliaToken::Name(word) if ["end", "else", "elseif"].contains(&word.as_str()) => return statements,
                 _ => statements.push(self.statement()),
             }
-            let is_end = matches!(self.peek(), Token::Line | Token::Name(_)) || self.takes(";");
+            let is_end = matches!(self.peek(), JuliaToken::Line | JuliaToken::Name(_)) || self.takes(";");
             assert!(
                 is_end,
                 "a statement goes on with {:?}: {:?}",
@@ -369,7 +371,7 @@ impl Parser {
         }
     }
 
-    fn statement(&mut self) -> Statement {
+    fn statement(&mut self) -> JuliaStatement {
         if self.takes_word("if") {
             let mut branches = vec![(Some(self.choice()), self.block())];
             while !self.takes_word("end") {
@@ -377,7 +379,7 @@ impl Parser {
                 assert!(condition.is_some() || self.takes_word("else"));
                 branches.push((condition, self.block()));
             }
-            return Statement::If(branches);
+            return JuliaStatement::If(branches);
         }
         if self.takes_word("for") {
             let name = self.name();
@@ -385,7 +387,7 @@ impl Parser {
             let over = self.choice();
             let body = self.block();
             assert!(self.takes_word("end"));
-            return Statement::For(name, over, body);
+            return JuliaStatement::For(name, over, body);
         }
         let mut targets = vec![self.choice()];
         while self.takes(",") {
@@ -406,17 +408,17 @@ impl Parser {
                 let value = if values.len() == 1 {
                     values.remove(0)
                 } else {
-                    Term::Tuple(values)
+                    JuliaTerm::Tuple(values)
                 };
-                return Statement::Assign(targets, operator, value);
+                return JuliaStatement::Assign(targets, operator, value);
             }
         }
         assert_eq!(targets.len(), 1, "a list without an assignment");
-        Statement::Term(targets.remove(0))
+        JuliaStatement::Evaluate(targets.remove(0))
     }
 
     /// `a ? b : c`, and everything that binds more strongly.
-    fn choice(&mut self) -> Term {
+    fn choice(&mut self) -> JuliaTerm {
         let condition = self.binary(0, true);
         if !self.takes("?") {
             return condition;
@@ -424,10 +426,10 @@ impl Parser {
         let first = self.binary(0, false);
         self.expect(":");
         let second = self.choice();
-        Term::Choice(Box::new([condition, first, second]))
+        JuliaTerm::Choice(Box::new([condition, first, second]))
     }
 
-    fn binary(&mut self, level: usize, ranges: bool) -> Term {
+    fn binary(&mut self, level: usize, ranges: bool) -> JuliaTerm {
         const LEVELS: [&[&str]; 5] = [
             &["||"],
             &["&&"],
@@ -445,18 +447,18 @@ impl Parser {
         let mut n_compared = 0;
         while let Some(operator) = LEVELS[level]
             .iter()
-            .find(|mark| matches!(self.peek(), Token::Mark(m) if m == *mark))
+            .find(|mark| matches!(self.peek(), JuliaToken::Mark(m) if m == *mark))
         {
             self.at += 1;
             n_compared += 1;
             assert!(level != 2 || n_compared == 1, "a chain of comparisons");
             let right = operand(self);
-            left = Term::Binary(operator, Box::new(left), Box::new(right));
+            left = JuliaTerm::Binary(operator, Box::new(left), Box::new(right));
         }
         left
     }
 
-    fn range(&mut self) -> Term {
+    fn range(&mut self) -> JuliaTerm {
         let first = self.binary(3, true);
         if !self.takes(":") {
             return first;
@@ -464,26 +466,26 @@ impl Parser {
         let second = self.binary(3, true);
         if self.takes(":") {
             let third = self.binary(3, true);
-            return Term::Range(Box::new(first), Some(Box::new(second)), Box::new(third));
+            return JuliaTerm::Range(Box::new(first), Some(Box::new(second)), Box::new(third));
         }
-        Term::Range(Box::new(first), None, Box::new(second))
+        JuliaTerm::Range(Box::new(first), None, Box::new(second))
     }
 
-    fn unary(&mut self) -> Term {
+    fn unary(&mut self) -> JuliaTerm {
         for mark in ["-", "!"] {
             if self.takes(mark) {
-                return Term::Unary(if mark == "-" { "-" } else { "!" }, Box::new(self.unary()));
+                return JuliaTerm::Unary(if mark == "-" { "-" } else { "!" }, Box::new(self.unary()));
             }
         }
         self.postfix()
     }
 
-    fn list(&mut self, end: &str) -> Vec<Term> {
+    fn list(&mut self, end: &str) -> Vec<JuliaTerm> {
         let mut terms = Vec::new();
         while !self.takes(end) {
             terms.push(self.choice());
             assert!(
-                self.takes(",") || matches!(self.peek(), Token::Mark(m) if *m == end),
+                self.takes(",") || matches!(self.peek(), JuliaToken::Mark(m) if *m == end),
                 "{:?}",
                 self.peek()
             );
@@ -494,25 +496,25 @@ impl Parser {
     fn is_keyword(&self) -> bool {
         matches!(
             (self.peek(), self.tokens.get(self.at + 1)),
-            (Token::Name(_), Some(Token::Mark("=")))
+            (JuliaToken::Name(_), Some(JuliaToken::Mark("=")))
         )
     }
 
-    fn postfix(&mut self) -> Term {
-        let mut term = match self.next() {
-            Token::Number(value) => Term::Value(value),
-            Token::Text(text) => Term::Value(V::Text(text)),
-            Token::Name(word) => match word.as_str() {
-                "true" | "false" => Term::Value(V::Bool(word == "true")),
-                "nothing" => Term::Value(V::Nothing),
-                "return" => return Term::Return(Box::new(self.choice())),
+    fn postfix(&mut self) -> JuliaTerm {
+        let mut term = match self.take_next() {
+            JuliaToken::Number(value) => JuliaTerm::Value(value),
+            JuliaToken::Text(text) => JuliaTerm::Value(V::Text(text)),
+            JuliaToken::Name(word) => match word.as_str() {
+                "true" | "false" => JuliaTerm::Value(V::Bool(word == "true")),
+                "nothing" => JuliaTerm::Value(V::Nothing),
+                "return" => return JuliaTerm::Return(Box::new(self.choice())),
                 _ => {
                     self.skip_braces();
-                    Term::Name(word)
+                    JuliaTerm::Name(word)
                 }
             },
-            Token::Mark("(") if self.is_keyword() => Term::Named(self.keywords()),
-            Token::Mark("(") => {
+            JuliaToken::Mark("(") if self.is_keyword() => JuliaTerm::Named(self.keywords()),
+            JuliaToken::Mark("(") => {
                 let inner = self.choice();
                 if self.takes(")") {
                     inner
@@ -520,22 +522,22 @@ impl Parser {
                     self.expect(",");
                     let mut terms = vec![inner];
                     terms.extend(self.list(")"));
-                    Term::Tuple(terms)
+                    JuliaTerm::Tuple(terms)
                 }
             }
-            Token::Mark("[") => Term::List(self.list("]")),
+            JuliaToken::Mark("[") => JuliaTerm::List(self.list("]")),
             other => panic!("{other:?} begins a term"),
         };
         loop {
             if self.takes("(") {
-                let Term::Name(name) = term else {
+                let JuliaTerm::Name(name) = term else {
                     panic!("a call of {term:?}")
                 };
                 let (mut values, mut named) = (Vec::new(), Vec::new());
                 while !self.is_keyword() && !self.takes(")") {
                     values.push(self.choice());
                     assert!(
-                        self.takes(",") || matches!(self.peek(), Token::Mark(")")),
+                        self.takes(",") || matches!(self.peek(), JuliaToken::Mark(")")),
                         "{:?}",
                         self.peek()
                     );
@@ -543,22 +545,24 @@ impl Parser {
                 if self.is_keyword() {
                     named = self.keywords();
                 }
-                term = Term::Call(name, values, named);
+                term = JuliaTerm::Call(name, values, named);
             } else if self.takes("[") {
                 let inner = self.list("]");
                 term = match term {
-                    Term::Name(name) if ["Float64", "String", "NTuple"].contains(&name.as_str()) => Term::List(inner),
-                    term => Term::Index(Box::new(term), inner),
+                    JuliaTerm::Name(name) if ["Float64", "String", "NTuple"].contains(&name.as_str()) => {
+                        JuliaTerm::List(inner)
+                    }
+                    term => JuliaTerm::Index(Box::new(term), inner),
                 };
             } else if self.takes(".") {
-                term = Term::Field(Box::new(term), self.name());
+                term = JuliaTerm::Field(Box::new(term), self.name());
             } else {
                 return term;
             }
         }
     }
 
-    fn keywords(&mut self) -> Vec<(String, Term)> {
+    fn keywords(&mut self) -> Vec<(String, JuliaTerm)> {
         let mut named = Vec::new();
         while !self.takes(")") {
             let name = self.name();
@@ -577,7 +581,7 @@ impl JuliaProgram {
     /// Reads a file that is one module.
     pub(super) fn parse(text: &str) -> Self {
         let mut program = Self::default();
-        let mut parser = Parser {
+        let mut parser = JuliaParser {
             tokens: tokens(text),
             at: 0,
         };
@@ -590,11 +594,11 @@ impl JuliaProgram {
     }
 
     /// The result of a function or a constructor.
-    pub(super) fn call(&self, name: &str, values: Vec<V>) -> Outcome<V> {
+    pub(super) fn call(&self, name: &str, values: Vec<V>) -> JuliaOutcome<V> {
         self.apply(name, values, Vec::new())
     }
 
-    fn apply(&self, name: &str, values: Vec<V>, named: Vec<(String, V)>) -> Outcome<V> {
+    fn apply(&self, name: &str, values: Vec<V>, named: Vec<(String, V)>) -> JuliaOutcome<V> {
         if let Some(fields) = self.records.get(name) {
             let mut made = Vec::new();
             assert!(
@@ -639,11 +643,11 @@ impl JuliaProgram {
         }
     }
 
-    fn run(&self, statements: &[Statement], scopes: &mut Scopes) -> Outcome<()> {
+    fn run(&self, statements: &[JuliaStatement], scopes: &mut Scopes) -> JuliaOutcome<()> {
         for statement in statements {
             match statement {
-                Statement::Term(term) => _ = self.evaluate(term, scopes)?,
-                Statement::Assign(targets, operator, term) => {
+                JuliaStatement::Evaluate(term) => _ = self.evaluate(term, scopes)?,
+                JuliaStatement::Assign(targets, operator, term) => {
                     let mut value = self.evaluate(term, scopes)?;
                     if let [target] = targets.as_slice() {
                         if let Some(operator) = operator {
@@ -660,7 +664,7 @@ impl JuliaProgram {
                         self.assign(target, value, scopes)?;
                     }
                 }
-                Statement::If(branches) => {
+                JuliaStatement::If(branches) => {
                     for (condition, body) in branches {
                         let holds = condition
                             .as_ref()
@@ -671,7 +675,7 @@ impl JuliaProgram {
                         }
                     }
                 }
-                Statement::For(name, over, body) => {
+                JuliaStatement::For(name, over, body) => {
                     let items: Vec<V> = match self.evaluate(over, scopes)? {
                         V::Range(first, step, last) => {
                             let n = ((last - first) / step + 1).max(0);
@@ -695,14 +699,14 @@ impl JuliaProgram {
         Ok(())
     }
 
-    fn assign(&self, target: &Term, value: V, scopes: &mut Scopes) -> Outcome<()> {
+    fn assign(&self, target: &JuliaTerm, value: V, scopes: &mut Scopes) -> JuliaOutcome<()> {
         match target {
-            Term::Name(name) => {
+            JuliaTerm::Name(name) => {
                 let known = scopes.iter().rposition(|scope| scope.contains_key(name));
                 let at = known.unwrap_or(scopes.len() - 1);
                 scopes[at].insert(name.clone(), value);
             }
-            Term::Index(of, places) => {
+            JuliaTerm::Index(of, places) => {
                 let of = self.evaluate(of, scopes)?;
                 let places = self.all(places, scopes)?;
                 match (&of, places.as_slice()) {
@@ -725,37 +729,39 @@ impl JuliaProgram {
         Ok(())
     }
 
-    fn all(&self, terms: &[Term], scopes: &mut Scopes) -> Outcome<Vec<V>> {
+    fn all(&self, terms: &[JuliaTerm], scopes: &mut Scopes) -> JuliaOutcome<Vec<V>> {
         terms.iter().map(|term| self.evaluate(term, scopes)).collect()
     }
 
-    fn evaluate(&self, term: &Term, scopes: &mut Scopes) -> Outcome<V> {
+    fn evaluate(&self, term: &JuliaTerm, scopes: &mut Scopes) -> JuliaOutcome<V> {
         let local = |name: &str, scopes: &Scopes| scopes.iter().rev().find_map(|scope| scope.get(name).cloned());
         Ok(match term {
-            Term::Value(value) => value.clone(),
-            Term::Name(name) => match local(name, scopes).or_else(|| self.globals.get(name).cloned()) {
+            JuliaTerm::Value(value) => value.clone(),
+            JuliaTerm::Name(name) => match local(name, scopes).or_else(|| self.globals.get(name).cloned()) {
                 Some(value) => value,
                 None => return fault(format!("UndefVarError: {name}")),
             },
-            Term::Unary("!", a) => V::Bool(!truth(&self.evaluate(a, scopes)?)?),
-            Term::Unary(_, a) => match self.evaluate(a, scopes)? {
+            JuliaTerm::Unary("!", a) => V::Bool(!truth(&self.evaluate(a, scopes)?)?),
+            JuliaTerm::Unary(_, a) => match self.evaluate(a, scopes)? {
                 V::Int(x) => V::Int(-x),
                 value => V::Float(-value.number()),
             },
-            Term::Binary("||", a, b) => match self.evaluate(a, scopes)? {
+            JuliaTerm::Binary("||", a, b) => match self.evaluate(a, scopes)? {
                 V::Bool(false) => self.evaluate(b, scopes)?,
                 holds => V::Bool(truth(&holds)?),
             },
-            Term::Binary("&&", a, b) => match self.evaluate(a, scopes)? {
+            JuliaTerm::Binary("&&", a, b) => match self.evaluate(a, scopes)? {
                 V::Bool(true) => self.evaluate(b, scopes)?,
                 holds => V::Bool(truth(&holds)?),
             },
-            Term::Binary(operator, a, b) => binary(operator, &self.evaluate(a, scopes)?, &self.evaluate(b, scopes)?)?,
-            Term::Choice(parts) => {
+            JuliaTerm::Binary(operator, a, b) => {
+                binary(operator, &self.evaluate(a, scopes)?, &self.evaluate(b, scopes)?)?
+            }
+            JuliaTerm::Choice(parts) => {
                 let holds = truth(&self.evaluate(&parts[0], scopes)?)?;
                 self.evaluate(&parts[if holds { 1 } else { 2 }], scopes)?
             }
-            Term::Range(first, step, last) => {
+            JuliaTerm::Range(first, step, last) => {
                 let step = step
                     .as_ref()
                     .map_or(Ok(V::Int(1)), |step| self.evaluate(step, scopes))?;
@@ -764,7 +770,7 @@ impl JuliaProgram {
                     other => return fault(format!("a range of {other:?}")),
                 }
             }
-            Term::Call(name, values, named) => {
+            JuliaTerm::Call(name, values, named) => {
                 // A variable hides a function.
                 if local(name, scopes).is_some() {
                     return fault(format!("{name} is a variable"));
@@ -776,7 +782,7 @@ impl JuliaProgram {
                 }
                 self.apply(name, values, by_name)?
             }
-            Term::Index(of, places) => {
+            JuliaTerm::Index(of, places) => {
                 let of = self.evaluate(of, scopes)?;
                 let places = self.all(places, scopes)?;
                 match (&of, places.as_slice()) {
@@ -796,35 +802,35 @@ impl JuliaProgram {
                     other => return fault(format!("an entry of {other:?}")),
                 }
             }
-            Term::Field(of, name) => match self.evaluate(of, scopes)? {
+            JuliaTerm::Field(of, name) => match self.evaluate(of, scopes)? {
                 V::Record(record) => match record.1.iter().find(|(field, _)| field == name) {
                     Some((_, value)) => value.clone(),
                     None => return fault(format!("no field {name}")),
                 },
                 other => return fault(format!("a field of {other:?}")),
             },
-            Term::List(terms) => V::Array(Rc::new(RefCell::new(self.all(terms, scopes)?))),
-            Term::Tuple(terms) => V::Tuple(self.all(terms, scopes)?),
-            Term::Named(fields) => {
+            JuliaTerm::List(terms) => V::Array(Rc::new(RefCell::new(self.all(terms, scopes)?))),
+            JuliaTerm::Tuple(terms) => V::Tuple(self.all(terms, scopes)?),
+            JuliaTerm::Named(fields) => {
                 let mut values = Vec::new();
                 for (name, term) in fields {
                     values.push((name.clone(), self.evaluate(term, scopes)?));
                 }
                 V::Record(Rc::new((String::new(), values)))
             }
-            Term::Return(value) => return Err(JuliaExit::Return(self.evaluate(value, scopes)?)),
+            JuliaTerm::Return(value) => return Err(JuliaExit::Return(self.evaluate(value, scopes)?)),
         })
     }
 }
 
-fn truth(value: &V) -> Outcome<bool> {
+fn truth(value: &V) -> JuliaOutcome<bool> {
     match value {
         V::Bool(holds) => Ok(*holds),
         other => fault(format!("{other:?} is no condition")),
     }
 }
 
-fn binary(operator: &str, a: &V, b: &V) -> Outcome<V> {
+fn binary(operator: &str, a: &V, b: &V) -> JuliaOutcome<V> {
     Ok(match (operator, a, b) {
         ("===", a, b) => V::Bool(a == b),
         ("!==", a, b) => V::Bool(a != b),
@@ -852,7 +858,7 @@ fn binary(operator: &str, a: &V, b: &V) -> Outcome<V> {
 }
 
 /// Functions of Julia's own library.
-fn built_in(name: &str, values: &[V]) -> Outcome<V> {
+fn built_in(name: &str, values: &[V]) -> JuliaOutcome<V> {
     let array = |values| V::Array(Rc::new(RefCell::new(values)));
     Ok(match (name, values) {
         ("sqrt", [x]) if x.number() < 0.0 => return fault("DomainError"),

@@ -45,13 +45,13 @@ fn table(name: &str) -> Vec<Vec<f64>> {
 }
 
 /// A module with a prepared model.
-struct Prepared {
+struct PreparedJulia {
     program: JuliaProgram,
     base: Vec<f64>,
     dynamics: V,
 }
 
-impl Prepared {
+impl PreparedJulia {
     fn new(text: &str, parameters: Vec<V>) -> Self {
         let program = JuliaProgram::parse(text);
         let call = |name: &str, values| {
@@ -140,7 +140,7 @@ fn status_name(program: &JuliaProgram, exit: JuliaExit) -> &'static str {
 fn an_arm_has_the_torques_of_the_table() {
     let parameters = table("pinocchio-panda-parameters.csv").remove(0);
     let parameters = parameters.into_iter().map(V::Float).collect();
-    let panda = Prepared::new(&module_text("panda"), parameters);
+    let panda = PreparedJulia::new(&module_text("panda"), parameters);
     let rows = table("pinocchio-panda.csv");
     assert!(rows.len() >= 40);
     let (mut worst, mut largest) = (0.0_f64, 0.0_f64);
@@ -162,7 +162,7 @@ fn an_arm_has_the_torques_of_the_table() {
 
 #[test]
 fn loops_in_closed_form_have_the_forces_of_the_table() {
-    let mill = Prepared::new(&module_text("spidermill-paper"), vec![]);
+    let mill = PreparedJulia::new(&module_text("spidermill-paper"), vec![]);
     // Columns of the first drive that are retained.
     let retained = [8, 9, 12, 14, 16];
     assert_eq!(mill.base.len(), retained.len());
@@ -189,7 +189,7 @@ fn loops_in_closed_form_have_the_forces_of_the_table() {
 
 #[test]
 fn loops_by_newtons_method_agree_with_themselves_and_with_nearby_poses() {
-    let robot = Prepared::new(&module_text("three_rrr"), vec![]);
+    let robot = PreparedJulia::new(&module_text("three_rrr"), vec![]);
     let nominal = [-0.37568, 1.70899, -2.37896];
     let mut near: Option<V> = None;
     for i in 0..6 {
@@ -228,7 +228,7 @@ fn names_of_the_model_file_stay_names() {
              at = [\"zeros\", 0]\n[[drive]]\nname = \"outputs\"\njoint = \"function\"\n"
         );
         std::fs::write(&file, text).unwrap();
-        let pendulum = Prepared::new(&emit(&derivation_from(&file)), vec![]);
+        let pendulum = PreparedJulia::new(&emit(&derivation_from(&file)), vec![]);
         let force = pendulum.call("inverse_dynamics", &[&[0.3], &[0.1], &[0.7]]).numbers()[0];
         let expected = 2.0 * (0.25 * 0.7 + 0.5 * 9.81 * 0.3_f64.cos());
         assert!((force - expected).abs() < 1e-12, "{name}: {force} {expected}");
