@@ -71,7 +71,7 @@ pub(super) fn field_identifier(name: &str) -> Ident {
         && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
         && !UNBINDABLE_NAMES.contains(&name);
     if !plain {
-        return Ident::new(&valid_spelling(name), Span::call_site());
+        return Ident::new(&spell_plain(name), Span::call_site());
     }
     // A keyword is no identifier for the parser, and needs the raw form.
     if NEWER_KEYWORDS.contains(&name) || syn::parse_str::<syn::Ident>(name).is_err() {
@@ -84,14 +84,14 @@ pub(super) fn field_identifier(name: &str) -> Ident {
 /// The identifier of a module: as [`field_identifier`], and different from the names in scope around it.
 pub(super) fn module_identifier(name: &str) -> Ident {
     if IN_SCOPE.contains(&name) {
-        Ident::new(&valid_spelling(name), Span::call_site())
+        Ident::new(&spell_plain(name), Span::call_site())
     } else {
         field_identifier(name)
     }
 }
 
-/// A leading `_` and the name with other characters as `_HEX_`.
-fn valid_spelling(name: &str) -> String {
+/// A leading `_`, which no name of a model file has, and the name with other characters as `_HEX_`.
+pub(super) fn spell_plain(name: &str) -> String {
     let mut spelled = "_".to_owned();
     // The code of a character is unique, so that no two names become equal.
     for c in name.chars() {

@@ -1,10 +1,10 @@
 //! The list of output languages, including crates that wrap the Rust module.
 
-use super::language::{C99Sources, EmissionRequest, EmittedFile, OutputForm, OutputLanguage, RustModule};
+use super::language::{C99Sources, EmissionRequest, EmittedFile, JuliaFile, OutputForm, OutputLanguage, RustModule};
 use super::wrap::{emit_c, emit_python};
 
 /// All languages; the first is the default.
-pub const LANGUAGES: [&dyn OutputLanguage; 4] = [&RustModule, &C99Sources, &CCrate, &PythonCrate];
+pub const LANGUAGES: [&dyn OutputLanguage; 5] = [&RustModule, &C99Sources, &CCrate, &PythonCrate, &JuliaFile];
 
 /// A crate that wraps the Rust module in a C library.
 struct CCrate;

@@ -19,7 +19,7 @@ impl CodeLanguage {
         LANGUAGES.into_iter().map(Self)
     }
 
-    /// The language with a name, such as `rust`, `c99`, `c` and `python`; `None` if there is none.
+    /// The language with a name, such as `rust`, `c99`, `c`, `python` and `julia`; `None` if there is none.
     ///
     /// ```
     /// use modelmill::generate::CodeLanguage;

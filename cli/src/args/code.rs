@@ -46,7 +46,7 @@ pub(crate) struct GenerateArgs {
     /// Model file (TOML)
     pub(crate) model: PathBuf,
     /// Write the source to this file instead of standard output; with --language c99, c or python, files to this folder
-    #[arg(long, value_name = "FILE.rs|DIR", required_if_eq_any(languages_in_folders()))]
+    #[arg(long, value_name = "FILE|DIR", required_if_eq_any(languages_in_folders()))]
     pub(crate) out: Option<PathBuf>,
     /// With the equation of motion: mass matrix, velocity terms, gravity, forward dynamics
     #[arg(long)]
@@ -58,8 +58,8 @@ pub(crate) struct GenerateArgs {
     /// your own tests
     #[arg(long)]
     pub(crate) self_test: bool,
-    /// What to write: a Rust module, sources in plain C99, or a crate that builds a C library with its header or a
-    /// Python module
+    /// What to write: a Rust or Julia module, sources in plain C99, or a crate that builds a C library with its header
+    /// or a Python module
     #[arg(long, value_parser = languages(), default_value = CodeLanguage::default().name())]
     pub(crate) language: CodeLanguage,
 }

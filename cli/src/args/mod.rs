@@ -132,6 +132,7 @@ pub(crate) enum ProgramCommand {
     #[command(after_help = "Examples (from the project's root):\n  \
         modelmill generate model-spec/models/scara.toml --out scara.rs\n  \
         modelmill generate model-spec/models/panda.toml --language c99 --out panda-c99\n  \
+        modelmill generate model-spec/models/panda.toml --language julia --dynamics --out panda.jl\n  \
         modelmill generate model-spec/models/panda.toml --language c --out panda-c\n  \
         modelmill generate model-spec/models/panda.toml --language python --dynamics --out panda-python")]
     Generate(GenerateArgs),

@@ -1,5 +1,5 @@
-//! `generate`: writes the model as Rust source, as C99 sources, or as a crate that builds a C library or a Python
-//! module.
+//! `generate`: writes the model as a Rust or Julia module, as C99 sources, or as a crate that builds a C library or a
+//! Python module.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ use crate::{commands, terminal};
 /// Writes the source that `cargo build` generates from the model, or a folder of sources, or a crate.
 pub(crate) fn run(host: &Host, args: &GenerateArgs) -> CommandOutcome {
     let more = [("--reactions", args.reactions), ("--self-test", args.self_test)];
-    // Some parts of the code exist for Rust only.
+    // Some languages lack some parts of the code.
     if let Some((flag, _)) = more.iter().find(|(_, asked)| *asked)
         && !args.language.has_all()
     {
@@ -69,7 +69,7 @@ fn write_module(target: Option<&OutputFile>, files: &[EmittedFile]) -> CommandOu
             "{}: {}, the module `{}`",
             target.path().display(),
             count(file.text.lines().count(), "line", "lines"),
-            file.path.trim_end_matches(".rs")
+            Path::new(&file.path).file_stem().unwrap_or_default().display()
         ));
     }
     Ok(())

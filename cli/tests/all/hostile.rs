@@ -450,6 +450,15 @@ fn crates_of_hostile_models_compile_and_hold_no_code_of_theirs() {
     for sign in ["<script", "](javascript", "<img"] {
         assert!(!bad.contains(sign), "{sign} in documentation of Rust");
     }
+    // Texts of the file are in comments of Julia, which begin with `#`, and in literals without `$` only.
+    let [bad_julia, good_julia] = [&models[0], &models[1]].map(|model| {
+        let file = printed(&["generate", text(model), "--language", "julia", "--dynamics"]);
+        let lines = file
+            .lines()
+            .map(|line| line.split('#').next().unwrap_or_default().trim_end());
+        lines.collect::<Vec<_>>().join("\n")
+    });
+    assert_eq!(bad_julia, good_julia, "other code in Julia");
     let crates = |language: &str, more: &[&str]| {
         let of = |name: &str, model| written_of(model, name, language, more);
         let [bad, good] = [of("hostile", &models[0]), of("harmless", &models[1])];

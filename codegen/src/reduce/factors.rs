@@ -17,8 +17,9 @@ pub(super) const MOST_OPERATIONS: u64 = 20_000_000_000;
 /// Relations to retained columns that are not longer than this are used directly.
 const FEW: usize = 12;
 
-/// Above this number of terms in all factors on retained columns, columns are written by neighbouring columns.
-const MOST_TERMS: usize = 5_000;
+/// Above this number of terms in one base parameter, columns are written by neighbouring columns where that is shorter.
+/// A parameter of so many terms takes some 2000 characters, more than a reader can check. By judgement.
+const MOST_TERMS: usize = 150;
 
 /// The dependent columns as combinations of others. Factors that cannot be reconstructed are `None`. `values` are those
 /// of the constants in the file, at which factors should be finite.
@@ -84,7 +85,7 @@ fn factors_by_relations(
     let mut related = nearest_relations(all, search, stream)?;
     // A near relation may be complicated: if the first joints of an arm have no effect on all of a link, relations
     // between links divide by sines of twists, and relations to retained columns do not.
-    let is_long = related.is_complete() && related.n_terms() > MOST_TERMS;
+    let is_long = related.is_complete() && related.is_shorter_nested(MOST_TERMS);
     let unwieldy = related.unwieldy_columns();
     // At the file's values a pivot of a near relation may vanish, for example at lengths that are equal on both sides.
     let undefined = related.undefined_columns(search.values);

@@ -6,8 +6,8 @@
 //! Khalil 1990). Its factors on the retained columns depend on all joints down to the base. So relations between
 //! neighbours are reconstructed, and the factors are sums of their products.
 //!
-//! Decision: products of relations are multiplied out up to 5000 terms; beyond that, base parameters are given by
-//! named sums, link by link. Polynomials over powers of lengths have one normal form, so this gives the same result
+//! Decision: products of relations are multiplied out up to 150 terms of one base parameter; beyond that, base
+//! parameters are given by named sums, link by link, if these are shorter. Polynomials over powers of lengths have one normal form, so this gives the same result
 //! as a direct reconstruction. Other quotients are reconstructed again from the combined relation, which needs no
 //! further points of motion.
 
@@ -342,14 +342,17 @@ impl SolvedRelations {
         wanted.iter().map(|(j, p)| function(j, p)).collect()
     }
 
-    /// Upper limit of the number of terms that all factors on retained columns have together after multiplication.
-    pub(super) fn n_terms(&self) -> usize {
+    /// Whether the relations have fewer terms than the factors on retained columns after multiplication, and one
+    /// retained column then has more than `most_terms`. Terms that cancel are counted.
+    pub(super) fn is_shorter_nested(&self, most_terms: usize) -> bool {
+        let mut nested = 0_usize;
         let mut counts: BTreeMap<usize, BTreeMap<usize, usize>> = BTreeMap::new();
         for (relation, factors) in &self.0 {
             let mut line: BTreeMap<usize, usize> = BTreeMap::new();
             for (k, factor) in relation.columns().zip(factors) {
                 // Terms of a product of polynomials multiply, terms of sums add up.
                 let n = factor.as_ref().map_or(1, |f| f.numerator.len());
+                nested = nested.saturating_add(n);
                 match counts.get(&k) {
                     None => *line.entry(k).or_default() += n,
                     Some(inner) => {
@@ -362,8 +365,14 @@ impl SolvedRelations {
             }
             counts.insert(relation.column, line);
         }
-        let all = counts.values().flat_map(BTreeMap::values);
-        all.fold(0_usize, |sum, n| sum.saturating_add(*n))
+        // Terms by retained column, each of which becomes a base parameter.
+        let mut expanded: BTreeMap<usize, usize> = BTreeMap::new();
+        for (p, n) in counts.values().flatten() {
+            let sum = expanded.entry(*p).or_default();
+            *sum = sum.saturating_add(*n);
+        }
+        let all = expanded.values().fold(0_usize, |sum, n| sum.saturating_add(*n));
+        nested < all && expanded.values().any(|n| *n > most_terms)
     }
 
     /// The relations without expansion.

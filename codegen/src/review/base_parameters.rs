@@ -45,7 +45,7 @@ pub fn factored_base_expression(derivation: &Derivation, k: usize) -> PrintedFor
         }
     }
     // One term per group: number * function * (sum of products).
-    for (function, mut members) in groups {
+    for (function, members) in groups {
         let factor = function.formula(mechanism);
         // The greatest common content of the numbers stands in front; the first term in parentheses is positive.
         let mut number = members.iter().fold(Rational::ZERO, |c, (k, _)| c.content_with(k));
@@ -58,13 +58,16 @@ pub fn factored_base_expression(derivation: &Derivation, k: usize) -> PrintedFor
             terms.extend((members.into_iter()).map(|(k, what)| PrintedFormula::product(k, [factor.clone(), what])));
             continue;
         }
-        for (k, _) in &mut members {
-            *k = &*k * &inverse;
-        }
-        let sum = members.into_iter().map(|(k, what)| PrintedFormula::product(k, [what]));
-        // number * function * sum
-        let term = PrintedFormula::product(number, [factor, PrintedFormula::sum(sum)]);
-        terms.push(term);
+        // number * function * sum, with the number in front or in the terms, whichever is shorter:
+        // `0.5*(m2 + m3)`, but `I2 + 3.61*mb` instead of `0.01*(100*I2 + 361*mb)`.
+        let with_number = |number: &Rational| {
+            let inverse = number.recip();
+            let sum = (members.iter()).map(|(k, what)| PrintedFormula::product(k * &inverse, [what.clone()]));
+            PrintedFormula::product(number.clone(), [factor.clone(), PrintedFormula::sum(sum)])
+        };
+        let (in_front, in_terms) = (with_number(&number), with_number(&Rational::ONE));
+        let is_shorter = in_terms.text().len() < in_front.text().len();
+        terms.push(if is_shorter { in_terms } else { in_front });
     }
     PrintedFormula::sum(terms)
 }

@@ -283,6 +283,9 @@ pub(super) fn drives(page: &mut PageDocument, derivation: &Derivation) {
     );
     // Only linear drives are listed: their lengths are new quantities.
     let mut lines = Vec::new();
+    // The tag counts all equations, so that a missing number shows that a long one was left out, and comments of
+    // emitted code refer to the same numbers.
+    let mut tag = 0;
     for (d, drive) in mechanism.drives.iter().enumerate() {
         if matches!(drive.kind, DriveKind::Joint(_)) {
             continue;
@@ -292,12 +295,12 @@ pub(super) fn drives(page: &mut PageDocument, derivation: &Derivation) {
             if id == Graph::ZERO {
                 return None;
             }
+            tag += 1;
             let right = short_formula(graph, mechanism, id)?;
-            let tag = format!("D{}", lines.len() + 1);
             lines.push(PageEquation {
                 left: PrintedFormula::name(left),
                 right,
-                tag,
+                tag: format!("D{tag}"),
                 unit: None,
             });
             Some(())

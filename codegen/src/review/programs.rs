@@ -115,7 +115,7 @@ pub(super) fn listings(derivation: &Derivation) -> Vec<ListedProgram<'_>> {
             "Passive coordinates, their rates and accelerations",
             outputs,
             &programs.passive,
-            "P",
+            "Q",
         ));
     }
     // Lengths and their rates, then the Jacobian row by row.
@@ -138,7 +138,7 @@ pub(super) fn listings(derivation: &Derivation) -> Vec<ListedProgram<'_>> {
                 .map(|a| FormulaSymbol::new(format!("J_{}_{}", d.name, mechanism.coordinates[*a].name)));
             outputs.extend(row);
         }
-        listings.push(("Drives and their Jacobian", outputs, &programs.drives, "D"));
+        listings.push(("Drives and their Jacobian", outputs, &programs.drives, "J"));
     }
     // The regressor, row by row.
     let rank = reduction.retained.len();

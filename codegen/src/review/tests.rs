@@ -303,3 +303,56 @@ fn equations_of_the_two_link_arm() {
     p6_min = MY2
     ");
 }
+
+/// A number in a comment of emitted code or in a text stands for one equation of the page.
+#[test]
+fn numbers_of_equations_are_unique() {
+    for name in MODELS {
+        let text = page(&derivation(name), PageFormat::Text, None);
+        let mut seen = BTreeSet::new();
+        for line in text.lines() {
+            let tag = line
+                .trim_start()
+                .strip_prefix('(')
+                .and_then(|rest| rest.split_once(')'));
+            let Some((tag, _)) = tag.filter(|(tag, _)| tag.ends_with(|c: char| c.is_ascii_digit())) else {
+                continue;
+            };
+            if tag.chars().all(|c| c.is_ascii_alphanumeric() || c == '.') {
+                assert!(seen.insert(tag.to_owned()), "{name}: two equations ({tag})");
+            }
+        }
+        assert!(seen.contains("16.1") && seen.contains("H1"), "{name}: {seen:?}");
+    }
+}
+
+/// Decimal factors stand in their terms, and a factor that all terms share stands in front.
+#[test]
+fn numbers_stand_where_they_are_short() {
+    let folder = std::env::temp_dir().join(format!("modelmill-factors-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let file = folder.join("arm.toml");
+    let text = "schema = 1\nname = \"arm\"\ngravity = [0, -9.81, 0]\n[parameters]\nI2 = { nominal = 1, unit = \"kg m^2\" }\n\
+                ma = { nominal = 2, unit = \"kg\" }\nmb = { nominal = 3, unit = \"kg\" }\n[coordinates]\nq1 = {}\nq2 = {}\n\
+                [[frame]]\nname = \"one\"\non = \"base\"\nmodified_dh = { theta = \"q1\" }\n\
+                [[frame]]\nname = \"two\"\non = \"one\"\nmodified_dh = { a = 1.5, theta = \"q2\" }\n\
+                [[lumped_mass]]\nmass = \"ma\"\non = \"two\"\nat = [0.5, 0]\n\
+                [[lumped_mass]]\nmass = \"mb\"\non = \"two\"\nat = [1.9, 0]\n\
+                [[lumped_mass]]\nmass = \"I2\"\non = \"one\"\nat = [1, 0]\n\
+                [[drive]]\nname = \"d1\"\njoint = \"q1\"\n[[drive]]\nname = \"d2\"\njoint = \"q2\"\n"
+        .replace("unit = \"kg m^2\"", "unit = \"kg\"");
+    std::fs::write(&file, text).unwrap();
+    let loaded = modelmill_spec::load_file(&file).unwrap_or_else(|failure| panic!("{failure}"));
+    let derivation = derive(&loaded.mechanism).unwrap();
+    std::fs::remove_dir_all(folder).unwrap();
+    for k in 0..derivation.reduction.retained.len() {
+        let text = factored_base_expression(&derivation, k).text();
+        let expanded = base_expression(&derivation, k).text();
+        assert!(!text.contains("100*") && !text.contains("0.01*"), "{text}");
+        assert!(text.len() <= expanded.len(), "{text} is longer than {expanded}");
+    }
+    let all: Vec<String> = (0..derivation.reduction.retained.len())
+        .map(|k| factored_base_expression(&derivation, k).text())
+        .collect();
+    assert!(all.iter().any(|text| text.contains("3.61*mb")), "{all:?}");
+}

@@ -6,6 +6,7 @@
 use modelmill_codegen::{Derivation, DynamicsPrograms, ReactionPrograms};
 
 pub(crate) mod c99;
+pub(crate) mod julia;
 pub(crate) mod rust;
 mod syntax;
 
@@ -116,5 +117,31 @@ impl OutputLanguage for C99Sources {
 
     fn emit_files(&self, source: &EmissionRequest<'_>) -> Vec<EmittedFile> {
         c99::emit_sources(source)
+    }
+}
+
+/// A Julia module.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct JuliaFile;
+
+impl OutputLanguage for JuliaFile {
+    fn name(&self) -> &'static str {
+        "julia"
+    }
+
+    fn description(&self) -> &'static str {
+        "A module for Julia"
+    }
+
+    fn output_form(&self) -> OutputForm {
+        OutputForm::Module
+    }
+
+    fn has_reactions_and_self_test(&self) -> bool {
+        false
+    }
+
+    fn emit_files(&self, source: &EmissionRequest<'_>) -> Vec<EmittedFile> {
+        julia::emit_module(source)
     }
 }

@@ -16,6 +16,9 @@ use super::{CodeExpression, CodeStatement, PoseCheck, RequestedAngle, StatementR
 /// most 100 characters.
 const WIDEST: usize = 80;
 
+/// Comment on the size with which a test of singularity compares.
+const SCALE_NOTE: &str = "scale for the test of singularity";
+
 /// Name of the array of angles whose sines and cosines are computed together.
 pub(crate) const ANGLES: &str = "angles";
 
@@ -36,7 +39,8 @@ impl StatementRoutine {
         // Names that this program may not use.
         let mut taken = scope.reserved_names_in(program);
         let first = LeadingAngles::from_program(program);
-        let named = name_values(program, scope, outputs, &mut taken);
+        let mut named = name_values(program, scope, outputs, &mut taken);
+        let guard_scales = name_guard_scales(program, scope, &mut named, &mut taken);
         let inside = inlined_values(program, &named, scope);
         let last = (!results_have_names).then_some(scope.sections.force_section());
         let sections = scope.sections.value_sections(program, &inside, &named, last);
@@ -60,6 +64,7 @@ impl StatementRoutine {
             first: first.reorder(&order),
             values: vec![None; order.len()],
             next: [0; 2],
+            guard_scales: guard_scales.into_iter().map(|i| place[i]).collect(),
             sections: order.iter().map(|i| sections[*i]).collect(),
             turns_signs,
             results_have_names,
@@ -70,7 +75,7 @@ impl StatementRoutine {
         for v in &builder.program.outputs {
             builder.outputs[v.index()] = true;
         }
-        builder.routine()
+        builder.routine().with_entry_names(outputs)
     }
 }
 
@@ -175,6 +180,40 @@ fn name_values(
     named
 }
 
+/// Names the sizes with which tests of singularity compare: `scale_Delta_1` for a determinant `Delta_1`. Returns their
+/// indices.
+fn name_guard_scales(
+    program: &StraightLineProgram,
+    scope: &NameScope,
+    named: &mut BTreeMap<usize, NamedValue>,
+    taken: &mut BTreeSet<String>,
+) -> BTreeSet<usize> {
+    let mut scales = BTreeSet::new();
+    for guard in &program.guards {
+        let PoseGuard::Regular(value, size) = guard else {
+            continue;
+        };
+        let i = size.index();
+        if is_leaf(&program.ops[i]) || named.contains_key(&i) {
+            continue;
+        }
+        // The sign of the compared value has no effect.
+        let compared = match program.ops[value.index()] {
+            ProgramOp::Neg(a) => a.index(),
+            _ => value.index(),
+        };
+        let compared = match &program.ops[compared] {
+            ProgramOp::Input(atom) => Some(scope.input_name(*atom)),
+            _ => named.get(&compared).map(|named| named.name.as_str()),
+        };
+        let name = compared.map_or("scale".to_owned(), |compared| format!("scale_{compared}"));
+        let name = unique_name(&name, taken);
+        named.insert(i, NamedValue { name, negative: false });
+        scales.insert(i);
+    }
+    scales
+}
+
 /// Which values are written inside the only formula that uses them.
 fn inlined_values(program: &StraightLineProgram, named: &BTreeMap<usize, NamedValue>, scope: &NameScope) -> Vec<bool> {
     let n = program.ops.len();
@@ -251,6 +290,8 @@ struct Builder<'a> {
     named: BTreeMap<usize, NamedValue>,
     /// The angles that are computed first.
     first: LeadingAngles,
+    /// Values that are the scale of a test of singularity.
+    guard_scales: BTreeSet<usize>,
     /// The section of each value.
     sections: Vec<usize>,
     /// Whether values get the sign of the quantity that names them. In long programs the signs decide which pairs of
@@ -387,6 +428,7 @@ impl Builder<'_> {
             statements.push(CodeStatement::Put {
                 output: *k,
                 value: self.value_expression(i).normalize_sign(),
+                entry: String::new(),
             });
         }
     }
@@ -452,7 +494,9 @@ impl Builder<'_> {
         // All others are named, with the sign chosen so that no extra operation is needed.
         let (name, value, turned) = self.choose_sign(i, value);
         // A comment names the equation on the page.
-        let note = self.scope.value_note(&name);
+        let note = (self.guard_scales.contains(&i))
+            .then(|| SCALE_NOTE.to_owned())
+            .or_else(|| self.scope.value_note(&name));
         let written = CodeExpression::name(&name);
         statements.push(CodeStatement::Let { name, value, note });
         self.values[i] = Some(if turned { CodeExpression::neg(written) } else { written });

@@ -7,6 +7,7 @@
 mod angles;
 mod build;
 mod expression;
+mod functions;
 mod once;
 mod order;
 mod pose;
@@ -15,6 +16,7 @@ mod scope;
 mod sections;
 
 pub(crate) use expression::{CodeExpression, OperatorPrecedence};
+pub(crate) use functions::{ModelFunction, model_functions};
 pub(crate) use once::PrecomputedValues;
 pub(crate) use order::order as in_order;
 pub(crate) use pose::SharedPose;
@@ -46,6 +48,25 @@ pub(crate) struct StatementRoutine {
 }
 
 impl StatementRoutine {
+    /// The same with names for its outputs, which comments state where a value is stored.
+    pub(crate) fn with_entry_names(mut self, names: &[String]) -> Self {
+        fn name_entries(statements: &mut [CodeStatement], names: &[String]) {
+            for statement in statements {
+                match statement {
+                    CodeStatement::Put { output, value, entry } => {
+                        let name = names.get(*output).cloned().unwrap_or_default();
+                        let is_value = matches!(value, CodeExpression::Name(value) if *value == name);
+                        *entry = if is_value { String::new() } else { name };
+                    }
+                    CodeStatement::Group { statements, .. } => name_entries(statements, names),
+                    _ => {}
+                }
+            }
+        }
+        name_entries(&mut self.state, names);
+        self
+    }
+
     /// Whether the program has guards, so that a pose may have no solution.
     pub(crate) fn can_fail(&self) -> bool {
         self.has_statement(&|statement| matches!(statement, CodeStatement::Guard(_)))
@@ -107,6 +128,8 @@ pub(crate) enum CodeStatement {
         output: usize,
         /// The value.
         value: CodeExpression,
+        /// Name of the output, such as `H_2_4`; empty if it has none or if the value has the same name.
+        entry: String,
     },
     /// A part of a long program, as a block that exports names to later parts.
     Group {
@@ -143,6 +166,13 @@ pub(crate) fn uses_load(derivation: &Derivation) -> bool {
     [&programs.regressor, &programs.inverse_dynamics]
         .iter()
         .any(|p| p.ops.iter().any(|op| matches!(op, ProgramOp::Input(Atom::Load(_)))))
+}
+
+/// Names of the entries of a matrix with `n_rows` rows, row by row and counted from 1: `H_1_1`, `H_1_2`, ...
+pub(crate) fn matrix_entry_names(letter: &str, n_rows: usize, n_columns: usize) -> Vec<String> {
+    (1..=n_rows)
+        .flat_map(|row| (1..=n_columns).map(move |column| format!("{letter}_{row}_{column}")))
+        .collect()
 }
 
 /// Inputs of a program in order: positions, rates, accelerations, loads, then passive coordinates if they are solved

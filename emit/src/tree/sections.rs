@@ -152,7 +152,9 @@ impl CodeSections {
             return None;
         }
         // Backwards: each value belongs to the earliest section that needs it. A value without users follows its
-        // operands.
+        // operands. Divisions have a long latency, so they start as early as possible; their operands stay where they
+        // belong.
+        let mut is_early = vec![false; n];
         let mut sections: Vec<Option<usize>> = vec![None; n];
         // Outputs belong to the last section.
         for value in &program.outputs {
@@ -168,10 +170,10 @@ impl CodeSections {
         for i in (0..n).rev() {
             // The section of its name, if it has one.
             let own = named.get(&i).and_then(|named| self.names.get(&named.name));
-            // Divisions have a long latency, so they start as early as possible.
-            let quotient = matches!(program.ops[i], ProgramOp::Div(..)) && !named.contains_key(&i);
-            let own = own.copied().or(quotient.then_some(0));
-            sections[i] = earlier(sections[i], own);
+            is_early[i] = matches!(program.ops[i], ProgramOp::Div(..))
+                && !named.contains_key(&i)
+                && !program.outputs.iter().any(|output| output.index() == i);
+            sections[i] = earlier(sections[i], own.copied());
             program.ops[i].for_each_operand(|v| {
                 sections[v.index()] = earlier(sections[v.index()], sections[i]);
             });
@@ -183,7 +185,7 @@ impl CodeSections {
                 sections[i] = 0;
                 continue;
             }
-            let mut section = sections[i];
+            let mut section = if is_early[i] { 0 } else { sections[i] };
             op.for_each_operand(|v| section = section.max(sections[v.index()]));
             sections[i] = section;
         }

@@ -584,7 +584,7 @@ class Model:
     def generate(
         self, language: str = "rust", *, dynamics: bool = False, reactions: bool = False, self_test: bool = False
     ) -> dict[str, str]:
-        """Returns code of the model: paths and texts of files. ``language`` is ``"rust"``, ``"c99"``, ``"c"`` or ``"python"``."""
+        """Returns code of the model: paths and texts of files. ``language`` is ``"rust"``, ``"c99"``, ``"c"``, ``"python"`` or ``"julia"``."""
         return dict(self._core.generate(language, dynamics, reactions, self_test))
 
     def __repr__(self) -> str:

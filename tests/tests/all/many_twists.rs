@@ -73,6 +73,18 @@ fn arms_of_many_symbolic_twists_are_reduced_exactly() {
     }
 }
 
+/// A sum of links is used as soon as a base parameter without it is long.
+#[test]
+fn base_parameters_of_ten_twisted_joints_can_be_read() {
+    let case = Case::new(&twisted(10), 12, 0.5).unwrap();
+    let base = case.derivation.base_parameters();
+    let longest = base.iter().map(|base| base.expression.len()).max().unwrap();
+    assert!(longest < 4_000, "{longest} characters");
+    let expanded = modelmill_emit::emit(&case.derivation).module();
+    assert!(expanded.len() < 500_000, "{} bytes", expanded.len());
+    case.reduction_keeps_the_forces().unwrap();
+}
+
 /// Base parameters of a long arm are sums link by link, and their text does not grow with the power of the joints.
 #[test]
 fn long_arms_are_grouped_link_by_link() {

@@ -13,7 +13,10 @@ use modelmill_codegen::{PassivePosition, StraightLineProgram};
 use super::{EmissionRequest, EmittedFile};
 use crate::fingerprint::Fingerprint;
 use crate::identifier::module_identifier;
-use crate::tree::{NameScope, PrecomputedValues, StatementRoutine, reads_passive, uses_load};
+use crate::tree::{
+    ModelFunction, NameScope, PrecomputedValues, StatementRoutine, inputs_of_state, model_functions, reads_passive,
+    uses_load,
+};
 
 /// Names of standard headers, which `#include` would find instead, and `main`.
 pub(crate) const RESERVED: [&str; 30] = [
@@ -79,35 +82,16 @@ struct TranslationUnit<'a> {
     /// Whether the passive coordinates are solved for by Newton's method.
     newton: bool,
     /// Programs that read geometry and base parameters.
-    functions: Vec<CFunction<'a>>,
+    functions: Vec<ModelFunction<'a>>,
     /// Their common precomputed values.
     once: PrecomputedValues,
     /// The program of the reactions with its own precomputed values.
-    reactions: Option<(CFunction<'a>, PrecomputedValues)>,
+    reactions: Option<(ModelFunction<'a>, PrecomputedValues)>,
     /// The regressor H for all products, for the self-test, with its own precomputed values.
-    columns: Option<(CFunction<'a>, PrecomputedValues)>,
-}
-
-/// A program with the C function that it becomes.
-struct CFunction<'a> {
-    /// The program; its operations are counted for the header.
-    program: &'a StraightLineProgram,
-    /// Name without prefix.
-    name: &'static str,
-    /// Documentation without a full stop; empty for functions that are not public.
-    doc: String,
-    /// Name of the result in the declaration.
-    result: &'static str,
-    /// Its statements.
-    routine: StatementRoutine,
-    /// Whether it reads passive coordinates that Newton's method has to solve for.
-    follows: bool,
-    /// Whether the header declares it.
-    is_public: bool,
+    columns: Option<(ModelFunction<'a>, PrecomputedValues)>,
 }
 
 impl<'a> TranslationUnit<'a> {
-    #[allow(clippy::too_many_lines, reason = "a list of functions, one after the other")]
     fn new(source: &'a EmissionRequest<'a>) -> Self {
         let derivation = source.derivation;
         let mechanism = &derivation.mechanism;
@@ -118,126 +102,25 @@ impl<'a> TranslationUnit<'a> {
         if RESERVED.contains(&name.as_str()) || statements::is_reserved(&name) {
             name.push_str("_model");
         }
-        let programs = &derivation.programs;
-        let (active, passive) = derivation.coordinates();
-        let of_coordinate = |i: &usize| mechanism.coordinates[*i].name.clone();
-        // A public function from a program, with names for its outputs.
-        let function = |program: &'a StraightLineProgram, name, doc: String, result, outputs: Vec<String>| {
-            let routine = StatementRoutine::new(program, &scope, &outputs);
+        let mut functions = model_functions(source, &scope);
+        let newton = matches!(derivation.programs.passive_position, PassivePosition::Newton(_));
+        // A function that is not in this list.
+        let function = |program: &'a StraightLineProgram, name, doc: &str, result| {
             let follows = reads_passive(derivation, program);
-            CFunction {
+            ModelFunction {
                 program,
                 name,
-                doc,
+                doc: doc.to_owned(),
                 result,
-                routine,
+                parts: Vec::new(),
+                routine: StatementRoutine::new(program, &scope, &[]),
+                inputs: inputs_of_state(derivation, follows),
                 follows,
                 is_public: true,
             }
         };
-        // Names such as `l_left` and `l_left_d`, one per drive.
-        let each = |letter: &str, suffix: &str| -> Vec<String> {
-            let drives = mechanism.drives.iter();
-            drives.map(|d| format!("{letter}_{}{suffix}", d.name)).collect()
-        };
-        // Lengths, rates, then the Jacobian row by row: the order of the program's outputs.
-        let mut of_motion = each("l", "");
-        of_motion.extend(each("l", "_d"));
-        for drive in &mechanism.drives {
-            of_motion.extend(active.iter().map(|a| format!("J_{}_{}", drive.name, of_coordinate(a))));
-        }
-        // Functions that every model has.
-        let mut functions = vec![
-            function(
-                &programs.inverse_dynamics,
-                "inverse_dynamics",
-                "Forces of the drives, N or N m".to_owned(),
-                "forces",
-                each("f", ""),
-            ),
-            function(
-                &programs.regressor,
-                "regressor",
-                "H_min row by row: one row per drive, one column per base parameter".to_owned(),
-                "regressor",
-                Vec::new(),
-            ),
-            function(
-                &programs.drives,
-                "drives",
-                "Lengths or angles of the drives, then their rates, then their Jacobian row by row".to_owned(),
-                "motion",
-                of_motion,
-            ),
-        ];
-        // Only mechanisms with loops have passive coordinates.
-        if !passive.is_empty() {
-            let names = ["", "_d", "_dd"].iter();
-            let names = names.flat_map(|suffix| passive.iter().map(move |p| (p, suffix)));
-            functions.push(function(
-                &programs.passive,
-                "passive",
-                "Passive coordinates, then their rates, then their accelerations".to_owned(),
-                "motion",
-                names
-                    .map(|(p, suffix)| format!("{}{suffix}", of_coordinate(p)))
-                    .collect(),
-            ));
-        }
-        // The terms of the equation of motion.
-        if let Some(dynamics) = source.dynamics {
-            let accelerations = "accelerations are not read";
-            for (program, name, doc, result) in [
-                (
-                    &dynamics.mass_matrix,
-                    "mass_matrix",
-                    format!("M row by row; {accelerations}"),
-                    "matrix",
-                ),
-                (
-                    &dynamics.coriolis,
-                    "coriolis",
-                    format!("c, generalised forces that depend on the rates; {accelerations}"),
-                    "forces",
-                ),
-                (
-                    &dynamics.gravity,
-                    "gravity",
-                    "g, generalised forces of gravity; rates and accelerations are not read".to_owned(),
-                    "forces",
-                ),
-                (
-                    &dynamics.effects,
-                    "effects",
-                    format!("e, generalised forces of the effects at zero acceleration; {accelerations}"),
-                    "forces",
-                ),
-                (
-                    &dynamics.bias,
-                    "bias_and_drives",
-                    format!(
-                        "c + g + e, at a lower cost than the three separately, then the Jacobian of the drives row by row; {accelerations}"
-                    ),
-                    "bias",
-                ),
-            ] {
-                functions.push(function(program, name, doc, result, Vec::new()));
-            }
-        }
-        // Loops without closed form add residual and scales, which are internal.
-        let newton = match &programs.passive_position {
-            PassivePosition::Newton(loops) => {
-                for (program, name) in [(&loops.residual, "gaps"), (&loops.scales, "scales")] {
-                    let mut function = function(program, name, String::new(), "values", Vec::new());
-                    (function.is_public, function.follows) = (false, false);
-                    functions.push(function);
-                }
-                true
-            }
-            _ => false,
-        };
         // A program with precomputed values of its own.
-        let alone = |mut function: CFunction<'a>| {
+        let alone = |mut function: ModelFunction<'a>| {
             let mut once = PrecomputedValues::new(&scope);
             once.absorb(&mut function.routine);
             (function, once)
@@ -247,20 +130,13 @@ impl<'a> TranslationUnit<'a> {
             alone(function(
                 &reactions.program,
                 "transmitted",
-                "Forces and moments in the joints, and forces in the closures of loops".to_owned(),
+                "Forces and moments in the joints, and forces in the closures of loops",
                 "wrenches",
-                Vec::new(),
             ))
         });
         // The self-test compares H_min with all columns.
         let columns = source.self_test.then(|| {
-            let mut function = function(
-                &programs.full_regressor,
-                "columns",
-                String::new(),
-                "columns",
-                Vec::new(),
-            );
+            let mut function = function(&derivation.programs.full_regressor, "columns", "", "columns");
             function.is_public = false;
             alone(function)
         });

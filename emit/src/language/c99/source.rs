@@ -8,13 +8,13 @@ use modelmill_codegen::{OperationCount, ProgramStage};
 
 use super::header::{forward_dynamics_declaration, signature};
 use super::statements::{CSyntax, comment};
-use super::{CFunction, TranslationUnit, newton, self_test};
+use super::{TranslationUnit, newton, self_test};
 use crate::fingerprint::Fingerprint;
 use crate::language::syntax::LanguageSyntax;
-use crate::tree::{BaseParameterCode, CodeExpression, PrecomputedValues, inputs_of_state};
+use crate::tree::{BaseParameterCode, CodeExpression, ModelFunction, PrecomputedValues};
 
 /// Operations per state of a function.
-pub(super) fn operation_count(function: &CFunction<'_>) -> OperationCount {
+pub(super) fn operation_count(function: &ModelFunction<'_>) -> OperationCount {
     function.program.count_operations(ProgramStage::State)
 }
 
@@ -231,7 +231,7 @@ pub(super) fn write_body(lines: &[String], text: &mut String) {
 /// A program as a static function from `inputs` to `outputs`. `owner` is the struct with the precomputed values.
 pub(super) fn write_program(
     unit: &TranslationUnit<'_>,
-    function: &CFunction<'_>,
+    function: &ModelFunction<'_>,
     once: &PrecomputedValues,
     owner: &str,
     text: &mut String,
@@ -261,20 +261,12 @@ pub(super) fn write_program(
             lines.push(format!("const double {} = self->once[{k}];", c.name(kept)));
         }
     }
-    // Loop programs take a pose, all others a state.
-    let derivation = unit.source.derivation;
-    let inputs = if function.name == "gaps" || function.name == "scales" {
-        let (active, passive) = derivation.coordinates();
-        active.into_iter().chain(passive).map(Atom::Coordinate).collect()
-    } else {
-        inputs_of_state(derivation, function.follows)
-    };
     // Inputs that this program reads, by name.
-    for (k, atom) in inputs.into_iter().enumerate() {
-        if routine.read.contains(&atom) {
+    for (k, atom) in function.inputs.iter().enumerate() {
+        if routine.read.contains(atom) {
             lines.push(format!(
                 "const double {} = inputs[{k}];",
-                c.name(unit.scope.input_name(atom))
+                c.name(unit.scope.input_name(*atom))
             ));
         }
     }
@@ -377,7 +369,7 @@ fn write_state_inputs(unit: &TranslationUnit<'_>, text: &mut String) {
 }
 
 /// A public function, and a second one with a guess if it follows the loops.
-fn write_public_function(unit: &TranslationUnit<'_>, function: &CFunction<'_>, owner: &str, text: &mut String) {
+fn write_public_function(unit: &TranslationUnit<'_>, function: &ModelFunction<'_>, owner: &str, text: &mut String) {
     let TranslationUnit { name, upper, .. } = unit;
     let n_state: usize = unit.state_parts().iter().map(|(_, n)| n).sum();
     // The state, and passive coordinates behind it.
@@ -524,7 +516,7 @@ fn write_forward_dynamics(unit: &TranslationUnit<'_>, text: &mut String) {
 /// The function `prepare_reactions`: base parameters, the prepared model, and the precomputed values of the reactions.
 fn write_reaction_preparation(
     unit: &TranslationUnit<'_>,
-    function: &CFunction<'_>,
+    function: &ModelFunction<'_>,
     once: &PrecomputedValues,
     text: &mut String,
 ) {

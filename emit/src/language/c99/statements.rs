@@ -1,9 +1,8 @@
 //! Statements and expressions as lines of C.
 
-use std::fmt::Write as _;
-
 use modelmill_codegen::expr::Unary;
 
+use crate::identifier::spell_plain;
 use crate::language::syntax::LanguageSyntax;
 use crate::tree::{CodeStatement, PoseCheck};
 
@@ -119,16 +118,7 @@ impl LanguageSyntax for CSyntax<'_> {
         if plain {
             return name.to_owned();
         }
-        // Other names get a leading `_`, with special characters as their code.
-        let mut spelled = "_".to_owned();
-        for c in name.chars() {
-            if c.is_ascii_alphanumeric() {
-                spelled.push(c);
-            } else {
-                let _ = write!(spelled, "_{:x}_", u32::from(c));
-            }
-        }
-        spelled
+        spell_plain(name)
     }
 
     fn number(&self, value: f64) -> String {
@@ -273,8 +263,13 @@ impl CSyntax<'_> {
                 ),
             }),
             // Outputs are elements of the caller's array.
-            CodeStatement::Put { output, value } => {
-                lines.push(format!("outputs[{output}] = {};", self.operand_text(value)));
+            CodeStatement::Put { output, value, entry } => {
+                let note = if entry.is_empty() {
+                    String::new()
+                } else {
+                    format!(" /* {} */", comment(entry))
+                };
+                lines.push(format!("outputs[{output}] = {};{note}", self.operand_text(value)));
             }
             // C needs no blocks, so groups are printed in place.
             CodeStatement::Group { statements, .. } => self.statements(statements, lines),

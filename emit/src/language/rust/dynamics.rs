@@ -79,6 +79,7 @@ pub(super) fn dynamics(derivation: &Derivation, scope: &NameScope, dynamics: &Dy
         doc: format!("{doc} {}.", operation_count(program)),
         inputs: ProgramStateInputs::Motion,
         outputs,
+        entries: Vec::new(),
         output: Some(output),
         // The Jacobian follows the bias in the outputs of the program; the method returns only the bias.
         results: (name == "bias").then(|| ResultConversion {

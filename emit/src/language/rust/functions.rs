@@ -8,7 +8,7 @@ use quote::quote;
 use super::items::operation_count;
 use super::newton::newton;
 use super::program::{ExtraItems, PreparationInputs, ProgramMethod, ProgramStateInputs, ProgramStruct};
-use crate::tree::{NameScope, reads_passive};
+use crate::tree::{NameScope, matrix_entry_names, reads_passive};
 
 /// The struct `Model`: all programs that need only the geometry.
 pub(super) fn model(derivation: &Derivation, scope: &NameScope) -> TokenStream {
@@ -27,6 +27,7 @@ pub(super) fn model(derivation: &Derivation, scope: &NameScope) -> TokenStream {
         ),
         inputs: ProgramStateInputs::Motion,
         outputs: Vec::new(),
+        entries: matrix_entry_names("H", mechanism.drives.len(), derivation.reduction.retained.len()),
         output: Some(quote! { [[T; N_BASE]; N_DRIVES] }),
         results: None,
     };
@@ -49,6 +50,7 @@ pub(super) fn model(derivation: &Derivation, scope: &NameScope) -> TokenStream {
         doc: "Lengths or angles of the drives, their rates, and their Jacobian.".to_owned(),
         inputs: ProgramStateInputs::Motion,
         outputs: of_motion,
+        entries: Vec::new(),
         output: Some(quote! { Drives<T> }),
         results: None,
     };
@@ -64,6 +66,7 @@ pub(super) fn model(derivation: &Derivation, scope: &NameScope) -> TokenStream {
             doc: "Passive coordinates with their rates and accelerations.".to_owned(),
             inputs: ProgramStateInputs::Motion,
             outputs: motion.map(|(p, suffix)| format!("{}{suffix}", name(p))).collect(),
+            entries: Vec::new(),
             output: Some(quote! { Passive<T> }),
             results: None,
         });
@@ -124,6 +127,7 @@ pub(super) fn inverse_dynamics(derivation: &Derivation, scope: &NameScope) -> To
         doc: format!("Forces of the drives, N or N m. {}.", operation_count(program)),
         inputs: ProgramStateInputs::Motion,
         outputs: drives.map(|d| format!("f_{}", d.name)).collect(),
+        entries: Vec::new(),
         output: Some(quote! { [T; N_DRIVES] }),
         results: None,
     };

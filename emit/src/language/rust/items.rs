@@ -116,6 +116,34 @@ fn tables(derivation: &Derivation) -> TokenStream {
             "BaseParameter::new({name:?}, {retained:?}, {unit:?}, {expression:?})"
         ))
     });
+    // Positions by name; a module each, so that they hide no variable and no other item.
+    let positions = |module: &str, doc: &str, names: Vec<&str>| {
+        if names.is_empty() {
+            return TokenStream::new();
+        }
+        let module = format_ident!("{module}");
+        let places = names.iter().enumerate().map(|(k, name)| {
+            let (called, k) = (field_identifier(name), Literal::usize_unsuffixed(k));
+            let doc = format!(" `{name}`.");
+            quote! { #[doc = #doc] pub const #called: usize = #k; }
+        });
+        quote! {
+            #[doc = #doc]
+            #[allow(non_upper_case_globals)]
+            pub mod #module { #(#places)* }
+        }
+    };
+    let coordinate = positions(
+        "coordinate",
+        " Positions of the independent coordinates in [`ACTIVE`] and in the arrays of a [`State`].",
+        active.clone().collect(),
+    );
+    let passive_coordinate = positions(
+        "passive_coordinate",
+        " Positions of the passive coordinates in [`PASSIVE`].",
+        passive.clone().collect(),
+    );
+    let drive = positions("drive", " Positions of the drives in [`DRIVES`].", drives.clone());
     let [n_active, n_passive, n_drives, n_base] =
         [n_active, n_passive, n_drives, n_base].map(Literal::usize_unsuffixed);
     quote! {
@@ -135,6 +163,9 @@ fn tables(derivation: &Derivation) -> TokenStream {
         pub const DRIVES: [&str; N_DRIVES] = [#(#drives),*];
         /// Base parameters, in the order of the columns of H_min.
         pub const BASE_PARAMETERS: [BaseParameter; N_BASE] = [#(#bases),*];
+        #coordinate
+        #passive_coordinate
+        #drive
     }
 }
 

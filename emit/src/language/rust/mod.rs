@@ -86,16 +86,16 @@ impl EmittedModule {
     /// The source as a file of its own, to be declared with `mod`.
     pub fn file(&self) -> String {
         // Attributes of a file are inner ones.
-        let (doc, items) = (doc_lines(&self.doc, true), &self.items);
-        print_source(&quote! { #doc #![allow(#LINTS)] #items })
+        let (doc, lints, items) = (doc_lines(&self.doc, true), lint_attributes(true), &self.items);
+        print_source(&quote! { #doc #lints #items })
     }
 
     /// The source as a `pub mod` that can be included anywhere.
     pub fn module(&self) -> String {
         // Attributes of a module are outer ones.
-        let (doc, items) = (doc_lines(&self.doc, false), &self.items);
+        let (doc, lints, items) = (doc_lines(&self.doc, false), lint_attributes(false), &self.items);
         let name = identifier::module_identifier(&self.name);
-        print_source(&quote! { #doc #[allow(#LINTS)] pub mod #name { #items } })
+        print_source(&quote! { #doc #lints pub mod #name { #items } })
     }
 }
 
@@ -104,15 +104,35 @@ pub fn module_name(model: &str) -> String {
     identifier::module_identifier(model).to_string()
 }
 
-/// Lints that emitted code does not follow: names come from the model file, and formulas are laid out in their own way.
-struct LintAttributes;
-const LINTS: LintAttributes = LintAttributes;
-
-impl quote::ToTokens for LintAttributes {
-    fn to_tokens(&self, tokens: &mut TokenStream) {
-        tokens.extend(quote! {
-            non_snake_case, unused_imports, clippy::all, clippy::pedantic
-        });
+/// Attributes that allow the lints which emitted code does not follow; `inner` ones belong to the file that they are in.
+///
+/// The first two lints are about names and numbers of the model file. The others are pedantic ones of clippy, for crates
+/// that enable these.
+fn lint_attributes(inner: bool) -> TokenStream {
+    let mark = inner.then(|| quote! { ! });
+    quote! {
+        # #mark [allow(non_snake_case, clippy::approx_constant, reason = "names and numbers come from the model file")]
+        # #mark [allow(
+            unused_imports,
+            clippy::wildcard_imports,
+            reason = "a model may need no item of the runtime's list"
+        )]
+        # #mark [allow(
+            clippy::similar_names,
+            clippy::many_single_char_names,
+            clippy::unreadable_literal,
+            clippy::too_many_lines,
+            clippy::doc_markdown,
+            reason = "formulas have the symbols and the digits of their sources"
+        )]
+        # #mark [allow(
+            clippy::inline_always,
+            clippy::unnecessary_wraps,
+            clippy::unused_self,
+            clippy::must_use_candidate,
+            clippy::trivially_copy_pass_by_ref,
+            reason = "all models have the same functions"
+        )]
     }
 }
 

@@ -34,6 +34,7 @@ pub(super) fn newton<'a>(derivation: &'a Derivation, scope: &NameScope) -> Optio
         doc: String::new(),
         inputs: ProgramStateInputs::Pose,
         outputs: Vec::new(),
+        entries: Vec::new(),
         output: None,
         results: None,
     };

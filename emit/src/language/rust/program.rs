@@ -75,6 +75,8 @@ pub(super) struct ProgramMethod<'a> {
     pub(super) inputs: ProgramStateInputs,
     /// Names of the program's outputs, where they have one.
     pub(super) outputs: Vec<String>,
+    /// Names of outputs that comments state and that values do not get, such as `H_2_4`.
+    pub(super) entries: Vec<String>,
     /// Return type of the method; `None` if there is no method.
     pub(super) output: Option<TokenStream>,
     /// Conversion of the outputs, if the method returns another type.
@@ -139,6 +141,9 @@ impl ProgramStruct<'_> {
             let program = rest.as_ref().unwrap_or(function.program);
             // The statements of the rest, without precomputed ones.
             let mut routine = StatementRoutine::new(program, self.scope, &function.outputs);
+            if !function.entries.is_empty() {
+                routine = routine.with_entry_names(&function.entries);
+            }
             once.absorb(&mut routine);
             let pose = pose.filter(|_| rest.is_some());
             routine.read.extend(pose.iter().flat_map(|pose| &pose.inputs));
@@ -348,6 +353,21 @@ impl ProgramStruct<'_> {
              last cycle; they are replaced by those of this state."
         );
         let model = self.model();
+        // Only users of the module have a nearby pose.
+        let near = self.is_public.then(|| {
+            quote! {
+                #[doc = #same]
+                #errors
+                pub fn #near(&self, state: &State<T>, passive: &mut [T; N_PASSIVE]) -> Result<#output, PoseError> {
+                    self.input?;
+                    check_finite(&inputs(state), &INPUTS)?;
+                    let found = #model.passive_position_near(&state.q, passive)?;
+                    let result = self.#at_passive(state, &found)?;
+                    *passive = found;
+                    Ok(result)
+                }
+            }
+        });
         // With passive coordinates: solve for them, then evaluate at them.
         let run = run(quote! { inputs_with_passive(state, passive) });
         quote! {
@@ -361,16 +381,7 @@ impl ProgramStruct<'_> {
                 self.#at_passive(state, &#model.passive_position(&state.q)?)
             }
 
-            #[doc = #same]
-            #errors
-            #visible fn #near(&self, state: &State<T>, passive: &mut [T; N_PASSIVE]) -> Result<#output, PoseError> {
-                self.input?;
-                check_finite(&inputs(state), &INPUTS)?;
-                let found = #model.passive_position_near(&state.q, passive)?;
-                let result = self.#at_passive(state, &found)?;
-                *passive = found;
-                Ok(result)
-            }
+            #near
 
             fn #at_passive(&self, state: &State<T>, passive: &[T; N_PASSIVE]) -> Result<#output, PoseError> {
                 #run

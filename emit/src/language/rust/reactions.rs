@@ -43,6 +43,7 @@ pub(super) fn reactions(derivation: &Derivation, scope: &NameScope, reactions: &
         ),
         inputs: ProgramStateInputs::Motion,
         outputs: names(reactions),
+        entries: Vec::new(),
         output: Some(quote! { ReactionForces<T> }),
         results: Some(ResultConversion {
             from_type: quote! { [T; #n_outputs] },

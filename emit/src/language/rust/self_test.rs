@@ -8,7 +8,7 @@ use quote::quote;
 use super::items::{loop_scale, nominal_values};
 use super::program::{ExtraItems, PreparationInputs, ProgramMethod, ProgramStateInputs, ProgramStruct};
 use crate::identifier::field_identifier;
-use crate::tree::{NameScope, uses_load};
+use crate::tree::{NameScope, matrix_entry_names, uses_load};
 
 /// The function `self_test`, and the struct with the regressor H for all products.
 #[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
@@ -25,6 +25,7 @@ pub(super) fn self_test(derivation: &Derivation, scope: &NameScope) -> TokenStre
         doc: "H: one row per drive, one column per product of parameters.".to_owned(),
         inputs: ProgramStateInputs::Motion,
         outputs: Vec::new(),
+        entries: matrix_entry_names("H", mechanism.drives.len(), products.len()),
         output: Some(quote! { [[T; N_PRODUCTS]; N_DRIVES] }),
         results: None,
     };
@@ -55,7 +56,8 @@ pub(super) fn self_test(derivation: &Derivation, scope: &NameScope) -> TokenStre
     });
     let (active, _) = derivation.coordinates();
     // Lengths are scaled with the geometry, so that the states stay near the nominal pose of a larger machine.
-    let scale = loop_scale(derivation, scope);
+    let has_length = active.iter().any(|i| mechanism.coordinates[*i].motion.is_length());
+    let scale = loop_scale(derivation, scope).filter(|_| has_length);
     let scaled = scale.as_ref().map(|_| quote! { scale });
     let nominal = nominal_values(derivation, &active, scaled.as_ref());
     // Range of each coordinate around its nominal value.

@@ -194,8 +194,13 @@ fn write(statement: &CodeStatement, depth: usize, lines: &mut Vec<String>) {
             }
             PoseCheck::Finite(value) => format!("n.finite({})?;", RustSyntax.operand_text(value)),
         }),
-        CodeStatement::Put { output, value } => {
-            line(format!("n.put({output}, {});", RustSyntax.operand_text(value)));
+        CodeStatement::Put { output, value, entry } => {
+            let note = if entry.is_empty() {
+                String::new()
+            } else {
+                format!(" // {entry}")
+            };
+            line(format!("n.put({output}, {});{note}", RustSyntax.operand_text(value)));
         }
         // A block, which returns the values that later statements read.
         CodeStatement::Group {

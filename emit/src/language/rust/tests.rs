@@ -42,6 +42,62 @@ fn the_printed_count_equals_a_recount_of_the_emitted_source() {
     }
 }
 
+/// The lines of a method, without indentation.
+fn method_lines<'a>(source: &'a str, method: &str) -> Vec<&'a str> {
+    let from = source.find(&format!("fn {method}<")).expect("the method");
+    let lines = source[from..].lines().map(str::trim);
+    lines.take_while(|line| *line != "Ok(())").collect()
+}
+
+/// Comments of stored values name the entry of the matrix, and scales of tests are named after what is tested.
+#[test]
+fn stored_values_and_scales_say_what_they_are() {
+    for model in ["two_link.toml", "spidermill.toml", "panda.toml"] {
+        let derivation = derivation(model);
+        let n_base = derivation.reduction.retained.len();
+        let source = super::emit(&derivation).file();
+        let mut n_named = 0;
+        for line in method_lines(&source, "regressor_program") {
+            let Some(rest) = line.strip_prefix("n.put(") else {
+                continue;
+            };
+            let place: usize = rest.split(',').next().unwrap().parse().unwrap();
+            let entry = format!("// H_{}_{}", place / n_base + 1, place % n_base + 1);
+            assert!(line.ends_with(&entry), "{line} is {entry}");
+            n_named += 1;
+        }
+        assert!(n_named > n_base, "{model}");
+        for line in source.lines().filter_map(|line| line.trim().strip_prefix("n.regular(")) {
+            let (value, scale) = line.strip_suffix(")?;").unwrap().split_once(", ").unwrap();
+            assert_eq!(
+                scale.trim_end_matches('_'),
+                format!("scale_{}", value.trim_end_matches('_'))
+            );
+        }
+    }
+}
+
+/// The wrench of a link stands below the heading of its balances.
+#[test]
+fn headings_stand_where_their_statements_are() {
+    let source = super::emit(&derivation("spidermill.toml")).file();
+    let mut heading = "";
+    let mut n_found = 0;
+    for line in method_lines(&source, "forces_program") {
+        heading = if line.starts_with("// ") { line } else { heading };
+        for link in ["S3", "S5"] {
+            if line.starts_with(&format!("let M_{link}_z =")) {
+                assert_eq!(heading, format!("// Link {link}: balances of forces and moments."));
+                n_found += 1;
+            }
+        }
+        if line.starts_with("let omega_S3_z =") {
+            assert_eq!(heading, "// Rates of the links.");
+        }
+    }
+    assert_eq!(n_found, 2);
+}
+
 /// Additions with subtractions, multiplications and divisions in a method of the source.
 fn recount(file: &syn::File, method: &str) -> (usize, usize, usize) {
     let mut count = (0, 0, 0);
