@@ -11,11 +11,12 @@ use super::conditional::ConditioningSet;
 use super::factored::GramFactor;
 use super::noise::effective_samples;
 use super::plausible::largest_forces;
-use super::pool::{ColumnPool, FitScope, dot, solve_gram};
+use super::pool::{ColumnPool, FitScope, solve_gram};
 use super::problem::{
     CandidateEffect, ColumnChoice, ColumnProvider, ColumnSource, DiagnosisProblem, EffectParameter, SignConstraint,
 };
 use super::thresholds::{CANCELLATION_SHARE, FULL_CANCELLATION_SHARE, RANDOM_SIGN_SHARE};
+use crate::signal::dot;
 
 /// A candidate with the columns for one choice of its constants.
 #[derive(Clone, Debug, PartialEq)]
@@ -139,7 +140,7 @@ impl<'a> EffectSelector<'a> {
         let factors = self.base_set.factors.clone();
         for (k, candidate) in problem.candidates.iter().enumerate() {
             if let ColumnSource::Body(_) | ColumnSource::Constant(_) = candidate.source {
-                let columns = self.linearise_model_change(k, &[], &factors).columns;
+                let columns = self.linearise_model_change(k, &[], &factors, None).columns;
                 self.choices[k].push(columns);
             }
         }
@@ -240,6 +241,20 @@ impl<'a> EffectSelector<'a> {
         } else {
             HashMap::new()
         };
+        // Faults of force signals share the force that acts.
+        let is_reading =
+            |(k, one): (usize, &CandidateEffect)| is_asked(k) && matches!(one.source, ColumnSource::ReadingFault(_));
+        let needs_force = candidates.clone().any(is_reading);
+        let fitted = needs_force.then(|| self.fitted_force(picks, &beside.factors, &[]));
+        // Products of all columns in the pool come from few passes over the samples.
+        let is_in_pool = |source: &ColumnSource| matches!(source, ColumnSource::Columns(_));
+        let in_pool = candidates
+            .clone()
+            .filter(|(k, one)| is_asked(*k) && is_in_pool(&one.source));
+        let columns: Vec<usize> = in_pool
+            .flat_map(|(k, _)| self.choices[k].iter().flatten().copied())
+            .collect();
+        self.compute_products_with(&columns, &beside);
         let mut seen = Vec::with_capacity(problem.candidates.len());
         for (k, candidate) in candidates {
             if !is_asked(k) {
@@ -264,7 +279,9 @@ impl<'a> EffectSelector<'a> {
                 ColumnSource::Tilt(_)
                 | ColumnSource::ReadingFault(_)
                 | ColumnSource::Body(_)
-                | ColumnSource::Constant(_) => Some(self.linearise_model_change(k, picks, &beside.factors)),
+                | ColumnSource::Constant(_) => {
+                    Some(self.linearise_model_change(k, picks, &beside.factors, fitted.as_ref()))
+                }
                 ColumnSource::LoadDependent => carried.get(&k).cloned(),
             };
             // Candidates whose columns are combinations of those of the set explain nothing new.

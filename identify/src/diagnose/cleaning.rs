@@ -6,13 +6,14 @@
 
 use super::disturbance::{Disturbance, EstimatedQuantity};
 use super::hum::{self, SlowSpectralLine};
-use super::pool::{ColumnPool, FitScope, dot, solve_gram};
+use super::pool::{ColumnPool, FitScope, solve_gram};
 use super::problem::DiagnosisProblem;
 use super::thresholds::{
     FORCE_OUTLIER_DEVIATIONS, OUTLIER_LEAST_FORCE_SHARE, OUTLIERS_MOST_SHARE, QUANTISED_FEWEST_REPEATS,
     QUANTISED_FEWEST_VALUES, QUANTISED_LEAST_NOISE_PART, QUANTISED_MOST_OFF_STEP, REVERSAL_OUTLIER_SAMPLES,
     REVERSAL_UNDECIDED_SAMPLES, REVERSALS_MOST_SHARE, STANDSTILL_MOST_SHARE, STANDSTILL_SHORTEST_S,
 };
+use crate::signal::dot;
 use crate::signal::median;
 
 /// Number of samples around an outlier whose median it is compared with.

@@ -2,6 +2,8 @@
 
 use std::borrow::Cow;
 
+use crate::signal::add_multiples;
+
 /// Values along all recordings, `[channel][sample]`: recordings of the fit first, then validation runs. `None` for a
 /// channel on which the column is zero throughout.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -27,6 +29,19 @@ impl ForceColumn {
                     }
                 }
                 None => *slot = Some(values.iter().map(|x| factor * x).collect()),
+            }
+        }
+    }
+
+    /// Adds multiples of other columns, in their order.
+    pub(crate) fn add_all(&mut self, parts: &[(f64, &Self)]) {
+        for (d, slot) in self.0.iter_mut().enumerate() {
+            let terms: Vec<(f64, &[f64])> = parts
+                .iter()
+                .filter_map(|(factor, column)| Some((*factor, column.0.get(d)?.as_deref()?)))
+                .collect();
+            if let Some((_, first)) = terms.first() {
+                add_multiples(slot.get_or_insert_with(|| vec![0.0; first.len()]), &terms);
             }
         }
     }

@@ -104,6 +104,13 @@ impl EffectSelector<'_> {
         })
     }
 
+    /// Computes the inner products of columns of the pool with a set and the measured forces, several at a time.
+    pub(crate) fn compute_products_with(&self, columns: &[usize], beside: &ConditioningSet) {
+        let mut others = beside.columns.clone();
+        others.push(self.measured);
+        self.pool.compute_cross_products(columns, &others);
+    }
+
     /// Weighted inner products of columns of the pool.
     fn products_of(&self, columns: &[usize], beside: &ConditioningSet) -> InnerProductBlocks {
         let product = |a: usize, b: usize| self.pool.weighted_product(a, b, &self.weights);

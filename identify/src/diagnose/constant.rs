@@ -18,15 +18,15 @@ impl ConstantCorrection {
     /// change up to the third power. `base` are the factors of the base columns.
     pub(crate) fn secant_column(&self, error: f64, base: &[f64], channels: usize) -> ForceColumn {
         let mut sum = ForceColumn(vec![None; channels]);
+        let mut parts: Vec<(f64, &ForceColumn)> = Vec::new();
         for (part, share) in [(&self.first_derivative, 1.0), (&self.second_derivative, 0.5 * error)] {
             if share == 0.0 {
                 continue;
             }
-            sum.add(share, &part.fixed);
-            for (change, factor) in part.base.iter().zip(base) {
-                sum.add(share * factor, change);
-            }
+            parts.push((share, &part.fixed));
+            parts.extend(base.iter().map(|factor| share * factor).zip(&part.base));
         }
+        sum.add_all(&parts);
         sum
     }
 }

@@ -3,9 +3,9 @@
 use super::bench::{EffectSelector, SelectedEffect};
 use super::in_time::{ChangeInterval, TimeResidual, time_residual};
 use super::noise::effective_samples;
-use super::pool::dot;
 use super::problem::{CandidateNature, DiagnosisProblem};
 use super::thresholds::{COLOURED_LEAST_VARIANCE_RATIO, COLOURED_MOST_EFFECTIVE_SHARE, SAME_CHANGE_TIME_SHARE};
+use crate::signal::dot;
 
 /// A named value of a disturbance or an effect.
 #[derive(Clone, Debug, PartialEq)]

@@ -21,13 +21,14 @@ use nalgebra::DMatrix;
 use serde::Serialize;
 
 use super::bench::{EffectSelector, SelectedEffect};
-use super::pool::{FitScope, dot, solve_gram};
+use super::pool::{FitScope, solve_gram};
 use super::rejection::RejectionReason;
 use super::thresholds::{
     BLOCKS_LEAST_T, EXPLICABLE_LEAST_NOISE_RATIO, GIVEN_BACK_LEAST_T, GIVEN_BACK_MOST_SHARE, LARGE_GAIN, LEAST_GAIN,
     LEAST_SHARES_T, MATERIAL_LEAST_GAIN, MIN_SHARE_OF_FORCE, MIN_SHARE_OF_OTHERS, MIN_SHARE_OF_REMOVED,
     NOISE_LEAST_GAIN_VARIANCES, NOISE_LEAST_T, WHITE_LEAST_EFFECTIVE_SHARE, WHITE_MOST_NOISE_RATIO,
 };
+use crate::signal::dot;
 
 /// Number of blocks into which the error of a segment is divided.
 const BLOCKS: usize = 12;

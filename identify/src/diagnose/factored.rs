@@ -2,7 +2,8 @@
 
 use nalgebra::DMatrix;
 
-use super::pool::{DEPENDENT, dot};
+use super::pool::DEPENDENT;
+use crate::signal::dot;
 
 /// Factor of a matrix of inner products; columns that depend on earlier ones are skipped.
 #[derive(Default)]

@@ -69,10 +69,20 @@ impl EffectSelector<'_> {
         // Forces of fixed parameters are part of every load.
         let mut sum = self.problem.fixed_forces.clone().unwrap_or_default();
         sum.0.resize(self.weights.len(), None);
-        for (k, factor) in parts {
-            sum.add(factor, self.pool.column(k));
-        }
+        let parts: Vec<(f64, &ForceColumn)> = parts.map(|(k, factor)| (factor, self.pool.column(k))).collect();
+        sum.add_all(&parts);
         sum
+    }
+
+    /// The force that acts in the fit of a set, without some of its columns. `factors` belong to base and picks.
+    pub(crate) fn fitted_force(
+        &self,
+        picks: &[SelectedEffect],
+        factors: &DVector<f64>,
+        without: &[usize],
+    ) -> ForceColumn {
+        let parts = self.columns(picks).into_iter().zip(factors.iter().copied());
+        self.sum_columns(parts.filter(|(k, _)| !without.contains(k)))
     }
 
     /// Load-dependent candidates by index, with columns for a load, added to the pool.
@@ -96,12 +106,14 @@ impl EffectSelector<'_> {
     }
 
     /// Columns of a candidate that changes the fitted model. If it is among the picks, they are linearised at its
-    /// present estimates: columns times parameters are the change there. `factors` belong to base and picks.
+    /// present estimates: columns times parameters are the change there. `factors` belong to base and picks; `fitted` is
+    /// their force, if it is known.
     pub(crate) fn linearise_model_change(
         &mut self,
         candidate: usize,
         picks: &[SelectedEffect],
         factors: &DVector<f64>,
+        fitted: Option<&ForceColumn>,
     ) -> SelectedEffect {
         // Present estimates of the candidate.
         let mine = picks.iter().position(|pick| pick.candidate == candidate);
@@ -121,9 +133,8 @@ impl EffectSelector<'_> {
                     let mut sum = component.fixed.clone();
                     sum.0.resize(self.weights.len(), None);
                     // Factors of the base come first, then those of effects, which do not depend on the tilt.
-                    for (change, factor) in component.base.iter().zip(factors.iter()) {
-                        sum.add(*factor, change);
-                    }
+                    let parts = factors.iter().copied().zip(&component.base);
+                    sum.add_all(&parts.collect::<Vec<_>>());
                     sum
                 });
                 let directions = tilt.directions(&angles).into_iter();
@@ -140,16 +151,16 @@ impl EffectSelector<'_> {
             // Sensor fault: computed from the fitted force without the column of the fault itself.
             ColumnSource::ReadingFault(reading) => {
                 // The force that acts: the fitted force without the part that the fault itself explains.
-                let mut force = self.problem.fixed_forces.clone().unwrap_or_default();
-                force.0.resize(self.weights.len(), None);
-                // The column of the fault itself is not part of the force that acts.
                 let own = mine.map_or(&[][..], |i| &picks[i].columns);
-                for (k, factor) in self.columns(picks).iter().zip(factors.iter()) {
-                    if !own.contains(k) {
-                        force.add(*factor, self.pool.column(*k));
+                let anew;
+                let force = match fitted.filter(|_| own.is_empty()) {
+                    Some(fitted) => fitted,
+                    None => {
+                        anew = self.fitted_force(picks, factors, own);
+                        &anew
                     }
-                }
-                vec![self.reading_fault_column(*reading, &force, found.map_or(0.0, |value| value[0]))]
+                };
+                vec![self.reading_fault_column(*reading, force, found.map_or(0.0, |value| value[0]))]
             }
             // Body: derivatives at the estimated centre.
             ColumnSource::Body(body) => body.columns(found.map_or([0.0; 3], |values| body.centre(&values))),
@@ -207,7 +218,7 @@ impl EffectSelector<'_> {
                 // The rank stays, since the columns change only slightly.
                 let anew = match self.problem.candidates[candidate].source {
                     ColumnSource::LoadDependent => self.best_load_dependent(&picks, i),
-                    _ => Some(self.linearise_model_change(candidate, &picks.clone(), &factors)),
+                    _ => Some(self.linearise_model_change(candidate, &picks.clone(), &factors, None)),
                 };
                 if let Some(anew) = anew {
                     picks[i] = SelectedEffect { rank, ..anew };

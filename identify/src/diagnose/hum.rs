@@ -9,12 +9,13 @@ use std::f64::consts::TAU;
 
 use super::column::ForceColumn;
 use super::disturbance::{Disturbance, EstimatedQuantity, is_white};
-use super::pool::{ColumnPool, FitScope, dot, solve_gram};
+use super::pool::{ColumnPool, FitScope, solve_gram};
 use super::problem::DiagnosisProblem;
 use super::thresholds::{
     LINE_LOW_HZ, LINE_LOWEST_HZ, LINE_MAIN_SHARE, MIN_LINE_RATIO, MIN_LINE_SHARE, MOST_LINES, SLOW_LINE_LEAST_PERIODS,
     SLOW_LINE_LEAST_SEGMENT_SHARE, SLOW_LINE_MOST_REMAINING_SHARE, SLOW_LINE_PARTS,
 };
+use crate::signal::dot;
 use crate::signal::{hann_power, median};
 
 /// Half width of the neighbourhood of a line, and of the line itself, in steps of the spectrum.

@@ -89,9 +89,10 @@ pub use support::EffectSupport;
 pub use thresholds::{FORCE_ROUNDING, LACKING_LEAST_PROBABILITY};
 pub use tilt::{ForceSensitivity, TiltCandidate};
 
+use crate::signal::dot;
 use bench::{EffectSelector, SelectedEffect};
 use in_time::FoundChange;
-use pool::{FitScope, dot};
+use pool::FitScope;
 use reproducible::repeatable_shares;
 use thresholds::{EFFECT_LEAST_UNEXPLAINED_RATIO, LEAST_GAIN, REPLACING_LAW_LEAST_SHARE};
 

@@ -8,11 +8,11 @@ pub fn effective_samples(values: &[f64]) -> f64 {
     let n = values.len();
     let mean = values.iter().sum::<f64>() / n.max(1) as f64;
     let centred: Vec<f64> = values.iter().map(|x| x - mean).collect();
-    let variance = super::pool::dot(&centred, &centred);
+    let variance = crate::signal::dot(&centred, &centred);
     if n < 4 || variance == 0.0 {
         return n as f64;
     }
-    let correlation = |lag: usize| super::pool::dot(&centred[..n - lag], &centred[lag..]) / variance;
+    let correlation = |lag: usize| crate::signal::dot(&centred[..n - lag], &centred[lag..]) / variance;
     // The sum starts at 1; pairs of lags follow up to a quarter of the series.
     let mut sum = 1.0;
     let mut lag = 1;

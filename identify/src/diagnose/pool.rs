@@ -11,20 +11,16 @@ use std::cell::{OnceCell, RefCell};
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
-use pulp::Arch;
 
 use super::column::ForceColumn;
 use super::numbered::ColumnMap;
 use super::problem::SampleLayout;
 use super::tile;
+use crate::signal::{add_multiples, dot};
 
 /// Inner products of a column with earlier ones, by part (0 is the fit, 1 the validation) and channel on which both
 /// act, first all channels of one part. In the maps for folds they are ordered by fold and channel.
 type PairProducts = ColumnMap<Box<[f64]>>;
-/// Inner products of fewer numbers are computed without dispatch to vector instructions.
-const SHORT: usize = 64;
-/// Number of partial sums of an inner product.
-pub(crate) const LANES: usize = 16;
 /// Folds of the cross-validation where there is no check.
 const FOLDS: usize = 10;
 /// If fewer products of a tile are unknown, they are computed one by one.
@@ -249,33 +245,53 @@ impl<'a> ColumnPool<'a> {
         // Sorted by channels, the columns of a tile mostly act on the same ones.
         which.sort_unstable_by_key(|k| (&self.acts[*k], *k));
         which.dedup();
-        let mut products = self.products.borrow_mut();
         // Every pair of groups is a tile of at most SIDE x SIDE products.
         let groups: Vec<&[usize]> = which.chunks(tile::SIDE).collect();
         for (i, rows) in groups.iter().enumerate() {
             for columns in &groups[..=i] {
-                let mut unknown = Vec::with_capacity(tile::SIDE * tile::SIDE);
-                for (r, a) in rows.iter().enumerate() {
-                    for (c, b) in columns.iter().enumerate() {
-                        // A tile on the diagonal has each pair twice.
-                        let is_twice = rows == columns && c > r;
-                        // A product is stored with the column of the larger index.
-                        let (later, earlier) = (*a.max(b), a.min(b));
-                        if !is_twice && self.has_common_channel(*a, *b) && !products[later].contains_key(earlier) {
-                            unknown.push((r, c));
-                        }
-                    }
-                }
-                if unknown.len() < FEW {
-                    continue; // Single products cost less.
-                }
-                // One pass over the samples gives all unknown products of the tile.
-                let made = self.compute_tile(rows, columns, &unknown);
-                for ((r, c), found) in unknown.into_iter().zip(made) {
-                    let (a, b) = (rows[r], columns[c]);
-                    products[a.max(b)].insert(a.min(b), found);
+                self.compute_unknown_of_tile(rows, columns);
+            }
+        }
+    }
+
+    /// Computes the unknown inner products of some columns with some others, in tiles.
+    pub(crate) fn compute_cross_products(&self, some: &[usize], others: &[usize]) {
+        let [some, others] = [some, others].map(|which| {
+            let mut which = which.to_vec();
+            which.sort_unstable_by_key(|k| (&self.acts[*k], *k));
+            which.dedup();
+            which
+        });
+        for rows in some.chunks(tile::SIDE) {
+            for columns in others.chunks(tile::SIDE) {
+                self.compute_unknown_of_tile(rows, columns);
+            }
+        }
+    }
+
+    /// Computes the unknown inner products of a tile.
+    fn compute_unknown_of_tile(&self, rows: &[usize], columns: &[usize]) {
+        let mut products = self.products.borrow_mut();
+        let mut unknown = Vec::with_capacity(tile::SIDE * tile::SIDE);
+        for (r, a) in rows.iter().enumerate() {
+            for (c, b) in columns.iter().enumerate() {
+                // A tile on the diagonal has each pair twice.
+                let is_twice = rows == columns && c > r;
+                // A product is stored with the column of the larger index.
+                let (later, earlier) = (a.max(b), a.min(b));
+                if !is_twice && self.has_common_channel(*a, *b) && !products[*later].contains_key(earlier) {
+                    unknown.push((r, c));
                 }
             }
+        }
+        if unknown.len() < FEW {
+            return; // Single products cost less.
+        }
+        // One pass over the samples gives all unknown products of the tile.
+        let made = self.compute_tile(rows, columns, &unknown);
+        for ((r, c), found) in unknown.into_iter().zip(made) {
+            let (a, b) = (rows[r], columns[c]);
+            products[a.max(b)].insert(a.min(b), found);
         }
     }
 
@@ -416,15 +432,13 @@ impl<'a> ColumnPool<'a> {
         let mut rest: Vec<Vec<f64>> = (self.columns[of].0.iter())
             .map(|values| values.clone().unwrap_or_else(|| vec![0.0; samples]))
             .collect();
-        // Channels on which a column is zero are skipped.
-        for (k, factor) in others.iter().zip(factors) {
-            for (rest, values) in rest.iter_mut().zip(&self.columns[*k].0) {
-                if let Some(values) = values {
-                    for (r, x) in rest.iter_mut().zip(values) {
-                        *r -= factor * x;
-                    }
-                }
-            }
+        for (d, rest) in rest.iter_mut().enumerate() {
+            // Channels on which a column is zero are skipped.
+            let terms = others.iter().zip(factors);
+            let terms: Vec<(f64, &[f64])> = terms
+                .filter_map(|(k, factor)| Some((-factor, self.values(*k, d)?)))
+                .collect();
+            add_multiples(rest, &terms);
         }
         for (rest, out) in rest.iter_mut().zip(&self.lost) {
             zero_where(rest, out);
@@ -453,40 +467,6 @@ pub(crate) enum FitScope {
     Fit,
     /// All.
     All,
-}
-
-/// Inner product of two series. Several partial sums are faster and round less. They do not depend on the width of the
-/// vectors, so that a diagnosis decides equally on every machine.
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    // For a few numbers the dispatch would cost more than the sum.
-    if a.len() < SHORT {
-        return sum_products(a, b);
-    }
-    Arch::new().dispatch(|| sum_products(a, b))
-}
-
-#[allow(
-    clippy::inline_always,
-    reason = "inlined code uses the vector instructions of its caller"
-)]
-/// Inner product with [`LANES`] partial sums; see [`dot`].
-#[inline(always)]
-fn sum_products(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; LANES];
-    // Groups of LANES numbers, each with its own partial sum; the tail is added at the end.
-    let (chunks_a, chunks_b) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
-    let tail: f64 = chunks_a
-        .remainder()
-        .iter()
-        .zip(chunks_b.remainder())
-        .map(|(x, y)| x * y)
-        .sum();
-    for (x, y) in chunks_a.zip(chunks_b) {
-        for (sum, (x, y)) in sums.iter_mut().zip(x.iter().zip(y)) {
-            *sum += x * y;
-        }
-    }
-    sums.iter().sum::<f64>() + tail
 }
 
 /// Least squares fit from inner products: factors of the first columns that explain the last column best, and the sum

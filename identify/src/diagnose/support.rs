@@ -12,11 +12,12 @@ use super::SetResidual;
 use super::aliases::EffectAlias;
 use super::bench::{EffectSelector, SelectedEffect};
 use super::evidence::SelectionEvidence;
-use super::pool::{FitScope, dot};
+use super::pool::FitScope;
 use super::thresholds::{
     ODDS_AT_REFERENCE, ODDS_OF_ALTERNATIVE, ODDS_PER_GAIN, ODDS_PER_T, ODDS_PER_UNEXPLAINED, PROBABILITY_MOST,
     SUPPORT_GAIN_RANGE, SUPPORT_GAIN_REFERENCE, SUPPORT_T_RANGE, SUPPORT_T_REFERENCE,
 };
+use crate::signal::dot;
 
 /// What supports an effect.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]

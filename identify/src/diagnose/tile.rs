@@ -5,7 +5,7 @@ use std::array;
 
 use pulp::{Arch, Simd, WithSimd};
 
-use super::pool::{LANES, dot};
+use crate::signal::{LANES, dot};
 
 /// Columns on either side of a tile.
 pub(crate) const SIDE: usize = 4;

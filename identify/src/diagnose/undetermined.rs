@@ -6,9 +6,9 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::bench::{EffectSelector, SelectedEffect};
-use super::pool::dot;
 use super::problem::{CandidateNature, ColumnSource, LocatedEffect};
 use super::thresholds::{UNDETERMINED_LEAST_SHARE, UNDETERMINED_MOST_VARIANCES};
+use crate::signal::dot;
 
 /// Largest number of samples that are used.
 const MOST: usize = 2000;

@@ -8,9 +8,10 @@
 
 use super::bench::EffectSelector;
 use super::noise::white_noise;
-use super::pool::{FitScope, dot};
+use super::pool::FitScope;
 use super::problem::{DiagnosisProblem, NoColumnProvider};
 use super::thresholds::FORCE_ROUNDING;
+use crate::signal::dot;
 
 impl DiagnosisProblem {
     /// Whether a channel has no force signal.

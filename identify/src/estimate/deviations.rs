@@ -24,13 +24,17 @@
 //! sum of the window: the same number, at a cost and a memory that do not grow with the lags times the parameters
 //! squared.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 use crate::estimate::error::LeastSquaresError;
 use crate::estimate::lags::{BartlettWindows, LagProducts, bandwidth, lags_for_bandwidth};
 use crate::estimate::rows::{RowVisitor, check_rows};
 use crate::estimate::solution::RegressionSolution;
 use crate::estimate::thresholds::FEWEST_ROWS;
+use crate::signal::dot;
+
+/// Samples whose influences are computed by one product of matrices.
+const BLOCK: usize = 256;
 
 /// Uncertainty of a solution. Lists are in the order of the regressor's columns.
 #[derive(Debug, Clone, PartialEq)]
@@ -101,6 +105,7 @@ pub(crate) fn from_influences<E>(
         memory.push(influence);
         residuals.push(errors);
     })?;
+    let (memory, residuals) = (memory.finish(), residuals.finish());
 
     // Second pass: prewhitened influences, summed with Bartlett's kernel.
     let whitening: Vec<f64> = (0..n).map(|j| memory.correlation(1, j).clamp(-0.97, 0.97)).collect();
@@ -202,9 +207,9 @@ impl<'a> InfluenceScores<'a> {
     ) -> Result<(), E> {
         let n = self.solution.values.len();
         let to_parameters = self.solution.unit_covariance();
-        let mut gradient = DVector::zeros(n);
-        let mut influence = DVector::zeros(n);
-        let mut errors = vec![0.0; self.channels];
+        let mut gradients = DMatrix::zeros(n, BLOCK);
+        let mut influences = DMatrix::zeros(n, BLOCK);
+        let mut errors = vec![0.0; self.channels * BLOCK];
         let mut rows = 0;
         show(&mut |regressor, measured| {
             check_rows(regressor, measured, n, rows)?;
@@ -215,22 +220,27 @@ impl<'a> InfluenceScores<'a> {
                 });
             }
             rows += measured.len();
-            let samples = regressor
-                .chunks_exact(n * self.channels)
-                .zip(measured.chunks_exact(self.channels));
-            for (sample, measured) in samples {
-                // Gradient of the sample: its rows times their residuals, summed over the channels.
-                gradient.fill(0.0);
-                for (channel, row) in sample.chunks_exact(n).enumerate() {
-                    let model: f64 = row.iter().zip(&self.solution.values).map(|(w, p)| w * p).sum();
-                    let error = measured[channel] - model;
-                    errors[channel] = error;
+            let blocks = regressor
+                .chunks(n * self.channels * BLOCK)
+                .zip(measured.chunks(self.channels * BLOCK));
+            for (regressor, measured) in blocks {
+                // Gradient of each sample: its rows times their residuals, summed over the channels.
+                let samples = measured.len() / self.channels;
+                gradients.fill(0.0);
+                for (k, (row, measured)) in regressor.chunks_exact(n).zip(measured).enumerate() {
+                    let error = measured - dot(row, &self.solution.values);
+                    errors[k] = error;
+                    let gradient = &mut gradients.as_mut_slice()[k / self.channels * n..][..n];
                     for (g, w) in gradient.iter_mut().zip(row) {
                         *g += w * error;
                     }
                 }
-                influence.gemv(1.0, &to_parameters, &gradient, 0.0);
-                take(influence.as_slice(), &errors);
+                let mut influences = influences.columns_mut(0, samples);
+                influences.gemm(1.0, &to_parameters, &gradients.columns(0, samples), 0.0);
+                for k in 0..samples {
+                    let errors = &errors[k * self.channels..(k + 1) * self.channels];
+                    take(influences.column(k).as_slice(), errors);
+                }
             }
             Ok(())
         })?;

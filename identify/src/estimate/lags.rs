@@ -1,11 +1,13 @@
 //! Autocovariances of series: sums of products over lags, Bartlett's weighted sum of them, and the automatic bandwidth
 //! (Newey and West; the equations are in [`deviations`](super::deviations)).
 
-use std::collections::VecDeque;
+use nalgebra::DMatrix;
 
-use nalgebra::{DMatrix, DVector};
+use crate::signal::{dot, float_to_count};
 
-use crate::signal::float_to_count;
+/// Samples that are collected before their products are added: with the samples before them they stay in the first-level
+/// cache.
+const BLOCK: usize = 512;
 
 /// Number of lags from which the bandwidth is estimated (Newey and West, for Bartlett's kernel).
 pub(crate) fn lags_for_bandwidth(samples: usize) -> usize {
@@ -14,7 +16,7 @@ pub(crate) fn lags_for_bandwidth(samples: usize) -> usize {
 
 /// Automatic bandwidth, samples, from the lag products of the influences; prewhitening with the coefficients
 /// `whitening` is applied to the products.
-pub(crate) fn bandwidth(memory: &LagProducts, whitening: &[f64], lags: usize, samples: usize) -> usize {
+pub(crate) fn bandwidth(memory: &AutocovarianceSums, whitening: &[f64], lags: usize, samples: usize) -> usize {
     let (mut curvature, mut power) = (0.0, 0.0);
     for (j, a) in whitening.iter().enumerate() {
         // Autocovariance of the prewhitened series.
@@ -43,8 +45,11 @@ pub(crate) struct LagProducts {
     width: usize,
     /// Largest lag.
     lags: usize,
-    /// The last samples, newest first.
-    recent: VecDeque<Vec<f64>>,
+    /// Samples of each series, `[series][sample]`: first those before the block, as many as the largest lag, then the
+    /// block. Before the first sample all are zero.
+    recent: Vec<Vec<f64>>,
+    /// Samples in the block.
+    filled: usize,
     /// `products[lag * width + series]`.
     products: Vec<f64>,
 }
@@ -55,30 +60,57 @@ impl LagProducts {
         Self {
             width,
             lags,
-            // The samples of the present window, oldest first.
-            recent: VecDeque::with_capacity(lags + 1),
+            recent: vec![vec![0.0; lags + BLOCK]; width],
+            filled: 0,
             products: vec![0.0; (lags + 1) * width],
         }
     }
 
     /// Adds one sample of all series.
     pub(crate) fn push(&mut self, values: &[f64]) {
-        let mut slot = if self.recent.len() > self.lags {
-            self.recent.pop_back()
-        } else {
-            None
+        let at = self.lags + self.filled;
+        for (series, value) in self.recent.iter_mut().zip(values) {
+            series[at] = *value;
         }
-        .unwrap_or_default();
-        slot.clear();
-        slot.extend_from_slice(values);
-        self.recent.push_front(slot);
-        for (earlier, products) in self.recent.iter().zip(self.products.chunks_exact_mut(self.width)) {
-            for ((product, now), before) in products.iter_mut().zip(values).zip(earlier) {
-                *product += now * before;
-            }
+        self.filled += 1;
+        if self.filled == BLOCK {
+            self.add_block();
         }
     }
 
+    /// Adds the products of the block, and keeps its last samples for the next one.
+    fn add_block(&mut self) {
+        let (lags, filled) = (self.lags, self.filled);
+        for (k, series) in self.recent.iter_mut().enumerate() {
+            let block = &series[lags..lags + filled];
+            for lag in 0..=lags {
+                let earlier = &series[lags - lag..lags - lag + filled];
+                self.products[lag * self.width + k] += dot(block, earlier);
+            }
+            series.copy_within(filled..filled + lags, 0);
+        }
+        self.filled = 0;
+    }
+
+    /// The sums over all samples.
+    pub(crate) fn finish(mut self) -> AutocovarianceSums {
+        self.add_block();
+        AutocovarianceSums {
+            width: self.width,
+            products: self.products,
+        }
+    }
+}
+
+/// Sums of products of several series with themselves some samples later.
+pub(crate) struct AutocovarianceSums {
+    /// Number of series.
+    width: usize,
+    /// `products[lag * width + series]`.
+    products: Vec<f64>,
+}
+
+impl AutocovarianceSums {
     /// Sum of products of a series at a lag.
     pub(crate) fn product(&self, lag: usize, series: usize) -> f64 {
         self.products[lag * self.width + series]
@@ -97,11 +129,18 @@ impl LagProducts {
 
 /// Bartlett's weighted sum of autocovariances, from sums over sliding windows.
 pub(crate) struct BartlettWindows {
+    /// Number of series.
+    width: usize,
     /// Length of a window, samples.
     length: usize,
-    recent: VecDeque<Vec<f64>>,
-    /// Sum over the window.
-    sum: DVector<f64>,
+    /// The samples of the present window in a ring, `[sample * width + series]`; places without a sample are zero.
+    recent: Vec<f64>,
+    /// Place of the oldest sample in the ring, which the next sample replaces.
+    oldest: usize,
+    /// Sum over the window, `[series]`.
+    sum: Vec<f64>,
+    /// Sums over windows whose products are not added yet, `[series][window]`.
+    pending: Vec<Vec<f64>>,
     /// Sum of the outer products of all windows; only the lower triangle.
     outer: DMatrix<f64>,
 }
@@ -109,50 +148,110 @@ pub(crate) struct BartlettWindows {
 impl BartlettWindows {
     pub(crate) fn new(width: usize, length: usize) -> Self {
         Self {
+            width,
             length,
-            recent: VecDeque::with_capacity(length),
-            sum: DVector::zeros(width),
+            recent: vec![0.0; width * length],
+            oldest: 0,
+            sum: vec![0.0; width],
+            pending: vec![Vec::with_capacity(BLOCK); width],
             outer: DMatrix::zeros(width, width),
         }
     }
 
     /// Adds one sample of all series.
     pub(crate) fn push(&mut self, values: &[f64]) {
-        let mut slot = if self.recent.len() == self.length {
-            self.drop_oldest()
-        } else {
-            Vec::new()
-        };
-        for (sum, value) in self.sum.iter_mut().zip(values) {
-            *sum += value;
-        }
-        slot.clear();
-        slot.extend_from_slice(values);
-        self.recent.push_back(slot);
-        self.add_outer();
+        self.shift_window(|k| values[k]);
     }
 
-    /// Removes the oldest sample from the window and returns its memory.
-    fn drop_oldest(&mut self) -> Vec<f64> {
-        let oldest = self.recent.pop_front().unwrap_or_default();
-        for (sum, value) in self.sum.iter_mut().zip(&oldest) {
-            *sum -= value;
+    /// Moves the window by one sample, whose value of each series is given, and collects its sum.
+    fn shift_window(&mut self, value: impl Fn(usize) -> f64) {
+        let start = self.oldest * self.width;
+        for k in 0..self.width {
+            let value = value(k);
+            // The oldest sample leaves the window before the next one enters.
+            let sum = self.sum[k] - self.recent[start + k];
+            self.sum[k] = sum + value;
+            self.recent[start + k] = value;
+            self.pending[k].push(self.sum[k]);
         }
-        oldest
+        self.oldest = (self.oldest + 1) % self.length;
+        if self.pending.first().is_some_and(|windows| windows.len() == BLOCK) {
+            self.add_outer();
+        }
     }
 
-    /// Adds the outer product of the present window.
+    /// Adds the outer products of the collected windows.
     fn add_outer(&mut self) {
-        self.outer.syger(1.0 / self.length as f64, &self.sum, &self.sum, 1.0);
+        for i in 0..self.width {
+            for j in 0..=i {
+                self.outer[(i, j)] += dot(&self.pending[i], &self.pending[j]) / self.length as f64;
+            }
+        }
+        for windows in &mut self.pending {
+            windows.clear();
+        }
     }
 
     /// The weighted sum; windows that extend beyond the last sample are included.
     pub(crate) fn finish(mut self) -> DMatrix<f64> {
-        while self.recent.len() > 1 {
-            self.drop_oldest();
-            self.add_outer();
+        // Until the last sample leaves the window.
+        for _ in 1..self.length {
+            self.shift_window(|_| 0.0);
         }
+        self.add_outer();
         self.outer.fill_upper_triangle_with_lower_triangle();
         self.outer
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_noise::TestNoise;
+
+    /// Sums by their definition, over more samples than a block has and over fewer than the largest lag.
+    #[test]
+    fn lag_products_are_sums_over_pairs_of_samples() {
+        for (samples, lags) in [(3, 5), (BLOCK, 1), (2 * BLOCK + 77, 40), (700, 600)] {
+            let mut noise = TestNoise::new(12);
+            let series: Vec<[f64; 2]> = (0..samples).map(|_| [noise.normal(), noise.normal()]).collect();
+            let mut products = LagProducts::new(2, lags);
+            for values in &series {
+                products.push(values);
+            }
+            let sums = products.finish();
+            for lag in 0..=lags {
+                for k in 0..2 {
+                    let pairs = series.iter().skip(lag).zip(&series);
+                    let expected: f64 = pairs.map(|(now, before)| now[k] * before[k]).sum();
+                    assert!(
+                        (sums.product(lag, k) - expected).abs() < 1e-9,
+                        "{samples} samples, lag {lag}"
+                    );
+                }
+            }
+        }
+    }
+
+    /// Bartlett's sum from lag products, with more windows than a block and with a window longer than the series.
+    #[test]
+    fn windows_agree_with_lag_products() {
+        for (samples, length) in [(1500, 600), (1500, 7), (20, 33)] {
+            let mut noise = TestNoise::new(4);
+            let (mut products, mut windows) = (LagProducts::new(1, length), BartlettWindows::new(1, length));
+            for _ in 0..samples {
+                let value = noise.normal();
+                products.push(&[value]);
+                windows.push(&[value]);
+            }
+            let sums = products.finish();
+            let weighted = |lag: usize| (1.0 - lag as f64 / length as f64) * sums.product(lag, 0);
+            let expected = weighted(0) + 2.0 * (1..length).map(weighted).sum::<f64>();
+            let found = windows.finish()[(0, 0)];
+            assert!(
+                (found - expected).abs() < 1e-9 * sums.product(0, 0),
+                "{samples} samples, window {length}"
+            );
+        }
     }
 }

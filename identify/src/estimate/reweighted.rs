@@ -140,7 +140,7 @@ mod tests {
     use super::*;
     use crate::estimate::prior::{ParameterPrior, solve_with_prior};
     use crate::estimate::thresholds::HUBER_BOUND;
-    use crate::estimate::weighted_rows::dot;
+    use crate::signal::dot;
     use crate::test_noise::TestNoise;
 
     const TRUTH: [f64; 3] = [4.0, -2.0, 1.0];

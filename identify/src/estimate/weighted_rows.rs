@@ -9,6 +9,7 @@ use crate::estimate::least_squares::LeastSquares;
 use crate::estimate::magnitudes::MagnitudeHistogram;
 use crate::estimate::rows::{RowVisitor, is_uninformative};
 use crate::estimate::solution::RegressionSolution;
+use crate::signal::dot;
 
 /// Final weights of the rows.
 #[derive(Debug, Clone, PartialEq)]
@@ -187,9 +188,4 @@ pub(crate) fn show_weighted<E: From<LeastSquaresError>>(
         }
         visit(&scaled, &right)
     })
-}
-
-/// Inner product of two rows.
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }

@@ -74,12 +74,12 @@ fn coarse_period(time: &[f64], moving: &[(&[f64], f64)]) -> Option<(f64, f64)> {
     let m = time.len().min(GRID);
     let step = (end - start) / (m - 1) as f64;
     // Positions on the grid, scaled so that unrelated motions have the distance 1.
+    let places: Vec<(usize, f64)> = (0..m).map(|i| place_in_time(time, start + step * i as f64)).collect();
     let grids: Vec<Vec<f64>> = moving
         .iter()
         .map(|(q, variance)| {
             let scale = (2.0 * variance * moving.len() as f64).sqrt();
-            let at = |i: usize| interpolate(time, &q[..time.len()], start + step * i as f64) / scale;
-            (0..m).map(at).collect()
+            places.iter().map(|place| value_at(q, *place) / scale).collect()
         })
         .collect();
     // Distance of the motion from itself some steps later, 1 for unrelated motions.
@@ -114,9 +114,10 @@ fn refine_period(time: &[f64], moving: &[(&[f64], f64)], period: f64, step: f64)
             if time[i] + period > end {
                 break;
             }
+            // One place in time for all coordinates.
+            let place = place_in_time(time, time[i] + period);
             for (q, variance) in moving {
-                let other = interpolate(time, q, time[i] + period);
-                sum += (other - q[i]).powi(2) / (2.0 * variance * moving.len() as f64);
+                sum += (value_at(q, place) - q[i]).powi(2) / (2.0 * variance * moving.len() as f64);
             }
             n += 1;
         }
@@ -203,18 +204,35 @@ fn variance(values: &[f64]) -> f64 {
 /// The sample before a time, and the share of the way to the next one. `None` if these two are more than `apart`
 /// apart, s. Outside of the samples the first or last pair is used up to half that distance.
 fn bracketing_sample(time: &[f64], at: f64, apart: f64) -> Option<(usize, f64)> {
-    let after = time.partition_point(|t| *t < at).clamp(1, time.len() - 1);
+    let after = first_not_before(time, at).clamp(1, time.len() - 1);
     let (t0, t1) = (time[after - 1], time[after]);
     let is_near = t1 - t0 <= apart && at >= t0 - 0.5 * apart && at <= t1 + 0.5 * apart;
     is_near.then(|| (after - 1, ((at - t0) / (t1 - t0)).clamp(0.0, 1.0)))
 }
 
-/// Linear interpolation; outside of the samples the first or last value.
-fn interpolate(time: &[f64], values: &[f64], at: f64) -> f64 {
-    let after = time.partition_point(|t| *t < at).clamp(1, time.len() - 1);
+/// The sample before a time, and the share of the way to the next one; outside of the samples the first or last one.
+fn place_in_time(time: &[f64], at: f64) -> (usize, f64) {
+    let after = first_not_before(time, at).clamp(1, time.len() - 1);
     let (t0, t1) = (time[after - 1], time[after]);
-    let part = ((at - t0) / (t1 - t0)).clamp(0.0, 1.0);
-    values[after - 1] + part * (values[after] - values[after - 1])
+    (after - 1, ((at - t0) / (t1 - t0)).clamp(0.0, 1.0))
+}
+
+/// Index of the first of ascending times that is not before `at`; their number if all are.
+fn first_not_before(time: &[f64], at: f64) -> usize {
+    let last = time.len() - 1;
+    // Steps are mostly equal, so that the index is known but for a few samples.
+    let guess = float_to_count((at - time[0]) / (time[last] - time[0]) * last as f64).clamp(1, last);
+    let (from, to) = (guess.saturating_sub(2), (guess + 2).min(last));
+    if time[from] < at && at <= time[to] {
+        from + time[from..=to].partition_point(|t| *t < at)
+    } else {
+        time.partition_point(|t| *t < at)
+    }
+}
+
+/// Linear interpolation of samples at a place.
+fn value_at(values: &[f64], (before, part): (usize, f64)) -> f64 {
+    values[before] + part * (values[before + 1] - values[before])
 }
 
 /// The minimum of a function with a single minimum between `low` and `high`, by golden section search.
@@ -264,6 +282,22 @@ mod tests {
         let drifting: Vec<f64> = time.iter().map(|t| t * t).collect();
         assert_eq!(find_period(&time, &[&drifting]), None);
         assert_eq!(find_period(&time, &[&vec![1.0; q.len()]]), None);
+    }
+
+    #[test]
+    fn a_place_in_time_is_the_same_as_by_bisection() {
+        let mut time = times(500);
+        // A gap, and times that repeat.
+        for t in &mut time[200..] {
+            *t += 3.0;
+        }
+        time[300] = time[299];
+        let mut noise = TestNoise::new(6);
+        let edges = [time[0] - 1.0, time[499] + 1.0, 2.0];
+        let inside = (0..2000).map(|_| time[0] + 5.0 * noise.uniform());
+        for at in inside.chain(time.clone()).chain(edges) {
+            assert_eq!(first_not_before(&time, at), time.partition_point(|t| *t < at), "{at}");
+        }
     }
 
     #[test]

@@ -286,8 +286,18 @@ impl<const N: usize> WithSimd for SteadyStateFilter<'_, N> {
             states.push(section.steady_state().map(|state| level.map(|level| state * level)));
             level = level.map(|level| level * section.dc_gain());
         }
-        // Two sections at a time share a pass over the samples.
-        let mut pass = |chunk: &mut [[f64; N]]| {
+        // Loops and not closures, because a closure would be compiled without the vector instructions.
+        let chunks = self.signal.len().div_ceil(CHUNK);
+        for k in 0..chunks {
+            // Chunks of a backward pass are counted from the end of the signal.
+            let (start, end) = if self.is_backward {
+                let end = self.signal.len() - k * CHUNK;
+                (end.saturating_sub(CHUNK), end)
+            } else {
+                (k * CHUNK, (k * CHUNK + CHUNK).min(self.signal.len()))
+            };
+            let chunk = &mut self.signal[start..end];
+            // Two sections at a time share a pass over the samples.
             for (sections, states) in self.sections.chunks(2).zip(states.chunks_mut(2)) {
                 match (sections, states) {
                     ([a, b], [of_a, of_b]) => {
@@ -297,11 +307,6 @@ impl<const N: usize> WithSimd for SteadyStateFilter<'_, N> {
                     _ => {}
                 }
             }
-        };
-        if self.is_backward {
-            self.signal.rchunks_mut(CHUNK).for_each(&mut pass);
-        } else {
-            self.signal.chunks_mut(CHUNK).for_each(&mut pass);
         }
     }
 }
@@ -321,7 +326,9 @@ fn run_sections<const M: usize, const N: usize>(
 ) {
     // The states are copied, so that they can be kept in registers.
     let mut z = states.each_ref().map(|state| **state);
-    let mut step = |x: &mut [f64; N]| {
+    let n = samples.len();
+    for i in 0..n {
+        let x = &mut samples[if is_backward { n - 1 - i } else { i }];
         for (section, [z1, z2]) in sections.iter().zip(&mut z) {
             let ([b0, b1, b2], [a1, a2]) = (section.b, section.a);
             for k in 0..N {
@@ -331,11 +338,6 @@ fn run_sections<const M: usize, const N: usize>(
                 x[k] = y;
             }
         }
-    };
-    if is_backward {
-        samples.iter_mut().rev().for_each(&mut step);
-    } else {
-        samples.iter_mut().for_each(&mut step);
     }
     for (state, z) in states.into_iter().zip(z) {
         *state = z;

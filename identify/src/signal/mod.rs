@@ -1,9 +1,11 @@
 //! Operations on the numbers of one signal, independent of their meaning: filters, spectra, statistics.
 
 mod filters;
+mod products;
 mod spectrum;
 mod statistics;
 
 pub use filters::{FilterError, LowPass, MAX_FILTER_ORDER};
+pub(crate) use products::{LANES, add_multiples, dot};
 pub(crate) use spectrum::hann_power;
 pub use statistics::{float_to_count, median, white_noise};

@@ -6,10 +6,12 @@
 //! parameters are projected out, and sets of one or two errors are tried.
 
 use modelmill_codegen::ModelEvaluator;
+use modelmill_identify::LeastSquares;
 use modelmill_identify::diagnose::{ForceColumn, LocatedEffect};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, DVectorView};
 
-use crate::error::Outcome;
+use crate::along::filter_and_decimate;
+use crate::error::{Error, Outcome};
 use crate::model::Model;
 use crate::regressors::regressor;
 use crate::segment::RecordingSegment;
@@ -154,7 +156,7 @@ impl<'a> GeometryComparison<'a> {
             errors: Vec::new(),
         };
         comparison.target = comparison.weighted(&measured);
-        let nominal = comparison.forces_and_basis(&[])?;
+        let nominal = comparison.forces_and_span(&[])?;
         // Fixed parameters may have other values than the nominal ones: only changes of the force count then.
         if comparison.estimated.is_empty() {
             let errors = stacked(&|run, d| run.error(d));
@@ -168,11 +170,13 @@ impl<'a> GeometryComparison<'a> {
                 _ => continue,
             };
             let step = STEP * size;
-            let sides = [-step, step].map(|step| comparison.forces_and_basis(&[(k, step)]));
-            let [Some((back, _)), Some((ahead, _))] = sides else {
+            let sides = [-step, step].map(|step| comparison.forces(&[(k, step)]));
+            let [Some(back), Some(ahead)] = sides else {
                 continue;
             };
-            let slope = without_basis(nominal.1.as_ref(), (ahead - back) / (2.0 * step));
+            let slope = nominal
+                .1
+                .project_out(&comparison.weights, (ahead - back) / (2.0 * step));
             if slope.iter().all(|x| x.is_finite()) && slope.norm() * size > 0.0 {
                 comparison.errors.push(ComparedError {
                     constant: k,
@@ -194,40 +198,59 @@ impl<'a> GeometryComparison<'a> {
         )
     }
 
-    /// For some changed constants: weighted forces for nominal dynamic parameters, and an orthonormal basis of the forces
-    /// of estimated base parameters. `None` if a pose has no solution.
-    fn forces_and_basis(&self, changes: &[(usize, f64)]) -> Option<(DVector<f64>, Option<DMatrix<f64>>)> {
+    /// The model with some changed constants, and the base parameters of the nominal dynamic parameters.
+    fn evaluator_at(&self, changes: &[(usize, f64)]) -> (ModelEvaluator<'a>, Vec<f64>) {
         let mut constants = self.constants.clone();
         for (k, change) in changes {
             constants[*k] += change;
         }
         let derivation = &self.varied.derivation;
         let base = derivation.base_values(&self.parameters, &constants);
-        let evaluator = ModelEvaluator::with_constants(derivation, constants);
-        let columns = regressor(&self.data, &evaluator, self.varied).ok()?;
-        let n = self.target.len() / self.weights.len().max(1);
-        let dense = |column: &ForceColumn| {
-            let channels = column.0.iter();
-            let dense: Vec<Vec<f64>> = channels.map(|x| x.clone().unwrap_or_else(|| vec![0.0; n])).collect();
-            self.weighted(&dense)
-        };
-        let columns: Vec<DVector<f64>> = columns.iter().map(dense).collect();
+        (ModelEvaluator::with_constants(derivation, constants), base)
+    }
+
+    /// Weighted forces for nominal dynamic parameters and some changed constants; `None` if a pose has no solution.
+    fn forces(&self, changes: &[(usize, f64)]) -> Option<DVector<f64>> {
+        let (evaluator, base) = self.evaluator_at(changes);
+        let mut forces: Vec<Vec<f64>> = vec![Vec::new(); self.weights.len()];
+        for (one, _) in &self.data {
+            let mut of_segment: Vec<Vec<f64>> = vec![Vec::new(); self.weights.len()];
+            let evaluated = one.for_each_block(self.varied, |states| {
+                Ok::<_, Error>(evaluator.inverse_dynamics(states, &base).map(|block| {
+                    for (force, more) in of_segment.iter_mut().zip(block) {
+                        force.extend(more);
+                    }
+                }))
+            });
+            evaluated.ok()?;
+            for (force, more) in forces.iter_mut().zip(filter_and_decimate(of_segment, one).ok()?) {
+                force.extend(more);
+            }
+        }
+        let forces = self.weighted(&forces);
+        (forces.len() == self.target.len() && forces.iter().all(|x| x.is_finite())).then_some(forces)
+    }
+
+    /// The same, and the span of the forces of estimated base parameters.
+    fn forces_and_span(&self, changes: &[(usize, f64)]) -> Option<(DVector<f64>, ForceSpan)> {
+        if self.target.is_empty() {
+            return None;
+        }
+        let (evaluator, base) = self.evaluator_at(changes);
+        let mut columns = regressor(&self.data, &evaluator, self.varied).ok()?;
         let mut sum = DVector::zeros(self.target.len());
         for (column, value) in columns.iter().zip(base) {
-            if column.len() != sum.len() {
-                return None;
-            }
-            sum += value * column;
+            add_weighted(&mut sum, value, column, &self.weights)?;
         }
-        let estimated: Vec<DVector<f64>> = self.estimated.iter().map(|k| columns[*k].clone()).collect();
-        let basis = (!estimated.is_empty()).then(|| DMatrix::from_columns(&estimated).qr().q());
-        sum.iter().all(|x| x.is_finite()).then_some((sum, basis))
+        let estimated = self.estimated.iter().map(|k| std::mem::take(&mut columns[*k]));
+        let span = ForceSpan::new(estimated.collect(), &self.weights, &self.target)?;
+        sum.iter().all(|x| x.is_finite()).then_some((sum, span))
     }
 
     /// The residual with some changed constants and the best estimates of base parameters.
     fn residual(&self, changes: &[(usize, f64)]) -> Option<DVector<f64>> {
-        let (forces, basis) = self.forces_and_basis(changes)?;
-        let left = without_basis(basis.as_ref(), &self.target - forces);
+        let (forces, span) = self.forces_and_span(changes)?;
+        let left = span.project_out(&self.weights, &self.target - forces);
         left.iter().all(|x| x.is_finite()).then_some(left)
     }
 
@@ -356,12 +379,89 @@ impl<'a> GeometryComparison<'a> {
     }
 }
 
-/// The part of a vector that the columns of an orthonormal basis do not explain.
-fn without_basis(basis: Option<&DMatrix<f64>>, vector: DVector<f64>) -> DVector<f64> {
-    match basis {
-        Some(q) => &vector - q * q.tr_mul(&vector),
-        None => vector,
+/// The forces of some base parameters along the recordings, and what they explain of other forces.
+struct ForceSpan {
+    /// Their forces per unit, not weighted.
+    columns: Vec<ForceColumn>,
+    /// Pseudo-inverse of the inner products of the weighted columns.
+    inverse: DMatrix<f64>,
+}
+
+impl ForceSpan {
+    /// From columns, and the weighted forces that are to be explained; all drives one after the other. `None` if a
+    /// number is not finite.
+    fn new(columns: Vec<ForceColumn>, weights: &[f64], target: &DVector<f64>) -> Option<Self> {
+        let n = columns.len();
+        if n == 0 {
+            let inverse = DMatrix::zeros(0, 0);
+            return Some(Self { columns, inverse });
+        }
+        let mut regression = LeastSquares::with_channels(n, weights.len());
+        let samples = target.len() / weights.len();
+        for (d, weight) in weights.iter().enumerate() {
+            let weigh = |column: &ForceColumn| match column.0.get(d) {
+                Some(Some(values)) => values.iter().map(|x| weight * x).collect(),
+                _ => vec![0.0; samples],
+            };
+            let weighted: Vec<Vec<f64>> = columns.iter().map(weigh).collect();
+            let weighted: Vec<&[f64]> = weighted.iter().map(Vec::as_slice).collect();
+            let measured = &target.as_slice()[d * samples..(d + 1) * samples];
+            regression.add_columns(d, &weighted, measured).ok()?;
+        }
+        let inverse = regression.solve().ok()?.unit_covariance();
+        Some(Self { columns, inverse })
     }
+
+    /// The part of weighted forces that the columns do not explain.
+    fn project_out(&self, weights: &[f64], mut forces: DVector<f64>) -> DVector<f64> {
+        if self.columns.is_empty() {
+            return forces;
+        }
+        // Seminormal equations. The second step corrects the rounding of the first one (A. Bjorck, "Stability analysis
+        // of the method of seminormal equations", Linear Algebra Appl. 88/89, 1987).
+        for _ in 0..2 {
+            let samples = forces.len() / weights.len().max(1);
+            let product = |column: &ForceColumn| -> f64 {
+                let channels = column
+                    .0
+                    .iter()
+                    .zip(weights)
+                    .zip(forces.as_slice().chunks_exact(samples));
+                let products = channels.filter_map(|((values, weight), forces)| {
+                    let values = DVectorView::from_slice(values.as_ref()?, samples);
+                    Some(weight * values.dot(&DVectorView::from_slice(forces, samples)))
+                });
+                products.sum()
+            };
+            let gradient = DVector::from_iterator(self.columns.len(), self.columns.iter().map(product));
+            let factors = &self.inverse * gradient;
+            for (column, factor) in self.columns.iter().zip(factors.iter()) {
+                if add_weighted(&mut forces, -factor, column, weights).is_none() {
+                    forces.fill(f64::NAN);
+                }
+            }
+        }
+        forces
+    }
+}
+
+/// Adds a multiple of a column to forces of all drives, one after the other; each drive has a weight. `None` if the
+/// numbers of samples differ.
+fn add_weighted(forces: &mut DVector<f64>, factor: f64, column: &ForceColumn, weights: &[f64]) -> Option<()> {
+    let samples = forces.len() / weights.len().max(1);
+    for ((values, weight), forces) in
+        (column.0.iter().zip(weights)).zip(forces.as_mut_slice().chunks_exact_mut(samples))
+    {
+        let Some(values) = values else { continue };
+        if values.len() != samples {
+            return None;
+        }
+        let factor = factor * weight;
+        for (force, value) in forces.iter_mut().zip(values) {
+            *force += factor * value;
+        }
+    }
+    Some(())
 }
 
 impl GeometryError {

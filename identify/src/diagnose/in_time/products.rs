@@ -7,11 +7,12 @@ use nalgebra::{DMatrix, DVector};
 
 use super::super::column::ForceColumn;
 use super::super::factored::GramFactor;
-use super::super::pool::{dot, solve_gram};
+use super::super::pool::solve_gram;
 use super::super::problem::DiagnosisProblem;
 use super::profile::TimeProfile;
 use super::residual::standstill_samples;
 use super::{ChangeForce, ChangeShape};
+use crate::signal::dot;
 
 /// Number of blocks of a recording.
 const BLOCKS: usize = 40;

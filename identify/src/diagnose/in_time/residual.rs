@@ -10,7 +10,6 @@ use std::ops::Range;
 use serde::Serialize;
 
 use super::super::noise::effective_samples;
-use super::super::pool::dot;
 use super::super::problem::DiagnosisProblem;
 use super::super::thresholds::{
     LARGE_RESIDUAL_LEAST_NOISE_RATIO, LARGE_RESIDUAL_LEAST_SHARE, LOUD_LEAST_RATIO, LOUD_LEAST_SHARE,
@@ -18,6 +17,7 @@ use super::super::thresholds::{
     STANDSTILL_RATE_SHARE, TIME_RESIDUAL_LEAST_NOISE_RATIO, TOP_SPEED_QUANTILE, WINDOW_FEWEST_SAMPLES,
 };
 use super::ChangeInterval;
+use crate::signal::dot;
 use crate::signal::{float_to_count, hann_power, median};
 
 /// Independent samples of a window.

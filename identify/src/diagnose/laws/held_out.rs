@@ -10,7 +10,8 @@ use super::features::LawProduct;
 use super::projection::LawSamples;
 use crate::diagnose::bench::{EffectSelector, SelectedEffect};
 use crate::diagnose::noise::effective_samples;
-use crate::diagnose::pool::{dot, solve_gram};
+use crate::diagnose::pool::solve_gram;
+use crate::signal::dot;
 
 /// Largest number of blocks of each segment.
 const BLOCKS: usize = 12;

@@ -25,13 +25,14 @@ pub use features::{LawFactor, LawProduct, LawSite};
 pub use shapes::{LawShape, LawVariable};
 
 use super::bench::{EffectSelector, SelectedEffect};
-use super::pool::{FitScope, dot};
+use super::pool::FitScope;
 use super::problem::{ColumnProvider, LocatedEffect};
 use super::thresholds::{
     LAW_HOPEFUL_PART, LAW_INDEPENDENT_COLUMNS, LAW_LEAST_NOISE_RATIO, LAW_LEAST_REPEATABLE_SHARE,
     LAW_LEAST_SHARE_ALONE, LAW_MOST_CHANCE, LAW_SAME_SHARE, LEAST_GAIN, MAX_NEAR_TIES, MIN_DISTINCTION,
     SECOND_TERM_LEAST_T,
 };
+use crate::signal::dot;
 use features::ProductForm;
 use held_out::{BlockValidation, ValidatedLaw};
 use projection::{LawProjection, LawSamples, ScoredProduct, SiteProjection};

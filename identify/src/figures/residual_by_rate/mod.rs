@@ -322,13 +322,17 @@ impl RateFit {
     fn new(columns: &RateColumns, terms: &[RateTerm], unexplained: f64) -> Option<Self> {
         let regressor = columns.regressor(terms);
         let solution = solve(&regressor, &columns.residual)?;
+        let n = regressor.len();
+        let mut rows = vec![0.0; n * BLOCK];
         let show = |visit: &mut RowVisitor<'_>| -> Result<(), LeastSquaresError> {
             for start in (0..columns.residual.len()).step_by(BLOCK) {
                 let end = (start + BLOCK).min(columns.residual.len());
-                let rows: Vec<f64> = (start..end)
-                    .flat_map(|i| regressor.iter().map(move |column| column[i]))
-                    .collect();
-                visit(&rows, &columns.residual[start..end])?;
+                for (j, column) in regressor.iter().enumerate() {
+                    for (row, value) in rows.chunks_exact_mut(n).zip(&column[start..end]) {
+                        row[j] = *value;
+                    }
+                }
+                visit(&rows[..n * (end - start)], &columns.residual[start..end])?;
             }
             Ok(())
         };
