@@ -13,7 +13,7 @@ use modelmill_spec::Sign;
 use super::ServoModel;
 use super::delay::{DelayQuery, ServoDelay, delays};
 use super::gains::GainValues;
-use super::instruments::commanded_segment;
+use super::instruments::{commanded_segment, project_on_instruments};
 use super::rows::{EquationRows, UsedSamples};
 use super::scale::ServoScale;
 use super::thresholds::{
@@ -305,7 +305,10 @@ impl<'a> ServoSystem<'a> {
         let plain = self.columns(own, weights);
         let mut reason = "the recording has no command that is free of the noise of sensors".to_owned();
         if let Some(instruments) = instruments {
-            let theirs = self.columns(instruments, weights);
+            let columns = self.columns(instruments, weights);
+            let known = self.known_part(instruments, weights);
+            let projected = project_on_instruments(&columns, &known, &plain, weights.len());
+            let theirs = projected.unwrap_or(columns);
             let joined: Vec<f64> = (theirs.chunks_exact(n).zip(plain.chunks_exact(n)))
                 .flat_map(|(z, w)| z.iter().chain(w).copied())
                 .collect();
@@ -359,13 +362,19 @@ impl<'a> ServoSystem<'a> {
 
     /// Weighted right-hand side: measured forces less the columns with fixed values.
     fn right_side(&self, rows: &EquationRows, weights: &[f64]) -> Vec<f64> {
+        let known = self.known_part(rows, weights);
+        let measured = rows.measured.iter().zip(weights.iter().cycle());
+        measured
+            .zip(known)
+            .map(|((y, weight), known)| weight * y - known)
+            .collect()
+    }
+
+    /// Weighted sum of the columns with fixed values.
+    fn known_part(&self, rows: &EquationRows, weights: &[f64]) -> Vec<f64> {
         let n = self.servo.equations.base.len();
-        let all = rows
-            .regressor
-            .chunks_exact(n)
-            .zip(&rows.measured)
-            .zip(weights.iter().cycle());
-        all.map(|((row, y), weight)| weight * (y - self.fixed.iter().map(|(k, p)| row[*k] * p).sum::<f64>()))
+        let all = rows.regressor.chunks_exact(n).zip(weights.iter().cycle());
+        all.map(|(row, weight)| weight * self.fixed.iter().map(|(k, p)| row[*k] * p).sum::<f64>())
             .collect()
     }
 

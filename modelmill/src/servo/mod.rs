@@ -11,6 +11,7 @@ mod estimate;
 mod forces;
 mod gains;
 mod instruments;
+mod projection;
 mod refine;
 mod rows;
 mod scale;

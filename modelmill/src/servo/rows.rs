@@ -4,12 +4,12 @@ use modelmill_codegen::ModelEvaluator;
 use modelmill_spec::{ExactExpression, ExactFunction, ModelActuator};
 
 use super::ServoModel;
-use super::forces::ActuatorStates;
 use super::gains::GainValues;
 use super::thresholds::{LARGEST_DELAY, MOST_SAMPLES, REVERSAL_PERIODS, SATURATION_SHARE, STANDSTILL_SHARE};
 use crate::along;
 use crate::error::Outcome;
 use crate::segment::RecordingSegment;
+use crate::segment::computed_forces::ActuatorStates;
 
 /// Equations of one segment, interleaved per sample.
 #[derive(Clone)]
@@ -78,12 +78,13 @@ impl UsedSamples {
         let Ok([_, rates]) = along::drive_motion(&servo.equations, &delayed) else {
             return;
         };
-        for actuator in servo.actuators() {
+        for (place, actuator) in servo.actuators().iter().enumerate() {
             let (drive, i) = (actuator.drive.0, servo.signal_position(actuator));
             let Some(limit) = actuator.saturation else {
                 continue;
             };
             let states = ActuatorStates {
+                actuator: place,
                 signal: delayed.run.q[i].clone(),
                 signal_rate: delayed.run.qd[i].clone(),
                 position: self.positions[drive].clone(),
