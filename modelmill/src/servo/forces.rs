@@ -21,6 +21,7 @@ use super::gains::{GainValues, delay_phrase};
 use super::refine::refine_delays;
 use super::suspects::{ServoLimit, servo_limits};
 use super::thresholds::{DELAY_STEP, FEWEST_DECIMATED, LARGEST_LIMIT_CHANGE};
+use super::turns::turn_offset;
 use crate::along;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
@@ -296,6 +297,7 @@ impl<'a> ActuatorForces<'a> {
             None => return Ok(recording.clone()),
         };
         let mut raw = recording.raw().clone();
+        raw.unwrap_angles(&self.angle_signals());
         let mechanism = &self.model.derivation.mechanism;
         let time = raw.column("t")?.to_vec();
         let motion = SmoothMotion::new(&self.servo, prepared)?;
@@ -316,9 +318,11 @@ impl<'a> ActuatorForces<'a> {
             let rate = motion.interpolate_at(&motion.rates[drive], &time, 0.0);
             for (k, (actuator, delay)) in own.filter(|(_, (actuator, _))| actuator.drive.0 == drive) {
                 let signal = raw.column(&actuator.signal)?;
+                let turns = turn_offset(actuator, signal, &position);
+                let signal: Vec<f64> = signal.iter().map(|value| value + turns).collect();
                 let states_at = |delay: f64| ActuatorStates {
                     actuator: k,
-                    signal: interpolate(&time, signal, &time, delay),
+                    signal: interpolate(&time, &signal, &time, delay),
                     signal_rate: motion.interpolate_at(&motion.signal_rates[k], &time, delay),
                     rate: rate.clone(),
                     position: position.clone(),
@@ -374,6 +378,13 @@ impl<'a> ActuatorForces<'a> {
             Some((preparation, _)) => completed.with_preparation(preparation),
             None => completed,
         })
+    }
+
+    /// The signals that are angles, with whether they are.
+    fn angle_signals(&self) -> Vec<(String, bool)> {
+        let angle = |one: &ModelActuator| one.has_position_error() && one.motion.is_angle();
+        let all = self.actuators.iter();
+        all.map(|one| (one.signal.clone(), angle(one))).collect()
     }
 
     /// The preparation of a recording with computed forces, and the highest frequency that its decimation passes, Hz;

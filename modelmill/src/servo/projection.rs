@@ -63,3 +63,25 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
 fn norm(column: &[f64]) -> f64 {
     dot(column, column).sqrt()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{ColumnSpan, dot};
+
+    #[test]
+    fn residuals_are_orthogonal_to_all_columns() {
+        let columns = [
+            vec![1.0, 1.0, 1.0, 1.0],
+            vec![1.0, 2.0, 3.0, 4.0],
+            vec![3.0, 4.0, 5.0, 6.0],
+        ];
+        let span = ColumnSpan::new(columns.clone());
+        // The third column is the second one and twice the first one.
+        assert_eq!(span.rank(), 2);
+        let rest = span.residual(&[0.5, -1.0, 2.0, 7.0]);
+        for column in &columns {
+            assert!(dot(&rest, column).abs() < 1e-12);
+        }
+        assert!(dot(&rest, &rest) > 1.0);
+    }
+}

@@ -6,6 +6,7 @@ use modelmill_spec::{ExactExpression, ExactFunction, ModelActuator};
 use super::ServoModel;
 use super::gains::GainValues;
 use super::thresholds::{LARGEST_DELAY, MOST_SAMPLES, REVERSAL_PERIODS, SATURATION_SHARE, STANDSTILL_SHARE};
+use super::turns::turn_offset;
 use crate::along;
 use crate::error::Outcome;
 use crate::segment::RecordingSegment;
@@ -61,9 +62,11 @@ impl UsedSamples {
         for (actuator, delay) in servo.actuators().iter().zip(delays) {
             let i = servo.signal_position(actuator);
             let (q, qd, qdd) = (&from.q[i], &from.qd[i], &from.qdd[i]);
+            let position = &self.positions[actuator.drive.0];
+            let turns = turn_offset(actuator, &self.segment.run.q[i], position);
             for (sample, t) in self.segment.run.time.iter().enumerate() {
                 let [value, rate, acceleration] = interpolate(&from.time, [q, qd, qdd], t - delay);
-                segment.run.q[i][sample] = actuator.effective_signal(value, self.positions[actuator.drive.0][sample]);
+                segment.run.q[i][sample] = actuator.effective_signal(value + turns, position[sample]);
                 segment.run.qd[i][sample] = rate;
                 segment.run.qdd[i][sample] = acceleration;
             }

@@ -17,6 +17,10 @@ pub(super) const DELAY_STEPS: usize = 100;
 pub(super) const LARGEST_DELAY: f64 = DELAY_STEPS as f64 * DELAY_STEP;
 /// Largest correction of a delay by forces, s: beyond it a Gauss-Newton step is not accurate. By judgement.
 pub(super) const LARGEST_DELAY_STEP: f64 = 0.02;
+/// Gauss-Newton steps of delays with instruments at most; some three suffice.
+pub(super) const DELAY_ITERATIONS: usize = 6;
+/// Change of a delay, s, below which it is known. By judgement: a hundredth of a sample at 1 kHz.
+pub(super) const DELAY_TOLERANCE: f64 = 1e-5;
 /// Most samples for the search of a delay. By judgement.
 pub(super) const DELAY_SAMPLES: usize = 4000;
 /// Fall of the log likelihood, times two, at the ends of an interval of 95 % of one parameter.
