@@ -8,11 +8,10 @@
 use super::delay::ServoDelay;
 use super::estimate::{ServoEstimator, ServoSystem};
 use super::rows::EquationRows;
-use super::thresholds::{DELAY_ITERATIONS, DELAY_STEP, DELAY_TOLERANCE, LARGEST_DELAY, LARGEST_DELAY_STEP};
+use super::thresholds::{
+    DELAY_ITERATIONS, DELAY_STEP, DELAY_TOLERANCE, HALF_INTERVAL, LARGEST_DELAY, LARGEST_DELAY_STEP,
+};
 use crate::error::Outcome;
-
-/// Half an interval of 95 % in standard deviations.
-const HALF_INTERVAL: f64 = 1.96;
 
 /// Changes of the equations by delays, for some actuators.
 #[derive(Default)]

@@ -4,18 +4,16 @@
 //! keeps the basis orthogonal to rounding (L. Giraud et al., "Rounding error analysis of the classical Gram-Schmidt
 //! orthogonalization process", Numer. Math. 101 (2005)).
 
-/// A column that has less than this share of its norm beside the others depends on them (1). By judgement: columns of
-/// regressors are exact to some 1e-12.
-const DEPENDENT_SHARE: f64 = 1e-8;
+use super::thresholds::DEPENDENT_SHARE;
 
 /// An orthonormal basis of the span of columns.
 #[derive(Clone, Default)]
-pub(super) struct ColumnSpan {
+pub(super) struct OrthonormalSpan {
     /// Its columns.
     basis: Vec<Vec<f64>>,
 }
 
-impl ColumnSpan {
+impl OrthonormalSpan {
     /// The span of some columns of equal length.
     pub(super) fn new(columns: impl IntoIterator<Item = Vec<f64>>) -> Self {
         let mut all = Self::default();
@@ -66,7 +64,7 @@ fn norm(column: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{ColumnSpan, dot};
+    use super::{OrthonormalSpan, dot};
 
     #[test]
     fn residuals_are_orthogonal_to_all_columns() {
@@ -75,7 +73,7 @@ mod tests {
             vec![1.0, 2.0, 3.0, 4.0],
             vec![3.0, 4.0, 5.0, 6.0],
         ];
-        let span = ColumnSpan::new(columns.clone());
+        let span = OrthonormalSpan::new(columns.clone());
         // The third column is the second one and twice the first one.
         assert_eq!(span.rank(), 2);
         let rest = span.residual(&[0.5, -1.0, 2.0, 7.0]);

@@ -12,15 +12,12 @@ use modelmill_identify::diagnose::ForceColumn;
 use modelmill_identify::estimate::LeastSquares;
 
 use super::delay::ServoDelay;
-use super::thresholds::{DELAY_SAMPLES, LARGEST_DELAY, LARGEST_DELAY_STEP};
+use super::thresholds::{DELAY_SAMPLES, HALF_INTERVAL, LARGEST_DELAY, LARGEST_DELAY_STEP};
 use crate::along;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 use crate::regressors::regressor;
 use crate::segment::RecordingSegment;
-
-/// Half an interval of 95 % in standard deviations.
-const HALF_INTERVAL: f64 = 1.96;
 
 /// Delays that fit the forces of some segments best, and what the forces would add to those that the file gives, s. The
 /// latter, and those of which the equations determine nothing, stay as they are.

@@ -14,10 +14,10 @@ use modelmill_identify::diagnose::{Disturbance, EstimatedQuantity, ForceColumn};
 use modelmill_spec::ModelActuator;
 
 use super::gains::GainValues;
-use super::projection::{ColumnSpan, dot};
+use super::projection::{OrthonormalSpan, dot};
 use super::thresholds::{
     CHECKED_FACTOR_ERROR, CHECKED_REDUCTION, DELAY_SAMPLES, DELAY_STEP, FEWEST_LIMITED, LARGEST_LIMIT_STEP,
-    LIMIT_FACTOR_ERROR, LIMIT_GRID, LIMIT_ITERATIONS, LIMIT_REDUCTION, LIMIT_STEP, LIMIT_T,
+    LIMIT_FACTOR_ERROR, LIMIT_GRID, LIMIT_ITERATIONS, LIMIT_REDUCTION, LIMIT_STEP, LIMIT_T, LIMIT_TOLERANCE,
 };
 use crate::along;
 use crate::error::Outcome;
@@ -180,7 +180,7 @@ impl<'a> LimitData<'a> {
 }
 
 /// A segment of the equations of one drive.
-struct DriveSegment<'a> {
+struct LimitSegment<'a> {
     /// The segment.
     segment: &'a RecordingSegment,
     /// The origin of its forces.
@@ -198,9 +198,9 @@ struct DriveEquations<'a> {
     /// The actuator without a limit that the file lacks.
     actuator: &'a ModelActuator,
     /// The segments whose rows follow one another.
-    segments: Vec<DriveSegment<'a>>,
+    segments: Vec<LimitSegment<'a>>,
     /// Columns of the regressor, usual friction and an offset.
-    usual: ColumnSpan,
+    usual: OrthonormalSpan,
     /// The force without the limit.
     force: Vec<f64>,
 }
@@ -244,7 +244,7 @@ impl<'a> DriveEquations<'a> {
             for (joined, column) in columns.iter_mut().zip(all) {
                 joined.extend(places.iter().map(|i| column[*i]));
             }
-            segments.push(DriveSegment {
+            segments.push(LimitSegment {
                 segment,
                 computed,
                 states,
@@ -256,7 +256,7 @@ impl<'a> DriveEquations<'a> {
             gains,
             actuator,
             segments,
-            usual: ColumnSpan::new(columns),
+            usual: OrthonormalSpan::new(columns),
             force: Vec::new(),
         };
         equations.force = equations.filtered_force(actuator, 0.0)?;
@@ -309,7 +309,7 @@ impl<'a> DriveEquations<'a> {
     }
 
     /// Usual columns and the change of a limited force by a delay: where the limit acts, it does not change.
-    fn span(&self, limited: &ModelActuator, force: &[f64]) -> Outcome<ColumnSpan> {
+    fn span(&self, limited: &ModelActuator, force: &[f64]) -> Outcome<OrthonormalSpan> {
         let late = self.filtered_force(limited, DELAY_STEP)?;
         let mut span = self.usual.clone();
         span.add(&difference(&late, force));
@@ -332,7 +332,7 @@ impl<'a> DriveEquations<'a> {
                 Some(fit) => (fitted, limit) = (fit, next),
                 None => most = 0.5 * step.abs(),
             }
-            if step.abs() < 1e-5 {
+            if step.abs() < LIMIT_TOLERANCE {
                 break;
             }
         }
@@ -371,7 +371,7 @@ impl<'a> DriveEquations<'a> {
     /// Fails when a segment is too short to be filtered.
     fn fit_limit(&self, limit: CandidateLimit) -> Outcome<Option<LimitFit>> {
         let limited = limit.applied(self.actuator);
-        let is_reached = |one: &DriveSegment| {
+        let is_reached = |one: &LimitSegment| {
             let [all, made] =
                 [self.actuator, &limited].map(|actuator| one.states.forces(self.model, actuator, self.gains));
             all.iter().zip(&made).filter(|(all, made)| all != made).count()

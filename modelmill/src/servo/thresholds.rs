@@ -76,3 +76,10 @@ pub(super) const LIMIT_STEP: f64 = 0.01;
 pub(super) const LIMIT_ITERATIONS: usize = 12;
 /// Largest change of a limit in one step, as a share of it (1). By judgement.
 pub(super) const LARGEST_LIMIT_STEP: f64 = 0.15;
+/// Change of a limit in one step, as a share of it (1), below which it is known. By judgement.
+pub(super) const LIMIT_TOLERANCE: f64 = 1e-5;
+/// A column that has less than this share of its norm outside the span of others depends on them (1). By judgement:
+/// columns of regressors are exact to some 1e-12.
+pub(super) const DEPENDENT_SHARE: f64 = 1e-8;
+/// Half an interval of 95 % in standard deviations.
+pub(super) const HALF_INTERVAL: f64 = 1.96;
