@@ -246,8 +246,13 @@ def claims(answer):
     return found | {(one["kind"], *one["at"]): () for one in answer["disturbances"] if one["kind"] in of_servos}
 
 
-def mark(case, found):
-    name, kind = DRIVES[case["drive"]], case["hidden"]
+def mark_claims(answer, kind, name):
+    """The mark of a diagnosis if `kind` is hidden at the drive `name`, and its claims."""
+    found = claims(answer)
+    return mark(kind, name, found), found
+
+
+def mark(kind, name, found):
     if kind == "none":
         return "false" if found else "right"
     if not found:
@@ -286,8 +291,7 @@ def main():
             if answer.returncode != 0:
                 verdict, found = "refused", answer.stderr.strip().splitlines()[-1:]
             else:
-                found = claims(json.loads(answer.stdout))
-                verdict = mark(case, found)
+                verdict, found = mark_claims(json.loads(answer.stdout), case["hidden"], DRIVES[case["drive"]])
                 (folder / "answer.json").write_text(answer.stdout)
             counts[verdict] += 1
             print(f"{k:3} {verdict:8} {case['hidden']} of {DRIVES[case['drive']]}, {case['size']:.3g}: {sorted(found)}", flush=True)

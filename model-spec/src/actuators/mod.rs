@@ -275,15 +275,12 @@ pub struct ModelActuator {
 
 impl ModelActuator {
     /// The signal that has the same effect on a servo without a dead band: the position inside the band, and the error
-    /// beyond it outside. The command of an angle is taken in the turn that is next to the position.
+    /// beyond it outside.
     pub fn effective_signal(&self, signal: f64, position: f64) -> f64 {
         if !self.kind.entry().is_position() {
             return signal;
         }
-        let mut error = signal - position;
-        if self.motion.is_angle() {
-            error -= std::f64::consts::TAU * (error / std::f64::consts::TAU).round();
-        }
+        let error = signal - position;
         match self.dead_band {
             Some(band) => position + error.signum() * (error.abs() - band).max(0.0),
             None => position + error,

@@ -12,8 +12,9 @@ use modelmill_spec::Sign;
 
 use super::ServoModel;
 use super::delay::{DelayQuery, ServoDelay, delays};
+use super::delay_steps::{DelayColumns, refine_by_instruments};
 use super::gains::GainValues;
-use super::instruments::commanded_segment;
+use super::instruments::{commanded_segment, project_on_instruments};
 use super::rows::{EquationRows, UsedSamples};
 use super::scale::ServoScale;
 use super::thresholds::{
@@ -122,14 +123,17 @@ impl ServoModel {
         };
         let (fit, check) = (segments(fit), segments(check));
         self.check_length(&fit)?;
-        let delays = delays(self, &fit, DelayQuery::OfModel)?;
-        let values: Vec<f64> = delays.iter().map(|delay| delay.value).collect();
+        let mut delays = delays(self, &fit, DelayQuery::OfModel)?;
         let mut system = ServoSystem::new(self, &fit)?;
+        refine_by_instruments(&system, &mut delays)?;
+        let mut values: Vec<f64> = delays.iter().map(|delay| delay.value).collect();
         let mut solved = system.solve(&values)?;
         if self.actuators().iter().any(|actuator| actuator.saturation.is_some()) {
             // The forces at a saturation are known only with the gains, which are better with each pass.
             for _ in 0..SATURATION_PASSES {
                 system.leave_out_saturated(&values, &solved)?;
+                refine_by_instruments(&system, &mut delays)?;
+                values = delays.iter().map(|delay| delay.value).collect();
                 solved = system.solve(&values)?;
             }
         }
@@ -180,9 +184,9 @@ impl ServoModel {
 }
 
 /// The system of equations of some recordings.
-struct ServoSystem<'a> {
+pub(super) struct ServoSystem<'a> {
     /// The model.
-    servo: &'a ServoModel,
+    pub(super) servo: &'a ServoModel,
     /// The samples that are used, by segment.
     samples: Vec<UsedSamples>,
     /// Estimated base parameters.
@@ -192,12 +196,16 @@ struct ServoSystem<'a> {
 }
 
 /// A solution with its equations.
-struct ServoSolution {
+pub(super) struct ServoSolution {
     solution: RegressionSolution,
     uncertainty: ParameterUncertainty,
-    estimator: ServoEstimator,
+    pub(super) estimator: ServoEstimator,
     /// The equations of the recordings, all segments after one another.
-    equations: EquationRows,
+    pub(super) equations: EquationRows,
+    /// The same at the instruments.
+    pub(super) instruments: Option<EquationRows>,
+    /// Weights of the drives.
+    pub(super) weights: Vec<f64>,
 }
 
 impl<'a> ServoSystem<'a> {
@@ -245,6 +253,20 @@ impl<'a> ServoSystem<'a> {
         Ok((own, instruments))
     }
 
+    /// The equations with some delays, without instruments.
+    ///
+    /// Fails when a pose has no solution.
+    pub(super) fn own_equations(&self, delays: &[f64]) -> Outcome<EquationRows> {
+        let mut own = EquationRows {
+            regressor: Vec::new(),
+            measured: Vec::new(),
+        };
+        for one in &self.samples {
+            own.append(one.equations(self.servo, &one.delayed(self.servo, delays))?);
+        }
+        Ok(own)
+    }
+
     /// Leaves out samples at which the actuators reach their saturation, with the gains of a solution.
     ///
     /// Fails when only ratios of gains can be known.
@@ -273,39 +295,48 @@ impl<'a> ServoSystem<'a> {
     }
 
     /// Solves the equations with some delays: first with equal weights, then with weights by drive.
-    fn solve(&self, delays: &[f64]) -> Outcome<ServoSolution> {
+    pub(super) fn solve(&self, delays: &[f64]) -> Outcome<ServoSolution> {
         let (own, instruments) = self.equations(delays)?;
         let mut weights = vec![1.0; self.n_rows()];
-        let first = self.solve_weighted(&own, instruments.as_ref(), &weights)?;
+        let first = self.solve_weighted(&own, instruments.as_ref(), &weights, &DelayColumns::default())?;
         if weights.len() > 1 {
             let values = self.base_values_of(&first.0);
             for (weight, row) in weights.iter_mut().zip(self.row_errors(&own, &values)) {
                 *weight = if row.error > 0.0 { row.error.recip() } else { 1.0 };
             }
         }
-        let (solution, uncertainty, estimator) = self.solve_weighted(&own, instruments.as_ref(), &weights)?;
+        let (solution, uncertainty, estimator) =
+            self.solve_weighted(&own, instruments.as_ref(), &weights, &DelayColumns::default())?;
         Ok(ServoSolution {
             solution,
             uncertainty,
             estimator,
             equations: own,
+            instruments,
+            weights,
         })
     }
 
-    /// Solves the equations with some weights of the drives.
-    fn solve_weighted(
+    /// Solves the equations with some weights of the drives, for the unknowns and for steps of some delays behind them.
+    ///
+    /// Fails when the equations cannot be solved.
+    pub(super) fn solve_weighted(
         &self,
         own: &EquationRows,
         instruments: Option<&EquationRows>,
         weights: &[f64],
+        delays: &DelayColumns,
     ) -> Outcome<(RegressionSolution, ParameterUncertainty, ServoEstimator)> {
-        let n = self.unknown.len();
+        let n = self.unknown.len() + delays.actuators.len();
         let failed = |error: LeastSquaresError| Error::input(format!("{}: {error}", self.servo.equations.path));
         let right = self.right_side(own, weights);
-        let plain = self.columns(own, weights);
+        let plain = self.columns(own, weights, delays);
         let mut reason = "the recording has no command that is free of the noise of sensors".to_owned();
         if let Some(instruments) = instruments {
-            let theirs = self.columns(instruments, weights);
+            let columns = self.columns(instruments, weights, delays);
+            let known = self.known_part(instruments, weights);
+            let projected = project_on_instruments(&columns, &known, &plain, weights.len());
+            let theirs = projected.unwrap_or(columns);
             let joined: Vec<f64> = (theirs.chunks_exact(n).zip(plain.chunks_exact(n)))
                 .flat_map(|(z, w)| z.iter().chain(w).copied())
                 .collect();
@@ -335,7 +366,8 @@ impl<'a> ServoSystem<'a> {
                 Err(error) => return Err(failed(error)),
             }
         }
-        let nominal: Vec<f64> = self.unknown.iter().map(|k| self.servo.equations.nominal[*k]).collect();
+        let mut nominal: Vec<f64> = self.unknown.iter().map(|k| self.servo.equations.nominal[*k]).collect();
+        nominal.resize(n, 0.0);
         let options = EstimateOptions::default();
         let found = estimate(&nominal, weights.len(), &options, |visit: &mut RowVisitor<'_>| {
             visit(&plain, &right)
@@ -348,29 +380,38 @@ impl<'a> ServoSystem<'a> {
         ))
     }
 
-    /// Weighted columns of the unknowns.
-    fn columns(&self, rows: &EquationRows, weights: &[f64]) -> Vec<f64> {
-        let n = self.servo.equations.base.len();
+    /// Weighted columns of the unknowns, and of steps of delays.
+    fn columns(&self, rows: &EquationRows, weights: &[f64], delays: &DelayColumns) -> Vec<f64> {
+        let (n, n_delays) = (self.servo.equations.base.len(), delays.actuators.len());
         let weighted = rows.regressor.chunks_exact(n).zip(weights.iter().cycle());
-        weighted
-            .flat_map(|(row, weight)| self.unknown.iter().map(move |k| weight * row[*k]))
-            .collect()
+        let all = weighted.enumerate().flat_map(|(i, (row, weight))| {
+            let steps = &delays.values[i * n_delays..(i + 1) * n_delays];
+            let unknown = self.unknown.iter().map(move |k| weight * row[*k]);
+            unknown.chain(steps.iter().map(move |x| weight * x))
+        });
+        all.collect()
     }
 
     /// Weighted right-hand side: measured forces less the columns with fixed values.
     fn right_side(&self, rows: &EquationRows, weights: &[f64]) -> Vec<f64> {
+        let known = self.known_part(rows, weights);
+        let measured = rows.measured.iter().zip(weights.iter().cycle());
+        measured
+            .zip(known)
+            .map(|((y, weight), known)| weight * y - known)
+            .collect()
+    }
+
+    /// Weighted sum of the columns with fixed values.
+    fn known_part(&self, rows: &EquationRows, weights: &[f64]) -> Vec<f64> {
         let n = self.servo.equations.base.len();
-        let all = rows
-            .regressor
-            .chunks_exact(n)
-            .zip(&rows.measured)
-            .zip(weights.iter().cycle());
-        all.map(|((row, y), weight)| weight * (y - self.fixed.iter().map(|(k, p)| row[*k] * p).sum::<f64>()))
+        let all = rows.regressor.chunks_exact(n).zip(weights.iter().cycle());
+        all.map(|(row, weight)| weight * self.fixed.iter().map(|(k, p)| row[*k] * p).sum::<f64>())
             .collect()
     }
 
     /// Values of all base parameters.
-    fn base_values(&self, solved: &ServoSolution) -> Vec<f64> {
+    pub(super) fn base_values(&self, solved: &ServoSolution) -> Vec<f64> {
         self.base_values_of(&solved.solution)
     }
 

@@ -5,11 +5,16 @@
 //! to the measured motion: a finite impulse response of the closed loop. Source: A. Janot, P.-O. Vandanjon, M. Gautier,
 //! "A generic instrumental variable approach for industrial robot identification", IEEE Trans. CST 22 (2014), who
 //! simulate the closed loop, which needs known gains.
+//!
+//! Known masses fix the scale of all other values. Where their forces are small, instruments of the unknown columns alone
+//! are weak for the scale, and all values come out too small by one factor. The known part of the equations along the
+//! commanded motion is therefore an instrument of its own, for each drive: two-stage least squares with more instruments
+//! than unknowns. Source: P. Young, "Recursive Estimation and Time-Series Analysis" (2011), section 7.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::ServoModel;
-use super::thresholds::{INSTRUMENT_LAGS, INSTRUMENT_RIDGE};
+use super::thresholds::{INSTRUMENT_LAGS, INSTRUMENT_RIDGE, PROJECTION_RIDGE};
 use crate::segment::RecordingSegment;
 use modelmill_spec::{ActuatorKind, ModelActuator};
 
@@ -122,6 +127,42 @@ fn fit_motion(features: &[Vec<Vec<f64>>; 3], motion: [&[f64]; 3]) -> Option<Comm
         total
     };
     Some(features.each_ref().map(|columns| sum(columns)))
+}
+
+/// The part of the regressor that follows from instruments, by rows as the regressor: the first stage of two-stage least
+/// squares. `known` is the known part of the equations along the commanded motion; its rows belong to `n_rows` drives
+/// in turn, each of which is an instrument of its own. `None` if the instruments depend on each other.
+pub(super) fn project_on_instruments(
+    instruments: &[f64],
+    known: &[f64],
+    regressor: &[f64],
+    n_rows: usize,
+) -> Option<Vec<f64>> {
+    let rows = known.len();
+    let n = regressor.len() / rows.max(1);
+    let width = n + n_rows;
+    // Columns have unit norm, so that the ridge has the same effect on all.
+    let mut z = DMatrix::zeros(rows, width);
+    for (i, (row, value)) in instruments.chunks_exact(n).zip(known).enumerate() {
+        for (k, x) in row.iter().enumerate() {
+            z[(i, k)] = *x;
+        }
+        z[(i, n + i % n_rows)] = *value;
+    }
+    for mut column in z.column_iter_mut() {
+        let norm = column.norm();
+        if norm > 0.0 {
+            column /= norm;
+        }
+    }
+    let w = DMatrix::from_row_slice(rows, n, regressor);
+    let mut normal = z.tr_mul(&z);
+    for k in 0..width {
+        normal[(k, k)] += PROJECTION_RIDGE;
+    }
+    let factors = normal.cholesky()?.solve(&z.tr_mul(&w));
+    let projected = z * factors;
+    Some(projected.transpose().as_slice().to_vec())
 }
 
 /// The scalar product of two columns.

@@ -7,15 +7,18 @@
 //! they are homogeneous: every multiple of a solution is a solution, so that only ratios can be known.
 
 mod delay;
+mod delay_steps;
 mod estimate;
 mod forces;
 mod gains;
 mod instruments;
+mod projection;
 mod refine;
 mod rows;
 mod scale;
 mod suspects;
 mod thresholds;
+mod turns;
 
 use modelmill_spec::ModelActuator;
 

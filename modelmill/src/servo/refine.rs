@@ -12,15 +12,12 @@ use modelmill_identify::diagnose::ForceColumn;
 use modelmill_identify::estimate::LeastSquares;
 
 use super::delay::ServoDelay;
-use super::thresholds::{DELAY_SAMPLES, LARGEST_DELAY, LARGEST_DELAY_STEP};
+use super::thresholds::{DELAY_SAMPLES, HALF_INTERVAL, LARGEST_DELAY, LARGEST_DELAY_STEP};
 use crate::along;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 use crate::regressors::regressor;
 use crate::segment::RecordingSegment;
-
-/// Half an interval of 95 % in standard deviations.
-const HALF_INTERVAL: f64 = 1.96;
 
 /// Delays that fit the forces of some segments best, and what the forces would add to those that the file gives, s. The
 /// latter, and those of which the equations determine nothing, stay as they are.
@@ -53,10 +50,21 @@ pub(super) fn refine_delays(
     Ok((refined, shifts))
 }
 
+/// The equation of a drive at one sample.
+#[derive(Clone)]
+struct DelayRow {
+    /// The columns.
+    columns: Vec<f64>,
+    /// The force.
+    force: f64,
+    /// Whether the row before is that of the sample before: no sample was left out, and no segment begins.
+    follows: bool,
+}
+
 /// The equations of all drives at the samples that count.
 struct DelayEquations {
-    /// For each drive its rows: the columns, the force, and whether the next row is its neighbour in time.
-    rows: Vec<Vec<(Vec<f64>, f64)>>,
+    /// For each drive its rows.
+    rows: Vec<Vec<DelayRow>>,
     /// The actuator of each of the last columns, with its drive.
     actuators: Vec<(usize, usize)>,
     /// Number of columns.
@@ -104,8 +112,10 @@ impl DelayEquations {
             };
             let every = measured[0].len().div_ceil(DELAY_SAMPLES).max(1);
             for (drive, rows) in rows.iter_mut().enumerate() {
+                let mut follows = false;
                 for i in (0..measured[drive].len()).step_by(every) {
                     if one.has_excluded_input(drive, i) {
+                        follows = false;
                         continue;
                     }
                     let mut row = vec![0.0; width];
@@ -128,7 +138,12 @@ impl DelayEquations {
                             row[usual + 3 * n_drives + at] = -slopes[k][i];
                         }
                     }
-                    rows.push((row, force));
+                    rows.push(DelayRow {
+                        columns: row,
+                        force,
+                        follows,
+                    });
+                    follows = true;
                 }
             }
         }
@@ -142,23 +157,23 @@ impl DelayEquations {
         };
         let all = || self.rows.iter().flatten();
         let used: Vec<usize> = (0..self.width)
-            .filter(|k| all().any(|(row, _)| row[*k] != 0.0))
+            .filter(|k| all().any(|row| row.columns[*k] != 0.0))
             .collect();
         let pick = |row: &[f64]| -> Vec<f64> { used.iter().map(|k| row[*k]).collect() };
         // Drives have equal weights first, then those of their residuals.
         let mut scales: Vec<f64> = self
             .rows
             .iter()
-            .map(|rows| rms(rows.iter().map(|(_, force)| *force)))
+            .map(|rows| rms(rows.iter().map(|row| row.force)))
             .collect();
         let mut lags = vec![0.0; self.rows.len()];
         let mut solution = None;
         for _ in 0..3 {
             let mut regression = LeastSquares::new(used.len());
             for (rows, scale) in self.rows.iter().zip(&scales).filter(|(_, scale)| **scale > 0.0) {
-                for (row, force) in rows {
-                    let row: Vec<f64> = pick(row).into_iter().map(|x| x / scale).collect();
-                    regression.add_rows(&row, &[force / scale]).map_err(failed)?;
+                for row in rows {
+                    let columns: Vec<f64> = pick(&row.columns).into_iter().map(|x| x / scale).collect();
+                    regression.add_rows(&columns, &[row.force / scale]).map_err(failed)?;
                 }
             }
             let found = RFactor::new(&regression)
@@ -167,19 +182,14 @@ impl DelayEquations {
             for ((rows, scale), lag) in self.rows.iter().zip(&mut scales).zip(&mut lags) {
                 let residual: Vec<f64> = rows
                     .iter()
-                    .map(|(row, force)| {
-                        let fitted = pick(row).iter().zip(&found.values).map(|(x, p)| x * p).sum::<f64>();
-                        force - fitted
+                    .map(|row| {
+                        let columns = pick(&row.columns);
+                        let fitted = columns.iter().zip(&found.values).map(|(x, p)| x * p).sum::<f64>();
+                        row.force - fitted
                     })
                     .collect();
                 *scale = rms(residual.iter().copied()).max(f64::MIN_POSITIVE);
-                let products: f64 = residual.windows(2).map(|w| w[0] * w[1]).sum();
-                let squares: f64 = residual.iter().map(|e| e * e).sum();
-                *lag = if squares > 0.0 {
-                    (products / squares).clamp(0.0, 0.999)
-                } else {
-                    0.0
-                };
+                *lag = neighbour_correlation(rows, &residual);
             }
             solution = Some(found);
         }
@@ -197,6 +207,25 @@ impl DelayEquations {
             Some((*actuator, solution.values[k], (covariance[(k, k)] * inflation).sqrt()))
         });
         Ok(steps.collect())
+    }
+}
+
+/// The correlation of residuals of neighbours in time, 0 to 0.999.
+fn neighbour_correlation(rows: &[DelayRow], residual: &[f64]) -> f64 {
+    let pairs = residual
+        .windows(2)
+        .zip(rows.iter().skip(1))
+        .filter(|(_, row)| row.follows);
+    let (products, squares) = pairs.fold((0.0, 0.0), |(products, squares), (pair, _)| {
+        (
+            products + pair[0] * pair[1],
+            squares + 0.5 * (pair[0] * pair[0] + pair[1] * pair[1]),
+        )
+    });
+    if squares > 0.0 {
+        f64::clamp(products / squares, 0.0, 0.999)
+    } else {
+        0.0
     }
 }
 

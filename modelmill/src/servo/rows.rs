@@ -4,12 +4,13 @@ use modelmill_codegen::ModelEvaluator;
 use modelmill_spec::{ExactExpression, ExactFunction, ModelActuator};
 
 use super::ServoModel;
-use super::forces::ActuatorStates;
 use super::gains::GainValues;
 use super::thresholds::{LARGEST_DELAY, MOST_SAMPLES, REVERSAL_PERIODS, SATURATION_SHARE, STANDSTILL_SHARE};
+use super::turns::turn_offset;
 use crate::along;
 use crate::error::Outcome;
 use crate::segment::RecordingSegment;
+use crate::segment::computed_forces::ActuatorStates;
 
 /// Equations of one segment, interleaved per sample.
 #[derive(Clone)]
@@ -61,9 +62,11 @@ impl UsedSamples {
         for (actuator, delay) in servo.actuators().iter().zip(delays) {
             let i = servo.signal_position(actuator);
             let (q, qd, qdd) = (&from.q[i], &from.qd[i], &from.qdd[i]);
+            let position = &self.positions[actuator.drive.0];
+            let turns = turn_offset(actuator, &self.segment.run.q[i], position);
             for (sample, t) in self.segment.run.time.iter().enumerate() {
                 let [value, rate, acceleration] = interpolate(&from.time, [q, qd, qdd], t - delay);
-                segment.run.q[i][sample] = actuator.effective_signal(value, self.positions[actuator.drive.0][sample]);
+                segment.run.q[i][sample] = actuator.effective_signal(value + turns, position[sample]);
                 segment.run.qd[i][sample] = rate;
                 segment.run.qdd[i][sample] = acceleration;
             }
@@ -78,12 +81,13 @@ impl UsedSamples {
         let Ok([_, rates]) = along::drive_motion(&servo.equations, &delayed) else {
             return;
         };
-        for actuator in servo.actuators() {
+        for (place, actuator) in servo.actuators().iter().enumerate() {
             let (drive, i) = (actuator.drive.0, servo.signal_position(actuator));
             let Some(limit) = actuator.saturation else {
                 continue;
             };
             let states = ActuatorStates {
+                actuator: place,
                 signal: delayed.run.q[i].clone(),
                 signal_rate: delayed.run.qd[i].clone(),
                 position: self.positions[drive].clone(),

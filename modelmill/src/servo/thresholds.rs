@@ -17,6 +17,10 @@ pub(super) const DELAY_STEPS: usize = 100;
 pub(super) const LARGEST_DELAY: f64 = DELAY_STEPS as f64 * DELAY_STEP;
 /// Largest correction of a delay by forces, s: beyond it a Gauss-Newton step is not accurate. By judgement.
 pub(super) const LARGEST_DELAY_STEP: f64 = 0.02;
+/// Gauss-Newton steps of delays with instruments at most; some three suffice.
+pub(super) const DELAY_ITERATIONS: usize = 6;
+/// Change of a delay, s, below which it is known. By judgement: a hundredth of a sample at 1 kHz.
+pub(super) const DELAY_TOLERANCE: f64 = 1e-5;
 /// Most samples for the search of a delay. By judgement.
 pub(super) const DELAY_SAMPLES: usize = 4000;
 /// Fall of the log likelihood, times two, at the ends of an interval of 95 % of one parameter.
@@ -34,6 +38,9 @@ pub(super) const INSTRUMENT_LAGS: [f64; 8] = [0.0, 0.01, 0.02, 0.04, 0.08, 0.16,
 pub(super) const INSTRUMENT_CORRELATION: f64 = 0.2;
 /// Ridge of the fit of instruments, as a share of the trace: lagged commands are nearly dependent. By judgement.
 pub(super) const INSTRUMENT_RIDGE: f64 = 1e-10;
+/// Ridge of the projection of the regressor on instruments of unit norm: above the rounding of their products. By
+/// judgement.
+pub(super) const PROJECTION_RIDGE: f64 = 1e-12;
 /// A value of an impossible sign is reported if it is this many standard deviations beyond zero. By judgement.
 pub(super) const IMPOSSIBLE_SIGMAS: f64 = 3.0;
 /// A balance error above this share of the force of a drive (1) is reported. By judgement: the EMPS axis has 0.044 on
@@ -60,7 +67,19 @@ pub(super) const CHECKED_FACTOR_ERROR: f64 = 0.3;
 pub(super) const SATURATION_SHARE: f64 = 0.9;
 /// Passes of the estimate with a saturation. By judgement.
 pub(super) const SATURATION_PASSES: usize = 3;
-
-/// A saturation that was found is certainly above this share of its estimate (1). By judgement: planted ones of 1.6 N m were
-/// estimated as 1.3 to 2.1 N m, since the smoothed motion rounds the corners of the force.
-pub(super) const CERTAIN_LIMIT_SHARE: f64 = 0.6;
+/// Change of a limit between two rounds, as a share of it (1), below which it is known. By judgement.
+pub(super) const LARGEST_LIMIT_CHANGE: f64 = 1e-3;
+/// Half the step of the derivative of a force by a limit, as a share of the limit (1). By judgement: few samples lie
+/// between both, and noise is far above rounding.
+pub(super) const LIMIT_STEP: f64 = 0.01;
+/// Gauss-Newton steps for a limit at most; some three suffice.
+pub(super) const LIMIT_ITERATIONS: usize = 12;
+/// Largest change of a limit in one step, as a share of it (1). By judgement.
+pub(super) const LARGEST_LIMIT_STEP: f64 = 0.15;
+/// Change of a limit in one step, as a share of it (1), below which it is known. By judgement.
+pub(super) const LIMIT_TOLERANCE: f64 = 1e-5;
+/// A column that has less than this share of its norm outside the span of others depends on them (1). By judgement:
+/// columns of regressors are exact to some 1e-12.
+pub(super) const DEPENDENT_SHARE: f64 = 1e-8;
+/// Half an interval of 95 % in standard deviations.
+pub(super) const HALF_INTERVAL: f64 = 1.96;

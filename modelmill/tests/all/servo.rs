@@ -213,6 +213,70 @@ fn gains_and_delay_are_recovered_with_a_known_gravity_load() {
     assert!(inside >= all - 5, "{inside} of {all}");
 }
 
+/// The position as an encoder of 12 bits reads it.
+pub(crate) fn by_encoder(mut log: Columns) -> Columns {
+    let step = std::f64::consts::TAU / 4096.0;
+    for (_, values) in log.iter_mut().filter(|(name, _)| name == "q") {
+        for value in values {
+            *value = step * (*value / step).round();
+        }
+    }
+    log
+}
+
+/// Where the known load is small beside the forces of the servo, noise must not make all other values too small by one
+/// factor, nor a delay too large.
+#[test]
+fn a_small_known_load_fixes_the_scale_without_bias() {
+    let planted = Planted {
+        j: 0.05,
+        ml: 0.03,
+        kp: 20.0,
+        kd: 0.5,
+        viscous: 0.05,
+        coulomb: 0.1,
+        delay: 0.012,
+    };
+    let servo = servo(&pendulum(&[("ml", planted.ml)]));
+    for seed in 40..44 {
+        let found = identify(&servo, by_encoder(simulate(&planted, seed, 6000)));
+        for (expression, truth) in [("kp", planted.kp), ("J", planted.j)] {
+            let (value, std) = value(&found, expression);
+            assert!(std < 0.1 * truth, "{seed} {expression} {value} +- {std}");
+            assert!(
+                (value - truth).abs() < (3.0 * std).max(0.05 * truth),
+                "{seed} {expression} {value} +- {std}"
+            );
+        }
+        let delay = &found.delays[0];
+        assert!((delay.value - planted.delay).abs() < 0.001, "{seed} {delay:?}");
+    }
+}
+
+/// A command in another turn than the position is the same command.
+#[test]
+fn full_turns_between_command_and_position_have_no_effect() {
+    let planted = Planted {
+        j: 0.05,
+        ml: 0.15,
+        kp: 20.0,
+        kd: 0.4,
+        viscous: 0.05,
+        coulomb: 0.1,
+        delay: 0.008,
+    };
+    let servo = servo(&pendulum(&[("ml", 0.15)]));
+    let log = simulate(&planted, 3, 4000);
+    let mut turned = log.clone();
+    for (_, values) in turned.iter_mut().filter(|(name, _)| name == "motor_command") {
+        values
+            .iter_mut()
+            .for_each(|value| *value += 2.0 * std::f64::consts::TAU);
+    }
+    let [here, there] = [log, turned].map(|log| value(&identify(&servo, log), "kp").0);
+    assert!((here - there).abs() < 1e-6 * here, "{here} {there}");
+}
+
 /// A friction that the model lacks is no noise: the values come with a warning, and not where nothing is lacking.
 #[test]
 fn a_balance_with_large_errors_is_reported() {

@@ -1,0 +1,117 @@
+//! Delays of signals by instrumental variables, together with all other unknowns.
+//!
+//! A system of equations goes in with first estimates of the delays, better ones with standard deviations come out. The
+//! change of the equations by a delay is a further column, whose factor is the step of the delay. It follows from the
+//! commands, so that it is its own instrument. Least squares would be biased: noise of the accelerations makes inertias
+//! too small, and a delay makes up for it.
+
+use super::delay::ServoDelay;
+use super::estimate::{ServoEstimator, ServoSystem};
+use super::rows::EquationRows;
+use super::thresholds::{
+    DELAY_ITERATIONS, DELAY_STEP, DELAY_TOLERANCE, HALF_INTERVAL, LARGEST_DELAY, LARGEST_DELAY_STEP,
+};
+use crate::error::Outcome;
+
+/// Changes of the equations by delays, for some actuators.
+#[derive(Default)]
+pub(super) struct DelayColumns {
+    /// The actuators, by place.
+    pub(super) actuators: Vec<usize>,
+    /// Derivatives by the delays, `[row][actuator]`, in units of the force per s.
+    pub(super) values: Vec<f64>,
+}
+
+/// Improves the delays that the file does not give; those stay that the equations do not determine.
+///
+/// Fails when a pose has no solution.
+pub(super) fn refine_by_instruments(system: &ServoSystem<'_>, delays: &mut [ServoDelay]) -> Outcome {
+    let estimated: Vec<usize> = (0..delays.len()).filter(|k| delays[*k].interval.is_some()).collect();
+    if estimated.is_empty() {
+        return Ok(());
+    }
+    for _ in 0..DELAY_ITERATIONS {
+        let values: Vec<f64> = delays.iter().map(|delay| delay.value).collect();
+        let solved = system.solve(&values)?;
+        if !matches!(solved.estimator, ServoEstimator::Instruments { .. }) {
+            return Ok(());
+        }
+        let columns = delay_columns(system, &values, &estimated, &system.base_values(&solved))?;
+        let joint = system.solve_weighted(
+            &solved.equations,
+            solved.instruments.as_ref(),
+            &solved.weights,
+            &columns,
+        )?;
+        let (solution, uncertainty, estimator) = joint;
+        if !matches!(estimator, ServoEstimator::Instruments { .. }) {
+            return Ok(());
+        }
+        let first = solution.values.len() - estimated.len();
+        let mut largest: f64 = 0.0;
+        for (at, k) in estimated.iter().enumerate() {
+            let (step, std) = (solution.values[first + at], uncertainty.std[first + at]);
+            if !solution.determined[first + at] || !std.is_finite() {
+                continue;
+            }
+            let one = &mut delays[*k];
+            let before = one.value;
+            one.value = (before + step.clamp(-LARGEST_DELAY_STEP, LARGEST_DELAY_STEP)).clamp(0.0, LARGEST_DELAY);
+            one.std = std;
+            one.is_open = one.value + HALF_INTERVAL * std >= LARGEST_DELAY;
+            one.interval = Some([-1.0, 1.0].map(|sign: f64| (one.value + sign * HALF_INTERVAL * std).max(0.0)));
+            largest = largest.max((one.value - before).abs());
+        }
+        if largest < DELAY_TOLERANCE {
+            break;
+        }
+    }
+    Ok(())
+}
+
+/// The change of all equations by the delays of some actuators.
+fn delay_columns(system: &ServoSystem<'_>, delays: &[f64], estimated: &[usize], base: &[f64]) -> Outcome<DelayColumns> {
+    let actuators = system.servo.actuators();
+    let body_rows = system.servo.body_rows();
+    let n = estimated.len();
+    let mut values: Vec<f64> = Vec::new();
+    // Signals of different drives are in different rows and are moved together.
+    let rank = |k: usize| {
+        actuators[..k]
+            .iter()
+            .filter(|one| one.drive == actuators[k].drive)
+            .count()
+    };
+    let last = (0..actuators.len()).map(rank).max().unwrap_or(0);
+    for round in 0..=last {
+        let moved = |step: f64| -> Outcome<EquationRows> {
+            let shifted: Vec<f64> = delays
+                .iter()
+                .enumerate()
+                .map(|(k, delay)| if rank(k) == round { delay + step } else { *delay })
+                .collect();
+            system.own_equations(&shifted)
+        };
+        let [before, after] = [moved(-DELAY_STEP)?, moved(DELAY_STEP)?];
+        let width = base.len();
+        let rows = after
+            .regressor
+            .chunks_exact(width)
+            .zip(before.regressor.chunks_exact(width));
+        values.resize(rows.len() * n, 0.0);
+        for (row, (after, before)) in rows.enumerate() {
+            let drive = body_rows[row % body_rows.len()];
+            let own = estimated
+                .iter()
+                .position(|k| rank(*k) == round && actuators[*k].drive.0 == drive);
+            if let Some(at) = own {
+                let change: f64 = after.iter().zip(before).zip(base).map(|((a, b), p)| (a - b) * p).sum();
+                values[row * n + at] = change / (2.0 * DELAY_STEP);
+            }
+        }
+    }
+    Ok(DelayColumns {
+        actuators: estimated.to_vec(),
+        values,
+    })
+}
