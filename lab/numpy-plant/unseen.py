@@ -515,6 +515,8 @@ def wrong_mass(case):
         values[j] *= 1 - share
     case.options = ["--held"]
     kinds = ("payload", "point_mass", "untied_part", "lumped_mass_placement")
+    # About a fixed axis the inertia of a link is that of its drive.
+    kinds += ("drive_inertia",) if j == 0 else ()
     case.truth = Truth(kinds, None, None, (), f"mass of link {j + 1} is {100 * share:.0f} % too small, values are fixed")
 
 
@@ -523,7 +525,9 @@ def encoder_zero(case):
     error = case.random.choice([-1, 1]) * case.random.uniform(0.02, 0.06)
     name = case.arm.coordinates[j]
     case.after.append(lambda run, x: {**x, name: x[name] + error})
-    case.truth = Truth(("encoder_zero",), case.places(j), error, (), f"zero of {name} off by {error:.3f} rad")
+    # A turn of the base about the first axis is the same.
+    alike = ("gravity_tilt",) if j == 0 else ()
+    case.truth = Truth(("encoder_zero",), case.places(j) + ("base",), error, alike, f"zero of {name} off by {error:.3f} rad")
 
 
 def wraps(case):
