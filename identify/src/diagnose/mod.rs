@@ -36,6 +36,7 @@ mod combinations;
 mod conditional;
 mod confirmed_readings;
 mod constant;
+mod determined;
 mod disturbance;
 mod drifts;
 mod estimates;

@@ -168,6 +168,7 @@ impl EffectSelector<'_> {
         let by_folds = self.has_run_parameters(accepted) || self.has_run_parameters(&next.picks);
         let error = |picks: &[SelectedEffect]| self.relative_errors(picks, by_folds).1;
         (!is_refinement || gain >= REFINEMENT_LEAST_GAIN)
+            && self.are_members_determined(&next.picks)
             && self.are_readings_confirmed(&next.picks)
             && error(&next.picks) <= (1.0 + STEP_MOST_RISE) * error(accepted)
     }
@@ -256,7 +257,9 @@ impl EffectSelector<'_> {
             tested += usize::from(trial.is_possible());
             let news: Vec<SelectedEffect> = set_difference(&trial.picks, accepted);
             let evidence = self.evidence(accepted, &trial.picks, &self.affected_channels(&news));
-            if evidence.is_sufficient() && trial.is_possible() && self.are_readings_confirmed(&trial.picks) {
+            let is_confirmed =
+                || self.are_members_determined(&trial.picks) && self.are_readings_confirmed(&trial.picks);
+            if evidence.is_sufficient() && trial.is_possible() && is_confirmed() {
                 return Some(SupportedEffectSet {
                     candidates: tried,
                     trial,

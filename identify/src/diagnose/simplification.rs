@@ -252,7 +252,8 @@ impl EffectSelector<'_> {
                     0.0
                 };
                 let score = score - ahead;
-                let is_confirmed = || self.are_readings_confirmed(&trial.picks);
+                let is_confirmed =
+                    || self.are_members_determined(&trial.picks) && self.are_readings_confirmed(&trial.picks);
                 if trial.freedoms <= now.freedoms && score < best.0 && is_confirmed() {
                     best = (score, ahead, Some(trial));
                 }

@@ -343,3 +343,26 @@ fn what_no_candidate_has_is_unexplained() {
     assert!(again[again.len() / 2] > 0.5, "{again:?}");
     assert!(wrong.len() <= 2, "{wrong:?}");
 }
+
+/// A joint that stands in each recording at another pose: the force of an effect is constant along the fit, as a column of
+/// the model is, and has another value along the check. Whatever the effect explains there, the fit gives it no value.
+#[test]
+fn an_effect_that_the_fit_does_not_determine_is_not_claimed() {
+    for seed in 0..3 {
+        let mut random = Random::new(900 + seed);
+        let ones = vec![1.0; 2 * SAMPLES];
+        let by_pose: Vec<f64> = (0..2 * SAMPLES).map(|i| if i < SAMPLES { 1.0 } else { 2.0 }).collect();
+        let noise = random.white();
+        let hidden = sum(&[(1.0, &by_pose), (1.0, &noise)]);
+        let candidates = vec![candidate("counterbalance", &[&by_pose], SignConstraint::Any)];
+        let mut problem = problem(&mut random, &hidden, candidates);
+        problem.base.push(column(&ones));
+        problem.base_is_part_of_load.push(true);
+        let diagnosis = answer(&problem);
+        assert!(found(&diagnosis).is_empty(), "{seed}: {:?}", found(&diagnosis));
+        // The pose of a joint that moves in the fit determines it.
+        problem.base.pop();
+        problem.base_is_part_of_load.pop();
+        assert_eq!(found(&answer(&problem)), ["counterbalance"], "{seed}");
+    }
+}

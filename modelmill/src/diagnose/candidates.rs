@@ -5,6 +5,8 @@
 //! entry. So there is no second definition of an effect, and effect kinds of a user's own library are tried like
 //! all others.
 
+use std::collections::BTreeSet;
+
 use modelmill_codegen::{Derivation, ParameterMonomial, PoseGuard};
 use modelmill_spec::{
     AddedEffect, ConstantSearch, ConstantValue, EffectKind, Mechanics, Mechanism, ModelConstant, ModelEffect, Scale,
@@ -290,7 +292,7 @@ impl CandidateVariant {
     }
 }
 
-/// The base columns of a model as functions of a tilt of its base.
+/// The columns of all parameters of a model as functions of a tilt of its base.
 ///
 /// Fails when the derivation fails.
 pub(crate) fn derive_tilt(model: &Model) -> Outcome<Derivation> {
@@ -303,11 +305,11 @@ pub(crate) fn derive_tilt(model: &Model) -> Outcome<Derivation> {
         ..AddedEffect::default()
     };
     let variant = model.loaded.with_additions(&constants, &[tilt])?;
+    // The tilt changes gravity in all columns, also in those that have no effect or are dependent while the base is level.
     let reduction = &model.derivation.reduction;
-    let base: Vec<&ParameterMonomial> = reduction.retained.iter().map(|k| &reduction.products[*k]).collect();
-    // The tilt changes gravity in all columns of the base.
-    let is_base = |product: &ParameterMonomial| base.contains(&product);
-    modelmill_codegen::derive_columns(&variant, &is_base).map_err(|error| Error::derivation(&model.path, error))
+    let own: BTreeSet<&ParameterMonomial> = reduction.products.iter().chain(&reduction.without_effect).collect();
+    let is_own = |product: &ParameterMonomial| own.contains(product);
+    modelmill_codegen::derive_columns(&variant, &is_own).map_err(|error| Error::derivation(&model.path, error))
 }
 
 /// A constant of a variant.

@@ -20,8 +20,25 @@ const SMEAR_SAMPLES: f64 = 2.0;
 /// stop acts at every visit of its place, a push only once.
 pub(super) fn leave_out_known_contacts(problem: &mut DiagnosisProblem, all: &SegmentList<'_>) {
     let faults = all.iter().flat_map(|(one, _)| &one.faults);
-    let contacts = faults.filter(|one| one.kind == "contact_event").cloned();
+    let contacts = faults.filter(|one| is_contact(one)).cloned();
     leave_out_contacts(problem, all, merge_contacts(contacts.collect()));
+}
+
+/// Whether a disturbance is a contact or a push.
+pub(super) fn is_contact(one: &Disturbance) -> bool {
+    one.kind == "contact_event"
+}
+
+/// Whether a recording has both a contact, found without knowledge of changes in time, and such a change.
+pub(super) fn are_contacts_doubtful(disturbances: &[Disturbance]) -> bool {
+    let is_change = |one: &&Disturbance| one.interval.is_some() && !is_contact(one);
+    let changed: Vec<&String> = disturbances
+        .iter()
+        .filter(is_change)
+        .flat_map(|one| &one.recordings)
+        .collect();
+    let mut contacts = disturbances.iter().filter(|one| is_contact(one));
+    contacts.any(|one| one.recordings.iter().any(|file| changed.contains(&file)))
 }
 
 /// Leaves out the contacts and pushes in the residual of a search, `[drive][sample]`. Returns whether there are any.
@@ -53,14 +70,19 @@ pub(super) fn drop_doubtful_contacts(
     residuals: &[TimeResidual],
     channels: &[String],
 ) {
-    let stands_out = |name: &String, force: f64| {
+    let largest_residual = |name: &String| {
         let here = residuals.iter().filter(|one| channels.get(one.channel) == Some(name));
-        let largest = here.map(|one| one.rms).fold(0.0, f64::max);
-        force.abs() > CONTACT_LEAST_RESIDUAL_RATIO * largest
+        here.map(|one| one.rms).max_by(f64::total_cmp)
     };
     disturbances.retain(|one| {
-        let mut forces = one.at.iter().zip(&one.estimates);
-        one.kind != "contact_event" || forces.any(|(name, force)| stands_out(name, force.value))
+        // A drive without such a residual shows nothing: it may only feel what another drive does.
+        let forces = one.at.iter().zip(&one.estimates);
+        let mut judged = forces
+            .filter_map(|(name, force)| {
+                Some(force.value.abs() > CONTACT_LEAST_RESIDUAL_RATIO * largest_residual(name)?)
+            })
+            .peekable();
+        !is_contact(one) || judged.peek().is_none() || judged.any(|stands_out| stands_out)
     });
 }
 
@@ -315,19 +337,29 @@ mod tests {
 
     use super::*;
 
-    /// A contact is stated only if its force is clearly larger than a residual that follows the time at other times.
+    /// A contact is stated only if its force is clearly larger than a residual that follows the time at other times; a
+    /// drive without such a residual does not save it.
     #[test]
     fn contacts_in_a_residual_as_large_are_dropped() {
         let channels = ["one".to_owned(), "two".to_owned()];
-        let contact = |at: &str, force: f64| Disturbance {
+        let on_both = |forces: &[(&str, f64)]| Disturbance {
             kind: "contact_event".to_owned(),
-            at: vec![at.to_owned()],
-            estimates: vec![EstimatedQuantity::new("force", force, "N m")],
+            at: forces.iter().map(|(at, _)| (*at).to_owned()).collect(),
+            estimates: (forces.iter())
+                .map(|(_, force)| EstimatedQuantity::new("force", *force, "N m"))
+                .collect(),
             recordings: Vec::new(),
             interval: None,
             description: None,
         };
-        let all = [contact("one", 3.2), contact("one", -40.0), contact("two", 3.2)];
+        let contact = |at: &str, force: f64| on_both(&[(at, force)]);
+        let all = [
+            contact("one", 3.2),
+            on_both(&[("one", 3.2), ("two", 0.4)]),
+            contact("one", -40.0),
+            contact("two", 3.2),
+            on_both(&[("one", -40.0), ("two", 0.4)]),
+        ];
         let ringing = TimeResidual {
             channel: 0,
             character: ResidualCharacter::Large,
@@ -338,6 +370,23 @@ mod tests {
         };
         let mut kept = all.to_vec();
         drop_doubtful_contacts(&mut kept, &[ringing], &channels);
-        assert_eq!(kept, all[1..]);
+        assert_eq!(kept, all[2..]);
+    }
+    /// A contact beside a change of the same recording is doubtful; one of another recording is not.
+    #[test]
+    fn contacts_of_changed_recordings_are_doubtful() {
+        let at = |kind: &str, file: &str, interval: Option<[f64; 2]>| Disturbance {
+            kind: kind.to_owned(),
+            at: vec!["one".to_owned()],
+            estimates: Vec::new(),
+            recordings: vec![file.to_owned()],
+            interval,
+            description: None,
+        };
+        let contact = at("contact_event", "a.csv", Some([1.0, 1.5]));
+        let change = |file: &str| at("payload_change", file, Some([1.2, 9.0]));
+        assert!(are_contacts_doubtful(&[contact.clone(), change("a.csv")]));
+        assert!(!are_contacts_doubtful(&[contact.clone(), change("b.csv")]));
+        assert!(!are_contacts_doubtful(&[contact, at("outliers", "a.csv", None)]));
     }
 }

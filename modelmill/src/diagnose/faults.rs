@@ -26,7 +26,8 @@ pub(crate) fn run_differences(model: &Model, recordings: &[&PreparedRecording]) 
     }
 }
 
-/// Subtracts known faults from the measured forces of a problem, and adds them to its disturbances.
+/// Subtracts known faults from the measured forces of a problem, and adds them to its disturbances. Returns the samples
+/// that were left out before the contacts were, `[channel][sample]`.
 ///
 /// Fails when a recording has no forces.
 pub(crate) fn subtract_known(
@@ -34,7 +35,7 @@ pub(crate) fn subtract_known(
     model: &Model,
     all: &SegmentList<'_>,
     between: &[RecordingDifference],
-) -> Outcome<()> {
+) -> Outcome<Vec<Vec<bool>>> {
     problem.removed.resize(model.drives().len(), 0.0);
     problem.removed_differences.resize(model.drives().len(), 0.0);
     // Powers are means over all samples.
@@ -60,6 +61,7 @@ pub(crate) fn subtract_known(
     }
     // Noise of quantisation and events come from the signals themselves.
     add_quantisation_noise(problem, model, all)?;
+    let without_contacts = problem.left_out.clone();
     leave_out_known_contacts(problem, all);
     // Faults from the preparation are listed once, with all of their recordings.
     for one in all.iter().flat_map(|(one, _)| &one.faults) {
@@ -80,7 +82,7 @@ pub(crate) fn subtract_known(
             None => problem.disturbances.push(one.clone()),
         }
     }
-    Ok(())
+    Ok(without_contacts)
 }
 
 /// A difference of two recordings as a disturbance.

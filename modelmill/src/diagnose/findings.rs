@@ -33,6 +33,7 @@ use super::named_zeros::NamedZeros;
 use super::off_nominal::{OffNominalParameter, off_nominal_parameters, reversed_sign_note};
 use super::problem::{self, DiagnosisQuery, DiagnosisSolution, FixedParameters};
 use super::requested_effects::NamedEffect;
+use super::standing_drives::StandingDrives;
 use super::thresholds::{EQUAL_ALTERNATIVE_LEAST_SHARE, MOST_VALIDATION_ERROR};
 use super::words::{self, ValidationMethod};
 
@@ -243,6 +244,12 @@ impl Model {
             faults::run_differences(self, &recordings)
         })??;
         let mut between = between;
+        let all: Vec<(&RecordingSegment, bool)> = data.iter().flatten().map(|one| (one, false)).collect();
+        let standing = StandingDrives::find(self, &all)?;
+        between.retain(|one| {
+            let (_, places, _) = one.changed.change.parts(one.changed.unit);
+            !standing.has_all(places)
+        });
         let is_clock_in_question = !recordings.iter().any(|one| one.has_recorded_derivatives(self));
         let (answer, named) = search_effects(self, &data, held, is_clock_in_question, &mut between)?;
         let judged = if data[1].is_empty() {
@@ -254,7 +261,12 @@ impl Model {
             check_prediction(&answer, judged)?;
         }
         let notes = data.iter().flatten().flat_map(RecordingSegment::notes);
-        let notes = self.caution().into_iter().chain(notes.cloned()).collect();
+        let notes = self
+            .caution()
+            .into_iter()
+            .chain(standing.note())
+            .chain(notes.cloned())
+            .collect();
         // The model file with the effects, and that model identified from the same recordings.
         let entries = added_effects::entries(self, &answer);
         let (edited, after) = if entries.is_empty() {

@@ -58,6 +58,7 @@ mod places;
 mod problem;
 mod requested_effects;
 mod signal_delays;
+mod standing_drives;
 mod thresholds;
 mod tilt;
 pub mod words;

@@ -22,7 +22,7 @@ use super::candidates::{DerivedCandidates, candidates};
 use super::clock::clock;
 use super::columns::{self, CandidateOrigin, load_dependent_columns, refined_columns};
 use super::constants::{ClaimedConstant, constants};
-use super::contacts::{drop_doubtful_contacts, leave_out_late_contacts};
+use super::contacts::{are_contacts_doubtful, drop_doubtful_contacts, is_contact, leave_out_late_contacts};
 use super::encoders::{self, encoders};
 use super::estimates::round_by_deviation;
 use super::faults::subtract_known;
@@ -36,6 +36,7 @@ use super::numbers::{layout, stack, variables};
 use super::payloads::{frame_loads, load_changes, payloads, reach};
 use super::places::sharing_places;
 use super::signal_delays::SignalDelays;
+use super::standing_drives::StandingDrives;
 use super::thresholds::FEWEST_SAMPLES;
 use super::words;
 use crate::regressors::{SegmentList, regressor};
@@ -135,7 +136,7 @@ pub(crate) fn find_missing_effects(
     };
     fix_parameters(&mut problem, model, held);
     problem.effects_only = !query.in_full;
-    subtract_known(&mut problem, model, &all, query.run_differences)?;
+    let without_contacts = subtract_known(&mut problem, model, &all, query.run_differences)?;
     let units: Vec<String> = (0..model.drives().len())
         .map(|d| model.force_unit(d).to_owned())
         .collect();
@@ -159,7 +160,9 @@ pub(crate) fn find_missing_effects(
     problem.candidates.extend(further);
     // None of these can be an entry of a model file.
     origins.resize(problem.candidates.len(), None);
-    drop_excluded_candidates(&mut problem, &mut origins, model, &delays);
+    let standing = StandingDrives::find(model, &all)?;
+    problem.change_shapes.retain(|one| !standing.excludes(&one.effect));
+    drop_excluded_candidates(&mut problem, &mut origins, model, &delays, &standing);
     // Stage 4: the search, which requests further columns while it runs.
     let supply = ColumnSupply {
         candidates: &candidates,
@@ -176,6 +179,16 @@ pub(crate) fn find_missing_effects(
         host.run_job("searching for missing effects", 0, |_| diagnose(problem, &supply))
     };
     let mut diagnosis = search(&mut problem)?;
+    // The audit knows no changes in time: where one begins, and after it, forces look like contacts. Those that are left
+    // once the change is known are found below.
+    if query.in_full && are_contacts_doubtful(&diagnosis.disturbances) {
+        problem.left_out = without_contacts;
+        problem.disturbances.retain(|one| !is_contact(one));
+        (problem.measured, problem.removed) = forces.clone();
+        problem.candidates.truncate(known);
+        problem.change_intervals.clear();
+        diagnosis = search(&mut problem)?;
+    }
     // A missing effect hides small contacts: with the effects found, they stand out. Then the search is repeated.
     if query.in_full && leave_out_late_contacts(&mut problem, model, &all, &diagnosis.residual) {
         (problem.measured, problem.removed) = forces;
@@ -216,16 +229,17 @@ pub(crate) fn find_missing_effects(
     })
 }
 
-/// Removes the candidates that computed forces exclude, with their origins, and adds the delays of their signals to the
-/// base: estimated delays are estimated anew with each set of effects.
+/// Removes the candidates that computed forces or standing drives exclude, with their origins, and adds the delays of
+/// the signals to the base: estimated delays are estimated anew with each set of effects.
 fn drop_excluded_candidates(
     problem: &mut DiagnosisProblem,
     origins: &mut Vec<CandidateOrigin>,
     model: &Model,
     delays: &SignalDelays,
+    standing: &StandingDrives,
 ) {
     let is_kept: Vec<bool> = (problem.candidates.iter())
-        .map(|one| !delays.excludes(model, one))
+        .map(|one| !delays.excludes(model, one) && !standing.excludes(&one.effect))
         .collect();
     let mut of_origins = is_kept.iter();
     origins.retain(|_| *of_origins.next().unwrap_or(&true));

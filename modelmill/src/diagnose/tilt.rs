@@ -1,6 +1,6 @@
 //! Change of the forces with gravity along each axis of the base, for a base that may be tilted.
 
-use modelmill_codegen::{Derivation, ModelEvaluator};
+use modelmill_codegen::{Derivation, ModelEvaluator, ParameterMonomial};
 use modelmill_identify::diagnose::{ForceColumn, ForceSensitivity, TiltCandidate};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
@@ -13,8 +13,8 @@ use crate::regressors::{SegmentList, regressor};
 /// Constants of a tilt, about x, y and z.
 pub(crate) const TILTS: [&str; 3] = ["tx", "ty", "tz"];
 
-/// Derivative of each base column by gravity along each axis of the base (per m/s^2), and the axes about which
-/// a tilt has an effect. Forces are linear in gravity, so two evaluations for each axis, with gravity in both
+/// Derivative of each base column, and of the forces of all other nominal parameters, by gravity along each axis of the
+/// base (per m/s^2), and the axes about which a tilt has an effect. Forces are linear in gravity, so two evaluations for each axis, with gravity in both
 /// directions, are exact.
 ///
 /// Fails when a pose has no solution.
@@ -32,8 +32,12 @@ pub(crate) fn tilt(derivation: &Derivation, model: &Model, all: &SegmentList<'_>
     if size == 0.0 {
         return Ok(tilt);
     }
-    // The reduction of the model without tilt decides which columns are needed.
     let own = &model.derivation.reduction;
+    let parameters = &model.derivation.mechanism.parameters;
+    let nominal: Vec<f64> = parameters.iter().map(|p| p.nominal).collect();
+    let constants = &model.derivation.mechanism.constants;
+    let constants: Vec<f64> = constants.iter().map(|c| c.value).collect();
+    let level = model.derivation.base_values(&nominal, &constants);
     for (axis, component) in tilt.components.iter_mut().enumerate() {
         // The base is turned so that gravity points along the axis, in either direction.
         let along = |sign: f64| {
@@ -49,21 +53,29 @@ pub(crate) fn tilt(derivation: &Derivation, model: &Model, all: &SegmentList<'_>
         };
         // Half the difference of both directions is the part that changes with gravity.
         let [before, after] = [along(-1.0)?, along(1.0)?];
+        // The difference of both directions, per unit of gravity.
+        let changes: Vec<ForceColumn> = (after.iter().zip(&before))
+            .map(|(after, before)| {
+                let mut change = ForceColumn(vec![None; model.drives().len()]);
+                change.add(0.5 / size, after);
+                change.add(-0.5 / size, before);
+                change
+            })
+            .collect();
+        let products = &derivation.reduction.products;
+        let change_of = |product: &ParameterMonomial| changes.iter().zip(products).find(|(_, other)| *other == product);
+        // What the parameters have in addition to the base: those that act on no drive while the base is level, such as
+        // the first moments of a link on a vertical axis, and dependencies that hold for level gravity only.
         component.fixed = ForceColumn(vec![None; model.drives().len()]);
+        for (change, product) in changes.iter().zip(products) {
+            component.fixed.add(product.value(&nominal), change);
+        }
         // The base columns in the order of the model.
-        for retained in &own.retained {
-            let product = &own.products[*retained];
-            let reduction = &derivation.reduction;
-            let place = reduction
-                .retained
-                .iter()
-                .position(|p| reduction.products[*p] == *product);
-            let mut change = ForceColumn(vec![None; model.drives().len()]);
-            if let Some(place) = place {
-                // The difference of both directions, per unit of gravity.
-                change.add(0.5 / size, &after[place]);
-                change.add(-0.5 / size, &before[place]);
-            }
+        for (retained, value) in own.retained.iter().zip(&level) {
+            let change = change_of(&own.products[*retained]);
+            let none = ForceColumn(vec![None; model.drives().len()]);
+            let change = change.map_or(none, |(change, _)| change.clone());
+            component.fixed.add(-value, &change);
             component.base.push(change);
         }
     }
@@ -73,14 +85,16 @@ pub(crate) fn tilt(derivation: &Derivation, model: &Model, all: &SegmentList<'_>
         ..tilt.clone()
     };
     for (axis, direction) in every.directions(&[0.0; 3]).into_iter().enumerate() {
-        let has_effect = (0..own.retained.len()).any(|k| {
+        let changes_forces = |part: &dyn Fn(&ForceSensitivity) -> ForceColumn| {
             let mut change = ForceColumn(vec![None; model.drives().len()]);
             for (share, component) in direction.iter().zip(&tilt.components) {
-                change.add(*share, &component.base[k]);
+                change.add(*share, &part(component));
             }
             let values = change.0.iter().flatten().flatten();
             values.fold(0.0_f64, |m, x| m.max(x.abs())) > TILT_LEAST_EFFECT
-        });
+        };
+        let has_effect = changes_forces(&|one| one.fixed.clone())
+            || (0..own.retained.len()).any(|k| changes_forces(&|one| one.base[k].clone()));
         if has_effect {
             tilt.axes.push(axis);
         }

@@ -9,7 +9,7 @@ use modelmill::diagnose::{DiagnosisFindings, DiagnosisOptions, DiagnosisVerdict,
 use modelmill::identify::EstimatorOptions;
 use modelmill::recording::RecordingOptions;
 
-use crate::made::{Made, bundled, run, run_of};
+use crate::made::{Made, bundled, run, run_of, with_part};
 
 const ARM: &str = "puma560";
 
@@ -344,4 +344,27 @@ fn gravity_of_the_wrong_sign_is_corrected() {
         says.len() == 1 && says[0].starts_with("gravity points along -y"),
         "{says:?}"
     );
+}
+
+/// A tilted base makes the first moment of a link on a vertical axis act on its drive. It has no effect while the base is
+/// level and is no base parameter, but its nominal value is known: nothing but the tilt is missing.
+#[test]
+fn a_tilted_base_needs_no_counterbalance() {
+    let column = "\n[[part]]\nname = \"column\"\non = \"link1\"\nmass = 25\ncentre = [0.12, 0.1, 0]\n\
+                  inertia = { xx = 0.1, yy = 0.1, zz = 0.1 }\n";
+    let tilt =
+        "\n[[effect]]\nkind = \"gravity_tilt\"\nat = [\"base\"]\nconstants = { tx = 0.04, ty = -0.03, tz = 0 }\n";
+    let truth = with_part(ARM, &format!("{column}{tilt}"));
+    let file = run_of(&truth, ARM, 760, Made::Nothing);
+    let model = with_part(ARM, column);
+    let recording = model.recording(&file, &RecordingOptions::default());
+    let recording = recording.expect("the recording");
+    let question = DiagnosisOptions {
+        fixed: FixedParameters::Known,
+        repeat_with_nominal: false,
+    };
+    let findings = (model.diagnose(&[&recording], &[], &question)).expect("an answer");
+    let found = only(&findings, "gravity_tilt", "base");
+    near(found, "tx", 0.04, 0.1);
+    near(found, "ty", -0.03, 0.1);
 }

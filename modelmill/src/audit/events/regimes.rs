@@ -4,6 +4,8 @@
 //! At standstill friction takes any value up to its limit. A reading in a dead band follows no force. Such samples
 //! neither start nor end an event.
 
+use std::ops::Range;
+
 use modelmill_identify::float_to_count;
 
 use super::smoothing::{dilate_mask, running_mean, true_ranges, true_share};
@@ -43,6 +45,15 @@ pub(super) fn standing_mask(rates: &[f64], samples_per_second: f64, slowest: f64
     let fastest = magnitudes.iter().fold(0.0_f64, |most, v| most.max(*v));
     let limit = (STANDSTILL_RATE_SHARE * fastest).max(slowest);
     let mut standing: Vec<bool> = magnitudes.iter().map(|v| *v <= limit).collect();
+    // A slow reversal passes evenly through all small rates; at standstill most of them are close to zero.
+    let is_calm = |range: &Range<usize>| {
+        let inner = magnitudes[range.clone()].iter();
+        2 * inner.filter(|v| **v <= CALM_RATE_SHARE * limit).count() >= range.len()
+    };
+    // A reversal soon after a slow start is no standstill to which the start belongs.
+    for range in true_ranges(&standing).into_iter().filter(|range| !is_calm(range)) {
+        standing[range].fill(false);
+    }
     // A push moves a drive a little that is held at a position: short and slow motion does not end a standstill.
     let moving: Vec<bool> = standing.iter().map(|stands| !stands).collect();
     let (gap, slow) = (count(STANDSTILL_LONGEST_GAP_S), (SLOW_RATE_SHARE * fastest).max(limit));
@@ -52,14 +63,9 @@ pub(super) fn standing_mask(rates: &[f64], samples_per_second: f64, slowest: f64
             standing[range].fill(true);
         }
     }
-    // A slow reversal passes evenly through all small rates; at standstill most of them are close to zero.
     let shortest = count(STANDSTILL_SHORTEST_S);
     for range in true_ranges(&standing) {
-        let calm = magnitudes[range.clone()]
-            .iter()
-            .filter(|v| **v <= CALM_RATE_SHARE * limit)
-            .count();
-        if range.len() < shortest || 2 * calm < range.len() {
+        if range.len() < shortest || !is_calm(&range) {
             standing[range].fill(false);
         }
     }
@@ -153,4 +159,37 @@ fn has_dead_band(trace: &ResidualTrace, drive: usize, is_standing: &[bool]) -> b
 /// Whether two readings are the same number; 0 and -0 are.
 fn is_same_reading(a: f64, b: f64) -> bool {
     (a - b).abs() == 0.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A drive that starts slowly and turns round soon afterwards moves from the start on; one that a push moves a little
+    /// stands all the time.
+    #[test]
+    fn a_slow_start_with_a_reversal_is_motion() {
+        let at = |k: usize| 0.01 * k as f64;
+        // Standstill for 2 s, then a rate of at most 4 % of the largest one that changes its sign after 0.36 s.
+        let starts: Vec<f64> = (0..600)
+            .map(|k| match at(k) - 2.0 {
+                t if t < 0.0 => 0.0,
+                t if t < 0.5 => -0.04 * (std::f64::consts::TAU * t / 0.72).sin(),
+                t => 0.04 + (t - 0.5).min(1.0),
+            })
+            .collect();
+        let mask = standing_mask(&starts, 100.0, 1e-4);
+        assert!(mask[..195].iter().all(|stands| *stands));
+        assert!(mask[206..].iter().all(|stands| !stands));
+        // The same bump between two standstills is a push.
+        let pushed: Vec<f64> = (0..600)
+            .map(|k| match at(k) - 2.0 {
+                t if (0.0..0.3).contains(&t) => 0.04 * (std::f64::consts::TAU * t / 0.3).sin(),
+                t if t < 2.0 => 0.0,
+                t => (t - 2.0).min(1.0),
+            })
+            .collect();
+        let mask = standing_mask(&pushed, 100.0, 1e-4);
+        assert!(mask[..395].iter().all(|stands| *stands));
+    }
 }
