@@ -1,15 +1,13 @@
 //! The functions of a model, the same for every language that prints them: programs with their names, documentation,
 //! and the form of their results.
 
-use modelmill_codegen::{PassivePosition, StraightLineProgram};
-
-use super::{StatementRoutine, inputs_of_state, matrix_entry_names, reads_passive};
-use crate::language::EmissionRequest;
-use crate::tree::NameScope;
 use modelmill_codegen::expr::Atom;
+use modelmill_codegen::{Derivation, DynamicsPrograms, PassivePosition, StraightLineProgram};
+
+use super::{NameScope, StatementRoutine, inputs_of_state, matrix_entry_names, reads_passive};
 
 /// A program as a function of a state or of a pose.
-pub(crate) struct ModelFunction<'a> {
+pub(crate) struct ProgramFunction<'a> {
     /// The program.
     pub(crate) program: &'a StraightLineProgram,
     /// Name of the function.
@@ -19,7 +17,7 @@ pub(crate) struct ModelFunction<'a> {
     /// Name of the result.
     pub(crate) result: &'static str,
     /// The parts of the result, in the order of the program's outputs.
-    pub(crate) parts: Vec<ResultPart>,
+    pub(crate) parts: Vec<OutputPart>,
     /// Its statements.
     pub(crate) routine: StatementRoutine,
     /// Inputs of the program, in order.
@@ -32,7 +30,7 @@ pub(crate) struct ModelFunction<'a> {
 
 /// A vector or a matrix in the outputs of a program; a matrix is stored row by row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct ResultPart {
+pub(crate) struct OutputPart {
     /// Its name where a result has several parts.
     pub(crate) name: &'static str,
     /// Number of rows, or of entries of a vector.
@@ -41,7 +39,7 @@ pub(crate) struct ResultPart {
     pub(crate) n_columns: Option<usize>,
 }
 
-impl ResultPart {
+impl OutputPart {
     fn vector(name: &'static str, n_rows: usize) -> Self {
         let n_columns = None;
         Self {
@@ -66,10 +64,13 @@ impl ResultPart {
     }
 }
 
-/// The functions of a model that read geometry and base parameters.
+/// The functions of a model that read geometry and base parameters; `dynamics` adds the equation of motion.
 #[allow(clippy::too_many_lines, reason = "a list of functions, one after the other")]
-pub(crate) fn model_functions<'a>(source: &EmissionRequest<'a>, scope: &NameScope) -> Vec<ModelFunction<'a>> {
-    let derivation = source.derivation;
+pub(crate) fn model_functions<'a>(
+    derivation: &'a Derivation,
+    dynamics: Option<&'a DynamicsPrograms>,
+    scope: &NameScope,
+) -> Vec<ProgramFunction<'a>> {
     let mechanism = &derivation.mechanism;
     let programs = &derivation.programs;
     let (active, passive) = derivation.coordinates();
@@ -81,7 +82,7 @@ pub(crate) fn model_functions<'a>(source: &EmissionRequest<'a>, scope: &NameScop
                     name,
                     doc: &str,
                     result,
-                    parts: Vec<ResultPart>,
+                    parts: Vec<OutputPart>,
                     outputs: Vec<String>,
                     entries: Vec<String>| {
         let mut routine = StatementRoutine::new(program, scope, &outputs);
@@ -89,7 +90,7 @@ pub(crate) fn model_functions<'a>(source: &EmissionRequest<'a>, scope: &NameScop
             routine = routine.with_entry_names(&entries);
         }
         let follows = reads_passive(derivation, program);
-        ModelFunction {
+        ProgramFunction {
             program,
             name,
             doc: doc.to_owned(),
@@ -119,7 +120,7 @@ pub(crate) fn model_functions<'a>(source: &EmissionRequest<'a>, scope: &NameScop
             "inverse_dynamics",
             "Forces of the drives, N or N m",
             "forces",
-            vec![ResultPart::vector("forces", n_drives)],
+            vec![OutputPart::vector("forces", n_drives)],
             each("f", ""),
             Vec::new(),
         ),
@@ -128,7 +129,7 @@ pub(crate) fn model_functions<'a>(source: &EmissionRequest<'a>, scope: &NameScop
             "regressor",
             "H_min row by row: one row per drive, one column per base parameter",
             "regressor",
-            vec![ResultPart::matrix("regressor", n_drives, n_base)],
+            vec![OutputPart::matrix("regressor", n_drives, n_base)],
             Vec::new(),
             matrix_entry_names("H", n_drives, n_base),
         ),
@@ -138,9 +139,9 @@ pub(crate) fn model_functions<'a>(source: &EmissionRequest<'a>, scope: &NameScop
             "Lengths or angles of the drives, then their rates, then their Jacobian row by row",
             "motion",
             vec![
-                ResultPart::vector("position", n_drives),
-                ResultPart::vector("rate", n_drives),
-                ResultPart::matrix("jacobian", n_drives, n_active),
+                OutputPart::vector("position", n_drives),
+                OutputPart::vector("rate", n_drives),
+                OutputPart::matrix("jacobian", n_drives, n_active),
             ],
             of_motion,
             Vec::new(),
@@ -156,7 +157,7 @@ pub(crate) fn model_functions<'a>(source: &EmissionRequest<'a>, scope: &NameScop
             "Passive coordinates, then their rates, then their accelerations",
             "motion",
             ["position", "rate", "acceleration"]
-                .map(|part| ResultPart::vector(part, n_passive))
+                .map(|part| OutputPart::vector(part, n_passive))
                 .into(),
             names
                 .map(|(p, suffix)| format!("{}{suffix}", of_coordinate(p)))
@@ -165,11 +166,11 @@ pub(crate) fn model_functions<'a>(source: &EmissionRequest<'a>, scope: &NameScop
         ));
     }
     // The terms of the equation of motion.
-    if let Some(dynamics) = source.dynamics {
-        let vector = |name| vec![ResultPart::vector(name, n_active)];
+    if let Some(dynamics) = dynamics {
+        let vector = |name| vec![OutputPart::vector(name, n_active)];
         let bias = vec![
-            ResultPart::vector("bias", n_active),
-            ResultPart::matrix("jacobian", n_drives, n_active),
+            OutputPart::vector("bias", n_active),
+            OutputPart::matrix("jacobian", n_drives, n_active),
         ];
         for (program, name, doc, result, parts) in [
             (
@@ -177,7 +178,7 @@ pub(crate) fn model_functions<'a>(source: &EmissionRequest<'a>, scope: &NameScop
                 "mass_matrix",
                 "M row by row; accelerations are not read",
                 "matrix",
-                vec![ResultPart::matrix("matrix", n_active, n_active)],
+                vec![OutputPart::matrix("matrix", n_active, n_active)],
             ),
             (
                 &dynamics.coriolis,

@@ -16,7 +16,7 @@ mod scope;
 mod sections;
 
 pub(crate) use expression::{CodeExpression, OperatorPrecedence};
-pub(crate) use functions::{ModelFunction, model_functions};
+pub(crate) use functions::{ProgramFunction, model_functions};
 pub(crate) use once::PrecomputedValues;
 pub(crate) use order::order as in_order;
 pub(crate) use pose::SharedPose;

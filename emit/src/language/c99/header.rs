@@ -6,7 +6,7 @@ use super::TranslationUnit;
 use super::statements::{CSyntax, comment};
 use crate::fingerprint::Fingerprint;
 use crate::language::syntax::LanguageSyntax;
-use crate::tree::ModelFunction;
+use crate::tree::ProgramFunction;
 
 /// Status codes in the order of their values: name after the prefix, and meaning.
 const STATUS: [(&str, &str); 6] = [
@@ -293,7 +293,7 @@ fn source_names(reactions: &modelmill_codegen::ReactionPrograms) -> Vec<String> 
 }
 
 /// The declaration of a function of one state.
-pub(super) fn signature(unit: &TranslationUnit<'_>, function: &ModelFunction<'_>, owner: &str, near: bool) -> String {
+pub(super) fn signature(unit: &TranslationUnit<'_>, function: &ProgramFunction<'_>, owner: &str, near: bool) -> String {
     declaration(unit, function.name, owner, near, function.result)
 }
 
@@ -311,7 +311,7 @@ fn declaration(unit: &TranslationUnit<'_>, what: &str, owner: &str, near: bool, 
 /// Which forms the function `bias` has: without guess, and with a guess if its program follows the loops.
 pub(super) fn bias_variants(unit: &TranslationUnit<'_>) -> &'static [bool] {
     // The program of the bias.
-    let follows = |f: &ModelFunction<'_>| f.name == "bias_and_drives" && f.follows;
+    let follows = |f: &ProgramFunction<'_>| f.name == "bias_and_drives" && f.follows;
     if unit.functions.iter().any(follows) {
         &[false, true]
     } else {

@@ -14,7 +14,7 @@ use super::{EmissionRequest, EmittedFile};
 use crate::fingerprint::Fingerprint;
 use crate::identifier::module_identifier;
 use crate::tree::{
-    ModelFunction, NameScope, PrecomputedValues, StatementRoutine, inputs_of_state, model_functions, reads_passive,
+    NameScope, PrecomputedValues, ProgramFunction, StatementRoutine, inputs_of_state, model_functions, reads_passive,
     uses_load,
 };
 
@@ -82,13 +82,13 @@ struct TranslationUnit<'a> {
     /// Whether the passive coordinates are solved for by Newton's method.
     newton: bool,
     /// Programs that read geometry and base parameters.
-    functions: Vec<ModelFunction<'a>>,
+    functions: Vec<ProgramFunction<'a>>,
     /// Their common precomputed values.
     once: PrecomputedValues,
     /// The program of the reactions with its own precomputed values.
-    reactions: Option<(ModelFunction<'a>, PrecomputedValues)>,
+    reactions: Option<(ProgramFunction<'a>, PrecomputedValues)>,
     /// The regressor H for all products, for the self-test, with its own precomputed values.
-    columns: Option<(ModelFunction<'a>, PrecomputedValues)>,
+    columns: Option<(ProgramFunction<'a>, PrecomputedValues)>,
 }
 
 impl<'a> TranslationUnit<'a> {
@@ -102,12 +102,12 @@ impl<'a> TranslationUnit<'a> {
         if RESERVED.contains(&name.as_str()) || statements::is_reserved(&name) {
             name.push_str("_model");
         }
-        let mut functions = model_functions(source, &scope);
+        let mut functions = model_functions(derivation, source.dynamics, &scope);
         let newton = matches!(derivation.programs.passive_position, PassivePosition::Newton(_));
         // A function that is not in this list.
         let function = |program: &'a StraightLineProgram, name, doc: &str, result| {
             let follows = reads_passive(derivation, program);
-            ModelFunction {
+            ProgramFunction {
                 program,
                 name,
                 doc: doc.to_owned(),
@@ -120,7 +120,7 @@ impl<'a> TranslationUnit<'a> {
             }
         };
         // A program with precomputed values of its own.
-        let alone = |mut function: ModelFunction<'a>| {
+        let alone = |mut function: ProgramFunction<'a>| {
             let mut once = PrecomputedValues::new(&scope);
             once.absorb(&mut function.routine);
             (function, once)

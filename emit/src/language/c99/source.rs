@@ -11,10 +11,10 @@ use super::statements::{CSyntax, comment};
 use super::{TranslationUnit, newton, self_test};
 use crate::fingerprint::Fingerprint;
 use crate::language::syntax::LanguageSyntax;
-use crate::tree::{BaseParameterCode, CodeExpression, ModelFunction, PrecomputedValues};
+use crate::tree::{BaseParameterCode, CodeExpression, PrecomputedValues, ProgramFunction};
 
 /// Operations per state of a function.
-pub(super) fn operation_count(function: &ModelFunction<'_>) -> OperationCount {
+pub(super) fn operation_count(function: &ProgramFunction<'_>) -> OperationCount {
     function.program.count_operations(ProgramStage::State)
 }
 
@@ -231,7 +231,7 @@ pub(super) fn write_body(lines: &[String], text: &mut String) {
 /// A program as a static function from `inputs` to `outputs`. `owner` is the struct with the precomputed values.
 pub(super) fn write_program(
     unit: &TranslationUnit<'_>,
-    function: &ModelFunction<'_>,
+    function: &ProgramFunction<'_>,
     once: &PrecomputedValues,
     owner: &str,
     text: &mut String,
@@ -369,7 +369,7 @@ fn write_state_inputs(unit: &TranslationUnit<'_>, text: &mut String) {
 }
 
 /// A public function, and a second one with a guess if it follows the loops.
-fn write_public_function(unit: &TranslationUnit<'_>, function: &ModelFunction<'_>, owner: &str, text: &mut String) {
+fn write_public_function(unit: &TranslationUnit<'_>, function: &ProgramFunction<'_>, owner: &str, text: &mut String) {
     let TranslationUnit { name, upper, .. } = unit;
     let n_state: usize = unit.state_parts().iter().map(|(_, n)| n).sum();
     // The state, and passive coordinates behind it.
@@ -516,7 +516,7 @@ fn write_forward_dynamics(unit: &TranslationUnit<'_>, text: &mut String) {
 /// The function `prepare_reactions`: base parameters, the prepared model, and the precomputed values of the reactions.
 fn write_reaction_preparation(
     unit: &TranslationUnit<'_>,
-    function: &ModelFunction<'_>,
+    function: &ProgramFunction<'_>,
     once: &PrecomputedValues,
     text: &mut String,
 ) {

@@ -14,7 +14,7 @@ use super::syntax::LanguageSyntax;
 use super::{EmissionRequest, EmittedFile};
 use crate::identifier::spell_plain;
 use crate::tree::{
-    BaseParameterCode, CodeStatement, ModelFunction, NameScope, PoseCheck, PrecomputedValues, StatementRoutine,
+    BaseParameterCode, CodeStatement, NameScope, PoseCheck, PrecomputedValues, ProgramFunction, StatementRoutine,
     base_parameters, model_functions, uses_load,
 };
 
@@ -100,7 +100,7 @@ struct JuliaModule<'a> {
     /// Names of all values.
     scope: NameScope,
     /// The functions of the model.
-    functions: Vec<ModelFunction<'a>>,
+    functions: Vec<ProgramFunction<'a>>,
     /// Their common precomputed values.
     once: PrecomputedValues,
     /// Whether the passive coordinates are solved for by Newton's method.
@@ -115,7 +115,7 @@ impl<'a> JuliaModule<'a> {
     fn new(source: &'a EmissionRequest<'a>) -> Self {
         let derivation = source.derivation;
         let scope = NameScope::new(derivation);
-        let mut functions = model_functions(source, &scope);
+        let mut functions = model_functions(derivation, source.dynamics, &scope);
         let mut once = PrecomputedValues::new(&scope);
         for function in &mut functions {
             once.absorb(&mut function.routine);
