@@ -157,21 +157,27 @@ fn counting_samples(servo: &ServoModel, segment: &RecordingSegment) -> Outcome<V
     let run = &segment.run;
     let rates = along::drive_rates(&servo.equations, segment)?;
     let has_direction = has_direction(servo);
-    let width = run.prepared.cutoff_hz.map_or(0.0, |cutoff| REVERSAL_PERIODS / cutoff);
     Ok(servo
         .body_rows()
         .into_iter()
         .map(|d| {
-            let n = rates[d].len().max(1) as f64;
-            let rms = (rates[d].iter().map(|v| v * v).sum::<f64>() / n).sqrt();
-            let is_moving = |sample: usize| {
-                rates[d][sample].abs() > (STANDSTILL_SHARE * rms).max(slope(&run.time, &rates[d], sample).abs() * width)
-            };
+            let moving = moving_samples(&run.time, &rates[d], run.prepared.cutoff_hz);
             (0..run.samples())
-                .map(|sample| run.is_force_measured(d, sample) && (!has_direction || is_moving(sample)))
+                .map(|sample| run.is_force_measured(d, sample) && (!has_direction || moving[sample]))
                 .collect()
         })
         .collect())
+}
+
+/// At which samples a drive moves in one direction: its rate is no standstill, and the filter of the cut-off, in Hz, mixes
+/// in no other direction.
+pub(super) fn moving_samples(time: &[f64], rates: &[f64], cutoff_hz: Option<f64>) -> Vec<bool> {
+    let width = cutoff_hz.map_or(0.0, |cutoff| REVERSAL_PERIODS / cutoff);
+    let n = rates.len().max(1) as f64;
+    let rms = (rates.iter().map(|v| v * v).sum::<f64>() / n).sqrt();
+    let least = STANDSTILL_SHARE * rms;
+    let is_moving = |sample: usize| rates[sample].abs() > least.max(slope(time, rates, sample).abs() * width);
+    (0..rates.len()).map(is_moving).collect()
 }
 
 /// The derivative of a column by the differences to its neighbours.

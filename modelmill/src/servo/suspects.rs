@@ -15,6 +15,7 @@ use modelmill_spec::ModelActuator;
 
 use super::gains::GainValues;
 use super::projection::{OrthonormalSpan, dot};
+use super::rows::moving_samples;
 use super::thresholds::{
     CHECKED_FACTOR_ERROR, CHECKED_REDUCTION, DELAY_SAMPLES, DELAY_STEP, FEWEST_LIMITED, LARGEST_LIMIT_STEP,
     LIMIT_FACTOR_ERROR, LIMIT_GRID, LIMIT_ITERATIONS, LIMIT_REDUCTION, LIMIT_STEP, LIMIT_T, LIMIT_TOLERANCE,
@@ -233,7 +234,10 @@ impl<'a> DriveEquations<'a> {
             )?;
             let samples = own[0].len();
             let every = (samples * data.segments.len()).div_ceil(DELAY_SAMPLES).max(1);
-            let counts = |i: &usize| !segment.has_excluded_input(drive, *i);
+            // The filter spreads the jump of the friction at a reversal, which would hide a limit.
+            let moving = moving_samples(&segment.run.time, rates, segment.run.prepared.cutoff_hz);
+            let kept = segment.decimation();
+            let counts = |i: &usize| !segment.has_excluded_input(drive, *i) && moving[kept * *i];
             let places: Vec<usize> = (0..samples).step_by(every).filter(counts).collect();
             let regressor = data.regressors[k].iter().map(|column| {
                 let values = column.0.get(drive).and_then(Option::as_ref);
