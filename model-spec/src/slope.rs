@@ -7,7 +7,7 @@ impl ExactExpression {
     /// not exist. The sign function counts as constant.
     pub fn slope(&self, by: CoordinateIdx, value: &dyn Fn(ModelSymbol) -> f64) -> f64 {
         match self {
-            Self::Rational(_) | Self::Pi => 0.0,
+            Self::Rational(_) | Self::Pi | Self::Power(_, 0) => 0.0,
             Self::Symbol(symbol) => f64::from(u8::from(*symbol == ModelSymbol::Coordinate(by))),
             Self::Sum(terms) => terms.iter().map(|term| term.slope(by, value)).sum(),
             // One factor at a time is replaced by its derivative.
@@ -26,7 +26,6 @@ impl ExactExpression {
                 (above.slope(by, value) - above.evaluate(value) / divisor * below.slope(by, value)) / divisor
             }
             Self::Negative(inner) => -inner.slope(by, value),
-            Self::Power(_, 0) => 0.0,
             Self::Power(base, exponent) => {
                 f64::from(*exponent) * base.evaluate(value).powi(exponent - 1) * base.slope(by, value)
             }

@@ -29,6 +29,21 @@ pub struct RigReductionOptions<'a> {
     pub gap_tolerance: f64,
 }
 
+impl RigReductionOptions<'_> {
+    /// The tolerance for gaps.
+    ///
+    /// Fails when it is negative or no number.
+    fn checked_tolerance(&self) -> Outcome<f64> {
+        let tolerance = self.gap_tolerance;
+        if tolerance.is_finite() && tolerance >= 0.0 {
+            return Ok(tolerance);
+        }
+        Err(Error::input(
+            "the tolerance for gaps must be a length in m that is not negative".to_owned(),
+        ))
+    }
+}
+
 /// The planar model of a rig.
 pub struct RigReduction {
     /// The rig's name.
@@ -64,7 +79,7 @@ impl Host {
     pub fn reduce(&self, path: &Path, options: &RigReductionOptions<'_>) -> Outcome<RigReduction> {
         let plan = options.plan;
         let mut loaded = self.noted_rig(path)?;
-        loaded.rig.gap_tolerance = options.gap_tolerance;
+        loaded.rig.gap_tolerance = options.checked_tolerance()?;
         // The plan names parts and their bodies; the default plan has one part for each body.
         let made = match plan {
             Some(plan) => modelmill_reduction::plan_file_with(plan, self.files())?,
@@ -105,7 +120,7 @@ impl Host {
     /// ```
     pub fn propose_plan(&self, path: &Path, options: &RigReductionOptions<'_>) -> Outcome<ProposedReduction> {
         let mut loaded = self.noted_rig(path)?;
-        loaded.rig.gap_tolerance = options.gap_tolerance;
+        loaded.rig.gap_tolerance = options.checked_tolerance()?;
         let rig = &loaded.rig;
         let refuse = |says: String| Error::input(format!("{}: {says}", path.display()));
         let proposal = self

@@ -315,7 +315,7 @@ impl<'r> RigTracker<'r> {
                         self.inverse = None;
                         continue;
                     }
-                    if outcome.1 > self.rig.gap_tolerance {
+                    if outcome.1.is_nan() || outcome.1 > self.rig.gap_tolerance {
                         break;
                     }
                 }

@@ -274,10 +274,7 @@ impl Case {
         let p_min = DVector::from_vec(base(&self.derivation, &nominal(mechanism)));
         let numbers = Numbers::new(mechanism, nominal(mechanism));
         let fault = |e: modelmill_codegen::PoseFault| self.breach(&e.to_string());
-        let active: Vec<usize> = (0..mechanism.coordinates.len())
-            .filter(|i| !mechanism.coordinates[*i].passive)
-            .collect();
-        let n = active.len();
+        let n = mechanism.coordinates.iter().filter(|c| !c.passive).count();
         let mut worst: f64 = 0.0;
         for i in 0..self.sample.len().min(3) {
             let mut rest = self.sample.only(i);
@@ -286,7 +283,12 @@ impl Case {
             }
             // Forces of the drives become forces on the coordinates by the drives' Jacobian.
             let pose = coordinates(&evaluator, mechanism, &rest);
-            let jacobian = DMatrix::from_fn(n, n, |d, a| numbers.drives(&along(&pose, active[a]))[d].0[1]);
+            // Passive coordinates and followers move with the active ones.
+            let still: Vec<Jet> = pose.iter().map(|q| Jet([*q, 0.0, 0.0])).collect();
+            let ways = directions(mechanism, &numbers, &still);
+            let moving = |way: &[f64]| -> Vec<Jet> { pose.iter().zip(way).map(|(q, v)| Jet([*q, *v, 0.0])).collect() };
+            // The first direction is the actual motion.
+            let jacobian = DMatrix::from_fn(n, n, |d, a| numbers.drives(&moving(&ways[a + 1]))[d].0[1]);
             let mut forces = |accelerated: Option<usize>| -> Result<DVector<f64>, String> {
                 for (k, acceleration) in rest.qdd.iter_mut().enumerate() {
                     acceleration[0] = f64::from(u8::from(accelerated == Some(k)));

@@ -78,15 +78,17 @@ pub(crate) struct ExportArgs {
     pub(crate) out: PathBuf,
 }
 
-/// Reads a length in m that is not negative.
+/// Reads the size of gaps in m.
 fn parse_length(text: &str) -> Result<f64, String> {
+    /// A larger gap is a wrong unit, m.
+    const LARGEST_GAP: f64 = 0.1;
     let value: f64 = text
         .parse()
         .map_err(|_| "expected a length in m, such as 0.002".to_owned())?;
-    if value.is_finite() && value >= 0.0 {
+    if (0.0..=LARGEST_GAP).contains(&value) {
         Ok(value)
     } else {
-        Err("expected a length in m that is not negative".to_owned())
+        Err("expected a length from 0 to 0.1 m, such as 0.002 for 2 mm".to_owned())
     }
 }
 

@@ -332,15 +332,13 @@ fn numbers_stand_where_they_are_short() {
     let folder = std::env::temp_dir().join(format!("modelmill-factors-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
     let file = folder.join("arm.toml");
-    let text = "schema = 1\nname = \"arm\"\ngravity = [0, -9.81, 0]\n[parameters]\nI2 = { nominal = 1, unit = \"kg m^2\" }\n\
-                ma = { nominal = 2, unit = \"kg\" }\nmb = { nominal = 3, unit = \"kg\" }\n[coordinates]\nq1 = {}\nq2 = {}\n\
+    // Without gravity only moments of inertia count: `I2 + 3.61*mb`.
+    let text = "schema = 1\nname = \"arm\"\ngravity = [0, 0, 0]\n[parameters]\nI2 = { nominal = 1, unit = \"kg m^2\" }\n\
+                m2 = { nominal = 2, unit = \"kg\" }\nmb = { nominal = 3, unit = \"kg\" }\n[coordinates]\nq1 = {}\n\
                 [[frame]]\nname = \"one\"\non = \"base\"\nmodified_dh = { theta = \"q1\" }\n\
-                [[frame]]\nname = \"two\"\non = \"one\"\nmodified_dh = { a = 1.5, theta = \"q2\" }\n\
-                [[lumped_mass]]\nmass = \"ma\"\non = \"two\"\nat = [0.5, 0]\n\
-                [[lumped_mass]]\nmass = \"mb\"\non = \"two\"\nat = [1.9, 0]\n\
-                [[lumped_mass]]\nmass = \"I2\"\non = \"one\"\nat = [1, 0]\n\
-                [[drive]]\nname = \"d1\"\njoint = \"q1\"\n[[drive]]\nname = \"d2\"\njoint = \"q2\"\n"
-        .replace("unit = \"kg m^2\"", "unit = \"kg\"");
+                [[part]]\nname = \"link\"\non = \"one\"\nmass = \"m2\"\ncentre = [0, 0]\ninertia = { zz = \"I2\" }\n\
+                [[lumped_mass]]\nmass = \"mb\"\non = \"one\"\nat = [1.9, 0]\n\
+                [[drive]]\nname = \"d1\"\njoint = \"q1\"\n";
     std::fs::write(&file, text).unwrap();
     let loaded = modelmill_spec::load_file(&file).unwrap_or_else(|failure| panic!("{failure}"));
     let derivation = derive(&loaded.mechanism).unwrap();

@@ -208,7 +208,7 @@ impl<'a> InfluenceScores<'a> {
         let n = self.solution.values.len();
         let to_parameters = self.solution.unit_covariance();
         let mut gradients = DMatrix::zeros(n, BLOCK);
-        let mut influences = DMatrix::zeros(n, BLOCK);
+        let mut influence = vec![0.0; n];
         let mut errors = vec![0.0; self.channels * BLOCK];
         let mut rows = 0;
         show(&mut |regressor, measured| {
@@ -235,11 +235,15 @@ impl<'a> InfluenceScores<'a> {
                         *g += w * error;
                     }
                 }
-                let mut influences = influences.columns_mut(0, samples);
-                influences.gemm(1.0, &to_parameters, &gradients.columns(0, samples), 0.0);
                 for k in 0..samples {
+                    // The matrix is symmetric, so that its columns are its rows. A product of matrices would add in an order
+                    // that depends on the machine.
+                    let gradient = &gradients.as_slice()[k * n..(k + 1) * n];
+                    for (influence, row) in influence.iter_mut().zip(to_parameters.as_slice().chunks_exact(n)) {
+                        *influence = dot(row, gradient);
+                    }
                     let errors = &errors[k * self.channels..(k + 1) * self.channels];
-                    take(influences.column(k).as_slice(), errors);
+                    take(&influence, errors);
                 }
             }
             Ok(())

@@ -123,6 +123,14 @@ fn coupling(
         );
         return None;
     }
+    if entry.periodic.is_some() && entry.table.is_none() {
+        log.push(
+            Diagnostic::error(span, "`periodic` needs a `table`")
+                .label("expected `table` with it")
+                .help("delete `periodic`, or give points: `table = [[x1, y1], ...]`"),
+        );
+        return None;
+    }
     if let Some(table) = &entry.table {
         let is_periodic = entry.periodic.is_some_and(|flag| flag.0);
         if is_periodic && dimension != CoordinateMotion::Revolute.dimension() {
@@ -205,11 +213,12 @@ fn has_kink(exact: &ExactExpression) -> bool {
         ExactExpression::Rational(_) | ExactExpression::Pi | ExactExpression::Symbol(_) => false,
         ExactExpression::Sum(inner) | ExactExpression::Product(inner) => inner.iter().any(has_kink),
         ExactExpression::Quotient(above, below) => has_kink(above) || has_kink(below),
-        ExactExpression::Negative(inner) | ExactExpression::Power(inner, _) => has_kink(inner),
         ExactExpression::Apply(ExactFunction::Abs | ExactFunction::Sign, inner) => {
             inner.mentions(&|symbol| matches!(symbol, ModelSymbol::Coordinate(_)))
         }
-        ExactExpression::Apply(_, inner) => has_kink(inner),
+        ExactExpression::Negative(inner) | ExactExpression::Power(inner, _) | ExactExpression::Apply(_, inner) => {
+            has_kink(inner)
+        }
     }
 }
 

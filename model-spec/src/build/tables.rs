@@ -172,7 +172,7 @@ fn turn_polynomial(
     for order in 1..=u32::try_from((n - 1) / 2).ok()? {
         shapes.extend([(order, false, 0.0), (order, true, 0.0)]);
     }
-    if n % 2 == 0 {
+    if n.is_multiple_of(2) {
         shapes.push((u32::try_from(n / 2).ok()?, false, points[0][0]));
     }
     let value = |(order, is_sine, from): &(u32, bool, f64), x: f64| {

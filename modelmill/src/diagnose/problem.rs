@@ -137,32 +137,30 @@ pub(crate) fn find_missing_effects(
     fix_parameters(&mut problem, model, held);
     problem.effects_only = !query.in_full;
     let without_contacts = subtract_known(&mut problem, model, &all, query.run_differences)?;
-    let units: Vec<String> = (0..model.drives().len())
-        .map(|d| model.force_unit(d).to_owned())
-        .collect();
-    // Candidates that a model file cannot contain: faults of signals, of encoders, of gears and of lengths.
-    let mut further = reading_fault_candidates(&problem);
-    further.extend(drift_candidates(&problem, &units));
-    further.extend(dahl_candidates(model, &all)?);
-    // Stage 3: candidates that need the derivatives of the forces by the motion.
-    further.extend(motion_candidates(model, &all, &problem, query)?);
+    // Stage 3: faults of signals, of encoders, of gears and of lengths, which a model file cannot contain.
+    let mut further = fault_candidates(model, &all, &problem, query)?;
     further.extend(other_friction);
     if query.in_full {
         if held == FixedParameters::All || problem.base.is_empty() {
-            let loads = frame_loads(model, &all, &PayloadColumns::new(model)?)?;
-            further.extend(payloads(model, &loads));
+            further.extend(payload_candidates(model, &all)?);
         }
         problem.change_shapes = load_changes(model, &all)?;
-        problem.change_shapes.extend(signal_changes(&problem, &units));
+        problem
+            .change_shapes
+            .extend(signal_changes(&problem, &force_units(model)));
     }
     let delays = SignalDelays::new(model, &all)?;
     further.extend(delays.candidates.iter().cloned());
     problem.candidates.extend(further);
     // None of these can be an entry of a model file.
     origins.resize(problem.candidates.len(), None);
-    let standing = StandingDrives::find(model, &all)?;
-    problem.change_shapes.retain(|one| !standing.excludes(&one.effect));
-    drop_excluded_candidates(&mut problem, &mut origins, model, &delays, &standing);
+    drop_excluded_candidates(
+        &mut problem,
+        &mut origins,
+        model,
+        &delays,
+        &StandingDrives::find(model, &all)?,
+    );
     // Stage 4: the search, which requests further columns while it runs.
     let supply = ColumnSupply {
         candidates: &candidates,
@@ -229,7 +227,39 @@ pub(crate) fn find_missing_effects(
     })
 }
 
-/// Removes the candidates that computed forces or standing drives exclude, with their origins, and adds the delays of
+/// Candidates that a model file cannot contain: faults of signals and drifts, Dahl friction, then those that need the
+/// derivatives of the forces by the motion.
+///
+/// Fails when a pose has no solution.
+fn fault_candidates(
+    model: &Model,
+    all: &[(&RecordingSegment, bool)],
+    problem: &DiagnosisProblem,
+    query: DiagnosisQuery<'_>,
+) -> Outcome<Vec<CandidateEffect>> {
+    let mut found = reading_fault_candidates(problem);
+    found.extend(drift_candidates(problem, &force_units(model)));
+    found.extend(dahl_candidates(model, all)?);
+    found.extend(motion_candidates(model, all, problem, query)?);
+    Ok(found)
+}
+
+/// The unit of the force of each drive.
+fn force_units(model: &Model) -> Vec<String> {
+    (0..model.drives().len())
+        .map(|d| model.force_unit(d).to_owned())
+        .collect()
+}
+
+/// Candidates of masses on the frames of a model.
+///
+/// Fails when a pose has no solution.
+fn payload_candidates(model: &Model, all: &[(&RecordingSegment, bool)]) -> Outcome<Vec<CandidateEffect>> {
+    let loads = frame_loads(model, all, &PayloadColumns::new(model)?)?;
+    Ok(payloads(model, &loads))
+}
+
+/// Removes the candidates and changes that computed forces or standing drives exclude, with their origins, and adds the delays of
 /// the signals to the base: estimated delays are estimated anew with each set of effects.
 fn drop_excluded_candidates(
     problem: &mut DiagnosisProblem,
@@ -238,6 +268,7 @@ fn drop_excluded_candidates(
     delays: &SignalDelays,
     standing: &StandingDrives,
 ) {
+    problem.change_shapes.retain(|one| !standing.excludes(&one.effect));
     let is_kept: Vec<bool> = (problem.candidates.iter())
         .map(|one| !delays.excludes(model, one) && !standing.excludes(&one.effect))
         .collect();

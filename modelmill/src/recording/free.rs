@@ -6,8 +6,6 @@ use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_identify::{PreparedRun, RecordingNote, SignalRecording as Raw, StatePreparation};
 use modelmill_spec::{FrameStep, FreeBody, Mechanism, TwistAxes};
 
-use super::shared_drives;
-use super::table_range;
 use super::thresholds::QUATERNION_LENGTH_TOLERANCE;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
@@ -37,8 +35,7 @@ pub(super) fn complete(model: &Model, raw: &mut Raw) -> Outcome<Vec<RecordingNot
         check_twist(mechanism, body, raw)?;
         fill_scalar_part(mechanism, body, raw);
     }
-    let mut notes: Vec<RecordingNote> = shared_drives::add_projected_forces(model, raw)?.into_iter().collect();
-    notes.extend(table_range::note_beyond_tables(mechanism, raw));
+    let mut notes = Vec::new();
     // A row without drive needs a force, which is zero.
     let mut zero = Vec::new();
     for (row, drive) in mechanism

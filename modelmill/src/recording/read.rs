@@ -12,6 +12,7 @@ use super::columns::read_options;
 use super::free;
 use super::leverage::DriveLeverage;
 use super::options::RecordingOptions;
+use super::{shared_drives, table_range};
 use crate::error::{Error, Outcome};
 use crate::host::kinds_of_files;
 use crate::model::Model;
@@ -151,6 +152,13 @@ pub(super) fn read_raw(model: &Model, file: &RecordingFiles, reading: &Recording
     }
     // Turns are added before anything is compared with its neighbours.
     raw.unwrap_angles(&model.active_coordinate_types());
+    // These notes concern the result, so that they stay with the recording.
+    if let Some(note) = shared_drives::add_projected_forces(model, &mut raw)? {
+        raw.add_note(note);
+    }
+    for note in table_range::note_beyond_tables(&model.derivation.mechanism, &raw) {
+        raw.add_note(note);
+    }
     // Force peaks near singular poses are no outliers.
     let leverage = DriveLeverage::new(model, &raw);
     let coordinates = model.measured_coordinates();

@@ -57,9 +57,11 @@ pub(super) fn add_projected_forces(model: &Model, raw: &mut Raw) -> Outcome<Opti
             }
         }
         let projected = project_forces(mechanism, &kinematics.gap_jacobian(&poses), &on_tree).ok_or_else(|| {
-            let line = raw.line(sample).unwrap_or(0);
+            let place = raw
+                .line(sample)
+                .map_or_else(|| format!("at sample {}", sample + 1), |line| format!("in line {line}"));
             Error::input(message!(
-                "{}: in line {line} the loops do not determine the passive rates; the forces of the drives cannot be \
+                "{}: {place} the loops do not determine the passive rates; the forces of the drives cannot be \
                  projected on the independent coordinates there, so leave such poses out of the recording",
                 raw.file()
             ))
@@ -134,7 +136,8 @@ fn project_forces(mechanism: &Mechanism, gaps: &[Vec<f64>], on_tree: &[f64]) -> 
     let pick = |columns: &[usize]| DMatrix::from_fn(gaps.len(), columns.len(), |r, k| gaps[r][columns[k]]);
     let decomposed = pick(&passive).svd(true, true);
     let (largest, least) = (decomposed.singular_values.max(), decomposed.singular_values.min());
-    if decomposed.singular_values.len() < passive.len() || !(least > PROJECTION_CONDITION * largest) {
+    let is_determined = least > PROJECTION_CONDITION * largest;
+    if decomposed.singular_values.len() < passive.len() || !is_determined {
         return None;
     }
     let rates = decomposed.solve(&pick(&active), 0.0).ok()?;

@@ -125,6 +125,13 @@ impl ServoModel {
         self.check_length(&fit)?;
         let mut delays = delays(self, &fit, DelayQuery::OfModel)?;
         let mut system = ServoSystem::new(self, &fit)?;
+        if system.unknown.is_empty() {
+            return Err(Error::input(format!(
+                "{}: every base parameter and gain is a number of the file, so there is nothing to identify; compare the \
+                 model with the recording, or declare values as parameters",
+                self.equations.path
+            )));
+        }
         refine_by_instruments(&system, &mut delays)?;
         let mut values: Vec<f64> = delays.iter().map(|delay| delay.value).collect();
         let mut solved = system.solve(&values)?;

@@ -21,7 +21,7 @@ use super::gains::{GainValues, delay_phrase};
 use super::refine::refine_delays;
 use super::suspects::{ServoLimit, servo_limits};
 use super::thresholds::{DELAY_STEP, FEWEST_DECIMATED, LARGEST_LIMIT_CHANGE};
-use super::turns::turn_offset;
+use super::turns::{turn_note, turn_offset};
 use crate::along;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
@@ -302,6 +302,7 @@ impl<'a> ActuatorForces<'a> {
         let time = raw.column("t")?.to_vec();
         let motion = SmoothMotion::new(&self.servo, prepared)?;
         let mut phrases = Vec::new();
+        let mut added_turns = Vec::new();
         let mut computed = ComputedForces {
             time: time.clone(),
             delays: Vec::new(),
@@ -320,6 +321,9 @@ impl<'a> ActuatorForces<'a> {
                 let signal = raw.column(&actuator.signal)?;
                 let turns = turn_offset(actuator, signal, &position);
                 let signal: Vec<f64> = signal.iter().map(|value| value + turns).collect();
+                if turns != 0.0 {
+                    added_turns.push(turn_note(raw.file(), actuator, turns));
+                }
                 let states_at = |delay: f64| ActuatorStates {
                     actuator: k,
                     signal: interpolate(&time, &signal, &time, delay),
@@ -354,6 +358,9 @@ impl<'a> ActuatorForces<'a> {
             self.leave_out_unknown(&mut raw, drive, &time);
         }
         raw.add_note(RecordingNote::info(self.note(raw.file(), &phrases)));
+        for says in added_turns {
+            raw.add_note(RecordingNote::info(says));
+        }
         let preparation = self.preparation_of(&time);
         if let Some((chosen, passed)) = &preparation {
             raw.add_note(RecordingNote::info(message!(

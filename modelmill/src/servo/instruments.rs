@@ -14,6 +14,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::ServoModel;
+use super::projection::dot;
 use super::thresholds::{INSTRUMENT_LAGS, INSTRUMENT_RIDGE, PROJECTION_RIDGE};
 use crate::segment::RecordingSegment;
 use modelmill_spec::{ActuatorKind, ModelActuator};
@@ -139,7 +140,10 @@ pub(super) fn project_on_instruments(
     n_rows: usize,
 ) -> Option<Vec<f64>> {
     let rows = known.len();
-    let n = regressor.len() / rows.max(1);
+    if rows == 0 || regressor.is_empty() {
+        return None;
+    }
+    let n = regressor.len() / rows;
     let width = n + n_rows;
     // Columns have unit norm, so that the ridge has the same effect on all.
     let mut z = DMatrix::zeros(rows, width);
@@ -163,9 +167,4 @@ pub(super) fn project_on_instruments(
     let factors = normal.cholesky()?.solve(&z.tr_mul(&w));
     let projected = z * factors;
     Some(projected.transpose().as_slice().to_vec())
-}
-
-/// The scalar product of two columns.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }

@@ -29,7 +29,9 @@ impl OrthonormalSpan {
         let mut rest = self.residual(column);
         let after = norm(&rest);
         if after > DEPENDENT_SHARE * before {
-            rest.iter_mut().for_each(|x| *x /= after);
+            for x in &mut rest {
+                *x /= after;
+            }
             self.basis.push(rest);
         }
     }

@@ -189,7 +189,7 @@ impl DelayEquations {
                     })
                     .collect();
                 *scale = rms(residual.iter().copied()).max(f64::MIN_POSITIVE);
-                *lag = neighbour_correlation(rows, &residual);
+                *lag = neighbour_correlation(&residual, rows.iter().map(|row| row.follows));
             }
             solution = Some(found);
         }
@@ -210,12 +210,10 @@ impl DelayEquations {
     }
 }
 
-/// The correlation of residuals of neighbours in time, 0 to 0.999.
-fn neighbour_correlation(rows: &[DelayRow], residual: &[f64]) -> f64 {
-    let pairs = residual
-        .windows(2)
-        .zip(rows.iter().skip(1))
-        .filter(|(_, row)| row.follows);
+/// The correlation of residuals of neighbours in time, 0 to 0.999. `follows` states of each residual whether it follows the
+/// one before it in time, without a gap.
+pub(super) fn neighbour_correlation(residual: &[f64], follows: impl Iterator<Item = bool>) -> f64 {
+    let pairs = residual.windows(2).zip(follows.skip(1)).filter(|(_, follows)| *follows);
     let (products, squares) = pairs.fold((0.0, 0.0), |(products, squares), (pair, _)| {
         (
             products + pair[0] * pair[1],

@@ -15,6 +15,7 @@ use modelmill_spec::ModelActuator;
 
 use super::gains::GainValues;
 use super::projection::{OrthonormalSpan, dot};
+use super::refine::neighbour_correlation;
 use super::rows::moving_samples;
 use super::thresholds::{
     CHECKED_FACTOR_ERROR, CHECKED_REDUCTION, DELAY_SAMPLES, DELAY_STEP, FEWEST_LIMITED, LARGEST_LIMIT_STEP,
@@ -188,6 +189,8 @@ struct LimitSegment<'a> {
     computed: &'a ComputedForces,
     /// What the force of the actuator was computed from.
     states: &'a ActuatorStates,
+    /// At which samples before decimation the drive moves in one direction.
+    moving: Vec<bool>,
     /// Samples after the filter that count.
     places: Vec<usize>,
 }
@@ -202,6 +205,8 @@ struct DriveEquations<'a> {
     segments: Vec<LimitSegment<'a>>,
     /// Columns of the regressor, usual friction and an offset.
     usual: OrthonormalSpan,
+    /// Of each row whether it follows the row before it in time, without a gap.
+    follows: Vec<bool>,
     /// The force without the limit.
     force: Vec<f64>,
 }
@@ -215,6 +220,7 @@ impl<'a> DriveEquations<'a> {
         let drive = actuator.drive.0;
         let mut segments = Vec::new();
         let mut columns: Vec<Vec<f64>> = Vec::new();
+        let mut follows = Vec::new();
         for (k, (segment, computed)) in data.segments.iter().enumerate() {
             let Some(states) = computed.actuators.iter().find(|one| one.actuator == place) else {
                 continue;
@@ -239,6 +245,8 @@ impl<'a> DriveEquations<'a> {
             let kept = segment.decimation();
             let counts = |i: &usize| !segment.has_excluded_input(drive, *i) && moving[kept * *i];
             let places: Vec<usize> = (0..samples).step_by(every).filter(counts).collect();
+            let is_next = |k: usize| k > 0 && places[k] == places[k - 1] + every;
+            follows.extend((0..places.len()).map(is_next));
             let regressor = data.regressors[k].iter().map(|column| {
                 let values = column.0.get(drive).and_then(Option::as_ref);
                 values.cloned().unwrap_or_else(|| vec![0.0; samples])
@@ -252,6 +260,7 @@ impl<'a> DriveEquations<'a> {
                 segment,
                 computed,
                 states,
+                moving,
                 places,
             });
         }
@@ -261,6 +270,7 @@ impl<'a> DriveEquations<'a> {
             actuator,
             segments,
             usual: OrthonormalSpan::new(columns),
+            follows,
             force: Vec::new(),
         };
         equations.force = equations.filtered_force(actuator, 0.0)?;
@@ -281,6 +291,12 @@ impl<'a> DriveEquations<'a> {
             all.extend(one.places.iter().map(|i| filtered[0][*i]));
         }
         Ok(all)
+    }
+
+    /// Number of residuals that count as independent: those of neighbours are not.
+    fn independent_samples(&self, residual: &[f64]) -> f64 {
+        let lag = neighbour_correlation(residual, self.follows.iter().copied());
+        residual.len() as f64 * (1.0 - lag) / (1.0 + lag)
     }
 
     /// The limits that are tried.
@@ -363,7 +379,7 @@ impl<'a> DriveEquations<'a> {
             return Ok(None);
         }
         let degrees = (n - span.rank() as f64).max(1.0);
-        let variance = dot(&left, &left) / degrees * n / independent_samples(&left);
+        let variance = dot(&left, &left) / degrees * n / self.independent_samples(&left);
         Ok(Some(LimitSlope {
             step: -dot(&slope, &left) / size,
             std: (variance / size).sqrt(),
@@ -378,7 +394,18 @@ impl<'a> DriveEquations<'a> {
         let is_reached = |one: &LimitSegment| {
             let [all, made] =
                 [self.actuator, &limited].map(|actuator| one.states.forces(self.model, actuator, self.gains));
-            all.iter().zip(&made).filter(|(all, made)| all != made).count()
+            let reached: Vec<f64> = all
+                .iter()
+                .zip(&made)
+                .map(|(a, m)| f64::from(u8::from((a - m).abs() > 0.0)))
+                .collect();
+            let reached = one.computed.resample(&reached, &one.segment.run.time);
+            // Only these samples can show the limit.
+            let counts = reached
+                .iter()
+                .zip(&one.moving)
+                .filter(|(r, moves)| **r > 0.5 && **moves);
+            counts.count()
         };
         if self.segments.iter().map(is_reached).sum::<usize>() < FEWEST_LIMITED {
             return Ok(None);
@@ -399,11 +426,23 @@ impl<'a> DriveEquations<'a> {
         let left: Vec<f64> = force.iter().zip(&excess).map(|(y, x)| y - factor * x).collect();
         let after = dot(&left, &left).max(f64::MIN_POSITIVE);
         let as_is = difference(&force, &excess);
+        // A saturation near zero leaves neither a force nor a residual, so that residuals count as shares of the force.
+        let before_as_is = if limit.is_saturation {
+            before * dot(&made, &made) / dot(&self.force, &self.force)
+        } else {
+            before
+        };
+        let reduction_as_is = (before_as_is - dot(&as_is, &as_is)) / before_as_is.max(f64::MIN_POSITIVE);
+        let reduction = (before - after) / before;
         Ok(Some(LimitFit {
             factor,
-            reduction: (before - after) / before,
-            reduction_as_is: (before - dot(&as_is, &as_is)) / before,
-            t: (independent_samples(&left) * (before - after).max(0.0) / after).sqrt(),
+            reduction: if limit.is_saturation {
+                reduction.min(reduction_as_is)
+            } else {
+                reduction
+            },
+            reduction_as_is,
+            t: (self.independent_samples(&left) * (before - after).max(0.0) / after).sqrt(),
         }))
     }
 }
@@ -425,16 +464,6 @@ impl ActuatorStates {
             ..self.clone()
         }
     }
-}
-
-/// Number of residuals that count as independent: those of neighbours are not.
-fn independent_samples(residual: &[f64]) -> f64 {
-    let squares = dot(residual, residual);
-    if squares <= 0.0 {
-        return residual.len() as f64;
-    }
-    let lag = (dot(&residual[1..], &residual[..residual.len() - 1]) / squares).clamp(0.0, 0.999);
-    residual.len() as f64 * (1.0 - lag) / (1.0 + lag)
 }
 
 /// The difference of two columns.

@@ -22,6 +22,16 @@ pub(super) fn turn_offset(actuator: &ModelActuator, signal: &[f64], position: &[
     -std::f64::consts::TAU * (usual / std::f64::consts::TAU).round()
 }
 
+/// A sentence on turns that are added to the command of an actuator, rad.
+pub(super) fn turn_note(file: &str, actuator: &ModelActuator, turns: f64) -> String {
+    format!(
+        "{file}: {} full turns are added to `{}`, so that the usual position error of the servo is below half a turn; correct \
+         the command if this error is real.",
+        (turns / std::f64::consts::TAU).round(),
+        actuator.signal
+    )
+}
+
 #[cfg(test)]
 mod tests {
     use super::turn_offset;
@@ -56,7 +66,7 @@ kp = 5
         let actuator = &model.actuators()[0];
         // Errors of up to 5 rad, such as after a step of several turns of a gear, are real.
         let position = vec![0.0; 5];
-        assert_eq!(turn_offset(actuator, &[0.1, 0.2, 5.0, 4.0, -0.1], &position), 0.0);
+        assert!(turn_offset(actuator, &[0.1, 0.2, 5.0, 4.0, -0.1], &position).abs() < 1e-12);
         let turn = std::f64::consts::TAU;
         let moved = [turn + 0.1, turn - 0.2, turn + 5.0, turn, turn];
         assert!((turn_offset(actuator, &moved, &position) + turn).abs() < 1e-12);

@@ -18,10 +18,17 @@ use crate::draws::Draws;
 /// Noise of each force beside its root mean square.
 const NOISE: f64 = 0.01;
 /// Samples of a recording, and the time between two, s.
-const SAMPLES: usize = 600;
+const MOST_SAMPLES: usize = 600;
 const STEP: f64 = 0.02;
 /// Waves of each coordinate.
 const WAVES: usize = 4;
+/// Most equations of a recording: a machine with many drives needs fewer samples.
+const MOST_EQUATIONS: usize = 9600;
+
+/// Number of samples of a recording.
+fn samples_of(mechanism: &Mechanism) -> usize {
+    MOST_SAMPLES.min(MOST_EQUATIONS / mechanism.drives.len())
+}
 
 /// Positions, rates and accelerations of the active coordinates, `[order][coordinate][sample]`.
 type Moving = [Vec<Vec<f64>>; 3];
@@ -29,6 +36,7 @@ type Moving = [Vec<Vec<f64>>; 3];
 /// Sums of waves around the nominal pose.
 fn motion(mechanism: &Mechanism, reach: f64) -> Moving {
     let mut draws = Draws::new(7);
+    let samples = samples_of(mechanism);
     let mut moving: Moving = Default::default();
     for coordinate in mechanism.coordinates.iter().filter(|c| !c.passive) {
         let size = if coordinate.motion.is_angle() {
@@ -36,13 +44,13 @@ fn motion(mechanism: &Mechanism, reach: f64) -> Moving {
         } else {
             0.3 * reach
         };
-        let mut columns = [(); 3].map(|()| vec![0.0; SAMPLES]);
+        let mut columns = [(); 3].map(|()| vec![0.0; samples]);
         columns[0].fill(coordinate.nominal);
         for _ in 0..WAVES {
             let rate = TAU * (0.15 + 0.6 * draws.uniform());
             let phase = TAU * draws.uniform();
             let amplitude = size * (0.2 + draws.uniform()) / WAVES as f64;
-            for k in 0..SAMPLES {
+            for k in 0..samples {
                 let (sin, cos) = (rate * STEP * k as f64 + phase).sin_cos();
                 columns[0][k] += amplitude * sin;
                 columns[1][k] += amplitude * rate * cos;
@@ -59,7 +67,7 @@ fn motion(mechanism: &Mechanism, reach: f64) -> Moving {
         .filter(|(_, c)| c.motion.is_quaternion())
         .map(|(i, _)| i)
         .collect();
-    for k in 0..SAMPLES {
+    for k in 0..samples {
         let square: f64 = quaternion.iter().map(|i| moving[0][*i][k].powi(2)).sum();
         for i in &quaternion {
             moving[0][*i][k] /= square.sqrt();
@@ -87,11 +95,12 @@ fn with_values(mut mechanism: Mechanism) -> Mechanism {
 fn forces(derivation: &Derivation) -> (Moving, Vec<Vec<f64>>) {
     let evaluator = ModelEvaluator::new(derivation);
     let base = derivation.nominal_base_values();
+    let samples = samples_of(&derivation.mechanism);
     let mut reach = 1.0;
     loop {
         let moving = motion(&derivation.mechanism, reach);
         let [q, qd, qdd] = &moving;
-        let still = vec![vec![0.0; SAMPLES]; derivation.mechanism.drives.len()];
+        let still = vec![vec![0.0; samples]; derivation.mechanism.drives.len()];
         let states = MotionStates {
             q: q.iter().map(Vec::as_slice).collect(),
             qd: qd.iter().map(Vec::as_slice).collect(),
@@ -111,6 +120,7 @@ fn forces(derivation: &Derivation) -> (Moving, Vec<Vec<f64>>) {
 fn recording(name: &str, derivation: &Derivation) -> PathBuf {
     let (moving, forces) = forces(derivation);
     let mechanism = &derivation.mechanism;
+    let samples = samples_of(mechanism);
     let active: Vec<&str> = (mechanism.coordinates.iter())
         .filter(|c| !c.passive)
         .map(|c| c.name.as_str())
@@ -126,11 +136,11 @@ fn recording(name: &str, derivation: &Derivation) -> PathBuf {
     }
     let sizes = forces.iter().map(|force| {
         let squares: f64 = force.iter().map(|f| f * f).sum();
-        (squares / SAMPLES as f64).sqrt()
+        (squares / samples as f64).sqrt()
     });
     let sizes: Vec<f64> = sizes.collect();
     let mut draws = Draws::new(11);
-    for k in 0..SAMPLES {
+    for k in 0..samples {
         let _ = write!(text, "\n{}", STEP * k as f64);
         for column in moving.iter().flatten() {
             let _ = write!(text, ",{}", column[k]);

@@ -269,9 +269,9 @@ fn full_turns_between_command_and_position_have_no_effect() {
     let log = simulate(&planted, 3, 4000);
     let mut turned = log.clone();
     for (_, values) in turned.iter_mut().filter(|(name, _)| name == "motor_command") {
-        values
-            .iter_mut()
-            .for_each(|value| *value += 2.0 * std::f64::consts::TAU);
+        for value in values {
+            *value += 2.0 * std::f64::consts::TAU;
+        }
     }
     let [here, there] = [log, turned].map(|log| value(&identify(&servo, log), "kp").0);
     assert!((here - there).abs() < 1e-6 * here, "{here} {there}");

@@ -9,6 +9,11 @@ mod random_models {
 
 /// Modules of fixtures, see `build.rs`.
 #[expect(unreachable_pub, dead_code, reason = "emitted for a crate of its own")]
+#[allow(
+    clippy::struct_field_names,
+    clippy::used_underscore_binding,
+    reason = "names of a model that is made to be awkward"
+)]
 mod fixture_models {
     include!(concat!(env!("OUT_DIR"), "/fixture_models.rs"));
 }

@@ -5,6 +5,15 @@
 //! variable hides a function of the same name, and the root of a negative number is an error. Whatever it does not know
 //! is a fault.
 
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::cast_sign_loss,
+    clippy::float_cmp,
+    clippy::needless_pass_by_value,
+    reason = "an interpreter for tests: its arrays are short, Julia compares numbers exactly, and arguments are values"
+)]
+
 use std::cell::RefCell;
 use std::collections::HashMap;
 use std::rc::Rc;

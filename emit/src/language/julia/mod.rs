@@ -26,7 +26,7 @@ const RESERVED_NAMES: &str = "\
     sqrt sign abs tanh exp sin cos sincos atan isfinite zeros copy vcat throw eps length eval check_fine check_divisor include \
     ans im NaN Inf once dynamics check matrix OK OUT_OF_REACH SINGULAR UNDEFINED NOT_FINITE SPECIAL \
     SINGULAR_SHARE LARGEST_INPUT MESSAGES ModelError Geometry Parameters Dynamics all_fine check_length \
-    solve forward near scale status";
+    solve forward near scale status loop_scale finish_preparation";
 
 /// Appends a line, indented by some levels, to the text of a module.
 macro_rules! put {
