@@ -9,23 +9,6 @@ pub(crate) struct ComputedForces {
     pub(crate) time: Vec<f64>,
     /// The delays that the forces depend on.
     pub(crate) delays: Vec<DelaySensitivity>,
-    /// What the forces were computed from.
-    pub(crate) actuators: Vec<ActuatorStates>,
-}
-
-/// What the force of one actuator depends on, by sample and without a filter.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct ActuatorStates {
-    /// Place of the actuator in the list of the mechanism.
-    pub(crate) actuator: usize,
-    /// The delayed signal.
-    pub(crate) signal: Vec<f64>,
-    /// Its rate.
-    pub(crate) signal_rate: Vec<f64>,
-    /// The position of the drive.
-    pub(crate) position: Vec<f64>,
-    /// Its rate.
-    pub(crate) rate: Vec<f64>,
 }
 
 /// How the force of a drive depends on the delay of one of its signals.
@@ -50,19 +33,9 @@ impl RecordingSegment {
         let Some(computed) = &self.computed else {
             return Vec::new();
         };
-        let delays = computed.delays.iter().filter(|_| !computed.time.is_empty());
-        delays
-            .map(|one| computed.resample(&one.values, &self.run.time))
-            .collect()
-    }
-}
-
-impl ComputedForces {
-    /// A column of the times of the forces at other times, by lines between its samples.
-    pub(crate) fn resample(&self, values: &[f64], times: &[f64]) -> Vec<f64> {
-        let time = &self.time;
+        let time = &computed.time;
         let last = time.len().saturating_sub(1);
-        let at = |t: &f64| {
+        let at = |values: &[f64], t: &f64| {
             let b = time.partition_point(|x| x < t).clamp(1.min(last), last);
             let (a, width) = (b.saturating_sub(1), time[b] - time[b.saturating_sub(1)]);
             let share = if width > 0.0 {
@@ -72,6 +45,9 @@ impl ComputedForces {
             };
             values[a] + share * (values[b] - values[a])
         };
-        times.iter().map(at).collect()
+        let delays = computed.delays.iter().filter(|_| !time.is_empty());
+        delays
+            .map(|one| self.run.time.iter().map(|t| at(&one.values, t)).collect())
+            .collect()
     }
 }

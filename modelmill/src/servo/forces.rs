@@ -20,15 +20,14 @@ use super::delay::{DelayQuery, ServoDelay, delays};
 use super::gains::{GainValues, delay_phrase};
 use super::refine::refine_delays;
 use super::suspects::{ServoLimit, servo_limits};
-use super::thresholds::{DELAY_STEP, FEWEST_DECIMATED, LARGEST_LIMIT_CHANGE};
-use super::turns::{turn_note, turn_offset};
+use super::thresholds::{CERTAIN_LIMIT_SHARE, DELAY_STEP, FEWEST_DECIMATED};
 use crate::along;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 use crate::progress::SilentProgress;
 use crate::recording::{PreparedRecording, RecordingOptions, SmoothingMethod, StatePreparation, UnpreparedRecording};
 use crate::segment::RecordingSegment;
-use crate::segment::computed_forces::{ActuatorStates, ComputedForces, DelaySensitivity};
+use crate::segment::computed_forces::{ComputedForces, DelaySensitivity};
 use crate::text::table::significant;
 
 /// Rounds in which limits and delays of servos are estimated in turn.
@@ -182,25 +181,15 @@ impl<'a> ActuatorForces<'a> {
             cutoff_hz: None,
             shifts: vec![0.0; model.actuators().len()],
         };
-        let mut cutoff = all.choose_preparation(runs);
-        // A limit and the delays bias each other until both are known.
+        let cutoff = all.choose_preparation(runs);
+        // A low cut-off rounds the corners at which a limit shows. A limit and the delays bias each other until both are
+        // known.
         for _ in 0..LIMIT_ROUNDS {
-            let before: Vec<f64> = all.limits.iter().map(|limit| limit.size).collect();
-            all.find_limits(runs)?;
+            all.find_limits()?;
             if all.limits.is_empty() {
                 break;
             }
             all.refine(runs)?;
-            let is_same =
-                |(limit, before): (&ServoLimit, &f64)| (limit.size - before).abs() <= LARGEST_LIMIT_CHANGE * limit.size;
-            if all.limits.len() == before.len() && all.limits.iter().zip(&before).all(is_same) {
-                break;
-            }
-        }
-        if !all.limits.is_empty() {
-            // The cut-off was chosen by forces that lacked the limit.
-            all.preparation = None;
-            cutoff = all.choose_preparation(runs);
         }
         all.motion = prepare_motion(model, &all.servo, runs, cutoff);
         all.refine(runs)?;
@@ -233,11 +222,7 @@ impl<'a> ActuatorForces<'a> {
 
     /// The recordings that decide, with their forces; those of the validation if there are no others.
     fn prepare_deciding_recordings(&self, runs: &ReadRuns) -> Vec<PreparedRecording> {
-        self.prepare_with_forces(runs, usize::from(self.motion[0].is_empty()))
-    }
-
-    /// The recordings of the fit (0) or of the validation (1) with their forces.
-    fn prepare_with_forces(&self, runs: &ReadRuns, k: usize) -> Vec<PreparedRecording> {
+        let k = usize::from(self.motion[0].is_empty());
         let affected = runs[k]
             .iter()
             .filter(|one| self.model.lacks_computable_forces(one))
@@ -253,27 +238,36 @@ impl<'a> ActuatorForces<'a> {
     /// Searches limits of servos that the file lacks.
     ///
     /// Fails when a pose has no solution.
-    fn find_limits(&mut self, runs: &ReadRuns) -> Outcome {
-        let segments = |all: Vec<PreparedRecording>| -> Vec<RecordingSegment> {
-            all.into_iter().flat_map(|one| one.segments).collect()
+    fn find_limits(&mut self) -> Outcome {
+        let segments = |all: &[Outcome<PreparedRecording>]| -> Vec<RecordingSegment> {
+            all.iter().flatten().flat_map(|one| one.segments.clone()).collect()
         };
-        let fit = segments(self.prepare_deciding_recordings(runs));
         let check = if self.motion[0].is_empty() {
             Vec::new()
         } else {
-            segments(self.prepare_with_forces(runs, 1))
+            segments(&self.motion[1])
         };
-        self.limits = servo_limits(self.model, [&fit, &check], &self.gains)?;
+        let seconds: Vec<f64> = self.delays.iter().map(|delay| delay.value).collect();
+        let all = [&*segments(deciding_recordings(&self.motion)), &check];
+        self.limits = servo_limits(self.model, &self.servo, all, &seconds, &self.gains)?;
         self.actuators = self.model.actuators().to_vec();
         for limit in &self.limits {
-            self.actuators[limit.actuator] = limit.limited.clone();
+            // A saturation is known roughly: forces about it are left out, and none is cut off.
+            self.actuators[limit.actuator] = ModelActuator {
+                saturation: self.model.actuators()[limit.actuator].saturation,
+                ..limit.limited.clone()
+            };
         }
         Ok(())
     }
 
-    /// Leaves out the forces of a drive that do not follow from its signals: those before the first command arrives.
-    fn leave_out_unknown(&self, raw: &mut Raw, drive: usize, time: &[f64]) {
+    /// Leaves out the forces of a drive that do not follow from its signals: those before the first command arrives, and
+    /// those near a saturation that the file lacks.
+    ///
+    /// Fails when the recording has no such column.
+    fn leave_out_unknown(&self, raw: &mut Raw, drive: usize, time: &[f64]) -> Outcome {
         let name = &self.model.derivation.mechanism.drives[drive].name;
+        // Before the first command arrives, the force is not known.
         let latest = self
             .delays
             .iter()
@@ -283,6 +277,21 @@ impl<'a> ActuatorForces<'a> {
         if latest > 0.0 {
             raw.leave_out_samples(name, &|t| t < time[0] + latest);
         }
+        let found = self
+            .limits
+            .iter()
+            .filter(|limit| self.actuators[limit.actuator].drive.0 == drive);
+        let found = found.filter_map(|limit| limit.limited.saturation.filter(|_| limit.is_saturation));
+        if let Some(limit) = found.reduce(f64::min) {
+            let force = raw.column(name)?.to_vec();
+            let at = |t: f64| time.partition_point(|x| *x < t);
+            raw.leave_out_samples(name, &|t| {
+                force
+                    .get(at(t))
+                    .is_some_and(|force| force.abs() > CERTAIN_LIMIT_SHARE * limit)
+            });
+        }
+        Ok(())
     }
 
     /// A recording with the forces of its actuators.
@@ -297,16 +306,13 @@ impl<'a> ActuatorForces<'a> {
             None => return Ok(recording.clone()),
         };
         let mut raw = recording.raw().clone();
-        raw.unwrap_angles(&self.angle_signals());
         let mechanism = &self.model.derivation.mechanism;
         let time = raw.column("t")?.to_vec();
         let motion = SmoothMotion::new(&self.servo, prepared)?;
         let mut phrases = Vec::new();
-        let mut added_turns = Vec::new();
         let mut computed = ComputedForces {
             time: time.clone(),
             delays: Vec::new(),
-            actuators: Vec::new(),
         };
         for drive in self.model.drives_to_compute(&raw) {
             let position = match mechanism.drives[drive].kind {
@@ -319,24 +325,18 @@ impl<'a> ActuatorForces<'a> {
             let rate = motion.interpolate_at(&motion.rates[drive], &time, 0.0);
             for (k, (actuator, delay)) in own.filter(|(_, (actuator, _))| actuator.drive.0 == drive) {
                 let signal = raw.column(&actuator.signal)?;
-                let turns = turn_offset(actuator, signal, &position);
-                let signal: Vec<f64> = signal.iter().map(|value| value + turns).collect();
-                if turns != 0.0 {
-                    added_turns.push(turn_note(raw.file(), actuator, turns));
-                }
-                let states_at = |delay: f64| ActuatorStates {
-                    actuator: k,
-                    signal: interpolate(&time, &signal, &time, delay),
-                    signal_rate: motion.interpolate_at(&motion.signal_rates[k], &time, delay),
-                    rate: rate.clone(),
-                    position: position.clone(),
+                let forces_at = |delay: f64| {
+                    let states = ActuatorStates {
+                        signal: interpolate(&time, signal, &time, delay),
+                        signal_rate: motion.interpolate_at(&motion.signal_rates[k], &time, delay),
+                        rate: rate.clone(),
+                        position: position.clone(),
+                    };
+                    states.forces(self.model, actuator, &self.gains)
                 };
-                let forces_at = |delay: f64| states_at(delay).forces(self.model, actuator, &self.gains);
-                let states = states_at(delay.value);
-                for (sum, force) in force.iter_mut().zip(states.forces(self.model, actuator, &self.gains)) {
+                for (sum, force) in force.iter_mut().zip(forces_at(delay.value)) {
                     *sum += force;
                 }
-                computed.actuators.push(states);
                 // A delay of the file may be far from the true one: a secant has the force of the difference exactly.
                 let [from, to] = match self.shifts[k] {
                     shift if shift.abs() > DELAY_STEP => [0.0, shift],
@@ -355,12 +355,9 @@ impl<'a> ActuatorForces<'a> {
             }
             let name = &mechanism.drives[drive].name;
             raw.set_column(name, force);
-            self.leave_out_unknown(&mut raw, drive, &time);
+            self.leave_out_unknown(&mut raw, drive, &time)?;
         }
         raw.add_note(RecordingNote::info(self.note(raw.file(), &phrases)));
-        for says in added_turns {
-            raw.add_note(RecordingNote::info(says));
-        }
         let preparation = self.preparation_of(&time);
         if let Some((chosen, passed)) = &preparation {
             raw.add_note(RecordingNote::info(message!(
@@ -385,13 +382,6 @@ impl<'a> ActuatorForces<'a> {
             Some((preparation, _)) => completed.with_preparation(preparation),
             None => completed,
         })
-    }
-
-    /// The signals that are angles, with whether they are.
-    fn angle_signals(&self) -> Vec<(String, bool)> {
-        let angle = |one: &ModelActuator| one.has_position_error() && one.motion.is_angle();
-        let all = self.actuators.iter();
-        all.map(|one| (one.signal.clone(), angle(one))).collect()
     }
 
     /// The preparation of a recording with computed forces, and the highest frequency that its decimation passes, Hz;
@@ -567,6 +557,19 @@ fn lagrange(time: &[f64], values: &[f64], t: f64) -> f64 {
     };
     let sum: f64 = values.iter().enumerate().map(|(k, value)| value * basis(k)).sum();
     if sum.is_finite() { sum } else { values[0] }
+}
+
+/// What the force of one actuator depends on, by sample.
+#[derive(Default)]
+pub(super) struct ActuatorStates {
+    /// The delayed signal.
+    pub(super) signal: Vec<f64>,
+    /// Its rate.
+    pub(super) signal_rate: Vec<f64>,
+    /// The position of the drive.
+    pub(super) position: Vec<f64>,
+    /// Its rate.
+    pub(super) rate: Vec<f64>,
 }
 
 impl ActuatorStates {

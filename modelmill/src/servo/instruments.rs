@@ -14,7 +14,6 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::ServoModel;
-use super::projection::dot;
 use super::thresholds::{INSTRUMENT_LAGS, INSTRUMENT_RIDGE, PROJECTION_RIDGE};
 use crate::segment::RecordingSegment;
 use modelmill_spec::{ActuatorKind, ModelActuator};
@@ -167,4 +166,9 @@ pub(super) fn project_on_instruments(
     let factors = normal.cholesky()?.solve(&z.tr_mul(&w));
     let projected = z * factors;
     Some(projected.transpose().as_slice().to_vec())
+}
+
+/// The scalar product of two columns.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }

@@ -12,7 +12,6 @@ mod estimate;
 mod forces;
 mod gains;
 mod instruments;
-mod projection;
 mod refine;
 mod rows;
 mod scale;

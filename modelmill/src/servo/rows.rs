@@ -4,13 +4,13 @@ use modelmill_codegen::ModelEvaluator;
 use modelmill_spec::{ExactExpression, ExactFunction, ModelActuator};
 
 use super::ServoModel;
+use super::forces::ActuatorStates;
 use super::gains::GainValues;
 use super::thresholds::{LARGEST_DELAY, MOST_SAMPLES, REVERSAL_PERIODS, SATURATION_SHARE, STANDSTILL_SHARE};
 use super::turns::turn_offset;
 use crate::along;
 use crate::error::Outcome;
 use crate::segment::RecordingSegment;
-use crate::segment::computed_forces::ActuatorStates;
 
 /// Equations of one segment, interleaved per sample.
 #[derive(Clone)]
@@ -81,13 +81,12 @@ impl UsedSamples {
         let Ok([_, rates]) = along::drive_motion(&servo.equations, &delayed) else {
             return;
         };
-        for (place, actuator) in servo.actuators().iter().enumerate() {
+        for actuator in servo.actuators() {
             let (drive, i) = (actuator.drive.0, servo.signal_position(actuator));
             let Some(limit) = actuator.saturation else {
                 continue;
             };
             let states = ActuatorStates {
-                actuator: place,
                 signal: delayed.run.q[i].clone(),
                 signal_rate: delayed.run.qd[i].clone(),
                 position: self.positions[drive].clone(),
@@ -171,7 +170,7 @@ fn counting_samples(servo: &ServoModel, segment: &RecordingSegment) -> Outcome<V
 
 /// At which samples a drive moves in one direction: its rate is no standstill, and the filter of the cut-off, in Hz, mixes
 /// in no other direction.
-pub(super) fn moving_samples(time: &[f64], rates: &[f64], cutoff_hz: Option<f64>) -> Vec<bool> {
+fn moving_samples(time: &[f64], rates: &[f64], cutoff_hz: Option<f64>) -> Vec<bool> {
     let width = cutoff_hz.map_or(0.0, |cutoff| REVERSAL_PERIODS / cutoff);
     let n = rates.len().max(1) as f64;
     let rms = (rates.iter().map(|v| v * v).sum::<f64>() / n).sqrt();

@@ -22,16 +22,6 @@ pub(super) fn turn_offset(actuator: &ModelActuator, signal: &[f64], position: &[
     -std::f64::consts::TAU * (usual / std::f64::consts::TAU).round()
 }
 
-/// A sentence on turns that are added to the command of an actuator, rad.
-pub(super) fn turn_note(file: &str, actuator: &ModelActuator, turns: f64) -> String {
-    format!(
-        "{file}: {} full turns are added to `{}`, so that the usual position error of the servo is below half a turn; correct \
-         the command if this error is real.",
-        (turns / std::f64::consts::TAU).round(),
-        actuator.signal
-    )
-}
-
 #[cfg(test)]
 mod tests {
     use super::turn_offset;
