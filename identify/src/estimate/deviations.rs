@@ -33,9 +33,6 @@ use crate::estimate::solution::RegressionSolution;
 use crate::estimate::thresholds::FEWEST_ROWS;
 use crate::signal::dot;
 
-/// Samples whose influences are computed by one product of matrices.
-const BLOCK: usize = 256;
-
 /// Uncertainty of a solution. Lists are in the order of the regressor's columns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParameterUncertainty {
@@ -207,9 +204,9 @@ impl<'a> InfluenceScores<'a> {
     ) -> Result<(), E> {
         let n = self.solution.values.len();
         let to_parameters = self.solution.unit_covariance();
-        let mut gradients = DMatrix::zeros(n, BLOCK);
+        let mut gradient = vec![0.0; n];
         let mut influence = vec![0.0; n];
-        let mut errors = vec![0.0; self.channels * BLOCK];
+        let mut errors = vec![0.0; self.channels];
         let mut rows = 0;
         show(&mut |regressor, measured| {
             check_rows(regressor, measured, n, rows)?;
@@ -220,31 +217,24 @@ impl<'a> InfluenceScores<'a> {
                 });
             }
             rows += measured.len();
-            let blocks = regressor
-                .chunks(n * self.channels * BLOCK)
-                .zip(measured.chunks(self.channels * BLOCK));
-            for (regressor, measured) in blocks {
-                // Gradient of each sample: its rows times their residuals, summed over the channels.
-                let samples = measured.len() / self.channels;
-                gradients.fill(0.0);
-                for (k, (row, measured)) in regressor.chunks_exact(n).zip(measured).enumerate() {
-                    let error = measured - dot(row, &self.solution.values);
-                    errors[k] = error;
-                    let gradient = &mut gradients.as_mut_slice()[k / self.channels * n..][..n];
+            let samples = regressor
+                .chunks_exact(n * self.channels)
+                .zip(measured.chunks_exact(self.channels));
+            for (sample, measured) in samples {
+                // Gradient of the sample: its rows times their residuals, summed over the channels.
+                gradient.fill(0.0);
+                for (channel, row) in sample.chunks_exact(n).enumerate() {
+                    let error = measured[channel] - dot(row, &self.solution.values);
+                    errors[channel] = error;
                     for (g, w) in gradient.iter_mut().zip(row) {
                         *g += w * error;
                     }
                 }
-                for k in 0..samples {
-                    // The matrix is symmetric, so that its columns are its rows. A product of matrices would add in an order
-                    // that depends on the machine.
-                    let gradient = &gradients.as_slice()[k * n..(k + 1) * n];
-                    for (influence, row) in influence.iter_mut().zip(to_parameters.as_slice().chunks_exact(n)) {
-                        *influence = dot(row, gradient);
-                    }
-                    let errors = &errors[k * self.channels..(k + 1) * self.channels];
-                    take(&influence, errors);
+                // The matrix is symmetric, so that its columns are its rows.
+                for (influence, row) in influence.iter_mut().zip(to_parameters.as_slice().chunks_exact(n)) {
+                    *influence = dot(row, &gradient);
                 }
+                take(&influence, &errors);
             }
             Ok(())
         })?;

@@ -134,13 +134,16 @@ fn project_forces(mechanism: &Mechanism, gaps: &[Vec<f64>], on_tree: &[f64]) -> 
         return Some(projected);
     }
     let pick = |columns: &[usize]| DMatrix::from_fn(gaps.len(), columns.len(), |r, k| gaps[r][columns[k]]);
-    let decomposed = pick(&passive).svd(true, true);
+    let (of_passive, of_active) = (pick(&passive), pick(&active));
+    let decomposed = of_passive.clone().svd(true, true);
     let (largest, least) = (decomposed.singular_values.max(), decomposed.singular_values.min());
     let is_determined = least > PROJECTION_CONDITION * largest;
     if decomposed.singular_values.len() < passive.len() || !is_determined {
         return None;
     }
-    let rates = decomposed.solve(&pick(&active), 0.0).ok()?;
+    let mut rates = decomposed.solve(&of_active, 0.0).ok()?;
+    // The decomposition has only half of all digits at single poses; one step of refinement restores them.
+    rates += decomposed.solve(&(of_active - of_passive * &rates), 0.0).ok()?;
     for (k, i) in active.iter().enumerate() {
         let carried: f64 = passive
             .iter()

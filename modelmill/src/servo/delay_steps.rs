@@ -22,7 +22,8 @@ pub(super) struct DelayColumns {
     pub(super) values: Vec<f64>,
 }
 
-/// Improves the delays that the file does not give; those stay that the equations do not determine.
+/// Improves the delays that the file does not give. Those stay that the equations do not determine, and all of them if
+/// the steps do not converge.
 ///
 /// Fails when a pose has no solution.
 pub(super) fn refine_by_instruments(system: &ServoSystem<'_>, delays: &mut [ServoDelay]) -> Outcome {
@@ -30,11 +31,14 @@ pub(super) fn refine_by_instruments(system: &ServoSystem<'_>, delays: &mut [Serv
     if estimated.is_empty() {
         return Ok(());
     }
+    let first_estimates = delays.to_vec();
+    let mut last_step = f64::INFINITY;
     for _ in 0..DELAY_ITERATIONS {
         let values: Vec<f64> = delays.iter().map(|delay| delay.value).collect();
         let solved = system.solve(&values)?;
         if !matches!(solved.estimator, ServoEstimator::Instruments { .. }) {
-            return Ok(());
+            last_step = f64::INFINITY;
+            break;
         }
         let columns = delay_columns(system, &values, &estimated, &system.base_values(&solved))?;
         let joint = system.solve_weighted(
@@ -45,7 +49,8 @@ pub(super) fn refine_by_instruments(system: &ServoSystem<'_>, delays: &mut [Serv
         )?;
         let (solution, uncertainty, estimator) = joint;
         if !matches!(estimator, ServoEstimator::Instruments { .. }) {
-            return Ok(());
+            last_step = f64::INFINITY;
+            break;
         }
         let first = solution.values.len() - estimated.len();
         let mut largest: f64 = 0.0;
@@ -62,9 +67,14 @@ pub(super) fn refine_by_instruments(system: &ServoSystem<'_>, delays: &mut [Serv
             one.interval = Some([-1.0, 1.0].map(|sign: f64| (one.value + sign * HALF_INTERVAL * std).max(0.0)));
             largest = largest.max((one.value - before).abs());
         }
+        last_step = largest;
         if largest < DELAY_TOLERANCE {
             break;
         }
+    }
+    // Steps that do not converge are worse than the estimate with which they began.
+    if last_step > DELAY_STEP {
+        delays.clone_from_slice(&first_estimates);
     }
     Ok(())
 }

@@ -20,6 +20,7 @@ use super::scale::ServoScale;
 use super::thresholds::{
     IMPOSSIBLE_SIGMAS, INSTRUMENT_CORRELATION, LARGE_BALANCE_ERROR, MOST_SAMPLES, SATURATION_PASSES,
 };
+use super::turns::turn_sentence;
 use crate::error::{Error, Outcome};
 use crate::recording::PreparedRecording;
 use crate::segment::RecordingSegment;
@@ -155,6 +156,7 @@ impl ServoModel {
         };
         let fitted = system.row_errors(&solved.equations, &base);
         let mut notes = remarks(self, &system.unknown, &solved, &delays);
+        notes.extend(system.turn_notes());
         notes.extend(large_errors(&fitted, "the fitted recordings"));
         notes.extend(large_errors(&checked, "the validation run"));
         for note in &notes {
@@ -258,6 +260,21 @@ impl<'a> ServoSystem<'a> {
             });
         }
         Ok((own, instruments))
+    }
+
+    /// Notes on full turns that were added to commands, one for each recording and actuator.
+    fn turn_notes(&self) -> Vec<RecordingNote> {
+        let mut notes = Vec::new();
+        for one in &self.samples {
+            let turns = one.added_turns(self.servo);
+            let added = self.servo.actuators().iter().zip(turns);
+            notes.extend(added.filter_map(|(actuator, turns)| turn_sentence(actuator, turns)));
+        }
+        notes.dedup();
+        notes
+            .into_iter()
+            .map(|says| RecordingNote::info(format!("{}: {says}.", self.servo.equations.path)))
+            .collect()
     }
 
     /// The equations with some delays, without instruments.

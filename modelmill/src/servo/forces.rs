@@ -21,6 +21,7 @@ use super::gains::{GainValues, delay_phrase};
 use super::refine::refine_delays;
 use super::suspects::{ServoLimit, servo_limits};
 use super::thresholds::{CERTAIN_LIMIT_SHARE, DELAY_STEP, FEWEST_DECIMATED};
+use super::turns::{turn_offset, turn_sentence};
 use crate::along;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
@@ -306,10 +307,12 @@ impl<'a> ActuatorForces<'a> {
             None => return Ok(recording.clone()),
         };
         let mut raw = recording.raw().clone();
+        raw.unwrap_angles(&self.angle_signals());
         let mechanism = &self.model.derivation.mechanism;
         let time = raw.column("t")?.to_vec();
         let motion = SmoothMotion::new(&self.servo, prepared)?;
         let mut phrases = Vec::new();
+        let mut added_turns = Vec::new();
         let mut computed = ComputedForces {
             time: time.clone(),
             delays: Vec::new(),
@@ -325,9 +328,12 @@ impl<'a> ActuatorForces<'a> {
             let rate = motion.interpolate_at(&motion.rates[drive], &time, 0.0);
             for (k, (actuator, delay)) in own.filter(|(_, (actuator, _))| actuator.drive.0 == drive) {
                 let signal = raw.column(&actuator.signal)?;
+                let turns = turn_offset(actuator, signal, &position);
+                let signal: Vec<f64> = signal.iter().map(|value| value + turns).collect();
+                added_turns.extend(turn_sentence(actuator, turns));
                 let forces_at = |delay: f64| {
                     let states = ActuatorStates {
-                        signal: interpolate(&time, signal, &time, delay),
+                        signal: interpolate(&time, &signal, &time, delay),
                         signal_rate: motion.interpolate_at(&motion.signal_rates[k], &time, delay),
                         rate: rate.clone(),
                         position: position.clone(),
@@ -358,6 +364,9 @@ impl<'a> ActuatorForces<'a> {
             self.leave_out_unknown(&mut raw, drive, &time)?;
         }
         raw.add_note(RecordingNote::info(self.note(raw.file(), &phrases)));
+        for says in added_turns {
+            raw.add_note(RecordingNote::info(format!("{}: {says}.", raw.file())));
+        }
         let preparation = self.preparation_of(&time);
         if let Some((chosen, passed)) = &preparation {
             raw.add_note(RecordingNote::info(message!(
@@ -382,6 +391,13 @@ impl<'a> ActuatorForces<'a> {
             Some((preparation, _)) => completed.with_preparation(preparation),
             None => completed,
         })
+    }
+
+    /// The signals of actuators, with whether they are commands of angles.
+    fn angle_signals(&self) -> Vec<(String, bool)> {
+        let is_angle = |one: &ModelActuator| one.has_position_error() && one.motion.is_angle();
+        let all = self.actuators.iter();
+        all.map(|one| (one.signal.clone(), is_angle(one))).collect()
     }
 
     /// The preparation of a recording with computed forces, and the highest frequency that its decimation passes, Hz;

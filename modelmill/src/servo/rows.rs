@@ -59,11 +59,11 @@ impl UsedSamples {
     pub(super) fn delayed(&self, servo: &ServoModel, delays: &[f64]) -> RecordingSegment {
         let mut segment = self.segment.clone();
         let from = &self.complete.run;
-        for (actuator, delay) in servo.actuators().iter().zip(delays) {
+        let turns = self.added_turns(servo);
+        for ((actuator, delay), turns) in servo.actuators().iter().zip(delays).zip(turns) {
             let i = servo.signal_position(actuator);
             let (q, qd, qdd) = (&from.q[i], &from.qd[i], &from.qdd[i]);
             let position = &self.positions[actuator.drive.0];
-            let turns = turn_offset(actuator, &self.segment.run.q[i], position);
             for (sample, t) in self.segment.run.time.iter().enumerate() {
                 let [value, rate, acceleration] = interpolate(&from.time, [q, qd, qdd], t - delay);
                 segment.run.q[i][sample] = actuator.effective_signal(value + turns, position[sample]);
@@ -72,6 +72,15 @@ impl UsedSamples {
             }
         }
         segment
+    }
+
+    /// The full turns that are added to the command of each actuator, rad.
+    pub(super) fn added_turns(&self, servo: &ServoModel) -> Vec<f64> {
+        let all = servo.actuators().iter().map(|actuator| {
+            let command = &self.segment.run.q[servo.signal_position(actuator)];
+            turn_offset(actuator, command, &self.positions[actuator.drive.0])
+        });
+        all.collect()
     }
 
     /// Leaves out the samples at which an actuator requests nearly as much as its saturation, or more: its force is not

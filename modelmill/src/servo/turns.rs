@@ -22,6 +22,18 @@ pub(super) fn turn_offset(actuator: &ModelActuator, signal: &[f64], position: &[
     -std::f64::consts::TAU * (usual / std::f64::consts::TAU).round()
 }
 
+/// A sentence on turns that were added to the command of an actuator, rad; `None` if there are none.
+pub(super) fn turn_sentence(actuator: &ModelActuator, turns: f64) -> Option<String> {
+    let count = (turns / std::f64::consts::TAU).round();
+    (count != 0.0).then(|| {
+        format!(
+            "full turns ({count}) were added to `{}`, so that the usual position error of the servo is below half a turn; \
+             correct the command if a larger error is real",
+            actuator.signal
+        )
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::turn_offset;

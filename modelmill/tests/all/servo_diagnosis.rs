@@ -1,6 +1,8 @@
 //! Comparison and diagnosis of servo logs without forces: what is planted in a pendulum on a position servo is found, and
 //! nothing is found where nothing is planted.
 
+use std::f64::consts::TAU;
+
 use modelmill::diagnose::{DiagnosisFindings, DiagnosisOptions};
 use modelmill::recording::{PreparedRecording, RecordingOptions};
 use modelmill::{Error, Model};
@@ -95,6 +97,34 @@ fn forces_follow_from_commands_and_gains() {
         says.iter().any(|text| text.contains("computed from the signals")),
         "{says:?}"
     );
+}
+
+/// A command of 350 degrees and one of -10 degrees are the same pose: neither constant turns nor angles that are wrapped to
+/// one turn change a force.
+#[test]
+fn commands_that_differ_by_full_turns_give_the_same_forces() {
+    let model = model(&pendulum(&KNOWN));
+    let log = simulate_limited(&PLANTED, NONE, 1, 5000);
+    let error_and_notes = |change: &dyn Fn(f64) -> f64| {
+        let mut changed = log.clone();
+        for (_, values) in changed.iter_mut().filter(|(name, _)| name == "motor_command") {
+            for value in values {
+                *value = change(*value);
+            }
+        }
+        let run = prepare(&model, changed).unwrap();
+        let compared = model.compare(&[&run], &values(&model, &PLANTED)).unwrap();
+        let notes: Vec<String> = run.notes().map(|note| note.says.in_library_words()).collect();
+        (compared.figures.nrms.unwrap(), notes.join("\n"))
+    };
+    let (expected, plain) = error_and_notes(&|q| q);
+    assert!(!plain.contains("full turns"), "{plain}");
+    let (turned, says) = error_and_notes(&|q| q - 2.0 * TAU);
+    assert!(says.contains("full turns (2) were added to `motor_command`"), "{says}");
+    let (wrapped, _) = error_and_notes(&|q| q.rem_euclid(TAU));
+    for error in [turned, wrapped] {
+        assert!((error / expected - 1.0).abs() < 1e-6, "{error} {expected}");
+    }
 }
 
 #[test]
