@@ -7,10 +7,20 @@ use crate::tree::{CodeExpression, OperatorPrecedence};
 pub(crate) trait LanguageSyntax {
     /// A variable; keywords and special characters are replaced.
     fn name(&self, name: &str) -> String;
-    /// A number between operators.
-    fn number(&self, value: f64) -> String;
-    /// A number that stands alone where a variable is expected; it may need a conversion or parentheses.
-    fn standalone_number(&self, value: f64) -> String;
+    /// A number between operators, with as many digits as give it back.
+    fn number(&self, value: f64) -> String {
+        format!("{value:?}")
+    }
+    /// A number that stands alone where a variable is expected; it may need a conversion. A negative one may follow an
+    /// operator, and needs parentheses.
+    fn standalone_number(&self, value: f64) -> String {
+        let number = self.number(value);
+        if value.is_sign_negative() {
+            format!("({number})")
+        } else {
+            number
+        }
+    }
     /// A function of one argument; the text of the argument needs no further parentheses.
     fn call(&self, function: Unary, argument: &str) -> String;
     /// Angle of the point (`x`, `y`) in rad; the text of `y` needs no further parentheses.

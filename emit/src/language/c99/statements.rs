@@ -121,19 +121,6 @@ impl LanguageSyntax for CSyntax<'_> {
         spell_plain(name)
     }
 
-    fn number(&self, value: f64) -> String {
-        format!("{value:?}")
-    }
-
-    fn standalone_number(&self, value: f64) -> String {
-        // A negative number may follow an operator.
-        if value.is_sign_negative() {
-            format!("({value:?})")
-        } else {
-            format!("{value:?}")
-        }
-    }
-
     fn call(&self, function: Unary, argument: &str) -> String {
         // The argument may have parentheses of its own, which the call replaces.
         let bare = argument

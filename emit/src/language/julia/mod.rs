@@ -52,18 +52,6 @@ impl LanguageSyntax for JuliaSyntax {
         if is_plain { name.to_owned() } else { spell_plain(name) }
     }
 
-    fn number(&self, value: f64) -> String {
-        format!("{value:?}")
-    }
-
-    fn standalone_number(&self, value: f64) -> String {
-        if value.is_sign_negative() {
-            format!("({value:?})")
-        } else {
-            format!("{value:?}")
-        }
-    }
-
     fn call(&self, function: Unary, argument: &str) -> String {
         format!("{}({argument})", FormulaFunction::from(function).name())
     }

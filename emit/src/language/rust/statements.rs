@@ -25,10 +25,6 @@ impl LanguageSyntax for RustSyntax {
         field_identifier(name).to_string()
     }
 
-    fn number(&self, value: f64) -> String {
-        format!("{value:?}")
-    }
-
     fn standalone_number(&self, value: f64) -> String {
         format!("n.number({value:?})")
     }
