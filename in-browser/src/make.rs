@@ -26,7 +26,7 @@ pub fn missing_target() -> Option<String> {
     (!is_there).then(|| format!("the compiler has no target {TARGET}; run `rustup target add {TARGET}` first"))
 }
 
-/// Compiles the workbench in a profile of the workspace, into the folder `builds`; returns the path of the module.
+/// Compiles the workbench in a profile that the workspace defines, into the folder `builds`; returns the path of the module.
 ///
 /// Fails with a sentence if the compiler fails.
 pub fn build_module(profile: &str, builds: &Path) -> Result<PathBuf, String> {
@@ -46,9 +46,8 @@ pub fn build_module(profile: &str, builds: &Path) -> Result<PathBuf, String> {
             "the workbench cannot be compiled for {TARGET}; see the messages of the compiler above"
         ));
     }
-    let folder = if profile == "dev" { "debug" } else { profile };
     let name = format!("{}.wasm", env!("CARGO_CRATE_NAME"));
-    Ok(builds.join(TARGET).join(folder).join(name))
+    Ok(builds.join(TARGET).join(profile).join(name))
 }
 
 /// All bundled models, and the recordings of the robot with rods, which its model lacks.

@@ -92,7 +92,7 @@ fn module() -> Option<PathBuf> {
     // The folder of this test is `deps` in that of its profile, and that in the folder of builds or of a target in it.
     let test = std::env::current_exe().expect("a test has a path");
     let builds = test.ancestors().nth(3).expect("a folder of builds");
-    Some(make::build_module("dev", builds).unwrap_or_else(|says| panic!("{says}")))
+    Some(make::build_module("page-test", builds).unwrap_or_else(|says| panic!("{says}")))
 }
 
 /// Compares two answers, and counts their numbers. How long something took is no part of them, and pictures and texts of

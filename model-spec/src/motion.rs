@@ -3,7 +3,9 @@
 
 use crate::exact::{CoordinateIdx, ModelSymbol};
 use crate::kinematics::{Vec3, rotation_from_quaternion};
-use crate::mechanism::{CoordinateCoupling, DriveKind, FrameAxis, FrameStep, FreeBody, Mechanism, PointIdx};
+use crate::mechanism::{
+    CoordinateCoupling, CouplingFunction, DriveKind, FrameAxis, FrameStep, FreeBody, Mechanism, PointIdx,
+};
 
 /// The geometry of a mechanism at the constants of its file.
 #[derive(Clone, Debug)]
@@ -17,7 +19,7 @@ pub struct Kinematics {
     /// Pairs of points that coincide.
     loops: Vec<[usize; 2]>,
     /// Coordinates that follow others.
-    couplings: Vec<CoordinateCoupling>,
+    couplings: Vec<NumericCoupling>,
     /// Values of the constants and parameters in functions of couplings.
     fixed: FixedValues,
 }
@@ -27,6 +29,19 @@ pub struct Kinematics {
 struct FixedValues {
     /// Those of the constants, in the order of the file.
     constants: Vec<f64>,
+}
+
+/// A coordinate that follows others: `offset + sum of factor * coordinate + function`.
+#[derive(Clone, Debug)]
+struct NumericCoupling {
+    /// The index of the coordinate that follows.
+    coordinate: usize,
+    /// Indices of the coordinates of the affine part with their factors.
+    terms: Vec<(usize, f64)>,
+    /// The constant part, rad or m.
+    offset: f64,
+    /// The part that is not affine.
+    function: Option<CouplingFunction>,
 }
 
 /// One step from a parent frame to its child.
@@ -106,6 +121,38 @@ impl FixedValues {
     }
 }
 
+impl NumericCoupling {
+    /// Evaluates the constants of a coupling.
+    fn new(coupling: &CoordinateCoupling, fixed: &FixedValues) -> Self {
+        let value = |symbol: ModelSymbol| fixed.value(symbol, &[]);
+        let terms = coupling.terms.iter();
+        NumericCoupling {
+            coordinate: coupling.coordinate.0,
+            terms: terms.map(|(i, factor)| (i.0, factor.evaluate(&value))).collect(),
+            offset: coupling.offset.evaluate(&value),
+            function: coupling.function.clone(),
+        }
+    }
+
+    /// The value of the coordinate that follows, rad or m.
+    fn value(&self, fixed: &FixedValues, coordinates: &[f64]) -> f64 {
+        let moved = self.terms.iter().map(|(i, factor)| factor * coordinates[*i]);
+        let function = self.function.as_ref().map_or(0.0, |function| {
+            function.value.evaluate(&|symbol| fixed.value(symbol, coordinates))
+        });
+        self.offset + moved.sum::<f64>() + function
+    }
+
+    /// Its derivatives by the coordinates that it follows, with their indices.
+    fn slopes(&self, fixed: &FixedValues, coordinates: &[f64]) -> Vec<(usize, f64)> {
+        let of_function = self.function.iter().flat_map(|function| {
+            let slope = |i| (function.value).slope(i, &|symbol| fixed.value(symbol, coordinates));
+            function.leaders.iter().map(move |i| (i.0, slope(*i)))
+        });
+        self.terms.iter().copied().chain(of_function).collect()
+    }
+}
+
 impl Kinematics {
     /// Evaluates all constants of a mechanism; only coordinates remain variable.
     pub fn new(mechanism: &Mechanism) -> Self {
@@ -145,6 +192,9 @@ impl Kinematics {
                     .collect(),
             }),
         };
+        let fixed = FixedValues {
+            constants: mechanism.constants.iter().map(|one| one.value).collect(),
+        };
         Self {
             n_coordinates: mechanism.coordinates.len(),
             frames: mechanism
@@ -158,10 +208,10 @@ impl Kinematics {
                 .map(|p| (p.frame.0, [0, 1, 2].map(|k| p.at[k].evaluate(&value))))
                 .collect(),
             loops: mechanism.loops.iter().map(|l| [l.joins[0].0, l.joins[1].0]).collect(),
-            couplings: mechanism.couplings.clone(),
-            fixed: FixedValues {
-                constants: mechanism.constants.iter().map(|one| one.value).collect(),
-            },
+            couplings: (mechanism.couplings.iter())
+                .map(|coupling| NumericCoupling::new(coupling, &fixed))
+                .collect(),
+            fixed,
         }
     }
 
@@ -246,9 +296,10 @@ impl Kinematics {
             let [a, b] = ends(l);
             [0, 1, 2].map(|k| a[k] - b[k])
         });
-        let of_couplings = self.couplings.iter().map(|follower| {
-            coordinates[follower.coordinate.0] - follower.value(&|symbol| self.fixed.value(symbol, coordinates))
-        });
+        let of_couplings = self
+            .couplings
+            .iter()
+            .map(|follower| coordinates[follower.coordinate] - follower.value(&self.fixed, coordinates));
         of_loops.chain(of_couplings).collect()
     }
 
@@ -267,9 +318,9 @@ impl Kinematics {
         }
         for follower in &self.couplings {
             let mut row = vec![0.0; self.n_coordinates];
-            row[follower.coordinate.0] = 1.0;
-            for (i, slope) in follower.slopes(&|symbol| self.fixed.value(symbol, &poses.coordinates)) {
-                row[i.0] -= slope;
+            row[follower.coordinate] = 1.0;
+            for (i, slope) in follower.slopes(&self.fixed, &poses.coordinates) {
+                row[i] -= slope;
             }
             rows.push(row);
         }

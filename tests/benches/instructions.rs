@@ -6,13 +6,13 @@
 //! Each figure is the difference of two numbers of calls, less what an empty call costs in the same loop.
 
 use std::hint::black_box;
-use std::process::{Command, ExitCode};
+use std::process::ExitCode;
 
 use modelmill_codegen::{ModelEvaluator, ProgramStage, StraightLineProgram};
-use modelmill_tests::base_parameters;
 use modelmill_tests::fixtures::{derive, derived, model};
 use modelmill_tests::sample::Sample;
 use modelmill_tests::stream::Stream;
+use modelmill_tests::{base_parameters, callgrind};
 
 /// States that calls go through in turn; a block evaluation takes all of them.
 const STATES: usize = 128;
@@ -43,7 +43,7 @@ fn main() -> ExitCode {
 
 /// Prints the table, running this program under valgrind for every figure.
 fn report(wanted: Option<&str>) -> ExitCode {
-    if Command::new("valgrind").arg("--version").output().is_err() {
+    if !callgrind::is_available() {
         println!("instruction counts need valgrind, which is not on this machine: nothing was measured");
         return ExitCode::SUCCESS;
     }
@@ -63,18 +63,22 @@ fn report(wanted: Option<&str>) -> ExitCode {
                 f if f.starts_with("H_min") => operations(&programs.regressor),
                 _ => operations(&programs.inverse_dynamics),
             };
-            let difference = |function| {
-                let [few, many] = calls.map(|n| instructions(name, function, n));
-                Some((many? - few?) / (calls[1] - calls[0]) as f64)
+            let difference = |function: &str| -> Result<f64, String> {
+                let [few, many] =
+                    calls.map(|n| callgrind::count_instructions(&["--measure", name, function, &n.to_string()]));
+                Ok((many? - few?) / (calls[1] - calls[0]) as f64)
             };
             let overhead = if calls[0] > 1 {
                 *empty.get_or_insert_with(|| difference("nothing").unwrap_or(0.0))
             } else {
                 0.0
             };
-            let Some(each) = difference(function) else {
-                println!("{name}: valgrind did not count {function}");
-                return ExitCode::FAILURE;
+            let each = match difference(function) {
+                Ok(each) => each,
+                Err(says) => {
+                    println!("{name}, {function}: {says}");
+                    return ExitCode::FAILURE;
+                }
             };
             let each = (each - overhead) / states as f64;
             println!("{name:<18} {function:<24} {operations:>20} {each:>15.0}");
@@ -88,36 +92,16 @@ fn operations(program: &StraightLineProgram) -> String {
     format!("{} ({}, {}, {})", c.add + c.mul, c.div, c.sqrt, c.sincos)
 }
 
-/// Instructions inside [`repeat`] for some calls of a function.
-fn instructions(name: &str, function: &str, calls: usize) -> Option<f64> {
-    let output = Command::new("valgrind")
-        .args([
-            "--tool=callgrind",
-            "--callgrind-out-file=/dev/null",
-            "--toggle-collect=*repeat_calls*",
-        ])
-        .arg(std::env::current_exe().ok()?)
-        .args(["--measure", name, function, &calls.to_string()])
-        .output()
-        .ok()?;
-    let text = String::from_utf8_lossy(&output.stderr);
-    let line = text.lines().find(|line| line.contains("Collected :"))?;
-    line.rsplit(' ').next()?.parse().ok()
-}
-
-/// The only function that is counted.
-#[inline(never)]
-fn repeat_calls(calls: usize, call: &mut dyn FnMut(usize)) {
-    for k in 0..calls {
-        call(k % STATES);
-    }
+/// Calls a function with the numbers of states in turn; only this is counted.
+fn repeat_states(calls: usize, call: &mut dyn FnMut(usize)) {
+    callgrind::repeat_calls(calls, &mut |k| call(k % STATES));
 }
 
 fn measured_by_name(name: &str, function: &str, calls: usize) {
     match function {
         "generation" => {
             let mechanism = model(name);
-            repeat_calls(calls, &mut |_| {
+            repeat_states(calls, &mut |_| {
                 let derivation = derive(black_box(&mechanism));
                 black_box(modelmill_emit::emit(&derivation).module());
             });
@@ -131,7 +115,7 @@ fn measured_by_name(name: &str, function: &str, calls: usize) {
             let states = sample.states();
             let nominal = base_parameters::nominal(&derivation.mechanism);
             let base = base_parameters::base(&derivation, &nominal);
-            repeat_calls(calls, &mut |_| {
+            repeat_states(calls, &mut |_| {
                 let states = black_box(&states);
                 if function == "H_min, block" {
                     _ = black_box(evaluator.regressor(states));
@@ -170,11 +154,11 @@ macro_rules! models {
                         .collect();
                     assert_eq!(states.len(), STATES);
                     match function {
-                        "nothing" => repeat_calls(calls, &mut |k| _ = black_box(black_box(&states[k]))),
-                        "H_min" => repeat_calls(calls, &mut |k| {
+                        "nothing" => repeat_states(calls, &mut |k| _ = black_box(black_box(&states[k]))),
+                        "H_min" => repeat_states(calls, &mut |k| {
                             _ = black_box(model.regressor(black_box(&states[k])));
                         }),
-                        "inverse dynamics" => repeat_calls(calls, &mut |k| {
+                        "inverse dynamics" => repeat_states(calls, &mut |k| {
                             _ = black_box(dynamics.forces(black_box(&states[k])));
                         }),
                         $("inverse dynamics, near" => {
@@ -182,7 +166,7 @@ macro_rules! models {
                             let mut state = states[0];
                             let centre = state.q;
                             let mut $near = model.passive_position(&centre).expect("within reach");
-                            repeat_calls(calls, &mut |k| {
+                            repeat_states(calls, &mut |k| {
                                 let x = k as f64 / STATES as f64;
                                 let shift = 0.5 * x * (1.0 - x);
                                 state.q = centre.map(|q| q + shift);

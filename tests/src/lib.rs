@@ -6,6 +6,7 @@
 
 pub mod balances;
 pub mod base_parameters;
+pub mod callgrind;
 pub mod counts;
 pub mod equation_of_motion;
 pub mod fixtures;

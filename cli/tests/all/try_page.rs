@@ -21,7 +21,7 @@ fn page() -> Option<String> {
     }
     let program = PathBuf::from(env!("CARGO_BIN_EXE_modelmill"));
     let builds = program.ancestors().nth(2).expect("a folder of builds");
-    let made = make::build_module("dev", builds).and_then(|module| make::build_page(&module));
+    let made = make::build_module("page-test", builds).and_then(|module| make::build_page(&module));
     let path = scratch("try.html");
     std::fs::write(&path, made.unwrap_or_else(|says| panic!("{says}"))).expect("the page");
     Some(path)

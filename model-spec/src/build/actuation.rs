@@ -41,19 +41,20 @@ pub(super) fn loops(
     places: &mut MechanismSpans,
     log: &mut DiagnosticLog,
 ) -> Vec<KinematicLoop> {
-    // Loops may have names; those must be unique.
     let entries = model.loops.as_ref().map_or(&[][..], |list| list.entries.as_slice());
-    check_unique("loop", entries.iter().filter_map(|entry| entry.name.as_ref()), log);
     if let Some(entry) = entries.get(MOST_LOOPS) {
         log.push(Diagnostic::error(entry.span, "there are too many loops").label(format!("at most {MOST_LOOPS}")));
     }
     // Loops beyond the limit are not looked at.
-    let mut loops = Vec::new();
+    let mut loops: Vec<KinematicLoop> = Vec::new();
+    // The place of each loop's name.
+    let mut named: Vec<SourceSpan> = Vec::new();
     for entry in entries.iter().take(MOST_LOOPS) {
         let joins = match (&entry.joins, &entry.welds) {
             (Some(joins), None) => joins,
             (None, Some(welds)) => {
                 loops.extend(weld_loops(entry.name.as_ref(), welds, tree, points, places, log));
+                named.resize(loops.len(), entry.name.as_ref().map_or(welds.span, |name| name.span));
                 continue;
             }
             _ if log.syntax_broken || entry.faulty => continue,
@@ -98,7 +99,14 @@ pub(super) fn loops(
                 .map_or_else(|| format!("{}_{}", first.text, second.text), |name| name.text.clone()),
             joins: [one, other],
         });
+        named.push(entry.name.as_ref().map_or(joins.span, |name| name.span));
     }
+    // Names must be unique, given or not; a weld has three loops.
+    let names = loops.iter().zip(named).map(|(closure, span)| SpannedName {
+        text: closure.name.clone(),
+        span,
+    });
+    check_unique("loop", names.collect::<Vec<_>>().iter(), log);
     loops
 }
 

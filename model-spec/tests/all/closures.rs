@@ -57,8 +57,11 @@ fn a_nominal_pose_next_to_a_fold_is_reported_with_its_distance() {
             .split_once("about ")
             .unwrap_or_else(|| panic!("{before}: {said}"))
             .1;
-        let told: f64 = label.split_once(' ').expect("a number").0.parse().expect("a number");
-        assert!((told - before).abs() < 0.06 * before, "{told} instead of {before}");
+        let printed: f64 = label.split_once(' ').expect("a number").0.parse().expect("a number");
+        assert!(
+            (printed - before).abs() < 0.06 * before,
+            "{printed} instead of {before}"
+        );
         assert!(label.contains("rad above"), "{said}");
     }
     for before in [0.03, 0.3, 0.8] {
@@ -112,6 +115,17 @@ fn a_weld_is_one_entry() {
     assert!(both.contains("does not specify what it joins"), "{both}");
     let same = refusal(&text.replace("[\"hinge\", \"end\"]", "[\"rocker\", \"end\"]"));
     assert!(same.contains("fixed to the same body"), "{same}");
+    // The weld's loops take names, as loops without a name do.
+    for name in ["weld", "weld_x", "weld_y"] {
+        let twice = refusal(&format!("{text}[[loop]]\nname = \"{name}\"\njoins = [\"A\", \"B\"]\n"));
+        assert!(
+            twice.contains(&format!("the loop `{name}` is defined twice")),
+            "{twice}"
+        );
+    }
+    let joins = "[[loop]]\njoins = [\"A\", \"B\"]\n";
+    let twice = refusal(&four_bar(0.5, &format!("{joins}{joins}")));
+    assert!(twice.contains("the loop `A_B` is defined twice"), "{twice}");
 }
 
 /// A crank with a coordinate that follows it.

@@ -4,20 +4,34 @@
 use std::path::Path;
 
 use modelmill_boundary::files::{DiskFiles, MemoryFiles};
-use modelmill_codegen::{ModelEvaluator, MotionStates};
+use modelmill_codegen::{Derivation, ModelEvaluator, MotionStates};
 use modelmill_reduction::{default_plan, reduce, sampled_forces};
 use modelmill_rig::Rig;
 
 use crate::{derived, shuffled};
 
-fn bundled() -> String {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../model-spec/rigs/spidermill-full.toml");
-    std::fs::read_to_string(path).expect("the rig")
-}
+/// The whole robot.
+const BUNDLED: &str = "model-spec/rigs/spidermill-full.toml";
 
-/// The rig with its entries in a random order.
-fn shuffled_rig(text: &str, seed: u64) -> Rig {
-    let loaded = modelmill_rig::load("shuffled.toml", &shuffled(text, seed), &DiskFiles::default());
+/// All rigs of the workspace. Those that extend another one are shuffled in their own entries.
+const RIGS: [&str; 7] = [
+    BUNDLED,
+    "model-spec/rigs/spidermill-seventeen.toml",
+    "model-spec/rigs/spidermill-with-rods.toml",
+    "model-spec/rigs/spidermill-worn.toml",
+    "examples/computed-torque/rig.toml",
+    "examples/live/rig.toml",
+    "fleet/program/five_bar.rig.toml",
+];
+
+/// The rig of a file of the workspace with its entries in a random order, or in their own order without a seed.
+fn rig_in_order(file: &str, seed: Option<u64>) -> Rig {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(file);
+    let mut text = std::fs::read_to_string(&path).expect("the rig");
+    if let Some(seed) = seed {
+        text = shuffled(&text, seed);
+    }
+    let loaded = modelmill_rig::load(&path.display().to_string(), &text, &DiskFiles::default());
     loaded.unwrap_or_else(|failure| panic!("{failure}")).rig
 }
 
@@ -31,9 +45,8 @@ fn model(rig: &Rig) -> String {
 /// Seven of the eleven groups rotate as another one or not at all; two loops of five equations less remain.
 #[test]
 fn parts_that_move_alike_need_no_coordinate() {
-    let text = bundled();
     for seed in 0..20 {
-        let rig = shuffled_rig(&text, seed);
+        let rig = rig_in_order(BUNDLED, Some(seed));
         let model = model(&rig);
         let loaded = modelmill_spec::load("model.toml", &model, &MemoryFiles::default()).expect("a model");
         let mechanism = &loaded.mechanism;
@@ -51,48 +64,69 @@ fn parts_that_move_alike_need_no_coordinate() {
     }
 }
 
+/// Reduces a rig with its entries in the orders of some seeds; checks the number of base parameters, and the model's
+/// forces against those of the rig.
+#[track_caller]
+fn check_orders(file: &str, seeds: impl IntoIterator<Item = u64>) {
+    let given = derived(&model(&rig_in_order(file, None)));
+    let n_base = given.base_parameters().len();
+    for seed in seeds {
+        let rig = rig_in_order(file, Some(seed));
+        let derivation = derived(&model(&rig));
+        assert_eq!(derivation.base_parameters().len(), n_base, "{file}, seed {seed}");
+        check_forces(&rig, &derivation, &format!("{file}, seed {seed}"));
+    }
+}
+
+/// The model has the forces of the rig at states that are drawn.
+#[track_caller]
+fn check_forces(rig: &Rig, derivation: &Derivation, case: &str) {
+    let sampled = sampled_forces(rig, 20, 0.2).expect("forces");
+    // Columns in the order of the model, forces of the rig in its own.
+    let names = derivation.mechanism.coordinates.iter().filter(|c| !c.passive);
+    let at: Vec<usize> = names
+        .map(|c| {
+            let own = rig.coordinates.iter().position(|r| r.name == c.name);
+            own.expect("the coordinate")
+        })
+        .collect();
+    let column = |of: fn(&modelmill_rig::RigState) -> &Vec<f64>| -> Vec<Vec<f64>> {
+        at.iter()
+            .map(|k| sampled.iter().map(|(state, _)| of(state)[*k]).collect())
+            .collect()
+    };
+    let (q, qd, qdd) = (column(|s| &s.q), column(|s| &s.qd), column(|s| &s.qdd));
+    let states = MotionStates {
+        q: q.iter().map(Vec::as_slice).collect(),
+        qd: qd.iter().map(Vec::as_slice).collect(),
+        qdd: qdd.iter().map(Vec::as_slice).collect(),
+        load: Vec::new(),
+    };
+    let forces = ModelEvaluator::new(derivation)
+        .inverse_dynamics(&states, &derivation.nominal_base_values())
+        .expect("forces");
+    for (drive, forces) in derivation.mechanism.drives.iter().zip(&forces) {
+        let k = rig.drives.iter().position(|r| r.name == drive.name).expect("the drive");
+        for (x, (_, y)) in forces.iter().zip(&sampled) {
+            let scale = y[k].abs().max(100.0);
+            assert!((x - y[k]).abs() < 1e-7 * scale, "{case}: {x} instead of {}", y[k]);
+        }
+    }
+}
+
 #[test]
 fn base_parameters_and_forces_are_those_of_any_other_order() {
-    let text = bundled();
-    for seed in [3, 11] {
-        let rig = shuffled_rig(&text, seed);
-        let derivation = derived(&model(&rig));
-        assert_eq!(derivation.base_parameters().len(), 9, "seed {seed}");
-        let sampled = sampled_forces(&rig, 20, 0.2).expect("forces");
-        // Columns in the order of the model, forces of the rig in its own.
-        let names = derivation.mechanism.coordinates.iter().filter(|c| !c.passive);
-        let at: Vec<usize> = names
-            .map(|c| {
-                rig.coordinates
-                    .iter()
-                    .position(|r| r.name == c.name)
-                    .expect("the coordinate")
-            })
-            .collect();
-        let column = |of: fn(&modelmill_rig::RigState) -> &Vec<f64>| -> Vec<Vec<f64>> {
-            at.iter()
-                .map(|k| sampled.iter().map(|(state, _)| of(state)[*k]).collect())
-                .collect()
-        };
-        let (q, qd, qdd) = (column(|s| &s.q), column(|s| &s.qd), column(|s| &s.qdd));
-        let states = MotionStates {
-            q: q.iter().map(Vec::as_slice).collect(),
-            qd: qd.iter().map(Vec::as_slice).collect(),
-            qdd: qdd.iter().map(Vec::as_slice).collect(),
-            load: Vec::new(),
-        };
-        let forces = ModelEvaluator::new(&derivation)
-            .inverse_dynamics(&states, &derivation.nominal_base_values())
-            .expect("forces");
-        for (drive, forces) in derivation.mechanism.drives.iter().zip(&forces) {
-            let k = rig.drives.iter().position(|r| r.name == drive.name).expect("the drive");
-            for (x, (_, y)) in forces.iter().zip(&sampled) {
-                assert!(
-                    (x - y[k]).abs() < 1e-7 * y[k].abs().max(100.0),
-                    "seed {seed}: {x} instead of {}",
-                    y[k]
-                );
-            }
-        }
+    assert_eq!(derived(&model(&rig_in_order(BUNDLED, None))).base_parameters().len(), 9);
+    check_orders(BUNDLED, [3, 11]);
+    check_orders("fleet/program/five_bar.rig.toml", [5]);
+}
+
+/// All rigs with 20 orders each.
+#[test]
+#[ignore = "for a computer with time"]
+fn permuted_entries_of_all_rigs_keep_base_and_forces() {
+    for file in RIGS {
+        check_orders(file, 0..20);
+        println!("{file}: 20 orders keep base parameters and forces");
     }
 }
