@@ -175,7 +175,7 @@ fn numbers_and_places_of_the_statements_are_right() {
         "{crank} {coupler}"
     );
     // Operations of the emitted code.
-    let model = crate::common::model("spidermill-paper");
+    let model = crate::common::model("spidermill-paper.toml");
     let operations = &json(&["equations", &model, "--json"])["operations"]["inverse_dynamics"];
     let count = |kind: &str| operations[kind].as_u64().unwrap();
     let named = format!(
