@@ -244,6 +244,11 @@ impl ModelUnit {
         None
     }
 
+    /// True for a length.
+    pub(crate) fn is_length(&self) -> bool {
+        self.text == "m"
+    }
+
     /// True for an angle, which may be the operand of sines and cosines.
     pub(crate) fn is_angle(&self) -> bool {
         self.text == "rad"

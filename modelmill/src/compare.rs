@@ -150,7 +150,7 @@ pub struct ErrorLocations {
     /// Drives whose error is rounding and was not located.
     pub rounding: Vec<String>,
     /// How the residuals depend on the rates of their drives, drive by drive: forms of friction that are spread over
-    /// all samples, so that no region shows them. Empty if there is no significant and material dependence.
+    /// all samples, so that no region shows them. Empty if the dependence is not significant or too small to matter.
     pub by_rate: Vec<RateDependence>,
 }
 

@@ -70,9 +70,9 @@ pub struct ProposedReduction {
 
 impl Host {
     /// Reduces a rig with spatial bodies to a planar model file, and measures the error of every approximation.
-    /// With a tolerance for gaps, the joints of the rig are closed as well as possible (least squares), and its forces
-    /// are those of this motion; a planned loop is closed exactly by the model, so that the difference of forces is what
-    /// the gaps cost.
+    /// With a tolerance for gaps, the rig's joints are closed as well as possible (least squares). The rig's forces are
+    /// those of this motion. The model closes its loops exactly. So the difference of both forces is the error that the
+    /// gaps cause.
     ///
     /// Fails with all errors and warnings of rig and plan, each with its place, and when the reduction does not support
     /// the mechanism.
@@ -150,7 +150,7 @@ impl Host {
         }
     }
 
-    /// The same; what a description has in addition is noted.
+    /// Reads a rig file or a robot description, and notes what a rig cannot have.
     fn noted_rig(&self, path: &Path) -> Outcome<LoadedRig> {
         if !is_description(path) {
             return self.rig(path);

@@ -68,7 +68,7 @@ pub struct StateSamples<'a> {
 pub enum ModelFunction {
     /// Forces of the drives, N or N m.
     InverseDynamics,
-    /// H_min of eq. (4): a row for each drive, a column for each base parameter.
+    /// H_min of eq. (10): a row for each drive, a column for each base parameter.
     Regressor,
     /// M of `J^T f = M q'' + b`: a row and a column for each active coordinate. f are the forces of the drives; J is
     /// the Jacobian of their coordinates with respect to the active coordinates.

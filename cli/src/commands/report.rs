@@ -1,9 +1,10 @@
 //! `report`: writes a diagnosis as one self-contained page.
 
+use modelmill::text::wrap::wrap_words;
 use std::path::PathBuf;
 
 use modelmill::Host;
-use modelmill::diagnose::{DiagnosisOptions, words};
+use modelmill::diagnose::DiagnosisOptions;
 use modelmill::report::page;
 
 use crate::args::ReportArgs;
@@ -33,7 +34,7 @@ pub(crate) fn run(host: &Host, args: &ReportArgs) -> CommandOutcome {
     let says = findings.verdict_text();
     terminal::print(&format!(
         "{}\n\nThe page is {}.",
-        words::lines(&says, 100).join("\n"),
+        wrap_words(&says, 100).join("\n"),
         path.display()
     ))
 }

@@ -2,7 +2,7 @@
 
 use std::sync::LazyLock;
 
-use crate::common::{html, json, number, printed, refused, scratch};
+use crate::common::{html, json, number, printed, refused, scratch, workspace};
 use serde_json::Value;
 
 /// One reduced experiment for all tests: its figures and its page.
@@ -161,6 +161,40 @@ fn the_authors_causes(found: &Value) {
     let held = |k: usize| number(found, &format!("/causes/held/m4_and_offset/{k}"));
     assert!((held(0) - 12.456).abs() < 0.02 * 12.456, "{}", held(0));
     assert!((held(1) - 0.02).abs() < 0.1 * 0.02, "{}", held(1));
+}
+
+/// Numbers in the table of statements are those of the model file, and its verdicts name chapters that exist.
+#[test]
+fn numbers_and_places_of_the_statements_are_right() {
+    let page = &EXPERIMENT.1;
+    // Half of the mass at each end of a link has the inertia m d^2 / 4 about the middle.
+    let ratio = |mass: f64, length: f64, inertia: f64| format!("{:.1} times", mass * length * length / 4.0 / inertia);
+    let [crank, coupler] = [ratio(50.9597, 1.13, 6.3195), ratio(14.5773, 1.03, 1.6173)];
+    assert!(
+        page.contains(&format!("S1 becomes {crank} and that of S3 {coupler}")),
+        "{crank} {coupler}"
+    );
+    // Operations of the emitted code.
+    let model = crate::common::model("spidermill-paper.toml");
+    let operations = &json(&["equations", &model, "--json"])["operations"]["inverse_dynamics"];
+    let count = |kind: &str| operations[kind].as_u64().unwrap();
+    let named = format!(
+        "{} additions, {} multiplications, {} divisions, {} square roots and {} pairs",
+        count("add"),
+        count("mul"),
+        count("div"),
+        count("sqrt"),
+        count("sincos")
+    );
+    assert!(page.contains(&named), "{named}");
+    // Each chapter of the guide that is named as the place of an answer exists.
+    for (at, _) in page.match_indices("<td>guide, ") {
+        let rest = &page[at + "<td>guide, ".len()..];
+        let chapter = rest.split([':', '<', ';']).next().unwrap().trim().replace(' ', "-");
+        let file = workspace(&format!("docs/guide/src/{chapter}.md"));
+        assert!(file.exists(), "{}", file.display());
+    }
+    assert!(page.matches("<td>guide, ").count() > 10);
 }
 
 #[test]

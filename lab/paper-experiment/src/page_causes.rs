@@ -76,8 +76,8 @@ impl ExperimentPage {
         self.paragraph(&format!(
             "The tool in the authors' situation: parameters from CAD, and recordings of the robot with contact points {} \
              mm beside the axes. The model is the paper's, with a constant eA = 0 for the distance. `modelmill diagnose \
-             --held` fixes all parameters at their CAD values. The constant eA names the distance; nothing else says what is \
-             wrong.",
+             --held` fixes all parameters at their CAD values. The constant eA names the distance; no other \
+             information about the error is given.",
             millimetres(held.offset)
         ));
         let [mass, offset] = held.first;

@@ -131,7 +131,8 @@ impl ExperimentPage {
                 &svg,
                 &format!(
                     "{caption} Rig with contact points {offset} mm beside the axes of the cranks (section 4), the paper's \
-                     treatment. Calculated: parameters of the CAD column of Table 1; estimated: identified."
+                     treatment. Calculated: parameters of the CAD column of Table 1; estimated: identified. At this scale the forces \
+                     of the rig and the estimated ones are one curve."
                 ),
             );
         }

@@ -117,9 +117,8 @@ impl ExperimentPage {
             .enumerate()
             .map(|(i, name)| {
                 let parameter = parameters.iter().find(|p| p.name == *name);
-                let unit = parameter.map_or("", |p| p.unit.as_str());
                 let mut row = vec![
-                    format!("{name}, {unit}"),
+                    labelled(name, experiment),
                     parameter.map_or_else(String::new, |p| format!("{:.4}", p.nominal)),
                     format!("{:.4}", printed::ESTIMATED[i].1),
                 ];
@@ -166,7 +165,7 @@ impl ExperimentPage {
             .iter()
             .enumerate()
             .map(|(i, name)| {
-                let mut row = vec![(*name).to_owned(), format!("{:.4}", printed::ESTIMATED[i].1)];
+                let mut row = vec![labelled(name, experiment), format!("{:.4}", printed::ESTIMATED[i].1)];
                 row.extend(solutions.iter().map(|one| decimals(one.values[i])));
                 row
             })
@@ -197,6 +196,13 @@ impl ExperimentPage {
             self.paragraph(&format!("Solution {}: {verdict}.", k + 1));
         }
     }
+}
+
+/// The name of a parameter with its unit.
+fn labelled(name: &str, experiment: &PaperExperiment) -> String {
+    let mut parameters = experiment.paper.derivation.mechanism.parameters.iter();
+    let unit = parameters.find(|p| p.name == name).map_or("", |p| p.unit.as_str());
+    format!("{name}, {unit}")
 }
 
 /// One row per run for all drives, and one per drive: how the paper's change follows the force of the misplaced mass.

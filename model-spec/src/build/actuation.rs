@@ -185,7 +185,8 @@ pub(super) fn drives(
                     format!("two drives act on `{}`", symbols.coordinates[joint.0].name),
                 )
                 .label("the second one")
-                .related(places.drives[first], "the first one"),
+                .related(places.drives[first], "the first one")
+                .help("each coordinate has one drive: delete one of the two, or change the `joint` of one"),
             );
         }
         places.drives.push(name.span);

@@ -16,6 +16,7 @@ mod free;
 mod identified;
 mod joints;
 mod limits;
+mod millimetres;
 mod retain;
 pub(crate) mod symbols;
 mod tables;
@@ -136,6 +137,7 @@ pub(crate) fn build(
     // These checks need the complete mechanism at its nominal values.
     bodies::warn_of_negative(model, &mechanism, log);
     degrees::warn_of_degrees(model, &mechanism, log);
+    millimetres::warn_of_millimetres(model, log);
     pose::check_pose(&mut mechanism, &places, log);
     if log.n_errors() == 0 {
         folds::warn_of_folds(&mechanism, &places, log);

@@ -13,6 +13,10 @@ pub(super) const LARGEST_ANGLE_LIMIT: f64 = 4.0 * TAU;
 /// Limits above this value stand for no limit at all and are not judged, rad. By judgement.
 pub(super) const NO_LIMIT: f64 = 1000.0;
 
+/// Largest length that is believed, m. Few machines have a link this long, while lengths of links in mm are nearly always
+/// larger. By judgement.
+pub(super) const LARGEST_LENGTH: f64 = 50.0;
+
 /// A periodic table ends at least this far before the argument at which it repeats, rad: a last point closer to it is the
 /// first point once more. Well above the rounding of 2 pi to a few digits. By judgement.
 pub(super) const TABLE_CLOSURE: f64 = 1e-3;

@@ -196,6 +196,28 @@ fn angles_in_degrees_are_remarked() {
     }
 }
 
+#[test]
+fn lengths_in_millimetres_are_remarked() {
+    for (from, to, meant) in [
+        ("l = { value = 0.4,", "l = { value = 400,", "write 0.4"),
+        ("c = { nominal = 0.2,", "c = { nominal = -200,", "write -0.2"),
+    ] {
+        let warnings = loaded(&changed(from, to)).warnings;
+        assert!(
+            warnings.len() == 1 && warnings[0].label == "lengths are in m" && !warnings[0].is_impossible,
+            "{to}: {warnings:?}"
+        );
+        assert!(format!("{:?}", warnings[0].help).contains(meant), "{to}: {warnings:?}");
+    }
+    // A long boom, and large values of other units.
+    for (from, to) in [
+        ("l = { value = 0.4,", "l = { value = 45,"),
+        ("m = { nominal = 2,", "m = { nominal = 2000,"),
+    ] {
+        assert!(loaded(&changed(from, to)).warnings.is_empty(), "{to}");
+    }
+}
+
 /// A motor behind a gear has many turns at the nominal pose.
 #[test]
 fn many_turns_behind_a_gear_are_not_remarked() {

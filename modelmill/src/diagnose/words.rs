@@ -584,25 +584,6 @@ fn disturbances(diagnosis: &ModelDiagnosis, channels: &[String]) -> Option<Strin
     })
 }
 
-/// Text in lines of at most `letters` letters, broken between words; a longer word has a line of its own.
-pub fn lines(text: &str, letters: usize) -> Vec<String> {
-    let mut lines: Vec<String> = vec![String::new()];
-    for word in text.split_whitespace() {
-        // Words are appended to the last line as long as they fit.
-        let line = lines.len() - 1;
-        let line = &mut lines[line];
-        if !line.is_empty() && line.chars().count() + 1 + word.chars().count() > letters {
-            lines.push(word.to_owned());
-        } else {
-            if !line.is_empty() {
-                line.push(' ');
-            }
-            line.push_str(word);
-        }
-    }
-    lines
-}
-
 /// The meaning of a kind of effect that is in no library, as a sentence; `None` for other kinds.
 pub(crate) fn meaning(kind: &str) -> Option<&'static str> {
     Some(match kind {

@@ -62,7 +62,8 @@ pub struct SeparationRequest {
     pub effect: NamedEffect,
     /// Its alternatives: effects with which it may be confused. Constants without a value are fitted like parameters.
     pub from: Vec<NamedEffect>,
-    /// Effects that are present in both cases and missing in the model file.
+    /// Effects that the machine has in any case and the model file lacks. They act with the effect and with its
+    /// alternatives.
     pub common_effects: Vec<NamedEffect>,
     /// Standard deviation of the noise in the forces, N or N m, as the scale of the difference.
     pub noise: Option<f64>,

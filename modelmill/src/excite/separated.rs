@@ -1,6 +1,7 @@
 //! Planning of motions that distinguish effects: which effects can be distinguished at all, how much they differ
 //! along the trajectory, and how many samples that needs.
 
+use crate::text::wrap::wrap_words;
 use std::fmt::Write as _;
 
 use modelmill_boundary::message;
@@ -406,6 +407,6 @@ impl SeparationResult {
 
 /// A sentence wrapped into indented lines.
 fn indent_lines(says: &str) -> Vec<String> {
-    let lines = words::lines(says, 98);
+    let lines = wrap_words(says, 98);
     lines.iter().map(|line| format!("  {line}")).collect()
 }

@@ -63,7 +63,7 @@ fn hypothesis(subject: &FaultSubject<'_>, group: &[usize]) -> FaultHypothesis {
     FaultHypothesis {
         kind: RecordingFaultKind::Units,
         clause: format!("the {angle} {} {is} in degrees and not in rad", name_list(&at)),
-        advice: message!("read in degrees what is in degrees ({})", subject.column_remedy(maps)),
+        advice: message!("convert the angle to rad ({})", subject.column_remedy(maps)),
         motion: MotionChange::Scale(scaled.collect()),
         forces: ForceChange::default(),
         operations: vec![ColumnOperation::scale(columns.into_iter().flatten(), degree)],

@@ -38,12 +38,14 @@ fn hypothesis(subject: &FaultSubject<'_>, group: &[usize], factor: f64) -> Fault
         };
         OptionSetting::new(OptionName::Columns, column)
     });
-    let is_torque = group.iter().all(|d| subject.model.force_unit(*d) == "N m");
-    let unit = match (is_large, is_torque) {
-        (true, true) => "N mm and not in N m",
-        (true, false) => "thousandths of their unit",
-        (false, true) => "kN m and not in N m",
-        (false, false) => "thousands of their unit",
+    let have_unit = |unit: &str| group.iter().all(|d| subject.model.force_unit(*d) == unit);
+    let unit = match (is_large, have_unit("N m"), have_unit("N")) {
+        (true, true, _) => "N mm and not in N m",
+        (true, _, true) => "mN and not in N",
+        (true, ..) => "thousandths of N and N m",
+        (false, true, _) => "kN m and not in N m",
+        (false, _, true) => "kN and not in N",
+        (false, ..) => "thousands of N and N m",
     };
     let (forces, are) = if at.len() == 1 {
         ("force", "is")
@@ -53,7 +55,7 @@ fn hypothesis(subject: &FaultSubject<'_>, group: &[usize], factor: f64) -> Fault
     FaultHypothesis {
         kind: RecordingFaultKind::Units,
         clause: format!("the {forces} of {} {are} in {unit}", name_list(&at)),
-        advice: message!("read the columns in their unit ({})", subject.column_remedy(maps)),
+        advice: message!("convert the force to SI units ({})", subject.column_remedy(maps)),
         motion: MotionChange::None,
         forces: ForceChange(group.iter().map(|d| (*d, *d, factor)).collect()),
         operations: at

@@ -53,7 +53,7 @@ fn hypothesis(subject: &FaultSubject<'_>, group: &[usize]) -> FaultHypothesis {
     FaultHypothesis {
         kind: RecordingFaultKind::Units,
         clause: format!("the {position} {} {is} in mm and not in m", name_list(&at)),
-        advice: message!("read the columns in their unit ({})", subject.column_remedy(maps)),
+        advice: message!("convert the position to m ({})", subject.column_remedy(maps)),
         motion: MotionChange::Scale(group.iter().map(|i| (*i, [1e-3; 3])).collect()),
         forces: ForceChange::default(),
         operations: vec![ColumnOperation::scale(columns, 1e-3)],

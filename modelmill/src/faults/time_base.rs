@@ -40,7 +40,7 @@ impl RecordingFaultEntry for TimeUnit {
                     at: vec!["t".to_owned()],
                     clause: format!("the time `t` is in {words} and not in seconds"),
                     advice: message!(
-                        "read the column in its unit ({})",
+                        "convert the time to s ({})",
                         subject.column_remedy([OptionSetting::new(OptionName::Columns, format!("t=t [{unit}]"))])
                     ),
                     motion: MotionChange::Scale(scaled),

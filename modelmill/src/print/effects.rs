@@ -1,5 +1,6 @@
 //! Output of `effects`: the library of effects as JSON, as a table, or one kind in detail.
 
+use crate::text::wrap::wrap_words;
 use modelmill_spec::{ActsOn, ConstantSearch, EffectKind, KindConstant, KindParameter, PlaceLoad, Scale, Sign};
 use serde_json::{Value, json};
 
@@ -157,20 +158,11 @@ pub fn kind_text(kind: &EffectKind, style: TerminalStyle) -> String {
 
 /// Text in lines of at most `WIDTH` letters.
 fn wrap_text(text: &str, indent: usize) -> Vec<String> {
-    let mut lines = vec![" ".repeat(indent)];
-    // A word longer than a line gets a line of its own.
-    for word in text.split_whitespace() {
-        let line = lines.last_mut().expect("there is a line");
-        if line.chars().count() + 1 + word.chars().count() > WIDTH && line.trim() != "" {
-            lines.push(format!("{}{word}", " ".repeat(indent)));
-        } else {
-            if !line.trim().is_empty() {
-                line.push(' ');
-            }
-            line.push_str(word);
-        }
-    }
+    let lines = wrap_words(text, WIDTH - indent);
     lines
+        .iter()
+        .map(|line| format!("{}{line}", " ".repeat(indent)))
+        .collect()
 }
 
 /// Units for the places where a symbol may stand, without repetition.

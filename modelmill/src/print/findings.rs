@@ -1,6 +1,7 @@
 //! Findings of a diagnosis, as JSON for scripts and as text for people: verdict, errors after each step,
 //! effects, disturbances, rejected candidates and next steps.
 
+use crate::text::wrap::wrap_words;
 use modelmill_identify::diagnose::{DiagnosisVerdict, LocatedEffect, SelectionStep};
 use serde_json::{Map, Value, json};
 
@@ -180,7 +181,7 @@ impl DiagnosisFindings {
     pub fn text(&self, style: TerminalStyle, spelling: &dyn StepSpelling) -> Vec<String> {
         let diagnosis = &self.diagnosis;
         let verdict = self.verdict_text();
-        let mut lines: Vec<String> = (words::lines(&verdict, 100).iter())
+        let mut lines: Vec<String> = (wrap_words(&verdict, 100).iter())
             .map(|line| style.bold(line))
             .collect();
         lines.push(String::new());
@@ -263,7 +264,7 @@ impl DiagnosisFindings {
         }));
         lines.extend(self.regions.iter().map(|region| format!("  {}.", region.says)));
         if self.regions.is_empty() {
-            lines.push("  Nowhere in particular: no range of a coordinate, rate, load or time stands out.".to_owned());
+            lines.push("  The error is clearly larger in no range of a coordinate, rate, load or time.".to_owned());
         }
     }
 
@@ -276,7 +277,7 @@ impl DiagnosisFindings {
             lines.push(String::new());
             lines.push(style.bold("Disturbances in the recordings (not model errors)"));
             for says in words::disturbance_sentences(&disturbances) {
-                let wrapped = words::lines(&says, 98);
+                let wrapped = wrap_words(&says, 98);
                 lines.extend(wrapped.iter().map(|line| format!("  {line}")));
             }
         }
@@ -286,7 +287,7 @@ impl DiagnosisFindings {
             for one in &diagnosis.time_residuals {
                 let unit = self.before.model.force_unit(one.channel);
                 let says = words::time_residual(one, &self.channels()[one.channel], unit);
-                let wrapped = words::lines(&format!("{says}."), 98);
+                let wrapped = wrap_words(&format!("{says}."), 98);
                 lines.extend(wrapped.iter().map(|line| format!("  {line}")));
             }
         }
@@ -351,7 +352,7 @@ impl DiagnosisFindings {
             }
             if !found.shared_with.is_empty() {
                 let says = words::shared_value(&found.effect, &found.shared_with);
-                let wrapped = words::lines(&says, 96);
+                let wrapped = wrap_words(&says, 96);
                 lines.extend(wrapped.iter().map(|line| format!("    {line}")));
             }
             // Alternatives follow with the motion that would distinguish them.
@@ -364,7 +365,7 @@ impl DiagnosisFindings {
                     && !distinguished.contains(&name)
                 {
                     distinguished.push(name);
-                    let wrapped = words::lines(says, 96);
+                    let wrapped = wrap_words(says, 96);
                     lines.extend(wrapped.iter().map(|line| style.dim(&format!("    {line}"))));
                 }
                 if let Some(proposal) = &found.separation
@@ -391,7 +392,7 @@ impl DiagnosisFindings {
                 words::kind(&entry.kind),
                 values.join(", ")
             );
-            lines.extend(words::lines(&says, 96).iter().map(|line| format!("    {line}")));
+            lines.extend(wrap_words(&says, 96).iter().map(|line| format!("    {line}")));
         }
     }
 
@@ -413,7 +414,7 @@ impl DiagnosisFindings {
         let advice = "The recordings do not show them clearly, so they are neither part of the verdict nor of the errors \
                       above. To decide, record a longer motion with more reversals and other speeds.";
         lines.extend(
-            words::lines(advice, 96)
+            wrap_words(advice, 96)
                 .iter()
                 .map(|line| style.dim(&format!("    {line}"))),
         );
@@ -484,9 +485,9 @@ impl DiagnosisFindings {
                     )
                 }
             };
-            let reason = words::lines(&format!("{title}: {}.", first.reason), 98);
+            let reason = wrap_words(&format!("{title}: {}.", first.reason), 98);
             lines.extend(reason.iter().map(|line| format!("  {line}")));
-            let wrapped = words::lines(&experiment, 96);
+            let wrapped = wrap_words(&experiment, 96);
             lines.extend(wrapped.iter().map(|line| style.dim(&format!("    {line}"))));
         }
     }

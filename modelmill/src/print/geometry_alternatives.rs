@@ -1,5 +1,6 @@
 //! Errors of the geometry that explain as much as the effects found, as JSON and as text.
 
+use crate::text::wrap::wrap_words;
 use serde_json::{Value, json};
 
 use crate::diagnose::{DiagnosisFindings, words};
@@ -41,6 +42,6 @@ impl DiagnosisFindings {
             ));
         }
         let advice = "These recordings do not distinguish them from the effects: measure the lengths.";
-        lines.extend(words::lines(advice, 98).iter().map(|line| format!("  {line}")));
+        lines.extend(wrap_words(advice, 98).iter().map(|line| format!("  {line}")));
     }
 }

@@ -1,5 +1,6 @@
 //! Laws that a diagnosis proposes for the residual, as JSON for scripts and as text for people.
 
+use crate::text::wrap::wrap_words;
 use std::fmt::Write as _;
 
 use serde_json::{Value, json};
@@ -68,7 +69,7 @@ pub(super) fn text(
         let law = &hypothesis.law;
         lines.push(format!("  {}", law.label()));
         lines.push(format!("    {}", values_text(&law.parameters)));
-        let wrapped = words::lines(&gain(law), 96);
+        let wrapped = wrap_words(&gain(law), 96);
         lines.extend(wrapped.iter().map(|line| format!("    {line}")));
         if !hypothesis.near_ties.is_empty() {
             let these = if hypothesis.near_ties.len() == 1 {
@@ -91,7 +92,7 @@ pub(super) fn text(
                 lines.push(format!("      {command}"));
             }
             None => {
-                let wrapped = words::lines(PATH_DEPENDENT_NOTE, 96);
+                let wrapped = wrap_words(PATH_DEPENDENT_NOTE, 96);
                 lines.extend(wrapped.iter().map(|line| format!("    {line}")));
             }
         }

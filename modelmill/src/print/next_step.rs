@@ -56,7 +56,7 @@ impl ResidualLook<'_> {
     pub(crate) fn correction_step(&self) -> Option<Message> {
         let fault = self.suspect?;
         Some(message!(
-            "All figures are doubtful: in {} {}. Next: correct this first: {}. Then run the command again.",
+            "All figures are doubtful: in {} {}. Next: {}, then run the command again.",
             joined_by_and(&fault.recordings),
             fault.clause,
             fault.advice.clone()
@@ -349,7 +349,7 @@ mod tests {
         let text = look.correction_step().expect("a step").spell(&LibrarySpelling);
         assert_eq!(
             text,
-            "All figures are doubtful: in run.csv the force of a has the wrong sign. Next: correct this first: turn it. Then run \
+            "All figures are doubtful: in run.csv the force of a has the wrong sign. Next: turn it, then run \
              the command again."
         );
     }

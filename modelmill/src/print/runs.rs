@@ -298,7 +298,7 @@ pub(crate) fn verdict_text(run: &RunReport) -> Message {
             format!("No {other}change found that is larger than noise and model error.").into()
         }
         RunVerdict::Unchanged => message!(
-            "No {other}change found on the other drives that is larger than noise and model error. {}",
+            "{} On the other drives, no {other}change is larger than noise and model error.",
             unknown
         ),
     }
@@ -334,8 +334,8 @@ fn undecided_text(undecided: &[UndecidedDrive]) -> Message {
     let unexplained = named(&|one| matches!(one, UndecidedReason::UnexplainedForce { .. }));
     if !unexplained.is_empty() {
         sentences.push(message!(
-            "The model leaves most of the force of {} unexplained, so that parameters fitted to it mean nothing. Find what is wrong \
-             with {}, then compare the runs again.",
+            "The model leaves most of the force of {} unexplained, so its fitted parameters mean nothing. Find the cause with {}, \
+             then compare the runs again.",
             list(&unexplained),
             Remedy::command(CommandName::Diagnose)
         ));

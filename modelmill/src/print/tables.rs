@@ -194,7 +194,7 @@ pub fn places(places: &ErrorLocations) -> Vec<String> {
         ));
     }
     if lines.is_empty() {
-        lines.push("  Nowhere in particular: no range of a coordinate, rate, load or time stands out.".to_owned());
+        lines.push("  The error is clearly larger in no range of a coordinate, rate, load or time.".to_owned());
     }
     lines
 }

@@ -1,5 +1,6 @@
 //! Verifications, as a table for people, JSON for scripts, and JUnit XML for services that run tests.
 
+use crate::text::wrap::wrap_words;
 use std::fmt::Write as _;
 
 use modelmill_boundary::text::html;
@@ -289,7 +290,7 @@ fn sentence(text: &str) -> String {
 
 /// Appends a text in lines with an indent.
 fn push_lines(lines: &mut Vec<String>, indent: &str, text: &str) {
-    let wrapped = crate::diagnose::words::lines(text, LINE_LETTERS);
+    let wrapped = wrap_words(text, LINE_LETTERS);
     lines.extend(wrapped.iter().map(|line| format!("{indent}{line}")));
 }
 

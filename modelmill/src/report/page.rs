@@ -129,13 +129,13 @@ fn summary(findings: &DiagnosisFindings) -> String {
 fn steps_section(findings: &DiagnosisFindings) -> String {
     // The picture shows the steps, the table has the numbers.
     format!(
-        "<figure class=\"still\"><figcaption><b>Error relative to the force</b> <span class=\"key c-fit\">fit</span> \
+        "<figure class=\"still broad\"><figcaption><b>Error relative to the force</b> <span class=\"key c-fit\">fit</span> \
          <span class=\"key c-after\">{}</span></figcaption>\n{}</figure>\n{}\n\
          <p>All errors are nrms: rms of measured minus calculated force, divided by rms of the measured force. Each step was \
          tested {}. <i>t value of the decrease</i>: the mean decrease of the squared error over blocks of time, divided by its \
-         standard error. <i>effective samples</i>: the number of independent samples that are worth as much as the correlated \
-         residuals. <i>noise of the force, at most</i>: estimated from the differences of successive samples; the standard \
-         deviations of missing effects assume at least this noise.</p>\n{}",
+         standard error. <i>effective samples</i>: the number of independent samples with as much information as the correlated \
+         residuals. <i>noise of the force</i>: an upper bound from the differences of successive samples. The standard deviations \
+         of the missing effects are computed with this noise, or with the residual if that is larger.</p>\n{}",
         findings.validation.phrase(),
         steps::picture(findings),
         tables::steps(findings),
@@ -325,7 +325,7 @@ fn sentences(places: &ErrorLocations, what: &str) -> String {
     } else if places.regions.is_empty() {
         let _ = writeln!(
             html,
-            "<p>{what} is largest nowhere in particular: no range of a coordinate, rate, load or time stands out.</p>",
+            "<p>{what} is clearly larger in no range of a coordinate, rate, load or time.</p>",
         );
     }
     html
@@ -336,8 +336,8 @@ fn candidates(findings: &DiagnosisFindings) -> String {
     format!(
         "<p>The table lists every kind of effect and disturbance at every place (drive, joint, point, body) where it can act. \
          <i>alone it would explain</i>: the share of the squared error that the candidate would remove without any other effect. \
-         <i>gain in addition to the effects found</i>: the share of the squared residual that it would remove if it were added to \
-         them; for an effect that was found, to the other effects found.\
+         <i>gain in addition to the effects found</i>: the share of the squared residual with these effects that the candidate \
+         would remove. For an effect that was found, the residual is that with the other effects.\
          <span class=\"script-only\"> Click on the heading of a column to sort.</span></p>\n{}",
         tables::candidates(findings)
     )

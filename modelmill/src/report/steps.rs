@@ -4,6 +4,7 @@
 use super::draw::{PlotAxis, SvgPicture, WIDTH};
 use crate::diagnose::{DiagnosisFindings, words};
 use crate::text::table::percent;
+use crate::text::wrap::wrap_words;
 
 /// Smallest height of a step.
 const ROW: f64 = 46.0;
@@ -30,7 +31,7 @@ pub(crate) fn picture(findings: &DiagnosisFindings) -> String {
     }
     let labels: Vec<Vec<String>> = steps
         .iter()
-        .map(|step| words::lines(&words::step_text(step, diagnosis, findings.channels()), LETTERS))
+        .map(|step| wrap_words(&words::step_text(step, diagnosis, findings.channels()), LETTERS))
         .collect();
     // All rows have the height of the longest label.
     let longest = labels.iter().map(Vec::len).max().unwrap_or(1);

@@ -145,7 +145,7 @@ pub(crate) fn drives(findings: &DiagnosisFindings) -> String {
     if findings.after.version().is_some() {
         head.push("#error with the effects");
     }
-    head.push("#noise of the force, at most");
+    head.push("#noise of the force");
     table("", &head, &rows)
 }
 

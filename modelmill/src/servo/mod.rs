@@ -3,7 +3,8 @@
 //! A model whose file has `[[actuator]]` goes in, with recordings of commands, currents or voltages. Out come base
 //! parameters and gains with standard deviations, the delay of each servo, and the numbers that fix the scale.
 //!
-//! The equations are `H p - S k = 0`, see [`modelmill_spec::Mechanism::with_servo_equations`]. Without a known number
+//! The equations are `H p - S k = 0`, with the gains `k` and the regressor `S` of the signals, see
+//! [`modelmill_spec::Mechanism::with_servo_equations`]. Without a known number
 //! they are homogeneous: every multiple of a solution is a solution, so that only ratios can be known.
 
 mod delay;

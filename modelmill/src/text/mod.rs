@@ -5,5 +5,6 @@ pub(crate) mod names;
 pub mod style;
 pub mod svg;
 pub mod table;
+pub mod wrap;
 
 pub use style::TerminalStyle;

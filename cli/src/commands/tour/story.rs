@@ -5,6 +5,7 @@ use modelmill::diagnose::{DiagnosisFindings, words};
 use modelmill::print::tables;
 use modelmill::text::TerminalStyle;
 use modelmill::text::table::{ColumnAlignment, count, percent, table};
+use modelmill::text::wrap::wrap_words;
 
 use super::{EDITED, PAPER_PAGE, PLAIN, RODS_PAGE, TourComparison, TourFolder, WITH_RODS, verdict};
 use crate::terminal::plot::{TerminalCurve, bar, time_axis};
@@ -56,7 +57,7 @@ impl TourText {
 
     /// A paragraph, wrapped.
     fn paragraph(&mut self, text: &str) {
-        self.lines(&words::lines(text, WIDTH));
+        self.lines(&wrap_words(text, WIDTH));
         self.line("");
     }
 
@@ -74,9 +75,9 @@ impl TourText {
         let reduction = &model.derivation.reduction;
         self.paragraph(&format!(
             "In this planar parallel robot two cranks, each driven by a ball screw, carry a platform through two couplers. Its \
-             model file has {}, {} and {}. The forces of the screws are linear in {} of masses, lengths and inertias, but the \
-             columns of many products are linearly dependent. Only {} combinations can be identified from measurements. They are \
-             found symbolically, in exact arithmetic:",
+             model file has {}, {} and {}. The forces of the screws are linear in {} of masses, lengths and inertias. Many of \
+             these products always act together. Measurements can determine only {} combinations of them, the base parameters. \
+             modelmill finds these symbolically, in exact arithmetic:",
             count(mechanism.parts.len(), "body", "bodies"),
             count(mechanism.loops.len(), "loop", "loops"),
             count(mechanism.drives.len(), "drive", "drives"),
@@ -137,7 +138,7 @@ impl TourText {
             "modelmill tries every effect of its library at every place of this mechanism, {} in all: friction of many kinds, \
              springs, inertias, offsets, delays, rods. It fits sets of candidates, together with the base parameters, to one \
              recording. It accepts an effect only if the error also falls on a second recording that is not fitted (the \
-             validation run). The base parameters are estimated, which alone reduces the error of step 2 to {}.",
+             validation run). Here the base parameters are estimated as well. This alone reduces the error of step 2 to {}.",
             count(all.len(), "candidate", "candidates"),
             percent(findings.diagnosis.steps.first().map(|step| step.check))
         ));
@@ -259,7 +260,7 @@ impl TourText {
             } else {
                 self.style.green(&bar)
             };
-            let lines = words::lines(&name, 34);
+            let lines = wrap_words(&name, 34);
             for (k, line) in lines.iter().enumerate() {
                 // Only the last line of a long name has the figure and the bar.
                 if k + 1 < lines.len() {
@@ -279,9 +280,9 @@ impl TourText {
         self.paragraph(
             "The paper that describes this robot reports an error of its model. It names two causes: the positions of the point \
              masses that replace the coupling elements and the platform, and the contact points of the screws on the cranks. \
-             modelmill finds another one, in the equations of the paper. They give half of the platform's mass m4 to each \
-             coupler. In the force balance this mass is at the joint between the couplers, but in the moment balance it is at \
-             the coupler's centre. The page docs/experiment.html examines all three causes. The recording is a simulation of the \
+             modelmill finds a third cause, in the equations of the paper: they give half of the platform's mass m4 to each \
+             coupler. In the balance of forces this half is at the joint between the couplers. In the balance of moments it is at \
+             the coupler's centre of mass. The page docs/experiment.html examines all three causes. The recording is a simulation of the \
              same robot without rods. The base parameters are fixed at their nominal values (`--held`), as in step 2:",
         );
         self.paragraph(&verdict(findings));
