@@ -5,7 +5,7 @@ use modelmill_identify::changes::NormalEquations;
 use modelmill_identify::diagnose::{DiagnosisProblem, Disturbance, TimeResidual};
 
 use super::thresholds::{
-    CONTACT_GAP_S, CONTACT_LEAST_RESIDUAL_RATIO, REPEATED_PLACE_FEWEST_SAMPLES, REPEATED_PLACE_MOST_RESIDUAL,
+    CONTACT_GAP_S, CONTACT_LEAST_KNOWN_SHARE, CONTACT_LEAST_RESIDUAL_RATIO, CONTACT_LEAST_REST_SHARE, REPEATED_PLACE_FEWEST_SAMPLES, REPEATED_PLACE_MOST_RESIDUAL,
 };
 use crate::audit::events::{
     ResidualTrace, event_disturbance, find_events, left_out_interval, motion_of_drives, slowest_rate, standing_states,
@@ -39,6 +39,66 @@ pub(super) fn are_contacts_doubtful(disturbances: &[Disturbance]) -> bool {
         .collect();
     let mut contacts = disturbances.iter().filter(|one| is_contact(one));
     contacts.any(|one| one.recordings.iter().any(|file| changed.contains(&file)))
+}
+
+/// The contacts of a problem that the residual of a search still has, `[drive][sample]`: the audit fits each recording by
+/// itself and without the effects, delays and clocks that the search finds, so that their forces may look like contacts.
+/// `None` if all are still there. `other_samples` marks samples that are left out for another reason, `[drive][sample]`;
+/// contacts that lie there for the most part stay.
+pub(super) fn contacts_in_residual(
+    problem: &DiagnosisProblem,
+    all: &SegmentList<'_>,
+    residual: &[Vec<f64>],
+    other_samples: &[Vec<bool>],
+) -> Option<Vec<Disturbance>> {
+    let contacts: Vec<Disturbance> = problem.disturbances.iter().filter(|one| is_contact(one)).cloned().collect();
+    if contacts.is_empty() {
+        return None;
+    }
+    let samples = ContactSamples::new(all);
+    let is_there = |contact: &Disturbance| {
+        let inside = samples.mask(contact.interval, contact);
+        let forces = contact.at.iter().zip(&contact.estimates);
+        let mut shares = forces
+            .filter_map(|(name, force)| {
+                let d = problem.layout.channels.iter().position(|one| one == name)?;
+                // At standstill the force is not measured in the sense of the model.
+                let unknown = [other_samples.get(d), problem.layout.left_out.get(d)];
+                let is_known = |i: &usize| !unknown.iter().flatten().any(|out| out[*i]);
+                let within: Vec<usize> = (0..inside.len()).filter(|i| inside[*i]).collect();
+                let known: Vec<f64> = within.iter().filter(|i| is_known(i)).map(|i| residual[d][*i]).collect();
+                let is_judged = known.len() as f64 >= CONTACT_LEAST_KNOWN_SHARE * within.len() as f64;
+                Some(largest_of_three(&known)? / force.value.abs()).filter(|_| is_judged)
+            })
+            .peekable();
+        // Without samples nothing speaks against a contact.
+        shares.peek().is_none() || shares.any(|share| share > CONTACT_LEAST_REST_SHARE)
+    };
+    let kept: Vec<Disturbance> = contacts.iter().filter(|one| is_there(one)).cloned().collect();
+    (kept.len() < contacts.len()).then_some(kept)
+}
+
+/// The largest magnitude of the medians of three neighbours; `None` if there are fewer values.
+fn largest_of_three(values: &[f64]) -> Option<f64> {
+    let medians = values.windows(3).map(|three| {
+        let mut three = [three[0], three[1], three[2]];
+        three.sort_by(f64::total_cmp);
+        three[1].abs()
+    });
+    medians.max_by(f64::total_cmp)
+}
+
+/// Leaves out only some contacts, of those that a problem has; `other_samples` are left out for another reason,
+/// `[drive][sample]`.
+pub(super) fn keep_contacts(
+    problem: &mut DiagnosisProblem,
+    all: &SegmentList<'_>,
+    kept: Vec<Disturbance>,
+    other_samples: &[Vec<bool>],
+) {
+    problem.left_out = other_samples.to_vec();
+    problem.disturbances.retain(|one| !is_contact(one));
+    leave_out_contacts(problem, all, kept);
 }
 
 /// Leaves out the contacts and pushes in the residual of a search, `[drive][sample]`. Returns whether there are any.

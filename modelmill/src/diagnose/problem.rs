@@ -22,7 +22,9 @@ use super::candidates::{DerivedCandidates, candidates};
 use super::clock::clock;
 use super::columns::{self, CandidateOrigin, load_dependent_columns, refined_columns};
 use super::constants::{ClaimedConstant, constants};
-use super::contacts::{are_contacts_doubtful, drop_doubtful_contacts, is_contact, leave_out_late_contacts};
+use super::contacts::{
+    are_contacts_doubtful, contacts_in_residual, drop_doubtful_contacts, keep_contacts, leave_out_late_contacts,
+};
 use super::encoders::{self, encoders};
 use super::estimates::round_by_deviation;
 use super::faults::subtract_known;
@@ -177,11 +179,15 @@ pub(crate) fn find_missing_effects(
         host.run_job("searching for missing effects", 0, |_| diagnose(problem, &supply))
     };
     let mut diagnosis = search(&mut problem)?;
-    // The audit knows no changes in time: where one begins, and after it, forces look like contacts. Those that are left
-    // once the change is known are found below.
-    if query.in_full && are_contacts_doubtful(&diagnosis.disturbances) {
-        problem.left_out = without_contacts;
-        problem.disturbances.retain(|one| !is_contact(one));
+    // The audit knows neither changes in time, nor delays and other effects that the search finds: they look like
+    // contacts, and the contacts that are left once they are known are found below.
+    let kept = if are_contacts_doubtful(&diagnosis.disturbances) {
+        Some(Vec::new())
+    } else {
+        contacts_in_residual(&problem, &all, &diagnosis.complete_residual, &without_contacts)
+    };
+    if let Some(kept) = kept.filter(|_| query.in_full) {
+        keep_contacts(&mut problem, &all, kept, &without_contacts);
         (problem.measured, problem.removed) = forces.clone();
         problem.candidates.truncate(known);
         problem.change_intervals.clear();

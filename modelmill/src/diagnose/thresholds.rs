@@ -40,6 +40,15 @@ pub(super) const SIGN_TRIALS: usize = 200;
 /// (1): the peaks of a ringing joint reach 4.6 (`flexible-motor-encoder`). By judgement.
 pub(super) const CONTACT_LEAST_RESIDUAL_RATIO: f64 = 5.5;
 
+/// A contact of the audit is there only if the residual with the effects found reaches this share of its force (1). A delay,
+/// a slow clock or outliers make the audit see forces of which 0.05 to 0.3 are left; of a contact at least 0.7 is left, since
+/// a low-pass rounds it. By judgement between them.
+pub(super) const CONTACT_LEAST_REST_SHARE: f64 = 0.5;
+
+/// A residual shows whether a contact is there only if this share of its samples (1) is in motion and not left out for
+/// another reason. By judgement.
+pub(super) const CONTACT_LEAST_KNOWN_SHARE: f64 = 0.5;
+
 /// Contacts with less time between them are reported as one, s. By judgement.
 pub(super) const CONTACT_GAP_S: f64 = 0.3;
 
