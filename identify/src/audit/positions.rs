@@ -9,7 +9,8 @@ use std::ops::RangeInclusive;
 use super::thresholds::{
     BACKLASH_ALIKE_OF_FIVE, BACKLASH_ALTERNATING_OF_FIVE, BACKLASH_ENCODER_STEPS, BACKLASH_FEWEST_JUMPS,
     BACKLASH_JUMP_SIGMAS, BACKLASH_SIZE_TOLERANCE, BACKLASH_TRAVEL_SHARE, FAST_RATE_SHARE, JITTER_FEWEST_SAMPLES,
-    JITTER_MIN_AGREEMENT, JITTER_MIN_ERROR_GROWTH, NEIGHBOURHOOD_MOST_SPAN, POSITION_FAULT_NEIGHBOURHOODS, SLOW_RATE_SHARE,
+    JITTER_MIN_AGREEMENT, JITTER_MIN_ERROR_GROWTH, NEIGHBOURHOOD_MOST_SPAN, POSITION_FAULT_NEIGHBOURHOODS,
+    SLOW_RATE_SHARE,
 };
 use crate::recording::SignalRecording;
 use crate::signal::median;
@@ -297,7 +298,9 @@ mod tests {
         for seed in 0..20 {
             let mut noise = TestNoise::new(seed);
             // Three gaps of 0.3 s at places that are drawn, about which the motion goes either way.
-            let starts: Vec<f64> = (0..3).map(|k| 0.5 + 2.2 * f64::from(k) + 0.6 * noise.uniform()).collect();
+            let starts: Vec<f64> = (0..3)
+                .map(|k| 0.5 + 2.2 * f64::from(k) + 0.6 * noise.uniform())
+                .collect();
             let is_kept = |t: &f64| !starts.iter().any(|start| (*start..start + 0.3).contains(t));
             let kept: Vec<f64> = time().into_iter().filter(is_kept).collect();
             let read = |noise: &mut TestNoise, k| -> Vec<f64> {

@@ -5,7 +5,8 @@ use modelmill_identify::changes::NormalEquations;
 use modelmill_identify::diagnose::{DiagnosisProblem, Disturbance, TimeResidual};
 
 use super::thresholds::{
-    CONTACT_GAP_S, CONTACT_LEAST_KNOWN_SHARE, CONTACT_LEAST_RESIDUAL_RATIO, CONTACT_LEAST_REST_SHARE, REPEATED_PLACE_FEWEST_SAMPLES, REPEATED_PLACE_MOST_RESIDUAL,
+    CONTACT_GAP_S, CONTACT_LEAST_KNOWN_SHARE, CONTACT_LEAST_RESIDUAL_RATIO, CONTACT_LEAST_REST_SHARE,
+    REPEATED_PLACE_FEWEST_SAMPLES, REPEATED_PLACE_MOST_RESIDUAL,
 };
 use crate::audit::events::{
     ResidualTrace, event_disturbance, find_events, left_out_interval, motion_of_drives, slowest_rate, standing_states,
@@ -51,7 +52,12 @@ pub(super) fn contacts_in_residual(
     residual: &[Vec<f64>],
     other_samples: &[Vec<bool>],
 ) -> Option<Vec<Disturbance>> {
-    let contacts: Vec<Disturbance> = problem.disturbances.iter().filter(|one| is_contact(one)).cloned().collect();
+    let contacts: Vec<Disturbance> = problem
+        .disturbances
+        .iter()
+        .filter(|one| is_contact(one))
+        .cloned()
+        .collect();
     if contacts.is_empty() {
         return None;
     }
@@ -62,13 +68,11 @@ pub(super) fn contacts_in_residual(
         let mut shares = forces
             .filter_map(|(name, force)| {
                 let d = problem.layout.channels.iter().position(|one| one == name)?;
-                // At standstill the force is not measured in the sense of the model.
                 let unknown = [other_samples.get(d), problem.layout.left_out.get(d)];
-                let is_known = |i: &usize| !unknown.iter().flatten().any(|out| out[*i]);
-                let within: Vec<usize> = (0..inside.len()).filter(|i| inside[*i]).collect();
-                let known: Vec<f64> = within.iter().filter(|i| is_known(i)).map(|i| residual[d][*i]).collect();
-                let is_judged = known.len() as f64 >= CONTACT_LEAST_KNOWN_SHARE * within.len() as f64;
-                Some(largest_of_three(&known)? / force.value.abs()).filter(|_| is_judged)
+                let is_known = |i: usize| !unknown.iter().flatten().any(|out| out[i]);
+                let within = (0..inside.len()).filter(|i| inside[*i]);
+                let rest: Vec<Option<f64>> = within.map(|i| is_known(i).then_some(residual[d][i])).collect();
+                share_in_residual(force.value, &rest)
             })
             .peekable();
         // Without samples nothing speaks against a contact.
@@ -78,14 +82,19 @@ pub(super) fn contacts_in_residual(
     (kept.len() < contacts.len()).then_some(kept)
 }
 
-/// The largest magnitude of the medians of three neighbours; `None` if there are fewer values.
-fn largest_of_three(values: &[f64]) -> Option<f64> {
-    let medians = values.windows(3).map(|three| {
+/// The share of a contact's force that a residual has: the largest magnitude of the medians of three neighbours. `rest` is the
+/// residual during the contact, `None` where it is not known, as at standstill. `None` if too little is known.
+fn share_in_residual(force: f64, rest: &[Option<f64>]) -> Option<f64> {
+    let known: Vec<f64> = rest.iter().copied().flatten().collect();
+    if (known.len() as f64) < CONTACT_LEAST_KNOWN_SHARE * rest.len() as f64 {
+        return None;
+    }
+    let medians = known.windows(3).map(|three| {
         let mut three = [three[0], three[1], three[2]];
         three.sort_by(f64::total_cmp);
         three[1].abs()
     });
-    medians.max_by(f64::total_cmp)
+    Some(medians.max_by(f64::total_cmp)? / force.abs())
 }
 
 /// Leaves out only some contacts, of those that a problem has; `other_samples` are left out for another reason,
@@ -431,6 +440,21 @@ mod tests {
         let mut kept = all.to_vec();
         drop_doubtful_contacts(&mut kept, &[ringing], &channels);
         assert_eq!(kept, all[2..]);
+    }
+    /// A residual has a contact that is in it, but not single wrong samples or noise; where the drive stands for the most
+    /// part, nothing is known.
+    #[test]
+    fn residuals_show_what_is_left_of_a_contact() {
+        let push = |size: f64| (0..20).map(move |k| size * (f64::from(k) * std::f64::consts::PI / 19.0).sin());
+        let known = |values: Vec<f64>| values.into_iter().map(Some).collect::<Vec<_>>();
+        let there = share_in_residual(-2.0, &known(push(-1.9).collect())).expect("known");
+        assert!((0.8..1.0).contains(&there), "{there}");
+        let mut noise: Vec<f64> = (0..20).map(|k| if k % 2 == 0 { 0.1 } else { -0.1 }).collect();
+        noise[7] = 5.0;
+        let gone = share_in_residual(2.0, &known(noise)).expect("known");
+        assert!(gone < CONTACT_LEAST_REST_SHARE, "{gone}");
+        let standing: Vec<Option<f64>> = push(1.9).enumerate().map(|(k, x)| (k > 12).then_some(x)).collect();
+        assert_eq!(share_in_residual(2.0, &standing), None);
     }
     /// A contact beside a change of the same recording is doubtful; one of another recording is not.
     #[test]

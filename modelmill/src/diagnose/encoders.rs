@@ -18,6 +18,8 @@ use super::problem::FixedParameters;
 use super::thresholds::{ENCODER_WAVE_SAMPLES, SLOPE_JUMP_MEDIANS};
 use crate::regressors::SegmentList;
 
+/// Kind of a wrong zero of an encoder.
+pub(super) const ENCODER_ZERO: &str = "encoder_zero";
 /// How often an error may repeat per turn, or along the travel of a prismatic coordinate.
 const TIMES: [u32; 16] = [1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 30, 36, 48, 60];
 /// Steps of the differences, as parts of the largest value.
@@ -50,7 +52,7 @@ pub(crate) fn zeros(model: &Model, slopes: &[Option<[ForceColumn; 3]>]) -> Vec<C
                 constants: Vec::new(),
                 columns: vec![column],
             }]),
-            ..disturbance("encoder_zero", name, &["shift"], is_angle)
+            ..disturbance(ENCODER_ZERO, name, &["shift"], is_angle)
         })
     };
     each.filter_map(candidate).collect()

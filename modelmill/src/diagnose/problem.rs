@@ -41,6 +41,7 @@ use super::signal_delays::SignalDelays;
 use super::standing_drives::StandingDrives;
 use super::thresholds::FEWEST_SAMPLES;
 use super::words;
+use super::zero_or_tilt::{add_zeros_as_alternatives, base_joints};
 use crate::regressors::{SegmentList, regressor};
 
 /// Which base parameters are fixed at their nominal values.
@@ -151,6 +152,7 @@ pub(crate) fn find_missing_effects(
             .change_shapes
             .extend(signal_changes(&problem, &force_units(model)));
     }
+    let joints = base_joints(&problem.candidates, &further, &encoders::values(model, &problem, held));
     let delays = SignalDelays::new(model, &all)?;
     further.extend(delays.candidates.iter().cloned());
     problem.candidates.extend(further);
@@ -206,6 +208,10 @@ pub(crate) fn find_missing_effects(
         &diagnosis.time_residuals,
         &problem.layout.channels,
     );
+    let is_tilt = |one: &CandidateEffect| matches!(one.source, ColumnSource::Tilt(_));
+    if let Some(tilt) = problem.candidates.iter().position(is_tilt) {
+        add_zeros_as_alternatives(&mut diagnosis.effects, tilt, &joints);
+    }
     measured_play::report_as_effects(model, &problem.candidates, &mut diagnosis);
     // Stage 5: texts, values that the model shares, and candidates that could not be evaluated.
     let mechanism = &model.derivation.mechanism;

@@ -64,6 +64,14 @@ pub(super) const REPEATED_PLACE_MOST_RESIDUAL: f64 = 0.5;
 /// column). Below it is rounding. By judgement.
 pub(super) const TILT_LEAST_EFFECT: f64 = 1e-6;
 
+/// A zero of an encoder acts as a tilt of the base if the columns of both differ by at most this part (1). It is rounding of
+/// the central differences. By judgement.
+pub(super) const ZERO_AS_TILT_MOST_DIFFERENCE: f64 = 1e-4;
+
+/// A tilt is about the axis of a joint if its other components are within this many standard deviations (1). By
+/// judgement.
+pub(super) const TILT_AXIS_MOST_DEVIATIONS: f64 = 3.0;
+
 /// A column of a payload has no effect if its largest value is below this part of the largest of all payload
 /// columns (1). Below it is rounding. By judgement.
 pub(super) const PAYLOAD_LEAST_EFFECT: f64 = 1e-9;
