@@ -4,10 +4,13 @@
 //! If time stamps are wrong, the position errors are the time error times the rate, with the same time error for all
 //! coordinates. With backlash, the position jumps each time the load changes sides, by one length to and fro.
 
+use std::ops::RangeInclusive;
+
 use super::thresholds::{
     BACKLASH_ALIKE_OF_FIVE, BACKLASH_ALTERNATING_OF_FIVE, BACKLASH_ENCODER_STEPS, BACKLASH_FEWEST_JUMPS,
     BACKLASH_JUMP_SIGMAS, BACKLASH_SIZE_TOLERANCE, BACKLASH_TRAVEL_SHARE, FAST_RATE_SHARE, JITTER_FEWEST_SAMPLES,
-    JITTER_MIN_AGREEMENT, JITTER_MIN_ERROR_GROWTH, POSITION_FAULT_NEIGHBOURHOODS, SLOW_RATE_SHARE,
+    JITTER_MIN_AGREEMENT, JITTER_MIN_ERROR_GROWTH, NEIGHBOURHOOD_MOST_SPAN, POSITION_FAULT_NEIGHBOURHOODS,
+    SLOW_RATE_SHARE,
 };
 use crate::recording::SignalRecording;
 use crate::signal::median;
@@ -86,10 +89,11 @@ struct CubicResidual {
 }
 
 impl CubicResidual {
-    /// Fits a cubic around every sample that has enough neighbours; `time` in s.
+    /// Fits a cubic around every sample that has enough neighbours without a gap between them; `time` in s.
     fn new(time: &[f64], q: &[f64]) -> Self {
         let (mut errors, mut rates) = (Vec::new(), Vec::new());
-        for i in SIDE..q.len() - SIDE {
+        let step = median_step(time);
+        for i in (SIDE..q.len() - SIDE).filter(|i| !has_gap(time, i - SIDE..=i + SIDE, step)) {
             let about = (i - SIDE..=i + SIDE).filter(|k| *k != i);
             // Relative to the sample, so that the value at zero is the error.
             let points = about.map(|k| (time[k] - time[i], q[k] - q[i]));
@@ -99,6 +103,17 @@ impl CubicResidual {
         }
         Self { errors, rates }
     }
+}
+
+/// The median time between samples, s.
+fn median_step(time: &[f64]) -> f64 {
+    median(time.windows(2).map(|pair| pair[1] - pair[0]).collect())
+}
+
+/// Whether some samples take much longer than usual, because samples between them are lost.
+fn has_gap(time: &[f64], samples: RangeInclusive<usize>, step: f64) -> bool {
+    let usual = (samples.end() - samples.start()) as f64 * step;
+    time[*samples.end()] - time[*samples.start()] > NEIGHBOURHOOD_MOST_SPAN * usual
 }
 
 /// Least squares fit of a cubic to points (time, value): value and slope at zero. If `step` is not zero, a jump of that
@@ -179,7 +194,12 @@ fn timing_jitter(all: &[CubicResidual]) -> Option<f64> {
 /// Length of the backlash with its standard deviation, rad or m, if the jumps have one size and alternate; else `None`.
 fn backlash_width(time: &[f64], q: &[f64]) -> Option<[f64; 2]> {
     // The factor of the step is half of the jump, since the step goes from -1 to 1.
+    let step = median_step(time);
     let jump = |i: usize| {
+        // A cubic does not follow the motion across a gap.
+        if has_gap(time, i - JUMP_NEIGHBOURS..=i + JUMP_NEIGHBOURS, step) {
+            return 0.0;
+        }
         let about = (i - JUMP_NEIGHBOURS..=i + JUMP_NEIGHBOURS).filter(|k| *k != i);
         2.0 * fit_cubic(about.map(|k| (time[k] - time[i], q[k] - q[i])), 1.0)[0]
     };
@@ -214,11 +234,17 @@ fn backlash_width(time: &[f64], q: &[f64]) -> Option<[f64; 2]> {
     // The width of each jump without the samples at which the load crosses the play.
     let across = |i: usize| {
         let reach = CROSSING_SAMPLES + JUMP_NEIGHBOURS;
-        let about = i.saturating_sub(reach)..(i + reach + 1).min(q.len());
+        let about = i.saturating_sub(reach)..=(i + reach).min(q.len() - 1);
+        if has_gap(time, about.clone(), step) {
+            return None;
+        }
         let beyond = about.filter(|k| k.abs_diff(i) > CROSSING_SAMPLES);
-        2.0 * fit_cubic(beyond.map(|k| (time[k] - time[i], q[k] - q[i])), 1.0)[0].abs()
+        Some(2.0 * fit_cubic(beyond.map(|k| (time[k] - time[i], q[k] - q[i])), 1.0)[0].abs())
     };
-    let widths: Vec<f64> = places.into_iter().map(across).collect();
+    let widths: Vec<f64> = places.into_iter().filter_map(across).collect();
+    if widths.is_empty() {
+        return None;
+    }
     let width = median(widths.clone());
     // Robust standard deviation of a median.
     let spread = 1.4826 * median(widths.iter().map(|one| (one - width).abs()).collect());
@@ -263,6 +289,28 @@ mod tests {
             let both = [0, 1].map(|k| CubicResidual::new(&time(), &read(&mut noise, k)));
             assert_eq!(timing_jitter(&both), None);
             assert_eq!(backlash_width(&time(), &read(&mut noise, 0)), None);
+        }
+    }
+
+    /// Lost samples are no play: without them the motion seems to jump where it is fast.
+    #[test]
+    fn gaps_are_no_faults_of_positions() {
+        for seed in 0..20 {
+            let mut noise = TestNoise::new(seed);
+            // Three gaps of 0.3 s at places that are drawn, about which the motion goes either way.
+            let starts: Vec<f64> = (0..3)
+                .map(|k| 0.5 + 2.2 * f64::from(k) + 0.6 * noise.uniform())
+                .collect();
+            let is_kept = |t: &f64| !starts.iter().any(|start| (*start..start + 0.3).contains(t));
+            let kept: Vec<f64> = time().into_iter().filter(is_kept).collect();
+            let read = |noise: &mut TestNoise, k| -> Vec<f64> {
+                kept.iter().map(|t| motion(*t, k) + 5e-6 * noise.normal()).collect()
+            };
+            let both = [0, 1].map(|k| CubicResidual::new(&kept, &read(&mut noise, k)));
+            assert_eq!(timing_jitter(&both), None);
+            for k in 0..2 {
+                assert_eq!(backlash_width(&kept, &read(&mut noise, k)), None, "{seed}");
+            }
         }
     }
 

@@ -121,6 +121,10 @@ pub(super) const REPEATED_CHANCE_FACTOR: f64 = 3.0;
 
 // --- Positions
 
+/// Neighbours of a sample are compared with a cubic only if they take at most this many times the usual time (1): one or
+/// two lost samples do no harm, a longer gap does. By judgement.
+pub(super) const NEIGHBOURHOOD_MOST_SPAN: f64 = 1.25;
+
 /// Faults of positions are searched only in recordings with at least this many times the neighbours on one side of a
 /// jump. By judgement.
 pub(super) const POSITION_FAULT_NEIGHBOURHOODS: usize = 20;

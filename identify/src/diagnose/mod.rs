@@ -195,8 +195,10 @@ pub struct ModelDiagnosis {
     /// Effects that the recordings can neither show nor exclude. Even if such an effect had a force as large as that of
     /// the drive, the part of it that the other columns cannot reproduce would be too small to detect.
     pub undetermined_effects: Vec<LocatedEffect>,
-    /// Residual of the last set, `[channel][sample]`, N or N m.
+    /// Residual of the last set, `[channel][sample]`, N or N m; samples that are left out are zero.
     pub residual: Vec<Vec<f64>>,
+    /// The same with the samples that are left out, which are not fitted; zero where no force was measured.
+    pub complete_residual: Vec<Vec<f64>>,
     /// Share of each channel's squared residual that is repeatable on data that was not fitted, 0 to 1.
     pub repeatable_share: Vec<f64>,
     /// Indices of the channels whose residual is unexplained.
@@ -356,6 +358,7 @@ fn diagnose_cleaned(
     }
     let untold = bench.find_undetermined(&picks, &rest);
     let later = bench.changes_in_residual(&picks);
+    let complete_residual = bench.complete_residual(&picks);
     let diagnosis = ModelDiagnosis {
         verdict,
         noise_floor: noise_floor(&budgets),
@@ -367,6 +370,7 @@ fn diagnose_cleaned(
         candidates,
         undetermined_effects: untold,
         residual: rest,
+        complete_residual,
         repeatable_share: again,
         unexplained,
         time_residuals,
@@ -595,6 +599,12 @@ impl EffectSelector<'_> {
         let pairs = errors.iter().zip(&forces);
         let by_channel = pairs.map(|(error, force)| relative(*error, *force));
         (fit, whole(&errors, &forces), by_channel.collect())
+    }
+
+    /// Residual of a set that is fitted to all samples but those left out, `[channel][sample]`, at all samples.
+    fn complete_residual(&self, picks: &[SelectedEffect]) -> Vec<Vec<f64>> {
+        let (factors, _) = self.fit(picks, FitScope::All);
+        (self.pool).full_residual(self.measured, &self.columns(picks), factors.as_slice())
     }
 
     /// Residual of a set that is fitted to the recordings of the fit, `[channel][sample]`. Samples at reversals count

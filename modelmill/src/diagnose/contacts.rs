@@ -5,7 +5,8 @@ use modelmill_identify::changes::NormalEquations;
 use modelmill_identify::diagnose::{DiagnosisProblem, Disturbance, TimeResidual};
 
 use super::thresholds::{
-    CONTACT_GAP_S, CONTACT_LEAST_RESIDUAL_RATIO, REPEATED_PLACE_FEWEST_SAMPLES, REPEATED_PLACE_MOST_RESIDUAL,
+    CONTACT_GAP_S, CONTACT_LEAST_KNOWN_SHARE, CONTACT_LEAST_RESIDUAL_RATIO, CONTACT_LEAST_REST_SHARE,
+    REPEATED_PLACE_FEWEST_SAMPLES, REPEATED_PLACE_MOST_RESIDUAL,
 };
 use crate::audit::events::{
     ResidualTrace, event_disturbance, find_events, left_out_interval, motion_of_drives, slowest_rate, standing_states,
@@ -39,6 +40,74 @@ pub(super) fn are_contacts_doubtful(disturbances: &[Disturbance]) -> bool {
         .collect();
     let mut contacts = disturbances.iter().filter(|one| is_contact(one));
     contacts.any(|one| one.recordings.iter().any(|file| changed.contains(&file)))
+}
+
+/// The contacts of a problem that the residual of a search still has, `[drive][sample]`: the audit fits each recording by
+/// itself and without the effects, delays and clocks that the search finds, so that their forces may look like contacts.
+/// `None` if all are still there. `other_samples` marks samples that are left out for another reason, `[drive][sample]`;
+/// contacts that lie there for the most part stay.
+pub(super) fn contacts_in_residual(
+    problem: &DiagnosisProblem,
+    all: &SegmentList<'_>,
+    residual: &[Vec<f64>],
+    other_samples: &[Vec<bool>],
+) -> Option<Vec<Disturbance>> {
+    let contacts: Vec<Disturbance> = problem
+        .disturbances
+        .iter()
+        .filter(|one| is_contact(one))
+        .cloned()
+        .collect();
+    if contacts.is_empty() {
+        return None;
+    }
+    let samples = ContactSamples::new(all);
+    let is_there = |contact: &Disturbance| {
+        let inside = samples.mask(contact.interval, contact);
+        let forces = contact.at.iter().zip(&contact.estimates);
+        let mut shares = forces
+            .filter_map(|(name, force)| {
+                let d = problem.layout.channels.iter().position(|one| one == name)?;
+                let unknown = [other_samples.get(d), problem.layout.left_out.get(d)];
+                let is_known = |i: usize| !unknown.iter().flatten().any(|out| out[i]);
+                let within = (0..inside.len()).filter(|i| inside[*i]);
+                let rest: Vec<Option<f64>> = within.map(|i| is_known(i).then_some(residual[d][i])).collect();
+                share_in_residual(force.value, &rest)
+            })
+            .peekable();
+        // Without samples nothing speaks against a contact.
+        shares.peek().is_none() || shares.any(|share| share > CONTACT_LEAST_REST_SHARE)
+    };
+    let kept: Vec<Disturbance> = contacts.iter().filter(|one| is_there(one)).cloned().collect();
+    (kept.len() < contacts.len()).then_some(kept)
+}
+
+/// The share of a contact's force that a residual has: the largest magnitude of the medians of three neighbours. `rest` is the
+/// residual during the contact, `None` where it is not known, as at standstill. `None` if too little is known.
+fn share_in_residual(force: f64, rest: &[Option<f64>]) -> Option<f64> {
+    let known: Vec<f64> = rest.iter().copied().flatten().collect();
+    if (known.len() as f64) < CONTACT_LEAST_KNOWN_SHARE * rest.len() as f64 {
+        return None;
+    }
+    let medians = known.windows(3).map(|three| {
+        let mut three = [three[0], three[1], three[2]];
+        three.sort_by(f64::total_cmp);
+        three[1].abs()
+    });
+    Some(medians.max_by(f64::total_cmp)? / force.abs())
+}
+
+/// Leaves out only some contacts, of those that a problem has; `other_samples` are left out for another reason,
+/// `[drive][sample]`.
+pub(super) fn keep_contacts(
+    problem: &mut DiagnosisProblem,
+    all: &SegmentList<'_>,
+    kept: Vec<Disturbance>,
+    other_samples: &[Vec<bool>],
+) {
+    problem.left_out = other_samples.to_vec();
+    problem.disturbances.retain(|one| !is_contact(one));
+    leave_out_contacts(problem, all, kept);
 }
 
 /// Leaves out the contacts and pushes in the residual of a search, `[drive][sample]`. Returns whether there are any.
@@ -371,6 +440,21 @@ mod tests {
         let mut kept = all.to_vec();
         drop_doubtful_contacts(&mut kept, &[ringing], &channels);
         assert_eq!(kept, all[2..]);
+    }
+    /// A residual has a contact that is in it, but not single wrong samples or noise; where the drive stands for the most
+    /// part, nothing is known.
+    #[test]
+    fn residuals_show_what_is_left_of_a_contact() {
+        let push = |size: f64| (0..20).map(move |k| size * (f64::from(k) * std::f64::consts::PI / 19.0).sin());
+        let known = |values: Vec<f64>| values.into_iter().map(Some).collect::<Vec<_>>();
+        let there = share_in_residual(-2.0, &known(push(-1.9).collect())).expect("known");
+        assert!((0.8..1.0).contains(&there), "{there}");
+        let mut noise: Vec<f64> = (0..20).map(|k| if k % 2 == 0 { 0.1 } else { -0.1 }).collect();
+        noise[7] = 5.0;
+        let gone = share_in_residual(2.0, &known(noise)).expect("known");
+        assert!(gone < CONTACT_LEAST_REST_SHARE, "{gone}");
+        let standing: Vec<Option<f64>> = push(1.9).enumerate().map(|(k, x)| (k > 12).then_some(x)).collect();
+        assert_eq!(share_in_residual(2.0, &standing), None);
     }
     /// A contact beside a change of the same recording is doubtful; one of another recording is not.
     #[test]

@@ -18,10 +18,14 @@ use super::problem::FixedParameters;
 use super::thresholds::{ENCODER_WAVE_SAMPLES, SLOPE_JUMP_MEDIANS};
 use crate::regressors::SegmentList;
 
+/// Kind of a wrong zero of an encoder.
+pub(super) const ENCODER_ZERO: &str = "encoder_zero";
 /// How often an error may repeat per turn, or along the travel of a prismatic coordinate.
 const TIMES: [u32; 16] = [1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 30, 36, 48, 60];
 /// Steps of the differences, as parts of the largest value.
 const STEP: f64 = 1e-5;
+/// Rates below this many steps show no usual slope.
+const USUAL_LEAST_STEPS: f64 = 10.0;
 
 /// Derivatives of the forces by position, rate and acceleration of every active coordinate, for given base
 /// parameters; `None` if the forces cannot be evaluated next to the recorded motion.
@@ -48,7 +52,7 @@ pub(crate) fn zeros(model: &Model, slopes: &[Option<[ForceColumn; 3]>]) -> Vec<C
                 constants: Vec::new(),
                 columns: vec![column],
             }]),
-            ..disturbance("encoder_zero", name, &["shift"], is_angle)
+            ..disturbance(ENCODER_ZERO, name, &["shift"], is_angle)
         })
     };
     each.filter_map(candidate).collect()
@@ -195,41 +199,63 @@ pub(crate) fn values(model: &Model, problem: &DiagnosisProblem, held: FixedParam
 fn sensitivity(model: &Model, all: &SegmentList<'_>, values: &[f64], coordinate: usize) -> Option<[ForceColumn; 3]> {
     let mut slopes = Vec::new();
     for order in 0..3 {
-        // The forces with one derivative of the motion changed by a step of either sign.
-        let along = |sign: f64| {
-            stack(all, |one| {
-                // A copy of the recording with one column changed.
+        let slope = stack(all, |one| {
+            // The motion of the coordinate of which one derivative is changed by a step of either sign.
+            let motion = &[&one.run.q, &one.run.qd, &one.run.qdd][order][coordinate];
+            let largest = motion.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+            let step = STEP * largest.max(f64::MIN_POSITIVE);
+            let along = |step: f64| {
                 let mut turned: RecordingSegment = one.clone();
                 let run = &mut turned.run;
-                let column = &mut [&mut run.q, &mut run.qd, &mut run.qdd][order][coordinate];
-                let largest = column.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
-                let step = sign * STEP * largest.max(f64::MIN_POSITIVE);
-                for x in column.iter_mut() {
+                for x in &mut [&mut run.q, &mut run.qd, &mut run.qdd][order][coordinate] {
                     *x += step;
                 }
-                let mut forces = along::forces(model, &turned, values)?;
-                for x in forces.iter_mut().flatten() {
-                    *x /= 2.0 * step.abs();
-                }
-                Ok(forces)
-            })
-        };
-        let [Ok(back), Ok(ahead)] = [along(-1.0), along(1.0)] else {
-            return None;
-        };
-        let pairs = ahead.into_iter().zip(back);
-        let slope = pairs.map(|(ahead, back)| {
-            let mut slope: Vec<f64> = ahead.iter().zip(&back).map(|(a, b)| a - b).collect();
-            // The median, since jumps of signs are rare but large.
-            let mut sizes: Vec<f64> = slope.iter().map(|x| x.abs()).collect();
-            sizes.sort_by(f64::total_cmp);
-            let bound = SLOPE_JUMP_MEDIANS * sizes.get(sizes.len() / 2).copied().unwrap_or(0.0);
-            for x in slope.iter_mut().filter(|x| x.abs() > bound) {
-                *x = 0.0;
-            }
-            slope
+                along::forces(model, &turned, values)
+            };
+            let (back, ahead) = (along(-step)?, along(step)?);
+            // A coordinate that stands has no rate of a certain sign: slopes there show no usual size.
+            let is_usual: Vec<bool> = (motion.iter())
+                .map(|x| order != 1 || x.abs() > USUAL_LEAST_STEPS * step)
+                .collect();
+            let pairs = ahead.iter().zip(&back);
+            let slopes = pairs.map(|(ahead, back)| {
+                let differences = ahead.iter().zip(back);
+                let mut slope: Vec<f64> = differences.map(|(a, b)| (a - b) / (2.0 * step)).collect();
+                clear_jumps(&mut slope, &is_usual);
+                slope
+            });
+            Ok(slopes.collect())
         });
-        slopes.push(ForceColumn::new(slope.collect()));
+        slopes.push(ForceColumn::new(slope.ok()?));
     }
     <[ForceColumn; 3]>::try_from(slopes).ok()
+}
+
+/// Sets the slopes to zero at which a sign jumps between the two steps, such as that of dry friction. This is done before
+/// a low-pass spreads them. `is_usual` marks the samples that show the usual size.
+fn clear_jumps(slope: &mut [f64], is_usual: &[bool]) {
+    // The median, since jumps of signs are rare but large.
+    let usual = slope.iter().zip(is_usual).filter(|(_, is_usual)| **is_usual);
+    let mut sizes: Vec<f64> = usual.map(|(x, _)| x.abs()).collect();
+    sizes.sort_by(f64::total_cmp);
+    let bound = SLOPE_JUMP_MEDIANS * sizes.get(sizes.len() / 2).copied().unwrap_or(0.0);
+    for x in slope.iter_mut().filter(|x| x.abs() > bound) {
+        *x = 0.0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A coordinate that stands for most of the time has jumps of dry friction there; they are cleared, and the slopes
+    /// in motion stay.
+    #[test]
+    fn jumps_at_standstill_are_cleared_and_slopes_in_motion_stay() {
+        let is_usual: Vec<bool> = (0..100).map(|k| k >= 80).collect();
+        let mut slope: Vec<f64> = is_usual.iter().map(|moves| if *moves { 1.5 } else { 4e4 }).collect();
+        clear_jumps(&mut slope, &is_usual);
+        assert!(slope[..80].iter().all(|x| x.abs() < 1e-12));
+        assert!(slope[80..].iter().all(|x| (x - 1.5).abs() < 1e-12));
+    }
 }

@@ -15,6 +15,7 @@
 //! 6. `encoders`, `gears`, `memory`, `payloads`, `constants`, `tilt`, `held_friction`, `signal_delays`: add candidates that
 //!    a model file cannot contain.
 //! 7. `problem`: formulates the search with all of these, and solves it.
+//!    `zero_or_tilt` adds wrong zeros of encoders as alternatives of a tilt.
 //! 8. `estimates`, `added_effects`: give each effect found one value per parameter, and add the effects to the model file, in
 //!    memory.
 //! 9. `model_versions`: identifies the models without and with the effects, and evaluates them along all recordings.
@@ -62,6 +63,7 @@ mod standing_drives;
 mod thresholds;
 mod tilt;
 pub mod words;
+mod zero_or_tilt;
 
 pub(crate) use candidates::sign;
 pub use completion::ModelCompletion;

@@ -22,7 +22,9 @@ use super::candidates::{DerivedCandidates, candidates};
 use super::clock::clock;
 use super::columns::{self, CandidateOrigin, load_dependent_columns, refined_columns};
 use super::constants::{ClaimedConstant, constants};
-use super::contacts::{are_contacts_doubtful, drop_doubtful_contacts, is_contact, leave_out_late_contacts};
+use super::contacts::{
+    are_contacts_doubtful, contacts_in_residual, drop_doubtful_contacts, keep_contacts, leave_out_late_contacts,
+};
 use super::encoders::{self, encoders};
 use super::estimates::round_by_deviation;
 use super::faults::subtract_known;
@@ -39,6 +41,7 @@ use super::signal_delays::SignalDelays;
 use super::standing_drives::StandingDrives;
 use super::thresholds::FEWEST_SAMPLES;
 use super::words;
+use super::zero_or_tilt::{add_zeros_as_alternatives, base_joints};
 use crate::regressors::{SegmentList, regressor};
 
 /// Which base parameters are fixed at their nominal values.
@@ -149,6 +152,7 @@ pub(crate) fn find_missing_effects(
             .change_shapes
             .extend(signal_changes(&problem, &force_units(model)));
     }
+    let joints = base_joints(&problem.candidates, &further, &encoders::values(model, &problem, held));
     let delays = SignalDelays::new(model, &all)?;
     further.extend(delays.candidates.iter().cloned());
     problem.candidates.extend(further);
@@ -177,11 +181,15 @@ pub(crate) fn find_missing_effects(
         host.run_job("searching for missing effects", 0, |_| diagnose(problem, &supply))
     };
     let mut diagnosis = search(&mut problem)?;
-    // The audit knows no changes in time: where one begins, and after it, forces look like contacts. Those that are left
-    // once the change is known are found below.
-    if query.in_full && are_contacts_doubtful(&diagnosis.disturbances) {
-        problem.left_out = without_contacts;
-        problem.disturbances.retain(|one| !is_contact(one));
+    // The audit knows neither changes in time, nor delays and other effects that the search finds: they look like
+    // contacts, and the contacts that are left once they are known are found below.
+    let kept = if are_contacts_doubtful(&diagnosis.disturbances) {
+        Some(Vec::new())
+    } else {
+        contacts_in_residual(&problem, &all, &diagnosis.complete_residual, &without_contacts)
+    };
+    if let Some(kept) = kept.filter(|_| query.in_full) {
+        keep_contacts(&mut problem, &all, kept, &without_contacts);
         (problem.measured, problem.removed) = forces.clone();
         problem.candidates.truncate(known);
         problem.change_intervals.clear();
@@ -200,6 +208,10 @@ pub(crate) fn find_missing_effects(
         &diagnosis.time_residuals,
         &problem.layout.channels,
     );
+    let is_tilt = |one: &CandidateEffect| matches!(one.source, ColumnSource::Tilt(_));
+    if let Some(tilt) = problem.candidates.iter().position(is_tilt) {
+        add_zeros_as_alternatives(&mut diagnosis.effects, tilt, &joints);
+    }
     measured_play::report_as_effects(model, &problem.candidates, &mut diagnosis);
     // Stage 5: texts, values that the model shares, and candidates that could not be evaluated.
     let mechanism = &model.derivation.mechanism;

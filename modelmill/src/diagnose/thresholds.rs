@@ -40,6 +40,15 @@ pub(super) const SIGN_TRIALS: usize = 200;
 /// (1): the peaks of a ringing joint reach 4.6 (`flexible-motor-encoder`). By judgement.
 pub(super) const CONTACT_LEAST_RESIDUAL_RATIO: f64 = 5.5;
 
+/// A contact of the audit is there only if the residual with the effects found reaches this share of its force (1). A delay,
+/// a slow clock or outliers make the audit see forces of which 0.05 to 0.3 are left; of a contact at least 0.7 is left, since
+/// a low-pass rounds it. By judgement between them.
+pub(super) const CONTACT_LEAST_REST_SHARE: f64 = 0.5;
+
+/// A residual shows whether a contact is there only if this share of its samples (1) is in motion and not left out for
+/// another reason. By judgement.
+pub(super) const CONTACT_LEAST_KNOWN_SHARE: f64 = 0.5;
+
 /// Contacts with less time between them are reported as one, s. By judgement.
 pub(super) const CONTACT_GAP_S: f64 = 0.3;
 
@@ -54,6 +63,14 @@ pub(super) const REPEATED_PLACE_MOST_RESIDUAL: f64 = 0.5;
 /// A tilt of the base about an axis is tried if it changes a base column by more than this (unit of the
 /// column). Below it is rounding. By judgement.
 pub(super) const TILT_LEAST_EFFECT: f64 = 1e-6;
+
+/// A zero of an encoder acts as a tilt of the base if the columns of both differ by at most this part (1). It is rounding of
+/// the central differences. By judgement.
+pub(super) const ZERO_AS_TILT_MOST_DIFFERENCE: f64 = 1e-4;
+
+/// A tilt is about the axis of a joint if its other components are within this many standard deviations (1). By
+/// judgement.
+pub(super) const TILT_AXIS_MOST_DEVIATIONS: f64 = 3.0;
 
 /// A column of a payload has no effect if its largest value is below this part of the largest of all payload
 /// columns (1). Below it is rounding. By judgement.
