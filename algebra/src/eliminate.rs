@@ -11,6 +11,8 @@ pub struct RowEchelonForm<const P: u64> {
     pub pivots: Vec<usize>,
     /// One row per pivot, with 1 in its pivot column and 0 in all other pivot columns.
     rows: Vec<Vec<FieldElement<P>>>,
+    /// The row of each pivot column.
+    row_of: Vec<Option<usize>>,
 }
 
 impl<const P: u64> RowEchelonForm<P> {
@@ -20,6 +22,7 @@ impl<const P: u64> RowEchelonForm<P> {
             order: order.to_vec(),
             pivots: Vec::new(),
             rows: Vec::new(),
+            row_of: Vec::new(),
         }
     }
 
@@ -44,6 +47,8 @@ impl<const P: u64> RowEchelonForm<P> {
             let factor = -known[pivot];
             add_multiple(known, factor, &row);
         }
+        self.row_of.resize(row.len(), None);
+        self.row_of[pivot] = Some(self.rows.len());
         self.pivots.push(pivot);
         self.rows.push(row);
         true
@@ -56,7 +61,7 @@ impl<const P: u64> RowEchelonForm<P> {
 
     /// The entry of a column in the row of a pivot; `None` if `pivot` is no pivot column.
     pub fn entry(&self, pivot: usize, column: usize) -> Option<FieldElement<P>> {
-        let row = self.pivots.iter().position(|p| *p == pivot)?;
+        let row = self.row_of.get(pivot).copied().flatten()?;
         Some(self.rows[row][column])
     }
 }

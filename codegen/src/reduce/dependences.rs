@@ -4,7 +4,7 @@ use modelmill_algebra::field::{FieldElement, MODULUS, PRIMES, RandomStream};
 use modelmill_spec::Mechanism;
 
 use super::reduction::{BaseReduction, ColumnDependency, ReductionMethod};
-use super::relations::{self, ColumnRelation, DependentColumn};
+use super::relations::{self, ColumnRelation, DependentColumn, TreeStructure};
 use super::sample::SampledRegressor;
 use crate::DeriveError;
 use crate::tree::expressions::ParameterMonomial;
@@ -31,9 +31,11 @@ pub(super) struct DependenceStructure {
 }
 
 impl DependenceStructure {
-    /// Samples the regressor and eliminates; columns that come first in `order` are retained first.
+    /// Samples the regressor and eliminates; columns that come first in `order` are retained first. In a `tree`, columns
+    /// are near if their links are.
     pub(super) fn find_dependences(
         regressor: &SampledRegressor,
+        tree: &TreeStructure,
         order: &[usize],
         stream: &mut RandomStream,
     ) -> Result<Self, DeriveError> {
@@ -52,7 +54,14 @@ impl DependenceStructure {
             .filter(|(j, p)| echelon.entry(*p, *j).is_some_and(|x| x != FieldElement::ZERO))
             .collect();
         let order: Vec<usize> = (order.iter().copied()).filter(|k| shown.contains(k)).collect();
-        let relations = relations::find_relations(&echelon, &order, &dependent);
+        let mut relations = relations::find_relations(&echelon, tree, &constants, &order, &dependent);
+        if let Some(tree) = &tree.columns
+            && let Some(values) = tree.evaluate(&constants)
+        {
+            for relation in relations.iter_mut().filter(|r| r.factors.is_none()) {
+                relation.compare_with_tree(tree, &values, &echelon);
+            }
+        }
         Ok(Self {
             shown,
             pivots,

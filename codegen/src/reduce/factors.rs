@@ -5,9 +5,11 @@ use modelmill_algebra::field::{FieldElement, RandomStream};
 
 use super::dependences::DependenceStructure;
 use super::oracle::{ConstantOccurrence, OperationBudget, PrimeFieldOracle};
+use super::rational_function::RationalFunction;
 use super::reconstruct::{self, DependenceSurvey, FunctionNeed};
-use super::relations::{self, ColumnRelation, DependentColumn, RelationRows, SolvedRelations};
+use super::relations::{self, ColumnRelation, DependentColumn, RelationRows, SolvedRelations, TreeStructure};
 use super::sample::SampledRegressor;
+use super::tree_columns::TreeColumns;
 use crate::DeriveError;
 use crate::expr::FieldPoint;
 
@@ -26,6 +28,7 @@ const MOST_TERMS: usize = 150;
 pub(super) fn find_factors(
     dependences: &DependenceStructure,
     regressor: &SampledRegressor,
+    tree: &TreeStructure,
     variables: &[ConstantOccurrence],
     roots: &[i64],
     values: &[f64],
@@ -43,6 +46,7 @@ pub(super) fn find_factors(
     let mut search = FactorSearch {
         dependences,
         regressor,
+        tree,
         variables,
         roots,
         values,
@@ -60,20 +64,37 @@ pub(super) fn find_factors(
 pub(super) fn n_quotients(
     dependences: &DependenceStructure,
     regressor: &SampledRegressor,
+    tree: &TreeStructure,
     variables: &[ConstantOccurrence],
     stream: &mut RandomStream,
 ) -> Result<usize, DeriveError> {
     let direct = dependences.relations.iter().filter(|r| r.has_retained_only());
     let direct: Vec<ColumnRelation> = direct.cloned().collect();
-    // Only relations to retained columns have factors on retained columns.
-    let mut oracle = MotionFactorOracle {
-        regressor,
-        dependences,
-        relations: &direct,
-        sampling: stream.clone(),
-        budget: &mut OperationBudget::new(MOST_OPERATIONS),
-    };
-    reconstruct::n_quotients(&mut oracle, variables, stream)
+    // Only relations to retained columns have factors on retained columns. Factors that are known are polynomials.
+    let direct = direct.into_iter().filter(|r| r.factors.is_none());
+    let (in_tree, others): (Vec<ColumnRelation>, Vec<ColumnRelation>) = direct.partition(|r| r.is_in_tree);
+    let mut budget = OperationBudget::new(MOST_OPERATIONS);
+    let mut found = 0;
+    if let Some(tree) = tree.columns.as_ref().filter(|_| !in_tree.is_empty()) {
+        let mut oracle = TreeFactorOracle {
+            regressor,
+            tree,
+            relations: &in_tree,
+            budget: &mut budget,
+        };
+        found += reconstruct::n_quotients(&mut oracle, variables, stream)?;
+    }
+    if !others.is_empty() {
+        let mut oracle = MotionFactorOracle {
+            regressor,
+            dependences,
+            relations: &others,
+            sampling: stream.clone(),
+            budget: &mut budget,
+        };
+        found += reconstruct::n_quotients(&mut oracle, variables, stream)?;
+    }
+    Ok(found)
 }
 
 /// The dependent columns from given relations, which include those to retained columns.
@@ -158,6 +179,8 @@ struct FactorSearch<'a> {
     dependences: &'a DependenceStructure,
     /// The regressor's columns at random points.
     regressor: &'a SampledRegressor,
+    /// What the links of a tree tell about their columns.
+    tree: &'a TreeStructure,
     /// Constants on which factors may depend.
     variables: &'a [ConstantOccurrence],
     /// Integers whose square roots factors may contain.
@@ -176,25 +199,45 @@ impl FactorSearch<'_> {
         may_wait: impl Fn(&ColumnRelation) -> bool,
         stream: &mut RandomStream,
     ) -> Result<SolvedRelations, DeriveError> {
-        let mut oracle = MotionFactorOracle {
-            regressor: self.regressor,
-            dependences: self.dependences,
-            relations: chosen,
-            sampling: stream.clone(),
-            budget: &mut self.budget,
-        };
-        let mut survey = DependenceSurvey::new(&mut oracle, self.variables, self.roots, stream)?;
-        // A relation to retained columns is needed by all that use its column.
-        let of_relation = |r: &ColumnRelation| {
-            let need = match (r.has_retained_only(), may_wait(r)) {
-                (true, _) => FunctionNeed::ByOthers,
-                (_, true) => FunctionNeed::IfShort,
-                (_, false) => FunctionNeed::ByItself,
+        // Relations between the links of a tree need no points of motion.
+        let unknown = chosen.iter().filter(|r| r.factors.is_none()).cloned();
+        let (in_tree, others): (Vec<ColumnRelation>, Vec<ColumnRelation>) = unknown.partition(|r| r.is_in_tree);
+        let mut of_tree = Vec::new();
+        if let Some(tree) = self.tree.columns.as_ref().filter(|_| !in_tree.is_empty()) {
+            let mut oracle = TreeFactorOracle {
+                regressor: self.regressor,
+                tree,
+                relations: &in_tree,
+                budget: &mut self.budget,
             };
-            std::iter::repeat_n(need, r.len())
-        };
-        let wanted: Vec<(usize, FunctionNeed)> = chosen.iter().flat_map(of_relation).enumerate().collect();
-        let factors = survey.reconstruct_functions(&mut oracle, &wanted, stream)?;
+            of_tree = reconstruct_factors(&mut oracle, &in_tree, &may_wait, self.variables, self.roots, stream)?;
+        }
+        let mut of_others = Vec::new();
+        if !others.is_empty() {
+            let mut oracle = MotionFactorOracle {
+                regressor: self.regressor,
+                dependences: self.dependences,
+                relations: &others,
+                sampling: stream.clone(),
+                budget: &mut self.budget,
+            };
+            of_others = reconstruct_factors(&mut oracle, &others, &may_wait, self.variables, self.roots, stream)?;
+        }
+        // Back in the order of the relations.
+        let (mut of_tree, mut of_others) = (of_tree.into_iter(), of_others.into_iter());
+        let mut factors = Vec::new();
+        for relation in chosen {
+            if let Some(known) = &relation.factors {
+                factors.extend(known.iter().cloned().map(Some));
+                continue;
+            }
+            let source = if relation.is_in_tree {
+                &mut of_tree
+            } else {
+                &mut of_others
+            };
+            factors.extend(source.take(relation.len()));
+        }
         Ok(SolvedRelations::new(chosen.iter(), factors))
     }
 
@@ -209,6 +252,66 @@ impl FactorSearch<'_> {
             related.replace(self.solve_relations(others, |_| false, stream)?);
         }
         Ok(())
+    }
+}
+
+/// Reconstructs the factors of relations, one relation after the other. Factors with many terms are left out where a
+/// relation `may_wait`.
+fn reconstruct_factors<O: PrimeFieldOracle>(
+    oracle: &mut O,
+    relations: &[ColumnRelation],
+    may_wait: &dyn Fn(&ColumnRelation) -> bool,
+    variables: &[ConstantOccurrence],
+    roots: &[i64],
+    stream: &mut RandomStream,
+) -> Result<Vec<Option<RationalFunction>>, DeriveError> {
+    let mut survey = DependenceSurvey::new(oracle, variables, roots, stream)?;
+    // A relation to retained columns is needed by all that use its column.
+    let of_relation = |r: &ColumnRelation| {
+        let need = match (r.has_retained_only(), may_wait(r)) {
+            (true, _) => FunctionNeed::ByOthers,
+            (_, true) => FunctionNeed::IfShort,
+            (_, false) => FunctionNeed::ByItself,
+        };
+        std::iter::repeat_n(need, r.len())
+    };
+    let wanted: Vec<(usize, FunctionNeed)> = relations.iter().flat_map(of_relation).enumerate().collect();
+    survey.reconstruct_functions(oracle, &wanted, stream)
+}
+
+/// Evaluates the factors of relations from the links of a tree.
+struct TreeFactorOracle<'a> {
+    /// Source of constants at which all functions exist.
+    regressor: &'a SampledRegressor,
+    /// The links.
+    tree: &'a TreeColumns,
+    /// Relations whose factors are evaluated.
+    relations: &'a [ColumnRelation],
+    /// Remaining field operations.
+    budget: &'a mut OperationBudget,
+}
+
+impl PrimeFieldOracle for TreeFactorOracle<'_> {
+    fn constants<const P: u64>(&self, stream: &mut RandomStream) -> Result<FieldPoint<FieldElement<P>>, DeriveError> {
+        self.regressor.sampler.constants(stream)
+    }
+
+    fn values<const P: u64>(
+        &mut self,
+        constants: &FieldPoint<FieldElement<P>>,
+    ) -> Result<Vec<FieldElement<P>>, DeriveError> {
+        // An estimate: the spaces of a link take some 10^4 operations, and so does a relation.
+        self.charge(10_000 * (self.tree.n_all_links() + self.relations.len()))?;
+        let values = self.tree.evaluate(constants).ok_or(DeriveError::RankChanged)?;
+        let mut factors = Vec::new();
+        for relation in self.relations {
+            factors.extend(relation.tree_factors(self.tree, &values)?);
+        }
+        Ok(factors)
+    }
+
+    fn charge(&mut self, operations: usize) -> Result<(), DeriveError> {
+        self.budget.spend(operations)
     }
 }
 
@@ -339,8 +442,9 @@ mod tests {
         .mechanism
     }
 
-    /// Factors by near relations where they pay, and by relations to retained columns alone.
-    fn both(mechanism: &Mechanism, operations: u64) -> Result<[Vec<DependentColumn>; 2], DeriveError> {
+    /// Factors by relations between neighbouring links, by relations to retained columns alone from the spaces of the
+    /// links, and by the same from points of motion.
+    fn three_ways(mechanism: &Mechanism, operations: u64) -> Result<[Vec<DependentColumn>; 3], DeriveError> {
         let mut graph = Graph::new();
         let equations = crate::regressor::unreduced_equations(&mut graph, mechanism)?;
         let columns: Vec<&Vec<ExprId>> = (equations.columns.iter())
@@ -353,7 +457,11 @@ mod tests {
         let regressor = sample_regressor(&mut graph, mechanism, projection, &outputs, columns.len())?;
         let mut stream = RandomStream::new(SEED);
         let order: Vec<usize> = (0..columns.len()).collect();
-        let mut dependences = DependenceStructure::find_dependences(&regressor, &order, &mut stream)?;
+        let effective: Vec<usize> = (0..equations.columns.len())
+            .filter(|k| equations.columns[*k].iter().any(|x| *x != Graph::ZERO))
+            .collect();
+        let tree = TreeStructure::new(&mut graph, &equations, &effective);
+        let mut dependences = DependenceStructure::find_dependences(&regressor, &tree, &order, &mut stream)?;
         let variables = constant_occurrences(&graph, &outputs, &projection.loops.residual);
         let roots = root_radicands(&graph, &outputs, &projection.loops.residual);
         let mut factors = |dependences: &DependenceStructure| {
@@ -361,6 +469,7 @@ mod tests {
             find_factors(
                 dependences,
                 &regressor,
+                &tree,
                 &variables,
                 &roots,
                 &values,
@@ -374,20 +483,27 @@ mod tests {
             "nothing is near"
         );
         dependences.relations.retain(ColumnRelation::has_retained_only);
-        Ok([near, factors(&dependences)?])
+        let by_links = factors(&dependences)?;
+        for relation in &mut dependences.relations {
+            let is_closed = relation.is_in_tree || relation.factors.is_some();
+            assert!(is_closed, "column {} is not of a link", relation.column);
+            (relation.is_in_tree, relation.factors) = (false, None);
+        }
+        Ok([near, by_links, factors(&dependences)?])
     }
 
     #[test]
     fn factors_put_together_from_near_ones_are_those_that_are_found_at_once() {
-        let [near, direct] = both(&twisted(4), MOST_OPERATIONS).unwrap();
+        let [near, by_links, direct] = three_ways(&twisted(4), MOST_OPERATIONS).unwrap();
         let all = direct.iter().flat_map(|line| &line.factors);
         assert!(all.clone().count() > 50 && all.clone().all(|(_, factor)| factor.is_some()));
         assert_eq!(near, direct);
+        assert_eq!(by_links, direct);
     }
 
     #[test]
     fn what_takes_too_long_is_given_up() {
-        let found = both(&twisted(4), 100_000).unwrap_err();
+        let found = three_ways(&twisted(4), 100_000).unwrap_err();
         assert_eq!(found, DeriveError::FactorsTooLong { operations: 100_000 });
     }
 }

@@ -18,6 +18,8 @@ mod constants;
 mod dependences;
 mod factors;
 mod fit;
+mod link_spaces;
+mod link_transfer;
 mod numeric;
 mod oracle;
 mod preference;
@@ -30,6 +32,10 @@ mod relations;
 mod sample;
 mod states;
 mod support;
+mod tree_columns;
+#[cfg(test)]
+mod tree_tests;
+mod trigonometric;
 
 use modelmill_algebra::field::RandomStream;
 use modelmill_spec::Mechanism;
@@ -47,6 +53,7 @@ use crate::tree::expressions::ParameterMonomial;
 use constants::{constant_occurrences, root_radicands};
 use dependences::DependenceStructure;
 use preference::{RetentionPreference, retention_preference};
+use relations::TreeStructure;
 use sample::sample_regressor;
 
 /// Reduces the columns `columns[k][d]` (product by drive) to a base: exactly if possible, else numerically.
@@ -123,11 +130,13 @@ fn reduce_exactly(
     let variables = constant_occurrences(graph, outputs, &projection.loops.residual);
     // Dependences with the columns in the order of declaration, and with each link's own columns first.
     let mut order = &preference.declared;
-    let mut dependences = DependenceStructure::find_dependences(&regressor, order, &mut stream)?;
+    let tree = TreeStructure::new(graph, equations, effective);
+    let mut dependences = DependenceStructure::find_dependences(&regressor, &tree, order, &mut stream)?;
     if preference.own_first != preference.declared {
-        let other = DependenceStructure::find_dependences(&regressor, &preference.own_first, &mut stream)?;
-        let mut n_quotients =
-            |dependences: &DependenceStructure| factors::n_quotients(dependences, &regressor, &variables, &mut stream);
+        let other = DependenceStructure::find_dependences(&regressor, &tree, &preference.own_first, &mut stream)?;
+        let mut n_quotients = |dependences: &DependenceStructure| {
+            factors::n_quotients(dependences, &regressor, &tree, &variables, &mut stream)
+        };
         // The second order is used if its factors have fewer sums in denominators.
         if other.pivots != dependences.pivots && n_quotients(&other)? < n_quotients(&dependences)? {
             (order, dependences) = (&preference.own_first, other);
@@ -149,6 +158,7 @@ fn reduce_exactly(
         let factors = factors::find_factors(
             dependences,
             &regressor,
+            &tree,
             &variables,
             &roots,
             &values,
@@ -181,7 +191,7 @@ fn reduce_exactly(
         }
         // The new choice becomes the order in which columns are tried.
         let (first, rest): (Vec<usize>, Vec<usize>) = order.iter().partition(|k| exchange.retained.contains(k));
-        dependences = DependenceStructure::find_dependences(&regressor, &[first, rest].concat(), &mut stream)?;
+        dependences = DependenceStructure::find_dependences(&regressor, &tree, &[first, rest].concat(), &mut stream)?;
     }
     let mut found = reduced(&dependences, &mut stream)?;
     // A factor without a value at the file's values divides by a pivot that vanishes there, for example at lengths that
@@ -195,7 +205,7 @@ fn reduce_exactly(
         };
         let (first, rest): (Vec<usize>, Vec<usize>) = order.iter().partition(|k| wanted.contains(k));
         tried.push(wanted);
-        dependences = DependenceStructure::find_dependences(&regressor, &[first, rest].concat(), &mut stream)?;
+        dependences = DependenceStructure::find_dependences(&regressor, &tree, &[first, rest].concat(), &mut stream)?;
         found = reduced(&dependences, &mut stream)?;
     }
     Ok(found)

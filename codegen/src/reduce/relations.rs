@@ -14,11 +14,16 @@
 use std::collections::BTreeMap;
 
 use modelmill_algebra::eliminate::{self, RowEchelonForm};
-use modelmill_algebra::field::FieldElement;
+use modelmill_algebra::field::{FieldElement, RandomStream};
 
+use super::link_transfer::LinkTransfers;
 use super::rational_function::{FactorVariable, PowerProduct, RationalFunction, TrigonometricPolynomial};
+use super::tree_columns::{TreeColumns, TreeValues};
+use super::trigonometric::{add_term, least_common_multiple, power_product, power_quotient};
 use crate::DeriveError;
-use crate::expr::{FieldPoint, Rational};
+use crate::expr::independent::SEED;
+use crate::expr::{FieldPoint, Graph, Rational};
+use crate::regressor::UnreducedEquations;
 
 /// One column as a combination of others, all numbered among the columns with an effect.
 #[derive(Clone, Debug)]
@@ -29,6 +34,10 @@ pub(super) struct ColumnRelation {
     retained: Vec<usize>,
     /// Dependent columns in the combination, which have relations before this one.
     pub(super) dependent: Vec<usize>,
+    /// Whether its factors follow from the links of a tree alone, without points of motion.
+    pub(super) is_in_tree: bool,
+    /// Its factors, if they are known without reconstruction.
+    pub(super) factors: Option<Vec<RationalFunction>>,
 }
 
 impl ColumnRelation {
@@ -40,6 +49,75 @@ impl ColumnRelation {
     /// Whether it contains retained columns only.
     pub(super) fn has_retained_only(&self) -> bool {
         self.dependent.is_empty()
+    }
+
+    /// A relation whose factors are known; `dependent` are all dependent columns.
+    fn from_factors(column: usize, factors: Vec<(usize, RationalFunction)>, dependent: &[usize]) -> Self {
+        let mut factors = factors;
+        factors.sort_by_key(|(k, _)| (dependent.contains(k), *k));
+        let (others, retained): (Vec<usize>, Vec<usize>) =
+            factors.iter().map(|(k, _)| *k).partition(|k| dependent.contains(k));
+        Self {
+            column,
+            retained,
+            dependent: others,
+            is_in_tree: false,
+            factors: Some(factors.into_iter().map(|(_, factor)| factor).collect()),
+        }
+    }
+
+    /// Whether its known factors combine columns that were reduced to `echelon` at the same constants.
+    fn has_values_of<const P: u64>(
+        &self,
+        constants: &FieldPoint<FieldElement<P>>,
+        echelon: &RowEchelonForm<P>,
+    ) -> bool {
+        let factors = self.factors.iter().flatten().map(|factor| factor.value(constants));
+        let Some(factors) = factors.collect::<Option<Vec<FieldElement<P>>>>() else {
+            return false;
+        };
+        echelon.pivots.iter().all(|p| {
+            let entry = |k: usize| echelon.entry(*p, k).unwrap_or_default();
+            let terms = self.columns().zip(&factors);
+            let sum = terms.fold(FieldElement::ZERO, |sum, (k, factor)| sum + *factor * entry(k));
+            sum == entry(self.column)
+        })
+    }
+
+    /// Determines whether the links of a tree give the factors that the columns have at the constants of `values`, at
+    /// which columns were reduced to `echelon`.
+    pub(super) fn compare_with_tree<const P: u64>(
+        &mut self,
+        tree: &TreeColumns,
+        values: &TreeValues<P>,
+        echelon: &RowEchelonForm<P>,
+    ) {
+        let columns: Vec<usize> = self.columns().collect();
+        let is_known = tree.n_links(columns.iter().copied().chain([self.column])).is_some();
+        let found = is_known.then(|| tree.relation_factors(values, &columns, self.column));
+        // The combination must be the column itself, entry by entry.
+        self.is_in_tree = found.flatten().is_some_and(|factors| {
+            echelon.pivots.iter().all(|p| {
+                let entry = |k: usize| echelon.entry(*p, k).unwrap_or_default();
+                let terms = columns.iter().zip(&factors);
+                let sum = terms.fold(FieldElement::ZERO, |sum, (k, factor)| sum + *factor * entry(*k));
+                sum == entry(self.column)
+            })
+        });
+    }
+
+    /// Its factors from the links of a tree.
+    ///
+    /// # Errors
+    /// [`DeriveError::RankChanged`] if the links have other dependences at these constants.
+    pub(super) fn tree_factors<const P: u64>(
+        &self,
+        tree: &TreeColumns,
+        values: &TreeValues<P>,
+    ) -> Result<Vec<FieldElement<P>>, DeriveError> {
+        let columns: Vec<usize> = self.columns().collect();
+        let found = tree.relation_factors(values, &columns, self.column);
+        found.ok_or(DeriveError::RankChanged)
     }
 
     /// The columns of its factors, in the order of [`Self::values`].
@@ -96,13 +174,25 @@ impl ColumnRelation {
 /// Relations for every dependent column, in an order in which each needs only earlier columns. The relation to retained
 /// columns comes first. If fewer columns are sufficient, a relation to the last columns before this one follows.
 ///
-/// `order` is the order in which columns are retained.
+/// In a tree, the last columns are those of the nearest links, and their relation also follows if it involves fewer links.
+/// Relations that `transfers` between links give take their place.
+///
+/// `order` is the order in which columns are retained, and `constants` are those at which columns were reduced.
 pub(super) fn find_relations<const P: u64>(
     echelon: &RowEchelonForm<P>,
+    structure: &TreeStructure,
+    constants: &FieldPoint<FieldElement<P>>,
     order: &[usize],
     dependent: &[usize],
 ) -> Vec<ColumnRelation> {
+    let tree = structure.columns.as_ref();
     let mut found = Vec::new();
+    // Columns that are not in the order come last.
+    let n = order.iter().max().map_or(0, |most| most + 1);
+    let mut positions = vec![usize::MAX; n.max(structure.n_columns)];
+    for (at, column) in order.iter().enumerate() {
+        positions[*column] = at;
+    }
     for (at, column) in order.iter().enumerate() {
         if !dependent.contains(column) {
             continue;
@@ -112,22 +202,51 @@ pub(super) fn find_relations<const P: u64>(
             .filter(|p| echelon.entry(*p, *column) != Some(FieldElement::ZERO))
             .collect();
         direct.sort_unstable();
-        let near = needed_columns(echelon, &order[..at], *column);
-        let is_shorter = near.len() < direct.len();
+        let transferred = structure.transfers.as_ref().and_then(|transfers| {
+            let factors = transfers.relation(*column, &positions)?;
+            let relation = ColumnRelation::from_factors(*column, factors, dependent);
+            relation.has_values_of(constants, echelon).then_some(relation)
+        });
+        if let Some(relation) = transferred {
+            if !relation.has_retained_only() {
+                let retained = direct;
+                found.push(ColumnRelation {
+                    column: *column,
+                    retained,
+                    dependent: Vec::new(),
+                    is_in_tree: false,
+                    factors: None,
+                });
+            }
+            found.push(relation);
+            continue;
+        }
+        let nearest: Vec<usize> = match tree {
+            Some(tree) => tree.nearest_first(*column, &order[..at]),
+            None => order[..at].iter().rev().copied().collect(),
+        };
+        let near = needed_columns(echelon, &nearest, *column);
+        let n_links = |columns: &[usize]| tree.and_then(|tree| tree.n_links(columns.iter().copied().chain([*column])));
+        let has_fewer_links = n_links(&near)
+            .zip(n_links(&direct))
+            .is_some_and(|(near, direct)| near < direct);
+        let is_shorter = near.len() < direct.len() || has_fewer_links;
         for columns in [Some(direct), is_shorter.then_some(near)].into_iter().flatten() {
             let (dependent, retained) = columns.into_iter().partition(|k| dependent.contains(k));
             found.push(ColumnRelation {
                 column: *column,
                 retained,
                 dependent,
+                is_in_tree: false,
+                factors: None,
             });
         }
     }
     found
 }
 
-/// The columns among those before `column` that express it if the last ones are preferred.
-fn needed_columns<const P: u64>(echelon: &RowEchelonForm<P>, before: &[usize], column: usize) -> Vec<usize> {
+/// The columns among `candidates` that express `column` if the first ones are preferred.
+fn needed_columns<const P: u64>(echelon: &RowEchelonForm<P>, candidates: &[usize], column: usize) -> Vec<usize> {
     /// A column as a vector over the retained ones, with the combination of columns that it equals.
     struct ColumnCombination<const P: u64> {
         /// Position of its first entry that is not zero, which is 1.
@@ -159,9 +278,9 @@ fn needed_columns<const P: u64>(echelon: &RowEchelonForm<P>, before: &[usize], c
             }
         }
     };
-    // The target is reduced by columns from the last one backwards, until nothing of it remains.
+    // The target is reduced by one column after the other, until nothing of it remains.
     let (mut target, mut made) = (vector_of(column), BTreeMap::new());
-    for &k in before.iter().rev() {
+    for &k in candidates {
         let (mut vector, mut of) = (vector_of(k), BTreeMap::from([(k, FieldElement::ONE)]));
         reduced(&known, &mut vector, &mut of);
         let Some(pivot) = vector.iter().position(|x| *x != FieldElement::ZERO) else {
@@ -186,6 +305,28 @@ fn needed_columns<const P: u64>(echelon: &RowEchelonForm<P>, before: &[usize], c
     }
     made.retain(|_, x| *x != FieldElement::ZERO);
     made.into_keys().collect()
+}
+
+/// What is known about the columns of an open tree from its links.
+pub(super) struct TreeStructure {
+    /// Number of effective columns.
+    n_columns: usize,
+    /// Spaces of the links; `None` unless every link has a coordinate of its own.
+    pub(super) columns: Option<TreeColumns>,
+    /// Inertia that moves between links; `None` with loops.
+    transfers: Option<LinkTransfers>,
+}
+
+impl TreeStructure {
+    /// Prepares the columns in `effective`.
+    pub(super) fn new(graph: &mut Graph, equations: &UnreducedEquations, effective: &[usize]) -> Self {
+        let mut stream = RandomStream::new(SEED);
+        Self {
+            n_columns: effective.len(),
+            columns: TreeColumns::new(graph, equations, effective, &mut stream),
+            transfers: LinkTransfers::new(graph, equations, effective),
+        }
+    }
 }
 
 /// Values of the factors of all relations in order, from columns that were reduced to `echelon`.
@@ -512,12 +653,12 @@ impl MonomialQuotient {
         let mut numerator = TrigonometricPolynomial::new();
         for (a, x) in &self.numerator {
             for (b, y) in &other.numerator {
-                add_term(&mut numerator, product(a, b), &(x * y));
+                add_term(&mut numerator, power_product(a, b), &(x * y));
             }
         }
         Self {
             numerator,
-            denominator: product(&self.denominator, &other.denominator),
+            denominator: power_product(&self.denominator, &other.denominator),
         }
     }
 
@@ -525,15 +666,15 @@ impl MonomialQuotient {
     fn add(&mut self, other: &Self) {
         let common = least_common_multiple(&self.denominator, &other.denominator);
         if common != self.denominator {
-            let missing = quotient(&common, &self.denominator);
+            let missing = power_quotient(&common, &self.denominator);
             let numerator = std::mem::take(&mut self.numerator);
             let terms = numerator.into_iter();
-            self.numerator = terms.map(|(p, k)| (product(&p, &missing), k)).collect();
+            self.numerator = terms.map(|(p, k)| (power_product(&p, &missing), k)).collect();
             self.denominator = common;
         }
-        let missing = quotient(&self.denominator, &other.denominator);
+        let missing = power_quotient(&self.denominator, &other.denominator);
         for (powers, k) in &other.numerator {
-            add_term(&mut self.numerator, product(powers, &missing), k);
+            add_term(&mut self.numerator, power_product(powers, &missing), k);
         }
     }
 
@@ -541,83 +682,5 @@ impl MonomialQuotient {
     fn to_function(&self) -> RationalFunction {
         let denominator = TrigonometricPolynomial::from([(self.denominator.clone(), Rational::ONE)]);
         RationalFunction::new(self.numerator.clone(), denominator)
-    }
-}
-
-/// The product of two products of powers, both sorted.
-fn product(a: &PowerProduct, b: &PowerProduct) -> PowerProduct {
-    merge_powers(a, b, |n, m| n + m)
-}
-
-/// The product with the larger exponent of every variable.
-fn least_common_multiple(a: &PowerProduct, b: &PowerProduct) -> PowerProduct {
-    merge_powers(a, b, u32::max)
-}
-
-/// `a / b`, which must be a product of powers.
-fn quotient(a: &PowerProduct, b: &PowerProduct) -> PowerProduct {
-    merge_powers(a, b, |n, m| n - m)
-}
-
-/// Combines the exponents of two sorted products of powers, variable by variable; zero exponents are dropped.
-fn merge_powers(a: &PowerProduct, b: &PowerProduct, exponent: impl Fn(u32, u32) -> u32) -> PowerProduct {
-    let mut found = PowerProduct::with_capacity(a.len() + b.len());
-    let (mut a, mut b) = (a.iter().peekable(), b.iter().peekable());
-    loop {
-        let next = match (a.peek(), b.peek()) {
-            (None, None) => return found,
-            (Some((v, _)), None) => *v,
-            (None, Some((w, _))) => *w,
-            (Some((v, _)), Some((w, _))) => *v.min(w),
-        };
-        let n = a.next_if(|(v, _)| *v == next).map_or(0, |(_, n)| *n);
-        let m = b.next_if(|(w, _)| *w == next).map_or(0, |(_, m)| *m);
-        let n = exponent(n, m);
-        if n > 0 {
-            found.push((next, n));
-        }
-    }
-}
-
-/// Adds a term, after squares of sines and roots have been replaced: `sin^2 = 1 - cos^2`, and `root^2` is a number.
-fn add_term(to: &mut TrigonometricPolynomial, powers: PowerProduct, k: &Rational) {
-    if k.is_zero() {
-        return;
-    }
-    // The first variable whose square must be replaced.
-    let squared = powers
-        .iter()
-        .position(|(v, n)| *n > 1 && matches!(v, FactorVariable::Sin(_) | FactorVariable::Root(_)));
-    let Some(at) = squared else {
-        let sum = to.entry(powers);
-        match sum {
-            std::collections::btree_map::Entry::Vacant(place) => _ = place.insert(k.clone()),
-            std::collections::btree_map::Entry::Occupied(mut place) => {
-                let total = place.get() + k;
-                if total.is_zero() {
-                    place.remove();
-                } else {
-                    place.insert(total);
-                }
-            }
-        }
-        return;
-    };
-    // One square is taken out; the remaining term is added recursively.
-    let (variable, n) = powers[at];
-    let mut rest = powers;
-    if n == 2 {
-        rest.remove(at);
-    } else {
-        rest[at].1 = n - 2;
-    }
-    match variable {
-        FactorVariable::Root(root) => add_term(to, rest, &(k * &Rational::integer(root))),
-        FactorVariable::Sin(i) => {
-            let with = product(&rest, &vec![(FactorVariable::Cos(i), 2)]);
-            add_term(to, rest, k);
-            add_term(to, with, &-k);
-        }
-        FactorVariable::Constant(_) | FactorVariable::Cos(_) => add_term(to, rest, k),
     }
 }
