@@ -156,7 +156,7 @@ pub(crate) fn figures(before: &ModelVersion, after: Option<&ModelVersion>, varia
         let picture = picture(&maps, &grid, &names, unit);
         let _ = writeln!(
             html,
-            "<figure class=\"still broad\"><figcaption><b>{}: rms error over {} and {}</b></figcaption>\n{picture}</figure>",
+            "<figure class=\"still\"><figcaption><b>{}: rms error over {} and {}</b></figcaption>\n{picture}</figure>",
             escape(drive),
             escape(&variables[i].0),
             escape(&variables[j].0),

@@ -129,7 +129,7 @@ fn summary(findings: &DiagnosisFindings) -> String {
 fn steps_section(findings: &DiagnosisFindings) -> String {
     // The picture shows the steps, the table has the numbers.
     format!(
-        "<figure class=\"still broad\"><figcaption><b>Error relative to the force</b> <span class=\"key c-fit\">fit</span> \
+        "<figure class=\"still\"><figcaption><b>Error relative to the force</b> <span class=\"key c-fit\">fit</span> \
          <span class=\"key c-after\">{}</span></figcaption>\n{}</figure>\n{}\n\
          <p>All errors are nrms: rms of measured minus calculated force, divided by rms of the measured force. Each step was \
          tested {}. <i>t value of the decrease</i>: the mean decrease of the squared error over blocks of time, divided by its \
