@@ -7,8 +7,8 @@ use super::smoothing::{
 };
 use super::trace::ResidualTrace;
 use crate::audit::thresholds::{
-    LEVEL_FEWEST_S, LEVEL_LEAST_FORCE_SHARE, LEVEL_MOST_RATIO, LONG_MEAN_S, SHORT_MEAN_S, SLOW_LEAST_FORCE_SHARE,
-    SLOW_LEAST_FRICTIONS, SLOW_MEAN_S,
+    LEVEL_FEWEST_S, LEVEL_LEAST_FORCE_SHARE, LEVEL_MOST_RATIO, LONG_MEAN_S, SHORT_MEAN_S, SLOW_MEAN_S,
+    STANDING_LEAST_FORCE_SHARE, STANDING_LEAST_FRICTIONS,
 };
 
 /// Fewest samples with which the share of a delay or a compliance is fitted.
@@ -74,8 +74,8 @@ impl SearchedResidual {
     }
 }
 
-/// Shows the samples of slow motion and of reversals whose residual is too large for a switch of friction. `smooth` is the
-/// residual over the short time.
+/// Shows the samples at which a drive stands while others move and its residual is too large for dry friction. `smooth` is
+/// the residual over the short time.
 fn unmask_large_forces(
     trace: &ResidualTrace,
     drive: usize,
@@ -89,10 +89,10 @@ fn unmask_large_forces(
     if regimes.has_dead_band || friction <= 0.0 {
         return;
     }
-    let least = (SLOW_LEAST_FRICTIONS * friction).max(SLOW_LEAST_FORCE_SHARE * force_rms);
+    let least = (STANDING_LEAST_FRICTIONS * friction).max(STANDING_LEAST_FORCE_SHARE * force_rms);
     for (i, masked) in is_masked.iter_mut().enumerate() {
-        // Where all drives stand, brakes may carry the weight.
-        let is_readable = !regimes.is_unreadable[i] && !regimes.all_stand[i];
+        // About a reversal a gear may slip, and where all drives stand, brakes may carry the weight.
+        let is_readable = !regimes.is_unreadable[i] && regimes.is_standing[i] && !regimes.all_stand[i];
         *masked &= !(is_readable && smooth[i].abs() > least);
     }
 }

@@ -75,7 +75,7 @@ pub(super) fn compare_with_similar_states(
 ) -> StateComparison {
     let around = trace.sample_count(AROUND_S, 1);
     let near = segment.start.saturating_sub(around)..segment.end + around;
-    // A force that is shown in slow motion, since it is too large for friction, is compared with that of friction.
+    // A force that is shown at standstill, since it is too large for friction, is compared with that of friction.
     let (slow, unreadable) = (&rest.regimes.is_slow, &rest.regimes.is_unreadable);
     let within_slow: Vec<bool> = (segment.start..segment.end)
         .filter(|i| !rest.is_masked[*i])

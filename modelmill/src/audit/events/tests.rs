@@ -279,12 +279,13 @@ fn faulty_readings_are_no_contacts() {
     }
 }
 
-/// A push of many times the dry friction shows on a drive that is slow meanwhile; one within the friction does not.
+/// A push of many times the dry friction shows on a drive that stands while others move; one within the friction does
+/// not, nor does a force about a reversal, where a gear may slip.
 #[test]
-fn large_pushes_show_in_slow_motion() {
+fn large_pushes_show_on_a_standing_drive() {
     for seed in 0..10 {
         // At the lower rate the drive counts as standing.
-        for (slow, size, is_shown) in [(0.02, 0.6, true), (0.005, 0.6, true), (0.02, 0.08, false)] {
+        for (slow, size, is_shown) in [(0.005, 0.6, true), (0.005, 0.08, false), (0.02, 0.6, false)] {
             let mut trace = calm_trace(600 + seed, false);
             let fastest = trace.motion[1][0].iter().fold(0.0_f64, |most, v| most.max(v.abs()));
             // The drive hardly moves for 2 s, and its friction of 0.02 is known.
