@@ -46,14 +46,6 @@ pub(super) const STANDSTILL_LONGEST_GAP_S: f64 = 0.4;
 /// nor ends an event.
 pub(super) const SLOW_RATE_SHARE: f64 = 0.05;
 
-/// In slow motion and about a reversal the residual shows a contact only if it exceeds this multiple of the dry friction
-/// (1): dry friction jumps by twice its size, and at rest it is up to twice as large. The KUKA KR300 has residuals of 7
-/// about a reversal; pushes of 57 were hidden.
-pub(super) const SLOW_LEAST_FRICTIONS: f64 = 15.0;
-
-/// It also exceeds this share of the rms force of the drive (1): errors of a smoothed start are smaller. By judgement.
-pub(super) const SLOW_LEAST_FORCE_SHARE: f64 = 0.2;
-
 /// Time about a switch of friction in which the residual shows no contact, in units of the smear of the smoothing.
 pub(super) const SWITCH_SMEARS: f64 = 0.5;
 

@@ -1,7 +1,7 @@
 //! Doubts about a segment of one drive: a noise that is large there, a switch of friction at its start or end, and a
 //! force so steep that an error of the time stamps explains it.
 
-use super::levels::{SearchedResidual, dry_friction};
+use super::levels::SearchedResidual;
 use super::segments::DriveSegment;
 use super::smoothing::{range_median, sample_quantile};
 use super::trace::ResidualTrace;
@@ -39,7 +39,7 @@ pub(super) fn may_be_friction(trace: &ResidualTrace, rest: &SearchedResidual, se
     let rate = &trace.motion[1][rest.drive];
     let last = segment.end.min(trace.samples()) - 1;
     let lasted = trace.time[last] - trace.time[segment.start];
-    let friction = dry_friction(trace, rest.drive);
+    let friction = dry_friction(trace, rest);
     let is_about_reversal = rate[segment.start] * rate[last] < 0.0 && lasted < STICK_LONGEST_S;
     if is_about_reversal && segment.force.abs() < STICK_MOST_FRICTIONS * friction {
         return true;
@@ -79,4 +79,13 @@ pub(super) fn edge_contrast(trace: &ResidualTrace, rest: &SearchedResidual, segm
     let last = level(end - inner_rise - inner, end - inner_rise) - level(end + rise, end + rise + window);
     let within = rest.smooth[segment.start..segment.end].iter().map(|x| sign * x);
     first.min(last) / sample_quantile(within.collect(), 0.8).max(segment.force.abs())
+}
+
+/// The dry friction of a drive: half of the median jump of its fitted force where the rate changes its sign between two
+/// samples, N or N m; 0 without reversals.
+fn dry_friction(trace: &ResidualTrace, rest: &SearchedResidual) -> f64 {
+    let (fitted, rate) = (trace.fitted_force(rest.drive), &trace.motion[1][rest.drive]);
+    let reversals = (1..rate.len()).filter(|i| rate[i - 1] * rate[*i] < 0.0);
+    let jumps = reversals.map(|i| 0.5 * (fitted[i] - fitted[i - 1]).abs());
+    sample_quantile(jumps.collect(), 0.5)
 }

@@ -7,8 +7,7 @@ use super::smoothing::{
 };
 use super::trace::ResidualTrace;
 use crate::audit::thresholds::{
-    LEVEL_FEWEST_S, LEVEL_LEAST_FORCE_SHARE, LEVEL_MOST_RATIO, LONG_MEAN_S, SHORT_MEAN_S, SLOW_LEAST_FORCE_SHARE,
-    SLOW_LEAST_FRICTIONS, SLOW_MEAN_S,
+    LEVEL_FEWEST_S, LEVEL_LEAST_FORCE_SHARE, LEVEL_MOST_RATIO, LONG_MEAN_S, SHORT_MEAN_S, SLOW_MEAN_S,
 };
 
 /// Fewest samples with which the share of a delay or a compliance is fitted.
@@ -48,7 +47,7 @@ pub(super) struct SearchedResidual {
 impl SearchedResidual {
     /// The residual of one drive of a trace.
     pub(super) fn new(trace: &ResidualTrace, drive: usize, regimes: DriveRegimes) -> Self {
-        let mut is_masked: Vec<bool> = (regimes.is_unknown.iter().zip(&regimes.is_standing))
+        let is_masked: Vec<bool> = (regimes.is_unknown.iter().zip(&regimes.is_standing))
             .map(|(unknown, stands)| *unknown || *stands || regimes.has_dead_band)
             .collect();
         let force_rms = trace.force_rms(drive);
@@ -57,7 +56,6 @@ impl SearchedResidual {
         let width = |time: f64| trace.sample_count(time, 3) | 1;
         let smooth = running_median(&values, width(SHORT_MEAN_S));
         let long = running_median(&values, width(LONG_MEAN_S));
-        unmask_large_forces(trace, drive, &mut is_masked, &regimes, &smooth, force_rms);
         // Over a long time a switch of friction within it would count as well.
         let slow = shown_median(&values, &is_masked, width(SLOW_MEAN_S));
         let fewest = trace.sample_count(LEVEL_FEWEST_S, FEWEST_FITTED / 2);
@@ -72,38 +70,6 @@ impl SearchedResidual {
             regimes,
         }
     }
-}
-
-/// Shows the samples of slow motion and of reversals whose residual is too large for a switch of friction. `smooth` is the
-/// residual over the short time.
-fn unmask_large_forces(
-    trace: &ResidualTrace,
-    drive: usize,
-    is_masked: &mut [bool],
-    regimes: &DriveRegimes,
-    smooth: &[f64],
-    force_rms: f64,
-) {
-    // Without reversals the dry friction is not known.
-    let friction = dry_friction(trace, drive);
-    if regimes.has_dead_band || friction <= 0.0 {
-        return;
-    }
-    let least = (SLOW_LEAST_FRICTIONS * friction).max(SLOW_LEAST_FORCE_SHARE * force_rms);
-    for (i, masked) in is_masked.iter_mut().enumerate() {
-        // Where all drives stand, brakes may carry the weight.
-        let is_readable = !regimes.is_unreadable[i] && !regimes.all_stand[i];
-        *masked &= !(is_readable && smooth[i].abs() > least);
-    }
-}
-
-/// The dry friction of a drive: half of the median jump of its fitted force where the rate changes its sign between two
-/// samples, N or N m; 0 without reversals.
-pub(super) fn dry_friction(trace: &ResidualTrace, drive: usize) -> f64 {
-    let (fitted, rate) = (trace.fitted_force(drive), &trace.motion[1][drive]);
-    let reversals = (1..rate.len()).filter(|i| rate[i - 1] * rate[*i] < 0.0);
-    let jumps = reversals.map(|i| 0.5 * (fitted[i] - fitted[i - 1]).abs());
-    sample_quantile(jumps.collect(), 0.5)
 }
 
 impl SmoothedResidual {

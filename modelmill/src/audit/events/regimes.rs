@@ -31,8 +31,6 @@ pub(super) struct DriveRegimes {
     pub(super) is_slow: Vec<bool>,
     /// Whether its residual shows no contact: a switch of friction, a reading that does not follow, no reading.
     pub(super) is_unknown: Vec<bool>,
-    /// Whether there is no reading that follows the force, whatever the motion; a part of `is_unknown`.
-    pub(super) is_unreadable: Vec<bool>,
     /// Whether its reading has a dead band, so that no sample shows a contact.
     pub(super) has_dead_band: bool,
 }
@@ -110,18 +108,14 @@ fn regimes_of_one_drive(
     let mut is_unknown = dilate_mask(&switches, reach);
     // Filters have transients at the ends of a run.
     let end = trace.sample_count(RUN_END_SMEARS * trace.smear, 1).min(n);
-    let mut is_unreadable = vec![false; n];
-    is_unreadable[..end].fill(true);
-    is_unreadable[n - end..].fill(true);
+    is_unknown[..end].fill(true);
+    is_unknown[n - end..].fill(true);
     let unmeasured: Vec<bool> = trace.is_measured[drive].iter().map(|is| !is).collect();
     let frozen = frozen_mask(trace, drive, &is_standing);
     for mask in [dilate_mask(&unmeasured, 1), dilate_mask(&frozen, reach)] {
-        for (unreadable, is) in is_unreadable.iter_mut().zip(mask) {
-            *unreadable |= is;
+        for (unknown, is) in is_unknown.iter_mut().zip(mask) {
+            *unknown |= is;
         }
-    }
-    for (unknown, unreadable) in is_unknown.iter_mut().zip(&is_unreadable) {
-        *unknown |= unreadable;
     }
     DriveRegimes {
         has_dead_band: has_dead_band(trace, drive, &is_standing),
@@ -129,7 +123,6 @@ fn regimes_of_one_drive(
         all_stand,
         is_slow,
         is_unknown,
-        is_unreadable,
     }
 }
 

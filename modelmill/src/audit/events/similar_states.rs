@@ -4,7 +4,7 @@
 use super::doubts::{EDGE_LEVEL_S, EDGE_RISE_S};
 use super::levels::SearchedResidual;
 use super::segments::DriveSegment;
-use super::smoothing::{differences_per_sample, range_median, running_mean, sample_quantile, true_share};
+use super::smoothing::{differences_per_sample, range_median, running_mean, sample_quantile};
 use super::trace::ResidualTrace;
 use crate::audit::thresholds::{
     ALONE_LEAST_SHARE, EDGE_LEAST_SHARE, EDGE_MOST_DISTANCE_SIGMAS, JERK_WEIGHT, NEIGHBOUR_MOST_DISTANCE_SIGMAS,
@@ -75,16 +75,8 @@ pub(super) fn compare_with_similar_states(
 ) -> StateComparison {
     let around = trace.sample_count(AROUND_S, 1);
     let near = segment.start.saturating_sub(around)..segment.end + around;
-    // A force that is shown in slow motion, since it is too large for friction, is compared with that of friction.
-    let (slow, unreadable) = (&rest.regimes.is_slow, &rest.regimes.is_unreadable);
-    let within_slow: Vec<bool> = (segment.start..segment.end)
-        .filter(|i| !rest.is_masked[*i])
-        .map(|i| slow[i])
-        .collect();
-    let is_slow = true_share(&within_slow) > 0.5;
-    let is_shown = |i: &usize| !rest.is_masked[*i] || is_slow && slow[*i] && !unreadable[*i];
     let others: Vec<usize> = (0..trace.samples())
-        .filter(|i| !near.contains(i) && is_shown(i))
+        .filter(|i| !near.contains(i) && !rest.is_masked[*i])
         .collect();
     let within: Vec<usize> = (segment.start..segment.end).filter(|i| !rest.is_masked[*i]).collect();
     let (mut known, mut alone) = (0_usize, 0_usize);

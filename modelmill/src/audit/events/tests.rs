@@ -278,30 +278,3 @@ fn faulty_readings_are_no_contacts() {
         }
     }
 }
-
-/// A push of many times the dry friction shows on a drive that is slow meanwhile; one within the friction does not.
-#[test]
-fn large_pushes_show_in_slow_motion() {
-    for seed in 0..10 {
-        // At the lower rate the drive counts as standing.
-        for (slow, size, is_shown) in [(0.02, 0.6, true), (0.005, 0.6, true), (0.02, 0.08, false)] {
-            let mut trace = calm_trace(600 + seed, false);
-            let fastest = trace.motion[1][0].iter().fold(0.0_f64, |most, v| most.max(v.abs()));
-            // The drive hardly moves for 2 s, and its friction of 0.02 is known.
-            for i in 1000..1250 {
-                trace.motion[1][0][i] = slow * fastest;
-            }
-            for i in 0..SAMPLES {
-                trace.measured[0][i] += 0.02 * trace.motion[1][0][i].signum();
-            }
-            add_force(&mut trace, 0, |i| {
-                let part = ((i as f64 / RATE - 8.5) / 0.8).clamp(0.0, 1.0);
-                size * (0.5 * TAU * part).sin().powi(2)
-            });
-            let events = find_events(&trace);
-            let is_it = |event: &ContactEvent| event.from > 8.4 && event.to < 9.4;
-            assert!(events.iter().all(is_it), "{seed} {slow} {size}: {events:?}");
-            assert_eq!(events.len(), usize::from(is_shown), "{seed} {slow} {size}: {events:?}");
-        }
-    }
-}
