@@ -17,6 +17,10 @@ use crate::expr::{FieldPoint, Rational};
 /// Largest number of coefficients of one linear system.
 const MOST_UNKNOWNS: usize = 400;
 
+/// Largest number of monomials that are listed for a numerator or denominator, most of which have coefficient zero. Lists
+/// are given up above it, because memory would go to gigabytes: a monomial takes some 100 bytes. By judgement.
+const MOST_MONOMIALS: usize = 300_000;
+
 /// What is known about a function before its coefficients are computed.
 #[derive(Clone, Debug, Default)]
 pub(super) struct FunctionShape {
@@ -211,8 +215,13 @@ impl FunctionShape {
             attempts.extend((0..=angle_degree).map(|d| (d, true)));
         }
         for (angle_in_denominator, roots_in_denominator) in attempts {
-            let mut numerator = with_roots(self.monomials(true, angle_degree));
-            let mut denominator = self.monomials(false, angle_in_denominator);
+            let listed = self.monomials(true, angle_degree, MOST_MONOMIALS);
+            let Some((numerator, denominator)) =
+                listed.zip(self.monomials(false, angle_in_denominator, MOST_MONOMIALS))
+            else {
+                continue;
+            };
+            let (mut numerator, mut denominator) = (with_roots(numerator), denominator);
             if roots_in_denominator {
                 denominator = with_roots(denominator);
             }
@@ -267,8 +276,10 @@ impl FunctionShape {
 
     /// Whether one linear system has all monomials that the degrees allow, in the first form that is tried.
     pub(super) fn is_short(&self) -> bool {
-        let monomials = [self.monomials(true, self.angle_degree()), self.monomials(false, 0)];
-        monomials.iter().map(Vec::len).sum::<usize>() <= MOST_UNKNOWNS
+        let numerator = self.monomials(true, self.angle_degree(), MOST_UNKNOWNS);
+        let denominator = self.monomials(false, 0, MOST_UNKNOWNS);
+        let both = numerator.zip(denominator);
+        both.is_some_and(|(above, below)| above.len() + below.len() <= MOST_UNKNOWNS)
     }
 
     /// The degree in cosines and sines together. A quotient of degree 2k in the tangent of half an angle is a quotient
@@ -279,9 +290,9 @@ impl FunctionShape {
         degrees.max().unwrap_or(0)
     }
 
-    /// All monomials that the degrees allow in the numerator or denominator. `angle_bound` limits the degree in cosine
-    /// and sine.
-    fn monomials(&self, numerator: bool, angle_bound: usize) -> Vec<PowerProduct> {
+    /// All monomials that the degrees allow in the numerator or denominator; `None` if there are more than `most`.
+    /// `angle_bound` limits the degree in cosine and sine.
+    fn monomials(&self, numerator: bool, angle_bound: usize, most: usize) -> Option<Vec<PowerProduct>> {
         let pick = |(n, d): (usize, usize)| if numerator { n } else { d };
         let mut monomials: Vec<(PowerProduct, usize)> = vec![(PowerProduct::new(), 0)];
         // The list is extended by one constant at a time.
@@ -314,12 +325,16 @@ impl FunctionShape {
                 }
             }
             monomials = extended;
+            // Each further constant adds monomials and removes none.
+            if monomials.len() > most {
+                return None;
+            }
         }
         let mut powers: Vec<PowerProduct> = monomials.into_iter().map(|(p, _)| p).collect();
         for p in &mut powers {
             p.sort_unstable();
         }
-        powers
+        Some(powers)
     }
 }
 
