@@ -298,7 +298,7 @@ pub(crate) fn verdict_text(run: &RunReport) -> Message {
             format!("No {other}change found that is larger than noise and model error.").into()
         }
         RunVerdict::Unchanged => message!(
-            "{} On the other drives, no {other}change is larger than noise and model error.",
+            "{} No {other}change found on the other drives that is larger than noise and model error.",
             unknown
         ),
     }
