@@ -23,18 +23,12 @@ const FEW: usize = 12;
 /// A parameter of so many terms takes some 2000 characters, more than a reader can check. By judgement.
 const MOST_TERMS: usize = 150;
 
-/// The dependent columns as combinations of others. Factors that cannot be reconstructed are `None`. `values` are those
-/// of the constants in the file, at which factors should be finite.
+/// The dependent columns as combinations of others. Factors that cannot be reconstructed are `None`.
 pub(super) fn find_factors(
-    dependences: &DependenceStructure,
-    regressor: &SampledRegressor,
-    tree: &TreeStructure,
-    variables: &[ConstantOccurrence],
-    roots: &[i64],
-    values: &[f64],
-    operations: u64,
+    mut search: FactorSearch<'_>,
     stream: &mut RandomStream,
 ) -> Result<Vec<DependentColumn>, DeriveError> {
+    let dependences = search.dependences;
     if dependences.wanted.is_empty() {
         return Ok(Vec::new());
     }
@@ -43,15 +37,6 @@ pub(super) fn find_factors(
         .filter(|relation| relation.has_retained_only())
         .cloned()
         .collect();
-    let mut search = FactorSearch {
-        dependences,
-        regressor,
-        tree,
-        variables,
-        roots,
-        values,
-        budget: OperationBudget::new(operations),
-    };
     let mut by = |relations: &[ColumnRelation]| factors_by_relations(relations, &mut search, stream);
     match by(&dependences.relations) {
         // Which columns are near may depend on the constants, for example with roots of either sign.
@@ -174,21 +159,21 @@ fn nearest_relations(
 }
 
 /// What all reconstructions of the factors of relations share.
-struct FactorSearch<'a> {
+pub(super) struct FactorSearch<'a> {
     /// The dependences between columns.
-    dependences: &'a DependenceStructure,
+    pub(super) dependences: &'a DependenceStructure,
     /// The regressor's columns at random points.
-    regressor: &'a SampledRegressor,
+    pub(super) regressor: &'a SampledRegressor,
     /// What the links of a tree tell about their columns.
-    tree: &'a TreeStructure,
+    pub(super) tree: &'a TreeStructure,
     /// Constants on which factors may depend.
-    variables: &'a [ConstantOccurrence],
+    pub(super) variables: &'a [ConstantOccurrence],
     /// Integers whose square roots factors may contain.
-    roots: &'a [i64],
-    /// Values of all constants in the file.
-    values: &'a [f64],
+    pub(super) roots: &'a [i64],
+    /// Values of all constants in the file, at which factors should be finite.
+    pub(super) values: &'a [f64],
     /// Remaining field operations.
-    budget: OperationBudget,
+    pub(super) budget: OperationBudget,
 }
 
 impl FactorSearch<'_> {
@@ -466,16 +451,16 @@ mod tests {
         let roots = root_radicands(&graph, &outputs, &projection.loops.residual);
         let mut factors = |dependences: &DependenceStructure| {
             let values: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
-            find_factors(
+            let search = FactorSearch {
                 dependences,
-                &regressor,
-                &tree,
-                &variables,
-                &roots,
-                &values,
-                operations,
-                &mut stream,
-            )
+                regressor: &regressor,
+                tree: &tree,
+                variables: &variables,
+                roots: &roots,
+                values: &values,
+                budget: OperationBudget::new(operations),
+            };
+            find_factors(search, &mut stream)
         };
         let near = factors(&dependences)?;
         assert!(

@@ -52,6 +52,8 @@ use crate::regressor::UnreducedEquations;
 use crate::tree::expressions::ParameterMonomial;
 use constants::{constant_occurrences, root_radicands};
 use dependences::DependenceStructure;
+use factors::FactorSearch;
+use oracle::OperationBudget;
 use preference::{RetentionPreference, retention_preference};
 use relations::TreeStructure;
 use sample::sample_regressor;
@@ -155,16 +157,16 @@ fn reduce_exactly(
     let values: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
     // Factors of a set of dependences, confirmed with fresh constants.
     let reduced = |dependences: &DependenceStructure, stream: &mut RandomStream| {
-        let factors = factors::find_factors(
+        let search = FactorSearch {
             dependences,
-            &regressor,
-            &tree,
-            &variables,
-            &roots,
-            &values,
-            factors::MOST_OPERATIONS,
-            stream,
-        )?;
+            regressor: &regressor,
+            tree: &tree,
+            variables: &variables,
+            roots: &roots,
+            values: &values,
+            budget: OperationBudget::new(factors::MOST_OPERATIONS),
+        };
+        let factors = factors::find_factors(search, stream)?;
         let reduction = dependences.reduction(mechanism, candidates, &names, factors)?;
         reduction.confirm_reduction(&regressor, &dependences.shown, stream)?;
         Ok(reduction)

@@ -17,6 +17,10 @@ fn below(stream: &mut RandomStream, n: usize) -> usize {
 }
 
 /// What a random tree consists of.
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "four properties that are drawn independently"
+)]
 struct RandomTree {
     n: usize,
     floating: bool,
@@ -43,7 +47,7 @@ impl RandomTree {
         let free = ["fx", "fy", "fz", "fw", "fa", "fb", "fc"];
         if self.floating {
             for name in free {
-                writeln!(text, "{name} = {{ nominal = {} }}", if name == "fw" { 1 } else { 0 }).unwrap();
+                writeln!(text, "{name} = {{ nominal = {} }}", i32::from(name == "fw")).unwrap();
             }
         }
         for i in 0..self.n {

@@ -4,7 +4,7 @@
 use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
     CandidateEffect, CandidateOutcome, ColumnChoice, ColumnProvider, ColumnSource, DiagnosisProblem, Disturbance,
-    FORCE_ROUNDING, ForceColumn, LawSite, LoadDependentQuery, ModelDiagnosis, RejectionReason, diagnose,
+    FORCE_ROUNDING, ForceColumn, LawSite, LoadDependentQuery, LocatedEffect, ModelDiagnosis, RejectionReason, diagnose,
     drift_candidates, reading_fault_candidates, signal_changes, white_noise,
 };
 
@@ -214,6 +214,18 @@ pub(crate) fn find_missing_effects(
     }
     measured_play::report_as_effects(model, &problem.candidates, &mut diagnosis);
     // Stage 5: texts, values that the model shares, and candidates that could not be evaluated.
+    describe_findings(&mut diagnosis, model, made.undefined);
+    Ok(DiagnosisSolution {
+        problem: problem.without_columns(),
+        are_changes_searched,
+        computed_forces_note: delays.note(model),
+        diagnosis,
+        candidates,
+    })
+}
+
+/// Adds texts, places that share a value, and the candidates that could not be evaluated.
+fn describe_findings(diagnosis: &mut ModelDiagnosis, model: &Model, undefined: Vec<LocatedEffect>) {
     let mechanism = &model.derivation.mechanism;
     let found = diagnosis.effects.iter_mut().chain(&mut diagnosis.possible_effects);
     for one in found {
@@ -224,19 +236,12 @@ pub(crate) fn find_missing_effects(
     }
     diagnosis
         .candidates
-        .extend(made.undefined.into_iter().map(|effect| CandidateOutcome {
+        .extend(undefined.into_iter().map(|effect| CandidateOutcome {
             effect,
             explained: 0.0,
             gain: 0.0,
             rejection_reason: Some(RejectionReason::NotFinite),
         }));
-    Ok(DiagnosisSolution {
-        problem: problem.without_columns(),
-        are_changes_searched,
-        computed_forces_note: delays.note(model),
-        diagnosis,
-        candidates,
-    })
 }
 
 /// Candidates that a model file cannot contain: faults of signals and drifts, Dahl friction, then those that need the
