@@ -85,6 +85,13 @@ fn compare(is_written: bool) -> Result<bool, String> {
     let compiler = compiler();
     let key = |model: &str, figure: &str| (model.to_owned(), figure.to_owned());
     let known = recorded.get(profile()).cloned().unwrap_or_default();
+    if known.is_empty() && !is_written {
+        println!(
+            "no figures of the profile `{}` are recorded; `-- --write` records them",
+            profile()
+        );
+        return Ok(true);
+    }
     let same_compiler = known.get(&key("", COMPILER)).is_some_and(|known| *known == compiler);
     let counts_instructions = callgrind::is_available() && (is_written || same_compiler);
 
