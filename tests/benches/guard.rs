@@ -15,9 +15,8 @@ use std::process::{Command, ExitCode};
 use modelmill_codegen::{ProgramStage, StraightLineProgram};
 use modelmill_emit::{EmissionRequest, LANGUAGES};
 use modelmill_tests::callgrind;
-use modelmill_tests::fixtures::{derive, derived, model};
-use modelmill_tests::sample::Sample;
-use modelmill_tests::stream::Stream;
+use modelmill_tests::drawn_states;
+use modelmill_tests::fixtures::{derive, model};
 use peak_alloc::PeakAlloc;
 
 #[global_allocator]
@@ -43,6 +42,9 @@ const GENERATED: [&str; 3] = ["two_link", "spidermill", "puma560"];
 /// Relative rise that is reported. Counts of one build repeat to the last digit, but for peak memory; this leaves room
 /// for that and for changes that move work without adding any.
 const TOLERANCE: f64 = 0.03;
+
+/// States that calls go through in turn.
+const STATES: usize = 128;
 
 /// Calls of an emitted function, and what one run more takes: the difference leaves out what a run costs.
 const CALLS: [usize; 2] = [128, 640];
@@ -228,17 +230,9 @@ macro_rules! emitted {
                     let model = module::Model::new(&geometry);
                     let base = module::base_parameters(&geometry, &module::Parameters::default()).expect("parameters");
                     let dynamics = module::InverseDynamics::new(&geometry, &base);
-                    let drawn = Sample::random(&derived($name).mechanism, 64, 0.1, &mut Stream::new(5));
-                    let states: Vec<module::State<f64>> = (0..drawn.len())
-                        .map(|i| module::State {
-                            q: std::array::from_fn(|k| drawn.q[k][i]),
-                            qd: std::array::from_fn(|k| drawn.qd[k][i]),
-                            qdd: std::array::from_fn(|k| drawn.qdd[k][i]),
-                        })
-                        .filter(|state| dynamics.forces(state).is_ok())
-                        .collect();
+                    let states = drawn_states!(module, dynamics, &modelmill_tests::fixtures::model($name), STATES);
                     callgrind::repeat_calls(calls, &mut |k| {
-                        let state = black_box(&states[k % states.len()]);
+                        let state = black_box(&states[k % STATES]);
                         if function == "H_min" {
                             _ = black_box(model.regressor(state));
                         } else {

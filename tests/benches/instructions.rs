@@ -12,7 +12,7 @@ use modelmill_codegen::{ModelEvaluator, ProgramStage, StraightLineProgram};
 use modelmill_tests::fixtures::{derive, derived, model};
 use modelmill_tests::sample::Sample;
 use modelmill_tests::stream::Stream;
-use modelmill_tests::{base_parameters, callgrind};
+use modelmill_tests::{base_parameters, callgrind, drawn_states};
 
 /// States that calls go through in turn; a block evaluation takes all of them.
 const STATES: usize = 128;
@@ -141,18 +141,7 @@ macro_rules! models {
                     let model = module::Model::new(&geometry);
                     let base = module::base_parameters(&geometry, &module::Parameters::default()).unwrap();
                     let dynamics = module::InverseDynamics::new(&geometry, &base);
-                    let mechanism = model_of($name);
-                    let drawn = Sample::random(&mechanism, 4 * STATES, 0.2, &mut Stream::new(5));
-                    let states: Vec<module::State<f64>> = (0..drawn.len())
-                        .map(|i| module::State {
-                            q: std::array::from_fn(|k| drawn.q[k][i]),
-                            qd: std::array::from_fn(|k| drawn.qd[k][i]),
-                            qdd: std::array::from_fn(|k| drawn.qdd[k][i]),
-                        })
-                        .filter(|state| dynamics.forces(state).is_ok())
-                        .take(STATES)
-                        .collect();
-                    assert_eq!(states.len(), STATES);
+                    let states = drawn_states!(module, dynamics, &modelmill_tests::fixtures::model($name), STATES);
                     match function {
                         "nothing" => repeat_states(calls, &mut |k| _ = black_box(black_box(&states[k]))),
                         "H_min" => repeat_states(calls, &mut |k| {
@@ -180,10 +169,6 @@ macro_rules! models {
             }
         }
     };
-}
-
-fn model_of(name: &str) -> modelmill_spec::Mechanism {
-    model(name)
 }
 
 models! {

@@ -8,6 +8,7 @@ pub mod balances;
 pub mod base_parameters;
 pub mod callgrind;
 pub mod counts;
+pub mod drawn_states;
 pub mod equation_of_motion;
 pub mod fixtures;
 pub mod free_bodies;

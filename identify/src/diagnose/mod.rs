@@ -11,8 +11,8 @@
 //! 3. `search` - forward search over sets, with exchanges; `combinations` tries pairs and the same kinds at all drives;
 //!    `evidence` decides on time that was not fitted; `simplification`
 //!    makes the last set as small and simple as possible.
-//! 4. `aliases` - effects that this recording cannot distinguish; `reproducible` - the repeatable residual that no
-//!    candidate explains.
+//! 4. `residuals` - what a set leaves; `aliases` - effects that this recording cannot distinguish; `reproducible` - the
+//!    repeatable residual that no candidate explains.
 //! 5. [`ModelDiagnosis`] - the answer.
 //!
 //! Disturbances of the recordings are reported by name too: `cleaning` removes outliers and `hum` beforehand, `drifts`
@@ -55,6 +55,7 @@ mod possible;
 mod problem;
 mod rejection;
 mod reproducible;
+mod residuals;
 mod search;
 mod simplification;
 mod support;
@@ -599,52 +600,6 @@ impl EffectSelector<'_> {
         let pairs = errors.iter().zip(&forces);
         let by_channel = pairs.map(|(error, force)| relative(*error, *force));
         (fit, whole(&errors, &forces), by_channel.collect())
-    }
-
-    /// Residual of a set that is fitted to all samples but those left out, `[channel][sample]`, at all samples.
-    fn complete_residual(&self, picks: &[SelectedEffect]) -> Vec<Vec<f64>> {
-        let (factors, _) = self.fit(picks, FitScope::All);
-        (self.pool).full_residual(self.measured, &self.columns(picks), factors.as_slice())
-    }
-
-    /// Residual of a set that is fitted to the recordings of the fit, `[channel][sample]`. Samples at reversals count
-    /// here; samples that are left out of the diagnosis are zero.
-    fn full_residual(&self, picks: &[SelectedEffect]) -> Vec<Vec<f64>> {
-        let (factors, _) = self.fit(picks, FitScope::Fit);
-        let columns = self.columns(picks);
-        let mut rest = (self.pool).full_residual(self.measured, &columns, factors.as_slice());
-        self.zero_left_out(&mut rest);
-        rest
-    }
-
-    /// Sets the samples that are left out of the diagnosis to zero, `[channel][sample]`.
-    fn zero_left_out(&self, values: &mut [Vec<f64>]) {
-        for (values, out) in values.iter_mut().zip(&self.problem.left_out) {
-            for (value, _) in values.iter_mut().zip(out).filter(|(_, out)| **out) {
-                *value = 0.0;
-            }
-        }
-    }
-
-    /// Whether a change raises the squared residual over all samples, reversals included, in the fit and in the
-    /// validation runs. Then it explains the samples that decide at the cost of those next to reversals, where an
-    /// effect would act too.
-    fn is_worse_overall(&self, before: &[SelectedEffect], after: &[SelectedEffect], channels: &[usize]) -> bool {
-        if self.problem.jumps.is_empty() {
-            return false;
-        }
-        let layout = &self.problem.layout;
-        let split = layout.fit_samples();
-        let [old, new] = [before, after].map(|picks| self.full_residual(picks));
-        let rises = |range: std::ops::Range<usize>| {
-            let of = |rest: &[Vec<f64>], d: usize| {
-                let part = &rest[d][range.clone()];
-                self.weights[d] * dot(part, part)
-            };
-            let more = channels.iter().map(|d| of(&new, *d) - of(&old, *d));
-            more.sum::<f64>() > 0.0
-        };
-        rises(0..split) && (!layout.has_check() || rises(split..layout.samples()))
     }
 
     /// Result for every candidate: found, or rejected with the reason.

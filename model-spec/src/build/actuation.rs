@@ -48,13 +48,13 @@ pub(super) fn loops(
     // Loops beyond the limit are not looked at.
     let mut loops: Vec<KinematicLoop> = Vec::new();
     // The place of each loop's name.
-    let mut named: Vec<SourceSpan> = Vec::new();
+    let mut name_spans: Vec<SourceSpan> = Vec::new();
     for entry in entries.iter().take(MOST_LOOPS) {
         let joins = match (&entry.joins, &entry.welds) {
             (Some(joins), None) => joins,
             (None, Some(welds)) => {
                 loops.extend(weld_loops(entry.name.as_ref(), welds, tree, points, places, log));
-                named.resize(loops.len(), entry.name.as_ref().map_or(welds.span, |name| name.span));
+                name_spans.resize(loops.len(), entry.name.as_ref().map_or(welds.span, |name| name.span));
                 continue;
             }
             _ if log.syntax_broken || entry.faulty => continue,
@@ -99,10 +99,10 @@ pub(super) fn loops(
                 .map_or_else(|| format!("{}_{}", first.text, second.text), |name| name.text.clone()),
             joins: [one, other],
         });
-        named.push(entry.name.as_ref().map_or(joins.span, |name| name.span));
+        name_spans.push(entry.name.as_ref().map_or(joins.span, |name| name.span));
     }
     // Names must be unique, given or not; a weld has three loops.
-    let names = loops.iter().zip(named).map(|(closure, span)| SpannedName {
+    let names = loops.iter().zip(name_spans).map(|(closure, span)| SpannedName {
         text: closure.name.clone(),
         span,
     });

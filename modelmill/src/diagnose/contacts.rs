@@ -441,6 +441,7 @@ mod tests {
         drop_doubtful_contacts(&mut kept, &[ringing], &channels);
         assert_eq!(kept, all[2..]);
     }
+
     /// A residual has a contact that is in it, but not single wrong samples or noise; where the drive stands for the most
     /// part, nothing is known.
     #[test]
@@ -456,6 +457,7 @@ mod tests {
         let standing: Vec<Option<f64>> = push(1.9).enumerate().map(|(k, x)| (k > 12).then_some(x)).collect();
         assert_eq!(share_in_residual(2.0, &standing), None);
     }
+
     /// A contact beside a change of the same recording is doubtful; one of another recording is not.
     #[test]
     fn contacts_of_changed_recordings_are_doubtful() {

@@ -94,16 +94,18 @@ pub(super) fn add_zeros_as_alternatives(effects: &mut [IdentifiedEffect], tilt: 
     }
 }
 
-/// Whether a tilt is about an axis within its uncertainty.
+/// Whether a tilt is about an axis within its uncertainty. A component without a standard deviation is not known.
 fn is_about_axis(found: &IdentifiedEffect, axis: &[f64]) -> bool {
     let along: f64 = found.estimates.iter().zip(axis).map(|(angle, part)| angle * part).sum();
     let parts = found.estimates.iter().zip(axis).zip(&found.standard_deviations);
-    let mut parts = parts.map(|((angle, part), deviation)| (angle - along * part, deviation.unwrap_or(0.0)));
+    let mut parts = parts.map(|((angle, part), deviation)| (angle - along * part, deviation.unwrap_or(f64::INFINITY)));
     parts.all(|(apart, deviation)| apart.abs() <= TILT_AXIS_MOST_DEVIATIONS * deviation)
 }
 
 #[cfg(test)]
 mod tests {
+    use modelmill_identify::diagnose::EffectSupport;
+
     use super::*;
 
     /// The forces of a wrong zero are those of a tilt about the axis of its joint, whatever its direction; other forces are
@@ -126,5 +128,55 @@ mod tests {
         let mut other = zero.clone();
         other.0[2] = None;
         assert_eq!(tilt_axis(&tilts, &other), None);
+    }
+
+    /// A tilt of some degrees with its standard deviations.
+    fn found_tilt(estimates: [f64; 2], deviations: [Option<f64>; 2]) -> IdentifiedEffect {
+        IdentifiedEffect {
+            effect: LocatedEffect {
+                kind: "gravity_tilt".to_owned(),
+                at: vec!["base".to_owned()],
+            },
+            candidate: 3,
+            constants: Vec::new(),
+            estimates: estimates.to_vec(),
+            standard_deviations: deviations.to_vec(),
+            probability: 0.9,
+            support: EffectSupport {
+                gain: 0.9,
+                t: 10.0,
+                unexplained: 0.0,
+                white_residual: true,
+                share: 1.0,
+            },
+            indistinguishable_from: Vec::new(),
+            shared_with: Vec::new(),
+            is_measured: false,
+        }
+    }
+
+    /// Only a tilt that may be about the axis of the joint has the zero as its alternative, and shares its probability.
+    #[test]
+    fn zeros_are_alternatives_of_tilts_about_their_axes() {
+        let zero = LocatedEffect {
+            kind: ENCODER_ZERO.to_owned(),
+            at: vec!["q1".to_owned()],
+        };
+        let joint = BaseJoint {
+            zero: zero.clone(),
+            axis: vec![1.0, 0.0],
+        };
+        let about = [
+            found_tilt([0.06, 0.001], [Some(0.001), Some(0.001)]),
+            found_tilt([0.06, 0.02], [Some(0.001), None]),
+        ];
+        for mut found in about {
+            add_zeros_as_alternatives(std::slice::from_mut(&mut found), 3, &[joint.clone(), joint.clone()]);
+            assert_eq!(found.indistinguishable_from, [zero.clone()]);
+            assert!(found.probability < 0.5, "{}", found.probability);
+        }
+        let mut across = found_tilt([0.06, 0.02], [Some(0.001), Some(0.001)]);
+        add_zeros_as_alternatives(std::slice::from_mut(&mut across), 3, &[joint]);
+        assert_eq!((across.indistinguishable_from.len(), across.probability), (0, 0.9));
     }
 }
