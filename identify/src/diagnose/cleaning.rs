@@ -9,9 +9,10 @@ use super::hum::{self, SlowSpectralLine};
 use super::pool::{ColumnPool, FitScope, solve_gram};
 use super::problem::DiagnosisProblem;
 use super::thresholds::{
-    FORCE_OUTLIER_DEVIATIONS, OUTLIER_LEAST_FORCE_SHARE, OUTLIERS_MOST_SHARE, QUANTISED_FEWEST_REPEATS,
-    QUANTISED_FEWEST_VALUES, QUANTISED_LEAST_NOISE_PART, QUANTISED_MOST_OFF_STEP, REVERSAL_OUTLIER_SAMPLES,
-    REVERSAL_UNDECIDED_SAMPLES, REVERSALS_MOST_SHARE, STANDSTILL_MOST_SHARE, STANDSTILL_SHORTEST_S,
+    FORCE_OUTLIER_DEVIATIONS, OUTLIER_LEAST_FORCE_SHARE, OUTLIER_LEAST_STEP, OUTLIERS_MOST_SHARE,
+    QUANTISED_FEWEST_REPEATS, QUANTISED_FEWEST_VALUES, QUANTISED_LEAST_NOISE_PART, QUANTISED_MOST_OFF_STEP,
+    REVERSAL_OUTLIER_SAMPLES, REVERSAL_UNDECIDED_SAMPLES, REVERSALS_MOST_SHARE, STANDSTILL_MOST_SHARE,
+    STANDSTILL_SHORTEST_S,
 };
 use crate::signal::dot;
 use crate::signal::median;
@@ -104,9 +105,11 @@ fn remove_outliers(problem: &mut DiagnosisProblem) -> Vec<Disturbance> {
             let force = problem.measured_force(d);
             let size = (dot(&force, &force) / force.len().max(1) as f64).sqrt();
             let bound = (FORCE_OUTLIER_DEVIATIONS * spread.max(problem.noise[d])).max(OUTLIER_LEAST_FORCE_SHARE * size);
-            let new: Vec<usize> = (0..rest.len())
-                .filter(|i| apart[*i].abs() > bound && !reverses[*i])
+            let mut candidates: Vec<bool> = (0..rest.len())
+                .map(|i| apart[i].abs() > bound && !reverses[i])
                 .collect();
+            leave_out_smooth_peaks(problem, rest, &apart, &mut candidates);
+            let new: Vec<usize> = (0..rest.len()).filter(|i| candidates[*i]).collect();
             // Frequent large distances belong to the force, for example stick-slip.
             let is_rare = (new.len() as f64) < OUTLIERS_MOST_SHARE * rest.len() as f64;
             let Some(values) = problem.measured.0[d].as_mut().filter(|_| is_rare) else {
@@ -175,6 +178,47 @@ fn deviation_from_neighbours(problem: &DiagnosisProblem, rest: &[f64]) -> Vec<f6
         start += segment.samples;
     }
     apart
+}
+
+/// Leaves out candidates for outliers that are peaks of a smooth residual: where there is no noise, these are far from
+/// the median of their neighbours, but close to the cubic polynomial through two samples before and two after them.
+///
+/// `apart` holds the distances from the median. Candidates without such samples stay.
+fn leave_out_smooth_peaks(problem: &DiagnosisProblem, rest: &[f64], apart: &[f64], candidates: &mut [bool]) {
+    let mut start = 0;
+    for segment in &problem.layout.segments {
+        let end = start + segment.samples;
+        let mut first = start;
+        while first < end {
+            // The samples from `first` up to `last` are candidates; `last` is none.
+            let last = (first..end).find(|i| !candidates[*i]).unwrap_or(end);
+            let peak = first..last;
+            let is_inside = first >= start + 2 && last + 1 < end && !candidates[last + 1];
+            if !peak.is_empty() && is_inside {
+                let support = [first - 2, first - 1, last, last + 1];
+                let largest =
+                    |distance: &dyn Fn(usize) -> f64| peak.clone().map(|i| distance(i).abs()).fold(0.0, f64::max);
+                let from_median = largest(&|i| apart[i]);
+                let from_polynomial = largest(&|i| rest[i] - interpolate(&support, rest, i));
+                if from_polynomial < OUTLIER_LEAST_STEP * from_median {
+                    candidates[peak].fill(false);
+                }
+            }
+            first = last + 1;
+        }
+        start = end;
+    }
+}
+
+/// Value at sample `i` of the polynomial through the samples `support` of `values`, by Lagrange's formula.
+fn interpolate(support: &[usize], values: &[f64], i: usize) -> f64 {
+    let weight = |j: usize| {
+        let others = support.iter().filter(|k| **k != j);
+        others
+            .map(|k| (i as f64 - *k as f64) / (j as f64 - *k as f64))
+            .product::<f64>()
+    };
+    support.iter().map(|j| values[*j] * weight(*j)).sum()
 }
 
 /// Distance of a sample from the median of its neighbours.
@@ -355,6 +399,37 @@ mod tests {
                     let count = found.estimates[0].value * n as f64;
                     // Neighbours of a peak may count, since there is no noise to compare them with.
                     assert!((0.5..3.5).contains(&count), "phase {phase}: {count}");
+                }
+            }
+        }
+    }
+
+    /// A model error without noise has sharp peaks, which are no outliers; one to three samples beside it are.
+    #[test]
+    fn smooth_peaks_are_no_outliers() {
+        for width in [10.0, 15.0, 30.0] {
+            for wild in 0..4 {
+                let mut problem = problem(1, |_, _| 0.0);
+                let smooth = |i: usize| {
+                    let from_peak = (i % 160) as f64 - 80.0;
+                    40.0 * (-(from_peak / width).powi(2)).exp() + 4.0 * (0.004 * i as f64).sin()
+                };
+                let n = problem.layout.samples();
+                let measured = |i: usize| smooth(i) + if (n / 2..n / 2 + wild).contains(&i) { 30.0 } else { 0.0 };
+                problem.measured = ForceColumn(vec![Some((0..n).map(measured).collect())]);
+                problem.noise = vec![0.0];
+                let found = clean_forces(&mut problem);
+                let outliers: Vec<&Disturbance> = found.iter().filter(|one| one.kind == "outliers").collect();
+                assert_eq!(
+                    outliers.len(),
+                    usize::from(wild > 0),
+                    "width {width}, {wild} outliers: {outliers:?}"
+                );
+                // The outliers are removed.
+                let cleaned = problem.measured_force(0);
+                for i in n / 2..n / 2 + wild {
+                    let left = cleaned[i] - smooth(i);
+                    assert!(left.abs() < 3.0, "width {width}, {wild} outliers: {left}");
                 }
             }
         }

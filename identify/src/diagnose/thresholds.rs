@@ -275,6 +275,10 @@ pub(super) const FORCE_OUTLIER_DEVIATIONS: f64 = 7.0;
 /// Distances below this share of the rms force (1) are rounding and no outliers. By judgement.
 pub(super) const OUTLIER_LEAST_FORCE_SHARE: f64 = 1e-3;
 
+/// Least distance of an outlier from the polynomial through the samples around it, relative to its distance from their
+/// median (1): a smooth peak is close to the polynomial. By judgement.
+pub(super) const OUTLIER_LEAST_STEP: f64 = 0.5;
+
 /// If at least this share of the samples stands out (1), they are part of the force and no outliers. By judgement.
 pub(super) const OUTLIERS_MOST_SHARE: f64 = 0.05;
 

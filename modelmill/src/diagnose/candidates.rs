@@ -16,6 +16,7 @@ use modelmill_spec::{
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 
+use super::constants::ClaimedConstant;
 use super::places::{CandidatePlace, candidate_places, is_applicable, place_sets};
 
 /// Values of a constant that are tried on an even grid.
@@ -82,6 +83,22 @@ pub(crate) struct DerivedCandidates {
     pub tilt: Option<(ChangeCandidate, Derivation)>,
     /// A delay of the forces.
     pub delay: Option<ChangeCandidate>,
+    /// Errors of constants that an earlier search claims: columns are evaluated with them.
+    pub constant_errors: Vec<ClaimedConstant>,
+}
+
+impl DerivedCandidates {
+    /// The values of a derivation's constants with the claimed errors.
+    pub(super) fn constant_values(&self, derivation: &Derivation) -> Vec<f64> {
+        let error = |name: &str| {
+            let claim = self.constant_errors.iter().find(|claim| claim.name == name);
+            claim.map_or(0.0, |claim| claim.value)
+        };
+        let constants = derivation.mechanism.constants.iter();
+        constants
+            .map(|constant| constant.value + error(&constant.name))
+            .collect()
+    }
 }
 
 /// How often the columns of an effect are evaluated.
@@ -171,6 +188,7 @@ pub(crate) fn candidates(model: &Model) -> Outcome<DerivedCandidates> {
         load_dependent: carried,
         tilt,
         delay,
+        constant_errors: Vec::new(),
     })
 }
 

@@ -244,8 +244,8 @@ fn single_columns(
         EvaluationFrequency::LoadDependent => &candidates.load_dependent,
     };
     let mechanism = &derivation.mechanism;
-    // Nominal constants, with the given values for the searched ones.
-    let mut constants: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
+    // Nominal constants with claimed errors, and the given values for the searched ones.
+    let mut constants = candidates.constant_values(derivation);
     for k in which {
         for (_, name, search) in &candidates.singles[*k].constants {
             if let Some(at) = mechanism.constants.iter().position(|c| c.name == *name) {

@@ -3,12 +3,15 @@
 
 use modelmill_identify::diagnose::DiagnosisVerdict;
 
-use crate::error::Outcome;
+use crate::error::{Error, Outcome};
 use crate::model::Model;
 use crate::runs::RecordingDifference;
 use crate::segment::RecordingSegment;
 
+use super::added_effects;
 use super::constants::{CONSTANT_ERROR, ClaimedConstant};
+use super::geometry_alternatives::{GeometryAlternative, GeometryError, geometry_alternatives};
+use super::model_versions::ModelVersion;
 use super::named_zeros::{self, NamedZeros};
 use super::problem::{self, DiagnosisQuery, DiagnosisSolution, FixedParameters};
 use super::thresholds::{CONSTANT_MOST_RESIDUAL, CONSTANT_SETTLED_SHARE, DIFFERENCE_LEAST_GAIN};
@@ -17,8 +20,7 @@ use super::thresholds::{CONSTANT_MOST_RESIDUAL, CONSTANT_SETTLED_SHARE, DIFFEREN
 const MOST_CONSTANT_ROUNDS: usize = 3;
 
 /// The search for missing effects, with differences `between` recordings, which are cleared if a search without them
-/// explains more. It is repeated with zeros of the model file as candidates where these may be wrong; these zeros are
-/// returned as well.
+/// explains more. It is repeated with zeros of the model file as candidates where these may be wrong.
 ///
 /// Fails as [`Model::diagnose`] does.
 pub(super) fn search_effects(
@@ -27,7 +29,7 @@ pub(super) fn search_effects(
     held: FixedParameters,
     is_clock_in_question: bool,
     between: &mut Vec<RecordingDifference>,
-) -> Outcome<(DiagnosisSolution, Option<NamedZeros>)> {
+) -> Outcome<EffectSearchAnswer> {
     let find_once = |between: &[RecordingDifference], zeros: Option<&NamedZeros>, claimed: &[ClaimedConstant]| {
         let asked = DiagnosisQuery {
             fixed: held,
@@ -39,9 +41,13 @@ pub(super) fn search_effects(
         };
         problem::find_missing_effects(model, &data[0], &data[1], asked)
     };
-    let find = |between: &[RecordingDifference], zeros: Option<&NamedZeros>| -> Outcome<DiagnosisSolution> {
-        let mut answer = find_once(between, zeros, &[])?;
-        let mut claimed = claimed_constants(&answer);
+    // A search from errors of constants that may be present.
+    let find_from = |between: &[RecordingDifference], zeros: Option<&NamedZeros>, guess: &[ClaimedConstant]| {
+        let mut answer = find_once(between, zeros, guess)?;
+        let mut claimed = guess.to_vec();
+        let first = claimed_constants(&answer);
+        claimed.retain(|one| first.iter().all(|other| other.name != one.name));
+        claimed.extend(first);
         // Values of a first search are inexact where an error is large.
         for _ in 0..MOST_CONSTANT_ROUNDS {
             if claimed.is_empty() {
@@ -62,8 +68,9 @@ pub(super) fn search_effects(
                 break;
             }
         }
-        Ok(answer)
+        Outcome::Ok(answer)
     };
+    let find = |between: &[RecordingDifference], zeros: Option<&NamedZeros>| find_from(between, zeros, &[]);
     // The search with differences between recordings; it is repeated without them if there are any.
     let mut answer = find(between, None)?;
     if !between.is_empty() {
@@ -77,6 +84,7 @@ pub(super) fn search_effects(
     // Zeros of the file may be wrong as well. They have no names, so they are tried only where something was found.
     let is_explained = answer.diagnosis.verdict == DiagnosisVerdict::Adequate;
     let named = if is_explained { None } else { NamedZeros::new(model)? };
+    let mut in_place_of_constants = None;
     if let Some(named) = &named
         && named_zeros::needs_search(&answer)
     {
@@ -84,8 +92,95 @@ pub(super) fn search_effects(
         if named.is_better(&with_zeros, &answer) {
             answer = with_zeros;
         }
+        // A constant may stand for zeros whose polynomials are inexact. With the errors that explain as much, they are
+        // exact.
+        in_place_of_constants = errors_in_place_of_constants(model, data, held, named, &answer)?;
+        let errors = in_place_of_constants.iter().flat_map(|one| &one.errors);
+        let guess: Vec<ClaimedConstant> = errors.filter_map(claimed_zero).collect();
+        if !guess.is_empty() {
+            let from_guess = find_from(between, Some(named), &guess)?;
+            if named.is_better(&from_guess, &answer) {
+                answer = from_guess;
+                in_place_of_constants = None;
+            }
+        }
     }
-    Ok((answer, named))
+    Ok(EffectSearchAnswer {
+        solution: answer,
+        zeros: named,
+        in_place_of_constants,
+    })
+}
+
+/// The answer of [`search_effects`].
+pub(super) struct EffectSearchAnswer {
+    /// The best answer.
+    pub(super) solution: DiagnosisSolution,
+    /// The zeros of the file that were tried.
+    pub(super) zeros: Option<NamedZeros>,
+    /// Errors of the geometry that explain at least as much as the wrong constants of the answer, beside its other
+    /// effects.
+    pub(super) in_place_of_constants: Option<GeometryAlternative>,
+}
+
+/// The error of a zero as a claim; `None` for a constant of the file.
+fn claimed_zero(error: &GeometryError) -> Option<ClaimedConstant> {
+    let (point, axis) = error.zero.as_ref()?;
+    Some(ClaimedConstant {
+        name: format!("{axis} of {point}"),
+        value: error.value,
+    })
+}
+
+/// The errors of the geometry that explain at least as much as the wrong constants that a search claims, beside its
+/// other effects; `None` if there are none.
+///
+/// Fails only when the job is cancelled.
+fn errors_in_place_of_constants(
+    model: &Model,
+    data: &[Vec<RecordingSegment>; 2],
+    held: FixedParameters,
+    named: &NamedZeros,
+    answer: &DiagnosisSolution,
+) -> Outcome<Option<GeometryAlternative>> {
+    let claimed = claimed_constants(answer);
+    let n_others = answer.diagnosis.effects.len() - claimed.len();
+    if claimed.is_empty() {
+        return Ok(None);
+    }
+    // The model with the other effects, where the file can have them.
+    let with_others = if n_others == 0 {
+        None
+    } else {
+        let entries = added_effects::entries(model, answer);
+        let Ok(edited) = added_effects::add_entries(model, &entries) else {
+            return Ok(None);
+        };
+        let derived = model.host().derive(&model.path, edited.loaded);
+        match ended_if_cancelled(derived)? {
+            Some(with_others) => Some(with_others.with_values_of(model)),
+            None => return Ok(None),
+        }
+    };
+    let own_zeros = with_others.as_ref().map(NamedZeros::new).transpose()?;
+    let zeros = own_zeros.as_ref().map_or(Some(named), Option::as_ref);
+    let whole = with_others.as_ref().unwrap_or(model).clone();
+    let version = ended_if_cancelled(ModelVersion::new(whole, data[0].clone(), data[1].clone(), held))?;
+    let Some((version, zeros)) = version.zip(zeros) else {
+        return Ok(None);
+    };
+    let names: Vec<&str> = claimed.iter().map(|one| one.name.as_str()).collect();
+    let alternatives = geometry_alternatives(&version, Some(zeros), held, &names, names.len(), 0.0)?;
+    Ok(alternatives.into_iter().next())
+}
+
+/// `None` for an error, apart from that of a cancelled job.
+fn ended_if_cancelled<T>(result: Outcome<T>) -> Outcome<Option<T>> {
+    match result {
+        Ok(value) => Ok(Some(value)),
+        Err(Error::Cancelled) => Err(Error::Cancelled),
+        Err(_) => Ok(None),
+    }
 }
 
 /// The errors of constants that a search claims.

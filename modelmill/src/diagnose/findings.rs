@@ -251,7 +251,8 @@ impl Model {
             !standing.has_all(places)
         });
         let is_clock_in_question = !recordings.iter().any(|one| one.has_recorded_derivatives(self));
-        let (answer, named) = search_effects(self, &data, held, is_clock_in_question, &mut between)?;
+        let found = search_effects(self, &data, held, is_clock_in_question, &mut between)?;
+        let (answer, named) = (found.solution, found.zeros);
         let judged = if data[1].is_empty() {
             ValidationMethod::CrossValidation
         } else {
@@ -330,6 +331,9 @@ impl Model {
         findings.regions = regions(&findings);
         findings.geometry_alternatives = alternatives_to_effects(&findings, named.as_ref(), held)?;
         findings.share_with_geometry();
+        if let Some(best) = &found.in_place_of_constants {
+            findings.share_constants(best);
+        }
         if options.repeat_with_nominal && held != FixedParameters::All && !findings.off_nominal.is_empty() {
             findings.with_nominal = Some(nominal_diagnosis(&findings, &between)?);
         }
@@ -344,9 +348,22 @@ impl DiagnosisFindings {
         let n_effects = self.missing.len();
         let is_equal =
             |one: &&GeometryAlternative| one.errors.len() <= n_effects && one.share >= EQUAL_ALTERNATIVE_LEAST_SHARE;
-        let Some(best) = self.geometry_alternatives.iter().find(is_equal) else {
-            return;
-        };
+        let best = self.geometry_alternatives.iter().find(is_equal).cloned();
+        if let Some(best) = best {
+            self.share_effects(&best, &|_| true);
+        }
+    }
+
+    /// Wrong constants beside other effects share their probability with errors of the geometry that explain as much.
+    fn share_constants(&mut self, best: &GeometryAlternative) {
+        let is_constant = |one: &LocatedEffect| one.kind == CONSTANT_ERROR;
+        if self.missing.iter().any(|one| !is_constant(&one.effect)) {
+            self.share_effects(best, &is_constant);
+        }
+    }
+
+    /// Some effects share their probability with errors of the geometry.
+    fn share_effects(&mut self, best: &GeometryAlternative, are_shared: &dyn Fn(&LocatedEffect) -> bool) {
         let claimed: Vec<LocatedEffect> = self.missing.iter().map(|one| one.effect.clone()).collect();
         let alternatives: Vec<LocatedEffect> = best.errors.iter().map(GeometryError::as_effect).collect();
         let others: Vec<LocatedEffect> = (alternatives.iter().filter(|one| !claimed.contains(*one)).cloned()).collect();
@@ -355,7 +372,8 @@ impl DiagnosisFindings {
         }
         let found = self.diagnosis.effects.iter_mut().zip(&mut self.missing);
         // What both explanations have in common stays as certain as before.
-        for (found, missing) in found.filter(|(found, _)| !alternatives.contains(&found.effect)) {
+        let is_shared = |one: &LocatedEffect| are_shared(one) && !alternatives.contains(one);
+        for (found, missing) in found.filter(|(found, _)| is_shared(&found.effect)) {
             // With n equal explanations each has 1/n; one more makes it 1/(n + 1).
             let shared = found.probability / (1.0 + found.probability);
             for (probability, list) in [

@@ -120,9 +120,11 @@ pub(crate) fn find_missing_effects(
 ) -> Outcome<DiagnosisSolution> {
     let held = query.fixed;
     // Stage 1: derive all candidates and evaluate their columns.
-    let candidates = model
+    let mut candidates = model
         .host()
         .run_job("deriving all candidates", 0, |_| candidates(model))??;
+    // Effects act on the mechanism with the claimed lengths and angles.
+    candidates.constant_errors = query.claimed.to_vec();
     let all: Vec<(&RecordingSegment, bool)> = (fit.iter().map(|one| (one, false)))
         .chain(check.iter().map(|one| (one, true)))
         .collect();

@@ -169,6 +169,7 @@ pub(crate) fn derive_effect(model: &Model, named: &NamedEffect, constants: Const
             entries,
             tilt,
             delay: None,
+            constant_errors: Vec::new(),
         },
         named: named.clone(),
         kind,

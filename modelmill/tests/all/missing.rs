@@ -179,6 +179,49 @@ fn wrong_zeros_are_alternatives_to_wrong_constants() {
     }
 }
 
+/// The published model with a name for the distance of the contact points and all parameters fixed: the misplaced mass
+/// and the distance are found with their values, since effects are evaluated at the claimed length.
+#[test]
+fn effects_act_at_the_length_that_is_claimed() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/seventeen-bodies");
+    let files = ["fit", "check"].map(|name| folder.join(format!("contact-20mm-{name}.csv.gz")));
+    if !files[0].exists() {
+        eprintln!("../shared/data/seventeen-bodies is absent: nothing is tested");
+        return;
+    }
+    let text = std::fs::read_to_string(folder.join("paperea.toml")).expect("a text");
+    let own = std::env::temp_dir().join(format!("modelmill-paperea-{}", std::process::id()));
+    std::fs::create_dir_all(&own).expect("a folder");
+    let file = own.join("paperea.toml");
+    let bundled = bundled("spidermill-paper").display().to_string();
+    std::fs::write(&file, text.replace("spidermill-models/spidermill-paper.toml", &bundled)).expect("a file");
+    let model = Model::open(&file).expect("the model");
+    let recordings = files.map(|file| {
+        model
+            .recording(&file, &RecordingOptions::default())
+            .expect("a recording")
+    });
+    let question = DiagnosisOptions {
+        fixed: FixedParameters::All,
+        repeat_with_nominal: false,
+    };
+    let findings = model
+        .diagnose(&[&recordings[0]], &[&recordings[1]], &question)
+        .expect("an answer");
+    std::fs::remove_dir_all(&own).expect("a folder");
+    let found = findings.missing.iter();
+    let mut found: Vec<(&str, f64)> = found
+        .map(|one| (one.effect.kind.as_str(), one.estimates[0].value))
+        .collect();
+    found.sort_by(|a, b| a.0.cmp(b.0));
+    let [("constant_error", distance), ("lumped_mass_placement", mass)] = found.as_slice() else {
+        panic!("{found:?}");
+    };
+    assert!((distance - 0.02).abs() < 1e-5, "{distance}");
+    // The platform's mass in the rig's file, kg.
+    assert!((mass - 12.456).abs() < 1e-3, "{mass}");
+}
+
 #[test]
 fn a_gear_that_yields_is_found_with_its_compliance() {
     let file = run(ARM, 730, Made::Yields(1, 4e-4));
