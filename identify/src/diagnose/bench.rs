@@ -133,7 +133,7 @@ impl<'a> EffectSelector<'a> {
     }
 
     /// Adds the columns with which bodies and constants are tried before they are selected: a body at the origin of its
-    /// frame, a constant at the error that is expected, with factors of the base alone. Only selected candidates get columns at their
+    /// frame, a constant without error, with factors of the base alone. Only selected candidates get columns at their
     /// estimated values.
     fn initialise_columns(&mut self) {
         let problem = self.problem;

@@ -11,8 +11,6 @@ pub struct ConstantCorrection {
     pub first_derivative: ForceSensitivity,
     /// Second derivative of the forces with respect to it.
     pub second_derivative: ForceSensitivity,
-    /// The error that an earlier search claims: the candidate is tried with the secant up to there. 0 if there is none.
-    pub expected_error: f64,
 }
 
 impl ConstantCorrection {
@@ -49,7 +47,6 @@ mod tests {
         let square = ConstantCorrection {
             first_derivative: held(2.0 * constant),
             second_derivative: held(2.0),
-            expected_error: 0.0,
         };
         let error = 0.4_f64;
         let column = square.secant_column(error, &[factor], 1);

@@ -166,7 +166,8 @@ impl EffectSelector<'_> {
             ColumnSource::Body(body) => body.columns(found.map_or([0.0; 3], |values| body.centre(&values))),
             // Constant: secant between no error and the estimated error.
             ColumnSource::Constant(constant) => {
-                let error = found.map_or(constant.expected_error, |values| values[0]);
+                // Without an estimate yet, the derivative is used.
+                let error = found.map_or(0.0, |values| values[0]);
                 // The derivatives are those of the base columns, whose factors come first.
                 let base = &factors.as_slice()[..self.base.len()];
                 vec![constant.secant_column(error, base, self.weights.len())]

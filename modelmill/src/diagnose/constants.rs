@@ -134,12 +134,8 @@ impl<'a> GeometryColumns<'a> {
             // With another length the loops may not close along the recordings.
             let sides = |step: f64| self.columns(all, k, -step).zip(self.columns(all, k, step));
             let claim = claimed.iter().find(|claim| claim.name == constant.name);
-            let expected = claim.map_or(0.0, |claim| claim.value);
-            let exact = (expected.abs() > step)
-                .then(|| sides(expected.abs()))
-                .flatten()
-                .map(|columns| (expected.abs(), columns));
-            let expected_error = if exact.is_some() { expected } else { 0.0 };
+            let exact = claim.map(|claim| claim.value.abs()).filter(|value| *value > step);
+            let exact = exact.and_then(|value| Some((value, sides(value)?)));
             let Some((step, (back, ahead))) = exact.or_else(|| Some((step, sides(step)?))) else {
                 continue;
             };
@@ -147,10 +143,9 @@ impl<'a> GeometryColumns<'a> {
                 middle = self.columns(all, k, 0.0);
             }
             let Some(middle) = &middle else { continue };
-            let Some(mut correction) = self.correction(k, step, [&back, middle, &ahead]) else {
+            let Some(correction) = self.correction(k, step, [&back, middle, &ahead]) else {
                 continue;
             };
-            correction.expected_error = expected_error;
             // A constant without effect on any force is no candidate.
             let slope = &correction.first_derivative;
             if slope.fixed.is_zero() && slope.base.iter().all(ForceColumn::is_zero) {
@@ -211,7 +206,6 @@ impl<'a> GeometryColumns<'a> {
         Some(ConstantCorrection {
             first_derivative,
             second_derivative,
-            expected_error: 0.0,
         })
     }
 }

@@ -14,7 +14,9 @@ use super::geometry_alternatives::{GeometryAlternative, GeometryError, geometry_
 use super::model_versions::ModelVersion;
 use super::named_zeros::{self, NamedZeros};
 use super::problem::{self, DiagnosisQuery, DiagnosisSolution, FixedParameters};
-use super::thresholds::{CONSTANT_MOST_RESIDUAL, CONSTANT_SETTLED_SHARE, DIFFERENCE_LEAST_GAIN};
+use super::thresholds::{
+    CLAIMED_LENGTH_MOST_RESIDUAL, CONSTANT_MOST_RESIDUAL, CONSTANT_SETTLED_SHARE, DIFFERENCE_LEAST_GAIN,
+};
 
 /// Most times a search is repeated with the errors of constants that it claims.
 const MOST_CONSTANT_ROUNDS: usize = 3;
@@ -30,20 +32,98 @@ pub(super) fn search_effects(
     is_clock_in_question: bool,
     between: &mut Vec<RecordingDifference>,
 ) -> Outcome<EffectSearchAnswer> {
-    let find_once = |between: &[RecordingDifference], zeros: Option<&NamedZeros>, claimed: &[ClaimedConstant]| {
-        let asked = DiagnosisQuery {
-            fixed: held,
+    let search = EffectSearch {
+        model,
+        data,
+        held,
+        is_clock_in_question,
+    };
+    // The search with differences between recordings; it is repeated without them if there are any.
+    let mut answer = search.find_from(between, None, &[])?;
+    if !between.is_empty() {
+        // A missing effect may look like a difference between recordings.
+        let without = search.find_from(&[], None, &[])?;
+        if without.mean_square_residual() < DIFFERENCE_LEAST_GAIN * answer.mean_square_residual() {
+            answer = without;
+            between.clear();
+        }
+    }
+    // Zeros of the file may be wrong as well. They have no names, so they are tried only where something was found.
+    let is_explained = answer.diagnosis.verdict == DiagnosisVerdict::Adequate;
+    let named = if is_explained { None } else { NamedZeros::new(model)? };
+    let mut in_place_of_constants = None;
+    if let Some(named) = &named
+        && named_zeros::needs_search(&answer)
+    {
+        let with_zeros = search.find_from(between, Some(named), &[])?;
+        if named.is_better(&with_zeros, &answer) {
+            answer = with_zeros;
+        }
+        // A constant may stand for zeros whose polynomials are inexact. With the errors that explain as much, they are
+        // exact.
+        in_place_of_constants = search.errors_in_place_of_constants(named, &answer)?;
+        let errors = in_place_of_constants.iter().flat_map(|one| &one.errors);
+        let guess: Vec<ClaimedConstant> = errors.filter_map(claimed_zero).collect();
+        if !guess.is_empty() {
+            let from_guess = search.find_from(between, Some(named), &guess)?;
+            if named.is_better(&from_guess, &answer) {
+                answer = from_guess;
+                in_place_of_constants = None;
+            }
+        }
+    }
+    Ok(EffectSearchAnswer {
+        solution: answer,
+        zeros: named,
+        in_place_of_constants,
+    })
+}
+
+/// What all searches for missing effects in the same recordings have in common.
+struct EffectSearch<'a> {
+    /// The model.
+    model: &'a Model,
+    /// The fitted recordings, and the validation runs.
+    data: &'a [Vec<RecordingSegment>; 2],
+    /// Which parameters keep their nominal values.
+    held: FixedParameters,
+    /// Whether the clock of the recordings may be wrong.
+    is_clock_in_question: bool,
+}
+
+impl EffectSearch<'_> {
+    /// One search with errors of constants that an earlier one claims.
+    ///
+    /// Fails as [`Model::diagnose`] does.
+    fn find_once(
+        &self,
+        between: &[RecordingDifference],
+        zeros: Option<&NamedZeros>,
+        claimed: &[ClaimedConstant],
+        are_effects_at_claims: bool,
+    ) -> Outcome<DiagnosisSolution> {
+        let query = DiagnosisQuery {
+            fixed: self.held,
             in_full: true,
             run_differences: between,
-            is_clock_in_question,
+            is_clock_in_question: self.is_clock_in_question,
             claimed,
+            are_effects_at_claims,
             zeros,
         };
-        problem::find_missing_effects(model, &data[0], &data[1], asked)
-    };
-    // A search from errors of constants that may be present.
-    let find_from = |between: &[RecordingDifference], zeros: Option<&NamedZeros>, guess: &[ClaimedConstant]| {
-        let mut answer = find_once(between, zeros, guess)?;
+        problem::find_missing_effects(self.model, &self.data[0], &self.data[1], query)
+    }
+
+    /// A search from errors of constants that may be present, repeated until the claimed errors are exact.
+    ///
+    /// Fails as [`Model::diagnose`] does.
+    fn find_from(
+        &self,
+        between: &[RecordingDifference],
+        zeros: Option<&NamedZeros>,
+        guess: &[ClaimedConstant],
+    ) -> Outcome<DiagnosisSolution> {
+        let mut answer = self.find_once(between, zeros, guess, false)?;
         let mut claimed = guess.to_vec();
         let first = claimed_constants(&answer);
         claimed.retain(|one| first.iter().all(|other| other.name != one.name));
@@ -53,7 +133,7 @@ pub(super) fn search_effects(
             if claimed.is_empty() {
                 break;
             }
-            let again = find_once(between, zeros, &claimed)?;
+            let again = self.find_once(between, zeros, &claimed, false)?;
             // Far from its value a constant may have no polynomial.
             if again.mean_square_residual() > CONSTANT_MOST_RESIDUAL * answer.mean_square_residual() {
                 break;
@@ -68,48 +148,68 @@ pub(super) fn search_effects(
                 break;
             }
         }
-        Outcome::Ok(answer)
-    };
-    let find = |between: &[RecordingDifference], zeros: Option<&NamedZeros>| find_from(between, zeros, &[]);
-    // The search with differences between recordings; it is repeated without them if there are any.
-    let mut answer = find(between, None)?;
-    if !between.is_empty() {
-        // A missing effect may look like a difference between recordings.
-        let without = find(&[], None)?;
-        if without.mean_square_residual() < DIFFERENCE_LEAST_GAIN * answer.mean_square_residual() {
-            answer = without;
-            between.clear();
-        }
-    }
-    // Zeros of the file may be wrong as well. They have no names, so they are tried only where something was found.
-    let is_explained = answer.diagnosis.verdict == DiagnosisVerdict::Adequate;
-    let named = if is_explained { None } else { NamedZeros::new(model)? };
-    let mut in_place_of_constants = None;
-    if let Some(named) = &named
-        && named_zeros::needs_search(&answer)
-    {
-        let with_zeros = find(between, Some(named))?;
-        if named.is_better(&with_zeros, &answer) {
-            answer = with_zeros;
-        }
-        // A constant may stand for zeros whose polynomials are inexact. With the errors that explain as much, they are
-        // exact.
-        in_place_of_constants = errors_in_place_of_constants(model, data, held, named, &answer)?;
-        let errors = in_place_of_constants.iter().flat_map(|one| &one.errors);
-        let guess: Vec<ClaimedConstant> = errors.filter_map(claimed_zero).collect();
-        if !guess.is_empty() {
-            let from_guess = find_from(between, Some(named), &guess)?;
-            if named.is_better(&from_guess, &answer) {
-                answer = from_guess;
-                in_place_of_constants = None;
+        // Effects beside a wrong length act at the length that is claimed. With wrong claims the loops may not close, and
+        // the answer stays as it is.
+        for _ in 0..MOST_CONSTANT_ROUNDS {
+            let claimed = claimed_constants(&answer);
+            if claimed.is_empty() || claimed.len() == answer.diagnosis.effects.len() {
+                break;
             }
+            let Some(again) = ended_if_cancelled(self.find_once(between, zeros, &claimed, true))? else {
+                break;
+            };
+            if again.mean_square_residual() > CLAIMED_LENGTH_MOST_RESIDUAL * answer.mean_square_residual() {
+                break;
+            }
+            answer = again;
         }
+        Ok(answer)
     }
-    Ok(EffectSearchAnswer {
-        solution: answer,
-        zeros: named,
-        in_place_of_constants,
-    })
+
+    /// The errors of the geometry that explain at least as much as the wrong constants that a search claims, beside its
+    /// other effects; `None` if there are none.
+    ///
+    /// Fails only when the job is cancelled.
+    fn errors_in_place_of_constants(
+        &self,
+        named: &NamedZeros,
+        answer: &DiagnosisSolution,
+    ) -> Outcome<Option<GeometryAlternative>> {
+        let claimed = claimed_constants(answer);
+        let n_others = answer.diagnosis.effects.len() - claimed.len();
+        if claimed.is_empty() {
+            return Ok(None);
+        }
+        // The model with the other effects, where the file can have them.
+        let with_others = if n_others == 0 {
+            None
+        } else {
+            let entries = added_effects::entries(self.model, answer);
+            let Ok(edited) = added_effects::add_entries(self.model, &entries) else {
+                return Ok(None);
+            };
+            let derived = self.model.host().derive(&self.model.path, edited.loaded);
+            match ended_if_cancelled(derived)? {
+                Some(with_others) => Some(with_others.with_values_of(self.model)),
+                None => return Ok(None),
+            }
+        };
+        let own_zeros = with_others.as_ref().map(NamedZeros::new).transpose()?;
+        let zeros = own_zeros.as_ref().map_or(Some(named), Option::as_ref);
+        let whole = with_others.as_ref().unwrap_or(self.model).clone();
+        let version = ended_if_cancelled(ModelVersion::new(
+            whole,
+            self.data[0].clone(),
+            self.data[1].clone(),
+            self.held,
+        ))?;
+        let Some((version, zeros)) = version.zip(zeros) else {
+            return Ok(None);
+        };
+        let names: Vec<&str> = claimed.iter().map(|one| one.name.as_str()).collect();
+        let alternatives = geometry_alternatives(&version, Some(zeros), self.held, &names, names.len(), 0.0)?;
+        Ok(alternatives.into_iter().next())
+    }
 }
 
 /// The answer of [`search_effects`].
@@ -130,48 +230,6 @@ fn claimed_zero(error: &GeometryError) -> Option<ClaimedConstant> {
         name: format!("{axis} of {point}"),
         value: error.value,
     })
-}
-
-/// The errors of the geometry that explain at least as much as the wrong constants that a search claims, beside its
-/// other effects; `None` if there are none.
-///
-/// Fails only when the job is cancelled.
-fn errors_in_place_of_constants(
-    model: &Model,
-    data: &[Vec<RecordingSegment>; 2],
-    held: FixedParameters,
-    named: &NamedZeros,
-    answer: &DiagnosisSolution,
-) -> Outcome<Option<GeometryAlternative>> {
-    let claimed = claimed_constants(answer);
-    let n_others = answer.diagnosis.effects.len() - claimed.len();
-    if claimed.is_empty() {
-        return Ok(None);
-    }
-    // The model with the other effects, where the file can have them.
-    let with_others = if n_others == 0 {
-        None
-    } else {
-        let entries = added_effects::entries(model, answer);
-        let Ok(edited) = added_effects::add_entries(model, &entries) else {
-            return Ok(None);
-        };
-        let derived = model.host().derive(&model.path, edited.loaded);
-        match ended_if_cancelled(derived)? {
-            Some(with_others) => Some(with_others.with_values_of(model)),
-            None => return Ok(None),
-        }
-    };
-    let own_zeros = with_others.as_ref().map(NamedZeros::new).transpose()?;
-    let zeros = own_zeros.as_ref().map_or(Some(named), Option::as_ref);
-    let whole = with_others.as_ref().unwrap_or(model).clone();
-    let version = ended_if_cancelled(ModelVersion::new(whole, data[0].clone(), data[1].clone(), held))?;
-    let Some((version, zeros)) = version.zip(zeros) else {
-        return Ok(None);
-    };
-    let names: Vec<&str> = claimed.iter().map(|one| one.name.as_str()).collect();
-    let alternatives = geometry_alternatives(&version, Some(zeros), held, &names, names.len(), 0.0)?;
-    Ok(alternatives.into_iter().next())
 }
 
 /// `None` for an error, apart from that of a cancelled job.

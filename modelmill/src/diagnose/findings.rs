@@ -467,6 +467,7 @@ fn nominal_diagnosis(findings: &DiagnosisFindings, between: &[RecordingDifferenc
         run_differences: between,
         is_clock_in_question: false,
         claimed: &[],
+        are_effects_at_claims: false,
         zeros: None,
     };
     let answer = problem::find_missing_effects(&version.model, &of(false), &of(true), query)?;

@@ -104,6 +104,8 @@ pub(crate) struct DiagnosisQuery<'a> {
     pub is_clock_in_question: bool,
     /// Errors of constants that an earlier search claims.
     pub claimed: &'a [ClaimedConstant],
+    /// Whether effects are evaluated with the claimed errors.
+    pub are_effects_at_claims: bool,
     /// Zeros of the model file that are candidates as wrong constants.
     pub zeros: Option<&'a NamedZeros>,
 }
@@ -123,8 +125,9 @@ pub(crate) fn find_missing_effects(
     let mut candidates = model
         .host()
         .run_job("deriving all candidates", 0, |_| candidates(model))??;
-    // Effects act on the mechanism with the claimed lengths and angles.
-    candidates.constant_errors = query.claimed.to_vec();
+    if query.are_effects_at_claims {
+        candidates.constant_errors = query.claimed.to_vec();
+    }
     let all: Vec<(&RecordingSegment, bool)> = (fit.iter().map(|one| (one, false)))
         .chain(check.iter().map(|one| (one, true)))
         .collect();

@@ -133,6 +133,11 @@ pub(super) const CONSTANT_SETTLED_SHARE: f64 = 0.01;
 /// distinguished from them. By judgement.
 pub(super) const EQUAL_ALTERNATIVE_LEAST_SHARE: f64 = 0.97;
 
+/// A search with effects at the claimed lengths replaces the one with effects at the lengths of the file if its mean
+/// square residual is at most this part (1). By judgement: on recordings of the rig with contact points beside the axes
+/// (`seventeen-bodies`) it is less than a hundred-thousandth.
+pub(super) const CLAIMED_LENGTH_MOST_RESIDUAL: f64 = 0.8;
+
 /// A search with zeros as candidates replaces the one without, if it needs fewer effects and its mean square residual is
 /// at most this many times as large (1). By judgement.
 pub(super) const ZEROS_MOST_RESIDUAL: f64 = 1.05;
