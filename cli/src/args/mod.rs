@@ -279,6 +279,14 @@ pub(crate) enum ProgramCommand {
         modelmill experiment --out /tmp --random 100 --starts 1 --json"
     )]
     Experiment(ExperimentArgs),
+    /// Report what this computer has of other programs, and which command needs what is missing
+    #[command(
+        after_help = "Other programs, such as compilers, are needed only for what the last column names. \
+        Exit status 1: the program itself does not work.\n\n\
+        Examples:\n  modelmill doctor\n  \
+        modelmill doctor --json | jq '.requirements[] | select(.state != \"present\") | .name'"
+    )]
+    Doctor(DoctorArgs),
     /// Print a completion script for a shell
     #[command(after_help = "Examples:\n  \
         modelmill completions bash > ~/.local/share/bash-completion/completions/modelmill\n  \
@@ -319,6 +327,14 @@ pub(crate) struct DiffArgs {
     pub(crate) json: bool,
     #[command(flatten)]
     pub(crate) preparation: PreparationArgs,
+}
+
+/// `doctor`.
+#[derive(Debug, Args)]
+pub(crate) struct DoctorArgs {
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 /// `completions`.

@@ -8,6 +8,7 @@ pub(crate) mod compare;
 pub(crate) mod completions;
 pub(crate) mod diagnose;
 pub(crate) mod diff;
+pub(crate) mod doctor;
 pub(crate) mod effects;
 pub(crate) mod equations;
 pub(crate) mod evaluate;

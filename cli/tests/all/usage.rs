@@ -58,6 +58,7 @@ fn every_command_helps_with_an_example() {
         "reduce",
         "import",
         "export",
+        "doctor",
         "completions",
         "tour",
     ] {
