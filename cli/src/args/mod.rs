@@ -2,6 +2,7 @@
 
 mod code;
 pub(crate) mod data;
+mod declared;
 pub(crate) mod drawing;
 pub(crate) mod effects;
 pub(crate) mod estimation;
