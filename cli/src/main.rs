@@ -118,6 +118,7 @@ fn run(host: &Host, command: &ProgramCommand) -> CommandOutcome {
         #[cfg(feature = "experiment")]
         ProgramCommand::Experiment(args) => commands::experiment::run(host, args),
         ProgramCommand::Doctor(args) => commands::doctor::run(args),
+        ProgramCommand::Manual(args) => commands::manual::run(args),
         ProgramCommand::Completions(args) => commands::completions::run(args),
         #[cfg(feature = "workbench")]
         ProgramCommand::Work(args) => commands::work::run(host, args),

@@ -294,6 +294,10 @@ pub(crate) enum ProgramCommand {
         modelmill completions zsh > ~/.zfunc/_modelmill\n  \
         modelmill completions fish > ~/.config/fish/completions/modelmill.fish")]
     Completions(CompletionsArgs),
+    /// Print the reference of all commands and options as Markdown, or write manual pages (man)
+    #[command(after_help = "Examples:\n  modelmill manual > commands.md\n  \
+        modelmill manual --out ~/.local/share/man/man1")]
+    Manual(ManualArgs),
     /// Show all main steps on bundled recordings: derive, compare, find the missing effect, add it, identify again
     #[command(after_help = "Examples:\n  modelmill tour\n  modelmill tour --out tour")]
     Tour(TourArgs),
@@ -343,6 +347,14 @@ pub(crate) struct DoctorArgs {
 pub(crate) struct CompletionsArgs {
     /// Shell for which the script is written
     pub(crate) shell: clap_complete::Shell,
+}
+
+/// `manual`.
+#[derive(Debug, Args)]
+pub(crate) struct ManualArgs {
+    /// Write manual pages into this folder, one for the program and one for each command, instead of the reference
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
 }
 
 /// `tour`.

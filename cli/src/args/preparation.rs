@@ -4,7 +4,7 @@ use std::path::Path;
 
 use clap::Args;
 use modelmill::Host;
-use modelmill::recording::{RecordingOptions, StandstillRule};
+use modelmill::recording::RecordingOptions;
 
 use crate::args::declared::DeclaredArgs;
 use crate::flags::{FlagSpelling, quote_word};
@@ -43,11 +43,7 @@ impl PreparationArgs {
 
     /// The bound of `--standstill`, if it is given.
     pub(crate) fn standstill(&self) -> Option<f64> {
-        match self.declared.options.standstill {
-            StandstillRule::Automatic => None,
-            StandstillRule::Below(part) => Some(part),
-            StandstillRule::KeepAll => Some(0.0),
-        }
+        self.declared.options.standstill.bound()
     }
 
     /// The options that differ from their defaults, as text for a command line, each with a space before it.

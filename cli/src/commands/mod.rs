@@ -20,6 +20,7 @@ pub(crate) mod generate;
 pub(crate) mod identify;
 pub(crate) mod import;
 pub(crate) mod interpret;
+pub(crate) mod manual;
 pub(crate) mod recordings;
 pub(crate) mod reduce;
 pub(crate) mod report;
