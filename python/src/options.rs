@@ -68,13 +68,13 @@ fn read_value<T>(one: &OptionDeclaration<T>, value: &Bound<'_, PyAny>) -> Option
         OptionKind::Switch { .. } => OptionValue::On,
         OptionKind::Number { .. } => OptionValue::Number(number(value)?),
         OptionKind::Integer { .. } => OptionValue::Integer(integer(value)?),
-        OptionKind::IntegerPair { .. } => match integer(value) {
-            Some(both) => OptionValue::IntegerPair(both, both),
-            None => {
-                let [first, second] = pair()?;
-                OptionValue::IntegerPair(integer(&first)?, integer(&second)?)
+        OptionKind::IntegerPair { .. } => {
+            if let Some(both) = integer(value) {
+                return Some(OptionValue::IntegerPair(both, both));
             }
-        },
+            let [first, second] = pair()?;
+            OptionValue::IntegerPair(integer(&first)?, integer(&second)?)
+        }
         OptionKind::Interval { .. } => {
             let [from, to] = pair()?;
             OptionValue::Interval(number(&from)?, number(&to)?)

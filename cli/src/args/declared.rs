@@ -1,5 +1,7 @@
 //! Options that the library declares, as flags: names, help, checks of values, completions.
 
+use std::fmt::Write as _;
+
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use clap::error::ErrorKind;
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
@@ -28,16 +30,16 @@ impl<T> DeclaredArgs<T> {
         expect(dead_code, reason = "only the workbench prints them")
     )]
     pub(crate) fn to_flags(&self) -> String {
-        let one = |(flag, values): &(&'static str, Vec<String>)| -> String {
+        let mut all = String::new();
+        for (flag, values) in &self.given {
             if values.is_empty() {
-                return format!(" --{flag}");
+                let _ = write!(all, " --{flag}");
             }
-            values
-                .iter()
-                .map(|value| format!(" --{flag} {}", quote_word(value)))
-                .collect()
-        };
-        self.given.iter().map(one).collect()
+            for value in values {
+                let _ = write!(all, " --{flag} {}", quote_word(value));
+            }
+        }
+        all
     }
 }
 

@@ -193,9 +193,10 @@ fn option_table(group: &OptionGroup<'_>) -> String {
         let _ = write!(table, "| `{}` | ", escape_cell(&name));
         if has_keywords {
             let is_declared = find_flag(one.get_id().as_str()) == one.get_long();
-            let _ = match is_declared {
-                true => write!(table, "`{}` | ", one.get_id()),
-                false => write!(table, "| "),
+            let _ = if is_declared {
+                write!(table, "`{}` | ", one.get_id())
+            } else {
+                write!(table, "| ")
             };
         }
         let _ = writeln!(table, "{} |", escape_cell(&explanation(one)));
