@@ -13,6 +13,8 @@ pub(crate) enum CommandFailure {
     NotVerified,
     /// The model file has values that no machine can have: exit status 1. The output states them.
     ImpossibleValues,
+    /// An essential part of the program does not work: exit status 1. The output states which.
+    Unusable,
     /// The reader of standard output closed it: exit status 0 and no message.
     BrokenPipe,
 }
@@ -26,7 +28,7 @@ impl CommandFailure {
         match self {
             Self::BrokenPipe => 0,
             Self::Usage(_) | Self::Library(modelmill::Error::Options(_)) => 2,
-            Self::NotVerified | Self::ImpossibleValues | Self::Input(_) | Self::Library(_) => 1,
+            Self::NotVerified | Self::ImpossibleValues | Self::Unusable | Self::Input(_) | Self::Library(_) => 1,
         }
     }
 }

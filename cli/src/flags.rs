@@ -7,6 +7,7 @@ use std::path::PathBuf;
 
 use modelmill::diagnose::{NamedEffect, SeparationProposal};
 use modelmill::edit::NewEffect;
+use modelmill::options::find_flag;
 use modelmill::print::{CommandName, OptionName, OptionSetting, RemedySpelling, StepSpelling};
 use modelmill::recording::RecordingOptions;
 use modelmill::text::table::significant;
@@ -158,14 +159,14 @@ impl RemedySpelling for FlagSpelling {
     }
 }
 
-/// The flag of an option: its name with hyphens, with a few exceptions.
+/// The flag of an option: that of its declaration, or its name with hyphens.
 fn flag(option: OptionName) -> String {
     match option {
-        OptionName::Columns => "--map".to_owned(),
-        OptionName::CutoffHz => "--cutoff".to_owned(),
         OptionName::Loads => "--load".to_owned(),
-        OptionName::Source => "--derivatives".to_owned(),
-        other => format!("--{}", other.name().replace('_', "-")),
+        other => match find_flag(other.name()) {
+            Some(flag) => format!("--{flag}"),
+            None => format!("--{}", other.name().replace('_', "-")),
+        },
     }
 }
 

@@ -69,7 +69,10 @@ fn report_failure(failure: &CommandFailure) -> ExitCode {
         }
         CommandFailure::Library(error) => terminal::error(&error.spell(&FlagSpelling)),
         CommandFailure::Input(says) | CommandFailure::Usage(says) => terminal::error(says),
-        CommandFailure::NotVerified | CommandFailure::ImpossibleValues | CommandFailure::BrokenPipe => {}
+        CommandFailure::NotVerified
+        | CommandFailure::ImpossibleValues
+        | CommandFailure::Unusable
+        | CommandFailure::BrokenPipe => {}
     }
     ExitCode::from(failure.status())
 }
@@ -114,6 +117,8 @@ fn run(host: &Host, command: &ProgramCommand) -> CommandOutcome {
         ProgramCommand::Excite(args) => commands::excite::run(host, args),
         #[cfg(feature = "experiment")]
         ProgramCommand::Experiment(args) => commands::experiment::run(host, args),
+        ProgramCommand::Doctor(args) => commands::doctor::run(args),
+        ProgramCommand::Manual(args) => commands::manual::run(args),
         ProgramCommand::Completions(args) => commands::completions::run(args),
         #[cfg(feature = "workbench")]
         ProgramCommand::Work(args) => commands::work::run(host, args),

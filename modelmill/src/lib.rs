@@ -210,6 +210,7 @@ pub mod identify;
 pub mod import;
 pub mod interpret;
 pub mod model;
+pub mod options;
 pub mod picture;
 pub mod print;
 pub mod progress;

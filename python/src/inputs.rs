@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 
 use crate::errors::input_error;
 use crate::model::new_host;
-use crate::options::ReadingOptions;
+use crate::options::Keywords;
 use crate::results::{PythonRecording, PythonResult, RemarkList};
 use crate::work::{run_blocking, run_interruptible};
 
@@ -30,7 +30,7 @@ pub(crate) enum PythonInput<'py> {
     /// One that was prepared before.
     Prepared(PyRef<'py, PythonRecording>),
     /// Name in messages, source and options.
-    Source(String, PythonSource<'py>, ReadingOptions),
+    Source(String, PythonSource<'py>, Keywords<RecordingOptions>),
 }
 
 /// A prepared recording, or the exception that states why there is none.
@@ -52,9 +52,9 @@ impl PassedRecording {
         py: Python<'_>,
         name: &str,
         source: PythonSource<'_>,
-        options: &ReadingOptions,
+        options: &Keywords<RecordingOptions>,
     ) -> PyResult<Self> {
-        let reading = options.reading().map_err(|says| input_error(py, &says))?;
+        let reading = options.options().map_err(|says| input_error(py, &says))?;
         Ok(match source {
             PythonSource::Files(files) => Self::Files(files, reading),
             PythonSource::Table(columns) => {

@@ -7,10 +7,10 @@ use std::sync::Arc;
 use modelmill::add::{EffectSetting, SettingValue, new_effect};
 use modelmill::diagnose::{DiagnosisOptions, FixedParameters};
 use modelmill::generate::{CodeLanguage, CodeOptions};
-use modelmill::identify::Instruments;
+use modelmill::identify::{EstimatorOptions, Instruments};
 use modelmill::model::{ModelChanges, PageFormat};
 use modelmill::picture::PictureOptions;
-use modelmill::recording::PreparedRecording;
+use modelmill::recording::{PreparedRecording, RecordingOptions};
 use modelmill::report::{page, runs_page};
 use modelmill::runs::UnreadRun;
 use modelmill::states::{ModelFunction, ModelFunctions, StateSamples};
@@ -23,7 +23,7 @@ use pyo3::prelude::*;
 use crate::arrays::state_matrix;
 use crate::errors::{input_error, library_error};
 use crate::inputs::{PassedRecording, PythonInput, RecordingOrError};
-use crate::options::{self, EstimationOptions, ExcitationOptions, OptionResult};
+use crate::options::{self, ExcitationOptions, Keywords, OptionResult};
 use crate::results::{PythonExcitation, PythonRecording, PythonResult, RemarkList, remarks};
 use crate::spelling::PythonSpelling;
 use crate::work::{JobListener, run_blocking, run_interruptible};
@@ -434,12 +434,17 @@ impl CoreModel {
         py: Python<'_>,
         data: Vec<PyRef<'_, PythonRecording>>,
         check: Vec<PyRef<'_, PythonRecording>>,
-        options: EstimationOptions,
+        options: Keywords<EstimatorOptions>,
+        reading: Keywords<RecordingOptions>,
         instruments: Vec<PyRef<'_, PythonRecording>>,
         instrument_period: Option<f64>,
         progress: Option<Bound<'_, PyAny>>,
     ) -> PyResult<PythonResult> {
-        let estimation = valid_options(py, options.estimation())?;
+        let standstill = valid_options(py, reading.options())?.standstill.bound();
+        let estimation = EstimatorOptions {
+            standstill: standstill.filter(|part| *part > 0.0),
+            ..valid_options(py, options.options())?
+        };
         let (data, check) = (recordings(&data), recordings(&check));
         let instruments = recordings(&instruments);
         self.run_interruptible(py, progress.as_ref(), || {

@@ -2,164 +2,86 @@
 
 use modelmill::diagnose::NamedEffect;
 use modelmill::excite::{ExcitationCriterion, ExcitationRequest, Options, SeparationRequest, TrajectoryLimit};
-use modelmill::identify::{EquationWeights, EstimateRefinement, EstimatorOptions};
-use modelmill::recording::{
-    DerivativeSource, MAX_FILTER_ORDER, RecordingOptions, SmoothingMethod, StandstillRule, StatePreparation,
-};
+use modelmill::options::{DeclaredOptions, OptionDeclaration, OptionKind, OptionValue, find_excluded_pair};
 use modelmill::runs::{KnownLoad, PerRunSelection, RunsOptions};
 use pyo3::prelude::*;
+use pyo3::types::PyFloat;
 
 /// An option, or a sentence with the fault of its value.
 pub(crate) type OptionResult<T> = Result<T, String>;
 
-/// How a recording is read and prepared; the keywords of every method that takes recordings.
-#[derive(FromPyObject)]
-#[pyo3(from_item_all)]
-pub(crate) struct ReadingOptions {
-    /// Names of the model with the columns of the recording.
-    columns: Vec<(String, String)>,
-    /// Cut-off frequency of the low-pass, Hz.
-    cutoff_hz: Option<f64>,
-    /// Order of the low-pass.
-    order: Option<usize>,
-    /// Numbers of samples to remove at the start and at the end.
-    trim: Option<(usize, usize)>,
-    /// Decimation: one of so many samples is kept.
-    decimate: usize,
-    /// Source of rates and accelerations: `recorded` or `positions`.
-    source: String,
-    /// Method of smoothing.
-    smoothing: String,
-    /// Period of the motion, s, for a Fourier series.
-    period: Option<f64>,
-    /// Highest frequency at which forces are compared, Hz.
-    band_hz: Option<f64>,
-    /// Whether samples with NaN or empty fields are left out.
-    skip_bad_samples: bool,
-    /// Whether forces during contacts and pushes are left out of fits and error figures.
-    leave_out_events: bool,
-    /// First and last time that are used, s.
-    between: Option<(f64, f64)>,
-    /// Sampling rate of recordings without times, Hz.
-    rate: Option<f64>,
-    /// Forces of a drive that is slower than this fraction of its maximum rate are left out; 0 leaves out none.
-    standstill: Option<f64>,
-}
+/// The options of a list of declarations, from a mapping of keywords to values. None and false stand for no value.
+pub(crate) struct Keywords<T>(OptionResult<T>);
 
-impl ReadingOptions {
+impl<T: DeclaredOptions> Keywords<T> {
     /// The options of the library; fails with the first invalid value.
-    pub(crate) fn reading(&self) -> OptionResult<RecordingOptions> {
-        let usual = StatePreparation::default();
-        let order = self.order.unwrap_or(usual.order);
-        if !(1..=MAX_FILTER_ORDER).contains(&order) {
-            return Err(format!("order={order}: expected 1 to {MAX_FILTER_ORDER}; 4 is usual"));
-        }
-        if self.decimate == 0 {
-            return Err("decimate=0: expected an integer of at least 1; 1 keeps all samples".to_owned());
-        }
-        if let Some((from, to)) = self.between
-            && !(from < to && from.is_finite() && to.is_finite())
-        {
-            return Err(format!(
-                "between=({from}, {to}): expected two times in s, the first before the second"
-            ));
-        }
-        Ok(RecordingOptions {
-            columns: self.columns.clone(),
-            preparation: StatePreparation {
-                cutoff_hz: check_positive("cutoff_hz", self.cutoff_hz, "a frequency in Hz such as 25")?,
-                order,
-                trim: self.trim,
-                decimate: self.decimate,
-                band_hz: check_positive("band_hz", self.band_hz, "a frequency in Hz such as 25")?,
-                source: match self.source.as_str() {
-                    "recorded" => DerivativeSource::RecordedFirst,
-                    "positions" => DerivativeSource::Positions,
-                    other => {
-                        return Err(expected_one_of("source", other, &["recorded", "positions"]));
-                    }
-                },
-                smoothing: self.smoothing()?,
-                ..usual
-            },
-            skip_bad_samples: self.skip_bad_samples,
-            leave_out_events: self.leave_out_events,
-            between: self.between,
-            rate: check_positive("rate", self.rate, "a sampling rate in Hz such as 100")?,
-            standstill: match check_fraction("standstill", self.standstill)? {
-                None => StandstillRule::Automatic,
-                Some(part) if part > 0.0 => StandstillRule::Below(part),
-                Some(_) => StandstillRule::KeepAll,
-            },
-        })
-    }
-
-    /// The method of smoothing; a period selects the Fourier series.
-    fn smoothing(&self) -> OptionResult<SmoothingMethod> {
-        let period = check_positive("period", self.period, "a time in s such as 7.29")?;
-        Ok(match (self.smoothing.as_str(), period) {
-            ("auto", None) => SmoothingMethod::Automatic,
-            ("auto" | "fourier", period) => SmoothingMethod::Fourier { period },
-            ("butterworth", _) => SmoothingMethod::Butterworth,
-            ("savitzky_golay", _) => SmoothingMethod::SavitzkyGolay,
-            (other, _) => {
-                let known = ["auto", "butterworth", "savitzky_golay", "fourier"];
-                return Err(expected_one_of("smoothing", other, &known));
-            }
-        })
+    pub(crate) fn options(&self) -> OptionResult<T> {
+        self.0.clone()
     }
 }
 
-/// How parameters are estimated.
-#[derive(FromPyObject)]
-#[pyo3(from_item_all)]
-pub(crate) struct EstimationOptions {
-    /// Weights of the equations.
-    weights: String,
-    /// Bound of the robust weights.
-    robust: Option<f64>,
-    /// Relative standard deviation of the nominal values, as prior knowledge.
-    prior: Option<f64>,
-    /// Whether the parameters must be physically possible.
-    physical: bool,
-    /// Whether parameters that the recording does not support are left out.
-    essential: bool,
-    /// Equations of a drive that is slower than this fraction of its maximum rate are excluded.
-    standstill: Option<f64>,
+impl<'py, T: DeclaredOptions> FromPyObject<'_, 'py> for Keywords<T> {
+    type Error = PyErr;
+
+    fn extract(given: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        Ok(Self(read_keywords(&given)?))
+    }
 }
 
-impl EstimationOptions {
-    /// The options of the library; fails with the first invalid value.
-    pub(crate) fn estimation(&self) -> OptionResult<EstimatorOptions> {
-        let prior = check_positive("prior", self.prior, "a relative standard deviation such as 0.2")?;
-        let refinement = match (prior, self.physical, self.essential) {
-            (None, false, false) => EstimateRefinement::None,
-            (Some(sigma), false, false) => EstimateRefinement::Prior(sigma),
-            (None, true, false) => EstimateRefinement::Physical,
-            (None, false, true) => EstimateRefinement::Essential,
-            _ => {
-                return Err("prior, physical and essential exclude each other; give one of them".to_owned());
-            }
-        };
-        Ok(EstimatorOptions {
-            weights: match self.weights.as_str() {
-                "auto" => EquationWeights::Automatic,
-                "none" => EquationWeights::None,
-                "channels" => EquationWeights::Channels,
-                "variance" => EquationWeights::Variance,
-                other => {
-                    return Err(expected_one_of(
-                        "weights",
-                        other,
-                        &["auto", "none", "channels", "variance"],
-                    ));
-                }
-            },
-            robust: check_positive("robust", self.robust, "a bound such as 1.345")?,
-            refinement,
-            standstill: check_fraction("standstill", self.standstill)?.filter(|part| *part > 0.0),
-        })
+/// Sets the options of all keywords. The outer error is for what is no mapping.
+fn read_keywords<T: DeclaredOptions>(given: &Bound<'_, PyAny>) -> PyResult<OptionResult<T>> {
+    let mut options = T::default();
+    let mut names = Vec::new();
+    for one in T::declarations() {
+        if !given.contains(one.name)? {
+            continue;
+        }
+        let value = given.get_item(one.name)?;
+        let is_switch = matches!(one.kind, OptionKind::Switch { .. });
+        if value.is_none() || is_switch && !value.is_truthy()? {
+            continue;
+        }
+        let read = read_value(one, &value).ok_or_else(|| one.expected());
+        if let Err(expected) = read.and_then(|value| one.set(&mut options, value)) {
+            return Ok(Err(format!("{}={}: {expected}", one.name, value.repr()?)));
+        }
+        names.push(one.name);
     }
+    Ok(match find_excluded_pair::<T>(&names) {
+        None => Ok(options),
+        Some((one, other)) => Err(format!("{one} and {other} exclude each other; give one of them")),
+    })
+}
+
+/// A value of Python for an option, converted as `float()` and `operator.index()` do; none for one of another type.
+fn read_value<T>(one: &OptionDeclaration<T>, value: &Bound<'_, PyAny>) -> Option<OptionValue> {
+    let number = |value: &Bound<'_, PyAny>| -> Option<f64> {
+        let number = value.py().get_type::<PyFloat>().call1((value,)).ok()?;
+        number.extract().ok()
+    };
+    let integer = |value: &Bound<'_, PyAny>| value.extract::<usize>().ok();
+    let pair = || -> Option<[Bound<'_, PyAny>; 2]> {
+        let parts: Vec<Bound<'_, PyAny>> = value.try_iter().ok()?.collect::<PyResult<_>>().ok()?;
+        parts.try_into().ok()
+    };
+    Some(match &one.kind {
+        OptionKind::Switch { .. } => OptionValue::On,
+        OptionKind::Number { .. } => OptionValue::Number(number(value)?),
+        OptionKind::Integer { .. } => OptionValue::Integer(integer(value)?),
+        OptionKind::IntegerPair { .. } => {
+            if let Some(both) = integer(value) {
+                return Some(OptionValue::IntegerPair(both, both));
+            }
+            let [first, second] = pair()?;
+            OptionValue::IntegerPair(integer(&first)?, integer(&second)?)
+        }
+        OptionKind::Interval { .. } => {
+            let [from, to] = pair()?;
+            OptionValue::Interval(number(&from)?, number(&to)?)
+        }
+        OptionKind::Choice { .. } => OptionValue::Choice(value.extract().ok()?),
+        OptionKind::Columns { .. } => OptionValue::Columns(value.extract().ok()?),
+    })
 }
 
 /// Options of an excitation.
@@ -282,16 +204,6 @@ fn check_positive(name: &str, value: Option<f64>, expected: &str) -> OptionResul
         Some(value) if !(value > 0.0 && value.is_finite()) => {
             Err(format!("{name}={value}: expected {expected}, above 0"))
         }
-        value => Ok(value),
-    }
-}
-
-/// An optional fraction, which must be from 0 to below 1.
-fn check_fraction(name: &str, value: Option<f64>) -> OptionResult<Option<f64>> {
-    match value {
-        Some(value) if !(0.0..1.0).contains(&value) => Err(format!(
-            "{name}={value}: expected a number between 0 and 1, such as 0.01"
-        )),
         value => Ok(value),
     }
 }

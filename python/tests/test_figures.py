@@ -73,7 +73,38 @@ def test_help_shows_real_keywords() -> None:
         assert signature.parameters["cutoff_hz"].kind is inspect.Parameter.KEYWORD_ONLY
         assert signature.parameters["trim"].default is None
         assert "standstill" in (method.__doc__ or "")
-    assert list(inspect.signature(modelmill.Model.identify).parameters)[:4] == ["self", "data", "check", "weights"]
+    identify = inspect.signature(modelmill.Model.identify).parameters
+    assert list(identify)[:3] == ["self", "data", "check"]
+    assert (identify["weights"].default, identify["robust"].default, identify["physical"].default) == ("auto", None, False)
+    assert "options" not in identify
+
+
+@pytest.mark.filterwarnings("ignore::modelmill.ModelmillWarning")
+def test_values_of_options_are_checked() -> None:
+    m = modelmill.load(MODELS / "spidermill.toml", progress=False)
+    for options, says in (
+        ({"cutoff_hz": "fast"}, "cutoff_hz='fast': expected a frequency"),
+        ({"cutoff_hz": 0}, "cutoff_hz=0: expected a frequency"),
+        ({"order": 2.5}, "order=2.5: expected an order"),
+        ({"order": 0}, "order=0: expected an order"),
+        ({"decimate": 0}, "decimate=0: expected an integer"),
+        ({"trim": (1, 2, 3)}, "trim=.*: expected a number of samples"),
+        ({"between": (3, 1)}, "between=.*: expected two times"),
+        ({"smoothing": "none"}, "smoothing='none': expected one of auto, butterworth"),
+        ({"standstill": 1}, "standstill=1: expected a number between 0 and 1"),
+        ({"weights": "some"}, "weights='some': expected one of auto"),
+        ({"prior": 0.2, "physical": True}, "physical and prior exclude each other"),
+    ):
+        with pytest.raises(ModelmillError, match=says):
+            m.identify(RUN, progress=False, **options)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="unknown keyword cut; .*cutoff_hz"):
+        m.identify(RUN, cut=3, progress=False)  # type: ignore[call-arg]
+    # None and False stand for no value, and a single number of samples for both ends.
+    same = [
+        m.identify(RUN, progress=False, robust=None, physical=False, trim=trim, cutoff_hz=np.float32(20), order=np.int64(4))
+        for trim in (50, (50, 50))
+    ]
+    assert np.array_equal(same[0].values, same[1].values)
 
 
 ARM = """<robot name="arm"><link name="base"><inertial><mass value="3"/>

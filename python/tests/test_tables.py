@@ -121,7 +121,7 @@ def test_options_that_make_no_sense_are_told(m: modelmill.Model) -> None:
     for options, says in [
         ({"cutoff_hz": -1.0}, "cutoff_hz=-1"),
         ({"order": 99}, "order=99"),
-        ({"cutoff_hz": "fast"}, "a number"),
+        ({"cutoff_hz": "fast"}, "a frequency"),
         ({"trim": (1, 2, 3)}, "a number of samples"),
         ({"decimate": 1.5}, "an integer"),
         ({"smoothing": "boxcar"}, "savitzky_golay"),

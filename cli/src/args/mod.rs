@@ -2,6 +2,7 @@
 
 mod code;
 pub(crate) mod data;
+mod declared;
 pub(crate) mod drawing;
 pub(crate) mod effects;
 pub(crate) mod estimation;
@@ -279,12 +280,24 @@ pub(crate) enum ProgramCommand {
         modelmill experiment --out /tmp --random 100 --starts 1 --json"
     )]
     Experiment(ExperimentArgs),
+    /// Report what this computer has of other programs, and which command needs what is missing
+    #[command(
+        after_help = "Other programs, such as compilers, are needed only for what the last column names. \
+        Exit status 1: the program itself does not work.\n\n\
+        Examples:\n  modelmill doctor\n  \
+        modelmill doctor --json | jq '.requirements[] | select(.state != \"present\") | .name'"
+    )]
+    Doctor(DoctorArgs),
     /// Print a completion script for a shell
     #[command(after_help = "Examples:\n  \
         modelmill completions bash > ~/.local/share/bash-completion/completions/modelmill\n  \
         modelmill completions zsh > ~/.zfunc/_modelmill\n  \
         modelmill completions fish > ~/.config/fish/completions/modelmill.fish")]
     Completions(CompletionsArgs),
+    /// Print the reference of all commands and options as Markdown, or write manual pages (man)
+    #[command(after_help = "Examples:\n  modelmill manual > commands.md\n  \
+        modelmill manual --out ~/.local/share/man/man1")]
+    Manual(ManualArgs),
     /// Show all main steps on bundled recordings: derive, compare, find the missing effect, add it, identify again
     #[command(after_help = "Examples:\n  modelmill tour\n  modelmill tour --out tour")]
     Tour(TourArgs),
@@ -321,11 +334,27 @@ pub(crate) struct DiffArgs {
     pub(crate) preparation: PreparationArgs,
 }
 
+/// `doctor`.
+#[derive(Debug, Args)]
+pub(crate) struct DoctorArgs {
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
 /// `completions`.
 #[derive(Debug, Args)]
 pub(crate) struct CompletionsArgs {
     /// Shell for which the script is written
     pub(crate) shell: clap_complete::Shell,
+}
+
+/// `manual`.
+#[derive(Debug, Args)]
+pub(crate) struct ManualArgs {
+    /// Write manual pages into this folder, one for the program and one for each command, instead of the reference
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
 }
 
 /// `tour`.

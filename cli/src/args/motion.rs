@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use modelmill::excite::TrajectoryLimit;
+use modelmill::options::parse_column;
 
 use crate::args::data::ParameterSource;
-use crate::args::preparation;
 use crate::args::separate::SeparateArgs;
 
 /// `simulate`.
@@ -30,7 +30,7 @@ pub(crate) struct SimulateArgs {
     #[arg(long, value_name = "N")]
     pub(crate) seed: Option<u64>,
     /// Column of the trajectory or recording for a name of the rig or model, e.g. `--map theta1=pos_left`; may be repeated
-    #[arg(long, value_name = "NAME=COLUMN", value_parser = preparation::parse_map)]
+    #[arg(long, value_name = "NAME=COLUMN", value_parser = parse_column)]
     pub(crate) map: Vec<(String, String)>,
     /// Print one JSON object on standard output
     #[arg(long)]

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use modelmill::diagnose::NamedEffect;
 use modelmill::excite::SeparationRequest;
+use modelmill::options::parse_column;
 use modelmill::recording::RecordingOptions;
 
 /// The effects that the motion has to distinguish.
@@ -30,7 +31,7 @@ pub(crate) struct SeparateArgs {
     #[arg(long, value_name = "RUN", num_args = 1.., requires = "separate")]
     pub(crate) data: Vec<PathBuf>,
     /// Column of the recordings for a name of the model, e.g. `--map theta1=pos_left`; may be repeated
-    #[arg(long, value_name = "NAME=COLUMN", value_parser = super::preparation::parse_map, requires = "data")]
+    #[arg(long, value_name = "NAME=COLUMN", value_parser = parse_column, requires = "data")]
     pub(crate) map: Vec<(String, String)>,
 }
 

@@ -28,7 +28,7 @@ pub(crate) fn run(host: &Host, args: &IdentifyArgs) -> CommandOutcome {
         .map(|path| OutputFile::new(path, inputs))
         .transpose()?;
     let mut reading = args.preparation.reading();
-    let standstill = args.preparation.standstill;
+    let standstill = args.preparation.standstill();
     // A bound of the user belongs to the estimator, which applies it to the equations of the fit only.
     if standstill.is_some() {
         reading.standstill = StandstillRule::KeepAll;

@@ -9,133 +9,9 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::common::markdown::Page;
 use crate::common::{modelmill, printed, workspace};
-
-/// A block between fences.
-struct Block {
-    /// Its language, empty if none is said.
-    language: String,
-    text: String,
-    /// Whether nothing but empty lines stands between it and the block before.
-    follows: bool,
-}
-
-/// A page of Markdown: its blocks, and the lines outside of them.
-struct Page {
-    path: PathBuf,
-    blocks: Vec<Block>,
-    prose: String,
-}
-
-impl Page {
-    fn read(path: &Path) -> Self {
-        let text = fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-        let mut page = Self {
-            path: path.to_owned(),
-            blocks: Vec::new(),
-            prose: String::new(),
-        };
-        let mut inside = false;
-        let mut follows = false;
-        for line in text.lines() {
-            if let Some(language) = line.strip_prefix("```") {
-                if !inside {
-                    page.blocks.push(Block {
-                        language: language.to_owned(),
-                        text: String::new(),
-                        follows,
-                    });
-                }
-                inside = !inside;
-                follows = true;
-            } else if inside {
-                let block = page.blocks.last_mut().expect("a block was opened");
-                block.text.push_str(line);
-                block.text.push('\n');
-            } else {
-                follows &= line.is_empty();
-                page.prose.push_str(line);
-                page.prose.push('\n');
-            }
-        }
-        assert!(!inside, "{}: a block has no end", path.display());
-        page
-    }
-
-    /// The commands of a block, each as its words.
-    fn commands(block: &Block) -> Vec<Vec<String>> {
-        if block.language != "sh" {
-            return Vec::new();
-        }
-        let text = block.text.replace("\\\n", " ");
-        text.lines()
-            .map(words_of_shell)
-            .filter(|words| words.first().is_some_and(|word| word == "modelmill"))
-            .map(|words| words[1..].to_vec())
-            .collect()
-    }
-
-    /// The anchors that headings make.
-    fn anchors(&self) -> BTreeSet<String> {
-        self.prose
-            .lines()
-            .filter(|line| line.starts_with('#'))
-            .map(|line| {
-                let title = line.trim_start_matches('#').trim().to_lowercase();
-                title
-                    .chars()
-                    .filter(|c| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_'))
-                    .map(|c| if c == ' ' { '-' } else { c })
-                    .collect()
-            })
-            .collect()
-    }
-
-    /// What links and pictures outside of code lead to, and files that are included.
-    fn targets(&self) -> Vec<String> {
-        let prose: String = self.prose.split('`').step_by(2).collect::<Vec<_>>().join("`");
-        let links = prose.split("](").skip(1);
-        let mut targets: Vec<String> = links
-            .filter_map(|rest| rest.split_once(')'))
-            .map(|(target, _)| target.to_owned())
-            .collect();
-        for block in &self.blocks {
-            for rest in block.text.split("{{#include ").skip(1) {
-                let path = rest.split([':', '}']).next().unwrap_or_default();
-                targets.push(path.to_owned());
-            }
-        }
-        targets
-    }
-}
-
-/// Splits a line as a shell does, without what follows a comment sign.
-fn words_of_shell(line: &str) -> Vec<String> {
-    let mut words: Vec<String> = Vec::new();
-    let mut quoted = false;
-    let mut open = false;
-    for c in line.chars() {
-        match c {
-            '"' => {
-                quoted = !quoted;
-                if quoted && !open {
-                    words.push(String::new());
-                    open = true;
-                }
-            }
-            '#' if !quoted && !open => break,
-            c if c.is_whitespace() && !quoted => open = false,
-            c => {
-                if !open {
-                    words.push(String::new());
-                    open = true;
-                }
-                words.last_mut().expect("a word was opened").push(c);
-            }
-        }
-    }
-    words
-}
+use crate::skills::skill_paths;
 
 fn guide() -> PathBuf {
     workspace("docs/guide/src")
@@ -147,10 +23,11 @@ fn chapters() -> Vec<String> {
     summary.targets()
 }
 
-/// README and chapters.
+/// README, chapters, and pages of tasks for agents.
 fn pages() -> Vec<Page> {
     let mut pages = vec![Page::read(&workspace("README.md"))];
     pages.extend(chapters().iter().map(|name| Page::read(&guide().join(name))));
+    pages.extend(skill_paths().iter().map(|path| Page::read(path)));
     pages
 }
 
@@ -199,6 +76,7 @@ fn every_chapter_is_a_file_and_every_file_a_chapter() {
 fn every_link_leads_somewhere() {
     let mut pages = pages();
     for name in [
+        "AGENTS.md",
         "ARCHITECTURE.md",
         "CONTRIBUTING.md",
         "docs/guide/src/SUMMARY.md",

@@ -622,3 +622,34 @@ fn magnitudes_show_wrong_signs_and_units() {
     let partly = checked(&arm.replace(", M = 2.1", ""));
     assert!(partly["total_mass"].is_null(), "{partly:#}");
 }
+
+/// An angle of a quarter turn is a rounded number: the arm stays in its plane, and the text states a size of 0 across it.
+#[test]
+fn rounded_angles_leave_no_size_across_a_plane() {
+    let [robot, file] = ["quarter_turn.urdf", "quarter_turn.toml"].map(scratch);
+    let inertial = "<inertial><mass value=\"1\"/><inertia ixx=\"1\" iyy=\"1\" izz=\"1\" ixy=\"0\" ixz=\"0\" iyz=\"0\"/></inertial>";
+    let joint = |name: &str, parent: &str, child: &str, origin: &str| {
+        format!(
+            "<joint name=\"{name}\" type=\"continuous\"><parent link=\"{parent}\"/><child link=\"{child}\"/>\
+             <origin {origin}/><axis xyz=\"0 0 1\"/></joint>"
+        )
+    };
+    let text = format!(
+        "<robot name=\"r\"><link name=\"base\"/><link name=\"a\">{inertial}</link><link name=\"b\">{inertial}</link>{}{}</robot>",
+        joint("ja", "base", "a", "rpy=\"1.5707963267948966 0 0\""),
+        joint("jb", "a", "b", "xyz=\"0.3 0 0\"")
+    );
+    std::fs::write(&robot, text).expect("written");
+    printed(&["import", &robot, "--out", &file]);
+    let text = printed(&["check", &file]);
+    let size = text
+        .lines()
+        .find(|line| line.contains(" m along x, y, z"))
+        .expect("a size");
+    let sides: Vec<f64> = size
+        .split_whitespace()
+        .filter_map(|word| word.parse().ok())
+        .take(3)
+        .collect();
+    assert!(sides[0] > 0.1 && sides[2] > 0.1 && sides[1].abs() == 0.0, "{size}");
+}

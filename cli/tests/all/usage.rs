@@ -58,6 +58,8 @@ fn every_command_helps_with_an_example() {
         "reduce",
         "import",
         "export",
+        "doctor",
+        "manual",
         "completions",
         "tour",
     ] {
@@ -322,4 +324,54 @@ fn help_that_cannot_be_written_is_an_error() {
         assert_eq!(ended.status.code(), Some(1), "{args:?}");
         assert!(String::from_utf8_lossy(&ended.stderr).contains("standard output cannot be written"));
     }
+}
+
+/// The reference in the guide is what the program prints. `UPDATE_REFERENCE=1` writes it.
+#[test]
+fn the_reference_of_the_guide_is_that_of_the_program() {
+    let path = crate::common::workspace("docs/guide/src/commands.md");
+    let expected = printed(&["manual"]);
+    if std::env::var_os("UPDATE_REFERENCE").is_some() {
+        std::fs::write(&path, &expected).expect("written");
+    }
+    let found = std::fs::read_to_string(&path).unwrap_or_default();
+    assert!(
+        found == expected,
+        "docs/guide/src/commands.md is old; write it with UPDATE_REFERENCE=1 cargo test --workspace --test all -- reference"
+    );
+    // Every flag that a help lists is in the reference.
+    for command in ["identify", "excite", "diagnose", "import", "manual"] {
+        let help = printed(&[command, "--help"]);
+        let flags = help.lines().map(str::trim_start).filter(|line| line.starts_with("--"));
+        for flag in flags.filter_map(|line| line.split([' ', '[']).next()) {
+            assert!(expected.contains(&format!("| `{flag}")), "{command} {flag}");
+        }
+    }
+}
+
+/// One manual page for the program and one for each command, each with the flags of its command.
+#[test]
+fn manual_pages_are_written_for_all_commands() {
+    let folder = std::path::PathBuf::from(crate::common::scratch("man"));
+    let path = folder.display().to_string();
+    printed(&["manual", "--out", &path]);
+    let help = printed(&["help"]);
+    let commands = help.split("Commands:\n").nth(1).expect("a list of commands");
+    let names = commands
+        .lines()
+        .take_while(|line| !line.is_empty())
+        .filter(|line| line.starts_with("  ") && !line.starts_with("   "))
+        .filter_map(|line| line.split_whitespace().next())
+        .filter(|name| *name != "help");
+    let mut pages = 0;
+    for name in names {
+        let page = std::fs::read_to_string(folder.join(format!("modelmill-{name}.1"))).expect("a page");
+        let title = format!(".TH MODELMILL-{} 1", name.to_uppercase());
+        assert!(page.contains(&title), "{page}");
+        pages += 1;
+    }
+    assert!(pages > 20, "{pages} pages");
+    let identify = std::fs::read_to_string(folder.join("modelmill-identify.1")).expect("a page");
+    // A hyphen of a flag is escaped in manual pages.
+    assert!(identify.contains("\\-\\-leave\\-out\\-events"), "{identify}");
 }

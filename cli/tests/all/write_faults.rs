@@ -196,6 +196,7 @@ fn files_of_models_are_written_completely_or_not_at_all() {
         &[
             &["equations", &two_link, "--out", "out.md"],
             &["check", &two_link, "--picture", "out.svg"],
+            &["manual", "--out", "."],
             &["export", &two_link, "--out", "out.urdf"],
             &["atlas", &two_link, &four_bar, "--out", "."],
             &[

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use crate::model::Model;
 use crate::model::sampled_rank::reachable_states;
-use crate::model::thresholds::{EARTH_GRAVITY, SIZE_POSES, SMALL_COMPONENT};
+use crate::model::thresholds::{EARTH_GRAVITY, ROUNDING_OF_SIZE, SIZE_POSES, SMALL_COMPONENT};
 use crate::text::table::significant;
 
 /// Gravity, mass and size of a mechanism at the values of its file.
@@ -66,7 +66,13 @@ impl ModelMagnitudes {
 
     /// The size as words.
     pub(crate) fn extent_text(&self) -> Option<String> {
-        let sides = self.extent?.map(|[low, high]| significant(high - low, 3));
+        let lengths = self.extent?.map(|[low, high]| high - low);
+        let largest = lengths.into_iter().fold(0.0, f64::max);
+        let sides = lengths.map(|length| {
+            // A quarter of a turn as a number leaves 1e-17 m across a plane.
+            let is_rounding = length < ROUNDING_OF_SIZE * largest;
+            significant(if is_rounding { 0.0 } else { length }, 3)
+        });
         let poses = self.n_poses;
         Some(format!(
             "{} m along x, y, z: around all frames and points at {poses} random poses near the nominal one",

@@ -40,3 +40,14 @@ pub enum StandstillRule {
     /// No forces are left out.
     KeepAll,
 }
+
+impl StandstillRule {
+    /// The fraction of the largest rate that was set, 0 if no forces are left out; none for the automatic rule.
+    pub fn bound(self) -> Option<f64> {
+        match self {
+            Self::Automatic => None,
+            Self::Below(part) => Some(part),
+            Self::KeepAll => Some(0.0),
+        }
+    }
+}

@@ -8,6 +8,7 @@ mod hanging;
 mod made;
 mod mechanisms;
 mod missing;
+mod options;
 mod permuted_entries;
 mod redundant_drives;
 mod run_plans;

@@ -107,6 +107,7 @@ class Model:
         data: list[Recording],
         check: list[Recording],
         options: Mapping[str, Any],
+        reading: Mapping[str, Any],
         instruments: list[Recording],
         instrument_period: float | None,
         progress: _Progress,

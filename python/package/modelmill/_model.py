@@ -8,9 +8,8 @@ import os
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from operator import index
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypedDict, Union, overload
+from typing import TYPE_CHECKING, Any, Union, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,7 +18,8 @@ from . import _core
 from ._compiled import Compiled
 from ._errors import ModelmillError, ModelmillWarning
 from ._figures import force_figure
-from ._keywords import with_reading_keywords
+from ._keywords import with_keywords
+from ._options import ESTIMATION, READING, EstimationOptions, PathText, ReadingOptions
 from ._progress import Told, told
 from ._results import (
     AnswerT,
@@ -47,120 +47,30 @@ if TYPE_CHECKING:
     from typing_extensions import Unpack
 
 Floats = NDArray[np.float64]
-PathText = Union[str, "os.PathLike[str]"]
 #: Base parameters: nominal values (None), a fit, the path of one, values in the order of ``p_min``, or some values by name.
 Values = Union[None, Identification, PathText, Mapping[str, float], ArrayLike]
 Progress = Union[Told, bool, None]
 
 
-class ReadingOptions(TypedDict, total=False):
-    """How a recording is read and its states are prepared; keywords of every method that takes recordings.
-
-    Attributes
-    ----------
-    columns : dict of str to str, or path
-        Names that the model needs, each with the name of a column of the recording, or a sum of columns, with a unit if it is
-        not SI: ``{"q6": "(pos6 - pos5)/32 - 90 [deg]"}``. The model needs ``t``, coordinates, and drives. Optional are a
-        coordinate with ``_d`` or ``_dd``, and a drive with ``_var`` for the variance of its force. Or the path of a file with
-        the table ``[recording.columns]``.
-    cutoff_hz : float
-        Cut-off of the low-pass on positions, Hz; default: chosen by cross-validation on the forces.
-    order : int
-        Order of the low-pass, which is applied forwards and backwards; default 4.
-    trim : int or (int, int)
-        Samples dropped at the start and at the end.
-    decimate : int
-        Keep every n-th sample, after an anti-aliasing low-pass on forces and regressor.
-    source : {"recorded", "positions"}
-        Whether recorded rates and accelerations are used, or all are computed from positions.
-    smoothing : {"auto", "butterworth", "savitzky_golay", "fourier"}
-        How positions are smoothed and differentiated.
-    period : float
-        Period of the motion, s, for a Fourier series.
-    band_hz : float
-        Cut-off of the low-pass for the error figures "in band", Hz.
-    skip_bad_samples : bool
-        Leave out samples with NaN instead of refusing the recording.
-    leave_out_events : bool
-        Leave out the forces during contacts and pushes.
-    between : (float, float)
-        Read only the samples between these times, s.
-    rate : float
-        Sampling rate of recordings without a column of times, Hz.
-    standstill : float
-        Leave out the forces of a drive while it is slower than this fraction of its maximum speed; 0 leaves out none. Default:
-        where the forces show that the drive sticks.
-    """
-
-    columns: Mapping[str, str] | PathText
-    cutoff_hz: float | None
-    order: int | None
-    trim: int | tuple[int, int] | None
-    decimate: int
-    source: str
-    smoothing: str
-    period: float | None
-    band_hz: float | None
-    skip_bad_samples: bool
-    leave_out_events: bool
-    between: tuple[float, float] | None
-    rate: float | None
-    standstill: float | None
-
-
-_READING: dict[str, Any] = {
-    "columns": {},
-    "cutoff_hz": None,
-    "order": None,
-    "trim": None,
-    "decimate": 1,
-    "source": "recorded",
-    "smoothing": "auto",
-    "period": None,
-    "band_hz": None,
-    "skip_bad_samples": False,
-    "leave_out_events": False,
-    "between": None,
-    "rate": None,
-    "standstill": None,
-}
+class IdentificationOptions(EstimationOptions, ReadingOptions, total=False):
+    """Keywords of :meth:`Model.identify`."""
 
 
 def _reading(options: Mapping[str, Any]) -> dict[str, Any]:
-    unknown = [name for name in options if name not in _READING]
-    if unknown:
-        raise TypeError(f"unknown keyword {', '.join(unknown)}; the keywords for reading a recording are {', '.join(_READING)}")
-    whole = {**_READING, **options}
-    columns = whole["columns"] or {}
+    _refuse_unknown(options, READING)
+    columns = options.get("columns") or {}
     if isinstance(columns, (str, os.PathLike)):
-        whole["columns"] = _core.column_mapping(columns)
+        pairs = _core.column_mapping(columns)
     else:
-        whole["columns"] = [(str(ours), str(theirs)) for ours, theirs in dict(columns).items()]
-    trim = whole["trim"]
-    whole["trim"] = None if trim is None else trim if isinstance(trim, (tuple, list)) else (trim, trim)
-    for names, expected, of in _TYPES:
-        for name in names:
-            try:
-                whole[name] = None if whole[name] is None else of(whole[name])
-            except (TypeError, ValueError):
-                raise ModelmillError(f"{name}={whole[name]!r}: expected {expected}") from None
-    return whole
+        pairs = [(str(ours), str(theirs)) for ours, theirs in dict(columns).items()]
+    return {**options, "columns": pairs}
 
 
-def _pair(of: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    def both(values: Any) -> Any:
-        first, second = values
-        return of(first), of(second)
-
-    return both
-
-
-_TYPES: list[tuple[tuple[str, ...], str, Callable[[Any], Any]]] = [
-    (("cutoff_hz", "period", "band_hz", "rate", "standstill"), "a number", float),
-    (("order", "decimate"), "an integer", index),
-    (("trim",), "a number of samples, or two of them", _pair(index)),
-    (("between",), "two times in s", _pair(float)),
-]
+def _refuse_unknown(options: Mapping[str, Any], *known: Mapping[str, Any]) -> None:
+    names = [name for one in known for name in one]
+    unknown = [name for name in options if name not in names]
+    if unknown:
+        raise TypeError(f"unknown keyword {', '.join(unknown)}; the keywords for options are {', '.join(names)}")
 
 
 def _warn(notes: Remarks, level: int = 3) -> None:
@@ -860,7 +770,7 @@ class Model:
 
     # Recordings.
 
-    @with_reading_keywords(_READING, ReadingOptions)
+    @with_keywords((READING, ReadingOptions))
     def recording(
         self, data: Source, *, name: str | None = None, progress: Progress = None, **reading: Unpack[ReadingOptions]
     ) -> Recording:
@@ -882,7 +792,7 @@ class Model:
         _warn(found.notes)
         return found
 
-    @with_reading_keywords(_READING, ReadingOptions)
+    @with_keywords((READING, ReadingOptions))
     def prepare_recordings(
         self,
         data: Sequence[Source],
@@ -987,7 +897,7 @@ class Model:
         first, second = self._all_recordings((data, what), (check, "check"), reading, progress, unprepared)
         return [one._core for one in first], [one._core for one in second]
 
-    @with_reading_keywords(_READING, ReadingOptions)
+    @with_keywords((READING, ReadingOptions))
     def plot(
         self,
         data: Source,
@@ -1028,7 +938,7 @@ class Model:
         values, what = self._values(parameters)
         return force_figure(run, self, [names.index(name) for name in chosen], values, what)
 
-    @with_reading_keywords(_READING, ReadingOptions)
+    @with_keywords((READING, ReadingOptions))
     def compare(
         self, data: Source, *, parameters: Values = None, progress: Progress = None, **reading: Unpack[ReadingOptions]
     ) -> Comparison:
@@ -1049,21 +959,16 @@ class Model:
         read, _ = self._recordings(data, None, reading, progress)
         return Comparison(_answered(progress, lambda hears: self._core.compare(read, values, name, hears)))
 
-    @with_reading_keywords(_READING, ReadingOptions)
+    @with_keywords((ESTIMATION, EstimationOptions), (READING, ReadingOptions))
     def identify(
         self,
         data: Source,
         *,
         check: Source = None,
-        weights: str = "auto",
-        robust: float | None = None,
-        prior: float | None = None,
-        physical: bool = False,
-        essential: bool = False,
         instruments: Source = None,
         instrument_period: float | None = None,
         progress: Progress = None,
-        **reading: Unpack[ReadingOptions],
+        **options: Unpack[IdentificationOptions],
     ) -> Identification:
         """Identifies base parameters from recordings by least squares.
 
@@ -1071,39 +976,28 @@ class Model:
         ----------
         data, check
             Recordings for the fit, and validation runs, which the fit does not use.
-        weights : {"auto", "none", "channels", "variance"}
-            How equations are weighted: by the residuals of their drive, by the recorded variance, or equally.
-        robust : float, optional
-            Threshold of the Huber estimator, in standard deviations; 1.345 is usual.
-        prior : float, optional
-            Nominal values as soft constraints, with this relative standard deviation.
-        physical : bool
-            All bodies must be physically possible.
-        essential : bool
-            Base parameters that the recordings do not support keep their nominal values.
         instruments, instrument_period : optional
             Instrumental variables: recordings of the reference motion, or the states one period (s) later.
-        progress, **reading
+        progress, **options
             As for :meth:`compare`; ``standstill`` concerns the equations of the fit only, and not the figures of the validation.
         """
+        _refuse_unknown(options, ESTIMATION, READING)
+        estimation = {name: one for name, one in options.items() if name in ESTIMATION}
+        reading = {name: one for name, one in options.items() if name in READING}
         # A bound of the user belongs to the estimator, which applies it to the equations of the fit only.
         standstill = reading.get("standstill")
         others = {name: one for name, one in reading.items() if name != "standstill"}
         unbound = {} if standstill is None else {"standstill": 0.0}
         read, checked = self._recordings(data, check, others, progress, unprepared=unbound)
         recorded, _ = self._recordings(instruments, None, others, progress, "instruments", unbound)
-        options = {
-            "weights": weights,
-            "robust": robust,
-            "prior": prior,
-            "physical": physical,
-            "essential": essential,
-            "standstill": standstill,
-        }
-        found = _answered(progress, lambda hears: self._core.identify(read, checked, options, recorded, instrument_period, hears))
+        bound = {"standstill": standstill}
+        found = _answered(
+            progress,
+            lambda hears: self._core.identify(read, checked, estimation, bound, recorded, instrument_period, hears),
+        )
         return Identification(found, self)
 
-    @with_reading_keywords(_READING, ReadingOptions)
+    @with_keywords((READING, ReadingOptions))
     def diagnose(
         self,
         data: Source,
@@ -1139,7 +1033,7 @@ class Model:
         """Returns the diagnosis as one page, inline in a notebook; arguments as for :meth:`diagnose`."""
         return self.diagnose(data, **options).report()
 
-    @with_reading_keywords(_READING, ReadingOptions)
+    @with_keywords((READING, ReadingOptions))
     def runs(
         self,
         data: Sequence[Source],
@@ -1315,7 +1209,7 @@ class Model:
         _warn(found.notes)
         return Interpretation(found)
 
-    @with_reading_keywords(_READING, ReadingOptions)
+    @with_keywords((READING, ReadingOptions))
     def diff(
         self, variant: Model, data: Source = None, *, progress: Progress = None, **reading: Unpack[ReadingOptions]
     ) -> Difference:

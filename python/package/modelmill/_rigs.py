@@ -12,7 +12,8 @@ import numpy as np
 
 from . import _core
 from ._errors import ModelmillError
-from ._model import Floats, Model, PathText, Progress, _warn, load
+from ._model import Floats, Model, Progress, _warn, load
+from ._options import PathText
 from ._progress import told
 from ._results import Excitation, Result, frame
 from ._tables import columns as columns_of

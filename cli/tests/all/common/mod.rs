@@ -2,6 +2,7 @@
 
 pub(crate) mod browser;
 pub(crate) mod html;
+pub(crate) mod markdown;
 pub(crate) mod workbench;
 
 use std::panic::Location;

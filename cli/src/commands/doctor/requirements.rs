@@ -1,0 +1,362 @@
+//! What the program and its commands need, and whether this computer has it.
+
+use std::env;
+use std::path::{Path, PathBuf};
+use std::thread;
+
+use modelmill::{Error, Host, bundled};
+
+use crate::flags::FlagSpelling;
+
+use super::programs::{find_program, find_version, is_at_least, read_output};
+
+/// Whether a requirement is met.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum RequirementState {
+    /// It is there and works.
+    Present,
+    /// It is there in a version that is too old.
+    Outdated,
+    /// It is there and does not work.
+    Fails,
+    /// It is not there.
+    Missing,
+}
+
+impl RequirementState {
+    /// Its name in text and JSON.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Present => "present",
+            Self::Outdated => "outdated",
+            Self::Fails => "fails",
+            Self::Missing => "missing",
+        }
+    }
+}
+
+/// A requirement with what this computer has.
+pub(super) struct RequirementCheck {
+    /// Its name.
+    pub(super) name: &'static str,
+    /// Whether no command works without it.
+    pub(super) is_essential: bool,
+    /// Whether it is met.
+    pub(super) state: RequirementState,
+    /// The version that was found.
+    pub(super) version: Option<String>,
+    /// The oldest version that suffices.
+    pub(super) least_version: Option<&'static str>,
+    /// Where it was found.
+    pub(super) path: Option<PathBuf>,
+    /// Commands that need it, and for what.
+    pub(super) needed_for: Vec<&'static str>,
+    /// What to do, unless the requirement is met.
+    pub(super) remedy: Option<String>,
+}
+
+impl RequirementCheck {
+    /// Whether the requirement is met.
+    pub(super) fn is_met(&self) -> bool {
+        self.state == RequirementState::Present
+    }
+}
+
+/// Another program that a command or its output needs.
+struct ExternalProgram {
+    /// The name of the requirement.
+    name: &'static str,
+    /// An environment variable with the program to use, which has priority.
+    variable: Option<&'static str>,
+    /// Programs that meet the requirement; the first one on the search path is used.
+    programs: &'static [&'static str],
+    /// Arguments by which it prints its version. Without any it is not started: a browser would open a window.
+    version_arguments: &'static [&'static str],
+    /// The oldest version that suffices.
+    least_version: Option<&'static str>,
+    /// Commands that need it, and for what.
+    needed_for: &'static [&'static str],
+    /// How to get it.
+    remedy: &'static str,
+}
+
+/// The programs. A new one is one entry.
+const PROGRAMS: &[ExternalProgram] = &[
+    ExternalProgram {
+        name: "Rust compiler",
+        variable: Some("RUSTC"),
+        programs: &["rustc"],
+        version_arguments: &["--version"],
+        // The packages of the workspace, among them the runtime of emitted code, have one oldest version.
+        least_version: Some(env!("CARGO_PKG_RUST_VERSION")),
+        needed_for: &["compiling the output of `generate` for Rust, C and Python"],
+        remedy: "Install Rust by https://rustup.rs, or update it with `rustup update`.",
+    },
+    ExternalProgram {
+        name: "Cargo",
+        variable: Some("CARGO"),
+        programs: &["cargo"],
+        version_arguments: &["--version"],
+        least_version: Some(env!("CARGO_PKG_RUST_VERSION")),
+        needed_for: &["building the output of `generate` for Rust, C and Python"],
+        remedy: "Install Rust by https://rustup.rs, or update it with `rustup update`.",
+    },
+    ExternalProgram {
+        name: "C compiler",
+        variable: Some("CC"),
+        programs: &["cc", "gcc", "clang"],
+        version_arguments: &["--version"],
+        least_version: None,
+        needed_for: &[
+            "compiling the output of `generate --language c99`",
+            "`compile()` in Python",
+        ],
+        remedy: "Install GCC or Clang, or set CC to the compiler.",
+    },
+    ExternalProgram {
+        name: "Python",
+        variable: None,
+        programs: &["python3", "python"],
+        version_arguments: &["--version"],
+        // `requires-python` of python/pyproject.toml.
+        least_version: Some("3.10"),
+        needed_for: &["the Python package", "the output of `generate --language python`"],
+        remedy: "Install Python from https://www.python.org or by the system's package manager.",
+    },
+    ExternalProgram {
+        name: "Julia",
+        variable: None,
+        programs: &["julia"],
+        version_arguments: &["--version"],
+        least_version: None,
+        needed_for: &["running the output of `generate --language julia`"],
+        remedy: "Install Julia from https://julialang.org.",
+    },
+    ExternalProgram {
+        name: "LaTeX",
+        variable: None,
+        programs: &["lualatex", "xelatex", "pdflatex", "tectonic"],
+        version_arguments: &["--version"],
+        least_version: None,
+        needed_for: &["typesetting the output of `equations --format latex`"],
+        remedy: "Install TeX Live or Tectonic, or use `equations --format html`.",
+    },
+    ExternalProgram {
+        name: "browser",
+        variable: Some("BROWSER"),
+        programs: &[
+            "firefox",
+            "chromium",
+            "chromium-browser",
+            "google-chrome",
+            "microsoft-edge",
+            "brave-browser",
+            "xdg-open",
+            "open",
+            "explorer",
+        ],
+        version_arguments: &[],
+        least_version: None,
+        needed_for: &[
+            "`work`",
+            "reading pages of `report`, `runs`, `tour` and `equations --format html`",
+        ],
+        remedy: "Install a browser, or open the pages on another computer: each is one file that needs nothing else.",
+    },
+];
+
+/// Checks all requirements: parts of the program first, then other programs, each in its own thread.
+pub(super) fn check_all() -> Vec<RequirementCheck> {
+    let mut checks = vec![check_derivation()];
+    checks.extend(check_formats());
+    checks.push(check_temporary_folder());
+    let programs = thread::scope(|scope| {
+        let running: Vec<_> = PROGRAMS
+            .iter()
+            .map(|program| scope.spawn(|| check_program(program)))
+            .collect();
+        let ended = running.into_iter().filter_map(|thread| thread.join().ok());
+        ended.collect::<Vec<_>>()
+    });
+    let python = programs.iter().find(|check| check.name == "Python" && check.is_met());
+    let packages = check_python_packages(python.and_then(|check| check.path.as_deref()));
+    checks.extend(programs);
+    checks.extend(packages);
+    checks
+}
+
+/// Derives a bundled model, and compares its exact rank with the numeric one: the program itself works.
+fn check_derivation() -> RequirementCheck {
+    let fault = derive_bundled_model().err();
+    RequirementCheck {
+        name: "derivation",
+        is_essential: true,
+        state: match fault {
+            None => RequirementState::Present,
+            Some(_) => RequirementState::Fails,
+        },
+        version: Some(env!("CARGO_PKG_VERSION").to_owned()),
+        least_version: None,
+        path: env::current_exe().ok(),
+        needed_for: vec!["all commands that read a model"],
+        remedy: fault.map(|says| {
+            format!("The program does not derive a bundled model correctly: {says}. Install it again, and report this if it remains.")
+        }),
+    }
+}
+
+/// Derives the first bundled model; the error states what is wrong with it.
+fn derive_bundled_model() -> Result<(), String> {
+    // A host of its own: a wrong `--library` is no fault of the program.
+    let host = Host::new();
+    let spell = |error: Error| error.spell(&FlagSpelling);
+    let (name, text) = bundled::MODELS[0];
+    let loaded = host.load_text(Path::new(name), text).map_err(spell)?;
+    let checked = host
+        .derive(name, loaded)
+        .and_then(|model| model.check())
+        .map_err(spell)?;
+    match (&checked.rank, checked.warnings.first()) {
+        (Some(_), None) => Ok(()),
+        (_, Some(warning)) => Err(warning.clone()),
+        (None, None) => Err("it has no base parameters".to_owned()),
+    }
+}
+
+/// Formats of recordings, which are features of the build.
+fn check_formats() -> Vec<RequirementCheck> {
+    let formats = [
+        ("Parquet files", cfg!(feature = "parquet"), "parquet"),
+        ("HDF5 and MATLAB 7.3 files", cfg!(feature = "hdf5"), "hdf5"),
+        ("MCAP and ROS bags", cfg!(feature = "logs"), "logs"),
+    ];
+    formats
+        .into_iter()
+        .map(|(name, is_built, feature)| RequirementCheck {
+            name,
+            is_essential: false,
+            state: if is_built {
+                RequirementState::Present
+            } else {
+                RequirementState::Missing
+            },
+            version: None,
+            least_version: None,
+            path: None,
+            needed_for: vec!["reading recordings of this format"],
+            remedy: (!is_built)
+                .then(|| format!("Build the program with the feature `{feature}`, which is on by default.")),
+        })
+        .collect()
+}
+
+/// The folder for temporary files, which `tour` uses without `--out`.
+fn check_temporary_folder() -> RequirementCheck {
+    let path = env::temp_dir();
+    let is_writable = path
+        .metadata()
+        .is_ok_and(|about| about.is_dir() && !about.permissions().readonly());
+    RequirementCheck {
+        name: "temporary folder",
+        is_essential: false,
+        state: if is_writable {
+            RequirementState::Present
+        } else {
+            RequirementState::Missing
+        },
+        version: None,
+        least_version: None,
+        path: Some(path),
+        needed_for: vec!["`tour` without --out"],
+        remedy: (!is_writable)
+            .then(|| "Use `tour --out DIR`, or set TMPDIR to a folder that can be written.".to_owned()),
+    }
+}
+
+/// Looks for one program and reads its version.
+fn check_program(program: &ExternalProgram) -> RequirementCheck {
+    let variable = program.variable.and_then(|name| env::var(name).ok());
+    // A variable may hold arguments too, such as `ccache gcc`, or several browsers.
+    let first = variable
+        .as_deref()
+        .and_then(|text| text.split([' ', ':']).find(|word| !word.is_empty()));
+    let path = match first {
+        Some(name) => find_program(&[name]),
+        None => find_program(program.programs),
+    };
+    let mut check = RequirementCheck {
+        name: program.name,
+        is_essential: false,
+        state: RequirementState::Missing,
+        version: None,
+        least_version: program.least_version,
+        path,
+        needed_for: program.needed_for.to_vec(),
+        remedy: None,
+    };
+    if let Some(path) = &check.path {
+        check.state = RequirementState::Present;
+        if !program.version_arguments.is_empty() {
+            let output = read_output(path, program.version_arguments);
+            check.version = output.as_deref().and_then(find_version);
+            check.state = match (&output, &check.version, program.least_version) {
+                (None, ..) => RequirementState::Fails,
+                (_, Some(version), Some(least)) if !is_at_least(version, least) => RequirementState::Outdated,
+                _ => RequirementState::Present,
+            };
+        }
+    }
+    if !check.is_met() {
+        let cause = match (first.zip(program.variable), &check.path, check.state) {
+            (Some((name, variable)), None, _) => format!("The variable {variable} names {name}, which is not found. "),
+            (_, Some(path), RequirementState::Fails) => format!("{} does not run. ", path.display()),
+            _ => String::new(),
+        };
+        check.remedy = Some(cause + program.remedy);
+    }
+    check
+}
+
+/// Packages of the Python that was found.
+fn check_python_packages(python: Option<&Path>) -> Vec<RequirementCheck> {
+    let packages: [(&'static str, &'static str, Vec<&'static str>, &'static str); 2] = [
+        (
+            "numpy in Python",
+            "numpy",
+            vec!["the Python package", "the output of `generate --language python`"],
+            "Install it with `python3 -m pip install numpy`.",
+        ),
+        (
+            "modelmill in Python",
+            "modelmill",
+            vec!["using modelmill from Python"],
+            "Install it with `python3 -m pip install ./python` in a clone of the project.",
+        ),
+    ];
+    packages
+        .into_iter()
+        .map(|(name, package, needed_for, remedy)| {
+            // The metadata of a package are read without importing it.
+            let script = format!("import importlib.metadata as m; print(m.version({package:?}))");
+            let version = python
+                .and_then(|path| read_output(path, &["-c", &script]))
+                .map(|text| text.trim().to_owned())
+                .filter(|text| !text.is_empty());
+            let is_found = version.is_some();
+            RequirementCheck {
+                name,
+                is_essential: false,
+                state: if is_found {
+                    RequirementState::Present
+                } else {
+                    RequirementState::Missing
+                },
+                version,
+                least_version: None,
+                path: None,
+                needed_for,
+                remedy: (!is_found).then(|| remedy.to_owned()),
+            }
+        })
+        .collect()
+}
