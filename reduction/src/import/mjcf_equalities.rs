@@ -94,21 +94,22 @@ impl<'a> MjcfReader<'a> {
                 Some(text) => Some(exact_numbers(node, "relpose", text)?),
                 None => None,
             };
-            // A zero quaternion means the relative pose of the file.
-            let relative = match pose {
-                Some([x, y, z, q @ ..]) if q.iter().any(|x| x.abs() > 0.0) => DescriptionPose {
-                    p: Vector3::new(x, y, z),
-                    r: rotation_from_quaternion(q)
-                        .ok_or_else(|| located_message(node, "`relpose` has no direction"))?,
-                },
-                _ => in_world(one).inverse().compose(&in_world(other)),
-            };
             // The weld connects both bodies at the anchor.
             let shift = DescriptionPose {
                 p: anchor,
                 r: Matrix3::identity(),
             };
-            return Ok([(one, relative.compose(&shift)), (other, shift)]);
+            // The position of `relpose` is that of the anchor in the first body. A zero quaternion means the relative pose
+            // of the file.
+            let first = match pose {
+                Some([x, y, z, q @ ..]) if q.iter().any(|x| x.abs() > 0.0) => DescriptionPose {
+                    p: Vector3::new(x, y, z),
+                    r: rotation_from_quaternion(q)
+                        .ok_or_else(|| located_message(node, "`relpose` has no direction"))?,
+                },
+                _ => in_world(one).inverse().compose(&in_world(other)).compose(&shift),
+            };
+            return Ok([(one, first), (other, shift)]);
         }
         // For `connect` the anchor is a point of the first body.
         let first = DescriptionPose {
