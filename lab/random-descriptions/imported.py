@@ -48,7 +48,9 @@ class EmittedModel:
 
         def names(kind):
             found = re.findall(rf"^#define {upper}_{kind}_(\w+) (\d+)$", text, re.M)
-            return [one for one, _ in sorted(found, key=lambda pair: int(pair[1]))]
+            # Words of C have an underscore in front, and their own underscores are written as codes.
+            plain = [(one.removeprefix("_").replace("_5f_", "_") if one.startswith("_") else one, k) for one, k in found]
+            return [one for one, _ in sorted(plain, key=lambda pair: int(pair[1]))]
 
         self.coordinates, self.passive, self.drives = names("COORDINATE"), names("PASSIVE"), names("DRIVE")
         self.name = name

@@ -11,6 +11,10 @@ use super::xml::{
     children, exact_numbers, line, located_message, number_attribute, numbers, required_attribute, vector,
 };
 
+/// Why a coupling is refused that is no constant ratio.
+const POLYNOMIAL: &str = "a coupling by a polynomial of higher degree is not imported; delete it, import the rest, and write it in the model \
+     file as the `follows` of the joint's coordinate";
+
 impl<'a> MjcfReader<'a> {
     /// The index of a body by name; none is the world.
     fn link(&self, node: &Node, name: &str) -> Result<Option<usize>, String> {
@@ -135,7 +139,7 @@ impl<'a> MjcfReader<'a> {
         if of.is_some() && (2..5).any(|k| coefficient(k) != 0.0) {
             return Err(located_message(
                 node,
-                "a coupling by a polynomial of higher degree is not supported; models have constant ratios only",
+                POLYNOMIAL,
             ));
         }
         // q1 - zero1 = c0 + c1*(q2 - zero2), solved for q1.
@@ -175,7 +179,7 @@ impl<'a> MjcfReader<'a> {
             if (2..5).any(|k| coefficient(k) != 0.0) {
                 return Err(located_message(
                     node,
-                    "a coupling by a polynomial of higher degree is not supported; models have constant ratios only",
+                    POLYNOMIAL,
                 ));
             }
             for (joint, length) in tendon_joints(node, other)? {
