@@ -463,8 +463,8 @@ class Mechanism:
         return np.array(out)
 
 
-def rank_of(mechanism, rng, spread=0.25, n_states=None):
-    """Rank of the regressor over random states, and the gap of singular values around it."""
+def rank_of(mechanism, rng, spread=0.25, n_states=None, expected=None):
+    """Rank of the regressor over random states, the singular values on both sides of it, and the number of states."""
     n = len(mechanism.active)
     rows, tries = [], 0
     wanted = n_states or max(24, 12 * len(mechanism.bodies()))
@@ -476,10 +476,14 @@ def rank_of(mechanism, rng, spread=0.25, n_states=None):
         h = None if start is None else mechanism.regressor(q, rng.uniform(-2, 2, n), rng.uniform(-4, 4, n), start)
         if h is not None:
             rows.append(h)
-    s = np.linalg.svd(np.concatenate(rows), compute_uv=False)
-    s = s / s[0]
-    s = np.r_[s, 1e-17]
-    gaps = s[:-1] / np.maximum(s[1:], 1e-17)
-    useful = [k for k in range(len(gaps)) if s[k] > 1e-11]
-    best = max(useful, key=lambda k: gaps[k])
-    return best + 1, s[best], s[best + 1], len(rows)
+    matrix = np.concatenate(rows)
+    # Columns of equal size, so that small ones are not taken for rounding.
+    matrix = matrix / np.maximum(np.linalg.norm(matrix, axis=0), 1e-9 * np.linalg.norm(matrix, axis=0).max())
+    s = np.linalg.svd(matrix, compute_uv=False)
+    s = np.r_[s / s[0], 1e-17]
+    # States are closed to 1e-13. A clear step at the expected rank decides, else what is above rounding.
+    if expected and expected < len(s) and s[expected] < 1e-13 and s[expected - 1] > 20 * s[expected]:
+        rank = expected
+    else:
+        rank = int((s > 1e-12).sum())
+    return rank, s[rank - 1], s[rank], len(rows)

@@ -95,7 +95,7 @@ class ModelFile:
     def push(self, on, at, base_at, moved):
         """A piston from the ground to a point of a body, whose slide moves the mechanism in place of the coordinate `moved`."""
         self.coordinates[moved][1] = True
-        self.coordinate("pz"), self.coordinate("py"), self.coordinate("s", 0.5, False)
+        self.coordinate("pz"), self.coordinate("py"), self.coordinate("s", 0.75, False)
         self.frame("swing", "base", xyz=list(base_at), joint='revolute = "pz"')
         self.frame("tilt", "swing", joint='revolute = "py", axis = "y"')
         self.frame("rod", "tilt", joint='prismatic = "s", axis = "x"')
@@ -342,7 +342,7 @@ def judge(program, path, rng, spread=0.5):
     if answer is None or not answer.get("valid"):
         return f"refused: {said.strip() or answer}", took
     m = Mechanism(path.read_text())
-    rank, last, beyond, n_states = rank_of(m, rng, spread, answer["base_parameters"] + 12)
+    rank, last, beyond, n_states = rank_of(m, rng, spread, answer["base_parameters"] + 12, answer["base_parameters"])
     faults = []
     if answer["base_parameters"] != rank:
         faults.append(f"{answer['base_parameters']} base parameters, rank {rank} (singular values {last:.1e}, {beyond:.1e}, {n_states} states, {answer['reduction']})")
