@@ -477,8 +477,8 @@ def rank_of(mechanism, rng, spread=0.25, n_states=None, expected=None):
         if h is not None:
             rows.append(h)
     matrix = np.concatenate(rows)
-    # Columns of equal size, so that small ones are not taken for rounding.
-    matrix = matrix / np.maximum(np.linalg.norm(matrix, axis=0), 1e-9 * np.linalg.norm(matrix, axis=0).max())
+    # Columns of similar size; those that are only rounding stay small.
+    matrix = matrix / np.maximum(np.linalg.norm(matrix, axis=0), 1e-2 * np.linalg.norm(matrix, axis=0).max())
     s = np.linalg.svd(matrix, compute_uv=False)
     s = np.r_[s / s[0], 1e-17]
     # States are closed to 1e-13. A clear step at the expected rank decides, else what is above rounding.

@@ -210,7 +210,10 @@ impl LoopProjection {
             .collect();
         // Drives that each move one coordinate need no solution, which would take long for each column of a large tree.
         if let Some(coordinates) = single_coordinates(&transposed) {
-            return Ok(coordinates.into_iter().map(|row| projected[self.freedoms[row]]).collect());
+            return Ok(coordinates
+                .into_iter()
+                .map(|row| projected[self.freedoms[row]])
+                .collect());
         }
         let rhs: Vec<Vec<ExprId>> = self.freedoms.iter().map(|a| vec![projected[*a]]).collect();
         let solution = linear::solve(graph, &transposed, &rhs, "the drives' forces")?;

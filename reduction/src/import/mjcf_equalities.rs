@@ -137,10 +137,7 @@ impl<'a> MjcfReader<'a> {
         let coefficient = |k: usize| given.get(k).copied().unwrap_or(0.0);
         let zero = |name: &str| self.joint_zero(node, name);
         if of.is_some() && (2..5).any(|k| coefficient(k) != 0.0) {
-            return Err(located_message(
-                node,
-                POLYNOMIAL,
-            ));
+            return Err(located_message(node, POLYNOMIAL));
         }
         // q1 - zero1 = c0 + c1*(q2 - zero2), solved for q1.
         let ratio = if of.is_some() { coefficient(1) } else { 0.0 };
@@ -177,10 +174,7 @@ impl<'a> MjcfReader<'a> {
         let mut terms = tendon_joints(node, &required_attribute(node, "tendon1")?)?;
         if let Some(other) = node.attribute("tendon2") {
             if (2..5).any(|k| coefficient(k) != 0.0) {
-                return Err(located_message(
-                    node,
-                    POLYNOMIAL,
-                ));
+                return Err(located_message(node, POLYNOMIAL));
             }
             for (joint, length) in tendon_joints(node, other)? {
                 terms.push((joint, -coefficient(1) * length));
