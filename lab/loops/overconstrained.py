@@ -344,8 +344,10 @@ def judge(program, path, rng, spread=0.5):
     m = Mechanism(path.read_text())
     rank, last, beyond, n_states = rank_of(m, rng, spread, answer["base_parameters"] + 12, answer["base_parameters"])
     faults = []
+    # Without a step to below rounding, double precision cannot decide the rank.
+    is_undecided = answer["base_parameters"] != rank and last < 1e-10
     if answer["base_parameters"] != rank:
-        faults.append(f"{answer['base_parameters']} base parameters, rank {rank} (singular values {last:.1e}, {beyond:.1e}, {n_states} states, {answer['reduction']})")
+        faults.append(("undecided: " if is_undecided else "") + f"{answer['base_parameters']} base parameters, rank {rank} (singular values {last:.1e}, {beyond:.1e}, {n_states} states, {answer['reduction']})")
     model = EmittedModel(program, path)
     worst, done = 0.0, 0
     nominal = np.array([m.nominal[n] for n in m.active])
@@ -408,7 +410,7 @@ def main():
                 why, took = judge(chosen.program, path, rng)
             except Exception as fault:  # noqa: BLE001
                 why, took = f"fault: {fault!r}", 0.0
-            verdict = "right" if not why else "refused" if why.startswith("refused") else "wrong"
+            verdict = "right" if not why else "refused" if why.startswith("refused") else "undecided" if why.startswith("undecided") and ";" not in why else "wrong"
             count[verdict] += 1
             print(f"{label}: {verdict} {took:.1f} s {why[:1500]}", flush=True)
     print(dict(count))
