@@ -73,6 +73,7 @@ pub use motion::{CoordinateAxis, FramePlacement, Kinematics, MechanismPoses};
 pub use reading::{read_referenced, read_text};
 pub use toml_budget::{TomlExcess, find_toml_excess};
 pub use unit::unit_product;
+pub use values::is_reserved_word;
 
 /// The JSON Schema of model files, by which editors complete and explain them; a test keeps it true.
 pub const SCHEMA: &str = include_str!("../schema/modelmill.schema.json");

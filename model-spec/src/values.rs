@@ -37,6 +37,11 @@ const RESERVED: [&str; 17] = [
     "t",
 ];
 
+/// Whether a text has a meaning of its own in expressions of model files, so that it cannot name anything.
+pub fn is_reserved_word(text: &str) -> bool {
+    RESERVED.contains(&text)
+}
+
 /// A name, where it is defined or where it is used.
 #[derive(Clone, Debug)]
 pub(crate) struct SpannedName {
@@ -104,7 +109,7 @@ fn similar_name(text: &str) -> Option<String> {
 ///
 /// These are functions, quantities of a place, `base`, and the time `t`.
 pub(crate) fn check_not_reserved(text: &str, span: SourceSpan, log: &mut DiagnosticLog) -> bool {
-    let reserved = RESERVED.contains(&text);
+    let reserved = is_reserved_word(text);
     if reserved {
         log.push(
             Diagnostic::error(span, format!("`{text}` cannot name anything new"))

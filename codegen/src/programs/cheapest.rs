@@ -23,10 +23,15 @@ type FormChange<F> = Box<dyn Fn(F) -> F>;
 /// Families of changes that a pass tries.
 type ChangeFamilies<F> = Vec<Vec<FormChange<F>>>;
 
+/// Most entries of columns, as columns times the depth of the tree, whose form is searched with all columns (1). A search
+/// writes them some twenty times; that of a humanoid with 40 coordinates takes about a second.
+const MOST_SEARCHED_ENTRIES: usize = 5000;
+
 /// Cost of outputs, in additions.
 pub(crate) type CostFunction<'a> = &'a dyn Fn(&mut Graph, &[ExprId]) -> usize;
 
-/// Searches for the cheapest form, pass by pass; a change that does not lower the cost is discarded.
+/// Searches for the cheapest form, pass by pass; a change that does not lower the cost is discarded. Returns the form
+/// and its outputs.
 ///
 /// `write` returns the outputs of a form. `steps` has for every pass the families of changes that it applies to the
 /// best form before it. The changes of a family go in one direction, and the rest is skipped once the cost rises.
@@ -36,7 +41,7 @@ fn search_cheapest_form<F: Copy>(
     steps: &[ChangeFamilies<F>],
     weigh: CostFunction<'_>,
     mut write: impl FnMut(&mut Graph, F) -> Result<Vec<ExprId>, DeriveError>,
-) -> Result<Vec<ExprId>, DeriveError> {
+) -> Result<(F, Vec<ExprId>), DeriveError> {
     // The best form so far with its outputs and cost.
     let (mut form, mut best) = (plain, write(graph, plain)?);
     let mut least = weigh(graph, &best);
@@ -64,7 +69,7 @@ fn search_cheapest_form<F: Copy>(
             }
         }
     }
-    Ok(best)
+    Ok((form, best))
 }
 
 /// Frames of the recursion by style and axes, so that each is written once.
@@ -160,14 +165,21 @@ pub(crate) fn cheapest_columns(
     }
     steps.truncate(n_passes);
     let mut written = FrameCache::default();
-    // Outputs are searched as one list, and then cut into columns.
-    let n_drives = mechanism.drives.len();
-    let outputs = search_cheapest_form(graph, ColumnForm::PLAIN, &steps, weigh, |graph, form| {
+    let mut write = |graph: &mut Graph, form: ColumnForm, products: &[ParameterMonomial]| {
         let key = (form.style, form.fixed_axes);
         let frames = written.frames_for(graph, equations, &equations.gravity, key);
-        let columns = equations.columns_of(graph, mechanism, frames, products, form)?;
-        Ok(columns.into_iter().flatten().collect())
+        equations.columns_of(graph, mechanism, frames, products, form)
+    };
+    // Outputs are searched as one list, and then cut into columns. Of a large tree some columns decide for all.
+    let every = (products.len() * deepest).div_ceil(MOST_SEARCHED_ENTRIES).max(1);
+    let searched: Vec<ParameterMonomial> = products.iter().step_by(every).cloned().collect();
+    let n_drives = mechanism.drives.len();
+    let (form, outputs) = search_cheapest_form(graph, ColumnForm::PLAIN, &steps, weigh, |graph, form| {
+        Ok(write(graph, form, &searched)?.into_iter().flatten().collect())
     })?;
+    if every > 1 {
+        return write(graph, form, products);
+    }
     Ok(outputs.chunks(n_drives.max(1)).map(<[_]>::to_vec).collect())
 }
 
@@ -183,11 +195,12 @@ pub(crate) fn cheapest_total(
     let mut steps = total_form_steps(&equations.tree);
     steps.truncate(n_passes);
     let mut written = FrameCache::default();
-    search_cheapest_form(graph, TotalForm::PLAIN, &steps, weigh, |graph, form| {
+    let found = search_cheapest_form(graph, TotalForm::PLAIN, &steps, weigh, |graph, form| {
         let key = (form.style, form.fixed_axes);
         let frames = written.frames_for(graph, equations, &equations.gravity, key);
         equations.inverse_dynamics(graph, mechanism, frames, value, form)
-    })
+    });
+    found.map(|(_, outputs)| outputs)
 }
 
 /// The generalised forces of all links under a gravity, in the cheapest form. `finish` turns them into the outputs
@@ -203,7 +216,7 @@ pub(crate) fn best_total(
 ) -> Result<Vec<ExprId>, DeriveError> {
     let n = mechanism.coordinates.len();
     let mut written = FrameCache::default();
-    search_cheapest_form(
+    let found = search_cheapest_form(
         graph,
         TotalForm::PLAIN,
         &total_form_steps(&equations.tree),
@@ -215,7 +228,8 @@ pub(crate) fn best_total(
             let on_tree = newton_euler::backward_recursion(graph, &frames.tree, form.style, n, wrenches);
             Ok(finish(graph, &on_tree))
         },
-    )
+    );
+    found.map(|(_, outputs)| outputs)
 }
 
 /// A change of a regressor column's form.

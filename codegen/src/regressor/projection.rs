@@ -208,6 +208,13 @@ impl LoopProjection {
             .iter()
             .map(|a| (0..n_drives).map(|d| self.drive_jacobian[d][*a]).collect())
             .collect();
+        // Drives that each move one coordinate need no solution, which would take long for each column of a large tree.
+        if let Some(coordinates) = single_coordinates(&transposed) {
+            return Ok(coordinates
+                .into_iter()
+                .map(|row| projected[self.freedoms[row]])
+                .collect());
+        }
         let rhs: Vec<Vec<ExprId>> = self.freedoms.iter().map(|a| vec![projected[*a]]).collect();
         let solution = linear::solve(graph, &transposed, &rhs, "the drives' forces")?;
         Ok(solution.values.into_iter().map(|row| row[0]).collect())
@@ -391,4 +398,17 @@ fn passive_rate_map(tree: &KinematicTree, passive: &[usize], n: usize) -> Vec<Ve
         done.push(p);
     }
     rates_of
+}
+
+/// For a square matrix that only permutes: the row of the one in each column; none for other matrices.
+fn single_coordinates(matrix: &[Vec<ExprId>]) -> Option<Vec<usize>> {
+    let mut rows = vec![None; matrix.len()];
+    for (row, entries) in matrix.iter().enumerate() {
+        let mut nonzero = entries.iter().enumerate().filter(|(_, entry)| **entry != Graph::ZERO);
+        let (Some((column, &Graph::ONE)), None) = (nonzero.next(), nonzero.next()) else {
+            return None;
+        };
+        rows.get_mut(column)?.get_or_insert(row);
+    }
+    rows.into_iter().collect()
 }

@@ -38,7 +38,11 @@ impl GeomShape {
                 }
             }
             "ellipsoid" => {
-                let [a, b, c] = [at(0)?, at(1)?, at(2)?];
+                // With `fromto` the first size is both radii across.
+                let [a, b, c] = match half {
+                    Some(half) => [at(0)?, at(0)?, half],
+                    None => [at(0)?, at(1)?, at(2)?],
+                };
                 Self {
                     volume: 4.0 / 3.0 * PI * a * b * c,
                     moments: [b * b + c * c, a * a + c * c, a * a + b * b].map(|sum| sum / 5.0),

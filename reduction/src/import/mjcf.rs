@@ -326,7 +326,13 @@ impl<'a> MjcfReader<'a> {
                     return Err(located_message(&child, "the world cannot have a joint"));
                 }
                 "joint" => self.read_joint(&child, inside, place)?,
-                "freejoint" => self.read_free_joint(&child, inside)?,
+                // The defaults of joints do not count for this element.
+                "freejoint" => {
+                    if let Some(link) = inside.link {
+                        let free = self.free_joint(&child, link)?;
+                        self.out.links[link].joints.push(free);
+                    }
+                }
                 _ => {}
             }
         }
@@ -387,10 +393,10 @@ impl<'a> MjcfReader<'a> {
 
     /// Mass and inertia of a body: its `<inertial>`, or its shapes, with the bounds of the file.
     fn inertial(&mut self, node: &Node<'a, '_>, class: Option<&'a str>) -> Result<DescriptionInertia, String> {
-        let given = node.children().find(|child| child.tag_name().name() == "inertial");
+        let given = self.find_inertial(node)?;
         // The given inertia counts, unless the file demands that of the shapes.
         let mut found = match (given, self.compiler.from_geoms) {
-            (Some(given), None | Some(false)) => {
+            (Some((given, place)), None | Some(false)) => {
                 let mut placed = self.read_placement(&given, None)?;
                 let [mass] = exact_numbers(&given, "mass", &required_attribute(&given, "mass")?)?;
                 // A full matrix is given in the axes of the body, a diagonal one in those of the element.
@@ -410,7 +416,7 @@ impl<'a> MjcfReader<'a> {
                 };
                 DescriptionInertia {
                     mass,
-                    at: placed,
+                    at: place.compose(&placed),
                     inertia,
                 }
             }
@@ -422,6 +428,21 @@ impl<'a> MjcfReader<'a> {
         found.mass = found.mass.max(self.compiler.least_mass);
         found.inertia = self.bounded_inertia(found.inertia);
         Ok(found)
+    }
+
+    /// The `<inertial>` of a body and the pose of the frame in which it stands.
+    fn find_inertial<'n>(&self, body: &Node<'a, 'n>) -> Result<Option<(Node<'a, 'n>, DescriptionPose)>, String> {
+        let mut waiting = vec![(*body, DescriptionPose::identity())];
+        while let Some((node, place)) = waiting.pop() {
+            for child in node.children().filter(Node::is_element) {
+                match child.tag_name().name() {
+                    "inertial" => return Ok(Some((child, place))),
+                    "frame" => waiting.push((child, place.compose(&self.read_placement(&child, None)?))),
+                    _ => {}
+                }
+            }
+        }
+        Ok(None)
     }
 
     /// An inertia with the bounds of the file, applied to the principal moments as in MuJoCo.
@@ -536,22 +557,16 @@ impl<'a> MjcfReader<'a> {
         Ok(shape.map(|shape| shape.inertial(mass, density, place.compose(&placed))))
     }
 
-    /// Reads a free joint, which only a body of the world may have.
-    fn read_free_joint(&mut self, node: &Node<'a, '_>, inside: MjcfContext<'a>) -> Result<(), String> {
+    /// A free joint, which only a body of the world may have.
+    fn free_joint(&self, node: &Node, link: usize) -> Result<DescriptionJoint, String> {
         let name = node.attribute("name").unwrap_or("root").to_owned();
-        let Some(link) = inside.link else {
-            return Ok(());
-        };
         if self.out.links[link].parent.is_some() {
             return Err(located_message(
                 node,
                 "a free joint is possible for a child of the world only",
             ));
         }
-        self.out.links[link]
-            .joints
-            .push(DescriptionJoint::new(name, DescriptionJointKind::Free, line(node)));
-        Ok(())
+        Ok(DescriptionJoint::new(name, DescriptionJointKind::Free, line(node)))
     }
 
     /// Reads a joint with its zero, limits and losses. It gets a drive only from an actuator.
@@ -568,7 +583,16 @@ impl<'a> MjcfReader<'a> {
             "hinge" => DescriptionJointKind::Revolute,
             "slide" => DescriptionJointKind::Prismatic,
             "ball" => DescriptionJointKind::Ball,
-            "free" => return self.read_free_joint(node, inside),
+            // Losses of a free joint are named as left out.
+            "free" => {
+                let mut free = self.free_joint(node, link)?;
+                free.damping = self.first(node, class, "damping")?;
+                free.friction = self.first(node, class, "frictionloss")?;
+                free.armature = self.first(node, class, "armature")?;
+                free.stiffness = self.first(node, class, "stiffness")?;
+                self.out.links[link].joints.push(free);
+                return Ok(());
+            }
             other => {
                 return Err(located_message(
                     node,

@@ -82,10 +82,16 @@ impl<'a> MjcfReader<'a> {
                     &format!("{} of this tendon: left out", bends.join(", ")),
                 ));
             }
-            if tendon.attribute("range").is_some() {
+            if self.text(&tendon, None, "range")?.is_some() && self.text(&tendon, None, "limited")? != Some("false") {
                 self.out
                     .remarks
                     .push(located_message(&tendon, "the range of this tendon is left out"));
+            }
+            // The limit of all actuators on a tendon is that of its drive.
+            if !is_drive && self.limited_force(&tendon)?.is_some() {
+                self.out
+                    .remarks
+                    .push(located_message(&tendon, "the force limit of this tendon is left out"));
             }
         }
         // A file without actuators describes the mechanism only.
@@ -139,7 +145,10 @@ impl<'a> MjcfReader<'a> {
             name: node.attribute("name").unwrap_or(&line).to_owned(),
             line: super::xml::line(node),
             ends,
-            force: self.force_range(node)?.map(|range| scale_range(range, gear)),
+            force: match self.limited_force(tendon)? {
+                Some(range) => Some(range),
+                None => self.force_range(node)?.map(|range| scale_range(range, gear)),
+            },
             damping: damping + drag * gear * gear,
             friction,
             armature: on_tendon + armature * gear * gear,
@@ -153,6 +162,13 @@ impl<'a> MjcfReader<'a> {
             ));
         }
         Ok(())
+    }
+
+    /// The limits of the sum of all actuators at a joint or tendon, N or N m; none if it has no limits.
+    fn limited_force(&self, node: &Node<'a, '_>) -> Result<Option<[f64; 2]>, String> {
+        let range = self.numbers(node, None, "actuatorfrcrange")?;
+        let is_limited = self.text(node, None, "actuatorfrclimited")? != Some("false");
+        Ok(range.filter(|[low, high]| is_limited && low < high))
     }
 
     /// The force limits of an actuator before its gear, N or N m; none if it has no limits.

@@ -11,6 +11,10 @@ use super::xml::{
     children, exact_numbers, line, located_message, number_attribute, numbers, required_attribute, vector,
 };
 
+/// Why a coupling is refused that is no constant ratio.
+const POLYNOMIAL: &str = "a coupling by a polynomial of higher degree is not imported; delete it, import the rest, and write it in the model \
+     file as the `follows` of the joint's coordinate";
+
 impl<'a> MjcfReader<'a> {
     /// The index of a body by name; none is the world.
     fn link(&self, node: &Node, name: &str) -> Result<Option<usize>, String> {
@@ -94,21 +98,22 @@ impl<'a> MjcfReader<'a> {
                 Some(text) => Some(exact_numbers(node, "relpose", text)?),
                 None => None,
             };
-            // A zero quaternion means the relative pose of the file.
-            let relative = match pose {
-                Some([x, y, z, q @ ..]) if q.iter().any(|x| x.abs() > 0.0) => DescriptionPose {
-                    p: Vector3::new(x, y, z),
-                    r: rotation_from_quaternion(q)
-                        .ok_or_else(|| located_message(node, "`relpose` has no direction"))?,
-                },
-                _ => in_world(one).inverse().compose(&in_world(other)),
-            };
             // The weld connects both bodies at the anchor.
             let shift = DescriptionPose {
                 p: anchor,
                 r: Matrix3::identity(),
             };
-            return Ok([(one, relative.compose(&shift)), (other, shift)]);
+            // The position of `relpose` is that of the anchor in the first body. A zero quaternion means the relative pose
+            // of the file.
+            let first = match pose {
+                Some([x, y, z, q @ ..]) if q.iter().any(|x| x.abs() > 0.0) => DescriptionPose {
+                    p: Vector3::new(x, y, z),
+                    r: rotation_from_quaternion(q)
+                        .ok_or_else(|| located_message(node, "`relpose` has no direction"))?,
+                },
+                _ => in_world(one).inverse().compose(&in_world(other)).compose(&shift),
+            };
+            return Ok([(one, first), (other, shift)]);
         }
         // For `connect` the anchor is a point of the first body.
         let first = DescriptionPose {
@@ -132,10 +137,7 @@ impl<'a> MjcfReader<'a> {
         let coefficient = |k: usize| given.get(k).copied().unwrap_or(0.0);
         let zero = |name: &str| self.joint_zero(node, name);
         if of.is_some() && (2..5).any(|k| coefficient(k) != 0.0) {
-            return Err(located_message(
-                node,
-                "a coupling by a polynomial of higher degree is not supported; models have constant ratios only",
-            ));
+            return Err(located_message(node, POLYNOMIAL));
         }
         // q1 - zero1 = c0 + c1*(q2 - zero2), solved for q1.
         let ratio = if of.is_some() { coefficient(1) } else { 0.0 };
@@ -172,10 +174,7 @@ impl<'a> MjcfReader<'a> {
         let mut terms = tendon_joints(node, &required_attribute(node, "tendon1")?)?;
         if let Some(other) = node.attribute("tendon2") {
             if (2..5).any(|k| coefficient(k) != 0.0) {
-                return Err(located_message(
-                    node,
-                    "a coupling by a polynomial of higher degree is not supported; models have constant ratios only",
-                ));
+                return Err(located_message(node, POLYNOMIAL));
             }
             for (joint, length) in tendon_joints(node, other)? {
                 terms.push((joint, -coefficient(1) * length));

@@ -23,6 +23,7 @@ mod placed;
 mod rig_text;
 mod sdf;
 mod sdf_couplings;
+mod sdf_tree;
 mod thresholds;
 mod unread;
 mod urdf;

@@ -8,14 +8,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::{Matrix3, Vector3};
 use roxmltree::{Document, Node};
 
-use super::counts::too_many_joints;
 use super::description::{
     ClosureConstraint, DescriptionClosure, DescriptionCoupling, DescriptionInertia, DescriptionJoint,
-    DescriptionJointKind, DescriptionLink, RobotDescription,
+    DescriptionJointKind, RobotDescription,
 };
-use super::placed::{DescriptionPose, rotation, rotation_between_axes, rotation_from_quaternion};
+use super::placed::{DescriptionPose, rotation, rotation_from_quaternion};
 use super::sdf_couplings::{gearbox_coupling, screw_coupling};
-use super::thresholds::MOST_MOVING_JOINTS;
+use super::sdf_tree::build_link_tree;
 use super::urdf_extensions::ball_constraint;
 use super::xml::{
     child, children, exact_numbers, line, located_message, required_attribute, required_child, symmetric, vector,
@@ -64,23 +63,35 @@ pub(super) struct SdfJoint {
     /// Joints in sequence; empty for a fixed joint.
     pub(super) joints: Vec<DescriptionJoint>,
     /// Pose of the joint in the model.
-    place: DescriptionPose,
+    pub(super) place: DescriptionPose,
     /// Name of the joint.
-    name: String,
+    pub(super) name: String,
     /// Line in the file.
-    line: u32,
+    pub(super) line: u32,
     /// Type in the file, such as `revolute`.
-    kind: String,
+    pub(super) kind: String,
+}
+
+/// Major and minor number of the format: 1.12 is later than 1.9.
+pub(super) type FormatVersion = (u32, u32);
+
+/// The first version in which an axis is given in the axes of the joint.
+const AXES_OF_THE_JOINT: FormatVersion = (1, 5);
+
+/// The version of a file, which decides in which axes joint axes are given; without one the latest that is read.
+fn format_version(root: &Node) -> FormatVersion {
+    let text = root.attribute("version").unwrap_or_default();
+    let mut numbers = text.trim().split('.').map(str::parse);
+    match (numbers.next(), numbers.next()) {
+        (Some(Ok(major)), Some(Ok(minor))) => (major, minor),
+        _ => (1, 12),
+    }
 }
 
 /// Reads a description; fails with one line that states the fault and its place.
 pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
     let root = document.root_element();
-    // The version decides in which axes joint axes are given.
-    let version: f64 = root
-        .attribute("version")
-        .and_then(|text| text.trim().parse().ok())
-        .unwrap_or(1.7);
+    let version = format_version(&root);
     // The model is in the file directly, or in a world.
     let world = child(&root, "world");
     let mut models = children(&root, "model").chain(world.iter().flat_map(|world| children(world, "model")));
@@ -141,7 +152,7 @@ pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
         .attribute("canonical_link")
         .and_then(|name| links.iter().position(|node| node.attribute("name") == Some(name)))
         .unwrap_or(0);
-    tree(&mut out, &links, &places, &joints, &own, base)?;
+    build_link_tree(&mut out, &links, &places, &joints, &own, base)?;
     read_constraints(&mut out, &model, &links, &frames)?;
     Ok(out)
 }
@@ -319,7 +330,7 @@ fn pose_of(node: &Node) -> Result<DescriptionPose, String> {
 }
 
 /// Mass and inertia of a link; 1 kg and 1 kg m^2 without `<inertial>`, as in the format.
-fn inertial(node: &Node) -> Result<DescriptionInertia, String> {
+pub(super) fn inertial(node: &Node) -> Result<DescriptionInertia, String> {
     let given = child(node, "inertial");
     let mut out = DescriptionInertia {
         mass: 1.0,
@@ -360,7 +371,12 @@ fn inertial(node: &Node) -> Result<DescriptionInertia, String> {
 
 /// Reads a `<joint>`: its links, its pose in the model, and its one or two axes. Screws become a rotation and a coupled
 /// translation.
-fn joint(node: &Node, frames: &SdfFrames, version: f64, out: &mut RobotDescription) -> Result<SdfJoint, String> {
+fn joint(
+    node: &Node,
+    frames: &SdfFrames,
+    version: FormatVersion,
+    out: &mut RobotDescription,
+) -> Result<SdfJoint, String> {
     let name = required_attribute(node, "name")?;
     // Each degree of freedom becomes a joint, with the element that describes its axis.
     let kind = required_attribute(node, "type")?;
@@ -368,7 +384,7 @@ fn joint(node: &Node, frames: &SdfFrames, version: f64, out: &mut RobotDescripti
         "fixed" => &[],
         "revolute" | "continuous" => &[("axis", DescriptionJointKind::Revolute)],
         "prismatic" => &[("axis", DescriptionJointKind::Prismatic)],
-        "ball" => &[("", DescriptionJointKind::Ball)],
+        "ball" => &[("axis", DescriptionJointKind::Ball)],
         "universal" | "revolute2" => &[
             ("axis", DescriptionJointKind::Revolute),
             ("axis2", DescriptionJointKind::Revolute),
@@ -445,7 +461,7 @@ pub(super) fn joint_end(node: &Node, tag: &str, frames: &SdfFrames) -> Result<Op
 pub(super) fn axis_in_model(
     node: &Node,
     frames: &SdfFrames,
-    version: f64,
+    version: FormatVersion,
     place: &DescriptionPose,
 ) -> Result<Vector3<f64>, String> {
     let (xyz, turned) = match child(node, "xyz") {
@@ -463,7 +479,7 @@ pub(super) fn axis_in_model(
     // Old versions give axes in the frame of the model.
     let in_model_frame = match text_of(node, "use_parent_model_frame") {
         Some(text) => ["1", "true"].contains(&text),
-        None => version < 1.45,
+        None => version < AXES_OF_THE_JOINT,
     };
     let axis = if in_model_frame { xyz } else { turned * xyz };
     if axis.norm() == 0.0 {
@@ -477,7 +493,7 @@ fn read_axis(
     joint: &mut DescriptionJoint,
     node: &Node,
     frames: &SdfFrames,
-    version: f64,
+    version: FormatVersion,
     place: &DescriptionPose,
     out: &mut RobotDescription,
 ) -> Result<(), String> {
@@ -486,8 +502,13 @@ fn read_axis(
         // Limits; very large numbers mean that there is none.
         let low = number_of(&limit, "lower")?.filter(|x| *x > -NO_LIMIT);
         let high = number_of(&limit, "upper")?.filter(|x| *x < NO_LIMIT);
-        if let (Some(low), Some(high)) = (low, high) {
-            joint.range = (low < high).then_some([low, high]);
+        match (low, high) {
+            (Some(low), Some(high)) => joint.range = (low < high).then_some([low, high]),
+            (None, None) => {}
+            _ => out.remarks.push(located_message(
+                &limit,
+                "it bounds the position on one side only and is left out: ranges of models have both ends",
+            )),
         }
         joint.rate = number_of(&limit, "velocity")?.filter(|x| *x > 0.0 && *x < NO_LIMIT);
         // An effort of zero marks a joint without a drive.
@@ -523,175 +544,6 @@ fn read_axis(
             leader: Some(of),
             ratio,
             offset: number_of(&mimic, "offset")?.unwrap_or(0.0) - ratio * reference,
-        });
-    }
-    Ok(())
-}
-
-/// The part that stands for the group of a part. Parts on the way are made to lead there at once.
-fn last_of_group(leads: &mut [usize], part: usize) -> usize {
-    let mut last = part;
-    while leads[last] != last {
-        last = leads[last];
-    }
-    let mut here = part;
-    while leads[here] != last {
-        here = std::mem::replace(&mut leads[here], last);
-    }
-    last
-}
-
-/// Builds a tree from links and joints. Joints that close a loop become closures, preferably ball joints.
-#[allow(
-    clippy::too_many_lines,
-    reason = "tree first, then what closes rings, on the same tables"
-)]
-fn tree(
-    out: &mut RobotDescription,
-    nodes: &[Node],
-    places: &[DescriptionPose],
-    joints: &[SdfJoint],
-    own: &DescriptionPose,
-    base: usize,
-) -> Result<(), String> {
-    // Spanning tree by merging groups of connected links; the world is the last entry. Ball joints come last, so that
-    // they are cut.
-    let n = nodes.len();
-    let part = |link: Option<usize>| link.unwrap_or(n);
-    let mut order: Vec<usize> = (0..joints.len()).collect();
-    order.sort_by_key(|k| joints[*k].kind == "ball");
-    // Each part leads to another one of its group; the last one stands for the group.
-    let mut leads: Vec<usize> = (0..=n).collect();
-    let mut in_tree = vec![false; joints.len()];
-    for k in order {
-        let [one, other] = [part(joints[k].parent), part(joints[k].child)].map(|p| last_of_group(&mut leads, p));
-        // A joint between two groups connects them; a joint inside of a group would close a loop.
-        if one != other {
-            in_tree[k] = true;
-            leads[other] = one;
-        }
-    }
-    // The joints of the tree at each part, in the order of the file.
-    let mut at: Vec<Vec<usize>> = vec![Vec::new(); n + 1];
-    for k in (0..joints.len()).filter(|k| in_tree[*k]) {
-        at[part(joints[k].parent)].push(k);
-        at[part(joints[k].child)].push(k);
-    }
-    // Links in the order in which they are reached: from the world, then from the base link, then from the remaining
-    // links. The last two get a free joint.
-    let mut index: Vec<Option<usize>> = vec![None; n];
-    let mut n_free = 0;
-    let starts = [None, Some(base)].into_iter().chain((0..n).map(Some));
-    for start in starts {
-        if let Some(link) = start {
-            if index[link].is_some() {
-                continue;
-            }
-            let suffix = if link == base {
-                String::new()
-            } else {
-                format!("_{}", nodes[link].attribute("name").unwrap_or_default())
-            };
-            // A link that no joint connects to the world is a free body.
-            n_free += 1;
-            if n_free > MOST_MOVING_JOINTS {
-                return Err(located_message(&nodes[link], &too_many_joints()));
-            }
-            index[link] = Some(out.links.len());
-            out.links.push(DescriptionLink {
-                name: required_attribute(&nodes[link], "name")?,
-                parent: None,
-                at: own.compose(&places[link]),
-                joints: vec![DescriptionJoint::new(
-                    format!("base{suffix}"),
-                    DescriptionJointKind::Free,
-                    line(&nodes[link]),
-                )],
-                inertial: inertial(&nodes[link])?,
-            });
-        }
-        // Follow the joints of the tree from this link.
-        let mut waiting = vec![start];
-        while let Some(here) = waiting.pop() {
-            for between in at[part(here)].iter().map(|k| &joints[*k]) {
-                // The tree can pass a joint in either direction.
-                let is_forward = between.parent == here;
-                let there = if is_forward { between.child } else { between.parent };
-                let Some(link) = there.filter(|link| index[*link].is_none()) else {
-                    continue;
-                };
-                // A joint that is passed from child to parent has the opposite axis, and its parts in reverse order.
-                let carrier = here.map_or_else(|| own.inverse(), |link| places[link]);
-                let to_link = places[link].inverse();
-                let mut moving = between.joints.clone();
-                for joint in &mut moving {
-                    // The anchor and the axis in the axes of the link that the joint moves.
-                    joint.anchor = to_link.compose(&between.place).p;
-                    joint.axis = to_link.r * joint.axis;
-                    if !is_forward {
-                        joint.axis = -joint.axis;
-                    }
-                }
-                if !is_forward {
-                    if moving.iter().any(|joint| joint.kind == DescriptionJointKind::Ball) {
-                        out.remarks.push(format!(
-                            "line {}: the tree passes the ball joint `{}` from child to parent; its angles are those of the parent relative to \
-                             the child",
-                            between.line, between.name
-                        ));
-                    }
-                    moving.reverse();
-                }
-                index[link] = Some(out.links.len());
-                out.links.push(DescriptionLink {
-                    name: required_attribute(&nodes[link], "name")?,
-                    parent: here.and_then(|link| index[link]),
-                    at: carrier.inverse().compose(&places[link]),
-                    joints: moving,
-                    inertial: inertial(&nodes[link])?,
-                });
-                waiting.push(Some(link));
-            }
-        }
-    }
-    // Joints outside of the tree close loops.
-    for between in joints.iter().zip(&in_tree).filter(|(_, is)| !**is).map(|(b, _)| b) {
-        // The conditions of the closure.
-        let holds = match between.kind.as_str() {
-            "ball" => ClosureConstraint::Origins,
-            "revolute" | "continuous" => ClosureConstraint::Axes,
-            "fixed" => ClosureConstraint::Frames,
-            other => {
-                return Err(format!(
-                    "line {}: the joint `{}` closes a loop and is {other}; loops can be closed by ball, revolute and fixed joints only",
-                    between.line, between.name
-                ));
-            }
-        };
-        // A hinge has its axis along x of the closure's frame.
-        let mut place = between.place;
-        if let (ClosureConstraint::Axes, Some(joint)) = (holds, between.joints.first()) {
-            place.r = rotation_between_axes(&Vector3::x(), &joint.axis).unwrap_or_else(Matrix3::identity);
-        }
-        // The same pose as seen from the links at both ends.
-        let end = |link: Option<usize>| match link {
-            Some(link) => (index[link], places[link].inverse().compose(&place)),
-            None => (None, own.compose(&place)),
-        };
-        // A cut joint has no coordinate, so nothing can act on it.
-        for joint in &between.joints {
-            if joint.damping != 0.0 || joint.friction != 0.0 || joint.stiffness != 0.0 {
-                out.remarks.push(format!(
-                    "line {}: damping, friction and springs of `{}`, which closes a loop, are left out",
-                    between.line, between.name
-                ));
-            }
-        }
-        out.closures.push(DescriptionClosure {
-            name: between.name.clone(),
-            line: between.line,
-            ends: [end(between.parent), end(between.child)],
-            constraint: holds,
         });
     }
     Ok(())

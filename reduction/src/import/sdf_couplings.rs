@@ -6,7 +6,7 @@
 use roxmltree::Node;
 
 use super::description::{DescriptionCoupling, DescriptionJoint, DescriptionJointKind};
-use super::sdf::{SdfFrames, SdfJoint, axis_in_model, joint_end, number_of, pose_in_model};
+use super::sdf::{FormatVersion, SdfFrames, SdfJoint, axis_in_model, joint_end, number_of, pose_in_model};
 use super::xml::{child, line, located_message, required_attribute, required_child};
 
 /// Largest sine of the angle between an axis of a gearbox and that of the joint that it couples (1). Directions with five
@@ -18,7 +18,7 @@ const PARALLEL: f64 = 1e-4;
 pub(super) fn gearbox_coupling(
     node: &Node,
     frames: &SdfFrames,
-    version: f64,
+    version: FormatVersion,
     joints: &[SdfJoint],
 ) -> Result<DescriptionCoupling, String> {
     let name = required_attribute(node, "name")?;

@@ -55,7 +55,7 @@ pub(crate) fn read(document: &Document, closures: Option<&str>, is_floating: boo
     let closures = closures.map(closures_file::read).transpose()?;
     if let Some(file) = &closures {
         out.remarks.extend(file.remarks.iter().cloned());
-        replace_joints(&mut joints, &file.joints)?;
+        replace_joints(&mut joints, &file.joints, &mut out.remarks)?;
     }
     resolve_fixed_couplings(&mut out, &joints);
     // Transmissions have no effect on a model, but other tools scale forces by their reduction.
@@ -160,8 +160,13 @@ pub(crate) fn read(document: &Document, closures: Option<&str>, is_floating: boo
     Ok(out)
 }
 
-/// Replaces joints by the kinds that the file of closures gives for them. Damping and friction of the URDF stay.
-fn replace_joints(joints: &mut [UrdfJoint], by: &[(String, JointReplacement)]) -> Result<(), String> {
+/// Replaces joints by the kinds that the file of closures gives for them. Damping and friction of the URDF stay; its
+/// limits are those of another motion.
+fn replace_joints(
+    joints: &mut [UrdfJoint],
+    by: &[(String, JointReplacement)],
+    remarks: &mut Vec<String>,
+) -> Result<(), String> {
     for (name, becomes) in by {
         let found = joints.iter_mut().find(|joint| &joint.name == name);
         let Some(UrdfJoint { joints, line, .. }) = found else {
@@ -171,6 +176,12 @@ fn replace_joints(joints: &mut [UrdfJoint], by: &[(String, JointReplacement)]) -
         };
         // The new joints keep the losses of the old one.
         let old = std::mem::take(joints);
+        let is_limited = |old: &DescriptionJoint| old.range.is_some() || old.rate.is_some() || old.force.is_some();
+        if old.iter().any(is_limited) && *becomes != JointReplacement::Fixed {
+            remarks.push(format!(
+                "line {line}: the limits of `{name}` are left out: the file of closures gives it another motion"
+            ));
+        }
         let new = |name: String, kind: DescriptionJointKind| {
             let mut joint = DescriptionJoint::new(name, kind, *line);
             (joint.damping, joint.friction) = old.first().map_or((0.0, 0.0), |old| (old.damping, old.friction));

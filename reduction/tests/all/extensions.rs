@@ -9,17 +9,17 @@ use crate::lines;
 
 const GRAVITY: f64 = 9.81;
 
-fn imported(text: &str) -> DescriptionImport {
+pub(crate) fn imported(text: &str) -> DescriptionImport {
     import(text, &ImportOptions::default()).unwrap_or_else(|error| panic!("{error}\n{text}"))
 }
 
-fn derived(imported: &DescriptionImport) -> Derivation {
+pub(crate) fn derived(imported: &DescriptionImport) -> Derivation {
     let loaded = modelmill_spec::load("model.toml", &imported.model, &MemoryFiles::default());
     derive(&loaded.unwrap_or_else(|failure| panic!("{failure}")).mechanism).expect("a derivation")
 }
 
 /// Value of the first independent coordinate, and the force of the first drive there. Other coordinates stay nominal.
-fn force(derivation: &Derivation, [offset, rate, acceleration]: [f64; 3]) -> (f64, f64) {
+pub(crate) fn force(derivation: &Derivation, [offset, rate, acceleration]: [f64; 3]) -> (f64, f64) {
     let coordinates = derivation.mechanism.coordinates.iter().filter(|c| !c.passive);
     let mut q: Vec<f64> = coordinates.map(|c| c.nominal).collect();
     q[0] += offset;

@@ -8,6 +8,7 @@ mod export;
 mod extensions;
 mod faulty;
 mod gaps;
+mod left_out;
 mod locks;
 mod mjcf;
 mod order_of_entries;

@@ -212,9 +212,16 @@ impl ModelTextBuilder<'_> {
             acts.rate = Some(acts.rate.map_or(rate, |old| old.min(rate)));
         }
         // Force limits and the starting value are those of the joint that gives the variable its name.
-        let is_leader = self.couplings.variables[variable].joint == joint.name;
+        let leader = &self.couplings.variables[variable].joint;
+        let is_leader = *leader == joint.name;
         if is_leader {
             acts.force = joint.force.map(|force| force.map(|force| force * ratio));
+        } else if joint.force.is_some() {
+            self.remarks.push(message!(
+                "line {}: the force limit of `{}`, which follows `{leader}`, is left out: one drive moves both",
+                joint.line,
+                joint.name
+            ));
         }
         // Loops are closed from the pose of the description, or from the zero of the joint.
         let given = description.pose.iter().find(|(name, _)| name == &joint.name);
@@ -281,9 +288,10 @@ impl ModelTextBuilder<'_> {
             joint.line, joint.name
         ));
         // Effects at the angles would be different from effects at the joint.
-        if joint.damping != 0.0 || joint.friction != 0.0 || joint.stiffness != 0.0 || joint.armature != 0.0 {
+        let acting = [joint.damping, joint.friction, joint.stiffness, joint.armature];
+        if joint.range.is_some() || acting.iter().any(|value| *value != 0.0) {
             self.remarks.push(message!(
-                "line {}: damping, friction, spring and armature of the ball joint `{}` are left out",
+                "line {}: damping, friction, spring, armature and range of the ball joint `{}` are left out",
                 joint.line,
                 joint.name
             ));
@@ -342,9 +350,9 @@ impl ModelTextBuilder<'_> {
         let list: Vec<String> = names.iter().map(|name| format!("\"{name}\"")).collect();
         let text = format!("free = [{}], quaternion = \"wxyz\", twist = \"mixed\"", list.join(", "));
         // A free body has no joint at which these could act.
-        if joint.damping != 0.0 || joint.armature != 0.0 || joint.friction != 0.0 {
+        if joint.damping != 0.0 || joint.armature != 0.0 || joint.friction != 0.0 || joint.stiffness != 0.0 {
             self.remarks.push(message!(
-                "line {}: damping, friction and armature of the free joint `{}` are left out",
+                "line {}: damping, friction, spring and armature of the free joint `{}` are left out",
                 joint.line,
                 joint.name
             ));

@@ -314,7 +314,8 @@ impl ModelTextBuilder<'_> {
         Ok(())
     }
 
-    /// A valid and unique name: invalid characters become `_`, and a number is added to a name that is used already.
+    /// A valid and unique name: invalid characters become `_`, and a number is added to a name that is used already or has
+    /// a meaning in expressions.
     fn unique_name(&mut self, wanted: &str) -> String {
         // Names have at most 40 characters before a number is added.
         let mut name: String = wanted
@@ -327,7 +328,7 @@ impl ModelTextBuilder<'_> {
         }
         let stem = name.clone();
         let mut n = 1;
-        while self.names.contains(&name) {
+        while self.names.contains(&name) || modelmill_spec::is_reserved_word(&name) {
             n += 1;
             name = format!("{stem}_{n}");
         }

@@ -14,6 +14,9 @@ use super::lines::NamedDriveLine;
 use super::{ImportCoordinate, ModelTextBuilder, round_to_15_digits};
 use crate::write::{significant_digits, toml_float, toml_string};
 
+/// The ten linear parameters of a body.
+const BODY_SYMBOLS: [&str; 10] = ["XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M"];
+
 impl ModelTextBuilder<'_> {
     /// Joins all sections to the text of the model file.
     pub(super) fn finish(
@@ -122,11 +125,18 @@ impl ModelTextBuilder<'_> {
         for (k, body) in self.bodies.iter().enumerate() {
             let frame = &self.frame_names[body.frame];
             // Symbols have the name of the frame; long names are replaced by a number.
-            let suffix = if frame.len() < 32 {
+            let mut suffix = if frame.len() < 32 {
                 format!("_{frame}")
             } else {
                 format!("_{}", k + 1)
             };
+            // A joint may have the name of such a symbol.
+            while BODY_SYMBOLS
+                .iter()
+                .any(|symbol| self.names.contains(&format!("{symbol}{suffix}")))
+            {
+                suffix.push_str("_body");
+            }
             // The ten parameters about the origin of the frame. Rotations leave rounding where an entry is zero.
             let largest = |entries: &[f64]| entries.iter().fold(0.0_f64, |all, one| all.max(one.abs()));
             let i = body
@@ -136,21 +146,22 @@ impl ModelTextBuilder<'_> {
                 .moment
                 .map(|one| zero_if_rounding(one, largest(body.moment.as_slice())));
             let values = [
-                ("XX", i[(0, 0)]),
-                ("XY", i[(0, 1)]),
-                ("XZ", i[(0, 2)]),
-                ("YY", i[(1, 1)]),
-                ("YZ", i[(1, 2)]),
-                ("ZZ", i[(2, 2)]),
-                ("MX", c.x),
-                ("MY", c.y),
-                ("MZ", c.z),
-                ("M", body.mass),
+                i[(0, 0)],
+                i[(0, 1)],
+                i[(0, 2)],
+                i[(1, 1)],
+                i[(1, 2)],
+                i[(2, 2)],
+                c.x,
+                c.y,
+                c.z,
+                body.mass,
             ];
             // Zeros are written as well: a value that the file does not state counts as unknown.
-            let nominal: Vec<String> = values
+            let nominal: Vec<String> = BODY_SYMBOLS
                 .iter()
-                .map(|(key, v)| format!("{key} = {}", toml_float(round_to_15_digits(*v))))
+                .zip(values)
+                .map(|(key, v)| format!("{key} = {}", toml_float(round_to_15_digits(v))))
                 .collect();
             let _ = write!(
                 text,
