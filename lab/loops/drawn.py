@@ -3,11 +3,13 @@
 usage: drawn.py MODELMILL [--name NAME]
 
 The files state poses as a user would guess them; passive coordinates are solved from there.
+The exit status is 1 if a verdict is wrong.
 """
 
 import argparse
 import collections
 import re
+import sys
 import tempfile
 from pathlib import Path
 
@@ -49,6 +51,7 @@ def main():
         count[verdict] += 1
         print(f"{source.stem}: {verdict} {took:.1f} s {why[:1800]}", flush=True)
     print(dict(count))
+    sys.exit(1 if count["wrong"] else 0)
 
 
 if __name__ == "__main__":

@@ -1,9 +1,9 @@
-"""Forty overconstrained loops from a seed, moved by turns and by slides, compared with independent mechanics.
+"""Forty overconstrained loops from a seed, moved by revolute and prismatic drives, compared with independent mechanics.
 
 usage: overconstrained.py MODELMILL [--seeds N] [--family NAME] [--keep FOLDER]
 
 For each: the number of base parameters against the rank of a regressor computed by `mechanics`, and forces of emitted C99 against its
-forces.
+forces. The exit status is 1 if a verdict is wrong.
 """
 
 import argparse
@@ -414,6 +414,7 @@ def main():
             count[verdict] += 1
             print(f"{label}: {verdict} {took:.1f} s {why[:1500]}", flush=True)
     print(dict(count))
+    sys.exit(1 if count["wrong"] else 0)
 
 
 if __name__ == "__main__":

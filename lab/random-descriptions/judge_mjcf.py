@@ -2,6 +2,7 @@
 
 usage: judge_mjcf.py MODELMILL [--seeds N] [--feature NAME] [--keep FOLDER]
 
+The exit status is 1 if a verdict is SILENT.
 Verdicts: right; named (a remark names what is left out); refused; SILENT (forces, closure or limits differ without a remark).
 """
 
@@ -151,15 +152,69 @@ def limit_faults(mj, model, joints):
                 out.append(f"range of {name}")
             elif text_of[j] in used and not np.allclose(limits["coordinates"][text_of[j]]["position"], mj.jnt_range[j], atol=1e-9):
                 out.append(f"range of {name} differs")
-        if mj.jnt_actfrclimited[j] and not limits.get("drives"):
-            out.append(f"force of {name}")
         if not mj.jnt_limited[j] and text_of.get(j) in limits.get("coordinates", {}) and "position" in limits["coordinates"][text_of[j]]:
             out.append(f"range of {name} without a limit")
-    for a in range(len(mj.actuator_forcelimited)):
-        if mj.actuator_forcelimited[a]:
-            low, high = sorted(mj.actuator_forcerange[a] * mj.actuator_gear[a, 0])
-            if not any(np.allclose(one.get("force", [0, 0]), [low, high]) for one in limits.get("drives", {}).values()):
-                out.append(f"force range of {mj.actuator(a).name}")
+    for t in range(mj.ntendon):
+        if mj.tendon_limited[t]:
+            out.append(f"range of the tendon {mj.tendon(t).name}")
+    return out + force_limit_faults(mj, model, text_of)
+
+
+def clamped(first, then):
+    """The limits of a force that is clamped to one range and then to another; none means no limits."""
+    if first is None or then is None:
+        return then if first is None else first
+    return [min(max(end, then[0]), then[1]) for end in first]
+
+
+def actuator_limits(mj, a):
+    """The force limits of an actuator before its gear; none if it has no limits."""
+    force = mj.actuator_forcerange[a].tolist() if mj.actuator_forcelimited[a] else None
+    # The control of a motor is its force.
+    is_motor = (mj.actuator_gaintype[a] == mujoco.mjtGain.mjGAIN_FIXED and mj.actuator_biastype[a] == mujoco.mjtBias.mjBIAS_NONE
+                and mj.actuator_dyntype[a] == mujoco.mjtDyn.mjDYN_NONE and mj.actuator_gainprm[a, 0] == 1)
+    return clamped(mj.actuator_ctrlrange[a].tolist(), force) if is_motor and mj.actuator_ctrllimited[a] else force
+
+
+def scaled(limits, gear):
+    return None if limits is None else sorted(float(gear * end) for end in limits)
+
+
+def force_limit_faults(mj, model, text_of):
+    """Force limits of MuJoCo that the drives of the model do not have, and the reverse."""
+    found = {name: entry.get("force") for name, entry in model.model.get("limits", {}).get("drives", {}).items()}
+    drives = model.model.get("drive", [])
+    at_coordinate = {drive["joint"]: drive["name"] for drive in drives if "joint" in drive}
+    lines = {drive["name"] for drive in drives if "linear" in drive}
+    kind = {name: [a for a in range(mj.nu) if mj.actuator_trntype[a] == value] for name, value in (
+        ("joint", mujoco.mjtTrn.mjTRN_JOINT), ("tendon", mujoco.mjtTrn.mjTRN_TENDON))}
+    out = []
+
+    def compare_one(what, drive, expected):
+        given = found.get(drive)
+        if (given is None) != (expected is None) or given is not None and not np.allclose(given, expected, atol=1e-9):
+            out.append(f"force of {what}: {given}, not {expected}")
+
+    for j, text in text_of.items():
+        own = mj.jnt_actfrcrange[j].tolist() if mj.jnt_actfrclimited[j] else None
+        ranges = [scaled(actuator_limits(mj, a), mj.actuator_gear[a, 0]) for a in kind["joint"] if mj.actuator_trnid[a, 0] == j]
+        # The limits of several actuators add up, if all have limits.
+        total = np.sum(ranges, axis=0).tolist() if ranges and None not in ranges else None
+        expected = clamped(total, own)
+        name = mj.joint(j).name
+        if text in at_coordinate:
+            compare_one(name, at_coordinate[text], expected)
+        elif expected is not None and (ranges or mj.nu == 0):
+            out.append(f"force of {name}, which has no drive: {expected}")
+    for t in range(mj.ntendon):
+        own = mj.tendon_actfrcrange[t].tolist() if mj.tendon_actfrclimited[t] else None
+        acting = [a for a in kind["tendon"] if mj.actuator_trnid[a, 0] == t]
+        drive = next((mj.actuator(a).name for a in acting if mj.actuator(a).name in lines), None)
+        if drive is not None and len(acting) == 1:
+            # The limit of a tendon is that of the force before the gear.
+            compare_one(drive, drive, scaled(clamped(actuator_limits(mj, acting[0]), own), mj.actuator_gear[acting[0], 0]))
+        elif own is not None or any(actuator_limits(mj, a) is not None for a in acting):
+            out.append(f"force of the tendon {mj.tendon(t).name}")
     return out
 
 
@@ -261,6 +316,7 @@ def main():
                 if chosen.feature or verdict in ("named", "SILENT"):
                     print("          " + said.replace("\n", "\n          "), flush=True)
     print(dict(count))
+    sys.exit(1 if count["SILENT"] else 0)
 
 
 if __name__ == "__main__":

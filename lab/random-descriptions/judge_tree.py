@@ -2,6 +2,7 @@
 
 usage: judge_tree.py MODELMILL {urdf,sdf} [--seeds N] [--feature NAME] [--keep FOLDER]
 
+The exit status is 1 if a verdict is SILENT.
 Verdicts: right; named (a remark names what is left out); refused; SILENT (forces, closure or limits differ without a remark).
 """
 
@@ -9,6 +10,7 @@ import argparse
 import collections
 import logging
 import math
+import sys
 import tempfile
 from pathlib import Path
 
@@ -254,6 +256,7 @@ def main():
                 if chosen.feature or verdict in ("named", "SILENT", "unjudged"):
                     print("          " + said.replace("\n", "\n          "), flush=True)
     print(dict(count))
+    sys.exit(1 if count["SILENT"] else 0)
 
 
 if __name__ == "__main__":

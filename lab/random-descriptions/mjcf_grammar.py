@@ -610,7 +610,8 @@ def spatial_tendon_default(t):
 
 def actuate(t, tag, joint=None, **attributes):
     """An actuator at one joint, and plain motors at the others."""
-    chosen = joint or t.joint()
+    # An element without children counts as false.
+    chosen = t.joint() if joint is None else joint
     s = t.section("actuator")
     for j in t.joints:
         if j is chosen:
@@ -684,6 +685,24 @@ def actuator_control_range(t):
 
 
 @feature()
+def actuator_and_joint_range(t):
+    """Both limits apply, the wider one at the joint or at its actuator."""
+    j = t.joint(); wide = t.rng.choice([1, 20]); j.set("actuatorfrcrange", f"{-wide} {wide}")
+    actuate(t, "motor", joint=j, forcerange="-3 4", gear=str(t.signed(4)))
+
+
+@feature()
+def actuator_two_ranges_at_one(t):
+    actuate(t, "motor", joint=t.joints[0], forcerange="-3 4")
+    ET.SubElement(t.section("actuator"), "motor", name="second", joint=t.joints[0].get("name"), forcerange="-1 3", gear="-2")
+
+
+@feature("actuator")
+def actuator_without_force(t):
+    j = t.joint(); j.set("actuatorfrcrange", "-1 1"); actuate(t, "motor", joint=j, forcerange="2 4")
+
+
+@feature()
 def actuator_some(t):
     s = t.section("actuator"); ET.SubElement(s, "motor", name="only", joint=t.joints[0].get("name"))
 
@@ -705,6 +724,31 @@ def actuator_spatial_tendon(t):
     spatial_tendon(t, damping="0.2", armature="0.1", frictionloss="0.3")
     s = t.section("actuator")
     ET.SubElement(s, "motor", name="mt", tendon="tt", armature="0.3", gear="2")
+    for j in t.joints[:-1]:
+        ET.SubElement(s, "motor", name=f"act_{j.get('name')}", joint=j.get("name"))
+
+
+@feature("tendon")
+def actuator_fixed_tendon_range(t):
+    fixed_tendon(t, "margin", "0.01")
+    ET.SubElement(t.section("actuator"), "motor", name="mt", tendon="tt", forcerange="-3 4")
+
+
+@feature()
+def actuator_spatial_tendon_range(t):
+    """Limits of the tendon and of its actuator, before the gear."""
+    wide = t.rng.choice([1, 20]); spatial_tendon(t, actuatorfrcrange=f"{-wide} {wide}")
+    s = t.section("actuator")
+    ET.SubElement(s, "motor", name="mt", tendon="tt", gear=str(t.signed(4)), **t.rng.choice([{}, {"forcerange": "-3 4"}]))
+    for j in t.joints[:-1]:
+        ET.SubElement(s, "motor", name=f"act_{j.get('name')}", joint=j.get("name"))
+
+
+@feature("tendon")
+def actuator_two_at_spatial_tendon(t):
+    spatial_tendon(t, actuatorfrcrange="-2 2")
+    s = t.section("actuator")
+    ET.SubElement(s, "motor", name="mt", tendon="tt"), ET.SubElement(s, "motor", name="other", tendon="tt", gear="2")
     for j in t.joints[:-1]:
         ET.SubElement(s, "motor", name=f"act_{j.get('name')}", joint=j.get("name"))
 

@@ -199,6 +199,12 @@ def limit_on_one_side(t):
     t.d.limits[j.get("name")] = {"position": [-0.4, None]}
 
 
+@feature("sdf", "limits")
+def limits_equal(t):
+    j = t.joint(); j.set("type", "prismatic"); t.sub(j, "axis/limit/lower", 0.3); t.sub(j, "axis/limit/upper", 0.3)
+    t.d.limits[j.get("name")] = {"position": [0.3, 0.3]}
+
+
 @feature("urdf")
 def limit_continuous(t):
     j = t.joint(); j.set("type", "continuous")
@@ -642,6 +648,12 @@ def ball_losses(t):
     j = t.joint(); j.set("type", "ball"); t.sub(j, "axis/dynamics/damping", 0.4)
 
 
+@feature("sdf", "limits")
+def ball_limits(t):
+    j = t.joint(); j.set("type", "ball"); t.sub(j, "axis/limit/velocity", 3)
+    t.d.limits["x"] = {"x": 1}
+
+
 @feature("sdf")
 def screw(t):
     j = t.joint(); j.set("type", "screw"); t.sub(j, "screw_thread_pitch", t.number(0.05, 0.2))
@@ -784,6 +796,12 @@ def loop_of_joints_losses(t):
 @feature("sdf", "cut")
 def loop_of_joints_limits(t):
     loop_of_joints(t); t.sub(t.top.findall("joint")[-1], "axis/limit/lower", -0.5); t.sub(t.top.findall("joint")[-1], "axis/limit/upper", 0.5)
+    t.d.limits["x"] = {"x": 1}
+
+
+@feature("sdf", "cut")
+def loop_of_joints_rate(t):
+    loop_of_joints(t); t.sub(t.top.findall("joint")[-1], f"axis/limit/{t.rng.choice(['velocity', 'effort'])}", 3)
     t.d.limits["x"] = {"x": 1}
 
 

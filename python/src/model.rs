@@ -440,9 +440,8 @@ impl CoreModel {
         instrument_period: Option<f64>,
         progress: Option<Bound<'_, PyAny>>,
     ) -> PyResult<PythonResult> {
-        let standstill = valid_options(py, reading.options())?.standstill.bound();
         let estimation = EstimatorOptions {
-            standstill: standstill.filter(|part| *part > 0.0),
+            standstill: valid_options(py, reading.options())?.standstill.bound(),
             ..valid_options(py, options.options())?
         };
         let (data, check) = (recordings(&data), recordings(&check));

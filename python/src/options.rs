@@ -10,7 +10,8 @@ use pyo3::types::PyFloat;
 /// An option, or a sentence with the fault of its value.
 pub(crate) type OptionResult<T> = Result<T, String>;
 
-/// The options of a list of declarations, from a mapping of keywords to values. None and false stand for no value.
+/// The options of a list of declarations, from a mapping of keywords to values. None stands for no value; so does false
+/// for a switch and for a number with an implied value, where true stands for the implied value.
 pub(crate) struct Keywords<T>(OptionResult<T>);
 
 impl<T: DeclaredOptions> Keywords<T> {
@@ -41,7 +42,16 @@ fn read_keywords<T: DeclaredOptions>(given: &Bound<'_, PyAny>) -> PyResult<Optio
         if value.is_none() || is_switch && !value.is_truthy()? {
             continue;
         }
-        let read = read_value(one, &value).ok_or_else(|| one.expected());
+        let read = match (&one.kind, read_boolean(&value)) {
+            (OptionKind::Number { implied: Some(_), .. }, Some(false)) => continue,
+            (
+                OptionKind::Number {
+                    implied: Some(implied), ..
+                },
+                Some(true),
+            ) => one.parse([*implied]),
+            _ => read_value(one, &value).ok_or_else(|| one.expected()),
+        };
         if let Err(expected) = read.and_then(|value| one.set(&mut options, value)) {
             return Ok(Err(format!("{}={}: {expected}", one.name, value.repr()?)));
         }
@@ -53,13 +63,26 @@ fn read_keywords<T: DeclaredOptions>(given: &Bound<'_, PyAny>) -> PyResult<Optio
     })
 }
 
-/// A value of Python for an option, converted as `float()` and `operator.index()` do; none for one of another type.
+/// A boolean of Python or numpy; none for a value of another type.
+fn read_boolean(value: &Bound<'_, PyAny>) -> Option<bool> {
+    value.extract().ok()
+}
+
+/// A value of Python for an option, converted as `float()` and `operator.index()` do; none for one of another type, and
+/// for booleans as numbers.
 fn read_value<T>(one: &OptionDeclaration<T>, value: &Bound<'_, PyAny>) -> Option<OptionValue> {
     let number = |value: &Bound<'_, PyAny>| -> Option<f64> {
+        // `float(True)` is 1, which nobody means.
+        if read_boolean(value).is_some() {
+            return None;
+        }
         let number = value.py().get_type::<PyFloat>().call1((value,)).ok()?;
         number.extract().ok()
     };
-    let integer = |value: &Bound<'_, PyAny>| value.extract::<usize>().ok();
+    let integer = |value: &Bound<'_, PyAny>| match read_boolean(value) {
+        Some(_) => None,
+        None => value.extract::<usize>().ok(),
+    };
     let pair = || -> Option<[Bound<'_, PyAny>; 2]> {
         let parts: Vec<Bound<'_, PyAny>> = value.try_iter().ok()?.collect::<PyResult<_>>().ok()?;
         parts.try_into().ok()

@@ -94,6 +94,16 @@ def test_values_of_options_are_checked() -> None:
         ({"standstill": 1}, "standstill=1: expected a number between 0 and 1"),
         ({"weights": "some"}, "weights='some': expected one of auto"),
         ({"prior": 0.2, "physical": True}, "physical and prior exclude each other"),
+        # Booleans are no numbers, except where a flag of the program may be given without a value.
+        ({"prior": True}, "prior=True: expected a positive number"),
+        ({"prior": False}, "prior=False: expected a positive number"),
+        ({"cutoff_hz": np.True_}, "cutoff_hz=.*True.*: expected a frequency"),
+        ({"order": True}, "order=True: expected an order"),
+        ({"trim": True}, "trim=True: expected a number of samples"),
+        ({"trim": (True, 5)}, "trim=.*: expected a number of samples"),
+        ({"between": (False, 3)}, "between=.*: expected two times"),
+        ({"standstill": False}, "standstill=False: expected a number between 0 and 1"),
+        ({"robust": True, "cutoff_hz": True}, "cutoff_hz=True: expected a frequency"),
     ):
         with pytest.raises(ModelmillError, match=says):
             m.identify(RUN, progress=False, **options)  # type: ignore[arg-type]
@@ -105,6 +115,14 @@ def test_values_of_options_are_checked() -> None:
         for trim in (50, (50, 50))
     ]
     assert np.array_equal(same[0].values, same[1].values)
+    # True stands for the bound of `--robust` without a value, and False for no bound.
+    plain, absent, implied, usual, one = (
+        m.identify(RUN, progress=False, cutoff_hz=20, **bound)  # type: ignore[arg-type]
+        for bound in ({}, {"robust": False}, {"robust": True}, {"robust": 1.345}, {"robust": 1})
+    )
+    assert np.array_equal(plain.values, absent.values)
+    assert np.array_equal(implied.values, usual.values)
+    assert not np.array_equal(implied.values, one.values)
 
 
 ARM = """<robot name="arm"><link name="base"><inertial><mass value="3"/>

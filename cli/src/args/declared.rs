@@ -78,7 +78,7 @@ impl<T: DeclaredOptions> FromArgMatches for DeclaredArgs<T> {
             // Values were checked as they were read.
             let value = one.parse(values.iter().map(String::as_str));
             let set = value.and_then(|value| one.set(&mut self.options, value));
-            set.map_err(|says| clap::Error::raw(ErrorKind::ValueValidation, says))?;
+            set.map_err(|message| clap::Error::raw(ErrorKind::ValueValidation, message))?;
             if !is_default(one, &values) {
                 self.given.push((one.flag, values));
             }

@@ -3,6 +3,7 @@
 use clap::Args;
 use modelmill::identify::EstimatorOptions;
 use modelmill::options::parse_column;
+use modelmill::recording::StandstillRule;
 
 use crate::args::declared::DeclaredArgs;
 
@@ -31,9 +32,9 @@ impl EstimatorArgs {
     }
 
     /// The same as options of the library.
-    pub(crate) fn options(&self, standstill: Option<f64>) -> EstimatorOptions {
+    pub(crate) fn options(&self, standstill: StandstillRule) -> EstimatorOptions {
         EstimatorOptions {
-            standstill: standstill.filter(|part| *part > 0.0),
+            standstill: standstill.bound(),
             ..self.declared.options.clone()
         }
     }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use clap::Args;
 use modelmill::Host;
-use modelmill::recording::RecordingOptions;
+use modelmill::recording::{RecordingOptions, StandstillRule};
 
 use crate::args::declared::DeclaredArgs;
 use crate::flags::{FlagSpelling, quote_word};
@@ -41,9 +41,9 @@ impl PreparationArgs {
         options
     }
 
-    /// The bound of `--standstill`, if it is given.
-    pub(crate) fn standstill(&self) -> Option<f64> {
-        self.declared.options.standstill.bound()
+    /// The rule of `--standstill`.
+    pub(crate) fn standstill(&self) -> StandstillRule {
+        self.declared.options.standstill
     }
 
     /// The options that differ from their defaults, as text for a command line, each with a space before it.

@@ -30,7 +30,7 @@ pub(crate) fn run(host: &Host, args: &IdentifyArgs) -> CommandOutcome {
     let mut reading = args.preparation.reading();
     let standstill = args.preparation.standstill();
     // A bound of the user belongs to the estimator, which applies it to the equations of the fit only.
-    if standstill.is_some() {
+    if standstill != StandstillRule::Automatic {
         reading.standstill = StandstillRule::KeepAll;
     }
     if !model.actuators().is_empty()

@@ -1,6 +1,7 @@
 //! Pages of tasks for agents: each has a head that agents read, all of its commands succeed one after the other, and the
 //! answers have the keys that its tables name.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -8,7 +9,7 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 use crate::common::markdown::Page;
-use crate::common::{modelmill, workspace};
+use crate::common::{modelmill, printed, workspace};
 
 /// The page of each folder of `skills`, in the order of the names.
 pub(crate) fn skill_paths() -> Vec<PathBuf> {
@@ -56,6 +57,23 @@ fn agents_are_shown_all_skills() {
     }
 }
 
+/// AGENTS.md lists the commands without `--json`, which are those of the manual.
+#[test]
+fn agents_are_shown_the_commands_without_json() {
+    let text = fs::read_to_string(workspace("AGENTS.md")).expect("a page");
+    let line = text.lines().find(|line| line.contains("have no `--json`: "));
+    let (_, list) = line.and_then(|line| line.split_once(": ")).expect("a list");
+    let listed: BTreeSet<&str> = list.split('`').skip(1).step_by(2).collect();
+    let manual = printed(&["manual"]);
+    let sections = manual.split("\n## ").skip(1);
+    let without: BTreeSet<&str> = sections
+        .filter_map(|section| section.split_once('\n'))
+        .filter(|(name, text)| text.contains(&format!("\n`modelmill {name}")) && !text.contains("| `--json` |"))
+        .map(|(name, _)| name)
+        .collect();
+    assert_eq!(listed, without);
+}
+
 #[test]
 fn the_commands_of_every_skill_succeed_in_their_order() {
     let mut faults = String::new();
@@ -81,9 +99,9 @@ fn the_commands_of_every_skill_succeed_in_their_order() {
                     .current_dir(&folder)
                     .output()
                     .expect("the program starts");
-                let says = String::from_utf8_lossy(&output.stderr);
+                let message = String::from_utf8_lossy(&output.stderr);
                 if !output.status.success() {
-                    let _ = writeln!(faults, "{}: {words:?}: {says}", path.display());
+                    let _ = writeln!(faults, "{}: {words:?}: {message}", path.display());
                 }
                 if words.contains(&"--json") {
                     let object: Value = serde_json::from_slice(&output.stdout).unwrap_or(Value::Null);
@@ -141,8 +159,8 @@ fn the_servo_log_is_identified_as_it_was_made() {
     }
 }
 
-/// The values of an answer under a dotted key; `[]` stands for every element of a list. An empty list has none, so its
-/// elements are not checked.
+/// The values of an answer under a dotted key; `[]` stands for every element of a list. There are none if a part of the
+/// key is missing or if a list is empty: a skill shows an answer with at least one element.
 fn find_key<'a>(object: &'a Value, key: &str) -> Vec<&'a Value> {
     let mut values = vec![object];
     for part in key.split('.') {

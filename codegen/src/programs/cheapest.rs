@@ -171,7 +171,11 @@ pub(crate) fn cheapest_columns(
         equations.columns_of(graph, mechanism, frames, products, form)
     };
     // Outputs are searched as one list, and then cut into columns. Of a large tree some columns decide for all.
-    let every = (products.len() * deepest).div_ceil(MOST_SEARCHED_ENTRIES).max(1);
+    let mut every = (products.len() * deepest).div_ceil(MOST_SEARCHED_ENTRIES).max(1);
+    // Each body has ten parameters in one order: other strides miss some kinds of columns.
+    while every.is_multiple_of(2) || every.is_multiple_of(5) {
+        every += 1;
+    }
     let searched: Vec<ParameterMonomial> = products.iter().step_by(every).cloned().collect();
     let n_drives = mechanism.drives.len();
     let (form, outputs) = search_cheapest_form(graph, ColumnForm::PLAIN, &steps, weigh, |graph, form| {

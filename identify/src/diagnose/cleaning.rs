@@ -108,10 +108,11 @@ fn remove_outliers(problem: &mut DiagnosisProblem) -> Vec<Disturbance> {
             let mut candidates: Vec<bool> = (0..rest.len())
                 .map(|i| apart[i].abs() > bound && !reverses[i])
                 .collect();
+            // Frequent large distances belong to the force, for example stick-slip or a ripple.
+            let count = candidates.iter().filter(|is_far| **is_far).count();
+            let is_rare = (count as f64) < OUTLIERS_MOST_SHARE * rest.len() as f64;
             leave_out_smooth_peaks(problem, rest, &apart, &mut candidates);
             let new: Vec<usize> = (0..rest.len()).filter(|i| candidates[*i]).collect();
-            // Frequent large distances belong to the force, for example stick-slip.
-            let is_rare = (new.len() as f64) < OUTLIERS_MOST_SHARE * rest.len() as f64;
             let Some(values) = problem.measured.0[d].as_mut().filter(|_| is_rare) else {
                 continue;
             };
@@ -404,7 +405,7 @@ mod tests {
         }
     }
 
-    /// A model error without noise has sharp peaks, which are no outliers; one to three samples beside it are.
+    /// A model error without noise has sharp peaks, which are no outliers. One to three samples that jump are outliers.
     #[test]
     fn smooth_peaks_are_no_outliers() {
         for width in [10.0, 15.0, 30.0] {

@@ -83,7 +83,8 @@ pub(crate) struct DerivedCandidates {
     pub tilt: Option<(ChangeCandidate, Derivation)>,
     /// A delay of the forces.
     pub delay: Option<ChangeCandidate>,
-    /// Errors of constants that an earlier search claims: columns are evaluated with them.
+    /// Errors of constants that an earlier search claims: columns of effects are evaluated with those of the model
+    /// file, but not those of a tilted base.
     pub constant_errors: Vec<ClaimedConstant>,
 }
 

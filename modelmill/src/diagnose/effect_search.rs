@@ -28,14 +28,14 @@ const MOST_CONSTANT_ROUNDS: usize = 3;
 pub(super) fn search_effects(
     model: &Model,
     data: &[Vec<RecordingSegment>; 2],
-    held: FixedParameters,
+    fixed: FixedParameters,
     is_clock_in_question: bool,
     between: &mut Vec<RecordingDifference>,
 ) -> Outcome<EffectSearchAnswer> {
     let search = EffectSearch {
         model,
         data,
-        held,
+        fixed,
         is_clock_in_question,
     };
     // The search with differences between recordings; it is repeated without them if there are any.
@@ -86,12 +86,18 @@ struct EffectSearch<'a> {
     /// The fitted recordings, and the validation runs.
     data: &'a [Vec<RecordingSegment>; 2],
     /// Which parameters keep their nominal values.
-    held: FixedParameters,
+    fixed: FixedParameters,
     /// Whether the clock of the recordings may be wrong.
     is_clock_in_question: bool,
 }
 
 impl EffectSearch<'_> {
+    /// Whether the model file has a constant with this name.
+    fn is_constant_of_file(&self, name: &str) -> bool {
+        let constants = &self.model.derivation.mechanism.constants;
+        constants.iter().any(|constant| constant.name == name)
+    }
+
     /// One search with errors of constants that an earlier one claims.
     ///
     /// Fails as [`Model::diagnose`] does.
@@ -103,7 +109,7 @@ impl EffectSearch<'_> {
         are_effects_at_claims: bool,
     ) -> Outcome<DiagnosisSolution> {
         let query = DiagnosisQuery {
-            fixed: self.held,
+            fixed: self.fixed,
             in_full: true,
             run_differences: between,
             is_clock_in_question: self.is_clock_in_question,
@@ -148,11 +154,13 @@ impl EffectSearch<'_> {
                 break;
             }
         }
-        // Effects beside a wrong length act at the length that is claimed. With wrong claims the loops may not close, and
+        // Effects in addition to a wrong length act at the length that is claimed. With wrong claims the loops may not close, and
         // the answer stays as it is.
         for _ in 0..MOST_CONSTANT_ROUNDS {
             let claimed = claimed_constants(&answer);
-            if claimed.is_empty() || claimed.len() == answer.diagnosis.effects.len() {
+            let n_others = answer.diagnosis.effects.len() - claimed.len();
+            // Zeros of the file are no constants of the candidates' mechanism.
+            if n_others == 0 || !claimed.iter().any(|claim| self.is_constant_of_file(&claim.name)) {
                 break;
             }
             let Some(again) = ended_if_cancelled(self.find_once(between, zeros, &claimed, true))? else {
@@ -166,7 +174,7 @@ impl EffectSearch<'_> {
         Ok(answer)
     }
 
-    /// The errors of the geometry that explain at least as much as the wrong constants that a search claims, beside its
+    /// The errors of the geometry that explain at least as much as the wrong constants that a search claims, in addition to its
     /// other effects; `None` if there are none.
     ///
     /// Fails only when the job is cancelled.
@@ -196,18 +204,18 @@ impl EffectSearch<'_> {
         };
         let own_zeros = with_others.as_ref().map(NamedZeros::new).transpose()?;
         let zeros = own_zeros.as_ref().map_or(Some(named), Option::as_ref);
-        let whole = with_others.as_ref().unwrap_or(self.model).clone();
+        let complete_model = with_others.as_ref().unwrap_or(self.model).clone();
         let version = ended_if_cancelled(ModelVersion::new(
-            whole,
+            complete_model,
             self.data[0].clone(),
             self.data[1].clone(),
-            self.held,
+            self.fixed,
         ))?;
         let Some((version, zeros)) = version.zip(zeros) else {
             return Ok(None);
         };
         let names: Vec<&str> = claimed.iter().map(|one| one.name.as_str()).collect();
-        let alternatives = geometry_alternatives(&version, Some(zeros), self.held, &names, names.len(), 0.0)?;
+        let alternatives = geometry_alternatives(&version, Some(zeros), self.fixed, &names, names.len(), 0.0)?;
         Ok(alternatives.into_iter().next())
     }
 }
@@ -218,8 +226,8 @@ pub(super) struct EffectSearchAnswer {
     pub(super) solution: DiagnosisSolution,
     /// The zeros of the file that were tried.
     pub(super) zeros: Option<NamedZeros>,
-    /// Errors of the geometry that explain at least as much as the wrong constants of the answer, beside its other
-    /// effects.
+    /// Errors of the geometry that explain at least as much as the wrong constants of the answer, in addition to its
+    /// other effects.
     pub(super) in_place_of_constants: Option<GeometryAlternative>,
 }
 

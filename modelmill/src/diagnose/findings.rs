@@ -354,7 +354,7 @@ impl DiagnosisFindings {
         }
     }
 
-    /// Wrong constants beside other effects share their probability with errors of the geometry that explain as much.
+    /// Wrong constants in addition to other effects share their probability with errors of the geometry that explain as much.
     fn share_constants(&mut self, best: &GeometryAlternative) {
         let is_constant = |one: &LocatedEffect| one.kind == CONSTANT_ERROR;
         if self.missing.iter().any(|one| !is_constant(&one.effect)) {
@@ -374,6 +374,10 @@ impl DiagnosisFindings {
         // What both explanations have in common stays as certain as before.
         let is_shared = |one: &LocatedEffect| are_shared(one) && !alternatives.contains(one);
         for (found, missing) in found.filter(|(found, _)| is_shared(&found.effect)) {
+            // An alternative that is known has its share already.
+            if others.iter().all(|one| found.indistinguishable_from.contains(one)) {
+                continue;
+            }
             // With n equal explanations each has 1/n; one more makes it 1/(n + 1).
             let shared = found.probability / (1.0 + found.probability);
             for (probability, list) in [

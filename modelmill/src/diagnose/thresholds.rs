@@ -134,8 +134,7 @@ pub(super) const CONSTANT_SETTLED_SHARE: f64 = 0.01;
 pub(super) const EQUAL_ALTERNATIVE_LEAST_SHARE: f64 = 0.97;
 
 /// A search with effects at the claimed lengths replaces the one with effects at the lengths of the file if its mean
-/// square residual is at most this part (1). By judgement: on recordings of the rig with contact points beside the axes
-/// (`seventeen-bodies`) it is less than a hundred-thousandth.
+/// square residual is at most this part (1). By judgement: where both lengths explain equally much, the answer stays.
 pub(super) const CLAIMED_LENGTH_MOST_RESIDUAL: f64 = 0.8;
 
 /// A search with zeros as candidates replaces the one without, if it needs fewer effects and its mean square residual is
@@ -146,9 +145,8 @@ pub(super) const ZEROS_MOST_RESIDUAL: f64 = 1.05;
 /// this part (1). By judgement.
 pub(super) const ZEROS_LEAST_RESIDUAL: f64 = 0.8;
 
-/// Each effect more than without zeros has to lower the mean square residual to this part (1). By judgement: on the
-/// recordings with contact points beside the axes (`seventeen-bodies`), two zeros leave less than a millionth of what
-/// one wrong constant leaves.
+/// Each effect more than without zeros has to lower the mean square residual to this part (1). By judgement: noise
+/// gives one more parameter a few thousandths.
 pub(super) const ZERO_MOST_RESIDUAL_EACH: f64 = 0.1;
 
 /// Most alternatives that are reported. By judgement: more do not help to decide what to measure.

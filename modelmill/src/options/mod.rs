@@ -50,7 +50,7 @@ pub enum OptionKind<T: 'static> {
         is_valid: fn(f64) -> bool,
         /// The sentence about an invalid value: "expected ...".
         expected: &'static str,
-        /// The value of a flag without a value, for example `--robust`.
+        /// The value of a flag without a value, for example `--robust`, and of `robust=True` in Python.
         implied: Option<&'static str>,
     },
     /// An integer.

@@ -42,12 +42,13 @@ pub enum StandstillRule {
 }
 
 impl StandstillRule {
-    /// The fraction of the largest rate that was set, 0 if no forces are left out; none for the automatic rule.
+    /// The fraction of the largest rate below which forces are left out. It is above 0, as
+    /// [`EstimatorOptions::standstill`](crate::identify::EstimatorOptions::standstill) expects it. None for the
+    /// automatic rule, and if no forces are left out.
     pub fn bound(self) -> Option<f64> {
         match self {
-            Self::Automatic => None,
-            Self::Below(part) => Some(part),
-            Self::KeepAll => Some(0.0),
+            Self::Below(part) if part > 0.0 => Some(part),
+            Self::Automatic | Self::Below(_) | Self::KeepAll => None,
         }
     }
 }

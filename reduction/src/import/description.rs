@@ -91,7 +91,7 @@ pub(crate) struct DescriptionJoint {
     pub(crate) axis: Vector3<f64>,
     /// Value of the coordinate at the pose of the description, rad or m.
     pub(crate) zero: f64,
-    /// Limits of the position, rad or m.
+    /// Limits of the position, rad or m. Limits that are not in ascending order are reported and left out.
     pub(crate) range: Option<[f64; 2]>,
     /// Largest rate, rad/s or m/s.
     pub(crate) rate: Option<f64>,
@@ -131,6 +131,11 @@ impl DescriptionJoint {
             rest: 0.0,
             is_driven: kind != DescriptionJointKind::Free,
         }
+    }
+
+    /// Whether its position, its rate or the force of its drive has limits.
+    pub(crate) fn has_limits(&self) -> bool {
+        self.range.is_some() || self.rate.is_some() || self.force.is_some()
     }
 }
 

@@ -645,15 +645,12 @@ impl<'a> MjcfReader<'a> {
                     "the range of a ball joint is left out: models have no limits of this kind",
                 ));
             } else if counts {
-                joint.range = Some(range.map(|x| in_unit(self, x)));
+                // As in MuJoCo, limits that are not in ascending order are none.
+                joint.range = Some(range.map(|x| in_unit(self, x))).filter(|[low, high]| low < high);
             }
         }
         // Limits of the sum of all actuators at the joint.
-        if let Some(range) = self.numbers::<2>(node, class, "actuatorfrcrange")?
-            && self.text(node, class, "actuatorfrclimited")? != Some("false")
-        {
-            joint.force = Some(range);
-        }
+        joint.force = self.total_force_range(node, class)?;
         // Passive forces at the joint.
         joint.damping = self.first(node, class, "damping")?;
         joint.friction = self.first(node, class, "frictionloss")?;

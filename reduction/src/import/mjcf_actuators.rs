@@ -1,6 +1,8 @@
 //! Reads the actuators of MJCF: drives of joints, of the joints of fixed tendons, and along straight spatial tendons.
 //! Also reads the keyframe, as the pose from which loops are closed.
 
+use std::collections::BTreeMap;
+
 use nalgebra::Vector3;
 use roxmltree::Node;
 
@@ -8,11 +10,15 @@ use super::description::{DescriptionJointKind, StraightDrive};
 use super::mjcf::MjcfReader;
 use super::xml::{children, located_message, numbers, required_attribute};
 
+/// Limits of the sum of all actuators at each joint, by its name, N or N m; none if one of them has no limits.
+type ActuatorRanges = BTreeMap<String, Option<[f64; 2]>>;
+
 impl<'a> MjcfReader<'a> {
     /// Reads all actuators: marks driven joints, adds straight drives, and reports properties of tendons that are left
     /// out.
     pub(super) fn read_actuators(&mut self, root: &Node<'a, '_>) -> Result<(), String> {
         let mut n = 0;
+        let mut at_joints = ActuatorRanges::new();
         for node in children(root, "actuator")
             .flat_map(|section| section.children().filter(Node::is_element).collect::<Vec<_>>())
         {
@@ -23,7 +29,7 @@ impl<'a> MjcfReader<'a> {
                 None => 1.0,
             };
             if let Some(name) = node.attribute("joint").or(node.attribute("jointinparent")) {
-                self.add_joint_drive(&node, name, gear)?;
+                self.add_joint_drive(&node, name, gear, &mut at_joints)?;
             } else if let Some(name) = node.attribute("tendon") {
                 // The tendon by its name.
                 let tendon = children(root, "tendon")
@@ -45,11 +51,15 @@ impl<'a> MjcfReader<'a> {
                         self.out.remarks.push(located_message(&node, &remark));
                     }
                 }
+                if self.actuator_range(&node)?.is_some() {
+                    let remark = "the force limits of an actuator on a fixed tendon: left out";
+                    self.out.remarks.push(located_message(&node, remark));
+                }
                 // A fixed tendon is a sum of joint positions; each joint gets a drive with its coefficient.
                 for joint in children(&tendon, "joint") {
                     let gear = gear * super::xml::number_attribute(&joint, "coef")?;
                     let name = required_attribute(&joint, "joint")?;
-                    self.add_joint_drive(&joint, &name, gear)?;
+                    self.add_joint_drive(&joint, &name, gear, &mut at_joints)?;
                 }
             } else {
                 self.out.remarks.push(located_message(
@@ -58,6 +68,7 @@ impl<'a> MjcfReader<'a> {
                 ));
             }
         }
+        self.limit_joint_drives(&at_joints);
         for tendon in
             children(root, "tendon").flat_map(|section| section.children().filter(Node::is_element).collect::<Vec<_>>())
         {
@@ -87,8 +98,8 @@ impl<'a> MjcfReader<'a> {
                     .remarks
                     .push(located_message(&tendon, "the range of this tendon is left out"));
             }
-            // The limit of all actuators on a tendon is that of its drive.
-            if !is_drive && self.limited_force(&tendon)?.is_some() {
+            // The limit of all actuators on a tendon is part of those of its drive.
+            if !is_drive && self.total_force_range(&tendon, None)?.is_some() {
                 self.out
                     .remarks
                     .push(located_message(&tendon, "the force limit of this tendon is left out"));
@@ -129,10 +140,16 @@ impl<'a> MjcfReader<'a> {
             *end = (link, place.p);
         }
         let line = tendon.attribute("name").unwrap_or_default().to_owned();
-        if self.out.straight_drives.iter().any(|known| known.tendon == line) {
+        if let Some(known) = (self.out.straight_drives.iter_mut()).find(|known| known.tendon == line) {
+            // Limits of the sum depend on the gears of both.
+            let limits = if known.force.take().is_some() {
+                ", without force limits"
+            } else {
+                ""
+            };
             self.out.remarks.push(located_message(
                 node,
-                &format!("another actuator also acts on the tendon `{line}`; both are one drive in the model"),
+                &format!("another actuator also acts on the tendon `{line}`; both are one drive in the model{limits}"),
             ));
             return Ok(());
         }
@@ -145,10 +162,9 @@ impl<'a> MjcfReader<'a> {
             name: node.attribute("name").unwrap_or(&line).to_owned(),
             line: super::xml::line(node),
             ends,
-            force: match self.limited_force(tendon)? {
-                Some(range) => Some(range),
-                None => self.force_range(node)?.map(|range| scale_range(range, gear)),
-            },
+            // MuJoCo limits the sum of all actuators of a tendon before their gears.
+            force: clamp_range(self.actuator_range(node)?, self.total_force_range(tendon, None)?)
+                .map(|range| scale_range(range, gear)),
             damping: damping + drag * gear * gear,
             friction,
             armature: on_tendon + armature * gear * gear,
@@ -165,33 +181,53 @@ impl<'a> MjcfReader<'a> {
     }
 
     /// The limits of the sum of all actuators at a joint or tendon, N or N m; none if it has no limits.
-    fn limited_force(&self, node: &Node<'a, '_>) -> Result<Option<[f64; 2]>, String> {
-        let range = self.numbers(node, None, "actuatorfrcrange")?;
-        let is_limited = self.text(node, None, "actuatorfrclimited")? != Some("false");
-        Ok(range.filter(|[low, high]| is_limited && low < high))
+    pub(super) fn total_force_range(
+        &self,
+        node: &Node<'a, '_>,
+        class: Option<&'a str>,
+    ) -> Result<Option<[f64; 2]>, String> {
+        self.limits(node, class, ["actuatorfrcrange", "actuatorfrclimited"])
     }
 
     /// The force limits of an actuator before its gear, N or N m; none if it has no limits.
-    fn force_range(&self, node: &Node<'a, '_>) -> Result<Option<[f64; 2]>, String> {
-        if let Some([low, high]) = self.numbers(node, None, "forcerange")?
-            && low < high
-            && self.text(node, None, "forcelimited")? != Some("false")
-        {
-            return Ok(Some([low, high]));
+    fn actuator_range(&self, node: &Node<'a, '_>) -> Result<Option<[f64; 2]>, String> {
+        let force = self.limits(node, None, ["forcerange", "forcelimited"])?;
+        // The control of a motor is its force, so that the range of the control limits it too.
+        if node.tag_name().name() == "motor" {
+            return Ok(clamp_range(
+                self.limits(node, None, ["ctrlrange", "ctrllimited"])?,
+                force,
+            ));
         }
-        // The control of a motor is its force, so that the range of the control limits it.
-        if node.tag_name().name() == "motor"
-            && let Some([low, high]) = self.numbers(node, None, "ctrlrange")?
-            && self.text(node, None, "ctrllimited")? != Some("false")
-        {
-            return Ok(Some([low, high]));
-        }
-        Ok(None)
+        Ok(force)
     }
 
-    /// Marks a joint as driven by an actuator `node`, with force limits and reflected rotor inertia.
-    fn add_joint_drive(&mut self, node: &Node<'a, '_>, name: &str, gear: f64) -> Result<(), String> {
-        let range = self.force_range(node)?;
+    /// The limits in an attribute; none if another attribute disables them or they are not in ascending order.
+    fn limits(
+        &self,
+        node: &Node<'a, '_>,
+        class: Option<&'a str>,
+        [range, limited]: [&str; 2],
+    ) -> Result<Option<[f64; 2]>, String> {
+        let is_limited = self.text(node, class, limited)? != Some("false");
+        let range = self.numbers(node, class, range)?;
+        Ok(range.filter(|[low, high]| is_limited && low < high))
+    }
+
+    /// Marks a joint as driven by an actuator `node`, with reflected rotor inertia, and adds its force limits to those of
+    /// other actuators `at_joints`.
+    fn add_joint_drive(
+        &mut self,
+        node: &Node<'a, '_>,
+        name: &str,
+        gear: f64,
+        at_joints: &mut ActuatorRanges,
+    ) -> Result<(), String> {
+        let range = self.actuator_range(node)?.map(|range| scale_range(range, gear));
+        at_joints
+            .entry(name.to_owned())
+            .and_modify(|sum| *sum = sum.zip(range).map(|([a, b], [c, d])| [a + c, b + d]))
+            .or_insert(range);
         let armature = self.first(node, None, "armature")?;
         let damping = self.first(node, None, "damping")?;
         for (what, value) in [("armature", armature), ("damping", damping)] {
@@ -211,10 +247,6 @@ impl<'a> MjcfReader<'a> {
         joint.is_driven = joint.kind != DescriptionJointKind::Free;
         joint.armature += armature * (gear * gear);
         joint.damping += damping * (gear * gear);
-        // Limits at the joint itself have priority.
-        if joint.force.is_none() {
-            joint.force = range.map(|range| scale_range(range, gear));
-        }
         if (gear - 1.0).abs() > 0.0 && node.tag_name().name() != "joint" {
             self.out.remarks.push(located_message(
                 node,
@@ -222,6 +254,20 @@ impl<'a> MjcfReader<'a> {
             ));
         }
         Ok(())
+    }
+
+    /// Limits the forces of driven joints: first by the actuators of each, then by its own limits, as in `MuJoCo`.
+    fn limit_joint_drives(&mut self, at_joints: &ActuatorRanges) {
+        for joint in self.out.links.iter_mut().flat_map(|link| &mut link.joints) {
+            let range = at_joints.get(&joint.name).copied().flatten();
+            joint.force = clamp_range(range, joint.force);
+            if let Some([low, _]) = joint.force.take_if(|[low, high]| low >= high) {
+                self.out.remarks.push(format!(
+                    "line {}: the limits of `{}` and of its actuators leave only the force {low}; they are left out",
+                    joint.line, joint.name
+                ));
+            }
+        }
     }
 
     /// Reads the first keyframe with positions, as the pose from which loops are closed.
@@ -245,6 +291,14 @@ impl<'a> MjcfReader<'a> {
             }
         }
         Ok(())
+    }
+}
+
+/// The limits of a force that is clamped to one range and then to another; none means no limits.
+fn clamp_range(first: Option<[f64; 2]>, then: Option<[f64; 2]>) -> Option<[f64; 2]> {
+    match (first, then) {
+        (Some(range), Some([low, high])) => Some(range.map(|end| end.clamp(low, high))),
+        (range, other) => range.or(other),
     }
 }
 

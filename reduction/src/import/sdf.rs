@@ -423,10 +423,16 @@ fn joint(
         // The second joint of a pair needs another name.
         let suffix = if k == 0 { "" } else { "_2" };
         let mut joint = DescriptionJoint::new(format!("{name}{suffix}"), *kind, line(node));
-        if let Some(axis) = child(node, tag) {
-            read_axis(&mut joint, &axis, frames, version, &place, out)?;
-        } else if *kind != DescriptionJointKind::Ball {
-            return Err(located_message(node, &format!("it needs <{tag}>")));
+        match child(node, tag) {
+            Some(axis) if *kind == DescriptionJointKind::Ball => read_ball_axis(&mut joint, &axis, out)?,
+            Some(axis) => read_axis(&mut joint, &axis, frames, version, &place, out)?,
+            None if *kind == DescriptionJointKind::Ball => {}
+            None => return Err(located_message(node, &format!("it needs <{tag}>"))),
+        }
+        // Drake's extension: rotor inertia and gear ratio are children of the joint, not of the axis.
+        if let Some(rotor) = number_of(node, "rotor_inertia")? {
+            let gear = number_of(node, "gear_ratio")?.unwrap_or(1.0);
+            joint.armature = rotor * gear * gear;
         }
         joints.push(joint);
     }
@@ -498,12 +504,56 @@ fn read_axis(
     out: &mut RobotDescription,
 ) -> Result<(), String> {
     joint.axis = axis_in_model(node, frames, version, place)?;
+    read_limits_and_losses(joint, node, out)?;
+    if let Some(mimic) = child(node, "mimic") {
+        // A coupling to another joint; the joint of a second axis has the suffix `_2`.
+        let mut of = required_attribute(&mimic, "joint")?;
+        if mimic.attribute("axis") == Some("axis2") {
+            of.push_str("_2");
+        }
+        let ratio = number_of(&mimic, "multiplier")?.unwrap_or(1.0);
+        let reference = number_of(&mimic, "reference")?.unwrap_or(0.0);
+        out.couplings.push(DescriptionCoupling {
+            line: line(&mimic),
+            joint: joint.name.clone(),
+            leader: Some(of),
+            ratio,
+            offset: number_of(&mimic, "offset")?.unwrap_or(0.0) - ratio * reference,
+        });
+    }
+    Ok(())
+}
+
+/// Reads the `<axis>` of a ball joint, which has no direction: limits and losses, which are reported as left out.
+fn read_ball_axis(joint: &mut DescriptionJoint, node: &Node, out: &mut RobotDescription) -> Result<(), String> {
+    read_limits_and_losses(joint, node, out)?;
+    let name = &joint.name;
+    if !joint.is_driven {
+        joint.is_driven = true;
+        out.remarks.push(located_message(
+            node,
+            &format!("the effort of 0 of the ball joint `{name}` is left out"),
+        ));
+    }
+    if let Some(mimic) = child(node, "mimic") {
+        out.remarks.push(located_message(
+            &mimic,
+            &format!(
+                "the coupling of the ball joint `{name}` is left out: only joints with one coordinate can be coupled"
+            ),
+        ));
+    }
+    Ok(())
+}
+
+/// Reads limits, losses and springs in an `<axis>`.
+fn read_limits_and_losses(joint: &mut DescriptionJoint, node: &Node, out: &mut RobotDescription) -> Result<(), String> {
     if let Some(limit) = child(node, "limit") {
         // Limits; very large numbers mean that there is none.
         let low = number_of(&limit, "lower")?.filter(|x| *x > -NO_LIMIT);
         let high = number_of(&limit, "upper")?.filter(|x| *x < NO_LIMIT);
         match (low, high) {
-            (Some(low), Some(high)) => joint.range = (low < high).then_some([low, high]),
+            (Some(low), Some(high)) => joint.range = Some([low, high]),
             (None, None) => {}
             _ => out.remarks.push(located_message(
                 &limit,
@@ -522,29 +572,6 @@ fn read_axis(
         joint.friction = number_of(&dynamics, "friction")?.unwrap_or(0.0);
         joint.stiffness = number_of(&dynamics, "spring_stiffness")?.unwrap_or(0.0);
         joint.rest = number_of(&dynamics, "spring_reference")?.unwrap_or(0.0);
-    }
-    // Drake's extension: rotor inertia and gear ratio are children of the joint, not of the axis.
-    if let Some(parent) = node.parent()
-        && let Some(rotor) = number_of(&parent, "rotor_inertia")?
-    {
-        let gear = number_of(&parent, "gear_ratio")?.unwrap_or(1.0);
-        joint.armature = rotor * gear * gear;
-    }
-    if let Some(mimic) = child(node, "mimic") {
-        // A coupling to another joint; the joint of a second axis has the suffix `_2`.
-        let mut of = required_attribute(&mimic, "joint")?;
-        if mimic.attribute("axis") == Some("axis2") {
-            of.push_str("_2");
-        }
-        let ratio = number_of(&mimic, "multiplier")?.unwrap_or(1.0);
-        let reference = number_of(&mimic, "reference")?.unwrap_or(0.0);
-        out.couplings.push(DescriptionCoupling {
-            line: line(&mimic),
-            joint: joint.name.clone(),
-            leader: Some(of),
-            ratio,
-            offset: number_of(&mimic, "offset")?.unwrap_or(0.0) - ratio * reference,
-        });
     }
     Ok(())
 }

@@ -142,7 +142,7 @@ pub(super) fn build_link_tree(
     // Joints outside of the tree close loops.
     for between in joints.iter().zip(&in_tree).filter(|(_, is)| !**is).map(|(b, _)| b) {
         // The conditions of the closure.
-        let holds = match between.kind.as_str() {
+        let constraint = match between.kind.as_str() {
             "ball" => ClosureConstraint::Origins,
             "revolute" | "continuous" => ClosureConstraint::Axes,
             "fixed" => ClosureConstraint::Frames,
@@ -155,7 +155,7 @@ pub(super) fn build_link_tree(
         };
         // A hinge has its axis along x of the closure's frame.
         let mut place = between.place;
-        if let (ClosureConstraint::Axes, Some(joint)) = (holds, between.joints.first()) {
+        if let (ClosureConstraint::Axes, Some(joint)) = (constraint, between.joints.first()) {
             place.r = rotation_between_axes(&Vector3::x(), &joint.axis).unwrap_or_else(Matrix3::identity);
         }
         // The same pose as seen from the links at both ends.
@@ -166,9 +166,9 @@ pub(super) fn build_link_tree(
         // A cut joint has no coordinate, so nothing can act on it.
         for joint in &between.joints {
             let acting = [joint.damping, joint.friction, joint.stiffness, joint.armature];
-            if joint.range.is_some() || acting.iter().any(|value| *value != 0.0) {
+            if joint.has_limits() || acting.iter().any(|value| *value != 0.0) {
                 out.remarks.push(format!(
-                    "line {}: damping, friction, spring, rotor and range of `{}`, which closes a loop, are left out",
+                    "line {}: damping, friction, spring, rotor and limits of `{}`, which closes a loop, are left out",
                     between.line, between.name
                 ));
             }
@@ -177,7 +177,7 @@ pub(super) fn build_link_tree(
             name: between.name.clone(),
             line: between.line,
             ends: [end(between.parent), end(between.child)],
-            constraint: holds,
+            constraint,
         });
     }
     Ok(())

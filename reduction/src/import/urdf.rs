@@ -176,8 +176,7 @@ fn replace_joints(
         };
         // The new joints keep the losses of the old one.
         let old = std::mem::take(joints);
-        let is_limited = |old: &DescriptionJoint| old.range.is_some() || old.rate.is_some() || old.force.is_some();
-        if old.iter().any(is_limited) && *becomes != JointReplacement::Fixed {
+        if old.iter().any(DescriptionJoint::has_limits) && *becomes != JointReplacement::Fixed {
             remarks.push(format!(
                 "line {line}: the limits of `{name}` are left out: the file of closures gives it another motion"
             ));

@@ -228,3 +228,219 @@ fn limits_and_losses_that_find_no_place_are_named() {
     let named = lines(&import(&plain, &options).expect("an import").remarks);
     assert!(named.contains("the limits of `j2` are left out"), "{named}");
 }
+
+/// The force limits of the drive at a joint or along a tendon, as the model file states them.
+fn force_limits(model: &str, drive: &str) -> Option<String> {
+    let table = model.split("[limits.drives]").nth(1)?;
+    let entry = table.lines().find(|line| line.starts_with(&format!("{drive} = ")))?;
+    Some(entry.split("force = ").nth(1)?.trim_end_matches(" }").to_owned())
+}
+
+/// `MuJoCo` clamps the force of each actuator, and then the sum of all at one joint. At tendons it clamps the sum before
+/// the gears.
+#[test]
+fn limits_of_actuators_and_of_their_joint_both_apply() {
+    for (joint, actuators, expected) in [
+        (
+            "-10 10",
+            "<motor joint=\"a_turn\" forcerange=\"-1 1\"/>",
+            Some("[-1.0, 1.0]"),
+        ),
+        (
+            "-2 10",
+            "<motor joint=\"a_turn\" forcerange=\"-3 4\" gear=\"2\"/>",
+            Some("[-2.0, 8.0]"),
+        ),
+        (
+            "-2 10",
+            "<motor joint=\"a_turn\" forcerange=\"-3 4\" ctrlrange=\"-0.5 9\"/>",
+            Some("[-0.5, 4.0]"),
+        ),
+        (
+            "-9 9",
+            "<motor joint=\"a_turn\" forcerange=\"-3 4\"/><motor joint=\"a_turn\" forcerange=\"-1 3\" gear=\"-1\"/>",
+            Some("[-6.0, 5.0]"),
+        ),
+        (
+            "-9 9",
+            "<motor joint=\"a_turn\" forcerange=\"-3 4\"/><motor joint=\"a_turn\"/>",
+            Some("[-9.0, 9.0]"),
+        ),
+        ("0 0", "<motor joint=\"a_turn\"/>", None),
+        ("-1 1", "<motor joint=\"a_turn\" forcerange=\"2 4\"/>", None),
+    ] {
+        let text = two_arms(
+            "",
+            [&format!("actuatorfrcrange=\"{joint}\""), ""],
+            &format!("<actuator>{actuators}<motor joint=\"b_turn\"/></actuator>"),
+        );
+        let result = imported(&text);
+        let limits = force_limits(&result.model, "a_turn_drive");
+        assert_eq!(limits.as_deref(), expected, "{text}");
+        let is_named = lines(&result.remarks).contains("leave only the force 1; they are left out");
+        assert_eq!(is_named, joint == "-1 1", "{text}");
+    }
+    let line = "<site name=\"s\" pos=\"1 0 0\"/><body name=\"a\"><joint name=\"slide\" type=\"slide\" axis=\"1 0 0\"/>\
+                <inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"0.01 0.01 0.01\"/><site name=\"e\"/></body>";
+    for (tendon, actuators, expected, is_named) in [
+        (
+            "-10 10",
+            "<motor name=\"m\" tendon=\"t\" forcerange=\"-1 1\"/>",
+            Some("[-1.0, 1.0]"),
+            false,
+        ),
+        (
+            "-10 10",
+            "<motor name=\"m\" tendon=\"t\" gear=\"2\"/>",
+            Some("[-20.0, 20.0]"),
+            false,
+        ),
+        (
+            "-10 10",
+            "<motor name=\"m\" tendon=\"t\" gear=\"-2\" forcerange=\"-1 30\"/>",
+            Some("[-20.0, 2.0]"),
+            false,
+        ),
+        (
+            "-10 10",
+            "<motor name=\"m\" tendon=\"t\"/><motor name=\"n\" tendon=\"t\"/>",
+            None,
+            true,
+        ),
+    ] {
+        let text = format!(
+            "<mujoco><worldbody>{line}</worldbody><tendon><spatial name=\"t\" actuatorfrcrange=\"{tendon}\"><site site=\"s\"/>\
+             <site site=\"e\"/></spatial></tendon><actuator>{actuators}</actuator></mujoco>"
+        );
+        let result = imported(&text);
+        assert_eq!(force_limits(&result.model, "m").as_deref(), expected, "{text}");
+        assert_eq!(
+            lines(&result.remarks).contains("without force limits"),
+            is_named,
+            "{text}"
+        );
+    }
+}
+
+#[test]
+fn equal_and_exchanged_limits_are_named() {
+    let with_limits = |lower: &str, upper: &str| {
+        let limit = format!("<limit><lower>{lower}</lower><upper>{upper}</upper></limit>");
+        sdf_arm("1.12", &limit)
+    };
+    let named = |lower: &str, upper: &str| lines(&imported(&with_limits(lower, upper)).remarks);
+    let equal = named("0.3", "0.3");
+    assert!(
+        equal.contains("both limits of `turn` are 0.3") && equal.contains("lock it at 0.3"),
+        "{equal}"
+    );
+    let exchanged = named("1", "-1");
+    assert!(
+        exchanged.contains("the lower limit of `turn`, 1, is above its upper limit, -1"),
+        "{exchanged}"
+    );
+    assert!(!named("-1", "1").contains("limit"));
+    // A locked joint does not move.
+    let locked = [("turn".to_owned(), 0.3)];
+    let options = ImportOptions {
+        locked: &locked,
+        ..ImportOptions::default()
+    };
+    let two = with_limits("0.3", "0.3").replace(
+        "</model>",
+        "<link name=\"hand\"/><joint name=\"wrist\" type=\"revolute\"><parent>arm</parent><child>hand</child><axis/></joint></model>",
+    );
+    let calm = lines(&import(&two, &options).expect("an import").remarks);
+    assert!(!calm.contains("both limits"), "{calm}");
+}
+
+#[test]
+fn an_axis_has_no_meaning_for_a_ball_joint() {
+    let ball = |axis: &str, more: &str| {
+        let text = sdf_arm("1.12", "").replace("revolute", "ball");
+        imported(&text.replace("<axis><xyz>0 1 0</xyz></axis>", &format!("{axis}{more}")))
+    };
+    let plain = ball("", "");
+    assert!(!lines(&plain.remarks).contains("left out"));
+    for (axis, more, remark) in [
+        ("<axis><xyz>0 0 0</xyz></axis>", "", ""),
+        ("<axis><xyz expressed_in=\"nowhere\">0 0 1</xyz></axis>", "", ""),
+        (
+            "<axis><limit><effort>0</effort></limit></axis>",
+            "",
+            "the effort of 0 of the ball joint",
+        ),
+        (
+            "<axis><limit><effort>3</effort></limit></axis>",
+            "",
+            "and limits of the ball joint",
+        ),
+        (
+            "<axis><limit><velocity>3</velocity></limit></axis>",
+            "",
+            "and limits of the ball joint",
+        ),
+        (
+            "<axis><mimic joint=\"other\"/></axis>",
+            "",
+            "the coupling of the ball joint",
+        ),
+        ("", "<rotor_inertia>0.1</rotor_inertia>", "and limits of the ball joint"),
+    ] {
+        let result = ball(axis, more);
+        assert_eq!(result.model, plain.model, "{axis}{more}");
+        let named = lines(&result.remarks);
+        assert_eq!(named.contains("left out"), !remark.is_empty(), "{axis}{more}: {named}");
+        assert!(named.contains(remark), "{axis}{more}: {named}");
+    }
+}
+
+#[test]
+fn limits_of_joints_that_close_a_loop_are_named() {
+    for (limit, is_named) in [
+        ("", false),
+        ("<velocity>2</velocity>", true),
+        ("<effort>3</effort>", true),
+        ("<lower>-1</lower><upper>1</upper>", true),
+    ] {
+        // A four-bar linkage whose last hinge closes the loop.
+        let link = |name: &str, x: f64, z: f64| {
+            format!("<link name=\"{name}\"><pose>{x} 0 {z} 0 0 0</pose><inertial><mass>1</mass></inertial></link>")
+        };
+        let joint = |name: &str, [parent, child]: [&str; 2], more: &str| {
+            format!(
+                "<joint name=\"{name}\" type=\"revolute\"><parent>{parent}</parent><child>{child}</child>\
+                 <axis><xyz>0 1 0</xyz>{more}</axis></joint>"
+            )
+        };
+        let links = link("a", 0.0, 0.0) + &link("b", 0.1, 0.3) + &link("c", 0.5, 0.0);
+        let joints = joint("j1", ["world", "a"], "")
+            + &joint("j2", ["a", "b"], "")
+            + &joint("j3", ["world", "c"], "")
+            + &joint("cut", ["c", "b"], &format!("<limit>{limit}</limit>"));
+        let text = format!("<sdf version=\"1.12\"><model name=\"m\">{links}{joints}</model></sdf>");
+        let named = lines(&imported(&text).remarks);
+        let remark = "rotor and limits of `cut`, which closes a loop, are left out";
+        assert_eq!(named.contains(remark), is_named, "{limit}: {named}");
+    }
+}
+
+#[test]
+fn bodies_have_different_symbols() {
+    let arm = |name: &str| {
+        format!(
+            "<body name=\"body_{name}\"><joint name=\"{name}\" axis=\"0 1 0\"/>\
+             <inertial pos=\"0.1 0 0\" mass=\"1\" diaginertia=\"0.01 0.01 0.01\"/></body>"
+        )
+    };
+    let text = ["a", "a_body", "M_a"].map(arm).concat().replace("\"body_", "\"");
+    let model = imported(&format!("<mujoco><worldbody>{text}</worldbody></mujoco>")).model;
+    let mut symbols: Vec<&str> = model.lines().filter(|line| line.starts_with("linear")).collect();
+    symbols
+        .iter_mut()
+        .for_each(|line| *line = line.split('"').nth(1).unwrap_or_default());
+    let mut different = symbols.clone();
+    different.sort_unstable();
+    different.dedup();
+    assert_eq!(different.len(), 3, "{symbols:?}\n{model}");
+}

@@ -3,6 +3,7 @@
 use std::env;
 use std::ffi::OsStr;
 use std::io::Read;
+use std::iter;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::thread;
@@ -22,6 +23,24 @@ const MAX_VERSION_BYTES: u64 = 4096;
 /// is no `PATH`.
 pub(super) fn find_program(names: &[&str]) -> Option<PathBuf> {
     names.iter().find_map(|name| find_one(OsStr::new(name)))
+}
+
+/// The program that the value of an environment variable names: a name or a path, in which spaces may occur, with or
+/// without arguments behind it, such as `ccache gcc`. A separator stands between several programs, of which the first
+/// that exists is used.
+pub(super) fn find_program_of_value(value: &str, separator: Option<char>) -> Option<PathBuf> {
+    find_program_before_arguments(value).or_else(|| value.split(separator?).find_map(find_program_before_arguments))
+}
+
+/// The program of the longest start of a text, up to a space or the end, that names one.
+fn find_program_before_arguments(text: &str) -> Option<PathBuf> {
+    let text = text.trim();
+    let ends = text.rmatch_indices(' ').map(|(end, _)| end);
+    iter::once(text.len())
+        .chain(ends)
+        .map(|end| text[..end].trim_end())
+        .filter(|start| !start.is_empty())
+        .find_map(|start| find_program(&[start]))
 }
 
 /// One program on the search path.

@@ -1,14 +1,18 @@
 //! What the program and its commands need, and whether this computer has it.
 
 use std::env;
+use std::fs::{self, OpenOptions};
+use std::io;
 use std::path::{Path, PathBuf};
+use std::process;
 use std::thread;
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use modelmill::{Error, Host, bundled};
 
 use crate::flags::FlagSpelling;
 
-use super::programs::{find_program, find_version, is_at_least, read_output};
+use super::programs::{find_program, find_program_of_value, find_version, is_at_least, read_output};
 
 /// Whether a requirement is met.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,12 +66,27 @@ impl RequirementCheck {
     }
 }
 
+/// An environment variable with the program to use.
+struct ProgramVariable {
+    /// Its name.
+    name: &'static str,
+    /// What separates several programs in its value.
+    separator: Option<char>,
+}
+
+impl ProgramVariable {
+    /// A variable with one program.
+    const fn with_one_program(name: &'static str) -> Self {
+        Self { name, separator: None }
+    }
+}
+
 /// Another program that a command or its output needs.
 struct ExternalProgram {
     /// The name of the requirement.
     name: &'static str,
     /// An environment variable with the program to use, which has priority.
-    variable: Option<&'static str>,
+    variable: Option<ProgramVariable>,
     /// Programs that meet the requirement; the first one on the search path is used.
     programs: &'static [&'static str],
     /// Arguments by which it prints its version. Without any it is not started: a browser would open a window.
@@ -84,7 +103,7 @@ struct ExternalProgram {
 const PROGRAMS: &[ExternalProgram] = &[
     ExternalProgram {
         name: "Rust compiler",
-        variable: Some("RUSTC"),
+        variable: Some(ProgramVariable::with_one_program("RUSTC")),
         programs: &["rustc"],
         version_arguments: &["--version"],
         // The packages of the workspace, among them the runtime of emitted code, have one oldest version.
@@ -94,7 +113,7 @@ const PROGRAMS: &[ExternalProgram] = &[
     },
     ExternalProgram {
         name: "Cargo",
-        variable: Some("CARGO"),
+        variable: Some(ProgramVariable::with_one_program("CARGO")),
         programs: &["cargo"],
         version_arguments: &["--version"],
         least_version: Some(env!("CARGO_PKG_RUST_VERSION")),
@@ -103,7 +122,7 @@ const PROGRAMS: &[ExternalProgram] = &[
     },
     ExternalProgram {
         name: "C compiler",
-        variable: Some("CC"),
+        variable: Some(ProgramVariable::with_one_program("CC")),
         programs: &["cc", "gcc", "clang"],
         version_arguments: &["--version"],
         least_version: None,
@@ -143,7 +162,11 @@ const PROGRAMS: &[ExternalProgram] = &[
     },
     ExternalProgram {
         name: "browser",
-        variable: Some("BROWSER"),
+        variable: Some(ProgramVariable {
+            name: "BROWSER",
+            // Elsewhere, a colon follows the letter of a disk.
+            separator: if cfg!(unix) { Some(':') } else { None },
+        }),
         programs: &[
             "firefox",
             "chromium",
@@ -178,8 +201,8 @@ pub(super) fn check_all() -> Vec<RequirementCheck> {
         let ended = running.into_iter().filter_map(|thread| thread.join().ok());
         ended.collect::<Vec<_>>()
     });
-    let python = programs.iter().find(|check| check.name == "Python" && check.is_met());
-    let packages = check_python_packages(python.and_then(|check| check.path.as_deref()));
+    let python = programs.iter().find(|check| check.name == "Python");
+    let packages = check_python_packages(python);
     checks.extend(programs);
     checks.extend(packages);
     checks
@@ -199,8 +222,8 @@ fn check_derivation() -> RequirementCheck {
         least_version: None,
         path: env::current_exe().ok(),
         needed_for: vec!["all commands that read a model"],
-        remedy: fault.map(|says| {
-            format!("The program does not derive a bundled model correctly: {says}. Install it again, and report this if it remains.")
+        remedy: fault.map(|message| {
+            format!("The program does not derive a bundled model correctly: {message}. Install it again, and report this if it remains.")
         }),
     }
 }
@@ -253,35 +276,51 @@ fn check_formats() -> Vec<RequirementCheck> {
 /// The folder for temporary files, which `tour` uses without `--out`.
 fn check_temporary_folder() -> RequirementCheck {
     let path = env::temp_dir();
-    let is_writable = path
-        .metadata()
-        .is_ok_and(|about| about.is_dir() && !about.permissions().readonly());
+    let (state, cause) = if !path.is_dir() {
+        (
+            RequirementState::Missing,
+            format!("There is no folder {}.", path.display()),
+        )
+    } else if let Err(error) = create_test_file(&path) {
+        let cause = format!("No file can be created in {}: {error}.", path.display());
+        (RequirementState::Fails, cause)
+    } else {
+        (RequirementState::Present, String::new())
+    };
     RequirementCheck {
         name: "temporary folder",
         is_essential: false,
-        state: if is_writable {
-            RequirementState::Present
-        } else {
-            RequirementState::Missing
-        },
+        state,
         version: None,
         least_version: None,
         path: Some(path),
         needed_for: vec!["`tour` without --out"],
-        remedy: (!is_writable)
-            .then(|| "Use `tour --out DIR`, or set TMPDIR to a folder that can be written.".to_owned()),
+        remedy: (state != RequirementState::Present).then(|| {
+            format!("{cause} Use `tour --out DIR`, or set {FOLDER_VARIABLE} to a folder in which files can be created.")
+        }),
     }
+}
+
+/// The environment variable of the folder for temporary files.
+const FOLDER_VARIABLE: &str = if cfg!(windows) { "TMP" } else { "TMPDIR" };
+
+/// Creates an empty file in a folder and removes it. Permissions do not show whether this user may do so, or whether
+/// the disk is writable.
+fn create_test_file(folder: &Path) -> io::Result<()> {
+    let time = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    let path = folder.join(format!("modelmill-doctor-{}-{}", process::id(), time.as_nanos()));
+    OpenOptions::new().write(true).create_new(true).open(&path)?;
+    fs::remove_file(&path)
 }
 
 /// Looks for one program and reads its version.
 fn check_program(program: &ExternalProgram) -> RequirementCheck {
-    let variable = program.variable.and_then(|name| env::var(name).ok());
-    // A variable may hold arguments too, such as `ccache gcc`, or several browsers.
-    let first = variable
-        .as_deref()
-        .and_then(|text| text.split([' ', ':']).find(|word| !word.is_empty()));
-    let path = match first {
-        Some(name) => find_program(&[name]),
+    let variable = program.variable.as_ref().and_then(|variable| {
+        let value = env::var(variable.name).ok()?;
+        (!value.trim().is_empty()).then_some((variable, value))
+    });
+    let path = match &variable {
+        Some((variable, value)) => find_program_of_value(value, variable.separator),
         None => find_program(program.programs),
     };
     let mut check = RequirementCheck {
@@ -307,8 +346,14 @@ fn check_program(program: &ExternalProgram) -> RequirementCheck {
         }
     }
     if !check.is_met() {
-        let cause = match (first.zip(program.variable), &check.path, check.state) {
-            (Some((name, variable)), None, _) => format!("The variable {variable} names {name}, which is not found. "),
+        let cause = match (&variable, &check.path, check.state) {
+            (Some((variable, value)), None, _) => {
+                format!(
+                    "The variable {} is {}, which names no program that exists. ",
+                    variable.name,
+                    value.trim()
+                )
+            }
             (_, Some(path), RequirementState::Fails) => format!("{} does not run. ", path.display()),
             _ => String::new(),
         };
@@ -317,8 +362,18 @@ fn check_program(program: &ExternalProgram) -> RequirementCheck {
     check
 }
 
-/// Packages of the Python that was found.
-fn check_python_packages(python: Option<&Path>) -> Vec<RequirementCheck> {
+/// Packages of the Python that was found, also of an outdated one.
+fn check_python_packages(python: Option<&RequirementCheck>) -> Vec<RequirementCheck> {
+    let state = python.map_or(RequirementState::Missing, |check| check.state);
+    let (can_run, first_step) = match state {
+        RequirementState::Present => (true, ""),
+        RequirementState::Outdated => (true, "Update Python first. "),
+        RequirementState::Fails | RequirementState::Missing => (
+            false,
+            "The package was not searched, because no Python runs. Install Python first. ",
+        ),
+    };
+    let path = python.and_then(|check| check.path.as_deref()).filter(|_| can_run);
     let packages: [(&'static str, &'static str, Vec<&'static str>, &'static str); 2] = [
         (
             "numpy in Python",
@@ -337,8 +392,8 @@ fn check_python_packages(python: Option<&Path>) -> Vec<RequirementCheck> {
         .into_iter()
         .map(|(name, package, needed_for, remedy)| {
             // The metadata of a package are read without importing it.
-            let script = format!("import importlib.metadata as m; print(m.version({package:?}))");
-            let version = python
+            let script = format!("{VERSION_SCRIPT}print(version({package:?}))\n");
+            let version = path
                 .and_then(|path| read_output(path, &["-c", &script]))
                 .map(|text| text.trim().to_owned())
                 .filter(|text| !text.is_empty());
@@ -355,8 +410,18 @@ fn check_python_packages(python: Option<&Path>) -> Vec<RequirementCheck> {
                 least_version: None,
                 path: None,
                 needed_for,
-                remedy: (!is_found).then(|| remedy.to_owned()),
+                remedy: (!is_found).then(|| format!("{first_step}{remedy}")),
             }
         })
         .collect()
 }
+
+/// Python that defines `version` of a package. Before Python 3.8 the module of the standard library did not exist.
+const VERSION_SCRIPT: &str = "\
+try:
+    from importlib.metadata import version
+except ImportError:
+    from pkg_resources import get_distribution
+    def version(name):
+        return get_distribution(name).version
+";

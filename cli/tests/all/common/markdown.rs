@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 /// A block between fences.
 pub(crate) struct Block {
-    /// Its language, empty if none is said.
+    /// Its language, empty if none is stated.
     pub(crate) language: String,
     pub(crate) text: String,
     /// Whether nothing but empty lines stands between it and the block before.

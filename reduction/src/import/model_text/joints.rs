@@ -198,7 +198,22 @@ impl ModelTextBuilder<'_> {
             self.reluctance[variable] = 1;
         }
         // The range of the variable; a negative ratio exchanges its ends.
-        if let Some(range) = joint.range {
+        if let Some([low, high]) = joint.range.filter(|[low, high]| low >= high) {
+            self.remarks.push(if low > high {
+                message!(
+                    "line {}: the lower limit of `{}`, {low}, is above its upper limit, {high}; both are left out",
+                    joint.line,
+                    joint.name
+                )
+            } else {
+                message!(
+                    "line {}: both limits of `{}` are {low}, so that it cannot move; in the model it moves without limits: lock it at \
+                     {low} in the import",
+                    joint.line,
+                    joint.name
+                )
+            });
+        } else if let Some(range) = joint.range {
             let mut ends = range.map(|end| (end - offset) / ratio);
             ends.sort_by(f64::total_cmp);
             acts.range = Some(
@@ -289,9 +304,9 @@ impl ModelTextBuilder<'_> {
         ));
         // Effects at the angles would be different from effects at the joint.
         let acting = [joint.damping, joint.friction, joint.stiffness, joint.armature];
-        if joint.range.is_some() || acting.iter().any(|value| *value != 0.0) {
+        if joint.has_limits() || acting.iter().any(|value| *value != 0.0) {
             self.remarks.push(message!(
-                "line {}: damping, friction, spring, armature and range of the ball joint `{}` are left out",
+                "line {}: damping, friction, spring, armature and limits of the ball joint `{}` are left out",
                 joint.line,
                 joint.name
             ));

@@ -1,5 +1,6 @@
 //! The sections of the model file after frames: coordinates, parts, drives, effects and limits.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use modelmill_boundary::message;
@@ -122,6 +123,7 @@ impl ModelTextBuilder<'_> {
 
     /// Writes the bodies with their ten linear parameters.
     fn parts(&self, text: &mut String) {
+        let mut used = BTreeSet::new();
         for (k, body) in self.bodies.iter().enumerate() {
             let frame = &self.frame_names[body.frame];
             // Symbols have the name of the frame; long names are replaced by a number.
@@ -130,13 +132,15 @@ impl ModelTextBuilder<'_> {
             } else {
                 format!("_{}", k + 1)
             };
-            // A joint may have the name of such a symbol.
-            while BODY_SYMBOLS
-                .iter()
-                .any(|symbol| self.names.contains(&format!("{symbol}{suffix}")))
-            {
+            // A joint may have the name of such a symbol, and another body may have the suffix.
+            let is_symbol_used = |suffix: &str| {
+                let mut symbols = BODY_SYMBOLS.iter();
+                symbols.any(|symbol| self.names.contains(&format!("{symbol}{suffix}")))
+            };
+            while used.contains(&suffix) || is_symbol_used(&suffix) {
                 suffix.push_str("_body");
             }
+            used.insert(suffix.clone());
             // The ten parameters about the origin of the frame. Rotations leave rounding where an entry is zero.
             let largest = |entries: &[f64]| entries.iter().fold(0.0_f64, |all, one| all.max(one.abs()));
             let i = body
