@@ -331,9 +331,7 @@ impl Model {
         findings.regions = regions(&findings);
         findings.geometry_alternatives = alternatives_to_effects(&findings, named.as_ref(), held)?;
         findings.share_with_geometry();
-        if let Some(best) = &found.in_place_of_constants {
-            findings.share_constants(best);
-        }
+        findings.share_constants(found.in_place_of_constants.as_ref());
         if options.repeat_with_nominal && held != FixedParameters::All && !findings.off_nominal.is_empty() {
             findings.with_nominal = Some(nominal_diagnosis(&findings, &between)?);
         }
@@ -355,9 +353,10 @@ impl DiagnosisFindings {
     }
 
     /// Wrong constants in addition to other effects share their probability with errors of the geometry that explain as much.
-    fn share_constants(&mut self, best: &GeometryAlternative) {
+    fn share_constants(&mut self, best: Option<&GeometryAlternative>) {
         let is_constant = |one: &LocatedEffect| one.kind == CONSTANT_ERROR;
-        if self.missing.iter().any(|one| !is_constant(&one.effect)) {
+        let has_others = self.missing.iter().any(|one| !is_constant(&one.effect));
+        if let Some(best) = best.filter(|_| has_others) {
             self.share_effects(best, &is_constant);
         }
     }

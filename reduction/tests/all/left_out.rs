@@ -436,9 +436,9 @@ fn bodies_have_different_symbols() {
     let text = ["a", "a_body", "M_a"].map(arm).concat().replace("\"body_", "\"");
     let model = imported(&format!("<mujoco><worldbody>{text}</worldbody></mujoco>")).model;
     let mut symbols: Vec<&str> = model.lines().filter(|line| line.starts_with("linear")).collect();
-    symbols
-        .iter_mut()
-        .for_each(|line| *line = line.split('"').nth(1).unwrap_or_default());
+    for line in &mut symbols {
+        *line = line.split('"').nth(1).unwrap_or_default();
+    }
     let mut different = symbols.clone();
     different.sort_unstable();
     different.dedup();
