@@ -25,10 +25,6 @@ impl<T> DeclaredArgs<T> {
     }
 
     /// The options that differ from their defaults, as text for a command line, each with a space before it.
-    #[cfg_attr(
-        not(feature = "workbench"),
-        expect(dead_code, reason = "only the workbench prints them")
-    )]
     pub(crate) fn to_flags(&self) -> String {
         let mut all = String::new();
         for (flag, values) in &self.given {
