@@ -5,6 +5,7 @@ passive coordinates at any state. Needs a C compiler.
 """
 
 import ctypes
+import math
 import re
 import subprocess
 import tomllib
@@ -56,6 +57,7 @@ class EmittedModel:
         self.name = name
         self.n_base = int(re.search(rf"#define {upper}_N_BASE (\d+)", text)[1])
         self.model = tomllib.loads(Path(model).read_text())
+        self.constants = {k: float(v["value"]) for k, v in self.model.get("constants", {}).items()}
         # Memory larger than any of the structs; they contain only numbers.
         self.geometry, self.parameters, self.dynamics = (ctypes.create_string_buffer(1 << 20) for _ in range(3))
         base = (ctypes.c_double * max(self.n_base, 1))()
@@ -106,3 +108,21 @@ class EmittedModel:
         """Names of coordinates with `follows`, with their expressions."""
         stated = self.model.get("coordinates", {})
         return {name: entry["follows"] for name, entry in stated.items() if "follows" in entry}
+
+    def evaluate(self, text, values):
+        """An expression of the model file; `values` gives the coordinates in it."""
+        names = {**self.constants, **values, "pi": math.pi}
+        return float(eval(text.strip(), {"__builtins__": {}}, names))
+
+    def coordinate_motion(self, q, qd, qdd):
+        """Positions, rates and accelerations of all coordinates by name; those that follow others do so linearly."""
+        passive = self.passive_motion(q, qd, qdd)
+        levels = []
+        for k, own in enumerate((q, qd, qdd)):
+            values = dict(zip(self.coordinates, own)) | dict(zip(self.passive, passive[k]))
+            zeros = {name: 0.0 for name in values}
+            for name, text in self.followers().items():
+                constant = self.evaluate(text, zeros) if k else 0.0
+                values[name] = self.evaluate(text, values) - constant
+            levels.append(values)
+        return levels

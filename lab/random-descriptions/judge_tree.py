@@ -3,13 +3,12 @@
 usage: judge_tree.py MODELMILL {urdf,sdf} [--seeds N] [--feature NAME] [--keep FOLDER]
 
 The exit status is 1 if a verdict is SILENT.
-Verdicts: right; named (a remark names what is left out); refused; SILENT (forces, closure or limits differ without a remark).
+Verdicts: right; named (a remark names what the import omits); refused; SILENT (forces, closure or limits differ without a remark).
 """
 
 import argparse
 import collections
 import logging
-import math
 import sys
 import tempfile
 from pathlib import Path
@@ -43,23 +42,7 @@ class Joints:
     def __init__(self, model, plant, description, said):
         self.model, self.plant, self.description = model, plant, description
         self.lines = said.splitlines()
-        self.constants = {k: float(v["value"]) for k, v in model.model.get("constants", {}).items()}
         self.frames = {f["name"]: f.get("joint", {}) for f in model.model["frame"]}
-
-    def levels(self, q, qd, qdd):
-        passive = self.model.passive_motion(q, qd, qdd)
-        out = []
-        for k, own in enumerate((q, qd, qdd)):
-            values = dict(zip(self.model.coordinates, own)) | dict(zip(self.model.passive, passive[k]))
-            zeros = {name: 0.0 for name in values}
-            for name, text in self.model.followers().items():
-                constant = self.evaluate(text, zeros) if k else 0.0
-                values[name] = self.evaluate(text, values) - constant
-            out.append(values)
-        return out
-
-    def evaluate(self, text, values):
-        return float(eval(text, {"__builtins__": {}}, {**self.constants, **values, "pi": math.pi}))
 
     def value(self, name, levels):
         """Position, rate and acceleration of a joint by its name."""
@@ -78,7 +61,7 @@ class Joints:
         raise ValueError(f"the joint `{name}` is lost")
 
     def motion(self, q, qd, qdd):
-        levels = self.levels(q, qd, qdd)
+        levels = self.model.coordinate_motion(q, qd, qdd)
         plant = self.plant
         position, rate, acceleration = (np.zeros(plant.num_positions()), np.zeros(plant.num_velocities()), np.zeros(plant.num_velocities()))
         for index in plant.GetJointIndices():
@@ -177,7 +160,7 @@ def compare(program, kind, path, description):
     real = [c for c in model.coordinates if not any(c == names[3] for names in free)]
     gravity = model.model["gravity"]
     plant.mutable_gravity_field().set_gravity_vector(
-        np.array([joints.evaluate(str(g).replace('"', ""), {}) for g in gravity]))
+        np.array([model.evaluate(str(g).replace('"', ""), {}) for g in gravity]))
     done, stated = 0, set()
     for _ in range(20):
         q = model.nominal() + rng.uniform(-0.3, 0.3, n)

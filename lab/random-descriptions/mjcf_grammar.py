@@ -5,15 +5,16 @@ feature out.
 """
 
 import math
-import random
 import xml.etree.ElementTree as ET
 
+from drawn_numbers import DrawnNumbers
 
-class Tree:
+
+class Tree(DrawnNumbers):
     """A random tree of two to four bodies with one joint each, as an element tree."""
 
     def __init__(self, seed):
-        self.rng = random.Random(seed)
+        super().__init__(seed)
         self.root = ET.Element("mujoco", model="m")
         self.compiler = ET.SubElement(self.root, "compiler", angle="radian")
         self.world = ET.SubElement(self.root, "worldbody")
@@ -21,15 +22,6 @@ class Tree:
         for k in range(self.rng.randint(2, 4)):
             parent = self.world if not self.bodies else self.rng.choice(self.bodies)
             self.add_body(parent, f"b{k + 1}")
-
-    def number(self, low=0.1, high=1.0):
-        return round(self.rng.uniform(low, high), 3)
-
-    def signed(self, size=0.5):
-        return round(self.rng.uniform(0.1, size) * self.rng.choice([-1, 1]), 3)
-
-    def vec(self, n=3, size=0.5):
-        return " ".join(str(self.signed(size)) for _ in range(n))
 
     def inertial(self, body):
         a, b = self.number(0.05, 0.2), self.number(0.05, 0.2)

@@ -3,9 +3,10 @@
 `describe(format, name, seed)` gives a `Description`: its text, and what a judge that does not read the feature needs to know.
 """
 
-import random
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass, field
+
+from drawn_numbers import DrawnNumbers
 
 DRAKE = "https://drake.mit.edu"
 ET.register_namespace("drake", DRAKE)
@@ -30,11 +31,11 @@ class Description:
     options: tuple = ()
 
 
-class Tree:
+class Tree(DrawnNumbers):
     """Two to four links on a base, with one joint each."""
 
     def __init__(self, kind, seed):
-        self.rng = random.Random(seed)
+        super().__init__(seed)
         self.kind = kind
         self.d = Description()
         rng = self.rng
@@ -52,15 +53,6 @@ class Tree:
             self.add_link(f"b{k + 1}")
             self.add_joint(f"j{k + 1}", parent, f"b{k + 1}")
         self.joints = [j for j in self.top.findall("joint") if j.get("type") != "fixed"]
-
-    def number(self, low=0.1, high=1.0):
-        return round(self.rng.uniform(low, high), 3)
-
-    def signed(self, size=0.5):
-        return round(self.rng.uniform(0.1, size) * self.rng.choice([-1, 1]), 3)
-
-    def vec(self, n=3, size=0.5):
-        return " ".join(str(self.signed(size)) for _ in range(n))
 
     def inertia(self):
         a, b = self.number(0.1, 0.2), self.number(0.1, 0.2)

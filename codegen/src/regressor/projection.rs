@@ -208,8 +208,8 @@ impl LoopProjection {
             .iter()
             .map(|a| (0..n_drives).map(|d| self.drive_jacobian[d][*a]).collect())
             .collect();
-        // Drives that each move one coordinate need no solution, which would take long for each column of a large tree.
-        if let Some(coordinates) = single_coordinates(&transposed) {
+        // If each drive moves one coordinate, no linear system is solved: its symbolic solution takes long for a large tree.
+        if let Some(coordinates) = find_permutation(&transposed) {
             return Ok(coordinates
                 .into_iter()
                 .map(|row| projected[self.freedoms[row]])
@@ -400,8 +400,8 @@ fn passive_rate_map(tree: &KinematicTree, passive: &[usize], n: usize) -> Vec<Ve
     rates_of
 }
 
-/// For a square matrix that only permutes: the row of the one in each column; none for other matrices.
-fn single_coordinates(matrix: &[Vec<ExprId>]) -> Option<Vec<usize>> {
+/// The row of the one in each column of a square matrix that permutes entries; `None` for other matrices.
+fn find_permutation(matrix: &[Vec<ExprId>]) -> Option<Vec<usize>> {
     let mut rows = vec![None; matrix.len()];
     for (row, entries) in matrix.iter().enumerate() {
         let mut nonzero = entries.iter().enumerate().filter(|(_, entry)| **entry != Graph::ZERO);

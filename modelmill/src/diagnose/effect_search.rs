@@ -10,7 +10,7 @@ use crate::segment::RecordingSegment;
 
 use super::added_effects;
 use super::constants::{CONSTANT_ERROR, ClaimedConstant};
-use super::geometry_alternatives::{GeometryAlternative, GeometryError, geometry_alternatives};
+use super::geometry_alternatives::{GeometryAlternative, geometry_alternatives};
 use super::model_versions::ModelVersion;
 use super::named_zeros::{self, NamedZeros};
 use super::problem::{self, DiagnosisQuery, DiagnosisSolution, FixedParameters};
@@ -39,10 +39,10 @@ pub(super) fn search_effects(
         is_clock_in_question,
     };
     // The search with differences between recordings; it is repeated without them if there are any.
-    let mut answer = search.find_from(between, None, &[])?;
+    let mut answer = search.find(between, None)?;
     if !between.is_empty() {
         // A missing effect may look like a difference between recordings.
-        let without = search.find_from(&[], None, &[])?;
+        let without = search.find(&[], None)?;
         if without.mean_square_residual() < DIFFERENCE_LEAST_GAIN * answer.mean_square_residual() {
             answer = without;
             between.clear();
@@ -51,27 +51,15 @@ pub(super) fn search_effects(
     // Zeros of the file may be wrong as well. They have no names, so they are tried only where something was found.
     let is_explained = answer.diagnosis.verdict == DiagnosisVerdict::Adequate;
     let named = if is_explained { None } else { NamedZeros::new(model)? };
-    let mut in_place_of_constants = None;
     if let Some(named) = &named
         && named_zeros::needs_search(&answer)
     {
-        let with_zeros = search.find_from(between, Some(named), &[])?;
+        let with_zeros = search.find(between, Some(named))?;
         if named.is_better(&with_zeros, &answer) {
             answer = with_zeros;
         }
-        // A constant may stand for zeros whose polynomials are inexact. With the errors that explain as much, they are
-        // exact.
-        in_place_of_constants = search.errors_in_place_of_constants(named, &answer)?;
-        let errors = in_place_of_constants.iter().flat_map(|one| &one.errors);
-        let guess: Vec<ClaimedConstant> = errors.filter_map(claimed_zero).collect();
-        if !guess.is_empty() {
-            let from_guess = search.find_from(between, Some(named), &guess)?;
-            if named.is_better(&from_guess, &answer) {
-                answer = from_guess;
-                in_place_of_constants = None;
-            }
-        }
     }
+    let in_place_of_constants = search.errors_in_place_of_constants(&answer)?;
     Ok(EffectSearchAnswer {
         solution: answer,
         zeros: named,
@@ -120,20 +108,12 @@ impl EffectSearch<'_> {
         problem::find_missing_effects(self.model, &self.data[0], &self.data[1], query)
     }
 
-    /// A search from errors of constants that may be present, repeated until the claimed errors are exact.
+    /// A search that is repeated until the claimed errors of constants are exact.
     ///
     /// Fails as [`Model::diagnose`] does.
-    fn find_from(
-        &self,
-        between: &[RecordingDifference],
-        zeros: Option<&NamedZeros>,
-        guess: &[ClaimedConstant],
-    ) -> Outcome<DiagnosisSolution> {
-        let mut answer = self.find_once(between, zeros, guess, false)?;
-        let mut claimed = guess.to_vec();
-        let first = claimed_constants(&answer);
-        claimed.retain(|one| first.iter().all(|other| other.name != one.name));
-        claimed.extend(first);
+    fn find(&self, between: &[RecordingDifference], zeros: Option<&NamedZeros>) -> Outcome<DiagnosisSolution> {
+        let mut answer = self.find_once(between, zeros, &[], false)?;
+        let mut claimed = claimed_constants(&answer);
         // Values of a first search are inexact where an error is large.
         for _ in 0..MOST_CONSTANT_ROUNDS {
             if claimed.is_empty() {
@@ -154,8 +134,8 @@ impl EffectSearch<'_> {
                 break;
             }
         }
-        // Effects in addition to a wrong length act at the length that is claimed. With wrong claims the loops may not close, and
-        // the answer stays as it is.
+        // Effects in addition to a wrong length act at the length that is claimed. With wrong claims the loops may not
+        // close, and the answer stays as it is.
         for _ in 0..MOST_CONSTANT_ROUNDS {
             let claimed = claimed_constants(&answer);
             let n_others = answer.diagnosis.effects.len() - claimed.len();
@@ -163,7 +143,7 @@ impl EffectSearch<'_> {
             if n_others == 0 || !claimed.iter().any(|claim| self.is_constant_of_file(&claim.name)) {
                 break;
             }
-            let Some(again) = ended_if_cancelled(self.find_once(between, zeros, &claimed, true))? else {
+            let Some(again) = ignore_unless_cancelled(self.find_once(between, zeros, &claimed, true))? else {
                 break;
             };
             if again.mean_square_residual() > CLAIMED_LENGTH_MOST_RESIDUAL * answer.mean_square_residual() {
@@ -174,48 +154,32 @@ impl EffectSearch<'_> {
         Ok(answer)
     }
 
-    /// The errors of the geometry that explain at least as much as the wrong constants that a search claims, in addition to its
-    /// other effects; `None` if there are none.
+    /// The errors of the geometry that explain at least as much as the wrong constants that a search claims in addition
+    /// to other effects; `None` if there are none, or if it claims constants alone.
     ///
     /// Fails only when the job is cancelled.
-    fn errors_in_place_of_constants(
-        &self,
-        named: &NamedZeros,
-        answer: &DiagnosisSolution,
-    ) -> Outcome<Option<GeometryAlternative>> {
+    fn errors_in_place_of_constants(&self, answer: &DiagnosisSolution) -> Outcome<Option<GeometryAlternative>> {
         let claimed = claimed_constants(answer);
-        let n_others = answer.diagnosis.effects.len() - claimed.len();
-        if claimed.is_empty() {
+        if claimed.is_empty() || claimed.len() == answer.diagnosis.effects.len() {
             return Ok(None);
         }
         // The model with the other effects, where the file can have them.
-        let with_others = if n_others == 0 {
-            None
-        } else {
-            let entries = added_effects::entries(self.model, answer);
-            let Ok(edited) = added_effects::add_entries(self.model, &entries) else {
-                return Ok(None);
-            };
-            let derived = self.model.host().derive(&self.model.path, edited.loaded);
-            match ended_if_cancelled(derived)? {
-                Some(with_others) => Some(with_others.with_values_of(self.model)),
-                None => return Ok(None),
-            }
+        let entries = added_effects::entries(self.model, answer);
+        let Ok(edited) = added_effects::add_entries(self.model, &entries) else {
+            return Ok(None);
         };
-        let own_zeros = with_others.as_ref().map(NamedZeros::new).transpose()?;
-        let zeros = own_zeros.as_ref().map_or(Some(named), Option::as_ref);
-        let complete_model = with_others.as_ref().unwrap_or(self.model).clone();
-        let version = ended_if_cancelled(ModelVersion::new(
-            complete_model,
-            self.data[0].clone(),
-            self.data[1].clone(),
-            self.fixed,
-        ))?;
-        let Some((version, zeros)) = version.zip(zeros) else {
+        let Some(with_others) = ignore_unless_cancelled(self.model.host().derive(&self.model.path, edited.loaded))?
+        else {
+            return Ok(None);
+        };
+        let with_others = with_others.with_values_of(self.model);
+        let zeros = NamedZeros::new(&with_others)?;
+        let [fit, check] = self.data.clone();
+        let Some(version) = ignore_unless_cancelled(ModelVersion::new(with_others, fit, check, self.fixed))? else {
             return Ok(None);
         };
         let names: Vec<&str> = claimed.iter().map(|one| one.name.as_str()).collect();
-        let alternatives = geometry_alternatives(&version, Some(zeros), self.fixed, &names, names.len(), 0.0)?;
+        let alternatives = geometry_alternatives(&version, zeros.as_ref(), self.fixed, &names, names.len(), 0.0)?;
         Ok(alternatives.into_iter().next())
     }
 }
@@ -231,17 +195,8 @@ pub(super) struct EffectSearchAnswer {
     pub(super) in_place_of_constants: Option<GeometryAlternative>,
 }
 
-/// The error of a zero as a claim; `None` for a constant of the file.
-fn claimed_zero(error: &GeometryError) -> Option<ClaimedConstant> {
-    let (point, axis) = error.zero.as_ref()?;
-    Some(ClaimedConstant {
-        name: format!("{axis} of {point}"),
-        value: error.value,
-    })
-}
-
 /// `None` for an error, apart from that of a cancelled job.
-fn ended_if_cancelled<T>(result: Outcome<T>) -> Outcome<Option<T>> {
+fn ignore_unless_cancelled<T>(result: Outcome<T>) -> Outcome<Option<T>> {
     match result {
         Ok(value) => Ok(Some(value)),
         Err(Error::Cancelled) => Err(Error::Cancelled),

@@ -330,8 +330,9 @@ impl Model {
         }
         findings.regions = regions(&findings);
         findings.geometry_alternatives = alternatives_to_effects(&findings, named.as_ref(), held)?;
-        findings.share_with_geometry();
-        findings.share_constants(found.in_place_of_constants.as_ref());
+        if !findings.share_with_geometry() {
+            findings.share_constants(found.in_place_of_constants.as_ref());
+        }
         if options.repeat_with_nominal && held != FixedParameters::All && !findings.off_nominal.is_empty() {
             findings.with_nominal = Some(nominal_diagnosis(&findings, &between)?);
         }
@@ -341,18 +342,20 @@ impl Model {
 
 impl DiagnosisFindings {
     /// Effects share their probability with an error of the geometry that explains as much with no more parts: the
-    /// recordings cannot distinguish them.
-    fn share_with_geometry(&mut self) {
+    /// recordings cannot distinguish them. Returns whether there is such an error.
+    fn share_with_geometry(&mut self) -> bool {
         let n_effects = self.missing.len();
         let is_equal =
             |one: &&GeometryAlternative| one.errors.len() <= n_effects && one.share >= EQUAL_ALTERNATIVE_LEAST_SHARE;
         let best = self.geometry_alternatives.iter().find(is_equal).cloned();
-        if let Some(best) = best {
-            self.share_effects(&best, &|_| true);
+        if let Some(best) = &best {
+            self.share_effects(best, &|_| true);
         }
+        best.is_some()
     }
 
-    /// Wrong constants in addition to other effects share their probability with errors of the geometry that explain as much.
+    /// Wrong constants in addition to other effects share their probability with errors of the geometry that explain as
+    /// much.
     fn share_constants(&mut self, best: Option<&GeometryAlternative>) {
         let is_constant = |one: &LocatedEffect| one.kind == CONSTANT_ERROR;
         let has_others = self.missing.iter().any(|one| !is_constant(&one.effect));
@@ -373,10 +376,6 @@ impl DiagnosisFindings {
         // What both explanations have in common stays as certain as before.
         let is_shared = |one: &LocatedEffect| are_shared(one) && !alternatives.contains(one);
         for (found, missing) in found.filter(|(found, _)| is_shared(&found.effect)) {
-            // An alternative that is known has its share already.
-            if others.iter().all(|one| found.indistinguishable_from.contains(one)) {
-                continue;
-            }
             // With n equal explanations each has 1/n; one more makes it 1/(n + 1).
             let shared = found.probability / (1.0 + found.probability);
             for (probability, list) in [

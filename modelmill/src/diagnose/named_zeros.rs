@@ -12,9 +12,7 @@ use crate::progress::SilentProgress;
 
 use super::constants::CONSTANT_ERROR;
 use super::problem::DiagnosisSolution;
-use super::thresholds::{
-    MOST_ZEROS, ZERO_MOST_RESIDUAL_EACH, ZEROS_LEAST_RESIDUAL, ZEROS_MOST_PRODUCTS, ZEROS_MOST_RESIDUAL,
-};
+use super::thresholds::{MOST_ZEROS, ZEROS_LEAST_RESIDUAL, ZEROS_MOST_PRODUCTS, ZEROS_MOST_RESIDUAL};
 
 /// Names of the axes.
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -95,7 +93,7 @@ impl NamedZeros {
     }
 
     /// Whether a search with these zeros as candidates is better than the one without: it names a zero, and explains as
-    /// much with fewer effects, more with as many, much more with further ones, or what was unexplained.
+    /// much with fewer effects, or more with as many, or what was unexplained.
     pub(super) fn is_better(&self, with_zeros: &DiagnosisSolution, without: &DiagnosisSolution) -> bool {
         let [new, old] = [with_zeros, without].map(|one| &one.diagnosis);
         let is_zero = |one: &IdentifiedEffect| self.has_place(&one.effect.at);
@@ -106,14 +104,8 @@ impl NamedZeros {
         let [n_new, n_old] = [new, old].map(|one| one.effects.len());
         let unexplained = DiagnosisVerdict::Unexplained;
         let is_solved = old.verdict == unexplained && new.verdict != unexplained;
-        // Each further effect has to explain most of what is left.
-        let further = i32::try_from(n_new.saturating_sub(n_old)).unwrap_or(i32::MAX);
-        let price = if is_solved {
-            1.0
-        } else {
-            ZERO_MOST_RESIDUAL_EACH.powi(further)
-        };
-        (n_new < n_old && ratio < ZEROS_MOST_RESIDUAL) || ratio < ZEROS_LEAST_RESIDUAL * price
+        (n_new < n_old && ratio < ZEROS_MOST_RESIDUAL)
+            || ((n_new <= n_old || is_solved) && ratio < ZEROS_LEAST_RESIDUAL)
     }
 
     /// Whether one of these places of an effect is a zero.

@@ -145,10 +145,6 @@ pub(super) const ZEROS_MOST_RESIDUAL: f64 = 1.05;
 /// this part (1). By judgement.
 pub(super) const ZEROS_LEAST_RESIDUAL: f64 = 0.8;
 
-/// Each effect more than without zeros has to lower the mean square residual to this part (1). By judgement: noise
-/// gives one more parameter a few thousandths.
-pub(super) const ZERO_MOST_RESIDUAL_EACH: f64 = 0.1;
-
 /// Most alternatives that are reported. By judgement: more do not help to decide what to measure.
 pub(super) const MOST_ALTERNATIVES: usize = 3;
 

@@ -70,13 +70,13 @@ const DECLARATIONS: &[OptionDeclaration<RecordingOptions>] = &[
         name: "decimate",
         flag: "decimate",
         placeholder: "N",
-        help: "Keep every n-th sample, after an anti-aliasing low-pass on forces and regressor. Default: chosen \
-               together with the cut-off; 1 if {cutoff_hz} or {smoothing} is given",
+        help: "Keep every n-th sample, after an anti-aliasing low-pass on forces and regressor. With 1, the default, n is \
+               chosen together with the cut-off; with {cutoff_hz} or {smoothing}, 1 keeps all samples",
         excludes: &[],
         kind: OptionKind::Integer {
             set: |options, factor| options.preparation.decimate = factor,
             range: (1, usize::MAX),
-            expected: "expected an integer of at least 1; 1 keeps all samples",
+            expected: "expected an integer of at least 1, such as 4",
             default: Some(1),
         },
     },

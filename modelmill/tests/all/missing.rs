@@ -137,6 +137,43 @@ fn a_zero_of_the_file_that_is_wrong_is_found_with_its_value() {
     }
 }
 
+/// The coordinate of the base's pivot and the length of the crank to the contact point change the forces in the same
+/// way: neither is claimed, and both are named.
+#[test]
+fn constants_that_act_alike_share_their_probability() {
+    const ROBOT: &str = "spidermill";
+    let text = std::fs::read_to_string(bundled(ROBOT)).expect("a model");
+    let given = Model::open(bundled(ROBOT)).expect("the model");
+    for (seed, name, error) in [(742, "Bx", 0.08), (743, "dA", -0.06)] {
+        let constants = &given.derivation.mechanism.constants;
+        let value = constants
+            .iter()
+            .find(|one| one.name == name)
+            .expect("the constant")
+            .value;
+        let entry = format!("{name} = {{ value = {value}");
+        let changed = text.replacen(&entry, &format!("{name} = {{ value = {}", value + error), 1);
+        assert_ne!(text, changed, "{entry}");
+        let truth = Model::from_text("other", &changed).expect("the model");
+        let files = [0, 10].map(|more| run_of(&truth, ROBOT, seed + more, Made::Nothing));
+        let recordings = files.map(|file| {
+            given
+                .recording(&file, &RecordingOptions::default())
+                .expect("a recording")
+        });
+        let findings = given
+            .diagnose(&[&recordings[0]], &[&recordings[1]], &DiagnosisOptions::default())
+            .expect("an answer");
+        let [claim] = findings.missing.as_slice() else {
+            panic!("{}", findings.verdict_text());
+        };
+        let named = claim.indistinguishable_from.iter().chain([&claim.effect]);
+        let named: Vec<&str> = named.flat_map(|one| &one.at).map(String::as_str).collect();
+        assert!(named.contains(&name), "{named:?}");
+        assert!(claim.probability < 0.5, "{claim:?}");
+    }
+}
+
 /// Both contact points 20 mm beside their axes: two wrong constants explain nearly as much, so both explanations are
 /// named.
 #[test]
