@@ -240,10 +240,9 @@ impl Model {
         let held = options.fixed;
         let recordings: Vec<&PreparedRecording> = of_fit.into_iter().chain(of_check).collect();
         // Differences between recordings are found first, since they would look like effects.
-        let between = (self.host()).run_job("comparing the recordings with each other", 0, |_| {
+        let mut between = (self.host()).run_job("comparing the recordings with each other", 0, |_| {
             faults::run_differences(self, &recordings)
         })??;
-        let mut between = between;
         let all: Vec<(&RecordingSegment, bool)> = data.iter().flatten().map(|one| (one, false)).collect();
         let standing = StandingDrives::find(self, &all)?;
         between.retain(|one| {
