@@ -353,8 +353,7 @@ fn joint(node: &Node, out: &mut RobotDescription) -> Result<UrdfJoint, String> {
         let (lower, upper) = (given(limit, "lower")?, given(limit, "upper")?);
         if required_attribute(node, "type")? != "continuous" && (lower.is_some() || upper.is_some()) {
             // The format defines zero as the default of each bound.
-            let range = [lower.unwrap_or(0.0), upper.unwrap_or(0.0)];
-            joint.range = (range[0] < range[1]).then_some(range);
+            joint.range = Some([lower.unwrap_or(0.0), upper.unwrap_or(0.0)]);
         }
         // Zero counts as "no limit".
         joint.rate = given(limit, "velocity")?.filter(|rate| *rate > 0.0);

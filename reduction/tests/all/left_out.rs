@@ -340,6 +340,22 @@ fn equal_and_exchanged_limits_are_named() {
         "{exchanged}"
     );
     assert!(!named("-1", "1").contains("limit"));
+    // The same in URDF.
+    let link = "<inertial><mass value=\"1\"/><inertia ixx=\"1\" iyy=\"1\" izz=\"1\" ixy=\"0\" ixz=\"0\" iyz=\"0\"/></inertial>";
+    for (limits, remark) in [
+        ("lower=\"0.3\" upper=\"0.3\"", "both limits of `turn` are 0.3"),
+        (
+            "lower=\"1\" upper=\"-1\"",
+            "the lower limit of `turn`, 1, is above its upper limit, -1",
+        ),
+    ] {
+        let urdf = format!(
+            "<robot name=\"r\"><link name=\"base\"/><link name=\"a\">{link}</link><joint name=\"turn\" type=\"revolute\">\
+             <parent link=\"base\"/><child link=\"a\"/><axis xyz=\"0 1 0\"/><limit {limits} effort=\"5\" velocity=\"2\"/></joint></robot>"
+        );
+        let named = lines(&imported(&urdf).remarks);
+        assert!(named.contains(remark), "{named}");
+    }
     // A locked joint does not move.
     let locked = [("turn".to_owned(), 0.3)];
     let options = ImportOptions {
