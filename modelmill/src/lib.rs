@@ -233,7 +233,7 @@ pub mod verify;
 
 pub use modelmill_boundary::files;
 pub use modelmill_identify::{FitFile, NoteSeverity, RecordingNote};
-pub use modelmill_spec::{EffectKind, SCHEMA, bundled, edit};
+pub use modelmill_spec::{EffectKind, SCHEMA, edit};
 
 pub use error::{Error, Outcome};
 pub use host::Host;

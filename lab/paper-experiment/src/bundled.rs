@@ -4,7 +4,8 @@ use std::path::Path;
 
 use modelmill::files::{FileSource, MemoryFiles};
 use modelmill::{Error, Host, Model, Outcome};
-use modelmill_spec::bundled::{MODELS, RIGS};
+use modelmill_recordings::MODELS;
+use modelmill_spec::bundled::RIGS;
 
 /// Bundled files as a source of files.
 fn files(bundled: &[(&str, &str)]) -> MemoryFiles {

@@ -8,7 +8,8 @@ use std::process;
 use std::thread;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use modelmill::{Error, Host, bundled};
+use modelmill::{Error, Host};
+use modelmill_recordings::MODELS;
 
 use crate::flags::FlagSpelling;
 
@@ -233,7 +234,7 @@ fn derive_bundled_model() -> Result<(), String> {
     // A host of its own: a wrong `--library` is no fault of the program.
     let host = Host::new();
     let spell = |error: Error| error.spell(&FlagSpelling);
-    let (name, text) = bundled::MODELS[0];
+    let (name, text) = MODELS[0];
     let loaded = host.load_text(Path::new(name), text).map_err(spell)?;
     let checked = host
         .derive(name, loaded)

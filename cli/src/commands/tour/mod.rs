@@ -11,8 +11,8 @@ use modelmill::diagnose::{DiagnosisFindings, DiagnosisOptions, FixedParameters};
 use modelmill::print::{StepSpelling, edit};
 use modelmill::recording::{PreparedRecording, RecordingOptions};
 use modelmill::report::page;
-use modelmill::{Host, Model, along, bundled};
-use modelmill_recordings::{BundledRuns, PLAIN, WITH_RODS};
+use modelmill::{Host, Model, along};
+use modelmill_recordings::{BundledRuns, MODELS, PLAIN, WITH_RODS};
 
 use crate::args::TourArgs;
 use crate::failure::{CommandFailure, CommandOutcome};
@@ -94,7 +94,7 @@ impl TourFolder {
             folder: folder.to_owned(),
         };
         // All bundled models, because some of them include others.
-        for (name, text) in bundled::MODELS {
+        for (name, text) in MODELS {
             place.write(name, text)?;
         }
         for runs in [&PLAIN, &WITH_RODS] {
