@@ -4,7 +4,9 @@ use super::bench::{EffectSelector, SelectedEffect};
 use super::in_time::{ChangeInterval, TimeResidual, time_residual};
 use super::noise::effective_samples;
 use super::problem::{CandidateNature, DiagnosisProblem};
-use super::thresholds::{COLOURED_LEAST_VARIANCE_RATIO, COLOURED_MOST_EFFECTIVE_SHARE, SAME_CHANGE_TIME_SHARE};
+use super::thresholds::{
+    COLOURED_LEAST_VARIANCE_RATIO, COLOURED_MOST_EFFECTIVE_SHARE, COLOURED_MOST_REPEATABLE_SHARE, SAME_CHANGE_TIME_SHARE,
+};
 use crate::signal::dot;
 
 /// A named value of a disturbance or an effect.
@@ -206,8 +208,12 @@ impl EffectSelector<'_> {
     }
 
     /// Coloured noise of a channel: its samples are correlated, and most of it is not repeatable. `None` if the noise
-    /// is white.
+    /// is white, or if most of the residual is repeatable: the estimate of the repeatable part is then not exact enough for a
+    /// statement about the rest.
     fn coloured_noise(&self, channel: usize, rest: &[f64], again: f64) -> Option<Disturbance> {
+        if again > COLOURED_MOST_REPEATABLE_SHARE {
+            return None;
+        }
         let layout = &self.problem.layout;
         let variance = self.pool.mean_square(channel, rest);
         if is_white(self.problem, channel, variance * (1.0 - again)) {
