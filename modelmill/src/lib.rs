@@ -192,6 +192,7 @@
 pub mod add;
 pub mod adopt;
 pub mod along;
+mod answers;
 pub mod atlas;
 pub mod audit;
 pub mod compare;

@@ -291,3 +291,47 @@ fn runs_says_what_changed() {
     let text = printed(&["runs", &model("spidermill.toml"), "--data", &recording, &recording]);
     assert!(text.contains("No change found"), "{text}");
 }
+
+/// The JSON Schema of a command's answer.
+fn answer_schema(command: &str) -> jsonschema::Validator {
+    let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../modelmill/schema/{command}.schema.json"));
+    let text = std::fs::read_to_string(file).expect("the schema is there");
+    let schema: Value = serde_json::from_str(&text).expect("the schema is JSON");
+    jsonschema::validator_for(&schema).expect("a valid schema")
+}
+
+/// Fails with the places where an answer differs from its schema.
+#[track_caller]
+fn assert_fits(schema: &jsonschema::Validator, answer: &Value) {
+    let faults: Vec<String> = schema
+        .iter_errors(answer)
+        .map(|fault| format!("{}: {fault}", fault.instance_path()))
+        .collect();
+    assert!(faults.is_empty(), "{faults:#?}");
+}
+
+#[test]
+fn answers_fit_their_schemas() {
+    let diagnose = answer_schema("diagnose");
+    let (fit, check) = (run("with-rods-fit.csv"), run("with-rods-check.csv"));
+    // Effects, candidates, alternatives and all parameters fixed.
+    for more in [&[][..], &["--held"], &["--check", &check]] {
+        let args = [&["diagnose", &model("spidermill-paper.toml"), "--data", &fit, "--json"], more].concat();
+        let answer = json(&args);
+        assert_fits(&diagnose, &answer);
+        let mut renamed = answer.clone();
+        renamed["verdict"] = value!("perhaps");
+        assert!(!diagnose.is_valid(&renamed));
+        let object = renamed.as_object_mut().expect("an object");
+        object.insert("verdict".to_owned(), answer["verdict"].clone());
+        object.remove("budget");
+        assert!(!diagnose.is_valid(&renamed));
+    }
+    let runs = answer_schema("runs");
+    for more in [&[][..], &["--per-run", "offset"]] {
+        let args = [&["runs", &model("spidermill.toml"), "--data", &fit, &check, "--json"], more].concat();
+        let answer = json(&args);
+        assert_fits(&runs, &answer);
+        assert_eq!(answer["per_run"].is_null(), more.is_empty());
+    }
+}

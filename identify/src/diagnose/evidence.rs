@@ -35,6 +35,7 @@ const BLOCKS: usize = 12;
 
 /// Evidence for one set of effects compared with another.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct SelectionEvidence {
     /// Relative decrease of the squared error on data that was not fitted, on the channels where the change acts.
     pub gain: f64,

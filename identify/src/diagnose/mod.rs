@@ -103,6 +103,7 @@ const FRICTION: [&str; 2] = ["viscous_friction", "coulomb_friction"];
 
 /// Verdict of a diagnosis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum DiagnosisVerdict {
     /// The residual of the model is noise as far as the recordings can show.

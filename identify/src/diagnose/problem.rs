@@ -90,6 +90,7 @@ impl SampleLayout {
 
 /// A kind of effect at its places, which share the parameters.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct LocatedEffect {
     /// Name of the kind.
     pub kind: String,

@@ -62,6 +62,20 @@ impl RejectionReason {
     }
 }
 
+#[cfg(feature = "schema")]
+impl schemars::JsonSchema for RejectionReason {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "RejectionReason".into()
+    }
+
+    fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        schemars::json_schema!({
+            "description": "The reason for which a candidate was rejected, as a phrase.",
+            "type": "string"
+        })
+    }
+}
+
 impl Serialize for RejectionReason {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(self.name())

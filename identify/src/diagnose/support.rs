@@ -21,6 +21,7 @@ use crate::signal::dot;
 
 /// What supports an effect.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct EffectSupport {
     /// Relative decrease of the squared error of its drives on data that was not fitted.
     pub gain: f64,

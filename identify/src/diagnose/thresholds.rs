@@ -361,6 +361,11 @@ pub(super) const SAME_CHANGE_TIME_SHARE: f64 = 0.1;
 /// judgement.
 pub(super) const SIMPLER_CHANGE_SHARE: f64 = 0.9;
 
+/// A change with more parameters is taken if it leaves less than this share of the squares that the simpler one leaves (1).
+/// Chosen on loads that are taken up during a recording (`lab/numpy-plant/unseen.py`): six more parameters of a wrong change
+/// lower the rest by a few percent, the inertia of a heavy load by half.
+pub(super) const GENERAL_CHANGE_REST: f64 = 0.7;
+
 // --- residual that follows the time
 
 /// A residual is tested for a part that follows the time if its variance is this many times that of the white noise

@@ -16,6 +16,7 @@ use crate::words::with_digits;
 
 /// A region with a larger share of a channel's squared error than of the samples.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ErrorRegion {
     /// The channel whose error it is.
     pub channel: String,

@@ -28,6 +28,7 @@ use modelmill_identify::SignalRecording;
 use modelmill_identify::diagnose::Disturbance;
 use modelmill_spec::{DriveKind, Mechanism};
 
+use crate::answers::CorrectedFaultAnswer;
 use crate::model::Model;
 use crate::segment::RecordingSegment;
 use crate::text::names::joined_by_and;
@@ -138,16 +139,16 @@ impl SuspectedFault {
         }
     }
 
-    /// The fault with its advice as JSON.
-    pub fn json(&self, spelling: &dyn RemedySpelling) -> serde_json::Value {
-        serde_json::json!({
-            "kind": self.kind.name(),
-            "at": self.at,
-            "recordings": self.recordings,
-            "says": self.clause,
-            "todo": self.advice.spell(spelling),
-            "heading": self.advice_heading(),
-        })
+    /// The fault with its advice, in the answer of a diagnosis.
+    pub(crate) fn answer(&self, spelling: &dyn RemedySpelling) -> CorrectedFaultAnswer {
+        CorrectedFaultAnswer {
+            kind: self.kind.name().to_owned(),
+            at: self.at.clone(),
+            recordings: self.recordings.clone(),
+            says: self.clause.clone(),
+            todo: self.advice.spell(spelling),
+            heading: self.advice_heading().to_owned(),
+        }
     }
 
     /// Whether it can be corrected hypothetically.

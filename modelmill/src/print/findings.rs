@@ -2,13 +2,19 @@
 //! effects, disturbances, rejected candidates and next steps.
 
 use crate::text::wrap::wrap_words;
-use modelmill_identify::diagnose::{DiagnosisVerdict, LocatedEffect, SelectionStep};
-use serde_json::{Map, Value, json};
+use indexmap::IndexMap;
+use modelmill_identify::diagnose::{DiagnosisVerdict, Disturbance, LocatedEffect, SelectionStep, TimeResidual};
+use serde_json::Value;
 
 use super::laws;
+use crate::answers::{
+    CandidateAnswer, DiagnosisAnswer, DisturbanceAnswer, DriveBudgetAnswer, DriveShareAnswer, EstimateAnswer,
+    MissingEffectAnswer, NominalDiagnosisAnswer, NominalEffectAnswer, OffNominalAnswer, RecordedIntervalAnswer,
+    SelectionStepAnswer, TimeResidualAnswer, UndecidedEffectAnswer, to_json,
+};
 use crate::diagnose::{DiagnosisFindings, EffectEstimate, MissingEffect, UndecidedEffect, words};
 use crate::faults::is_named_by_verdict;
-use crate::print::{OptionName, Remedy, StepSpelling, notes};
+use crate::print::{OptionName, Remedy, StepSpelling, note_answers};
 use crate::text::TerminalStyle;
 use crate::text::table::{ColumnAlignment, all_digits, number, percent, significant, table};
 
@@ -18,163 +24,139 @@ const MOST_CANDIDATES: usize = 6;
 const NAMED_LEAST_SHARE: f64 = 0.01;
 
 impl DiagnosisFindings {
-    /// All findings as one JSON object; `spelling` writes commands or calls for its reader.
-    ///
-    /// - `verdict`, `noise_floor` (relative to the force, as all errors here)
-    /// - `budget`: for each drive, the parts of its residual (`noise`, `in_time`, `model`) and the disturbances that were
-    ///   `subtracted` from its force, relative to the rms force of the drive; `rms` is this force in `unit`. `not_repeating`
-    ///   are `in_time` and `subtracted` together
-    /// - `disturbances`: faults of the recordings, with estimates and times (`interval`, s)
-    /// - `corrected`: faults of the recordings that were corrected hypothetically, with what to do about them (`todo`);
-    ///   all other findings hold for the corrected recordings
-    /// - `unresolved`: faults of the recordings that could not be corrected; nothing else is stated then
-    /// - `steps`: errors after each added effect, on fitted (`fit`) and validation data (`check`)
-    /// - `effects`: missing effects with estimates, probability, what supports them, alternatives, and the places whose
-    ///   value the model uses there too (`shared_with`): the estimates are then the difference from that value
-    /// - `geometry_alternatives`: errors of the geometry that explain as much as the effects found (`share`, 1 for as
-    ///   much): each a constant, or a coordinate of a point that the file writes as zero
-    /// - `possible`: the same for effects with a probability below 0.5
-    /// - `candidates`: all effects that were tried, with the share of the squared error that each explains
-    ///   alone and the reason of its rejection
-    /// - `untold`: effects that the recordings can neither show nor exclude
-    /// - `laws`: hypotheses for the residual
-    /// - `parameters_off_nominal`: base parameters that differ from the file, in standard deviations (`sigmas`)
-    /// - `unexplained`: drives with a repeatable residual that no effect explains
-    /// - `follows_time`: drives with a residual that follows the time and not the state, and cannot be noise
-    /// - `data`, `where`: notes on the recordings, and regions where the error is largest
-    /// - `with_nominal_parameters`: the diagnosis with all parameters fixed
+    /// All findings as one JSON object; `spelling` writes commands or calls for its reader. Its fields are those of the schema
+    /// `schema/diagnose.schema.json`.
     pub fn json(&self, spelling: &dyn StepSpelling) -> Value {
-        let diagnosis = &self.diagnosis;
-        // Values are by drive, in the order of the model.
-        let channels = self.channels();
-        let model = &self.before.model;
-        // Missing effects with the motion that would separate them from their alternatives. Kinds and places have
-        // the names of the model file.
-        let described = |effects: &[MissingEffect]| -> Vec<Value> {
-            let described = effects.iter().map(|missing| {
-                let separation = missing.separation.as_ref();
-                json!({
-                    "kind": missing.effect.kind,
-                    "at": missing.effect.at,
-                    "estimates": estimates(&missing.estimates),
-                    "probability": missing.probability,
-                    "support": missing.support,
-                    "indistinguishable_from": missing.indistinguishable_from,
-                    "shared_with": missing.shared_with,
-                    "separate_by": missing.separating_experiment,
-                    "separate_command": separation.and_then(|proposal| spelling.spell_separation(model, proposal)),
-                })
-            });
-            described.collect()
-        };
-        // All candidates, including those that were found; they have no rejection reason. A script can sort them
-        // by either share.
-        let candidates: Vec<Value> = (diagnosis.candidates.iter())
-            .map(|c| {
-                json!({"kind": c.effect.kind, "at": c.effect.at, "explained": c.explained, "gain": c.gain, "refused": c.rejection_reason})
-            })
-            .collect();
-        // Base parameters that differ from the file.
-        let off: Vec<Value> = (self.off_nominal.iter())
-            .map(|off| {
-                let p = &off.parameter;
-                json!({"name": p.name, "expression": p.expression, "nominal": off.nominal, "value": p.value, "sigmas": off.sigmas, "unit": p.unit})
-            })
-            .collect();
-        // Parts of the residual are relative to the rms force of the drive.
-        let budget: Map<String, Value> = (channels.iter().zip(&diagnosis.budgets).enumerate())
-            .map(|(d, (channel, budget))| {
-                // A drive without force has no relative parts.
-                let part = |x: f64| {
-                    if budget.force > 0.0 { x / budget.force } else { 0.0 }
-                };
-                let value = json!({
-                    "noise": part(budget.noise),
-                    "not_repeating": part(budget.non_repeatable()),
-                    "in_time": part(budget.in_time),
-                    "subtracted": part(budget.subtracted),
-                    "model": part(budget.model),
-                    "unit": model.force_unit(d),
-                    "rms": budget.force,
-                });
-                (channel.clone(), value)
-            })
-            .collect();
-        // Disturbances with estimates, recordings and times.
-        let disturbances: Vec<Value> = (self.disturbances().iter())
-            .map(|one| {
-                json!({
-                    "kind": one.kind,
-                    "at": one.at,
-                    "says": one.description,
-                    "estimates": one.estimates.iter().map(|q| {
-                        json!({"name": q.name, "value": q.value, "std": q.standard_deviation, "unit": q.unit})
-                    }).collect::<Vec<_>>(),
-                    "recordings": one.recordings,
-                    "interval": one.interval,
-                    "in_verdict": is_named_by_verdict(one),
-                })
-            })
-            .collect();
-        // Drives whose residual is repeatable, so that a model could explain it.
-        let unexplained: Vec<Value> = (diagnosis.unexplained.iter())
-            .map(|d| json!({"channel": channels[*d], "reproducible": diagnosis.repeatable_share[*d]}))
-            .collect();
-        // Keys are part of the interface; their meaning is listed above.
-        json!({
-            "model": model.name,
-            "verdict": diagnosis.verdict,
-            "noise_floor": diagnosis.noise_floor,
-            "budget": budget,
-            "disturbances": disturbances,
-            "corrected": self.corrected.iter().map(|fault| fault.json(spelling)).collect::<Vec<_>>(),
-            "unresolved": self.unresolved.iter().map(|fault| fault.json(spelling)).collect::<Vec<_>>(),
-            "steps": steps(&diagnosis.steps),
-            "effects": described(&self.missing),
-            "geometry_alternatives": self.geometry_alternatives_json(),
-            "possible": described(&self.possible),
-            "candidates": candidates,
-            "untold": self.undecided.iter().map(|one| {
-                json!({"kind": one.effect.kind, "at": one.effect.at, "says": one.reason, "separate_by": one.separating_experiment})
-            }).collect::<Vec<_>>(),
-            "laws": laws::laws(&self.laws, model, spelling),
-            "parameters_off_nominal": off,
-            "unexplained": unexplained,
-            "follows_time": self.time_residuals(),
-            "data": notes(&self.notes, spelling),
-            "where": self.regions,
-            "with_nominal_parameters": self.with_nominal.as_ref().map(|held| {
-                json!({
-                    "verdict": held.diagnosis.verdict,
-                    "steps": steps(&held.diagnosis.steps),
-                    "effects": held.missing.iter().map(|(effect, found)| {
-                        json!({"kind": effect.kind, "at": effect.at, "estimates": estimates(found)})
-                    }).collect::<Vec<_>>(),
-                })
-            }),
-        })
+        to_json(&self.answer(spelling))
     }
 
-    /// Residuals that follow the time and are no noise, as JSON.
-    fn time_residuals(&self) -> Vec<Value> {
-        let (diagnosis, channels) = (&self.diagnosis, self.channels());
-        let model = &self.before.model;
-        (diagnosis.time_residuals.iter())
-            .map(|one| {
-                json!({
-                    "channel": channels[one.channel],
-                    "character": one.character,
-                    "rms": one.rms,
-                    "noise": one.noise,
-                    "unit": model.force_unit(one.channel),
-                    "frequency": one.frequency,
-                    "intervals": one.intervals.iter().map(|time| {
-                        json!({"recording": time.recording, "interval": time.interval})
-                    }).collect::<Vec<_>>(),
-                    "says": words::time_residual(one, &channels[one.channel], model.force_unit(one.channel)),
+    /// All findings as the answer of `diagnose`.
+    fn answer(&self, spelling: &dyn StepSpelling) -> DiagnosisAnswer {
+        let diagnosis = &self.diagnosis;
+        let (model, channels) = (&self.before.model, self.channels());
+        let candidates = diagnosis.candidates.iter().map(|one| CandidateAnswer {
+            kind: one.effect.kind.clone(),
+            at: one.effect.at.clone(),
+            explained: one.explained,
+            gain: one.gain,
+            refused: one.rejection_reason,
+        });
+        let off_nominal = self.off_nominal.iter().map(|off| OffNominalAnswer {
+            name: off.parameter.name.clone(),
+            expression: off.parameter.expression.clone(),
+            nominal: off.nominal,
+            value: off.parameter.value,
+            sigmas: off.sigmas,
+            unit: off.parameter.unit.clone(),
+        });
+        let unexplained = diagnosis.unexplained.iter().map(|d| DriveShareAnswer {
+            channel: channels[*d].clone(),
+            reproducible: diagnosis.repeatable_share[*d],
+        });
+        let undecided = self.undecided.iter().map(|one| UndecidedEffectAnswer {
+            kind: one.effect.kind.clone(),
+            at: one.effect.at.clone(),
+            says: one.reason.clone(),
+            separate_by: one.separating_experiment.clone(),
+        });
+        let with_nominal = self.with_nominal.as_ref().map(|held| NominalDiagnosisAnswer {
+            verdict: held.diagnosis.verdict,
+            steps: held.diagnosis.steps.iter().map(step_answer).collect(),
+            effects: (held.missing.iter())
+                .map(|(effect, found)| NominalEffectAnswer {
+                    kind: effect.kind.clone(),
+                    at: effect.at.clone(),
+                    estimates: estimate_answers(found),
                 })
-            })
-            .collect()
+                .collect(),
+        });
+        DiagnosisAnswer {
+            model: model.name.clone(),
+            verdict: diagnosis.verdict,
+            noise_floor: diagnosis.noise_floor,
+            budget: self.budget_answers(),
+            disturbances: self.disturbances().iter().map(disturbance_answer).collect(),
+            corrected: self.corrected.iter().map(|fault| fault.answer(spelling)).collect(),
+            unresolved: self.unresolved.iter().map(|fault| fault.answer(spelling)).collect(),
+            steps: diagnosis.steps.iter().map(step_answer).collect(),
+            effects: self.effect_answers(&self.missing, spelling),
+            geometry_alternatives: self.geometry_answers(),
+            possible: self.effect_answers(&self.possible, spelling),
+            candidates: candidates.collect(),
+            untold: undecided.collect(),
+            laws: laws::law_answers(&self.laws, model, spelling),
+            parameters_off_nominal: off_nominal.collect(),
+            unexplained: unexplained.collect(),
+            follows_time: self.time_residual_answers(),
+            data: note_answers(&self.notes, spelling),
+            regions: self.regions.clone(),
+            with_nominal_parameters: with_nominal,
+        }
+    }
+
+    /// Missing effects with the motion that would separate them from their alternatives. Kinds and places have the names of
+    /// the model file.
+    fn effect_answers(&self, effects: &[MissingEffect], spelling: &dyn StepSpelling) -> Vec<MissingEffectAnswer> {
+        let model = &self.before.model;
+        let answer = |missing: &MissingEffect| {
+            let separation = missing.separation.as_ref();
+            MissingEffectAnswer {
+                kind: missing.effect.kind.clone(),
+                at: missing.effect.at.clone(),
+                estimates: estimate_answers(&missing.estimates),
+                probability: missing.probability,
+                support: missing.support,
+                indistinguishable_from: missing.indistinguishable_from.clone(),
+                shared_with: missing.shared_with.clone(),
+                separate_by: missing.separating_experiment.clone(),
+                separate_command: separation.and_then(|proposal| spelling.spell_separation(model, proposal)),
+            }
+        };
+        effects.iter().map(answer).collect()
+    }
+
+    /// Parts of the residual of each drive, relative to its rms force.
+    fn budget_answers(&self) -> IndexMap<String, DriveBudgetAnswer> {
+        let model = &self.before.model;
+        let budgets = self.channels().iter().zip(&self.diagnosis.budgets).enumerate();
+        let budgets = budgets.map(|(d, (channel, budget))| {
+            // A drive without force has no relative parts.
+            let part = |x: f64| if budget.force > 0.0 { x / budget.force } else { 0.0 };
+            let answer = DriveBudgetAnswer {
+                noise: part(budget.noise),
+                not_repeating: part(budget.non_repeatable()),
+                in_time: part(budget.in_time),
+                subtracted: part(budget.subtracted),
+                model: part(budget.model),
+                unit: model.force_unit(d).to_owned(),
+                rms: budget.force,
+            };
+            (channel.clone(), answer)
+        });
+        budgets.collect()
+    }
+
+    /// Residuals that follow the time and are no noise.
+    fn time_residual_answers(&self) -> Vec<TimeResidualAnswer> {
+        let (model, channels) = (&self.before.model, self.channels());
+        let answer = |one: &TimeResidual| {
+            let unit = model.force_unit(one.channel);
+            let intervals = one.intervals.iter().map(|time| RecordedIntervalAnswer {
+                recording: time.recording.clone(),
+                interval: time.interval,
+            });
+            TimeResidualAnswer {
+                channel: channels[one.channel].clone(),
+                character: one.character.clone(),
+                rms: one.rms,
+                noise: one.noise,
+                unit: unit.to_owned(),
+                frequency: one.frequency,
+                intervals: intervals.collect(),
+                says: words::time_residual(one, &channels[one.channel], unit),
+            }
+        };
+        self.diagnosis.time_residuals.iter().map(answer).collect()
     }
 
     /// The findings as lines of text, the verdict first.
@@ -566,24 +548,45 @@ pub(crate) fn values_text(estimates: &[EffectEstimate]) -> String {
     values.collect::<Vec<String>>().join(", ")
 }
 
-/// Estimates as JSON.
-pub(super) fn estimates(all: &[EffectEstimate]) -> Vec<Value> {
-    let one = |e: &EffectEstimate| json!({"name": e.name, "value": e.value, "std": e.std, "unit": e.unit});
-    all.iter().map(one).collect()
+/// Estimates of an effect.
+pub(super) fn estimate_answers(all: &[EffectEstimate]) -> Vec<EstimateAnswer> {
+    let answer = |one: &EffectEstimate| EstimateAnswer {
+        name: one.name.clone(),
+        value: one.value,
+        std: one.std,
+        unit: one.unit.clone(),
+    };
+    all.iter().map(answer).collect()
 }
 
-/// The steps of the search as JSON.
-fn steps(all: &[SelectionStep]) -> Vec<Value> {
-    let one_step = |step: &SelectionStep| {
-        json!({
-            "added": step.added.first(),
-            "also_added": step.added.get(1..).unwrap_or_default(),
-            "dropped": step.dropped,
-            "fit": step.fit,
-            "check": step.check,
-            "gain": step.evidence.map(|e| e.gain),
-            "evidence": step.evidence,
-        })
-    };
-    all.iter().map(one_step).collect()
+/// A disturbance with estimates, recordings and times.
+fn disturbance_answer(one: &Disturbance) -> DisturbanceAnswer {
+    let estimates = one.estimates.iter().map(|quantity| EstimateAnswer {
+        name: quantity.name.clone(),
+        value: quantity.value,
+        std: quantity.standard_deviation,
+        unit: quantity.unit.clone(),
+    });
+    DisturbanceAnswer {
+        kind: one.kind.clone(),
+        at: one.at.clone(),
+        says: one.description.clone(),
+        estimates: estimates.collect(),
+        recordings: one.recordings.clone(),
+        interval: one.interval,
+        in_verdict: is_named_by_verdict(one),
+    }
+}
+
+/// A step of the search.
+fn step_answer(step: &SelectionStep) -> SelectionStepAnswer {
+    SelectionStepAnswer {
+        added: step.added.first().cloned(),
+        also_added: step.added.get(1..).unwrap_or_default().to_vec(),
+        dropped: step.dropped.clone(),
+        fit: step.fit,
+        check: step.check,
+        gain: step.evidence.map(|evidence| evidence.gain),
+        evidence: step.evidence,
+    }
 }

@@ -1,27 +1,29 @@
-//! Errors of the geometry that explain as much as the effects found, as JSON and as text.
+//! Errors of the geometry that explain as much as the effects found, in the answer and as text.
 
 use crate::text::wrap::wrap_words;
-use serde_json::{Value, json};
-
+use crate::answers::{GeometryAlternativeAnswer, GeometryErrorAnswer};
 use crate::diagnose::{DiagnosisFindings, words};
 use crate::text::TerminalStyle;
 use crate::text::names::joined_by_and;
 
 impl DiagnosisFindings {
-    /// Errors of the geometry that explain as much as the effects found, as JSON.
-    pub(super) fn geometry_alternatives_json(&self) -> Value {
+    /// Errors of the geometry that explain as much as the effects found.
+    pub(super) fn geometry_answers(&self) -> Vec<GeometryAlternativeAnswer> {
         let alternatives = self.geometry_alternatives.iter().map(|one| {
             let errors = one.errors.iter().map(|error| {
                 let (point, axis) = error.zero.as_ref().map(|(point, axis)| (point, axis)).unzip();
-                json!({
-                    "constant": error.constant,
-                    "point": point,
-                    "axis": axis,
-                    "value": error.value,
-                    "unit": error.unit,
-                })
+                GeometryErrorAnswer {
+                    constant: error.constant.clone(),
+                    point: point.cloned(),
+                    axis: axis.map(|axis| (*axis).to_owned()),
+                    value: error.value,
+                    unit: error.unit.clone(),
+                }
             });
-            json!({"errors": errors.collect::<Vec<_>>(), "share": one.share})
+            GeometryAlternativeAnswer {
+                errors: errors.collect(),
+                share: one.share,
+            }
         });
         alternatives.collect()
     }

@@ -3,9 +3,8 @@
 use crate::text::wrap::wrap_words;
 use std::fmt::Write as _;
 
-use serde_json::{Value, json};
-
-use super::findings::{estimates, values_text};
+use super::findings::{estimate_answers, values_text};
+use crate::answers::{LawAnswer, LawHypothesisAnswer};
 use crate::diagnose::{LawHypothesis, ProposedLaw, words};
 use crate::model::Model;
 use crate::print::StepSpelling;
@@ -20,35 +19,35 @@ pub(crate) const LIBRARY: &str = "laws.toml";
 /// Why a law with memory has no entry.
 pub(crate) const PATH_DEPENDENT_NOTE: &str = "It depends on the earlier motion, which no formula of a library can express. It is reported so that you can search for the cause.";
 
-/// Laws as JSON, the best first, each with its alternatives.
-pub(super) fn laws(laws: &[LawHypothesis], model: &Model, spelling: &dyn StepSpelling) -> Vec<Value> {
+/// Laws, the best first, each with its alternatives.
+pub(super) fn law_answers(laws: &[LawHypothesis], model: &Model, spelling: &dyn StepSpelling) -> Vec<LawHypothesisAnswer> {
     let one = |hypothesis: &LawHypothesis| {
-        // `near_ties` has the labels of the alternatives, `ties` all of them in full.
-        let mut object = law(&hypothesis.law, model, spelling);
         let ties = hypothesis.near_ties.iter();
-        object["near_ties"] = ties.clone().map(|tie| json!(tie.label())).collect();
-        object["ties"] = ties.map(|tie| law(tie, model, spelling)).collect();
-        object["says"] = json!(HYPOTHESIS);
-        object
+        LawHypothesisAnswer {
+            law: law_answer(&hypothesis.law, model, spelling),
+            near_ties: ties.clone().map(ProposedLaw::label).collect(),
+            ties: ties.map(|tie| law_answer(tie, model, spelling)).collect(),
+            says: HYPOTHESIS.to_owned(),
+        }
     };
     laws.iter().map(one).collect()
 }
 
-/// A law as JSON, with its entry for a library and the step that adds it.
-fn law(law: &ProposedLaw, model: &Model, spelling: &dyn StepSpelling) -> Value {
+/// A law with its entry for a library and the step that adds it.
+fn law_answer(law: &ProposedLaw, model: &Model, spelling: &dyn StepSpelling) -> LawAnswer {
     let entry = law.entry.as_ref();
-    json!({
-        "expression": law.expression,
-        "at": [law.at],
-        "gain": law.gain,
-        "parameters": estimates(&law.parameters),
-        "instead_of": law.instead_of,
-        "in_addition_to": law.in_addition_to,
-        "entry": entry.map(|entry| &entry.text),
-        "kind": entry.map(|entry| &entry.effect.kind),
-        "places": entry.map(|entry| &entry.effect.at),
-        "command": entry.map(|entry| spelling.spell_effect_of_library(model, &entry.effect, LIBRARY)),
-    })
+    LawAnswer {
+        expression: law.expression.clone(),
+        at: [law.at.clone()],
+        gain: law.gain,
+        parameters: estimate_answers(&law.parameters),
+        instead_of: law.instead_of.clone(),
+        in_addition_to: law.in_addition_to.clone(),
+        entry: entry.map(|entry| entry.text.clone()),
+        kind: entry.map(|entry| entry.effect.kind.clone()),
+        places: entry.map(|entry| entry.effect.at.clone()),
+        command: entry.map(|entry| spelling.spell_effect_of_library(model, &entry.effect, LIBRARY)),
+    }
 }
 
 /// Laws as lines of text.

@@ -31,12 +31,23 @@ mod verification;
 use modelmill_identify::RecordingNote;
 use serde_json::Value;
 
+use crate::answers::NoteAnswer;
+
 pub(crate) use findings::values_text;
 pub use spelling::{
     CommandName, LibrarySpelling, Message, OptionName, OptionSetting, Remedy, RemedySpelling, StepSpelling,
 };
 pub use summary::{faults, refusal, warnings};
 pub use verification::{VERIFICATION_SCHEMA, VerificationContext};
+
+/// Notes of an answer.
+pub(crate) fn note_answers(notes: &[RecordingNote], spelling: &dyn RemedySpelling) -> Vec<NoteAnswer> {
+    let answer = |note: &RecordingNote| NoteAnswer {
+        severity: note.severity,
+        says: note.says.spell(spelling),
+    };
+    notes.iter().map(answer).collect()
+}
 
 /// Notes as JSON.
 pub(crate) fn notes(notes: &[RecordingNote], spelling: &dyn RemedySpelling) -> Value {

@@ -3,8 +3,13 @@
 use modelmill_boundary::message;
 use modelmill_boundary::text::{CommandName, Message, OptionName, Remedy};
 use modelmill_identify::ParameterInfo;
-use serde_json::{Value, json};
+use serde_json::Value;
 
+use crate::answers::{
+    ChangePointAnswer, DriveGainAnswer, EstimateAnswer, MeanStepAnswer, MovedParameterAnswer, ParameterAnswer,
+    RunAnswer, RunChangeAnswer, RunValueAnswer, RunValuesAnswer, RunsAnswer, SharedFitAnswer, UndecidedDriveAnswer,
+    UnreadRunAnswer, to_json,
+};
 use crate::print::RemedySpelling;
 use crate::runs::{
     ChangePoint, FittedValue, PhysicalChange, RunChange, RunReport, RunValue, RunVerdict, RunsComparison, SharedFit,
@@ -14,134 +19,117 @@ use crate::text::TerminalStyle;
 use crate::text::table::{ColumnAlignment, count, percent, table, with_std};
 
 impl RunsComparison {
-    /// All differences as one JSON object; values in SI units.
-    ///
-    /// - `together`: base parameters of one fit to all runs; `runs`: those of each run fitted separately, with its
-    ///   `verdict` relative to the first (`changed`, `different`, `unchanged`, `cannot_tell`; null for the first), and
-    ///   the drives whose forces cannot show a change (`undecided`)
-    /// - `moved`: base parameters that differ between the first run and another, in standard deviations (`sigmas`)
-    /// - `changes`: physical changes of a run relative to the first
-    /// - `change_points`: permanent changes; they are searched for if there are at least four runs
-    /// - `unread`: files that could not be evaluated, with the reason
-    /// - `per_run`: the fit of all runs at once in which some values are separate for each run, if it was requested
+    /// All differences as one JSON object; its fields are those of the schema `schema/runs.schema.json`.
     pub fn json(&self, spelling: &dyn RemedySpelling) -> Value {
-        let later = || self.runs.iter().enumerate().skip(1);
-        // All figures are relative to the first run.
-        let moved = later().flat_map(|(k, run)| run.moved.iter().map(move |p| self.moved_parameter_json(k, *p)));
-        let all = self.runs.iter().enumerate();
-        // Events within the first run are listed as well, with the pair of indices 0 and 0.
-        let changes = all.flat_map(|(k, run)| run.changes.iter().map(move |one| change_json([0, k], one)));
-        let unread = self.unread.iter();
-        let unread = unread.map(|one| json!({ "file": one.file, "says": one.error.spell(spelling) }));
-        // Each run with its own fit.
-        let runs = self.runs.iter().enumerate().map(|(k, run)| {
-            json!({
-                "file": run.file,
-                "samples": run.samples,
-                "parameters": self.parameters_json(&run.alone),
-                "verdict": (k > 0).then(|| run.verdict().keyword()),
-                "undecided": run.undecided.iter().map(undecided_json).collect::<Vec<_>>(),
-                "says": (k > 0).then(|| verdict_text(run).spell(spelling)),
-            })
-        });
-        json!({
-            "model": self.model,
-            "together": self.parameters_json(&self.together),
-            "runs": runs.collect::<Vec<_>>(),
-            "moved": moved.collect::<Vec<_>>(),
-            "changes": changes.collect::<Vec<_>>(),
-            "change_points": self.points.iter().map(|one| self.point_json(one)).collect::<Vec<_>>(),
-            "unread": unread.collect::<Vec<_>>(),
-            "per_run": self.shared.as_ref().map(|shared| self.shared_json(shared)),
-        })
+        to_json(&self.answer(spelling))
     }
 
-    /// A lasting change as JSON: the run from which on it is there, means before and since, and physical causes.
-    fn point_json(&self, point: &ChangePoint) -> Value {
+    /// All differences as the answer of `runs`.
+    fn answer(&self, spelling: &dyn RemedySpelling) -> RunsAnswer {
+        let later = || self.runs.iter().enumerate().skip(1);
+        // All figures are relative to the first run.
+        let moved = later().flat_map(|(k, run)| run.moved.iter().map(move |p| self.moved_parameter_answer(k, *p)));
+        let all = self.runs.iter().enumerate();
+        // Events within the first run are listed as well, with the pair of indices 0 and 0.
+        let changes = all.flat_map(|(k, run)| run.changes.iter().map(move |one| change_answer([0, k], one)));
+        let unread = self.unread.iter().map(|one| UnreadRunAnswer {
+            file: one.file.clone(),
+            says: one.error.spell(spelling),
+        });
+        // Each run with its own fit.
+        let runs = self.runs.iter().enumerate().map(|(k, run)| RunAnswer {
+            file: run.file.clone(),
+            samples: run.samples,
+            parameters: self.parameter_answers(&run.alone),
+            verdict: (k > 0).then(|| run.verdict().keyword()),
+            undecided: run.undecided.iter().map(undecided_answer).collect(),
+            says: (k > 0).then(|| verdict_text(run).spell(spelling)),
+        });
+        RunsAnswer {
+            model: self.model.clone(),
+            together: self.parameter_answers(&self.together),
+            runs: runs.collect(),
+            moved: moved.collect(),
+            changes: changes.collect(),
+            change_points: self.points.iter().map(|one| self.point_answer(one)).collect(),
+            unread: unread.collect(),
+            per_run: self.shared.as_ref().map(|shared| self.shared_answer(shared)),
+        }
+    }
+
+    /// A lasting change: the run from which on it is there, means before and since, and physical causes.
+    fn point_answer(&self, point: &ChangePoint) -> ChangePointAnswer {
         // Means of each parameter before and since the change.
-        let steps = point.steps.iter().map(|step| {
-            json!({
-                "parameter": self.parameters[step.parameter].name,
-                "before": step.before.value,
-                "now": step.now.value,
-                "std": step.before.difference_std(step.now),
-                "unit": self.parameters[step.parameter].unit,
-            })
+        let steps = point.steps.iter().map(|step| MeanStepAnswer {
+            parameter: self.parameters[step.parameter].name.clone(),
+            before: step.before.value,
+            now: step.now.value,
+            std: step.before.difference_std(step.now),
+            unit: self.parameters[step.parameter].unit.clone(),
         });
         let changes = point.changes.iter();
-        json!({
-            "run": point.run,
-            "file": self.runs[point.run].file,
-            "parameters": steps.collect::<Vec<_>>(),
-            "changes": changes.map(|one| change_json([point.run - 1, point.run], one)).collect::<Vec<_>>(),
-        })
+        ChangePointAnswer {
+            run: point.run,
+            file: self.runs[point.run].file.clone(),
+            parameters: steps.collect(),
+            changes: changes
+                .map(|one| change_answer([point.run - 1, point.run], one))
+                .collect(),
+        }
     }
 
     /// The joint fit, in which some values are shared and each run has others for itself.
-    fn shared_json(&self, fit: &SharedFit) -> Value {
-        // Names and units come from the model.
+    fn shared_answer(&self, fit: &SharedFit) -> SharedFitAnswer {
+        // Names and units come from the model. Base parameters that are separate for each run are not in the shared list.
         let shared = self.parameters.iter().zip(&fit.shared);
-        // Base parameters that are separate for each run are not in the shared list.
-        let shared = shared.filter_map(|(info, value)| {
-            let value = (*value)?;
-            Some(json!({ "name": info.name, "expression": info.expression, "value": value.value, "std": value.std, "unit": info.unit }))
-        });
-        // Factors of force signals, which need a known load.
-        let gains = fit
-            .gains
-            .iter()
-            .map(|(drive, gain)| json!({ "drive": drive, "gain": gain.value, "std": gain.std }));
+        let shared = shared.filter_map(|(info, value)| Some(parameter_answer(info, &(*value)?)));
         // Values of each run, absolute or relative to the first run.
         let runs = fit.runs.iter().map(|(file, values)| {
-            let values = values.iter().map(|one| {
-                json!({
-                    "of": one.quantity,
-                    "name": one.name,
-                    "value": one.value.value,
-                    "std": one.value.std,
-                    "unit": one.unit,
-                    "against_first": one.is_against_first,
-                })
+            let values = values.iter().map(|one| RunValueAnswer {
+                quantity: one.quantity.clone(),
+                name: one.name.clone(),
+                value: one.value.value,
+                std: one.value.std,
+                unit: one.unit.clone(),
+                is_against_first: one.is_against_first,
             });
-            json!({ "file": file, "values": values.collect::<Vec<_>>() })
+            RunValuesAnswer {
+                file: file.clone(),
+                values: values.collect(),
+            }
         });
-        json!({
-            "shared": shared.collect::<Vec<_>>(),
-            "gains": gains.collect::<Vec<_>>(),
-            "runs": runs.collect::<Vec<_>>(),
-        })
+        let gains = fit.gains.iter().map(|(drive, gain)| DriveGainAnswer {
+            drive: drive.clone(),
+            gain: gain.value,
+            std: gain.std,
+        });
+        SharedFitAnswer {
+            shared: shared.collect(),
+            gains: gains.collect(),
+            runs: runs.collect(),
+        }
     }
 
-    /// Base parameters with one fitted value each as JSON.
-    fn parameters_json(&self, fitted: &[FittedValue]) -> Vec<Value> {
-        // A parameter that the run does not determine has no standard deviation.
+    /// Base parameters with one fitted value each.
+    fn parameter_answers(&self, fitted: &[FittedValue]) -> Vec<ParameterAnswer> {
         let pairs = self.parameters.iter().zip(fitted);
-        let one = |(info, fitted): (&ParameterInfo, &FittedValue)| {
-            json!({
-                "name": info.name,
-                "expression": info.expression,
-                "value": fitted.value,
-                "std": fitted.std,
-                "unit": info.unit,
-            })
-        };
-        pairs.map(one).collect()
+        pairs.map(|(info, fitted)| parameter_answer(info, fitted)).collect()
     }
 
     /// A base parameter of a run that differs from that of the first.
-    fn moved_parameter_json(&self, run: usize, k: usize) -> Value {
+    fn moved_parameter_answer(&self, run: usize, k: usize) -> MovedParameterAnswer {
         // Both values are from separate fits, so their errors are independent.
         let (before, now) = (self.runs[0].alone[k], self.runs[run].alone[k]);
         let std = self.runs[run].difference_std(&self.runs[0], k);
-        json!({
-            "parameter": self.parameters[k].name,
-            "sigmas": (now.value - before.value).abs() / std,
-            "before": before.value,
-            "now": now.value,
-            "std": std,
-            "unit": self.parameters[k].unit,
-            "between": [0, run],
-        })
+        MovedParameterAnswer {
+            parameter: self.parameters[k].name.clone(),
+            sigmas: (now.value - before.value).abs() / std,
+            before: before.value,
+            now: now.value,
+            std,
+            unit: self.parameters[k].unit.clone(),
+            between: [0, run],
+        }
     }
 
     /// The comparison as text: permanent changes, the fit of all runs at once, and each run.
@@ -359,15 +347,30 @@ fn undecided_text(undecided: &[UndecidedDrive]) -> Message {
     Message::join(sentences, " ")
 }
 
-/// A drive whose forces cannot show a change, as JSON: the reason with its number.
-fn undecided_json(one: &UndecidedDrive) -> Value {
+/// A drive whose forces cannot show a change: the reason with its number.
+fn undecided_answer(one: &UndecidedDrive) -> UndecidedDriveAnswer {
     let share = match one.reason {
         UndecidedReason::UnexplainedForce { share } | UndecidedReason::SmallestChange { share } => {
             Some(share).filter(|share| share.is_finite())
         }
         UndecidedReason::TooFewEquations { .. } | UndecidedReason::Standstill => None,
     };
-    json!({ "drive": one.drive, "reason": one.reason.keyword(), "share": share })
+    UndecidedDriveAnswer {
+        drive: one.drive.clone(),
+        reason: one.reason.keyword(),
+        share,
+    }
+}
+
+/// A base parameter with a fitted value; one that the run does not determine has no standard deviation.
+fn parameter_answer(info: &ParameterInfo, fitted: &FittedValue) -> ParameterAnswer {
+    ParameterAnswer {
+        name: info.name.clone(),
+        expression: info.expression.clone(),
+        value: fitted.value,
+        std: fitted.std,
+        unit: info.unit.clone(),
+    }
 }
 
 /// Adds one line for each change, with the changes that explain the runs equally well.
@@ -400,28 +403,31 @@ fn write_many_runs(later: &[RunReport], lines: &mut Vec<String>, style: Terminal
     }
 }
 
-/// A change as JSON; `between` are the indices of both runs.
-fn change_json(between: [usize; 2], change: &RunChange) -> Value {
+/// A change; `between` are the indices of both runs.
+fn change_answer(between: [usize; 2], change: &RunChange) -> RunChangeAnswer {
     let (kind, at, estimates) = change.change.parts(change.unit);
     // Sizes of the change with standard deviations.
-    let estimates = estimates.iter().map(
-        |(name, estimate, unit)| json!({ "name": name, "value": estimate.value, "std": estimate.std, "unit": unit }),
-    );
+    let estimates = estimates.iter().map(|(name, estimate, unit)| EstimateAnswer {
+        name: (*name).to_owned(),
+        value: estimate.value,
+        std: Some(estimate.std),
+        unit: (*unit).to_owned(),
+    });
     // Only contacts have a time.
     let interval = match &change.change {
-        PhysicalChange::ContactEvent { interval, .. } => Some(interval),
+        PhysicalChange::ContactEvent { interval, .. } => Some(*interval),
         _ => None,
     };
-    json!({
-        "kind": kind,
-        "at": at,
-        "estimates": estimates.collect::<Vec<_>>(),
-        "between": between,
-        "interval": interval,
-        "gain": change.gain,
-        "indistinguishable_from": change.rivals,
-        "says": change.says,
-    })
+    RunChangeAnswer {
+        kind: kind.to_owned(),
+        at: at.into_iter().map(str::to_owned).collect(),
+        estimates: estimates.collect(),
+        between,
+        interval,
+        gain: change.gain,
+        indistinguishable_from: change.rivals.clone(),
+        says: change.says.clone(),
+    }
 }
 
 /// The joint fit: factors of force signals, and values that each run has for itself.

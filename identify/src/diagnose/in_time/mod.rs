@@ -19,7 +19,9 @@ use super::problem::{
     CandidateEffect, CandidateNature, ColumnChoice, ColumnSource, DiagnosisProblem, EffectParameter, LocatedEffect,
     SignConstraint,
 };
-use super::thresholds::{CHANGE_LEAST_ADVANTAGE, CHANGE_LEAST_SHARE, INTERVAL_LEAST_ADVANTAGE, SIMPLER_CHANGE_SHARE};
+use super::thresholds::{
+    CHANGE_LEAST_ADVANTAGE, CHANGE_LEAST_SHARE, GENERAL_CHANGE_REST, INTERVAL_LEAST_ADVANTAGE, SIMPLER_CHANGE_SHARE,
+};
 use products::BlockProducts;
 use profile::{TimeProfile, slow_profiles};
 pub use residual::{ResidualCharacter, TimeResidual, top_speed};
@@ -65,6 +67,17 @@ pub(crate) struct FoundChange {
     pub(crate) intervals: Vec<ChangeInterval>,
     /// Weighted squares that it explains in all recordings.
     explained: f64,
+    /// Weighted squares that remain in all recordings.
+    remaining: f64,
+}
+
+impl FoundChange {
+    /// Whether a more general change of the same kind and place explains clearly more, or leaves clearly less: after a heavy
+    /// load the simpler change explains nearly all, and what it leaves is still far above the noise.
+    fn is_too_simple(&self, general: &Self) -> bool {
+        self.explained < SIMPLER_CHANGE_SHARE * general.explained
+            || general.remaining < GENERAL_CHANGE_REST * self.remaining
+    }
 }
 
 /// Changes that explain more of the residual of a set than slow changes of the same shape do. `set` are the columns of
@@ -81,13 +94,12 @@ pub(crate) fn find_changes(problem: &DiagnosisProblem, set: &[&ForceColumn]) -> 
         let Some(change) = find_change(problem, &products, k, shape) else {
             continue;
         };
-        // Of two shapes with the same kind and place the one with fewer columns comes first: it is kept if it explains
-        // nearly as much.
+        // Of two shapes with the same kind and place the one with fewer columns comes first.
         let same = found
             .iter_mut()
             .find(|other| other.candidate.effect == change.candidate.effect);
         match same {
-            Some(other) if other.explained < SIMPLER_CHANGE_SHARE * change.explained => *other = change,
+            Some(other) if other.is_too_simple(&change) => *other = change,
             Some(_) => {}
             None => found.push(change),
         }
@@ -141,13 +153,17 @@ fn find_change(
     let mut columns = Vec::new();
     let mut intervals = Vec::new();
     let mut explained = 0.0;
+    // The set is fitted again to all recordings, so that a change in one lowers the squares of the others too.
+    let all = 0..products.recordings.len();
+    let mut remaining: f64 = all.map(|r| products.residual_squares(k, r)).sum();
     let times = problem.layout.times();
     for (r, recording) in products.recordings.iter().enumerate() {
-        let Some((gain, profile)) = best_profile(products, k, r) else {
+        let Some(best) = best_profile(products, k, r) else {
             continue;
         };
-        explained += gain;
-        let samples = products.refine_times(k, r, &profile);
+        explained += best.gain;
+        remaining -= best.gain + best.of_level;
+        let samples = products.refine_times(k, r, &best.profile);
         let last = recording.samples.end - 1;
         intervals.push(ChangeInterval {
             recording: recording.name.clone(),
@@ -181,12 +197,23 @@ fn find_change(
         },
         intervals,
         explained,
+        remaining: remaining.max(0.0),
     })
 }
 
-/// The step or interval of a shape that explains most in a recording, with the squares that it explains; `None` if it
-/// explains too little, or hardly more than a slow change.
-fn best_profile(products: &BlockProducts<'_>, shape: usize, recording: usize) -> Option<(f64, TimeProfile)> {
+/// The step or interval of a shape that explains most in a recording.
+struct BestProfile {
+    /// Weighted squares that it explains in addition to a constant level of the recording.
+    gain: f64,
+    /// Weighted squares that the level explains.
+    of_level: f64,
+    /// When it acts.
+    profile: TimeProfile,
+}
+
+/// The step or interval of a shape that explains most in a recording; `None` if it explains too little, or hardly more than a
+/// slow change.
+fn best_profile(products: &BlockProducts<'_>, shape: usize, recording: usize) -> Option<BestProfile> {
     let blocks = products.recordings[recording].blocks.len();
     // The level of the recording is free, since the other recordings may have changes too.
     let level = vec![1.0; blocks];
@@ -204,12 +231,17 @@ fn best_profile(products: &BlockProducts<'_>, shape: usize, recording: usize) ->
     let is_enough = |gain: f64| gain > CHANGE_LEAST_SHARE * total && gain > CHANGE_LEAST_ADVANTAGE * slow;
     // An interval has a second time, so that it must explain clearly more than a step.
     let interval = best(&mut TimeProfile::intervals(blocks));
-    match interval {
+    let (gain, profile) = match interval {
         Some((of_interval, interval)) if of_interval > INTERVAL_LEAST_ADVANTAGE * gain && is_enough(of_interval) => {
-            Some((of_interval, interval))
+            (of_interval, interval)
         }
-        _ => is_enough(gain).then_some((gain, step)),
-    }
+        _ => (gain, step),
+    };
+    is_enough(gain).then_some(BestProfile {
+        gain,
+        of_level,
+        profile,
+    })
 }
 
 /// A column within some samples, zero elsewhere.

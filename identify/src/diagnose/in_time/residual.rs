@@ -27,6 +27,7 @@ const FEWEST_WINDOWS: usize = 12;
 
 /// What a residual that follows the time is like.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum ResidualCharacter {
     /// It stands out in some intervals.
