@@ -84,7 +84,7 @@ impl FrameCache {
         equations: &UnreducedEquations,
         gravity: &vector::SymbolicVector,
         key: (RecursionStyle, bool),
-    ) -> &RecursionFrames {
+    ) -> &mut RecursionFrames {
         // Few frames are written, so a list is searched.
         let at = self.0.iter().position(|(k, _)| *k == key);
         let at = at.unwrap_or_else(|| {
@@ -92,7 +92,7 @@ impl FrameCache {
             self.0.push((key, frames));
             self.0.len() - 1
         });
-        &self.0[at].1
+        &mut self.0[at].1
     }
 }
 
