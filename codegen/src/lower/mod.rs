@@ -63,9 +63,8 @@ pub(crate) static PASSES: [LoweringPass; 3] = [
 /// Largest number of rounds of all passes; the rounds end earlier if one makes the program no cheaper.
 const MOST_ROUNDS: usize = 4;
 
-/// Most nodes of a graph that is rewritten. Passes visit all nodes dozens of times: with a million nodes, as in the
-/// regressor of a chain with 100 joints, they take minutes in a debug build. Larger graphs become programs as they are.
-/// The largest bundled model has some thirty thousand. By judgement.
+/// Most nodes of a graph that is rewritten. Passes visit all nodes many times: for a chain with 100 joints they took more
+/// than half of `check`. Larger graphs become programs as they are. By judgement.
 const MOST_REWRITTEN_NODES: usize = 200_000;
 
 /// Lowers the expressions of a request to a program.
