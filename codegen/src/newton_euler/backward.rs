@@ -1,6 +1,6 @@
 //! The backward recursion: wrenches are carried down to the base, and their moment or force is added at each joint.
 
-use super::project::project_on_joints;
+use super::project::{JointAxisCache, project_on_joints};
 use super::rows::{ForceRows, add_wrench, moment_before_axis_offset};
 use super::{JointSide, RecursionStyle, SymbolicWrench, rotate_into_outer};
 use crate::expr::vector::SymbolicVector;
@@ -78,11 +78,13 @@ pub(crate) struct CarryDepths {
     pub(crate) forces: usize,
 }
 
-/// Generalised forces of wrenches that are carried separately, without being summed.
+/// Generalised forces of wrenches that are carried separately, without being summed. `cache` belongs to this tree and
+/// style.
 pub(crate) fn carry_wrench(
     graph: &mut Graph,
     tree: &KinematicTree,
     style: RecursionStyle,
+    cache: &mut JointAxisCache,
     n_coordinates: usize,
     depths: CarryDepths,
     wrenches: impl IntoIterator<Item = (usize, JointSide, SymbolicWrench)>,
@@ -110,7 +112,7 @@ pub(crate) fn carry_wrench(
             // Near the base a projection on the remaining axes is cheaper than further transformations.
             if side == JointSide::Moving && path.len() <= depth && !hangs_free {
                 rows.add_joint_force(link, wrench.moment[2], wrench.force[2]);
-                project_on_joints(graph, tree, style, i, &wrench, &mut rows);
+                project_on_joints(graph, tree, style, i, &wrench, cache, &mut rows);
                 break;
             }
             // Otherwise the wrench is carried to the parent of this joint, or of the first of parallel joints.

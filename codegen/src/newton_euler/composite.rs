@@ -9,7 +9,9 @@
 
 use modelmill_spec::{CoordinateIdx, FreeBody, TwistAxes};
 
-use super::{BodyInertia, CarryDepths, InertiaDiagonal, JointSide, RecursionStyle, SymbolicWrench, carry_wrench};
+use super::{
+    BodyInertia, CarryDepths, InertiaDiagonal, JointAxisCache, JointSide, RecursionStyle, SymbolicWrench, carry_wrench,
+};
 use crate::expr::vector::{self, AxisRotation, SymbolicVector};
 use crate::expr::{ExprId, Graph, Rational};
 use crate::tree::{KinematicTree, TreeLink, free};
@@ -209,6 +211,7 @@ pub(crate) fn mass_matrix(
         .collect();
     // Wrenches are carried from link to link down to the base.
     let depths = CarryDepths { moments: 0, forces: 0 };
+    let mut cache = JointAxisCache::default();
     // Terms of every entry, added at the end.
     let mut terms = vec![vec![Vec::new(); n_coordinates]; n_coordinates];
     for (m, coordinates) in motions.iter().enumerate() {
@@ -223,7 +226,8 @@ pub(crate) fn mass_matrix(
             moments.translation_wrench(graph)
         };
         let wrench = [(m / 2, JointSide::Moving, wrench)];
-        let column = carry_wrench(graph, &apart, style, 2 * n + 6 * bodies_free.len(), depths, wrench);
+        let n_rows = 2 * n + 6 * bodies_free.len();
+        let column = carry_wrench(graph, &apart, style, &mut cache, n_rows, depths, wrench);
         // Forces on the free body at the base.
         for ((_, body), on_body) in bodies_free.iter().zip(column[2 * n..].chunks(6)) {
             for (c, entry) in free_body_forces(graph, body, on_body) {

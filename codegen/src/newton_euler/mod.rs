@@ -25,6 +25,7 @@ pub(crate) use body::{BodyInertia, InertiaDiagonal, flatten_along_axes, wrenches
 pub(crate) use composite::mass_matrix;
 pub(crate) use joints::{JointLoad, joint_wrenches};
 pub(crate) use motion::{TreeMotion, forward_recursion};
+pub(crate) use project::JointAxisCache;
 
 /// An element in which a link's inertia is linear. The first moment occurs twice: in the balance of forces and in the
 /// balance of moments. The two are equal except for lumped masses with different places in the two balances.

@@ -2,19 +2,32 @@
 //! joint i and a point on it (virtual power). Axes through one point share the moment about it. Axes and points are
 //! shared by all wrenches that are projected in the same frame.
 
+use rustc_hash::FxHashMap;
+
 use super::rows::{ForceRows, moment_before_axis_offset};
 use super::{RecursionStyle, SymbolicWrench, rotate_into_inner};
 use crate::expr::vector::{self, SymbolicVector};
 use crate::expr::{ExprId, Graph};
 use crate::tree::KinematicTree;
 
-/// Adds the forces of a wrench on link `at` to all joints above it.
+/// Axes and lever arms that were written for one tree and one style. Without it, each of them would be written anew
+/// from link to link for every wrench: work that grows with the third power of a tree's depth.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct JointAxisCache {
+    /// Direction of the axis of a joint in the frame of a link: by joint and link.
+    directions: FxHashMap<(usize, usize), SymbolicVector>,
+    /// The vectors of [`lever_arm`] before the last offset and rotation: by joint, place on its axis, and link.
+    arms: FxHashMap<(usize, ExprId, usize), SymbolicVector>,
+}
+
+/// Adds the forces of a wrench on link `at` to all joints above it. `cache` belongs to this tree and style.
 pub(super) fn project_on_joints(
     graph: &mut Graph,
     tree: &KinematicTree,
     style: RecursionStyle,
     at: usize,
     wrench: &SymbolicWrench,
+    cache: &mut JointAxisCache,
     rows: &mut ForceRows,
 ) {
     let path = tree.path_to(Some(at));
@@ -37,14 +50,14 @@ pub(super) fn project_on_joints(
         rest = further;
         // A pure moment needs no point.
         let arm = if wrench.has_force() {
-            lever_arm(graph, tree, style, *last, points[*last].along, &path)
+            lever_arm(graph, tree, style, cache, *last, points[*last].along, &path)
         } else {
             vector::ZERO
         };
         // Axes in the frame of the link.
         let axes: Vec<SymbolicVector> = group
             .iter()
-            .map(|i| axis_direction(graph, tree, style, *i, at))
+            .map(|i| axis_direction(graph, tree, style, cache, *i, at))
             .collect();
         // Several axes share the moment about their common point. A single axis needs only one component of it.
         let shared = (group.len() > 1).then(|| {
@@ -132,6 +145,7 @@ fn axis_direction(
     graph: &mut Graph,
     tree: &KinematicTree,
     style: RecursionStyle,
+    cache: &mut JointAxisCache,
     joint: usize,
     at: usize,
 ) -> SymbolicVector {
@@ -147,10 +161,15 @@ fn axis_direction(
     let Some(parent) = tree.links[first].parent else {
         return z;
     };
+    if let Some(written) = cache.directions.get(&(joint, at)) {
+        return *written;
+    }
     // The direction in the parent's frame, rotated to this link.
-    let above = axis_direction(graph, tree, style, joint, parent);
+    let above = axis_direction(graph, tree, style, cache, joint, parent);
     let fixed = rotate_into_inner(graph, &tree.links[first].pre, &above);
-    graph.rotate_in(style.joint_rotation(&tree.links[at]), &fixed)
+    let direction = graph.rotate_in(style.joint_rotation(&tree.links[at]), &fixed);
+    cache.directions.insert((joint, at), direction);
+    direction
 }
 
 /// Vector from a point on the axis of `joint`, given by its position along it, to the point of the last link of `path`
@@ -159,20 +178,30 @@ fn lever_arm(
     graph: &mut Graph,
     tree: &KinematicTree,
     style: RecursionStyle,
+    cache: &mut JointAxisCache,
     joint: usize,
     along: ExprId,
     path: &[usize],
 ) -> SymbolicVector {
     let start = path.iter().position(|i| *i == joint).unwrap_or(0);
+    // The nearest link to the end of the path up to which the vector is known.
+    let known = (start + 1..path.len())
+        .rev()
+        .find_map(|k| Some((k, *cache.arms.get(&(joint, along, path[k]))?)));
     // On the fixed side of the first of parallel joints; the rotation is applied only where these end.
-    let mut v = [Graph::ZERO, Graph::ZERO, graph.neg(along)];
-    let mut above = joint;
-    for i in &path[start + 1..] {
-        let link = &tree.links[*i];
-        let (across, own) = style.split_position(link);
+    let (known, mut v) = known.unwrap_or((start, [Graph::ZERO, Graph::ZERO, graph.neg(along)]));
+    for k in known + 1..path.len() {
+        let (above, i) = (path[k - 1], path[k]);
+        // The offset along the axis of the link above; that of the last link is not included.
+        if k > start + 1 {
+            let (_, own) = style.split_position(&tree.links[above]);
+            v[2] = graph.add(v[2], own);
+        }
+        let link = &tree.links[i];
+        let (across, _) = style.split_position(link);
         let turn = style.joint_rotation(&tree.links[above]).clone();
         // At the end of parallel joints the vector is rotated and the position added in the parent's frame.
-        if style.first_rotated_link(tree, *i) == *i {
+        if style.first_rotated_link(tree, i) == i {
             v = graph.rotate_in(&turn, &v);
             v = graph.add_vectors(&[v, across]);
             v = rotate_into_inner(graph, &link.pre, &v);
@@ -181,11 +210,8 @@ fn lever_arm(
             let across = graph.rotate_out(&turn, &across);
             v = graph.add_vectors(&[v, across]);
         }
-        // The offset along the last link's own axis is not included.
-        if Some(i) != path.last() {
-            v[2] = graph.add(v[2], own);
-        }
-        above = *i;
+        cache.arms.insert((joint, along, i), v);
     }
-    graph.rotate_in(style.joint_rotation(&tree.links[above]), &v)
+    let last = path.last().copied().unwrap_or(joint);
+    graph.rotate_in(style.joint_rotation(&tree.links[last]), &v)
 }

@@ -6,8 +6,8 @@ use crate::expr::vector::{self, AxisRotation};
 use crate::expr::{ExprId, Graph};
 use crate::newton_euler::inertia::InertiaByProduct;
 use crate::newton_euler::{
-    self, BodyInertia, CarryDepths, InertiaDiagonal, InertiaElement, InertiaFactors, JointSide, RecursionStyle,
-    SymbolicWrench, TreeMotion,
+    self, BodyInertia, CarryDepths, InertiaDiagonal, InertiaElement, InertiaFactors, JointAxisCache, JointSide,
+    RecursionStyle, SymbolicWrench, TreeMotion,
 };
 use crate::tree::KinematicTree;
 use crate::tree::expressions::ParameterMonomial;
@@ -152,6 +152,8 @@ pub(crate) struct RecursionFrames {
     turns: Vec<AxisRotation>,
     /// Motion of the links in these frames.
     pub(crate) motion: TreeMotion,
+    /// Axes of the joints in these frames, as far as columns needed them.
+    pub(crate) axes: JointAxisCache,
 }
 
 impl RecursionFrames {
@@ -171,7 +173,12 @@ impl RecursionFrames {
         };
         // Velocities and accelerations from the base to the ends.
         let motion = newton_euler::forward_recursion(graph, &tree, gravity, style);
-        Self { tree, turns, motion }
+        Self {
+            tree,
+            turns,
+            motion,
+            axes: JointAxisCache::default(),
+        }
     }
 
     /// An inertia of a link in the axes of its frame.

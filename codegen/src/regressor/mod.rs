@@ -101,9 +101,9 @@ pub(crate) fn unreduced_equations(graph: &mut Graph, mechanism: &Mechanism) -> R
     };
     // Columns in the plain form; cheaper forms are searched for the retained ones only.
     let form = ColumnForm::PLAIN;
-    let frames = RecursionFrames::new(graph, &equations.tree, &gravity, form.style, false);
+    let mut frames = RecursionFrames::new(graph, &equations.tree, &gravity, form.style, false);
     let products = equations.products.clone();
-    equations.columns = equations.columns_of(graph, mechanism, &frames, &products, form)?;
+    equations.columns = equations.columns_of(graph, mechanism, &mut frames, &products, form)?;
     Ok(equations)
 }
 
@@ -113,18 +113,25 @@ impl UnreducedEquations {
         &self,
         graph: &mut Graph,
         mechanism: &Mechanism,
-        frames: &RecursionFrames,
+        frames: &mut RecursionFrames,
         products: &[ParameterMonomial],
         form: ColumnForm,
     ) -> Result<Vec<Vec<ExprId>>, DeriveError> {
         let n = mechanism.coordinates.len();
-        let (tree, style) = (&frames.tree, form.style);
         products
             .iter()
             .map(|product| {
                 // Wrenches of the links, carried to the joints.
                 let wrenches = form.wrenches(graph, &self.inertia, frames, product, products);
-                let on_tree = newton_euler::carry_wrench(graph, tree, style, n, form.depths, wrenches);
+                let on_tree = newton_euler::carry_wrench(
+                    graph,
+                    &frames.tree,
+                    form.style,
+                    &mut frames.axes,
+                    n,
+                    form.depths,
+                    wrenches,
+                );
                 let value = |m: &ParameterMonomial| {
                     if m == product { Graph::ONE } else { Graph::ZERO }
                 };

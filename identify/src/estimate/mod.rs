@@ -42,7 +42,8 @@ pub use essential::{DroppedParameter, EssentialOptions, EssentialParameters, sel
 pub use instruments::{InstrumentalEstimate, estimate_with_instruments};
 pub use least_squares::LeastSquares;
 pub use numeric_rank::{
-    NumericDependency, NumericReduction, RegressorRank, condition_number, numeric_rank, reduce_numerically,
+    NumericDependency, NumericReduction, RegressorRank, condition_number, measure_rank_and_condition, numeric_rank,
+    reduce_numerically,
 };
 pub use physical::{NOMINAL_WEIGHT, PhysicalParameters, physical_parameters};
 pub use prior::{ParameterPrior, solve_with_prior};

@@ -52,8 +52,41 @@ pub struct NumericDependency {
 /// rounding, `max(rows, columns) * epsilon * largest`, are treated as equal to it.
 /// Fails if an entry is not finite or there are no columns.
 pub fn numeric_rank(w: &DMatrix<f64>) -> Result<RegressorRank, LeastSquaresError> {
-    let (scaled, _) = scale(w)?;
-    let singular_values = singular_values(&scaled)?;
+    let norms = column_norms(w)?;
+    rank_of_factor(&r_factor(w), &norms, w.nrows())
+}
+
+/// Ratio of the largest to the smallest singular value of a matrix in its units; `None` if the smallest is at the level
+/// of rounding, so that columns are dependent.
+/// Fails if an entry is not finite or there are no columns.
+pub fn condition_number(w: &DMatrix<f64>) -> Result<Option<f64>, LeastSquaresError> {
+    let norms = column_norms(w)?;
+    condition_of_factor(&r_factor(w), &norms, w.nrows())
+}
+
+/// The numeric rank of a regressor as by [`numeric_rank`], and the condition number of some of its columns as by
+/// [`condition_number`], from one factorisation.
+/// Fails if an entry is not finite or there are no columns.
+pub fn measure_rank_and_condition(
+    w: &DMatrix<f64>,
+    columns: &[usize],
+) -> Result<(RegressorRank, Option<f64>), LeastSquaresError> {
+    let mut norms = column_norms(w)?;
+    let factor = r_factor(w);
+    let rank = rank_of_factor(&factor, &norms, w.nrows())?;
+    // Rounding noise is relative to the largest of the columns that count.
+    norms = columns.iter().map(|k| w.column(*k).norm()).collect();
+    zero_noise_columns(&mut norms);
+    if columns.is_empty() {
+        return Err(LeastSquaresError::NoParameters);
+    }
+    let condition = condition_of_factor(&factor.select_columns(columns), &norms, w.nrows())?;
+    Ok((rank, condition))
+}
+
+/// The rank of a matrix of `n_rows` rows from its R factor and the norms of its columns.
+fn rank_of_factor(factor: &DMatrix<f64>, norms: &[f64], n_rows: usize) -> Result<RegressorRank, LeastSquaresError> {
+    let singular_values = singular_values(&scale(factor, norms))?;
     let largest = singular_values[0];
     if largest == 0.0 {
         return Ok(RegressorRank {
@@ -64,7 +97,7 @@ pub fn numeric_rank(w: &DMatrix<f64>) -> Result<RegressorRank, LeastSquaresError
             condition_number: f64::INFINITY,
         });
     }
-    let floor = largest * f64::EPSILON * w.nrows().max(w.ncols()) as f64;
+    let floor = largest * f64::EPSILON * n_rows.max(factor.ncols()) as f64;
     let level = |i: usize| singular_values.get(i).map_or(floor, |s| s.max(floor));
     let mut best = (1, 0.0);
     for rank in 1..=singular_values.len() {
@@ -74,7 +107,7 @@ pub fn numeric_rank(w: &DMatrix<f64>) -> Result<RegressorRank, LeastSquaresError
         }
     }
     let (rank, gap) = best;
-    let plain = self::singular_values(w)?;
+    let plain = self::singular_values(factor)?;
     Ok(RegressorRank {
         scaled_condition_number: largest / singular_values[rank - 1],
         condition_number: plain[0] / plain[rank - 1],
@@ -84,18 +117,15 @@ pub fn numeric_rank(w: &DMatrix<f64>) -> Result<RegressorRank, LeastSquaresError
     })
 }
 
-/// Ratio of the largest to the smallest singular value of a matrix in its units; `None` if the smallest is at the level
-/// of rounding, so that columns are dependent.
-/// Fails if an entry is not finite or there are no columns.
-pub fn condition_number(w: &DMatrix<f64>) -> Result<Option<f64>, LeastSquaresError> {
+/// The condition number of a matrix of `n_rows` rows from its R factor and the norms of its columns.
+fn condition_of_factor(factor: &DMatrix<f64>, norms: &[f64], n_rows: usize) -> Result<Option<f64>, LeastSquaresError> {
     // Different units are no dependence, so this is tested on scaled columns.
-    let (scaled, _) = scale(w)?;
-    let scaled = singular_values(&scaled)?;
-    let floor = scaled[0] * f64::EPSILON * w.nrows().max(w.ncols()) as f64;
+    let scaled = singular_values(&scale(factor, norms))?;
+    let floor = scaled[0] * f64::EPSILON * n_rows.max(factor.ncols()) as f64;
     if scaled[scaled.len() - 1] <= floor {
         return Ok(None);
     }
-    let plain = singular_values(w)?;
+    let plain = singular_values(factor)?;
     Ok(Some(plain[0] / plain[plain.len() - 1]).filter(|c| c.is_finite()))
 }
 
@@ -103,7 +133,8 @@ pub fn condition_number(w: &DMatrix<f64>) -> Result<Option<f64>, LeastSquaresErr
 /// fallback without an exact reduction.
 /// Fails if an entry is not finite or there are no columns; `rank` is limited to the possible rank.
 pub fn reduce_numerically(w: &DMatrix<f64>, rank: usize) -> Result<NumericReduction, LeastSquaresError> {
-    let (scaled, norms) = scale(w)?;
+    let norms = column_norms(w)?;
+    let scaled = scale(w, &norms);
     let n = w.ncols();
     let rank = rank
         .min(n)
@@ -153,8 +184,8 @@ pub(crate) fn zero_noise_columns(norms: &mut [f64]) {
     }
 }
 
-/// The matrix with columns of norm 1 (zero columns and rounding noise become zero), and the norms.
-fn scale(w: &DMatrix<f64>) -> Result<(DMatrix<f64>, Vec<f64>), LeastSquaresError> {
+/// The norms of all columns; rounding noise counts as zero.
+fn column_norms(w: &DMatrix<f64>) -> Result<Vec<f64>, LeastSquaresError> {
     if w.ncols() == 0 {
         return Err(LeastSquaresError::NoParameters);
     }
@@ -169,30 +200,41 @@ fn scale(w: &DMatrix<f64>) -> Result<(DMatrix<f64>, Vec<f64>), LeastSquaresError
     }
     let mut norms: Vec<f64> = w.column_iter().map(|column| column.norm()).collect();
     zero_noise_columns(&mut norms);
+    Ok(norms)
+}
+
+/// The matrix, or its R factor, with columns of norm 1; columns of norm zero become zero.
+fn scale(w: &DMatrix<f64>, norms: &[f64]) -> DMatrix<f64> {
     let mut scaled = w.clone();
-    for (mut column, norm) in scaled.column_iter_mut().zip(&norms) {
+    for (mut column, norm) in scaled.column_iter_mut().zip(norms) {
         if *norm > 0.0 {
             column.unscale_mut(*norm);
         } else {
             column.fill(0.0);
         }
     }
-    Ok((scaled, norms))
+    scaled
 }
 
-/// As many singular values as there are columns, largest first.
-fn singular_values(w: &DMatrix<f64>) -> Result<Vec<f64>, LeastSquaresError> {
-    // A tall matrix is reduced to its R factor first: same singular values, far less work.
-    let small = if w.nrows() > w.ncols() {
+/// The R factor of a tall matrix, or the matrix itself: same singular values, far less work. The factor of scaled columns
+/// is the factor with scaled columns, since the errors of Householder's method are relative to each column.
+fn r_factor(w: &DMatrix<f64>) -> DMatrix<f64> {
+    if w.nrows() > w.ncols() {
         w.clone().qr().r()
     } else {
         w.clone()
-    };
-    let svd = small
+    }
+}
+
+/// As many singular values as there are columns, largest first.
+fn singular_values(factor: &DMatrix<f64>) -> Result<Vec<f64>, LeastSquaresError> {
+    let n = factor.ncols();
+    // Some columns of an R factor are tall again.
+    let svd = r_factor(factor)
         .try_svd(false, false, f64::EPSILON, 10_000)
         .ok_or(LeastSquaresError::NoConvergence)?;
     let mut values: Vec<f64> = svd.singular_values.iter().copied().collect();
-    values.resize(w.ncols(), 0.0);
+    values.resize(n, 0.0);
     values.sort_by(|a, b| b.total_cmp(a));
     Ok(values)
 }
@@ -242,6 +284,21 @@ mod tests {
         near[(0, 1)] += 1e-6;
         let condition = condition_number(&near).unwrap().unwrap();
         assert!(condition > 1e6 && condition < 1e9, "{condition:e}");
+    }
+
+    #[test]
+    fn one_factorisation_gives_rank_and_condition() {
+        let w = sample();
+        for columns in [&[0, 1, 2][..], &[1, 5], &[0, 1, 2, 3], &[4]] {
+            let (rank, condition) = measure_rank_and_condition(&w, columns).unwrap();
+            assert_eq!(rank, numeric_rank(&w).unwrap());
+            let alone = condition_number(&w.select_columns(columns)).unwrap();
+            match (condition, alone) {
+                (Some(a), Some(b)) => assert!((a / b - 1.0).abs() < 1e-9, "{columns:?}: {a} and {b}"),
+                (a, b) => assert_eq!(a, b, "{columns:?}"),
+            }
+        }
+        assert!(measure_rank_and_condition(&w, &[]).is_err());
     }
 
     #[test]

@@ -12,7 +12,7 @@ use std::cmp::Ordering;
 
 use modelmill_codegen::review::NumericRank;
 use modelmill_codegen::{ModelEvaluator, MotionStates, PoseFault, PoseReason, ReductionMethod};
-use modelmill_identify::estimate::{condition_number, numeric_rank};
+use modelmill_identify::estimate::measure_rank_and_condition;
 use modelmill_runtime::RandomBits;
 use modelmill_spec::CoordinateMotion;
 use nalgebra::DMatrix;
@@ -182,14 +182,15 @@ fn sampled_rank(model: &Model) -> Result<SampledRank, String> {
     let near_fold = sampling.extend_travel(model, &evaluator);
     // States that Newton's method cannot follow in a row are evaluated one by one.
     sampling.draw(&evaluator, wanted)?;
-    let (full, retained) = match both_regressors(&evaluator, &sampling.states()) {
-        Ok(both) => both,
+    let full = match evaluator.full_regressor(&sampling.states()) {
+        Ok(full) => full,
         Err(fault) if is_pose_dependent(&fault) => regressors_state_by_state(&evaluator, &mut sampling, wanted)?,
         Err(fault) => return Err(fault.to_string()),
     };
-    let found = numeric_rank(&full).map_err(|error| error.to_string())?;
-    // The condition number is that of the printed base, even if its columns are dependent at these values.
-    let condition = condition_number(&retained).map_err(|error| error.to_string())?;
+    // The condition number is that of the printed base, even if its columns are dependent at these values. Columns of
+    // H_min are columns of H.
+    let retained = &model.derivation.reduction.retained;
+    let (found, condition) = measure_rank_and_condition(&full, retained).map_err(|error| error.to_string())?;
     Ok(SampledRank {
         numeric_rank: NumericRank {
             rank: found.rank,
@@ -202,14 +203,6 @@ fn sampled_rank(model: &Model) -> Result<SampledRank, String> {
     })
 }
 
-/// H for all products and H_min at given states, rows interleaved by drive.
-fn both_regressors(
-    evaluator: &ModelEvaluator<'_>,
-    states: &MotionStates<'_>,
-) -> Result<(DMatrix<f64>, DMatrix<f64>), PoseFault> {
-    Ok((evaluator.full_regressor(states)?, evaluator.regressor(states)?))
-}
-
 /// Whether the fault depends on the pose, so that another state may have a solution.
 fn is_pose_dependent(fault: &PoseFault) -> bool {
     matches!(
@@ -218,7 +211,7 @@ fn is_pose_dependent(fault: &PoseFault) -> bool {
     )
 }
 
-/// The regressors at states that are evaluated one by one. In a row, Newton's method would start from the state before,
+/// H at states that are evaluated one by one. In a row, Newton's method would start from the state before,
 /// but random states are not neighbours. A state where the mechanism is singular is replaced by another one.
 ///
 /// Fails when as many states as wanted were left out.
@@ -226,14 +219,11 @@ fn regressors_state_by_state(
     evaluator: &ModelEvaluator<'_>,
     sampling: &mut StateSampling,
     wanted: usize,
-) -> Result<(DMatrix<f64>, DMatrix<f64>), String> {
-    let (mut full, mut retained) = (Vec::new(), Vec::new());
+) -> Result<DMatrix<f64>, String> {
+    let mut full = Vec::new();
     while full.len() < wanted {
-        match both_regressors(evaluator, &sampling.single_state(full.len())) {
-            Ok((all, few)) => {
-                full.push(all);
-                retained.push(few);
-            }
+        match evaluator.full_regressor(&sampling.single_state(full.len())) {
+            Ok(one) => full.push(one),
             Err(fault) if is_pose_dependent(&fault) && sampling.left_out < wanted => {
                 sampling.exclude_state(full.len());
                 sampling.draw(evaluator, wanted)?;
@@ -248,7 +238,7 @@ fn regressors_state_by_state(
             }
         }
     }
-    Ok((stack_rows(&full), stack_rows(&retained)))
+    Ok(stack_rows(&full))
 }
 
 /// Matrices of equal width, one below the other.
