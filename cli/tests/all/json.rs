@@ -314,9 +314,10 @@ fn assert_fits(schema: &jsonschema::Validator, answer: &Value) {
 fn answers_fit_their_schemas() {
     let diagnose = answer_schema("diagnose");
     let (fit, check) = (run("with-rods-fit.csv"), run("with-rods-check.csv"));
+    let [paper, complete] = ["spidermill-paper.toml", "spidermill.toml"].map(model);
     // Effects, candidates, alternatives and all parameters fixed.
     for more in [&[][..], &["--held"], &["--check", &check]] {
-        let args = [&["diagnose", &model("spidermill-paper.toml"), "--data", &fit, "--json"], more].concat();
+        let args = [&["diagnose", paper.as_str(), "--data", &fit, "--json"], more].concat();
         let answer = json(&args);
         assert_fits(&diagnose, &answer);
         let mut renamed = answer.clone();
@@ -329,7 +330,7 @@ fn answers_fit_their_schemas() {
     }
     let runs = answer_schema("runs");
     for more in [&[][..], &["--per-run", "offset"]] {
-        let args = [&["runs", &model("spidermill.toml"), "--data", &fit, &check, "--json"], more].concat();
+        let args = [&["runs", complete.as_str(), "--data", &fit, &check, "--json"], more].concat();
         let answer = json(&args);
         assert_fits(&runs, &answer);
         assert_eq!(answer["per_run"].is_null(), more.is_empty());
