@@ -156,11 +156,13 @@ impl<'a> BagCollector<'a> {
             (other, _) => Err(format!("its messages are encoded as `{other}`, which is not supported")),
         };
         // A topic that cannot be read is kept with the reason and reported only if it is listed.
-        let ros = ros.and_then(|ros| match self.topics.len() < MOST_TOPICS {
-            true => Ok(ros),
-            false => Err(format!(
-                "the log has more than {MOST_TOPICS} topics, of which the first ones are read"
-            )),
+        let ros = ros.and_then(|ros| {
+            if self.topics.len() >= MOST_TOPICS {
+                return Err(format!(
+                    "the log has more than {MOST_TOPICS} topics, of which the first ones are read"
+                ));
+            }
+            Ok(ros)
         });
         let reader = ros.and_then(|ros| {
             let definition = definition::parse_definition(kind, encoding.text, ros)?;
