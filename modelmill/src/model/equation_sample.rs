@@ -40,7 +40,7 @@ impl Model {
                 loads: (0..self.drives().len()).map(|k| 1.0 + spread(k)).collect(),
                 forces: Vec::new(),
             };
-            let found = self.forces_at(&evaluator, &sample)?;
+            let found = forces_at(&evaluator, &sample)?;
             sample.forces = found.into_iter().map(|(force, _)| force).collect();
             Some(sample)
         })
@@ -61,7 +61,7 @@ impl Model {
         if motion.iter().any(|values| values.len() != n) || forces.iter().any(|values| values.len() != drives.len()) {
             return fail(FitFault::DrivesDiffer);
         }
-        let found = self.forces_at(&ModelEvaluator::new(&self.derivation), sample);
+        let found = forces_at(&ModelEvaluator::new(&self.derivation), sample);
         for (k, drive) in drives.into_iter().enumerate() {
             let theirs = sample.forces[k];
             let ours = found.as_ref().map(|found| found[k]);
@@ -75,28 +75,28 @@ impl Model {
         }
         Ok(())
     }
+}
 
-    /// Forces of the drives at the state of a sample, each with the sum of the magnitudes of its summands; `None` if
-    /// the mechanism has no solution there.
-    fn forces_at(&self, evaluator: &ModelEvaluator<'_>, sample: &EquationSample) -> Option<Vec<(f64, f64)>> {
-        fn columns(values: &[f64]) -> Vec<&[f64]> {
-            values.iter().map(std::slice::from_ref).collect()
-        }
-        let regressor = evaluator
-            .regressor(&MotionStates {
-                q: columns(&sample.positions),
-                qd: columns(&sample.rates),
-                qdd: columns(&sample.accelerations),
-                load: columns(&sample.loads),
-            })
-            .ok()?;
-        let sums = regressor.row_iter().map(|row| {
-            let summands = row.iter().enumerate().map(|(k, h)| h * (0.5 + spread(k)));
-            summands.fold((0.0, 0.0), |(sum, size), x| (sum + x, size + x.abs()))
-        });
-        let sums: Vec<(f64, f64)> = sums.collect();
-        sums.iter().all(|(force, _)| force.is_finite()).then_some(sums)
+/// Forces of the drives at the state of a sample, each with the sum of the magnitudes of its summands; `None` if
+/// the mechanism has no solution there.
+fn forces_at(evaluator: &ModelEvaluator<'_>, sample: &EquationSample) -> Option<Vec<(f64, f64)>> {
+    fn columns(values: &[f64]) -> Vec<&[f64]> {
+        values.iter().map(std::slice::from_ref).collect()
     }
+    let regressor = evaluator
+        .regressor(&MotionStates {
+            q: columns(&sample.positions),
+            qd: columns(&sample.rates),
+            qdd: columns(&sample.accelerations),
+            load: columns(&sample.loads),
+        })
+        .ok()?;
+    let sums = regressor.row_iter().map(|row| {
+        let summands = row.iter().enumerate().map(|(k, h)| h * (0.5 + spread(k)));
+        summands.fold((0.0, 0.0), |(sum, size), x| (sum + x, size + x.abs()))
+    });
+    let sums: Vec<(f64, f64)> = sums.collect();
+    sums.iter().all(|(force, _)| force.is_finite()).then_some(sums)
 }
 
 /// Numbers between 0 and 1 that are far from each other and from simple ratios: multiples of the golden ratio, without
