@@ -12,8 +12,9 @@ pub(super) const DEEPEST_ELEMENT: usize = 200;
 pub(super) const MOST_ATTRIBUTES: usize = 500;
 
 /// Most tags, comments and attributes of a text together. The parser keeps some 100 bytes of each, which is ten to twenty
-/// times their size for the smallest ones, so that this many take some 30 MB. Published robots have less than 50 000.
-pub(super) const MOST_XML_NODES: usize = 300_000;
+/// times their size for the smallest ones, so that this many take some 50 MB. Published robots have less than 50 000; 15 000
+/// links with inertias have 420 000.
+pub(super) const MOST_XML_NODES: usize = 500_000;
 
 /// Most links or bodies, each of which takes some kilobytes. Published robots have less than 1000.
 pub(super) const MOST_LINKS: usize = 20_000;
