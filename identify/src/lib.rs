@@ -55,10 +55,10 @@ pub use estimate::{
     LeastSquares, LeastSquaresError, NullDirection, ParameterUncertainty, RANK_TOLERANCE, RFactor, RegressionSolution,
 };
 pub use figures::{
-    BandError, ChannelFigures, DriveResidual, ErrorAccumulator, ErrorFigures, ErrorRegion, EstimatorOutput,
-    FiguresError, FilteredChannelFigures, FilteredFigures, FitFault, FitFile, FitFileError, FitParameter,
-    LocateOptions, ParameterInfo, ParameterStatus, RateDependence, RateTerm, ResidualLevels, TIME_COLUMN, TRIMMED_PART,
-    add_filtered_forces, compare_forces, find_rate_dependence, fit_parameters, locate_errors,
+    BandError, ChannelFigures, DriveResidual, EquationSample, ErrorAccumulator, ErrorFigures, ErrorRegion,
+    EstimatorOutput, FiguresError, FilteredChannelFigures, FilteredFigures, FitFault, FitFile, FitFileError,
+    FitParameter, LocateOptions, ParameterInfo, ParameterStatus, RateDependence, RateTerm, ResidualLevels, TIME_COLUMN,
+    TRIMMED_PART, add_filtered_forces, compare_forces, find_rate_dependence, fit_parameters, locate_errors,
 };
 pub use motion::{
     DECIMATION_PASSBAND, DerivativeSource, PreparationChoices, PreparationRecord, PreparedRun, RunRepeatability,

@@ -5,6 +5,7 @@
 //!
 //! Recursive descent: a sum contains products, a product contains powers, a power contains atoms.
 
+use modelmill_boundary::nesting::NestingLevel;
 use num_bigint::BigInt;
 use num_rational::BigRational;
 use num_traits::{One, Pow, Zero};
@@ -44,7 +45,7 @@ pub(crate) fn parse(
     let mut parser = FormulaParser {
         text,
         at: 0,
-        depth: 0,
+        level: NestingLevel::top(DEEPEST),
         outer,
         inner,
     };
@@ -64,8 +65,8 @@ struct FormulaParser<'a> {
     text: &'a str,
     /// Position of the next character, in bytes.
     at: usize,
-    /// Levels of sums that are open now.
-    depth: usize,
+    /// The level of the sum that is open now.
+    level: NestingLevel,
     /// The place of the complete expression in the file.
     outer: SourceSpan,
     /// Byte in the file at which the text starts, if it stands there without escapes.
@@ -123,7 +124,7 @@ impl FormulaParser<'_> {
                 term
             });
         }
-        self.depth -= 1;
+        self.level = self.level.leave();
         // A single term is returned without a sum around it.
         let ast = match <[FormulaAst; 1]>::try_from(terms) {
             Ok([only]) => only,
@@ -445,17 +446,14 @@ impl FormulaParser<'_> {
 
     /// Counts a level of nesting and fails if there are too many.
     fn enter_level(&mut self) -> ParseResult<()> {
-        self.depth += 1;
-        if self.depth > DEEPEST {
-            return Err(Box::new(
-                Diagnostic::error(
-                    self.span(self.at.saturating_sub(1), self.at),
-                    "this expression is nested too deeply",
-                )
-                .label(format!("at most {DEEPEST} levels of parentheses"))
-                .help("name parts of it as constants"),
-            ));
-        }
+        self.level = self.level.enter().map_err(|_| {
+            Diagnostic::error(
+                self.span(self.at.saturating_sub(1), self.at),
+                "this expression is nested too deeply",
+            )
+            .label(format!("at most {DEEPEST} levels of parentheses"))
+            .help("name parts of it as constants")
+        })?;
         Ok(())
     }
 

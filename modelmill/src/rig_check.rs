@@ -55,6 +55,10 @@ impl Host {
         let Ok(text) = self.files().read_text(path, modelmill_spec::LARGEST_FILE as u64) else {
             return false;
         };
+        // A text beyond the limits of model files is refused by their reader.
+        if modelmill_spec::find_toml_excess(&text).is_some() {
+            return false;
+        }
         // Recordings and pictures are no TOML.
         let Ok(table) = text.parse::<Table>() else {
             return false;

@@ -3,7 +3,7 @@
 
 use std::time::{Duration, Instant};
 
-use modelmill_fuzz_targets::corpus::read_corpus;
+use modelmill_fuzz_targets::corpus::{read_corpus, repository};
 use modelmill_fuzz_targets::mutation::{MutationNoise, mutate};
 use modelmill_fuzz_targets::targets::TARGETS;
 
@@ -28,5 +28,20 @@ fn every_reader_ends_within_its_budget() {
             println!("{}: mutation {n} with the seed 1", target.name);
             (target.run)(&mutate(&files, &mut noise));
         }
+    }
+}
+
+#[test]
+fn every_target_has_a_wrapper_for_coverage_guided_fuzzing() {
+    let folder = repository().join("fuzz");
+    let manifest = std::fs::read_to_string(folder.join("Cargo.toml")).expect("the workspace of `cargo fuzz`");
+    let listed: Vec<&str> = manifest
+        .lines()
+        .filter_map(|line| line.strip_prefix("path = \"fuzz_targets/")?.strip_suffix(".rs\""))
+        .collect();
+    assert_eq!(listed, TARGETS.map(|target| target.name));
+    for name in listed {
+        let wrapper = std::fs::read_to_string(folder.join(format!("fuzz_targets/{name}.rs"))).expect("a wrapper");
+        assert!(wrapper.contains(&format!("targets::{name}(data)")), "{name}");
     }
 }

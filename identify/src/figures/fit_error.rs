@@ -73,6 +73,17 @@ pub enum FitFault {
         /// The expression of the model.
         model: String,
     },
+    /// The model has the same base parameters, but other equations.
+    EquationsDiffer {
+        /// Name of a drive whose forces differ.
+        drive: String,
+        /// The force at the state in the file, N or N m.
+        file: f64,
+        /// The force of the model at the same state; `None` if it does not exist there.
+        model: Option<f64>,
+    },
+    /// The model has other numbers of coordinates or drives.
+    DrivesDiffer,
 }
 
 impl FitFileError {
@@ -126,6 +137,21 @@ impl FitFileError {
             } => message!(
                 "{file}: `{name}` is `{theirs}` in the fit but `{model}` in the model; \
                  the fit belongs to another model or to an earlier state of it: identify again"
+            ),
+            FitFault::EquationsDiffer {
+                drive,
+                file: theirs,
+                model,
+            } => {
+                let ours = model.map_or_else(|| "no solution".to_owned(), |force| format!("the force {force}"));
+                message!(
+                    "{file}: the model has other equations than when the fit was made: at the fit's `equation_sample`, drive \
+                     `{drive}` had the force {theirs} and has {ours} now; the values would be wrong: identify again"
+                )
+            }
+            FitFault::DrivesDiffer => message!(
+                "{file}: the model has other coordinates or drives than when the fit was made; the values would be wrong: \
+                 identify again"
             ),
         }
     }

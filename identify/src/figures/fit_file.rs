@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::estimate::{ParameterUncertainty, RegressionSolution};
 use crate::figures::ErrorFigures;
+use crate::figures::equation_sample::EquationSample;
 use crate::figures::fit_error::{FitFault, FitFileError};
 use crate::recording::RecordingNote;
 use crate::words::nearest_name;
@@ -103,6 +104,9 @@ pub struct FitFile {
     /// Values of the model's constants, on which the regressor and the expressions depend.
     #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
     pub constants: IndexMap<String, f64>,
+    /// The model's equations at one state, by which another model is recognised; absent in fits of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub equation_sample: Option<EquationSample>,
     /// Directions that the recording does not determine, one sentence each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub undetermined: Vec<String>,

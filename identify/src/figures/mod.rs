@@ -8,6 +8,7 @@
 //! Figures are of every recorded sample, however the fit was computed. In addition there are figures after one low-pass
 //! on both forces ([`FilteredFigures`]), which exclude the noise of the force above the motion.
 
+mod equation_sample;
 mod filtered;
 mod fit_error;
 mod fit_file;
@@ -20,6 +21,7 @@ use std::fmt;
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
+pub use equation_sample::EquationSample;
 pub use filtered::{BandError, FilteredChannelFigures, FilteredFigures, add_filtered_forces};
 pub use fit_error::{FitFault, FitFileError};
 pub use fit_file::{EstimatorOutput, FitFile, FitParameter, ParameterInfo, ParameterStatus, fit_parameters};

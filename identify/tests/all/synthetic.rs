@@ -168,6 +168,7 @@ fn positions_alone_give_the_parameters_within_a_fifth_of_a_percent() {
         parameters: fit_parameters(&infos, &solution, &deviations),
         covariance: None,
         constants: [("L1".to_owned(), 0.7)].into(),
+        equation_sample: None,
         undetermined: Vec::new(),
         fit: comparison.finish().expect("figures"),
         check: None,

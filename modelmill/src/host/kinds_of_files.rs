@@ -6,6 +6,9 @@ use modelmill_boundary::files::{FileSource, PathKind};
 
 use crate::host::Host;
 
+/// A model file, as a phrase.
+pub(super) const MODEL_FILE: &str = "a model file";
+
 /// The kind of a file of the project, as a phrase with an article; `None` if it is no file of the project.
 pub(crate) fn file_kind(host: &Host, path: &Path) -> Option<&'static str> {
     // Other files are not opened: a pipe cannot be read twice.
@@ -21,7 +24,7 @@ pub(crate) fn file_kind(host: &Host, path: &Path) -> Option<&'static str> {
     // Model, rig and plan share the extension; the first one that loads decides.
     if path.extension().is_some_and(|e| e == "toml") {
         if modelmill_spec::load_file_with(path, host.libraries(), files).is_ok() {
-            Some("a model file")
+            Some(MODEL_FILE)
         } else {
             kind_of_model_source(path, files)
         }

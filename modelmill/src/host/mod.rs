@@ -171,7 +171,8 @@ impl Host {
         )?
         // A valid file of another kind gets a message that names the kind.
         .map_err(|failure| match kinds_of_files::file_kind(self, path) {
-            Some(kind) => Error::input(format!(
+            // The file itself may be readable a moment later, or without a file that it extends.
+            Some(kind) if kind != kinds_of_files::MODEL_FILE => Error::input(format!(
                 "{} is {kind}; a model file (TOML) is expected, such as those in model-spec/models{}",
                 path.display(),
                 if kind.contains("rig") {
@@ -180,7 +181,7 @@ impl Host {
                     ""
                 }
             )),
-            None => failure.into(),
+            _ => failure.into(),
         })
     }
 

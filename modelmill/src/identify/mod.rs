@@ -210,6 +210,7 @@ pub fn identify(
             covariance: covariance(&found, parameters.len()),
             parameters,
             constants: constants.iter().map(|c| (c.name.clone(), c.value)).collect(),
+            equation_sample: model.equation_sample(),
             undetermined: solution.describe_undetermined(&names),
             fit,
             check,

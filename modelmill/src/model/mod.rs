@@ -2,6 +2,7 @@
 
 mod changes;
 mod entries;
+mod equation_sample;
 mod equations;
 mod gravity_variants;
 mod magnitudes;

@@ -268,7 +268,7 @@ struct SampledCoordinate {
 }
 
 /// What counts as one for a coordinate: 1 rad or 0.5 m.
-fn motion_unit(motion: CoordinateMotion) -> f64 {
+pub(super) fn motion_unit(motion: CoordinateMotion) -> f64 {
     if motion.is_angle() { 1.0 } else { 0.5 }
 }
 

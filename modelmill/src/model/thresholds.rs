@@ -20,3 +20,12 @@ pub(super) const EQUAL_VALUES: f64 = 1e-12;
 /// 0. By judgement: rounding of some hundred frames in double precision stays below 1e-13, and no machine is measured
 /// to 1e-12 of its size.
 pub(super) const ROUNDING_OF_SIZE: f64 = 1e-12;
+
+/// Largest difference of two forces at one state, relative to the sum of the magnitudes of their summands, that counts as
+/// rounding. Programs that were factored differently differ by 1e-15 to 1e-11, and loops are closed to 1e-10. A length of
+/// 1 m that changes by 0.01 mm changes forces by some 1e-5.
+pub(super) const EQUAL_FORCES: f64 = 1e-7;
+
+/// Distances from the nominal pose, rad (half of it for lengths, m), at which a state for comparing equations is tried, in
+/// this order: far from it most terms differ, near it closed loops are still reachable. By judgement.
+pub(super) const SAMPLE_DISTANCES: [f64; 6] = [0.7, 0.3, 0.1, 0.03, 0.01, 0.0];

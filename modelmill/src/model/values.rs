@@ -41,7 +41,7 @@ impl Model {
 
     /// The values of a fit; `file` is its name in messages.
     ///
-    /// Fails when the fit lacks a base parameter of this model.
+    /// Fails when the fit lacks a base parameter of this model, or was made with other equations.
     pub fn values_of(&self, fit: &FitFile, file: &str) -> Outcome<BaseParameterValues> {
         let names: Vec<(&str, &str)> = self
             .base
@@ -54,6 +54,10 @@ impl Model {
         let constants: Vec<(&str, f64)> = constants.map(|c| (c.name.as_str(), c.value)).collect();
         // Other constants of geometry change the meaning of base parameters, but not their number.
         let others = fit.differing_constants(&constants, file)?;
+        // With other constants the forces differ too, which the notes state.
+        if others.is_empty() {
+            self.check_equations(fit, file)?;
+        }
         let notes = others.into_iter().map(|(name, then, now)| {
             RecordingNote::warning(format!(
                 "{file} was made with {name} = {then}, but {} has {name} = {now}; identify again unless this is intended",

@@ -39,6 +39,9 @@ fn columns_of_text(text: &str) -> Result<Vec<(String, String)>, String> {
     /// What the file must contain.
     const EXPECTED: &str =
         "a mapping file has lines such as q1 = \"pos1 [deg]\", in the table [recording.columns] or alone";
+    if let Some(excess) = modelmill_spec::find_toml_excess(text) {
+        return Err(format!("{}: {}", excess.fault, excess.limit));
+    }
     let table: Table = text.parse().map_err(|fault| format!("it is no valid TOML: {fault}"))?;
     let only = |table: &Table, key: &str| match table.keys().find(|other| *other != key) {
         Some(other) => Err(format!("`{other}` is not read; {EXPECTED}")),

@@ -3,6 +3,8 @@
 //! Only the part of YAML that these files use is read: keys at the start of lines, followed by lists in brackets or
 //! with dashes. Unknown keys are reported.
 
+use super::thresholds::LARGEST_CLOSURES;
+
 /// Contents of the file.
 #[derive(Debug, Default)]
 pub(crate) struct ClosureFile {
@@ -44,6 +46,9 @@ const KNOWN_KEYS: [&str; 5] = ["closed_loop", "type", "name_mot", "joint_name", 
 
 /// Reads the file; fails with the line and what was expected.
 pub(crate) fn read(text: &str) -> Result<ClosureFile, String> {
+    if text.len() > LARGEST_CLOSURES {
+        return Err(format!("the file of closures is larger than {LARGEST_CLOSURES} bytes"));
+    }
     // Lines that start with a blank, a dash or a bracket continue the value of the key before.
     let mut entries: Vec<(u32, &str, String)> = Vec::new();
     for (line, text) in (1..).zip(text.lines()) {

@@ -4,6 +4,7 @@
 //! Source: MuJoCo's XML reference, "include": the children of the other file's root, each file once, with names
 //! relative to the folder of the main file.
 
+use modelmill_boundary::nesting::NestingLevel;
 use roxmltree::Document;
 
 use super::xml::{located_message, required_attribute};
@@ -17,15 +18,15 @@ const DEEPEST: usize = 20;
 ///
 /// Text that is not XML or not MJCF is returned unchanged; the import reports its fault.
 pub fn expand_includes(text: &str, read: &dyn Fn(&str) -> Result<String, String>) -> Result<String, String> {
-    expand_file(text, read, &mut Vec::new(), 0)
+    expand_file(text, read, &mut Vec::new(), NestingLevel::top(DEEPEST))
 }
 
-/// Expands one file. `seen` are the names of the files included so far, `depth` is the level of nesting.
+/// Expands one file. `seen` are the names of the files included so far, `level` is that of nesting.
 fn expand_file(
     text: &str,
     read: &dyn Fn(&str) -> Result<String, String>,
     seen: &mut Vec<String>,
-    depth: usize,
+    level: NestingLevel,
 ) -> Result<String, String> {
     // Faults of the main file are reported by the import, also of one that is too deep to be parsed.
     if check_xml_budget(text).is_err() {
@@ -35,7 +36,7 @@ fn expand_file(
         return Ok(text.to_owned());
     };
     let root = document.root_element();
-    if depth == 0 && root.tag_name().name() != "mujoco" {
+    if level == NestingLevel::top(DEEPEST) && root.tag_name().name() != "mujoco" {
         return Ok(text.to_owned());
     }
     // The text between includes stays as it is.
@@ -46,16 +47,19 @@ fn expand_file(
             continue;
         }
         let name = required_attribute(&node, "file")?;
-        if depth == DEEPEST || seen.contains(&name) {
+        if seen.contains(&name) {
             return Err(located_message(
                 &node,
                 &format!("`{name}` is included twice; MuJoCo permits each file once"),
             ));
         }
+        let inside = level
+            .enter()
+            .map_err(|fault| located_message(&node, &format!("`{name}` cannot be included; {fault}")))?;
         // Read the other file and expand its own includes.
         seen.push(name.clone());
         let other = read(&name).map_err(|fault| located_message(&node, &fault))?;
-        let whole = expand_file(&other, read, seen, depth + 1)
+        let whole = expand_file(&other, read, seen, inside)
             .map_err(|fault| located_message(&node, &format!("in `{name}`: {fault}")))?;
         check_xml_budget(&whole).map_err(|fault| located_message(&node, &format!("in `{name}`: {fault}")))?;
         let inner = Document::parse(&whole)

@@ -5,6 +5,7 @@
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 
+use modelmill_boundary::nesting::NestingLevel;
 use nalgebra::{Matrix3, Vector3};
 use roxmltree::{Document, Node};
 
@@ -48,6 +49,9 @@ pub(super) struct SdfFrames<'a, 'i> {
 }
 
 impl<'a, 'i> SdfFrames<'a, 'i> {
+    /// The level of a pose to which no other one refers.
+    pub(super) const TOP: NestingLevel = NestingLevel::top(LONGEST_CHAIN);
+
     /// The first frame of a name, with its index.
     fn find(&self, name: &str) -> Option<(usize, &SdfFrame<'a, 'i>)> {
         self.by_name.get(name).map(|k| (*k, &self.frames[*k]))
@@ -131,7 +135,12 @@ pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
     let links: Vec<Node> = children(&model, "link").collect();
     let mut places = Vec::new();
     for node in &links {
-        places.push(pose_in_model(&frames, &required_attribute(node, "name")?, node, 0)?);
+        places.push(pose_in_model(
+            &frames,
+            &required_attribute(node, "name")?,
+            node,
+            SdfFrames::TOP,
+        )?);
     }
     let mut joints = Vec::new();
     // Gearboxes couple other joints, which are read first.
@@ -179,12 +188,14 @@ fn read_constraints(
         let end = |tag: &str| -> Result<(Option<usize>, DescriptionPose), String> {
             let inner = required_child(&node, tag)?;
             let name = inner.text().unwrap_or("").trim();
-            let place = pose_in_model(frames, name, &inner, 0)?;
+            let place = pose_in_model(frames, name, &inner, SdfFrames::TOP)?;
             let Some(link) = attached_link(name, &inner, frames)? else {
                 return Ok((None, place));
             };
             let link = required_attribute(&links[link], "name")?;
-            let in_link = pose_in_model(frames, &link, &inner, 0)?.inverse().compose(&place);
+            let in_link = pose_in_model(frames, &link, &inner, SdfFrames::TOP)?
+                .inverse()
+                .compose(&place);
             Ok((index(&link), in_link))
         };
         out.closures.push(DescriptionClosure {
@@ -277,18 +288,15 @@ pub(super) fn pose_in_model(
     frames: &SdfFrames,
     name: &str,
     from: &Node,
-    depth: usize,
+    level: NestingLevel,
 ) -> Result<DescriptionPose, String> {
     // The recursion ends at the frame of the model.
     if name == "__model__" || name.is_empty() || name == "world" {
         return Ok(DescriptionPose::identity());
     }
-    if depth > LONGEST_CHAIN {
-        return Err(located_message(
-            from,
-            "its pose is relative to itself through other frames",
-        ));
-    }
+    let inner = level
+        .enter()
+        .map_err(|_| located_message(from, "its pose is relative to itself through other frames"))?;
     let (k, frame) = frames
         .find(name)
         .ok_or_else(|| located_message(from, &format!("there is no frame `{name}`")))?;
@@ -302,7 +310,7 @@ pub(super) fn pose_in_model(
         .filter(|name| !name.is_empty())
         .unwrap_or(&frame.usually);
     let placed = pose.map_or(Ok(DescriptionPose::identity()), |pose| pose_of(&pose))?;
-    let pose = pose_in_model(frames, relative, &frame.node, depth + 1)?.compose(&placed);
+    let pose = pose_in_model(frames, relative, &frame.node, inner)?.compose(&placed);
     frames.poses.borrow_mut()[k] = Some(pose);
     Ok(pose)
 }
@@ -410,7 +418,7 @@ fn joint(
             "a joint and a link or frame have the same name, so poses that refer to it are ambiguous; rename one",
         ));
     }
-    let place = pose_in_model(frames, &name, node, 0)?;
+    let place = pose_in_model(frames, &name, node, SdfFrames::TOP)?;
     let (parent, child_link) = (joint_end(node, "parent", frames)?, joint_end(node, "child", frames)?);
     if parent == child_link {
         return Err(located_message(
@@ -475,7 +483,7 @@ pub(super) fn axis_in_model(
             // The axis is given in the axes of the joint, or of a named frame.
             let given = xyz.attribute("expressed_in").filter(|name| !name.is_empty());
             let turned = match given {
-                Some(name) => pose_in_model(frames, name, node, 0)?.r,
+                Some(name) => pose_in_model(frames, name, node, SdfFrames::TOP)?.r,
                 None => place.r,
             };
             (vector(exact_numbers(&xyz, "xyz", xyz.text().unwrap_or(""))?), turned)

@@ -24,7 +24,7 @@ pub(super) fn gearbox_coupling(
     let name = required_attribute(node, "name")?;
     let ratio =
         number_of(node, "gearbox_ratio")?.ok_or_else(|| located_message(node, "a gearbox needs <gearbox_ratio>"))?;
-    let place = pose_in_model(frames, &name, node, 0)?;
+    let place = pose_in_model(frames, &name, node, SdfFrames::TOP)?;
     let reference = joint_end(node, "gearbox_reference_body", frames)?;
     let mut turned = Vec::new();
     for (tag, axis) in [("parent", "axis"), ("child", "axis2")] {

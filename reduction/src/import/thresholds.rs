@@ -11,6 +11,17 @@ pub(super) const DEEPEST_ELEMENT: usize = 200;
 /// the square of their number.
 pub(super) const MOST_ATTRIBUTES: usize = 500;
 
+/// Most tags, comments and attributes of a text together. The parser keeps some 100 bytes of each, which is ten to twenty
+/// times their size for the smallest ones, so that this many take some 50 MB. Published robots have less than 50 000; 15 000
+/// links with inertias have 420 000.
+pub(super) const MOST_XML_NODES: usize = 500_000;
+
+/// Most links or bodies, each of which takes some kilobytes. Published robots have less than 1000.
+pub(super) const MOST_LINKS: usize = 20_000;
+
+/// Longest file of closures, bytes. Published ones have some kilobytes; a list of names takes forty times its size.
+pub(super) const LARGEST_CLOSURES: usize = 1 << 20;
+
 /// Most joints that move. By judgement: models have at most 100 coordinates, and each joint becomes entries of the model
 /// file, of which a table has at most 1000.
 pub(super) const MOST_MOVING_JOINTS: usize = 1000;

@@ -23,6 +23,8 @@ mod parquet_columns;
 #[cfg(feature = "parquet")]
 mod parquet_pages;
 #[cfg(feature = "parquet")]
+mod parquet_split;
+#[cfg(feature = "parquet")]
 mod parquet_values;
 #[cfg(feature = "logs")]
 mod rosbag;

@@ -330,7 +330,7 @@ pub(super) fn column_reader<R: ChunkReader + 'static>(
         Compression::ZSTD(_) => CompressionMethod::Zstd,
         Compression::BROTLI(_) => CompressionMethod::Brotli,
         _ => {
-            let pages = OrderedPages::new(group.get_column_page_reader(i).map_err(parquet_fault)?);
+            let pages = OrderedPages::new(group.get_column_page_reader(i).map_err(parquet_fault)?, column);
             return Ok(get_column_reader(column.clone(), Box::new(pages)));
         }
     };
@@ -343,7 +343,7 @@ pub(super) fn column_reader<R: ChunkReader + 'static>(
         .map_err(parquet_fault)?;
     let rows = usize::try_from(group.metadata().num_rows()).unwrap_or(0);
     let pages = SerializedPageReader::new(bytes.clone(), &as_stored, rows, None).map_err(parquet_fault)?;
-    let pages = OrderedPages::new(Box::new(UnpackedPages { pages, packing }));
+    let pages = OrderedPages::new(Box::new(UnpackedPages { pages, packing }), column);
     Ok(get_column_reader(column.clone(), Box::new(pages)))
 }
 

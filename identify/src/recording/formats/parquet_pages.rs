@@ -11,8 +11,10 @@ use flate2::read::MultiGzDecoder;
 use parquet::basic::Encoding;
 use parquet::column::page::{Page, PageMetadata, PageReader};
 use parquet::errors::{ParquetError, Result};
+use parquet::schema::types::ColumnDescPtr;
 
 use crate::recording::formats::packing::CompressionMethod;
+use crate::recording::formats::parquet_split::join_streams;
 
 /// Largest page after decompression in bytes; writers usually make pages of one million.
 const LARGEST_PAGE: u64 = 128 << 20;
@@ -175,20 +177,23 @@ impl<P: PageReader> PageReader for UnpackedPages<P> {
     }
 }
 
-/// The pages of a column, whose values may refer to a dictionary only behind one. The library takes that for granted, and
-/// ends the program otherwise.
+/// The pages of a column, whose values may refer to a dictionary only behind one, and which have as many values as their
+/// levels state. The library takes that for granted, and ends the program otherwise.
 pub(super) struct OrderedPages {
     /// The pages.
     pages: Box<dyn PageReader>,
+    /// The column.
+    column: ColumnDescPtr,
     /// Whether a dictionary was passed on.
     has_dictionary: bool,
 }
 
 impl OrderedPages {
     /// Checks the order of these pages.
-    pub(super) fn new(pages: Box<dyn PageReader>) -> Self {
+    pub(super) fn new(pages: Box<dyn PageReader>, column: &ColumnDescPtr) -> Self {
         Self {
             pages,
+            column: column.clone(),
             has_dictionary: false,
         }
     }
@@ -215,7 +220,7 @@ impl PageReader for OrderedPages {
                 ));
             }
         }
-        Ok(page)
+        page.map(|page| join_streams(page, &self.column)).transpose()
     }
 
     fn peek_next_page(&mut self) -> Result<Option<PageMetadata>> {

@@ -8,6 +8,8 @@
 
 use std::io::{self, Read, Seek, SeekFrom};
 
+use modelmill_boundary::nesting::NestingLevel;
+
 /// Largest depth of a tree; a deeper one would exceed any disk.
 const DEEPEST: usize = 24;
 /// Longest row in bytes.
@@ -179,7 +181,7 @@ impl<R: Read + Seek> SqliteDatabase<R> {
     ) -> io::Result<()> {
         // Every page may be visited once at most, so that cycles end.
         let mut left = self.pages;
-        self.visit_tree(table, table.root, 0, &mut left, show)
+        self.visit_tree(table, table.root, NestingLevel::top(DEEPEST), &mut left, show)
     }
 
     /// Passes the rows below a page to `show`, from left to right. `left` is the number of pages that may still be
@@ -188,12 +190,13 @@ impl<R: Read + Seek> SqliteDatabase<R> {
         &mut self,
         table: &SqliteTable,
         number: u32,
-        depth: usize,
+        level: NestingLevel,
         left: &mut u64,
         show: &mut dyn FnMut(Vec<SqliteValue>) -> io::Result<()>,
     ) -> io::Result<()> {
-        if depth > DEEPEST || *left == 0 {
-            return Err(io::Error::other("its pages run in circles"));
+        let in_circles = || io::Error::other("its pages run in circles");
+        if *left == 0 {
+            return Err(in_circles());
         }
         *left -= 1;
         let page = self.read_page(number)?;
@@ -211,7 +214,13 @@ impl<R: Read + Seek> SqliteDatabase<R> {
         for i in 0..cells {
             let at = usize::from(read_u16(&page, pointers + 2 * i)?);
             if kind == BRANCH {
-                self.visit_tree(table, read_u32(&page, at)?, depth + 1, left, show)?;
+                self.visit_tree(
+                    table,
+                    read_u32(&page, at)?,
+                    level.enter().map_err(|_| in_circles())?,
+                    left,
+                    show,
+                )?;
             } else {
                 let (number, payload) = self.read_cell(&page, at, left)?;
                 let mut row = read_record(&payload)?;
@@ -226,7 +235,13 @@ impl<R: Read + Seek> SqliteDatabase<R> {
         }
         // The last child of an inner page is in its header.
         if kind == BRANCH {
-            self.visit_tree(table, read_u32(&page, start + 8)?, depth + 1, left, show)?;
+            self.visit_tree(
+                table,
+                read_u32(&page, start + 8)?,
+                level.enter().map_err(|_| in_circles())?,
+                left,
+                show,
+            )?;
         }
         Ok(())
     }

@@ -6,6 +6,8 @@
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
+use modelmill_boundary::nesting::NestingLevel;
+
 /// Deepest nesting of messages; no real definition reaches it.
 const DEEPEST: usize = 32;
 
@@ -126,7 +128,7 @@ pub(super) fn parse_definition(name: &str, text: &str, ros: RosVersion) -> Resul
             done: BTreeMap::new(),
             ros,
         };
-        return reader.parse_message(&own, 0);
+        return reader.parse_message(&own, NestingLevel::top(DEEPEST));
     }
     let mut texts = BTreeMap::new();
     // Split the text at the lines of `=` into one list of lines per type.
@@ -150,7 +152,7 @@ pub(super) fn parse_definition(name: &str, text: &str, ros: RosVersion) -> Resul
         done: BTreeMap::new(),
         ros,
     };
-    reader.parse_message(&own, 0)
+    reader.parse_message(&own, NestingLevel::top(DEEPEST))
 }
 
 /// Whether a log has no definition of a type, so that the one of a common type is used.
@@ -174,14 +176,10 @@ struct RosDefinitionParser<'a> {
 }
 
 impl RosDefinitionParser<'_> {
-    /// Parses the definition of one type; `depth` is its nesting.
-    fn parse_message(&mut self, name: &str, depth: usize) -> Result<Rc<RosMessageDefinition>, String> {
+    /// Parses the definition of one type at a level of nesting.
+    fn parse_message(&mut self, name: &str, level: NestingLevel) -> Result<Rc<RosMessageDefinition>, String> {
         if let Some(done) = self.done.get(name) {
             return Ok(done.clone());
-        }
-        // A type that contains itself would recurse without end.
-        if depth > DEEPEST {
-            return Err(format!("`{name}` contains itself"));
         }
         // A type that the file does not define may be a common one.
         let Some(lines) = self.texts.get(name).cloned() else {
@@ -189,7 +187,7 @@ impl RosDefinitionParser<'_> {
                 Some(text) => {
                     let lines = text.lines().collect();
                     self.texts.insert(name.to_owned(), lines);
-                    self.parse_message(name, depth)
+                    self.parse_message(name, level)
                 }
                 None => Err(format!(
                     "the file does not define `{name}`, and it is not one of the common types; convert the log to MCAP where \
@@ -219,7 +217,7 @@ impl RosDefinitionParser<'_> {
             if end == 0 {
                 return Err(format!("the line `{line}` of `{name}` cannot be read"));
             }
-            fields.push((rest[..end].to_owned(), self.parse_field_type(kind, name, depth)?));
+            fields.push((rest[..end].to_owned(), self.parse_field_type(kind, name, level)?));
         }
         let definition = Rc::new(RosMessageDefinition { fields });
         self.done.insert(name.to_owned(), definition.clone());
@@ -227,10 +225,16 @@ impl RosDefinitionParser<'_> {
     }
 
     /// Parses the type of a field in the message `within`.
-    fn parse_field_type(&mut self, text: &str, within: &str, depth: usize) -> Result<RosFieldType, String> {
+    fn parse_field_type(&mut self, text: &str, within: &str, level: NestingLevel) -> Result<RosFieldType, String> {
+        // A type that contains itself would recurse without end.
+        let inner = || {
+            level
+                .enter()
+                .map_err(|_| format!("`{within}` contains itself, or lists of lists"))
+        };
         // `type[]`, `type[n]` and `type[<=n]` are lists; the last one has a variable length.
         if let Some((of, length)) = text.strip_suffix(']').and_then(|text| text.rsplit_once('[')) {
-            let of = self.parse_field_type(of, within, depth)?;
+            let of = self.parse_field_type(of, within, inner()?)?;
             let length = match length {
                 "" => None,
                 most if most.starts_with("<=") => None,
@@ -270,7 +274,7 @@ impl RosDefinitionParser<'_> {
         if full == "builtin_interfaces/Time" || full == "builtin_interfaces/Duration" {
             return Ok(RosFieldType::Time { is_signed: true });
         }
-        Ok(RosFieldType::Message(self.parse_message(&full, depth + 1)?))
+        Ok(RosFieldType::Message(self.parse_message(&full, inner()?)?))
     }
 }
 
@@ -305,5 +309,16 @@ mod tests {
         assert_eq!(fields, ["header", "name", "position", "velocity", "effort"]);
         let unknown = parse_definition("lab_msgs/msg/Torques", "", RosVersion::Two).unwrap_err();
         assert!(unknown.contains("`lab_msgs/Torques`"), "{unknown}");
+    }
+
+    #[test]
+    fn lists_of_lists_and_types_in_themselves_are_refused_before_they_use_up_the_stack() {
+        let parse = |text: &str| parse_definition("a/B", text, RosVersion::Two).map(drop);
+        assert_eq!(parse(&format!("float64{} x\n", "[2]".repeat(DEEPEST))), Ok(()));
+        let own = "a/B x\n".to_owned();
+        for text in [format!("float64{} x\n", "[]".repeat(500_000)), own] {
+            let says = parse(&text).unwrap_err();
+            assert!(says.contains("`a/B` contains itself"), "{says}");
+        }
     }
 }

@@ -7,7 +7,7 @@
 mod definition;
 mod message;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 use indexmap::IndexMap;
 
@@ -30,6 +30,8 @@ const MOST_LAYOUTS: usize = 64;
 const MOST_SHAPES: usize = 1024;
 /// Most columns of a topic.
 const MOST_COLUMNS: usize = 1 << 17;
+/// Most topics that are read; each takes some kilobytes. Logs of large robots have some thousand.
+const MOST_TOPICS: usize = 10_000;
 /// Memory of an arrival, in numbers, including what is sorted and joined later.
 const ARRIVAL: usize = 8;
 /// Times below this many nanoseconds, 104 days, are exact as seconds. Larger ones are counted from the first one.
@@ -154,6 +156,14 @@ impl<'a> BagCollector<'a> {
             (other, _) => Err(format!("its messages are encoded as `{other}`, which is not supported")),
         };
         // A topic that cannot be read is kept with the reason and reported only if it is listed.
+        let ros = ros.and_then(|ros| {
+            if self.topics.len() >= MOST_TOPICS {
+                return Err(format!(
+                    "the log has more than {MOST_TOPICS} topics, of which the first ones are read"
+                ));
+            }
+            Ok(ros)
+        });
         let reader = ros.and_then(|ros| {
             let definition = definition::parse_definition(kind, encoding.text, ros)?;
             let is_common = definition::is_definition_missing(encoding.text);
@@ -263,6 +273,7 @@ impl BagTopic {
         }
         // Indices of the columns; new ones are added to the topic.
         let mut places = Vec::with_capacity(columns.len());
+        let mut taken = HashSet::with_capacity(columns.len());
         for (name, kind) in columns {
             let name = format!("{}.{name}", self.name);
             let entry = self.columns.entry(name);
@@ -272,7 +283,7 @@ impl BagTopic {
                 layouts: BTreeSet::new(),
                 values: is_kept(name).then(Vec::new),
             });
-            if places.contains(&place) {
+            if !taken.insert(place) {
                 return Err(format!(
                     "two of its numbers are called `{}`",
                     self.columns.get_index(place).map_or("", |(name, _)| name)
