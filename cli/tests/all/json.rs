@@ -294,7 +294,8 @@ fn runs_says_what_changed() {
 
 /// The JSON Schema of a command's answer.
 fn answer_schema(command: &str) -> jsonschema::Validator {
-    let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../modelmill/schema/{command}.schema.json"));
+    let file =
+        std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../modelmill/schema/{command}.schema.json"));
     let text = std::fs::read_to_string(file).expect("the schema is there");
     let schema: Value = serde_json::from_str(&text).expect("the schema is JSON");
     jsonschema::validator_for(&schema).expect("a valid schema")

@@ -5,7 +5,8 @@ use super::in_time::{ChangeInterval, TimeResidual, time_residual};
 use super::noise::effective_samples;
 use super::problem::{CandidateNature, DiagnosisProblem};
 use super::thresholds::{
-    COLOURED_LEAST_VARIANCE_RATIO, COLOURED_MOST_EFFECTIVE_SHARE, COLOURED_MOST_REPEATABLE_SHARE, SAME_CHANGE_TIME_SHARE,
+    COLOURED_LEAST_VARIANCE_RATIO, COLOURED_MOST_EFFECTIVE_SHARE, COLOURED_MOST_REPEATABLE_SHARE,
+    SAME_CHANGE_TIME_SHARE,
 };
 use crate::signal::dot;
 

@@ -1,10 +1,10 @@
 //! Errors of the geometry that explain as much as the effects found, in the answer and as text.
 
-use crate::text::wrap::wrap_words;
 use crate::answers::{GeometryAlternativeAnswer, GeometryErrorAnswer};
 use crate::diagnose::{DiagnosisFindings, words};
 use crate::text::TerminalStyle;
 use crate::text::names::joined_by_and;
+use crate::text::wrap::wrap_words;
 
 impl DiagnosisFindings {
     /// Errors of the geometry that explain as much as the effects found.

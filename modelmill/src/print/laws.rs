@@ -20,7 +20,11 @@ pub(crate) const LIBRARY: &str = "laws.toml";
 pub(crate) const PATH_DEPENDENT_NOTE: &str = "It depends on the earlier motion, which no formula of a library can express. It is reported so that you can search for the cause.";
 
 /// Laws, the best first, each with its alternatives.
-pub(super) fn law_answers(laws: &[LawHypothesis], model: &Model, spelling: &dyn StepSpelling) -> Vec<LawHypothesisAnswer> {
+pub(super) fn law_answers(
+    laws: &[LawHypothesis],
+    model: &Model,
+    spelling: &dyn StepSpelling,
+) -> Vec<LawHypothesisAnswer> {
     let one = |hypothesis: &LawHypothesis| {
         let ties = hypothesis.near_ties.iter();
         LawHypothesisAnswer {
