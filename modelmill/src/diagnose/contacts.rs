@@ -6,7 +6,7 @@ use modelmill_identify::diagnose::{DiagnosisProblem, Disturbance, TimeResidual};
 
 use super::thresholds::{
     CONTACT_GAP_S, CONTACT_LEAST_KNOWN_SHARE, CONTACT_LEAST_RESIDUAL_RATIO, CONTACT_LEAST_REST_SHARE,
-    REPEATED_PLACE_FEWEST_SAMPLES, REPEATED_PLACE_MOST_RESIDUAL,
+    CONTACTS_MOST_SHARE, REPEATED_PLACE_FEWEST_SAMPLES, REPEATED_PLACE_MOST_RESIDUAL,
 };
 use crate::audit::events::{
     ResidualTrace, event_disturbance, find_events, left_out_interval, motion_of_drives, slowest_rate, standing_states,
@@ -30,8 +30,29 @@ pub(super) fn is_contact(one: &Disturbance) -> bool {
     one.kind == "contact_event"
 }
 
-/// Whether a recording has both a contact, found without knowledge of changes in time, and such a change.
-pub(super) fn are_contacts_doubtful(disturbances: &[Disturbance]) -> bool {
+/// Whether contacts, found without knowledge of changes in time, may be such changes: a recording has both, or contacts last
+/// for a large part of it, so that little is left that could show a change. `all` are the recordings.
+pub(super) fn are_contacts_doubtful(disturbances: &[Disturbance], all: &SegmentList<'_>) -> bool {
+    let total = |file: &str| -> f64 {
+        let segments = all.iter().filter(|(one, _)| one.run.file == file);
+        segments
+            .map(|(one, _)| one.run.time[one.run.time.len() - 1] - one.run.time[0])
+            .sum()
+    };
+    let mut files = all.iter().map(|(one, _)| one.run.file.as_str());
+    let lasts_long = |file: &str| {
+        let contacts = disturbances
+            .iter()
+            .filter(|one| is_contact(one) && one.recordings.iter().any(|other| other == file));
+        let intervals = contacts.filter_map(|one| one.interval);
+        let sum: f64 = intervals.map(|[from, to]| to - from).sum();
+        sum > CONTACTS_MOST_SHARE * total(file)
+    };
+    has_contact_and_change(disturbances) || files.any(lasts_long)
+}
+
+/// Whether a recording has both a contact and a change in time.
+fn has_contact_and_change(disturbances: &[Disturbance]) -> bool {
     let is_change = |one: &&Disturbance| one.interval.is_some() && !is_contact(one);
     let changed: Vec<&String> = disturbances
         .iter()
@@ -471,8 +492,8 @@ mod tests {
         };
         let contact = at("contact_event", "a.csv", Some([1.0, 1.5]));
         let change = |file: &str| at("payload_change", file, Some([1.2, 9.0]));
-        assert!(are_contacts_doubtful(&[contact.clone(), change("a.csv")]));
-        assert!(!are_contacts_doubtful(&[contact.clone(), change("b.csv")]));
-        assert!(!are_contacts_doubtful(&[contact, at("outliers", "a.csv", None)]));
+        assert!(has_contact_and_change(&[contact.clone(), change("a.csv")]));
+        assert!(!has_contact_and_change(&[contact.clone(), change("b.csv")]));
+        assert!(!has_contact_and_change(&[contact, at("outliers", "a.csv", None)]));
     }
 }

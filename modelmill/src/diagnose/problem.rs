@@ -188,7 +188,7 @@ pub(crate) fn find_missing_effects(
     let mut diagnosis = search(&mut problem)?;
     // The audit knows neither changes in time, nor delays and other effects that the search finds: they look like
     // contacts, and the contacts that are left once they are known are found below.
-    let kept = if are_contacts_doubtful(&diagnosis.disturbances) {
+    let kept = if are_contacts_doubtful(&diagnosis.disturbances, &all) {
         Some(Vec::new())
     } else {
         contacts_in_residual(&problem, &all, &diagnosis.complete_residual, &without_contacts)
