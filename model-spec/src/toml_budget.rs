@@ -17,9 +17,9 @@ use crate::document::LARGEST_FILE;
 /// this project have at most 3400; this many take some 40 MB while they are parsed.
 const MOST_MARKS: usize = 200_000;
 
-/// Most brackets and braces that are open at one place. Model files have at most 8; this many take less than 0.2 MB of the
-/// stack, of which threads have 2 MB.
-const MOST_OPEN: usize = 200;
+/// Most brackets and braces that are open at one place: the limit of the parser itself. Model files have at most 8; this many
+/// take less than 0.1 MB of the stack, of which threads have 2 MB.
+const MOST_OPEN: usize = 80;
 
 /// What a text has too much of: the first byte beyond the limit, the fault, and the limit in words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,7 +58,7 @@ pub fn find_toml_excess(text: &str) -> Option<TomlExcess> {
     find_deep_bracket(text).map(|at| TomlExcess {
         at,
         fault: "brackets are nested too deeply, or many are not closed",
-        limit: "at most 200 are open at one place",
+        limit: "they are at most 80 deep",
     })
 }
 

@@ -63,10 +63,6 @@ pub(crate) static PASSES: [LoweringPass; 3] = [
 /// Largest number of rounds of all passes; the rounds end earlier if one makes the program no cheaper.
 const MOST_ROUNDS: usize = 4;
 
-/// Most nodes of a graph that is rewritten. Passes visit all nodes many times: for a chain with 100 joints they took more
-/// than half of `check`. Larger graphs become programs as they are. By judgement.
-const MOST_REWRITTEN_NODES: usize = 200_000;
-
 /// Lowers the expressions of a request to a program.
 pub(crate) fn lower(graph: &Graph, request: &LoweringRequest<'_>) -> StraightLineProgram {
     lower_with_passes(graph, &PASSES, request)
@@ -89,9 +85,6 @@ pub(crate) fn lower_with_passes(
     // whole arena several times, so it holds only needed nodes.
     let (mut graph, mut roots) = graph.compacted(&roots);
     let mut best = schedule::schedule(&graph, &roots, request);
-    if graph.len() > MOST_REWRITTEN_NODES {
-        return best;
-    }
     for _ in 0..MOST_ROUNDS {
         (graph, roots) = graph.compacted(&roots);
         for pass in passes {

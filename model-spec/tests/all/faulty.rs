@@ -183,14 +183,15 @@ fn color_marks_the_same_text() {
 }
 
 #[test]
-fn nested_brackets() {
+fn a_thousand_nested_brackets() {
     for (open, close) in [("[", "]"), ("{ a = ", " }")] {
-        // The second limit is that of the text, before it is parsed.
-        for (depth, limit) in [(100, "at most 80 deep"), (1000, "at most 200 are open")] {
-            let text = format!("schema = 1\nx = {}1{}\n", open.repeat(depth), close.repeat(depth));
-            let found = failure(&text);
-            assert!(found.render(false).contains(limit), "{}", found.render(false));
-        }
+        let text = format!("schema = 1\nx = {}1{}\n", open.repeat(1000), close.repeat(1000));
+        let found = failure(&text);
+        assert!(
+            found.render(false).contains("at most 80 deep"),
+            "{}",
+            found.render(false)
+        );
         let unclosed = format!("x = {}", open.repeat(200_000));
         failure(&unclosed);
     }

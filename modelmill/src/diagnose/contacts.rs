@@ -35,9 +35,8 @@ pub(super) fn is_contact(one: &Disturbance) -> bool {
 pub(super) fn are_contacts_doubtful(disturbances: &[Disturbance], all: &SegmentList<'_>) -> bool {
     let total = |file: &str| -> f64 {
         let segments = all.iter().filter(|(one, _)| one.run.file == file);
-        segments
-            .map(|(one, _)| one.run.time[one.run.time.len() - 1] - one.run.time[0])
-            .sum()
+        let span = |time: &[f64]| Some(time.last()? - time.first()?);
+        segments.filter_map(|(one, _)| span(&one.run.time)).sum()
     };
     let mut files = all.iter().map(|(one, _)| one.run.file.as_str());
     let lasts_long = |file: &str| {

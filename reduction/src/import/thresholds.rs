@@ -17,7 +17,7 @@ pub(super) const MOST_ATTRIBUTES: usize = 500;
 pub(super) const MOST_XML_NODES: usize = 500_000;
 
 /// Most links or bodies, each of which takes some kilobytes. Published robots have less than 1000.
-pub(super) const MOST_LINKS: usize = 20_000;
+pub(super) const MOST_LINKS: usize = 30_000;
 
 /// Longest file of closures, bytes. Published ones have some kilobytes; a list of names takes forty times its size.
 pub(super) const LARGEST_CLOSURES: usize = 1 << 20;

@@ -142,7 +142,7 @@ mod tests {
         for part in ["<link/>", "<body name='b'/>", "<link></link>", "<body\n/>"] {
             assert_eq!(check_xml_budget(&many(part, MOST_LINKS)), Ok(()), "{part}");
             let fault = check_xml_budget(&many(part, MOST_LINKS + 1)).unwrap_err();
-            assert!(fault.contains("more than 20000 links or bodies"), "{fault}");
+            assert!(fault.contains("more than 30000 links or bodies"), "{fault}");
         }
     }
 

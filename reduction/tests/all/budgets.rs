@@ -75,7 +75,7 @@ fn descriptions_of_many_joints_links_and_names_are_refused_in_time() {
     });
     let slides = repeated(mjcf, 4 * N, |k| format!("\n<joint name='j{k}' type='slide'/>"));
     let same = repeated(mjcf, N, |_| "\n<joint name='j'/>".to_owned());
-    let loose = repeated(sdf, 3 * N, |k| format!("\n<link name='l{k}'/>"));
+    let loose = repeated(sdf, 4 * N, |k| format!("\n<link name='l{k}'/>"));
     let chain = repeated(sdf, N, |k| {
         format!(
             "\n<link name='l{k}'/><joint name='j{k}' type='revolute'><parent>{}</parent><child>l{k}</child>\
