@@ -100,7 +100,7 @@ impl Sample {
     pub fn reachable(&self, evaluator: &ModelEvaluator<'_>) -> Self {
         self.filtered(|i| {
             let one = self.only(i);
-            evaluator.full_regressor(&one.states()).is_ok()
+            evaluator.check_states(&one.states()).is_ok()
         })
     }
 }

@@ -148,16 +148,22 @@ impl<'a> RegisterMachine<'a> {
             }
         }
         // Slots of other values are free again after their last use.
-        let mut ends: Vec<Vec<usize>> = vec![Vec::new(); program.ops.len() + 1];
+        // Operations by their last use: the first one of each, and the next one with the same last use.
+        let mut first_ending = vec![None; program.ops.len() + 1];
+        let mut next_ending = vec![None; program.ops.len()];
         for i in 0..program.ops.len() {
             if computed[i] && program.stages[i] == ProgramStage::State {
                 slots[i] = free.pop().unwrap_or_else(|| {
                     n_slots += 1;
                     n_slots - 1
                 });
-                ends[last_use[i]].push(slots[i]);
+                next_ending[i] = first_ending[last_use[i]].replace(i);
             }
-            free.append(&mut ends[i]);
+            let mut ending = first_ending[i];
+            while let Some(k) = ending {
+                free.push(slots[k]);
+                ending = next_ending[k];
+            }
         }
         let kept = (0..program.ops.len())
             .filter(|i| needed[*i] && program.stages[*i] == ProgramStage::Fixed)

@@ -197,6 +197,14 @@ impl<'a> ModelEvaluator<'a> {
         self.evaluate_matrix(&self.programs.full_regressor, states)
     }
 
+    /// Whether the model has a solution at all states, without the entries of H.
+    ///
+    /// Fails where [`Self::full_regressor`] fails, with the same fault.
+    pub fn check_states(&self, states: &MotionStates<'_>) -> Result<(), PoseFault> {
+        // What guards do not read is skipped.
+        self.evaluate_blocks(&self.programs.full_regressor, &|_| false, states, &[], |_| Ok(()))
+    }
+
     /// Forces of the drives for given base parameters: one vector per drive.
     pub fn inverse_dynamics(&self, states: &MotionStates<'_>, base: &[f64]) -> Result<Vec<Vec<f64>>, PoseFault> {
         self.evaluate_program(&self.programs.inverse_dynamics, states, base)

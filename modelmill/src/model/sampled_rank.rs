@@ -416,7 +416,7 @@ impl StateSampling {
                 load: resting(self.n_drives),
             };
             // Every refused pose narrows the range around the nominal pose.
-            if evaluator.full_regressor(&still).is_err() {
+            if evaluator.check_states(&still).is_err() {
                 self.refused += 1;
                 if self.refused > 20 * wanted {
                     return Err(format!(
