@@ -197,7 +197,7 @@ impl<'a> ModelEvaluator<'a> {
         self.evaluate_matrix(&self.programs.full_regressor, states)
     }
 
-    /// Whether the model has a solution at all states, without the entries of H.
+    /// Checks that the model has a solution at all states, without computing the entries of H.
     ///
     /// Fails where [`Self::full_regressor`] fails, with the same fault.
     pub fn check_states(&self, states: &MotionStates<'_>) -> Result<(), PoseFault> {
