@@ -13,6 +13,11 @@ static EXPERIMENT: LazyLock<(Value, String)> = LazyLock::new(|| {
     (found, page)
 });
 
+/// The page of the experiment.
+pub(crate) fn page() -> &'static str {
+    &EXPERIMENT.1
+}
+
 /// A folder that is fresh for this test.
 fn folder(name: &str) -> String {
     let folder = scratch(name);

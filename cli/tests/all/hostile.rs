@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use crate::common::{Ran, ran};
-use crate::languages::{STRICT, cargo, folder, has_its_crates, python, run, there, written_of};
+use crate::languages::{STRICT, cargo, folder, has_its_crates, python, python_library, run, there, written_of};
 
 /// Each would do something where it is let out: end a comment or a string, begin a line, steer a terminal, be a tag.
 const TEXTS: [&str; 34] = [
@@ -573,11 +573,7 @@ fn import(place: &Path, module: &Path) {
     };
     let imported = place.join("module");
     std::fs::create_dir_all(&imported).unwrap();
-    std::fs::copy(
-        folder("target").join("release/libyield_model.so"),
-        imported.join("yield_model.so"),
-    )
-    .unwrap();
+    std::fs::copy(python_library("yield_model"), imported.join("yield_model.so")).unwrap();
     let script = "import sys; sys.path.insert(0, sys.argv[1]); import yield_model as m; \
                   names = [n for n in dir(m) if 'evil' in n]; assert not names, names; \
                   assert m.CONSTANTS['double'] == 0.01 and m.CONSTANTS['Double'] == 0.02; \

@@ -57,13 +57,24 @@ fn built(model: &str, language: &str, options: &[&str]) -> PathBuf {
     out
 }
 
-/// Lets cargo look at a crate, or build it, in the folder of all these tests.
+/// Lets cargo look at a crate, or build it. Modules of Python are built without optimisation, and in a folder of their own:
+/// cargo builds one crate at a time in a folder.
 pub(crate) fn cargo(what: &str, at: &Path, options: &[&str]) {
+    let (target, profile) = if at.join("pyproject.toml").exists() {
+        ("python-target", "dev")
+    } else {
+        ("target", "release")
+    };
     run(Command::new(env!("CARGO"))
-        .args([what, "--release", "--quiet", "--target-dir"])
-        .arg(folder("target"))
+        .args([what, "--profile", profile, "--quiet", "--target-dir"])
+        .arg(folder(target))
         .args(options)
         .current_dir(at));
+}
+
+/// A module of Python that was built.
+pub(crate) fn python_library(name: &str) -> PathBuf {
+    folder("python-target").join(format!("debug/lib{name}.so"))
 }
 
 fn tables() -> PathBuf {
@@ -275,11 +286,7 @@ fn the_python_module_gives_the_torques_of_the_table() {
         built(model, "python", &[]);
         let module = folder("module");
         std::fs::create_dir_all(&module).unwrap();
-        std::fs::copy(
-            folder("target").join(format!("release/lib{name}.so")),
-            module.join(format!("{name}.so")),
-        )
-        .unwrap();
+        std::fs::copy(python_library(name), module.join(format!("{name}.so"))).unwrap();
         let says = run(Command::new(&python)
             .arg(project().join("cli/tests/languages").join(test))
             .arg(&module)

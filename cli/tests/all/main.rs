@@ -31,6 +31,7 @@ mod guide;
 mod hidden_cases;
 #[cfg(unix)]
 mod hostile;
+mod in_browser;
 mod interpret;
 mod json;
 mod languages;
@@ -49,7 +50,6 @@ mod simulate;
 mod skills;
 mod sound;
 mod time_limit;
-mod try_page;
 mod tx40;
 mod usage;
 mod variants;

@@ -6,6 +6,7 @@ use serde_json::Value;
 use crate::common::browser::{Browser, Medium, Window};
 use crate::common::workbench::Workbench;
 use crate::common::{model, printed, run, scratch};
+use crate::experiment;
 
 fn texts(value: &Value) -> Vec<String> {
     serde_json::from_value(value.clone()).expect("texts")
@@ -83,8 +84,7 @@ fn written_pages_fit_every_screen_and_paper() {
     printed(&["atlas", &robot, &delta, &arm, "--out", &folder]);
     printed(&["report", &robot, "--data", &fit, "--check", &other, "--out", &folder]);
     printed(&["runs", &robot, "--data", &fit, &other, "--out", &folder]);
-    let small = format!("experiment --out {folder} --random 40 --starts 1 --rate 60");
-    printed(&small.split(' ').collect::<Vec<_>>());
+    std::fs::write(&pages[5].1, experiment::page()).expect("the page");
     for (what, path) in &pages {
         let window = browser.open(&format!("file://{path}"));
         check(&mut browser, &window, what);

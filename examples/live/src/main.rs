@@ -198,29 +198,33 @@ mod tests {
         assert!(sitting.learned.is_some() && sitting.alarms.is_empty());
         let dry = RigLaw::CoulombFriction { Fc: 10.0 };
         let viscous = RigLaw::ViscousFriction { Fv: 120.0 };
-        for (name, drive, growth) in [
-            ("Fc_spindle_left", 0, dry),
-            ("Fc_spindle_right", 1, dry),
-            ("Fv_spindle_left", 0, viscous),
-            ("Fv_spindle_right", 1, viscous),
-        ] {
+        let check = |name: &str, drive: usize, growth: RigLaw| {
             let mut now = sitting.clone();
-            now.machine = now
-                .machine
-                .with_wear(FrictionWear {
-                    drive,
-                    growth,
-                    from: 240.0,
-                    duration: 1.0,
-                })
-                .unwrap();
+            let wear = FrictionWear {
+                drive,
+                growth,
+                from: 240.0,
+                duration: 1.0,
+            };
+            now.machine = now.machine.with_wear(wear).unwrap();
             now.run_until(250.0).unwrap();
             let found = now.identified.first();
             let (t, change) = found.unwrap_or_else(|| panic!("{name}: {:?}", now.lines()));
             let parameter = &model::BASE_PARAMETERS[change.parameter];
             assert_eq!(parameter.expression, name, "{:?}", now.lines());
             assert!(*t < 250.0);
-        }
+        };
+        std::thread::scope(|scope| {
+            for (name, drive, growth) in [
+                ("Fc_spindle_left", 0, dry),
+                ("Fc_spindle_right", 1, dry),
+                ("Fv_spindle_left", 0, viscous),
+                ("Fv_spindle_right", 1, viscous),
+            ] {
+                let check = &check;
+                scope.spawn(move || check(name, drive, growth));
+            }
+        });
     }
 
     #[test]

@@ -5,6 +5,8 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::signal::dot;
+
 /// A regressor whose rows are those of some channels at some samples.
 #[derive(Debug, Clone)]
 pub struct ChannelRegressor {
@@ -145,21 +147,20 @@ impl ChannelRegressor {
         let mut normal = DMatrix::zeros(self.columns, self.columns);
         let mut right = DVector::zeros(self.columns);
         for (c, channel) in self.channels.iter().enumerate() {
-            // Interleaved index of a sample of the range.
-            let at = |i: usize| (samples.start + i) * n + c;
-            // Transposed rows times their weights.
-            let mut weighted = channel.rows.rows_range(samples.clone()).transpose();
-            for (i, mut column) in weighted.column_iter_mut().enumerate() {
-                column *= weights[at(i)];
-            }
-            // Products among the columns of this channel, then added to their places in the complete matrix.
-            let own = &weighted * channel.rows.rows_range(samples.clone());
-            let forces = DVector::from_fn(samples.len(), |i, _| measured[at(i)]);
-            let own_right = &weighted * forces;
-            for (j, column) in channel.column_indices.iter().enumerate() {
-                right[*column] += own_right[j];
-                for (i, row) in channel.column_indices.iter().enumerate() {
-                    normal[(*row, *column)] += own[(i, j)];
+            let of_rows =
+                |values: &DVector<f64>| -> Vec<f64> { samples.clone().map(|sample| values[sample * n + c]).collect() };
+            let (weights, forces) = (of_rows(weights), of_rows(measured));
+            let rows = channel.rows.as_slice();
+            let column = |k: usize| &rows[k * channel.rows.nrows()..][samples.clone()];
+            for (j, to) in channel.column_indices.iter().enumerate() {
+                let weighted: Vec<f64> = column(j).iter().zip(&weights).map(|(x, weight)| x * weight).collect();
+                right[*to] += dot(&weighted, &forces);
+                for (i, other) in channel.column_indices[..=j].iter().enumerate() {
+                    let product = dot(&weighted, column(i));
+                    normal[(*other, *to)] += product;
+                    if i < j {
+                        normal[(*to, *other)] += product;
+                    }
                 }
             }
         }

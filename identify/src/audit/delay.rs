@@ -16,6 +16,7 @@ use nalgebra::{DMatrix, DVector};
 use super::by_channel::ChannelRegressor;
 use super::robust::{RobustFit, robust_fit, solve_normal};
 use super::thresholds::{DELAY_RESOLUTION_STEPS, DELAY_STUDENT_FACTOR, FAR_SHIFT_MIN_IMPROVEMENT};
+use crate::signal::dot;
 
 /// Number of blocks of time, which are left out one by one.
 const BLOCKS: usize = 20;
@@ -185,8 +186,7 @@ impl DelayAudit<'_> {
             }
         }
         // The regressor does not change with the shift, so one factorisation serves all shifts.
-        let transposed = weighted.transpose();
-        let mut normal = &transposed * &weighted;
+        let mut normal = weighted.transpose() * &weighted;
         // A small ridge keeps dependent columns solvable.
         for i in 0..normal.ncols() {
             normal[(i, i)] += 1e-9;
@@ -196,7 +196,10 @@ impl DelayAudit<'_> {
             let (forces, _) = self.shift_forces(channels.iter().map(|c| (*c, steps * step)));
             let of_row = rows.iter().map(|row| forces[*row] * weights[row % n]);
             let forces = DVector::from_iterator(rows.len(), of_row);
-            let right = &transposed * &forces;
+            let products = weighted
+                .column_iter()
+                .map(|column| dot(column.as_slice(), forces.as_slice()));
+            let right = DVector::from_iterator(weighted.ncols(), products);
             let size = forces.norm_squared();
             (size > 0.0).then(|| 1.0 - right.dot(&normal.solve(&right)) / size)
         };

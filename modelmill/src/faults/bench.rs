@@ -5,7 +5,7 @@
 //! kept. Every change of the forces (sign, unit, exchange) then costs a small system of equations only.
 
 use modelmill_codegen::{ModelEvaluator, MotionStates};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::correction::{ForceChange, MotionChange};
 use super::thresholds::{BENCH_FEWEST_SAMPLES, FIT_ERROR_FLOOR, NOMINAL_ERROR_CAP, NOMINAL_ERROR_FLOOR};
@@ -269,17 +269,75 @@ struct ChannelMoments {
     right: Vec<DVector<f64>>,
     /// Sum of squares of each force.
     squares: Vec<f64>,
+    /// The same without the part that the columns of this drive alone explain.
+    reduced: ReducedMoments,
+}
+
+/// Inner products of the columns of the model in the rows of one drive, after least squares on the columns that only
+/// this drive has. These are fitted by each drive alone, whatever its weight, so that they need to be eliminated once.
+struct ReducedMoments {
+    /// The columns among themselves.
+    normal: DMatrix<f64>,
+    /// The columns with the force of each drive.
+    right: Vec<DVector<f64>>,
+    /// Sum of squares of each force.
+    squares: Vec<f64>,
 }
 
 impl ChannelMoments {
-    /// The inner products of the rows of a drive with the forces of all drives.
+    /// The inner products of the rows of a drive with the forces of all drives. The last [`MORE`] columns are those of
+    /// this drive alone.
     fn new(rows: &DMatrix<f64>, forces: &[Vec<f64>]) -> Self {
         let vector = |force: &Vec<f64>| DVector::from_column_slice(force);
+        let normal = rows.transpose() * rows;
+        let right: Vec<DVector<f64>> = forces.iter().map(|force| rows.tr_mul(&vector(force))).collect();
+        let squares: Vec<f64> = forces.iter().map(|force| vector(force).norm_squared()).collect();
+        let reduced = ReducedMoments::new(&normal, &right, &squares);
         Self {
-            normal: rows.tr_mul(rows),
-            right: forces.iter().map(|force| rows.tr_mul(&vector(force))).collect(),
-            squares: forces.iter().map(|force| vector(force).norm_squared()).collect(),
+            normal,
+            right,
+            squares,
+            reduced,
         }
+    }
+}
+
+impl ReducedMoments {
+    /// Eliminates the last [`MORE`] columns: the Schur complement of their normal equations.
+    fn new(normal: &DMatrix<f64>, right: &[DVector<f64>], squares: &[f64]) -> Self {
+        let base = normal.ncols() - MORE;
+        let own = normal.view((base, base), (MORE, MORE)).into_owned();
+        let diagonal = own.diagonal();
+        let halves = factor_scaled(own, &diagonal).map(|(factor, scale)| {
+            let half = |mut columns: DMatrix<f64>| {
+                for mut column in columns.column_iter_mut() {
+                    column.component_mul_assign(&scale);
+                }
+                factor.l_dirty().solve_lower_triangular_mut(&mut columns);
+                columns
+            };
+            let across = normal.view((base, 0), (MORE, base)).into_owned();
+            let forces = right.iter().map(|right| right.rows(base, MORE).into_owned());
+            (half(across), half(DMatrix::from_columns(&forces.collect::<Vec<_>>())))
+        });
+        let mut reduced = Self {
+            normal: normal.view((0, 0), (base, base)).into_owned(),
+            right: right.iter().map(|right| right.rows(0, base).into_owned()).collect(),
+            squares: squares.to_vec(),
+        };
+        if let Some((columns, forces)) = halves {
+            reduced.normal -= columns.transpose() * &columns;
+            for ((right, square), force) in reduced
+                .right
+                .iter_mut()
+                .zip(&mut reduced.squares)
+                .zip(forces.column_iter())
+            {
+                *right -= columns.tr_mul(&force);
+                *square -= force.norm_squared();
+            }
+        }
+        reduced
     }
 }
 
@@ -288,33 +346,36 @@ impl HypothesisRows {
     /// drive counts as much as a large one.
     fn fit_errors(&self, change: &ForceChange) -> Vec<Option<f64>> {
         let n = self.channels.len();
-        let columns = self.base + MORE * n;
-        // Place of a column of a drive among all columns.
-        let place = |d: usize, k: usize| if k < self.base { k } else { k + MORE * d };
+        let base = self.base;
         let squares: Vec<f64> = (0..n).map(|d| change.squares(d, &self.channels[d].squares)).collect();
         let mut errors: Vec<Option<f64>> = squares.iter().map(|s| (*s > 0.0).then_some(1.0)).collect();
         for _ in 0..ROUNDS {
-            let mut normal = DMatrix::zeros(columns, columns);
-            let mut right = DVector::zeros(columns);
+            let mut normal = DMatrix::zeros(base, base);
+            let mut complete = DVector::zeros(base);
+            let mut right = DVector::zeros(base);
             for (d, channel) in self.channels.iter().enumerate() {
                 let Some(error) = errors[d] else { continue };
                 let weight = 1.0 / (squares[d] * error.max(FIT_ERROR_FLOOR).powi(2));
                 let (source, factor) = change.source(d);
-                for j in 0..channel.normal.ncols() {
-                    right[place(d, j)] += weight * factor * channel.right[source][j];
-                    for i in 0..channel.normal.nrows() {
-                        normal[(place(d, i), place(d, j))] += weight * channel.normal[(i, j)];
-                    }
+                right.axpy(weight * factor, &channel.reduced.right[source], 1.0);
+                for j in 0..base {
+                    complete[j] += weight * channel.normal[(j, j)];
+                    // Only the lower triangle is read.
+                    let from = channel.reduced.normal.view((j, j), (base - j, 1));
+                    normal
+                        .view_mut((j, j), (base - j, 1))
+                        .zip_apply(&from, |sum, x| *sum += weight * x);
                 }
             }
-            let Some(values) = solve_scaled(normal, &right) else {
+            let Some(values) = solve_reduced(normal, &complete, &right) else {
                 return errors;
             };
             for (d, channel) in self.channels.iter().enumerate() {
-                let own = DVector::from_fn(channel.normal.ncols(), |k, _| values[place(d, k)]);
                 let (source, factor) = change.source(d);
-                let left =
-                    squares[d] - 2.0 * factor * own.dot(&channel.right[source]) + own.dot(&(&channel.normal * &own));
+                let reduced = &channel.reduced;
+                let unexplained = factor * factor * reduced.squares[source];
+                let left = unexplained - 2.0 * factor * values.dot(&reduced.right[source])
+                    + values.dot(&(&reduced.normal * &values));
                 if let Some(error) = &mut errors[d] {
                     *error = (left.max(0.0) / squares[d]).sqrt();
                 }
@@ -351,14 +412,112 @@ impl HypothesisRows {
 }
 
 /// Solves normal equations whose columns are scaled to one, with a very small ridge; `None` if a number is not finite.
-pub(super) fn solve_scaled(mut normal: DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
-    let scale = normal.diagonal().map(|x| if x > 0.0 { x.sqrt().recip() } else { 0.0 });
+pub(super) fn solve_scaled(normal: DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
+    let complete = normal.diagonal();
+    solve_reduced(normal, &complete, right)
+}
+
+/// The same for normal equations from which other columns were eliminated.
+fn solve_reduced(normal: DMatrix<f64>, complete: &DVector<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
+    let (factor, scale) = factor_scaled(normal, complete)?;
+    Some(factor.solve(&right.component_mul(&scale)).component_mul(&scale))
+}
+
+/// Factor of normal equations whose columns are scaled to one, with the ridge, and the factors of the scale. `complete` is
+/// their diagonal before other columns were eliminated: a column that those explain has nothing but rounding left. Only the
+/// lower triangle is read.
+fn factor_scaled(mut normal: DMatrix<f64>, complete: &DVector<f64>) -> Option<(Cholesky<f64, Dyn>, DVector<f64>)> {
+    let scale = complete.map(|square| if square > 0.0 { square.sqrt().recip() } else { 0.0 });
     for j in 0..scale.len() {
-        for i in 0..scale.len() {
+        for i in j..scale.len() {
             normal[(i, j)] *= scale[i] * scale[j];
         }
         normal[(j, j)] += RIDGE;
     }
-    let solved = normal.cholesky()?.solve(&right.component_mul(&scale));
-    Some(solved.component_mul(&scale))
+    Some((normal.cholesky()?, scale))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers that look random, `[row, column]`.
+    fn numbers(rows: usize, columns: usize, salt: f64) -> DMatrix<f64> {
+        DMatrix::from_fn(rows, columns, |i, k| {
+            (salt + 12.9898 * i as f64 + 78.233 * k as f64).sin() * 43.7 % 1.0
+        })
+    }
+
+    /// Fitted errors by least squares on the rows of all drives, with all columns.
+    fn errors_of_rows(rows: &[DMatrix<f64>], forces: &[Vec<f64>], change: &ForceChange) -> Vec<f64> {
+        let (n, samples) = (rows.len(), forces[0].len());
+        let base = rows[0].ncols() - MORE;
+        let force = |d: usize, i: usize| {
+            let (source, factor) = change.source(d);
+            factor * forces[source][i]
+        };
+        let size = |d: usize| (0..samples).map(|i| force(d, i).powi(2)).sum::<f64>().sqrt();
+        let mut errors = vec![1.0_f64; n];
+        for _ in 0..ROUNDS {
+            let weight = |d: usize| 1.0 / (size(d) * errors[d].max(FIT_ERROR_FLOOR));
+            let stacked = DMatrix::from_fn(n * samples, base + MORE * n, |row, k| {
+                let (d, i) = (row / samples, row % samples);
+                let own = (base + MORE * d..base + MORE * (d + 1)).contains(&k);
+                match (k < base, own) {
+                    (true, _) => weight(d) * rows[d][(i, k)],
+                    (_, true) => weight(d) * rows[d][(i, k - MORE * d)],
+                    _ => 0.0,
+                }
+            });
+            let measured = DVector::from_fn(n * samples, |row, _| {
+                weight(row / samples) * force(row / samples, row % samples)
+            });
+            let svd = stacked.clone().svd(true, true);
+            let values = svd
+                .solve(&measured, 1e-9 * svd.singular_values.max())
+                .expect("vectors are there");
+            let residual = measured - stacked * values;
+            errors = (0..n)
+                .map(|d| residual.rows(d * samples, samples).norm() / (size(d) * weight(d)))
+                .collect();
+        }
+        errors
+    }
+
+    #[test]
+    fn fitted_errors_are_those_of_all_columns_together() {
+        let (samples, base) = (60, 5);
+        for dependent in [false, true] {
+            let rows: Vec<DMatrix<f64>> = (0..3)
+                .map(|d| {
+                    let mut rows = numbers(samples, base + MORE, 0.3 + f64::from(d));
+                    // A base parameter that the columns of a drive explain, and one that does not act on it.
+                    if dependent && d == 1 {
+                        let own = 2.0 * rows.column(base + MORE - 1);
+                        rows.set_column(0, &own);
+                        rows.column_mut(1).fill(0.0);
+                    }
+                    rows
+                })
+                .collect();
+            let forces: Vec<Vec<f64>> = (rows.iter().enumerate())
+                .map(|(d, rows)| {
+                    let exact = rows.column_sum();
+                    let noise = numbers(samples, 1, 9.7 + d as f64);
+                    (0..samples).map(|i| exact[i] + 0.3 * noise[i]).collect()
+                })
+                .collect();
+            let channels = rows.iter().map(|rows| ChannelMoments::new(rows, &forces)).collect();
+            let moments = HypothesisRows { channels, base };
+            for change in [vec![], vec![(1, 1, -1.0)], vec![(0, 2, 1.0), (2, 0, 1.0)]] {
+                let change = ForceChange(change);
+                let expected = errors_of_rows(&rows, &forces, &change);
+                let found = moments.fit_errors(&change);
+                for (found, expected) in found.iter().zip(&expected) {
+                    let found = found.expect("all drives have forces");
+                    assert!((found - expected).abs() < 1e-6 * expected, "{found} and {expected}");
+                }
+            }
+        }
+    }
 }

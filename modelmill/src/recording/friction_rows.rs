@@ -36,14 +36,14 @@ pub(super) fn regressor_with_friction(model: &Model, states: &PickedStates) -> O
 
 /// Solves scaled normal equations with a small ridge, since columns may be equal. Only the lower triangle is read.
 pub(super) fn solve_scaled(normal: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
-    let mut normal = symmetric(normal);
+    let mut normal = normal.clone();
     let n = right.len();
     let scale: Vec<f64> = (0..n)
         .map(|i| normal[(i, i)].max(0.0).sqrt())
         .map(|norm| if norm > 0.0 { norm.recip() } else { 0.0 })
         .collect();
     for i in 0..n {
-        for j in 0..n {
+        for j in 0..=i {
             normal[(i, j)] *= scale[i] * scale[j];
         }
         normal[(i, i)] += 1e-9;
@@ -51,11 +51,4 @@ pub(super) fn solve_scaled(normal: &DMatrix<f64>, right: &DVector<f64>) -> Optio
     let scale = DVector::from_vec(scale);
     let scaled = right.component_mul(&scale);
     Some(normal.cholesky()?.solve(&scaled).component_mul(&scale))
-}
-
-/// The symmetric matrix of a lower triangle.
-pub(super) fn symmetric(lower: &DMatrix<f64>) -> DMatrix<f64> {
-    let mut whole = lower.clone();
-    whole.fill_upper_triangle_with_lower_triangle();
-    whole
 }

@@ -4,7 +4,7 @@
 use modelmill_identify::{LowPass, float_to_count};
 use nalgebra::{DMatrix, DVector};
 
-use super::friction_rows::{solve_scaled, symmetric};
+use super::friction_rows::solve_scaled;
 use super::thresholds::SMOOTHING_ROWS_PER_COLUMN;
 
 /// Number of parts of the time, each of which is held out once.
@@ -120,7 +120,7 @@ pub(super) struct FoldSums {
 /// Normal equations of one drive.
 #[derive(Clone)]
 pub(super) struct DriveNormalEquations {
-    /// Gram matrix of the columns, lower triangle.
+    /// Gram matrix of the columns.
     normal: DMatrix<f64>,
     /// Inner products of columns and force.
     right: DVector<f64>,
@@ -144,16 +144,28 @@ impl FoldSums {
         }
     }
 
-    /// Adds the rows of all drives at a sample.
-    pub(super) fn add(&mut self, samples: &WindowSamples, i: usize) {
+    /// Adds the rows of all drives at some samples.
+    pub(super) fn add(&mut self, samples: &WindowSamples, which: &[usize]) {
         let drives = self.drives.len();
         for (d, one) in self.drives.iter_mut().enumerate() {
-            let row = samples.regressor.row(i * drives + d).transpose();
-            let force = samples.forces[(i, d)];
-            one.normal.syger(1.0, &row, &row, 1.0);
-            one.right.axpy(force, &row, 1.0);
-            one.size += force * force;
-            one.rows += 1;
+            let rows = samples
+                .regressor
+                .select_rows(&which.iter().map(|i| i * drives + d).collect::<Vec<_>>());
+            // Most columns of friction belong to other drives, and are zero here.
+            let acting: Vec<usize> = (0..rows.ncols())
+                .filter(|k| rows.column(*k).iter().any(|x| *x != 0.0))
+                .collect();
+            let rows = rows.select_columns(&acting);
+            let forces = DVector::from_iterator(which.len(), which.iter().map(|i| samples.forces[(*i, d)]));
+            let (normal, right) = (rows.transpose() * &rows, rows.tr_mul(&forces));
+            for (j, column) in acting.iter().enumerate() {
+                one.right[*column] += right[j];
+                for (i, row) in acting.iter().enumerate() {
+                    one.normal[(*row, *column)] += normal[(i, j)];
+                }
+            }
+            one.size += forces.norm_squared();
+            one.rows += which.len();
         }
     }
 }
@@ -196,7 +208,7 @@ pub(super) fn fit_folds(folds: &[FoldSums]) -> Option<Vec<DVector<f64>>> {
             let found = solve_scaled(&normal, &right)?;
             // The sum of squares of the residual follows from the sums of the fold.
             for (left, one) in left.iter_mut().zip(&judged.drives) {
-                let explained = 2.0 * one.right.dot(&found) - (symmetric(&one.normal) * &found).dot(&found);
+                let explained = 2.0 * one.right.dot(&found) - (&one.normal * &found).dot(&found);
                 *left += (one.size - explained).max(0.0);
             }
             values.push(found);

@@ -482,3 +482,56 @@ fn singular_poses_are_singular_at_any_size() {
         assert!(of(FRAC_PI_2 - 1e-6).is_ok(), "{unit}");
     }
 }
+
+/// `check_states` refuses the states that the regressor refuses, for the same reason, and no other.
+#[test]
+fn a_check_of_states_refuses_what_the_regressor_refuses() {
+    let mut refused = 0;
+    let mut accepted = 0;
+    for name in [
+        "five_bar",
+        "four_bar",
+        "three_rrr",
+        "spidermill",
+        "slider_crank",
+        "delta",
+        "gough_stewart",
+    ] {
+        let derivation = derived(name);
+        let evaluator = ModelEvaluator::new(&derivation);
+        // Poses near the nominal one, and far beyond what the lengths allow.
+        for (reach, seed) in [(0.2, 1), (3.0, 2)] {
+            let all = Sample::random(&derivation.mechanism, 60, reach, &mut Stream::new(seed));
+            for i in 0..all.len() {
+                let one = all.only(i);
+                let found = evaluator.check_states(&one.states());
+                assert_eq!(
+                    found,
+                    evaluator.full_regressor(&one.states()).map(|_| ()),
+                    "{name}, {reach}, state {i}"
+                );
+                match found {
+                    Ok(()) => accepted += 1,
+                    Err(_) => refused += 1,
+                }
+            }
+            // Of many states the first that has no solution is named.
+            let whole = evaluator.check_states(&all.states());
+            assert_eq!(
+                whole,
+                evaluator.full_regressor(&all.states()).map(|_| ()),
+                "{name}, {reach}"
+            );
+        }
+        // A number that is none is named by both.
+        let mut lost = Sample::random(&derivation.mechanism, 3, 0.1, &mut Stream::new(3));
+        lost.q[0][1] = f64::NAN;
+        let whole = evaluator.check_states(&lost.states());
+        assert_eq!(whole, evaluator.full_regressor(&lost.states()).map(|_| ()), "{name}");
+        assert!(whole.is_err(), "{name}");
+    }
+    assert!(
+        refused > 100 && accepted > 200,
+        "{refused} refused, {accepted} accepted"
+    );
+}

@@ -1,4 +1,7 @@
-//! The page that has the mill in itself, opened from the disk: it derives, diagnoses and adds with the figures of the program.
+//! The mill as WebAssembly, in a page that is opened from the disk and under Node: it derives, diagnoses and adds with the
+//! figures of the program.
+
+mod node;
 
 use std::path::PathBuf;
 
@@ -8,12 +11,8 @@ use serde_json::Value;
 use crate::common::browser::{Browser, Window};
 use crate::common::{self, model, number, run, scratch};
 
-/// The page around a module that tests have built anyway; `None`, with the reason, where none can be built. `MODELMILL_PAGE`
-/// names a page to look at in its place, such as one that was made for size.
-fn page() -> Option<String> {
-    if let Some(own) = std::env::var_os("MODELMILL_PAGE") {
-        return Some(own.into_string().expect("a path of plain text"));
-    }
+/// The module, built now; `None`, with the reason, where this machine has no compiler for it.
+fn module() -> Option<PathBuf> {
     if let Some(why) = make::missing_target() {
         assert!(std::env::var_os("MODELMILL_WASM_REQUIRED").is_none(), "{why}");
         eprintln!("skipped: {why}");
@@ -21,9 +20,18 @@ fn page() -> Option<String> {
     }
     let program = PathBuf::from(env!("CARGO_BIN_EXE_modelmill"));
     let builds = program.ancestors().nth(2).expect("a folder of builds");
-    let made = make::build_module("page-test", builds).and_then(|module| make::build_page(&module));
+    Some(make::build_module("page-test", builds).unwrap_or_else(|says| panic!("{says}")))
+}
+
+/// The page around the module; `None`, with the reason, where none can be built. `MODELMILL_PAGE` names a page to look at
+/// in its place, such as one that was made for size.
+fn page() -> Option<String> {
+    if let Some(own) = std::env::var_os("MODELMILL_PAGE") {
+        return Some(own.into_string().expect("a path of plain text"));
+    }
+    let made = make::build_page(&module()?).unwrap_or_else(|says| panic!("{says}"));
     let path = scratch("try.html");
-    std::fs::write(&path, made.unwrap_or_else(|says| panic!("{says}"))).expect("the page");
+    std::fs::write(&path, made).expect("the page");
     Some(path)
 }
 

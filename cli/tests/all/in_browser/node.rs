@@ -1,12 +1,14 @@
 //! The mill under WebAssembly gives the answers that it gives here.
 
 use std::fs::File;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Stdio};
 
 use modelmill_in_browser::make;
 use modelmill_workbench::RequestHandler;
 use serde_json::{Value, json};
+
+use crate::common::scratch;
 
 /// Largest deviation of a number, relative: sines and cosines come from another library there, in whose last digit they differ.
 /// The model explains the forces but for 4e-7 of them, so that what is told of this rest has seven digits fewer.
@@ -17,7 +19,13 @@ const FOUND: [&str; 5] = ["verdict", "noise_floor", "budget", "steps", "effects"
 
 #[test]
 fn node_derives_identifies_and_diagnoses_with_the_same_numbers() {
-    let Some(module) = module() else { return };
+    if Command::new("node").arg("--version").output().is_err() {
+        let why = "there is no `node` to run WebAssembly";
+        assert!(std::env::var_os("MODELMILL_WASM_REQUIRED").is_none(), "{why}");
+        eprintln!("skipped: {why}");
+        return;
+    }
+    let Some(module) = super::module() else { return };
     let bundle = make::load_bundle().expect("models and recordings are there");
     let recordings = bundle.recordings.iter().map(|(_, name, text, _)| (name, text));
     let models = bundle.models.iter().map(|(name, text)| (name, text));
@@ -47,8 +55,8 @@ fn node_derives_identifies_and_diagnoses_with_the_same_numbers() {
     let found = &here[2]["told"]["found"]["entries"][0]["kind"];
     assert_eq!(found, "rod_inertia");
 
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/ask.mjs");
-    let asked = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("questions.json");
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/all/in_browser/ask.mjs");
+    let asked = scratch("questions.json");
     let text = json!({ "files": files, "questions": questions }).to_string();
     std::fs::write(&asked, text).expect("the questions are written");
     let node = Command::new("node")
@@ -78,21 +86,6 @@ fn node_derives_identifies_and_diagnoses_with_the_same_numbers() {
         }
     }
     assert!(numbers > 200, "{numbers} numbers were compared");
-}
-
-/// The module, built now; `None`, with the reason, where this machine has no compiler or no Node for it.
-fn module() -> Option<PathBuf> {
-    let node = Command::new("node").arg("--version").output().is_ok();
-    let no_node = (!node).then(|| "there is no `node` to run WebAssembly".to_owned());
-    if let Some(why) = no_node.or_else(make::missing_target) {
-        assert!(std::env::var_os("MODELMILL_WASM_REQUIRED").is_none(), "{why}");
-        eprintln!("skipped: {why}");
-        return None;
-    }
-    // The folder of this test is `deps` in that of its profile, and that in the folder of builds or of a target in it.
-    let test = std::env::current_exe().expect("a test has a path");
-    let builds = test.ancestors().nth(3).expect("a folder of builds");
-    Some(make::build_module("page-test", builds).unwrap_or_else(|says| panic!("{says}")))
 }
 
 /// Compares two answers, and counts their numbers. How long something took is no part of them, and pictures and texts of
