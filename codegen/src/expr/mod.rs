@@ -22,7 +22,8 @@ pub(crate) mod vector;
 
 use std::collections::BTreeSet;
 
-use rustc_hash::FxHashMap;
+use indexmap::IndexSet;
+use rustc_hash::FxBuildHasher;
 
 pub use angle::AtomAngleSum;
 pub(crate) use coordinates::coordinates_of;
@@ -123,10 +124,8 @@ impl Node {
 /// The arena of expressions.
 #[derive(Clone, Debug)]
 pub struct Graph {
-    /// Nodes by index; operands stand before the nodes that use them.
-    nodes: Vec<Node>,
-    /// Index of every node, so that an equal node is found instead of being stored twice.
-    ids: FxHashMap<Node, ExprId>,
+    /// Nodes by index, each once; operands stand before the nodes that use them.
+    nodes: IndexSet<Node, FxBuildHasher>,
 }
 
 impl Default for Graph {
@@ -144,8 +143,7 @@ impl Graph {
     /// A graph that contains only the numbers 0 and 1.
     pub fn new() -> Self {
         let mut graph = Self {
-            nodes: Vec::new(),
-            ids: FxHashMap::default(),
+            nodes: IndexSet::default(),
         };
         let zero = graph.intern(Node::Rational(Rational::ZERO));
         let one = graph.intern(Node::Rational(Rational::ONE));
@@ -245,12 +243,7 @@ impl Graph {
 
     /// The id of a node: that of the equal node that is stored already, or a new one.
     fn intern(&mut self, node: Node) -> ExprId {
-        if let Some(id) = self.ids.get(&node) {
-            return *id;
-        }
-        let id = ExprId(u32::try_from(self.nodes.len()).expect("graph below 4G nodes"));
-        self.nodes.push(node.clone());
-        self.ids.insert(node, id);
-        id
+        let (index, _) = self.nodes.insert_full(node);
+        ExprId(u32::try_from(index).expect("graph below 4G nodes"))
     }
 }

@@ -85,8 +85,10 @@ pub(crate) fn lower_with_passes(
     // whole arena several times, so it holds only needed nodes.
     let (mut graph, mut roots) = graph.compacted(&roots);
     let mut best = schedule::schedule(&graph, &roots, request);
-    for _ in 0..MOST_ROUNDS {
-        (graph, roots) = graph.compacted(&roots);
+    for round in 0..MOST_ROUNDS {
+        if round > 0 {
+            (graph, roots) = graph.compacted(&roots);
+        }
         for pass in passes {
             (graph, roots) = (pass.run)(graph, &roots);
         }

@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 
 use modelmill_spec::Mechanism;
+use rayon::prelude::*;
 
 use crate::DeriveError;
 use crate::expr::{Atom, AtomAngleSum, ExprId, Graph, Node, nominal_value};
@@ -324,6 +325,24 @@ impl PassiveClosure {
         }
     }
 
+    /// The same for several programs, each with its outputs.
+    pub(crate) fn programs(
+        &self,
+        graph: &mut Graph,
+        equations: &UnreducedEquations,
+        outputs: &[&[ExprId]],
+    ) -> Vec<StraightLineProgram> {
+        let nothing = BTreeMap::new();
+        let closed: Vec<ClosedOutputs> = (outputs.iter())
+            .map(|outputs| self.close(graph, equations, outputs, &nothing))
+            .collect();
+        let graph = &*graph;
+        closed
+            .into_par_iter()
+            .map(|closed| self.lower(graph, &closed))
+            .collect()
+    }
+
     /// The same with some rates and accelerations replaced by `known` expressions, such as zero.
     pub(crate) fn program_at(
         &self,
@@ -332,6 +351,18 @@ impl PassiveClosure {
         outputs: &[ExprId],
         known: &BTreeMap<ExprId, ExprId>,
     ) -> StraightLineProgram {
+        let closed = self.close(graph, equations, outputs, known);
+        self.lower(graph, &closed)
+    }
+
+    /// Closes some expressions over the active coordinates.
+    fn close(
+        &self,
+        graph: &mut Graph,
+        equations: &UnreducedEquations,
+        outputs: &[ExprId],
+        known: &BTreeMap<ExprId, ExprId>,
+    ) -> ClosedOutputs {
         let projection = &equations.projection;
         // Rates first, because accelerations depend on them.
         let passive_rates = graph.substitute(&projection.passive_rates, known);
@@ -366,16 +397,35 @@ impl PassiveClosure {
                 varies.then(|| (base, graph.scale(*size, &factor.abs().recip())))
             })
             .collect();
+        ClosedOutputs {
+            outputs: outputs.to_vec(),
+            regular,
+            definitions,
+        }
+    }
+
+    /// Lowers closed expressions to a program.
+    fn lower(&self, graph: &Graph, closed: &ClosedOutputs) -> StraightLineProgram {
         lower_with_passes(
             graph,
             self.passes,
             &LoweringRequest {
                 may_be_undefined: self.may_be_undefined,
-                outputs,
+                outputs: &closed.outputs,
                 reachable: &self.reachable,
-                regular: &regular,
-                definitions: &definitions,
+                regular: &closed.regular,
+                definitions: &closed.definitions,
             },
         )
     }
+}
+
+/// Expressions that depend on active coordinates only, ready to be lowered.
+struct ClosedOutputs {
+    /// The expressions.
+    outputs: Vec<ExprId>,
+    /// Determinants that must not vanish, with their sizes.
+    regular: Vec<(ExprId, ExprId)>,
+    /// Passive coordinates.
+    definitions: Vec<AtomDefinition>,
 }

@@ -140,22 +140,37 @@ pub(crate) fn programs(
     // Expressions are closed over the active coordinates and lowered.
     let n_motion = drives.len();
     let together = [drives.as_slice(), &inverse_dynamics].concat();
-    let mut program = |outputs: &[ExprId]| closing.program(graph, equations, outputs);
-    let regressor = program(&regressor);
-    let inverse_dynamics = program(&inverse_dynamics);
-    let mut drives = program(&drives);
-    if matches!(passive_position, PassivePosition::Closed) {
+    let is_closed = matches!(passive_position, PassivePosition::Closed);
+    let full_regressor = row_by_row(&all);
+    let together = if is_closed { together.as_slice() } else { &[] };
+    let outputs = [
+        &regressor,
+        &inverse_dynamics,
+        &drives,
+        together,
+        &passive,
+        &full_regressor,
+    ];
+    let [
+        regressor,
+        inverse_dynamics,
+        mut drives,
+        together,
+        passive,
+        full_regressor,
+    ] = (closing.programs(graph, equations, &outputs).try_into()).expect("one program for each list of outputs");
+    if is_closed {
         // Loops are closed by the same operations as in the inverse dynamics, so that the code has them once, unless
         // that costs more than a tenth.
-        let same = program(&together).with_outputs(n_motion);
+        let same = together.with_outputs(n_motion);
         if 10 * same.weight() <= 11 * drives.weight() {
             drives = same;
         }
     }
     Ok(ModelPrograms {
         passive_position,
-        passive: program(&passive),
-        full_regressor: program(&row_by_row(&all)),
+        passive,
+        full_regressor,
         regressor,
         inverse_dynamics,
         base_parameters,
