@@ -70,4 +70,4 @@ pub use recording::{
     RecordingFile, RecordingFiles, RecordingNote, SignalRecording, TableInfo, UnwrappedAngle, display_name_of_bytes,
     has_recording_extension, sample_place_word,
 };
-pub use signal::{FilterError, LowPass, MAX_FILTER_ORDER, float_to_count, median};
+pub use signal::{FilterError, LowPass, MAX_FILTER_ORDER, float_to_count, gram, median};

@@ -309,6 +309,24 @@ impl PassiveClosure {
         self.program_at(graph, equations, outputs, &BTreeMap::new())
     }
 
+    /// Closes several lists of expressions in their order, and lowers them all at once.
+    pub(crate) fn lower_all(
+        &self,
+        graph: &mut Graph,
+        equations: &UnreducedEquations,
+        outputs: &[Vec<ExprId>],
+    ) -> Vec<StraightLineProgram> {
+        let nothing = BTreeMap::new();
+        let closed: Vec<ClosedOutputs> = (outputs.iter())
+            .map(|outputs| self.close(graph, equations, outputs, &nothing))
+            .collect();
+        let graph = &*graph;
+        closed
+            .into_par_iter()
+            .map(|closed| self.lower(graph, &closed))
+            .collect()
+    }
+
     /// Cost of a program of some expressions, in additions. In an open chain the expressions themselves are counted:
     /// closing changes nothing and lowering saves little, and that takes a small part of the time.
     pub(crate) fn program_cost(
@@ -325,25 +343,7 @@ impl PassiveClosure {
         }
     }
 
-    /// The same for several programs, each with its outputs.
-    pub(crate) fn programs(
-        &self,
-        graph: &mut Graph,
-        equations: &UnreducedEquations,
-        outputs: &[&[ExprId]],
-    ) -> Vec<StraightLineProgram> {
-        let nothing = BTreeMap::new();
-        let closed: Vec<ClosedOutputs> = (outputs.iter())
-            .map(|outputs| self.close(graph, equations, outputs, &nothing))
-            .collect();
-        let graph = &*graph;
-        closed
-            .into_par_iter()
-            .map(|closed| self.lower(graph, &closed))
-            .collect()
-    }
-
-    /// The same with some rates and accelerations replaced by `known` expressions, such as zero.
+    /// A program with some rates and accelerations replaced by `known` expressions, such as zero.
     pub(crate) fn program_at(
         &self,
         graph: &mut Graph,

@@ -142,35 +142,25 @@ pub(crate) fn programs(
     let together = [drives.as_slice(), &inverse_dynamics].concat();
     let is_closed = matches!(passive_position, PassivePosition::Closed);
     let full_regressor = row_by_row(&all);
-    let together = if is_closed { together.as_slice() } else { &[] };
-    let outputs = [
-        &regressor,
-        &inverse_dynamics,
-        &drives,
-        together,
-        &passive,
-        &full_regressor,
-    ];
-    let [
-        regressor,
-        inverse_dynamics,
-        mut drives,
-        together,
-        passive,
-        full_regressor,
-    ] = (closing.programs(graph, equations, &outputs).try_into()).expect("one program for each list of outputs");
+    let mut outputs = vec![regressor, inverse_dynamics, drives, passive, full_regressor];
+    if is_closed {
+        outputs.insert(3, together);
+    }
+    let mut programs = closing.lower_all(graph, equations, &outputs).into_iter();
+    let mut next = || programs.next().expect("a program for each list of outputs");
+    let (regressor, inverse_dynamics, mut drives) = (next(), next(), next());
     if is_closed {
         // Loops are closed by the same operations as in the inverse dynamics, so that the code has them once, unless
         // that costs more than a tenth.
-        let same = together.with_outputs(n_motion);
+        let same = next().with_outputs(n_motion);
         if 10 * same.weight() <= 11 * drives.weight() {
             drives = same;
         }
     }
     Ok(ModelPrograms {
         passive_position,
-        passive,
-        full_regressor,
+        passive: next(),
+        full_regressor: next(),
         regressor,
         inverse_dynamics,
         base_parameters,

@@ -147,19 +147,20 @@ impl ChannelRegressor {
         let mut normal = DMatrix::zeros(self.columns, self.columns);
         let mut right = DVector::zeros(self.columns);
         for (c, channel) in self.channels.iter().enumerate() {
-            let of_rows =
+            let of_channel =
                 |values: &DVector<f64>| -> Vec<f64> { samples.clone().map(|sample| values[sample * n + c]).collect() };
-            let (weights, forces) = (of_rows(weights), of_rows(measured));
-            let rows = channel.rows.as_slice();
-            let column = |k: usize| &rows[k * channel.rows.nrows()..][samples.clone()];
-            for (j, to) in channel.column_indices.iter().enumerate() {
+            let (weights, forces) = (of_channel(weights), of_channel(measured));
+            let (rows, height) = (channel.rows.as_slice(), channel.rows.nrows());
+            let column = |k: usize| &rows[k * height..(k + 1) * height][samples.clone()];
+            // Products among the columns of this channel, at their places in the complete matrix, which is symmetric.
+            for (j, column_j) in channel.column_indices.iter().enumerate() {
                 let weighted: Vec<f64> = column(j).iter().zip(&weights).map(|(x, weight)| x * weight).collect();
-                right[*to] += dot(&weighted, &forces);
-                for (i, other) in channel.column_indices[..=j].iter().enumerate() {
+                right[*column_j] += dot(&weighted, &forces);
+                for (i, column_i) in channel.column_indices[..=j].iter().enumerate() {
                     let product = dot(&weighted, column(i));
-                    normal[(*other, *to)] += product;
+                    normal[(*column_i, *column_j)] += product;
                     if i < j {
-                        normal[(*to, *other)] += product;
+                        normal[(*column_j, *column_i)] += product;
                     }
                 }
             }

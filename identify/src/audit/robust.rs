@@ -5,10 +5,11 @@
 //! median of the absolute residuals. Columns may be dependent, since a very small ridge is added to the scaled normal
 //! equations.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use nalgebra::DVector;
 
 use super::by_channel::ChannelRegressor;
 use super::thresholds::AUDIT_HUBER_BOUND_SIGMAS;
+use crate::estimate::ScaledNormal;
 use crate::signal::median;
 
 /// Number of times rows are reweighted.
@@ -16,7 +17,7 @@ const ROUNDS: usize = 5;
 /// Residuals below this share of the largest force are rounding.
 const ROUNDING: f64 = 1e-9;
 /// Ridge that is added to the diagonal of the scaled normal equations, which is 1.
-const RIDGE: f64 = 1e-10;
+pub(super) const NORMAL_RIDGE: f64 = 1e-10;
 
 /// Result of a robust fit.
 #[derive(Debug, Clone)]
@@ -41,12 +42,12 @@ impl RobustFit {
     ) -> Option<Vec<f64>> {
         let nothing = DVector::zeros(self.weights.len());
         let (normal, _) = regressor.normal_equations(&self.weights, &nothing, 0..regressor.samples());
-        let (factor, scale) = factor_normal(normal)?;
+        let factor = ScaledNormal::new(normal, NORMAL_RIDGE)?;
         // The weight of a row without error is the inverse variance of its channel.
         let weight = (channel..self.weights.len()).step_by(regressor.channels());
         let weight = weight.fold(0.0_f64, |most, row| most.max(self.weights[row]));
         let deviation = |sample: &usize| {
-            let row = regressor.row(channel, *sample).component_mul(&scale);
+            let row = regressor.row(channel, *sample);
             (weight * row.dot(&factor.solve(&row)).max(0.0)).sqrt()
         };
         Some(samples.iter().map(deviation).collect())
@@ -87,7 +88,7 @@ pub fn robust_fit(regressor: &ChannelRegressor, measured: &DVector<f64>, counts:
             return None;
         }
         let (normal, right) = regressor.normal_equations(&weights, measured, 0..regressor.samples());
-        let values = solve_normal(normal, &right)?;
+        let values = ScaledNormal::new(normal, NORMAL_RIDGE)?.solve(&right);
         rest = measured - regressor.multiply(values.as_slice());
         found = Some(values);
     }
@@ -100,27 +101,10 @@ pub fn robust_fit(regressor: &ChannelRegressor, measured: &DVector<f64>, counts:
     })
 }
 
-/// Solves normal equations with a very small ridge; `None` if they are not positive definite.
-pub(super) fn solve_normal(normal: DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
-    let (factor, scale) = factor_normal(normal)?;
-    let solved = factor.solve(&right.component_mul(&scale));
-    Some(solved.component_mul(&scale))
-}
-
-/// Factor of normal equations whose columns are scaled to one, with a very small ridge, and the scales.
-fn factor_normal(mut normal: DMatrix<f64>) -> Option<(Cholesky<f64, Dyn>, DVector<f64>)> {
-    let scale = normal.diagonal().map(|x| if x > 0.0 { x.sqrt().recip() } else { 0.0 });
-    for i in 0..scale.len() {
-        for j in 0..scale.len() {
-            normal[(i, j)] *= scale[i] * scale[j];
-        }
-        normal[(i, i)] += RIDGE;
-    }
-    Some((normal.cholesky()?, scale))
-}
-
 #[cfg(test)]
 mod tests {
+    use nalgebra::DMatrix;
+
     use super::*;
     use crate::test_noise::TestNoise;
 

@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::estimate::body_matrices::{BodyMatrix, NominalBodyMatrix};
 use crate::estimate::error::PhysicalError;
+use crate::estimate::scaled_normal::ScaledNormal;
 
 /// Base parameters as a function of physical parameters, with derivatives (rows: base parameters), in the order of the
 /// regressor's columns.
@@ -128,11 +129,12 @@ impl MisfitFunction<'_> {
                         damped[(i, i)] = 1.0;
                     }
                 }
-                let step = solve_scaled(&damped, &point.gradient).map(|step| -step);
-                let Some(step) = step else {
+                // Parameters differ in units.
+                let Some(factor) = ScaledNormal::new(damped, 0.0) else {
                     damping *= 100.0;
                     continue;
                 };
+                let step = -factor.solve(&point.gradient);
                 let slope = point.gradient.dot(&step);
                 // Negligible decrease: one unit is half a squared standard deviation.
                 if -slope <= 1e-8 * (1.0 + point.value.abs().min(1e4)) {
@@ -166,14 +168,4 @@ impl MisfitFunction<'_> {
         }
         Err(PhysicalError::NoConvergence)
     }
-}
-
-/// Solves a positive definite system after scaling its diagonal to 1, since parameters differ in units.
-fn solve_scaled(matrix: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
-    let scale = matrix.diagonal().map(|d| if d > 0.0 { d.sqrt().recip() } else { 1.0 });
-    let scaled = DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| {
-        scale[i] * matrix[(i, j)] * scale[j]
-    });
-    let solved = scaled.cholesky()?.solve(&right.component_mul(&scale));
-    Some(solved.component_mul(&scale))
 }

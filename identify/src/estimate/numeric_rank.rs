@@ -221,7 +221,7 @@ fn scale(w: &DMatrix<f64>, norms: &[f64]) -> DMatrix<f64> {
 ///
 /// Reflections of some columns are applied to the others together, `I - V T V'`: products of matrices take a fraction of
 /// the time of one reflection after the other (Golub and Van Loan, 5.2.3).
-fn r_factor(w: &DMatrix<f64>) -> DMatrix<f64> {
+pub(crate) fn r_factor(w: &DMatrix<f64>) -> DMatrix<f64> {
     let (rows, columns) = w.shape();
     if rows <= columns {
         return w.clone();
@@ -234,8 +234,7 @@ fn r_factor(w: &DMatrix<f64>) -> DMatrix<f64> {
         let right = start + width;
         if right < columns {
             let mut rest = reduced.view_mut((start, right), (rows - start, columns - right));
-            let mut products = vectors.transpose() * &rest;
-            products = factors.tr_mul(&products);
+            let products = factors.tr_mul(&(vectors.transpose() * &rest));
             rest.gemm(-1.0, &vectors, &products, 1.0);
         }
     }
@@ -299,29 +298,33 @@ mod tests {
     use crate::LeastSquares;
     use crate::test_noise::TestNoise;
 
-    /// The factor has the products of the columns, and its columns are those of a reflection after the other but for their
+    /// The factor has the products of the columns, and its rows are those of one reflection after the other but for their
     /// signs.
     #[test]
     fn the_factor_has_the_products_of_the_columns() {
         let mut noise = TestNoise::new(4);
         for (rows, columns) in [(3, 2), (40, 31), (100, 32), (150, 65), (300, 140), (5, 9)] {
             let mut w = DMatrix::from_fn(rows, columns, |_, _| noise.normal());
+            let check = |w: &DMatrix<f64>| {
+                let factor = r_factor(w);
+                assert!((factor.tr_mul(&factor) - w.tr_mul(w)).amax() < 1e-14 * w.norm_squared());
+                assert!(rows <= columns || factor == factor.upper_triangle());
+                factor
+            };
+            let factor = check(&w);
+            if rows > columns {
+                let textbook = w.clone().qr().r();
+                assert!(
+                    (textbook.abs() - factor.abs()).amax() < 1e-13 * w.norm(),
+                    "{rows}, {columns}"
+                );
+            }
             if columns > 3 {
-                // A column of zeros, and one that depends on others.
+                // A column of zeros, and one that depends on others: the rows behind it are any.
                 w.column_mut(1).fill(0.0);
                 let sum = w.column(0) + w.column(2);
                 w.set_column(3, &sum);
-            }
-            let factor = r_factor(&w);
-            let scale = (w.norm() * w.norm()).max(1.0);
-            assert!((factor.tr_mul(&factor) - w.tr_mul(&w)).amax() < 1e-14 * scale);
-            if rows > columns {
-                assert_eq!(factor, factor.upper_triangle());
-                let textbook = w.qr().r();
-                assert!(
-                    (textbook.abs() - factor.abs()).amax() < 1e-13 * scale.sqrt(),
-                    "{rows}, {columns}"
-                );
+                check(&w);
             }
         }
     }

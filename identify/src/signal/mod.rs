@@ -6,6 +6,7 @@ mod spectrum;
 mod statistics;
 
 pub use filters::{FilterError, LowPass, MAX_FILTER_ORDER};
+pub use products::gram;
 pub(crate) use products::{LANES, add_multiples, dot};
 pub(crate) use spectrum::hann_power;
 pub use statistics::{float_to_count, median, white_noise};

@@ -3,6 +3,7 @@
 //! Decision: products are added without fused operations, in an order that no machine changes, so that a diagnosis
 //! decides equally everywhere.
 
+use nalgebra::DMatrix;
 use pulp::{Arch, Simd, WithSimd};
 
 /// Number of partial sums of an inner product.
@@ -58,6 +59,21 @@ impl WithSimd for SeriesProduct<'_> {
         }
         sums
     }
+}
+
+/// Inner products of all columns of a matrix with each other.
+pub fn gram(columns: &DMatrix<f64>) -> DMatrix<f64> {
+    let (rows, n) = columns.shape();
+    let column = |k: usize| &columns.as_slice()[k * rows..(k + 1) * rows];
+    let mut products = DMatrix::zeros(n, n);
+    for j in 0..n {
+        for i in 0..=j {
+            let product = dot(column(i), column(j));
+            products[(i, j)] = product;
+            products[(j, i)] = product;
+        }
+    }
+    products
 }
 
 /// Adds multiples of series to a sum of the same length: `sum += factor * values` for each term, in their order.
@@ -135,6 +151,14 @@ mod tests {
             assert_eq!(dot(&a, &b).to_bits(), textbook(&a, &b).to_bits(), "{n} numbers");
         }
     }
+    #[test]
+    fn products_of_columns_are_those_of_the_transposed_matrix() {
+        for (rows, n) in [(0, 3), (7, 0), (5, 4), (130, 9)] {
+            let columns = DMatrix::from_fn(rows, n, |i, k| (0.3 + i as f64 * (1.0 + k as f64)).sin());
+            assert!((gram(&columns) - columns.tr_mul(&columns)).abs().sum() < 1e-11);
+        }
+    }
+
     #[test]
     fn multiples_are_added_in_their_order() {
         for (n, count) in [(0, 3), (5, 0), (1025, 1), (2500, 4), (3000, 7)] {

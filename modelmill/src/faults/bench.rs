@@ -5,7 +5,9 @@
 //! kept. Every change of the forces (sign, unit, exchange) then costs a small system of equations only.
 
 use modelmill_codegen::{ModelEvaluator, MotionStates};
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use modelmill_identify::estimate::ScaledNormal;
+use modelmill_identify::gram;
+use nalgebra::{DMatrix, DVector};
 
 use super::correction::{ForceChange, MotionChange};
 use super::thresholds::{BENCH_FEWEST_SAMPLES, FIT_ERROR_FLOOR, NOMINAL_ERROR_CAP, NOMINAL_ERROR_FLOOR};
@@ -179,7 +181,7 @@ impl<'a> FaultBench<'a> {
         })
     }
 
-    /// The rows of the model after a change of the motion; `None` if a pose has no solution.
+    /// The rows of the model after a change of the motion; `None` if a pose has no solution or a number is not finite.
     pub(super) fn rows(&self, change: &MotionChange) -> Option<HypothesisRows> {
         let n = self.forces.len();
         let (model_rows, drives) = self.with_states(change, |states| {
@@ -207,7 +209,7 @@ impl<'a> FaultBench<'a> {
             if rows.iter().any(|x| !x.is_finite()) {
                 return None;
             }
-            channels.push(ChannelMoments::new(&rows, &self.forces));
+            channels.push(ChannelMoments::new(&rows, &self.forces, self.nominal())?);
         }
         Some(HypothesisRows { channels, base })
     }
@@ -263,13 +265,17 @@ pub(super) struct HypothesisRows {
 
 /// Inner products of the columns of one drive.
 struct ChannelMoments {
-    /// The columns among themselves.
-    normal: DMatrix<f64>,
-    /// The columns with the force of each drive.
+    /// Squares of the columns of the model.
+    column_squares: DVector<f64>,
+    /// The columns that are fitted with nominal values, among themselves.
+    friction: DMatrix<f64>,
+    /// All columns with the force of the nominal values; `None` without these.
+    nominal: Option<DVector<f64>>,
+    /// All columns with the force of each drive.
     right: Vec<DVector<f64>>,
     /// Sum of squares of each force.
     squares: Vec<f64>,
-    /// The same without the part that the columns of this drive alone explain.
+    /// The columns of the model without the part that those of this drive alone explain.
     reduced: ReducedMoments,
 }
 
@@ -280,64 +286,51 @@ struct ReducedMoments {
     normal: DMatrix<f64>,
     /// The columns with the force of each drive.
     right: Vec<DVector<f64>>,
-    /// Sum of squares of each force.
+    /// Sum of squares of what is left of each force. The ridge adds at most its square root, relative to the force, to
+    /// an error: far below [`FIT_ERROR_FLOOR`].
     squares: Vec<f64>,
 }
 
 impl ChannelMoments {
-    /// The inner products of the rows of a drive with the forces of all drives. The last [`MORE`] columns are those of
-    /// this drive alone.
-    fn new(rows: &DMatrix<f64>, forces: &[Vec<f64>]) -> Self {
+    /// The inner products of the rows of a drive with the forces of all drives and with that of nominal values. The last
+    /// [`MORE`] columns are those of this drive alone. `None` if a number is not finite.
+    fn new(rows: &DMatrix<f64>, forces: &[Vec<f64>], nominal: Option<&[f64]>) -> Option<Self> {
         let vector = |force: &Vec<f64>| DVector::from_column_slice(force);
-        let normal = rows.transpose() * rows;
+        let base = rows.ncols() - MORE;
+        let normal = gram(rows);
         let right: Vec<DVector<f64>> = forces.iter().map(|force| rows.tr_mul(&vector(force))).collect();
         let squares: Vec<f64> = forces.iter().map(|force| vector(force).norm_squared()).collect();
-        let reduced = ReducedMoments::new(&normal, &right, &squares);
-        Self {
-            normal,
+        let many = MORE_WITH_NOMINAL;
+        Some(Self {
+            column_squares: normal.diagonal().rows(0, base).into_owned(),
+            friction: normal.view((base, base), (many, many)).into_owned(),
+            nominal: nominal.map(|values| normal.columns(0, base) * DVector::from_column_slice(values)),
+            reduced: ReducedMoments::new(&normal, &right, &squares)?,
             right,
             squares,
-            reduced,
-        }
+        })
     }
 }
 
 impl ReducedMoments {
-    /// Eliminates the last [`MORE`] columns: the Schur complement of their normal equations.
-    fn new(normal: &DMatrix<f64>, right: &[DVector<f64>], squares: &[f64]) -> Self {
+    /// Eliminates the last [`MORE`] columns: the Schur complement of their normal equations. `None` if a number is not
+    /// finite.
+    fn new(normal: &DMatrix<f64>, right: &[DVector<f64>], squares: &[f64]) -> Option<Self> {
         let base = normal.ncols() - MORE;
-        let own = normal.view((base, base), (MORE, MORE)).into_owned();
-        let diagonal = own.diagonal();
-        let halves = factor_scaled(own, &diagonal).map(|(factor, scale)| {
-            let half = |mut columns: DMatrix<f64>| {
-                for mut column in columns.column_iter_mut() {
-                    column.component_mul_assign(&scale);
-                }
-                factor.l_dirty().solve_lower_triangular_mut(&mut columns);
-                columns
-            };
-            let across = normal.view((base, 0), (MORE, base)).into_owned();
-            let forces = right.iter().map(|right| right.rows(base, MORE).into_owned());
-            (half(across), half(DMatrix::from_columns(&forces.collect::<Vec<_>>())))
-        });
+        let solver = ScaledNormal::new(normal.view((base, base), (MORE, MORE)).into_owned(), RIDGE)?;
+        let of_model = solver.half_solve(normal.view((base, 0), (MORE, base)).into_owned());
+        let forces = right.iter().map(|right| right.rows(base, MORE).into_owned());
+        let of_forces = solver.half_solve(DMatrix::from_columns(&forces.collect::<Vec<_>>()));
         let mut reduced = Self {
-            normal: normal.view((0, 0), (base, base)).into_owned(),
-            right: right.iter().map(|right| right.rows(0, base).into_owned()).collect(),
-            squares: squares.to_vec(),
+            normal: normal.view((0, 0), (base, base)) - of_model.transpose() * &of_model,
+            right: Vec::with_capacity(right.len()),
+            squares: Vec::with_capacity(right.len()),
         };
-        if let Some((columns, forces)) = halves {
-            reduced.normal -= columns.transpose() * &columns;
-            for ((right, square), force) in reduced
-                .right
-                .iter_mut()
-                .zip(&mut reduced.squares)
-                .zip(forces.column_iter())
-            {
-                *right -= columns.tr_mul(&force);
-                *square -= force.norm_squared();
-            }
+        for ((right, square), of_force) in right.iter().zip(squares).zip(of_forces.column_iter()) {
+            reduced.right.push(right.rows(0, base) - of_model.tr_mul(&of_force));
+            reduced.squares.push(square - of_force.norm_squared());
         }
-        reduced
+        Some(reduced)
     }
 }
 
@@ -351,15 +344,15 @@ impl HypothesisRows {
         let mut errors: Vec<Option<f64>> = squares.iter().map(|s| (*s > 0.0).then_some(1.0)).collect();
         for _ in 0..ROUNDS {
             let mut normal = DMatrix::zeros(base, base);
-            let mut complete = DVector::zeros(base);
+            let mut column_squares = DVector::zeros(base);
             let mut right = DVector::zeros(base);
             for (d, channel) in self.channels.iter().enumerate() {
                 let Some(error) = errors[d] else { continue };
                 let weight = 1.0 / (squares[d] * error.max(FIT_ERROR_FLOOR).powi(2));
                 let (source, factor) = change.source(d);
                 right.axpy(weight * factor, &channel.reduced.right[source], 1.0);
+                column_squares.axpy(weight, &channel.column_squares, 1.0);
                 for j in 0..base {
-                    complete[j] += weight * channel.normal[(j, j)];
                     // Only the lower triangle is read.
                     let from = channel.reduced.normal.view((j, j), (base - j, 1));
                     normal
@@ -367,9 +360,10 @@ impl HypothesisRows {
                         .zip_apply(&from, |sum, x| *sum += weight * x);
                 }
             }
-            let Some(values) = solve_reduced(normal, &complete, &right) else {
+            let Some(solver) = ScaledNormal::after_elimination(normal, &column_squares, RIDGE) else {
                 return errors;
             };
+            let values = solver.solve(&right);
             for (d, channel) in self.channels.iter().enumerate() {
                 let (source, factor) = change.source(d);
                 let reduced = &channel.reduced;
@@ -387,25 +381,24 @@ impl HypothesisRows {
     /// Error of each drive with nominal values of the base parameters, and friction and an offset fitted, relative to
     /// the error with friction and offset alone.
     fn nominal_errors(&self, change: &ForceChange, nominal: &[f64]) -> Vec<Option<f64>> {
+        let values = DVector::from_column_slice(nominal);
         let one = |(d, channel): (usize, &ChannelMoments)| {
             let (source, factor) = change.source(d);
             let squares = change.squares(d, &channel.squares);
-            let mut own = DVector::zeros(self.base + MORE);
-            own.rows_mut(0, self.base).copy_from_slice(nominal);
+            let forces = &channel.right[source] * factor;
             // Inner products of the residual of the nominal values.
-            let products = &channel.normal * &own;
-            let left = squares - 2.0 * factor * own.dot(&channel.right[source]) + own.dot(&products);
-            let right = &channel.right[source] * factor - products;
-            let (first, many) = (self.base, MORE_WITH_NOMINAL);
-            let normal = channel.normal.view((first, first), (many, many)).into_owned();
+            let products = channel.nominal.as_ref()?;
+            let on_model = |products: &DVector<f64>| values.dot(&products.rows(0, self.base));
+            let left = squares - 2.0 * on_model(&forces) + on_model(products);
             let unexplained = |left: f64, right: &DVector<f64>| {
-                let right = right.rows(first, many).into_owned();
-                let explained = solve_scaled(normal.clone(), &right).map_or(0.0, |values| values.dot(&right));
+                let right = right.rows(self.base, MORE_WITH_NOMINAL).into_owned();
+                let explained = solve_scaled(channel.friction.clone(), &right).map_or(0.0, |found| found.dot(&right));
                 (left - explained).max(0.0)
             };
-            let alone = unexplained(squares, &(&channel.right[source] * factor));
+            let alone = unexplained(squares, &forces);
             let floor = FIT_ERROR_FLOOR * FIT_ERROR_FLOOR * squares;
-            (squares > 0.0).then(|| (unexplained(left, &right) / alone.max(floor)).sqrt())
+            let rest = &forces - products;
+            (squares > 0.0).then(|| (unexplained(left, &rest) / alone.max(floor)).sqrt())
         };
         self.channels.iter().enumerate().map(one).collect()
     }
@@ -413,28 +406,7 @@ impl HypothesisRows {
 
 /// Solves normal equations whose columns are scaled to one, with a very small ridge; `None` if a number is not finite.
 pub(super) fn solve_scaled(normal: DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
-    let complete = normal.diagonal();
-    solve_reduced(normal, &complete, right)
-}
-
-/// The same for normal equations from which other columns were eliminated.
-fn solve_reduced(normal: DMatrix<f64>, complete: &DVector<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
-    let (factor, scale) = factor_scaled(normal, complete)?;
-    Some(factor.solve(&right.component_mul(&scale)).component_mul(&scale))
-}
-
-/// Factor of normal equations whose columns are scaled to one, with the ridge, and the factors of the scale. `complete` is
-/// their diagonal before other columns were eliminated: a column that those explain has nothing but rounding left. Only the
-/// lower triangle is read.
-fn factor_scaled(mut normal: DMatrix<f64>, complete: &DVector<f64>) -> Option<(Cholesky<f64, Dyn>, DVector<f64>)> {
-    let scale = complete.map(|square| if square > 0.0 { square.sqrt().recip() } else { 0.0 });
-    for j in 0..scale.len() {
-        for i in j..scale.len() {
-            normal[(i, j)] *= scale[i] * scale[j];
-        }
-        normal[(j, j)] += RIDGE;
-    }
-    Some((normal.cholesky()?, scale))
+    Some(ScaledNormal::new(normal, RIDGE)?.solve(right))
 }
 
 #[cfg(test)]
@@ -497,6 +469,17 @@ mod tests {
                         rows.set_column(0, &own);
                         rows.column_mut(1).fill(0.0);
                     }
+                    // A drive that stands still has neither rate nor acceleration; one with a constant rate has an offset
+                    // twice.
+                    if dependent && d == 0 {
+                        for k in [0, 1, 3] {
+                            rows.column_mut(base + k).fill(0.0);
+                        }
+                    }
+                    if dependent && d == 2 {
+                        rows.column_mut(base).fill(0.4);
+                        rows.column_mut(base + 2).fill(1.0);
+                    }
                     rows
                 })
                 .collect();
@@ -507,8 +490,15 @@ mod tests {
                     (0..samples).map(|i| exact[i] + 0.3 * noise[i]).collect()
                 })
                 .collect();
-            let channels = rows.iter().map(|rows| ChannelMoments::new(rows, &forces)).collect();
+            let moments = rows.iter().map(|rows| ChannelMoments::new(rows, &forces, None));
+            let channels = moments.collect::<Option<_>>().expect("numbers are finite");
             let moments = HypothesisRows { channels, base };
+            let without = ForceChange(vec![(1, 1, 0.0)]);
+            assert_eq!(
+                moments.fit_errors(&without)[1],
+                None,
+                "a force of zero has no relative error"
+            );
             for change in [vec![], vec![(1, 1, -1.0)], vec![(0, 2, 1.0), (2, 0, 1.0)]] {
                 let change = ForceChange(change);
                 let expected = errors_of_rows(&rows, &forces, &change);

@@ -29,15 +29,21 @@ impl Model {
     ///
     /// Fails when the entry cannot be written, or when the derivation fails.
     pub(crate) fn with_gravity(&self, gravity: [f64; 3]) -> Outcome<Self> {
-        let mut known = (self.gravity_variants.0.lock()).unwrap_or_else(PoisonError::into_inner);
+        let known = || (self.gravity_variants.0.lock()).unwrap_or_else(PoisonError::into_inner);
         let bits = gravity.map(f64::to_bits);
-        let derived = if let Some(same) = known.iter().find(|other| other.bits == bits) {
-            same.model.clone()
+        let same = known()
+            .iter()
+            .find(|other| other.bits == bits)
+            .map(|other| other.model.clone());
+        // Nothing is locked during a derivation, which may wait for other threads.
+        let derived = if let Some(same) = same {
+            same
         } else {
             let text = write_gravity(self.text(), gravity).map_err(Error::input)?;
             let host = self.host.clone().with_progress(Arc::new(SilentProgress));
             let loaded = host.load_text(Path::new(&self.path), &text)?;
             let derived = host.derive(&self.path, loaded)?;
+            let mut known = known();
             // The oldest one makes room, so that a direction that recordings ask for again stays.
             if known.len() >= MOST_KEPT {
                 known.remove(0);

@@ -573,12 +573,12 @@ impl<'a> SmootherSearch<'a> {
             }
             let fold_of = |i: usize| ((before + i) * FOLDS / total).min(FOLDS - 1);
             // Filtered rows are correlated, so that only some of them are added.
-            let mut added = vec![Vec::new(); FOLDS];
+            let mut samples_of_fold = vec![Vec::new(); FOLDS];
             for i in (margin..n - margin).step_by(thin) {
-                added[fold_of(i)].push(i);
+                samples_of_fold[fold_of(i)].push(i);
             }
-            for (fold, which) in folds.iter_mut().zip(&added) {
-                fold.add(&filtered, which);
+            for (fold, indices) in folds.iter_mut().zip(&samples_of_fold) {
+                fold.add(&filtered, indices);
             }
             let mut start = 0;
             while start < n {

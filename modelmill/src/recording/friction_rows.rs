@@ -2,11 +2,14 @@
 //! choice must not depend on whether the model file knows friction. States go in; rows come out.
 
 use modelmill_codegen::ModelEvaluator;
+use modelmill_identify::estimate::ScaledNormal;
 use nalgebra::{DMatrix, DVector};
 
 use crate::model::Model;
 use crate::segment::picked_states::{PickedStates, rate_sign};
 
+/// Ridge on the diagonal of scaled normal equations.
+const RIDGE: f64 = 1e-9;
 /// Columns that are added for each drive: rate, its sign, and a constant.
 pub(super) const FRICTION_COLUMNS: usize = 3;
 
@@ -34,21 +37,7 @@ pub(super) fn regressor_with_friction(model: &Model, states: &PickedStates) -> O
     more.iter().all(|x| x.is_finite()).then_some(more)
 }
 
-/// Solves scaled normal equations with a small ridge, since columns may be equal. Only the lower triangle is read.
-pub(super) fn solve_scaled(normal: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
-    let mut normal = normal.clone();
-    let n = right.len();
-    let scale: Vec<f64> = (0..n)
-        .map(|i| normal[(i, i)].max(0.0).sqrt())
-        .map(|norm| if norm > 0.0 { norm.recip() } else { 0.0 })
-        .collect();
-    for i in 0..n {
-        for j in 0..=i {
-            normal[(i, j)] *= scale[i] * scale[j];
-        }
-        normal[(i, i)] += 1e-9;
-    }
-    let scale = DVector::from_vec(scale);
-    let scaled = right.component_mul(&scale);
-    Some(normal.cholesky()?.solve(&scaled).component_mul(&scale))
+/// Solves scaled normal equations with a small ridge, since columns may be equal.
+pub(super) fn solve_scaled(normal: DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
+    Some(ScaledNormal::new(normal, RIDGE)?.solve(right))
 }

@@ -1,7 +1,7 @@
 //! The residual of forces on held-out parts of a run: the pieces of its computation. Rows of windows go in; normal
 //! equations of each fold, the values that fit the other folds, and the power of the residual by octaves come out.
 
-use modelmill_identify::{LowPass, float_to_count};
+use modelmill_identify::{LowPass, float_to_count, gram};
 use nalgebra::{DMatrix, DVector};
 
 use super::friction_rows::solve_scaled;
@@ -145,27 +145,27 @@ impl FoldSums {
     }
 
     /// Adds the rows of all drives at some samples.
-    pub(super) fn add(&mut self, samples: &WindowSamples, which: &[usize]) {
+    pub(super) fn add(&mut self, samples: &WindowSamples, indices: &[usize]) {
         let drives = self.drives.len();
         for (d, one) in self.drives.iter_mut().enumerate() {
             let rows = samples
                 .regressor
-                .select_rows(&which.iter().map(|i| i * drives + d).collect::<Vec<_>>());
+                .select_rows(&indices.iter().map(|i| i * drives + d).collect::<Vec<_>>());
             // Most columns of friction belong to other drives, and are zero here.
-            let acting: Vec<usize> = (0..rows.ncols())
+            let nonzero: Vec<usize> = (0..rows.ncols())
                 .filter(|k| rows.column(*k).iter().any(|x| *x != 0.0))
                 .collect();
-            let rows = rows.select_columns(&acting);
-            let forces = DVector::from_iterator(which.len(), which.iter().map(|i| samples.forces[(*i, d)]));
-            let (normal, right) = (rows.transpose() * &rows, rows.tr_mul(&forces));
-            for (j, column) in acting.iter().enumerate() {
+            let rows = rows.select_columns(&nonzero);
+            let forces = DVector::from_iterator(indices.len(), indices.iter().map(|i| samples.forces[(*i, d)]));
+            let (normal, right) = (gram(&rows), rows.tr_mul(&forces));
+            for (j, column) in nonzero.iter().enumerate() {
                 one.right[*column] += right[j];
-                for (i, row) in acting.iter().enumerate() {
+                for (i, row) in nonzero.iter().enumerate() {
                     one.normal[(*row, *column)] += normal[(i, j)];
                 }
             }
             one.size += forces.norm_squared();
-            one.rows += which.len();
+            one.rows += indices.len();
         }
     }
 }
@@ -205,7 +205,7 @@ pub(super) fn fit_folds(folds: &[FoldSums]) -> Option<Vec<DVector<f64>>> {
                     right += &one.right * *weight;
                 }
             }
-            let found = solve_scaled(&normal, &right)?;
+            let found = solve_scaled(normal, &right)?;
             // The sum of squares of the residual follows from the sums of the fold.
             for (left, one) in left.iter_mut().zip(&judged.drives) {
                 let explained = 2.0 * one.right.dot(&found) - (&one.normal * &found).dot(&found);
@@ -215,4 +215,48 @@ pub(super) fn fit_folds(folds: &[FoldSums]) -> Option<Vec<DVector<f64>>> {
         }
     }
     Some(values)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sums_are_those_of_one_row_after_the_other() {
+        let (samples, drives, width) = (40, 2, 7);
+        // The last column is that of no drive, and the one before it of the second.
+        let value = |row: usize, k: usize| match k {
+            6 => 0.0,
+            5 if row % drives == 0 => 0.0,
+            _ => (0.7 * row as f64 * (k as f64 + 1.0)).sin(),
+        };
+        let rows = WindowSamples {
+            regressor: DMatrix::from_fn(samples * drives, width, value),
+            forces: DMatrix::from_fn(samples, drives, |i, d| (i as f64 - 3.0) * (d as f64 + 0.5)),
+        };
+        let mut sums = FoldSums::new(drives, width);
+        let parts: [Vec<usize>; 3] = [(0..9).collect(), Vec::new(), (20..33).step_by(3).collect()];
+        for part in &parts {
+            sums.add(&rows, part);
+        }
+        for (d, found) in sums.drives.iter().enumerate() {
+            let mut expected = DriveNormalEquations {
+                normal: DMatrix::zeros(width, width),
+                right: DVector::zeros(width),
+                size: 0.0,
+                rows: 0,
+            };
+            for i in parts.iter().flatten() {
+                let row = rows.regressor.row(i * drives + d).transpose();
+                expected.normal += &row * row.transpose();
+                expected.right += &row * rows.forces[(*i, d)];
+                expected.size += rows.forces[(*i, d)].powi(2);
+                expected.rows += 1;
+            }
+            assert!((&found.normal - expected.normal).amax() < 1e-12);
+            assert!((&found.right - expected.right).amax() < 1e-11);
+            assert!((found.size - expected.size).abs() < 1e-11);
+            assert_eq!(found.rows, expected.rows);
+        }
+    }
 }

@@ -70,13 +70,13 @@ pub(super) fn is_harmless(
     let mut counted = 0;
     for one in &passed {
         let edge = margin(one.lower.forces.nrows(), band.rate, band.passed);
-        let mut added = vec![Vec::new(); FOLDS];
+        let mut samples_of_fold = vec![Vec::new(); FOLDS];
         for i in (edge..one.lower.forces.nrows() - edge).step_by(thin) {
-            added[counted % FOLDS].push(i);
+            samples_of_fold[counted % FOLDS].push(i);
             counted += 1;
         }
-        for (fold, which) in folds.iter_mut().zip(&added) {
-            fold.add(&one.lower, which);
+        for (fold, indices) in folds.iter_mut().zip(&samples_of_fold) {
+            fold.add(&one.lower, indices);
         }
     }
     let values = fit_folds(&folds)?.into_iter().next()?;

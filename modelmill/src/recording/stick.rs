@@ -441,7 +441,7 @@ impl FrictionRows {
                 normal += one * weight;
                 right += product * weight;
             }
-            let found = solve_scaled(&normal, &right)?;
+            let found = solve_scaled(normal, &right)?;
             let residual = &self.forces - &self.regressor * &found;
             for (d, left) in left.iter_mut().enumerate() {
                 let of_drive = (d..residual.len())
