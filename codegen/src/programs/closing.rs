@@ -20,6 +20,10 @@ use crate::lower::{
 use crate::regressor::UnreducedEquations;
 use crate::tree::checks;
 
+/// Programs of smaller graphs are lowered one after the other: they take some milliseconds, and each thread reserves memory
+/// of its own, which a limit of address space counts. By judgement.
+const FEWEST_NODES_AT_ONCE: usize = 20_000;
+
 /// Replaces passive coordinates, rates and accelerations in expressions.
 #[derive(Clone)]
 pub(crate) struct PassiveClosure {
@@ -321,6 +325,9 @@ impl PassiveClosure {
             .map(|outputs| self.close(graph, equations, outputs, &nothing))
             .collect();
         let graph = &*graph;
+        if graph.len() < FEWEST_NODES_AT_ONCE {
+            return closed.iter().map(|closed| self.lower(graph, closed)).collect();
+        }
         closed
             .into_par_iter()
             .map(|closed| self.lower(graph, &closed))

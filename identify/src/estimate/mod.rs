@@ -57,5 +57,4 @@ pub use thresholds::{FEWEST_ROWS, HUBER_BOUND, RANK_TOLERANCE};
 pub use undetermined::NullDirection;
 pub use weighted_rows::RowWeighting;
 
-pub(crate) use numeric_rank::r_factor;
 pub(crate) use undetermined::null_directions;

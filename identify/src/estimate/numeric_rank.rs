@@ -221,7 +221,7 @@ fn scale(w: &DMatrix<f64>, norms: &[f64]) -> DMatrix<f64> {
 ///
 /// Reflections of some columns are applied to the others together, `I - V T V'`: products of matrices take a fraction of
 /// the time of one reflection after the other (Golub and Van Loan, 5.2.3).
-pub(crate) fn r_factor(w: &DMatrix<f64>) -> DMatrix<f64> {
+fn r_factor(w: &DMatrix<f64>) -> DMatrix<f64> {
     let (rows, columns) = w.shape();
     if rows <= columns {
         return w.clone();

@@ -8,7 +8,6 @@ use super::{
     ExcitationCriterion, ExcitationLimits, ExcitationMotion, ExcitationPlant, FourierSeries, Options,
     samples_per_period,
 };
-use crate::estimate::r_factor;
 
 /// A plant with limits and options; counts evaluations of the criterion.
 pub(super) struct TrajectoryEvaluator<'a> {
@@ -136,4 +135,10 @@ fn log_det(w: &DMatrix<f64>) -> f64 {
     let rows = w.nrows() as f64;
     let logarithms = singular.iter().map(|s| -(s * s / rows).ln());
     logarithms.sum()
+}
+
+/// R factor of the QR factorisation, which has the singular values of the matrix. Of the few columns of a small machine one
+/// reflection after the other is as fast as blocks, and a search of motions keeps its digits.
+fn r_factor(w: &DMatrix<f64>) -> DMatrix<f64> {
+    w.clone().qr().r()
 }
