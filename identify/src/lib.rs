@@ -23,7 +23,7 @@
 //! Folders, each of which uses only those above it:
 //!
 //! - `words`: words of messages
-//! - `signal`: filters, spectra, statistics of plain numbers
+//! - `signal`: filters, spectra, statistics and normal equations of plain numbers
 //! - `recording`: files to named columns
 //! - `motion`: columns to states
 //! - `audit`: checks of recordings
@@ -70,4 +70,4 @@ pub use recording::{
     RecordingFile, RecordingFiles, RecordingNote, SignalRecording, TableInfo, UnwrappedAngle, display_name_of_bytes,
     has_recording_extension, sample_place_word,
 };
-pub use signal::{FilterError, LowPass, MAX_FILTER_ORDER, float_to_count, gram, median};
+pub use signal::{FilterError, LowPass, MAX_FILTER_ORDER, ScaledNormal, float_to_count, gram, median};

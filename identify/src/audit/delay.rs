@@ -16,8 +16,7 @@ use nalgebra::{DMatrix, DVector};
 use super::by_channel::ChannelRegressor;
 use super::robust::{NORMAL_RIDGE, RobustFit, robust_fit};
 use super::thresholds::{DELAY_RESOLUTION_STEPS, DELAY_STUDENT_FACTOR, FAR_SHIFT_MIN_IMPROVEMENT};
-use crate::estimate::ScaledNormal;
-use crate::signal::dot;
+use crate::signal::{ScaledNormal, dot};
 
 /// Number of blocks of time, which are left out one by one.
 const BLOCKS: usize = 20;

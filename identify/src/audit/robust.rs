@@ -9,8 +9,7 @@ use nalgebra::DVector;
 
 use super::by_channel::ChannelRegressor;
 use super::thresholds::AUDIT_HUBER_BOUND_SIGMAS;
-use crate::estimate::ScaledNormal;
-use crate::signal::median;
+use crate::signal::{ScaledNormal, median};
 
 /// Number of times rows are reweighted.
 const ROUNDS: usize = 5;

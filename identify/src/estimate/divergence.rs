@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::estimate::body_matrices::{BodyMatrix, NominalBodyMatrix};
 use crate::estimate::error::PhysicalError;
-use crate::estimate::scaled_normal::ScaledNormal;
+use crate::signal::ScaledNormal;
 
 /// Base parameters as a function of physical parameters, with derivatives (rows: base parameters), in the order of the
 /// regressor's columns.

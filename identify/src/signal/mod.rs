@@ -1,12 +1,14 @@
-//! Operations on the numbers of one signal, independent of their meaning: filters, spectra, statistics.
+//! Operations on numbers, independent of their meaning: filters, spectra, statistics, normal equations.
 
 mod filters;
 mod products;
+mod scaled_normal;
 mod spectrum;
 mod statistics;
 
 pub use filters::{FilterError, LowPass, MAX_FILTER_ORDER};
 pub use products::gram;
 pub(crate) use products::{LANES, add_multiples, dot};
+pub use scaled_normal::ScaledNormal;
 pub(crate) use spectrum::hann_power;
 pub use statistics::{float_to_count, median, white_noise};

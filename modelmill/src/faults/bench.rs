@@ -5,8 +5,7 @@
 //! kept. Every change of the forces (sign, unit, exchange) then costs a small system of equations only.
 
 use modelmill_codegen::{ModelEvaluator, MotionStates};
-use modelmill_identify::estimate::ScaledNormal;
-use modelmill_identify::gram;
+use modelmill_identify::{ScaledNormal, gram};
 use nalgebra::{DMatrix, DVector};
 
 use super::correction::{ForceChange, MotionChange};

@@ -2,7 +2,7 @@
 //! choice must not depend on whether the model file knows friction. States go in; rows come out.
 
 use modelmill_codegen::ModelEvaluator;
-use modelmill_identify::estimate::ScaledNormal;
+use modelmill_identify::ScaledNormal;
 use nalgebra::{DMatrix, DVector};
 
 use crate::model::Model;
