@@ -227,7 +227,7 @@ mod tests {
         // The last column is that of no drive, and the one before it of the second.
         let value = |row: usize, k: usize| match k {
             6 => 0.0,
-            5 if row % drives == 0 => 0.0,
+            5 if row.is_multiple_of(drives) => 0.0,
             _ => (0.7 * row as f64 * (k as f64 + 1.0)).sin(),
         };
         let rows = WindowSamples {
