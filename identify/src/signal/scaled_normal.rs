@@ -66,7 +66,7 @@ mod tests {
         let found = factor.solve(&right);
         let back = &normal * &found - &right;
         assert!(back.component_div(&right).amax() < 1e-9, "{back}");
-        let half = factor.half_solve(DMatrix::from_columns(&[right.clone()]));
+        let half = factor.half_solve(DMatrix::from_columns(std::slice::from_ref(&right)));
         assert!((half.norm_squared() - right.dot(&found)).abs() < 1e-9 * half.norm_squared());
 
         let twice = DMatrix::from_fn(9, 3, |i, k| if k == 1 { rows[(i, 0)] } else { 0.5 * rows[(i, k)] });
