@@ -70,4 +70,4 @@ pub use recording::{
     RecordingFile, RecordingFiles, RecordingNote, SignalRecording, TableInfo, UnwrappedAngle, display_name_of_bytes,
     has_recording_extension, sample_place_word,
 };
-pub use signal::{FilterError, LowPass, MAX_FILTER_ORDER, ScaledNormal, float_to_count, gram, median};
+pub use signal::{FilterError, LowPass, MAX_FILTER_ORDER, ScaledNormalEquations, float_to_count, gram, median};

@@ -16,7 +16,7 @@ use nalgebra::{DMatrix, DVector};
 use super::by_channel::ChannelRegressor;
 use super::robust::{NORMAL_RIDGE, RobustFit, robust_fit};
 use super::thresholds::{DELAY_RESOLUTION_STEPS, DELAY_STUDENT_FACTOR, FAR_SHIFT_MIN_IMPROVEMENT};
-use crate::signal::{ScaledNormal, dot};
+use crate::signal::{ScaledNormalEquations, dot};
 
 /// Number of blocks of time, which are left out one by one.
 const BLOCKS: usize = 20;
@@ -327,7 +327,7 @@ impl DelayAudit<'_> {
             all.1 += right;
         }
         let without = blocks.iter().map(|(normal, right)| {
-            let values = ScaledNormal::new(&all.0 - normal, NORMAL_RIDGE)?.solve(&(&all.1 - right));
+            let values = ScaledNormalEquations::new(&all.0 - normal, NORMAL_RIDGE)?.solve(&(&all.1 - right));
             Some(values.rows(n - last, last).into_owned())
         });
         let without: Vec<DVector<f64>> = without.collect::<Option<_>>()?;

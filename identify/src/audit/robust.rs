@@ -9,7 +9,7 @@ use nalgebra::DVector;
 
 use super::by_channel::ChannelRegressor;
 use super::thresholds::AUDIT_HUBER_BOUND_SIGMAS;
-use crate::signal::{ScaledNormal, median};
+use crate::signal::{ScaledNormalEquations, median};
 
 /// Number of times rows are reweighted.
 const ROUNDS: usize = 5;
@@ -41,7 +41,7 @@ impl RobustFit {
     ) -> Option<Vec<f64>> {
         let nothing = DVector::zeros(self.weights.len());
         let (normal, _) = regressor.normal_equations(&self.weights, &nothing, 0..regressor.samples());
-        let factor = ScaledNormal::new(normal, NORMAL_RIDGE)?;
+        let factor = ScaledNormalEquations::new(normal, NORMAL_RIDGE)?;
         // The weight of a row without error is the inverse variance of its channel.
         let weight = (channel..self.weights.len()).step_by(regressor.channels());
         let weight = weight.fold(0.0_f64, |most, row| most.max(self.weights[row]));
@@ -87,7 +87,7 @@ pub fn robust_fit(regressor: &ChannelRegressor, measured: &DVector<f64>, counts:
             return None;
         }
         let (normal, right) = regressor.normal_equations(&weights, measured, 0..regressor.samples());
-        let values = ScaledNormal::new(normal, NORMAL_RIDGE)?.solve(&right);
+        let values = ScaledNormalEquations::new(normal, NORMAL_RIDGE)?.solve(&right);
         rest = measured - regressor.multiply(values.as_slice());
         found = Some(values);
     }

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::estimate::body_matrices::{BodyMatrix, NominalBodyMatrix};
 use crate::estimate::error::PhysicalError;
-use crate::signal::ScaledNormal;
+use crate::signal::ScaledNormalEquations;
 
 /// Base parameters as a function of physical parameters, with derivatives (rows: base parameters), in the order of the
 /// regressor's columns.
@@ -130,7 +130,7 @@ impl MisfitFunction<'_> {
                     }
                 }
                 // Parameters differ in units.
-                let Some(factor) = ScaledNormal::new(damped, 0.0) else {
+                let Some(factor) = ScaledNormalEquations::new(damped, 0.0) else {
                     damping *= 100.0;
                     continue;
                 };

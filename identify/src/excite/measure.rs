@@ -137,8 +137,8 @@ fn log_det(w: &DMatrix<f64>) -> f64 {
     logarithms.sum()
 }
 
-/// R factor of the QR factorisation, which has the singular values of the matrix. Of the few columns of a small machine one
-/// reflection after the other is as fast as blocks, and a search of motions keeps its digits.
+/// R factor of the QR factorisation, which has the singular values of the matrix. Blocks gain
+/// nothing for few columns.
 fn r_factor(w: &DMatrix<f64>) -> DMatrix<f64> {
     w.clone().qr().r()
 }

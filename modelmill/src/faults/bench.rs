@@ -5,7 +5,7 @@
 //! kept. Every change of the forces (sign, unit, exchange) then costs a small system of equations only.
 
 use modelmill_codegen::{ModelEvaluator, MotionStates};
-use modelmill_identify::{ScaledNormal, gram};
+use modelmill_identify::{ScaledNormalEquations, gram};
 use nalgebra::{DMatrix, DVector};
 
 use super::correction::{ForceChange, MotionChange};
@@ -23,7 +23,7 @@ const MORE: usize = 4;
 /// Those of them that are fitted with nominal values: an inertia of the drive would take the place of that of bodies.
 const MORE_WITH_NOMINAL: usize = 3;
 /// Ridge on the diagonal of scaled normal equations.
-const RIDGE: f64 = 1e-10;
+pub(super) const RIDGE: f64 = 1e-10;
 /// Number of times the weights of the drives are set to their errors.
 const ROUNDS: usize = 4;
 
@@ -285,8 +285,8 @@ struct ReducedMoments {
     normal: DMatrix<f64>,
     /// The columns with the force of each drive.
     right: Vec<DVector<f64>>,
-    /// Sum of squares of what is left of each force. The ridge adds at most its square root, relative to the force, to
-    /// an error: far below [`FIT_ERROR_FLOOR`].
+    /// Sum of squares of the residual of each force. The ridge raises a relative error by at most its own square root,
+    /// which is far below [`FIT_ERROR_FLOOR`].
     squares: Vec<f64>,
 }
 
@@ -316,7 +316,7 @@ impl ReducedMoments {
     /// finite.
     fn new(normal: &DMatrix<f64>, right: &[DVector<f64>], squares: &[f64]) -> Option<Self> {
         let base = normal.ncols() - MORE;
-        let solver = ScaledNormal::new(normal.view((base, base), (MORE, MORE)).into_owned(), RIDGE)?;
+        let solver = ScaledNormalEquations::new(normal.view((base, base), (MORE, MORE)).into_owned(), RIDGE)?;
         let of_model = solver.half_solve(normal.view((base, 0), (MORE, base)).into_owned());
         let forces = right.iter().map(|right| right.rows(base, MORE).into_owned());
         let of_forces = solver.half_solve(DMatrix::from_columns(&forces.collect::<Vec<_>>()));
@@ -359,7 +359,7 @@ impl HypothesisRows {
                         .zip_apply(&from, |sum, x| *sum += weight * x);
                 }
             }
-            let Some(solver) = ScaledNormal::after_elimination(normal, &column_squares, RIDGE) else {
+            let Some(solver) = ScaledNormalEquations::after_elimination(normal, &column_squares, RIDGE) else {
                 return errors;
             };
             let values = solver.solve(&right);
@@ -391,7 +391,8 @@ impl HypothesisRows {
             let left = squares - 2.0 * on_model(&forces) + on_model(products);
             let unexplained = |left: f64, right: &DVector<f64>| {
                 let right = right.rows(self.base, MORE_WITH_NOMINAL).into_owned();
-                let explained = solve_scaled(channel.friction.clone(), &right).map_or(0.0, |found| found.dot(&right));
+                let solver = ScaledNormalEquations::new(channel.friction.clone(), RIDGE);
+                let explained = solver.map_or(0.0, |solver| solver.solve(&right).dot(&right));
                 (left - explained).max(0.0)
             };
             let alone = unexplained(squares, &forces);
@@ -401,11 +402,6 @@ impl HypothesisRows {
         };
         self.channels.iter().enumerate().map(one).collect()
     }
-}
-
-/// Solves normal equations whose columns are scaled to one, with a very small ridge; `None` if a number is not finite.
-pub(super) fn solve_scaled(normal: DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
-    Some(ScaledNormal::new(normal, RIDGE)?.solve(right))
 }
 
 #[cfg(test)]

@@ -7,9 +7,10 @@
 use modelmill_boundary::message;
 use modelmill_boundary::text::Remedy;
 use modelmill_codegen::ModelEvaluator;
+use modelmill_identify::ScaledNormalEquations;
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use super::bench::{FaultBench, HypothesisErrors, solve_scaled};
+use super::bench::{FaultBench, HypothesisErrors, RIDGE};
 use super::correction::{FaultCorrection, ForceChange, MotionChange};
 use super::thresholds::{
     GRAVITY_AXIS_TOLERANCE_RAD, GRAVITY_FEWEST_DRIVES, GRAVITY_LEAST_ANGLE_RAD, GRAVITY_LEAST_GAIN_OF_DRIVE,
@@ -189,9 +190,9 @@ impl GravityRows {
         let place = |d: usize, k: usize| if k < 3 { k } else { k + FRICTION * d };
         let mut weights: Vec<f64> = self.measured.iter().map(weight_of).collect();
         let mut values = DVector::zeros(width);
-        let mut normal = DMatrix::zeros(width, width);
+        let mut last = None;
         for _ in 0..ROUNDS {
-            normal = DMatrix::zeros(width, width);
+            let mut normal = DMatrix::zeros(width, width);
             let mut right = DVector::zeros(width);
             for (d, columns) in self.columns.iter().enumerate() {
                 let own = columns.tr_mul(columns);
@@ -203,17 +204,20 @@ impl GravityRows {
                     }
                 }
             }
-            values = solve_scaled(normal.clone(), &right)?;
+            let solver = ScaledNormalEquations::new(normal, RIDGE)?;
+            values = solver.solve(&right);
+            last = Some(solver);
             for (d, columns) in self.columns.iter().enumerate() {
                 let own = DVector::from_fn(columns.ncols(), |k, _| values[place(d, k)]);
                 weights[d] = weight_of(&(&self.measured[d] - columns * own));
             }
         }
+        let solver = last?;
         // Weights are inverse variances, but neighbouring samples are not independent.
         let is_certain = (0..3).all(|k| {
             let mut unit = DVector::zeros(width);
             unit[k] = 1.0;
-            let variance = solve_scaled(normal.clone(), &unit).map_or(f64::INFINITY, |column| column[k]);
+            let variance = solver.solve(&unit)[k];
             (CORRELATED * variance.max(0.0)).sqrt() < GRAVITY_MOST_UNCERTAINTY * size
         });
         is_certain.then(|| Vector3::new(values[0], values[1], values[2]))

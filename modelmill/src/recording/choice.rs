@@ -26,7 +26,7 @@ use nalgebra::DMatrix;
 use super::free;
 use super::friction_rows::regressor_with_friction;
 use super::held_out::{
-    FOLDS, FoldSums, HeldOutResidual, OctavePower, ROUNDING, TimeWindow, WindowSamples, fit_folds, margin,
+    FOLDS, FoldSums, HeldOutResidual, OctavePower, ROUNDING, TimeWindow, WindowSamples, add_to_folds, fit_folds, margin,
 };
 use super::options::RecordingOptions;
 use super::raised_cutoff::{ComparedBand, RaisedWindow, is_harmless};
@@ -573,13 +573,8 @@ impl<'a> SmootherSearch<'a> {
             }
             let fold_of = |i: usize| ((before + i) * FOLDS / total).min(FOLDS - 1);
             // Filtered rows are correlated, so that only some of them are added.
-            let mut samples_of_fold = vec![Vec::new(); FOLDS];
-            for i in (margin..n - margin).step_by(thin) {
-                samples_of_fold[fold_of(i)].push(i);
-            }
-            for (fold, indices) in folds.iter_mut().zip(&samples_of_fold) {
-                fold.add(&filtered, indices);
-            }
+            let added = (margin..n - margin).step_by(thin);
+            add_to_folds(&mut folds, &filtered, added.map(|i| (fold_of(i), i)));
             let mut start = 0;
             while start < n {
                 let fold = fold_of(start);

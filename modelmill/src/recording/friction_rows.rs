@@ -2,7 +2,7 @@
 //! choice must not depend on whether the model file knows friction. States go in; rows come out.
 
 use modelmill_codegen::ModelEvaluator;
-use modelmill_identify::ScaledNormal;
+use modelmill_identify::ScaledNormalEquations;
 use nalgebra::{DMatrix, DVector};
 
 use crate::model::Model;
@@ -39,5 +39,5 @@ pub(super) fn regressor_with_friction(model: &Model, states: &PickedStates) -> O
 
 /// Solves scaled normal equations with a small ridge, since columns may be equal.
 pub(super) fn solve_scaled(normal: DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
-    Some(ScaledNormal::new(normal, RIDGE)?.solve(right))
+    Some(ScaledNormalEquations::new(normal, RIDGE)?.solve(right))
 }

@@ -145,7 +145,7 @@ impl FoldSums {
     }
 
     /// Adds the rows of all drives at some samples.
-    pub(super) fn add(&mut self, samples: &WindowSamples, indices: &[usize]) {
+    fn add(&mut self, samples: &WindowSamples, indices: &[usize]) {
         let drives = self.drives.len();
         for (d, one) in self.drives.iter_mut().enumerate() {
             let rows = samples
@@ -167,6 +167,19 @@ impl FoldSums {
             one.size += forces.norm_squared();
             one.rows += indices.len();
         }
+    }
+}
+
+/// Adds samples to folds: the index of a fold, and that of a sample.
+pub(super) fn add_to_folds(
+    folds: &mut [FoldSums],
+    samples: &WindowSamples,
+    pairs: impl Iterator<Item = (usize, usize)>,
+) {
+    let mut samples_of_fold = vec![Vec::new(); folds.len()];
+    pairs.for_each(|(fold, sample)| samples_of_fold[fold].push(sample));
+    for (fold, indices) in folds.iter_mut().zip(&samples_of_fold) {
+        fold.add(samples, indices);
     }
 }
 

@@ -8,7 +8,7 @@
 
 use modelmill_identify::float_to_count;
 
-use super::held_out::{FOLDS, FoldSums, WindowSamples, fit_folds, margin};
+use super::held_out::{FOLDS, FoldSums, WindowSamples, add_to_folds, fit_folds, margin};
 use super::thresholds::{RAISED_LEAST_MOTION_SHARE, RAISED_MOST_NOISE_RATIO, RAISED_MOTION_SIGMAS};
 
 /// Rows of one window at both cut-offs.
@@ -70,14 +70,11 @@ pub(super) fn is_harmless(
     let mut counted = 0;
     for one in &passed {
         let edge = margin(one.lower.forces.nrows(), band.rate, band.passed);
-        let mut samples_of_fold = vec![Vec::new(); FOLDS];
-        for i in (edge..one.lower.forces.nrows() - edge).step_by(thin) {
-            samples_of_fold[counted % FOLDS].push(i);
-            counted += 1;
-        }
-        for (fold, indices) in folds.iter_mut().zip(&samples_of_fold) {
-            fold.add(&one.lower, indices);
-        }
+        let added = (edge..one.lower.forces.nrows() - edge).step_by(thin);
+        let first = counted;
+        counted += added.len();
+        let pairs = added.enumerate().map(|(k, i)| ((first + k) % FOLDS, i));
+        add_to_folds(&mut folds, &one.lower, pairs);
     }
     let values = fit_folds(&folds)?.into_iter().next()?;
     let mut sums = CutoffForceChange::default();

@@ -76,6 +76,22 @@ fn every_published_crate_says_what_it_is() {
 }
 
 /// They are copies, since not every system that checks a repository out knows links.
+/// A manifest that builds no test program of a library or of a program would hide tests in it.
+#[test]
+fn crates_without_a_test_program_have_no_unit_tests() {
+    let without: Vec<(PathBuf, String)> = (members().into_iter())
+        .filter(|(_, manifest)| manifest.contains("\ntest = false\n"))
+        .collect();
+    assert!(without.len() > 3, "{} crates build no test program", without.len());
+    for path in without.iter().flat_map(|(folder, _)| files(&folder.join("src"), "rs")) {
+        assert!(
+            !text(&path).contains("#[test]"),
+            "{} has tests that nobody runs",
+            path.display()
+        );
+    }
+}
+
 #[test]
 fn licences_are_those_of_the_project() {
     let folders = published().into_iter().map(|(folder, _)| folder);

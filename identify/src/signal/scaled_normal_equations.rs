@@ -5,16 +5,16 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-/// Factor `L` of scaled normal equations, `S N S + ridge I = L L'`.
+/// Normal equations `N x = b` that are scaled and factored, `S N S + ridge I = L L'`.
 #[derive(Debug, Clone)]
-pub struct ScaledNormal {
+pub struct ScaledNormalEquations {
     /// The factor.
     factor: Cholesky<f64, Dyn>,
     /// The diagonal of `S`: the inverse norm of each column; 0 for a column of zeros.
     scale: DVector<f64>,
 }
 
-impl ScaledNormal {
+impl ScaledNormalEquations {
     /// Factors normal equations, of which only the lower triangle is read. The ridge is relative to the diagonal.
     /// `None` if they are not positive definite, or an entry is not finite.
     pub fn new(normal: DMatrix<f64>, ridge: f64) -> Option<Self> {
@@ -22,8 +22,8 @@ impl ScaledNormal {
         Self::after_elimination(normal, &squares, ridge)
     }
 
-    /// The same for normal equations from which other columns were eliminated. `squares` is their diagonal before that:
-    /// a column that the eliminated ones explain has nothing but rounding left, and keeps its scale.
+    /// The same for normal equations from which other columns were eliminated. `squares` is their diagonal before that,
+    /// and sets the scale: of a column that the eliminated ones explain, only rounding remains.
     pub fn after_elimination(mut normal: DMatrix<f64>, squares: &DVector<f64>, ridge: f64) -> Option<Self> {
         let scale = squares.map(|square| if square > 0.0 { square.sqrt().recip() } else { 0.0 });
         for j in 0..scale.len() {
@@ -62,7 +62,7 @@ mod tests {
         let rows = DMatrix::from_fn(9, 3, |i, k| columns[k] * (1.0 + i as f64 * (k as f64 + 0.3)).sin());
         let normal = rows.transpose() * &rows;
         let right = DVector::from_vec(vec![2e-6, -1.0, 3e7]);
-        let factor = ScaledNormal::new(normal.clone(), 0.0).expect("independent columns");
+        let factor = ScaledNormalEquations::new(normal.clone(), 0.0).expect("independent columns");
         let found = factor.solve(&right);
         let back = &normal * &found - &right;
         assert!(back.component_div(&right).amax() < 1e-9, "{back}");
@@ -71,13 +71,13 @@ mod tests {
 
         let twice = DMatrix::from_fn(9, 3, |i, k| if k == 1 { rows[(i, 0)] } else { 0.5 * rows[(i, k)] });
         let normal = twice.transpose() * &twice;
-        assert!(ScaledNormal::new(normal.clone(), 1e-10).is_some());
+        assert!(ScaledNormalEquations::new(normal.clone(), 1e-10).is_some());
         let empty = DMatrix::zeros(2, 2);
-        assert!(ScaledNormal::new(empty.clone(), 0.0).is_none());
-        let solved = ScaledNormal::new(empty, 1e-10)
+        assert!(ScaledNormalEquations::new(empty.clone(), 0.0).is_none());
+        let solved = ScaledNormalEquations::new(empty, 1e-10)
             .expect("a ridge")
             .solve(&DVector::zeros(2));
         assert_eq!(solved, DVector::zeros(2));
-        assert!(ScaledNormal::new(normal * f64::NAN, 1e-10).is_none());
+        assert!(ScaledNormalEquations::new(normal * f64::NAN, 1e-10).is_none());
     }
 }
