@@ -75,7 +75,6 @@ fn every_published_crate_says_what_it_is() {
     }
 }
 
-/// They are copies, since not every system that checks a repository out knows links.
 /// A manifest that builds no test program of a library or of a program would hide tests in it.
 #[test]
 fn crates_without_a_test_program_have_no_unit_tests() {
@@ -92,6 +91,7 @@ fn crates_without_a_test_program_have_no_unit_tests() {
     }
 }
 
+/// They are copies, since not every system that checks a repository out knows links.
 #[test]
 fn licences_are_those_of_the_project() {
     let folders = published().into_iter().map(|(folder, _)| folder);
